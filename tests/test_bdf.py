@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import re
+
 import meshes
 import numpy as np
 import pytest
 
-from microslip.data import Mesh
+from microslip.cli import main
+from microslip.data import Mesh, UserError
 from microslip.fem.discretise import discretise
 from microslip.mesh import mesh_problems, read_mesh
 
@@ -60,3 +63,54 @@ def test_constraints_of_the_chosen_set_are_supports(tmp_path):
     (tmp_path / "a.bdf").write_text("\n".join(lines).replace("SPC = 20", "SUBCASE 1"))
     read = read_mesh(tmp_path / "a.bdf", "m")
     assert not read.supports and "several sets of SPC" in read.not_held[0]
+
+
+def constrained(folder, cards, control=()):
+    """A cube of two bricks with more cards."""
+    text = bulk(meshes.brick("hexahedron", (1, 1, 2), (0.02, 0.01, 0.03)))
+    text = text.replace("CEND", "\n".join(["CEND", *control])).replace("ENDDATA", "\n".join([*cards, "ENDDATA"]))
+    (folder / "a.bdf").write_text(text)
+    return read_mesh(folder / "a.bdf", "m")
+
+
+def test_equations_hold_where_the_case_control_chooses_them(tmp_path):
+    cards = ["MPC,5,9,1,1.0,10,1,-1.0"]
+    assert constrained(tmp_path, cards, ["MPC = 5"]).links is not None
+    both = constrained(tmp_path, [*cards, "MPC,6,11,1,1.0,12,1,-1.0"], ["SUBCASE 1", "MPC = 5", "SUBCASE 2", "MPC = 6"])
+    assert "subcases choose several sets of MPC (5, 6)" in both.lost[0]
+    left = constrained(tmp_path, cards)
+    assert left.links is None and "the only set of MPC, of which the case control chooses none" in left.lost[0]
+    assert "MPC = 6 of the case control is not defined" in constrained(tmp_path, [], ["MPC = 6"]).lost[0]
+
+
+@pytest.mark.parametrize(
+    "card",
+    ["CONM2,70,9,,1.-4", "RBAR,60,9,10,123456", "RBE1,61,9,123456", "CELAS2,62,1.+6,9,1,10,1", "CBUSH,63,1,9,10"],
+)
+def test_cards_that_count_and_are_not_read_are_told_with_their_line(tmp_path, card):
+    read = constrained(tmp_path, [card, "FORCE,1,9,0,1.0,1.0,0.0,0.0", "CORD2R,3,,0.,0.,0.,0.,0.,1."])
+    (told,) = read.lost
+    assert re.match(rf"a.bdf, line \d+: {card.split(',')[0]} \(1 card\) is not read: .* frequencies will differ", told)
+    assert told in mesh_problems(read)[1]
+
+
+@pytest.mark.parametrize(
+    ("card", "wrong"),
+    [
+        ("MPC,5,{n},1,1.0,9,1,-1.0", True), ("RBE2,6,{n},12,9", True), ("RBE2,6,9,3,{n}", True),
+        ("RBE3,7,,{n},123,1.0,123,9", False), ("RBE2,6,9,123,{n}", False), ("RBE3,7,,{n},3,1.0,123,9", True),
+    ],
+)  # fmt: skip
+def test_single_directions_in_a_local_system_are_refused(tmp_path, card, wrong):
+    cards = ["CORD2R,3,,0.,0.,0.,0.,0.,1.,+", "+,0.,1.,0.", "GRID,900,,0.03,0.0,0.0,3", card.format(n=900)]
+    if wrong:
+        with pytest.raises(UserError, match=r"line \d+: .*GRID 900 in a local system"):
+            constrained(tmp_path, cards, ["MPC = 5"])
+    else:
+        assert constrained(tmp_path, cards, ["MPC = 5"]).links is not None
+
+
+def test_a_material_that_is_not_read_refuses_the_import(tmp_path, capsys):
+    constrained(tmp_path, ["PSOLID,1,2", "MAT9,2,1.+11"])
+    assert main(["import", str(tmp_path / "a.bdf"), str(tmp_path / "out")]) == 2
+    assert "'MAT9 2'" in capsys.readouterr().err and not (tmp_path / "out").exists()

@@ -227,3 +227,43 @@ def test_displacements_that_are_zero_are_supports(tmp_path):
     assert dict(read.supports) == {"Z0": "xyz", "held y": "y"}
     assert read.node_id[read.point_sets["held y"]].tolist() == [other]
     assert read.not_held == (f"D,{other},UX prescribes a displacement",)
+
+
+BAR = meshes.brick("hexahedron", (1, 1, 2), (0.02, 0.01, 0.03))
+
+
+def test_coupled_nodes_are_equations(tmp_path):
+    """CP as the CE that say the same; one whose nodes are not in its line is refused."""
+    text = archive(BAR)
+    written(tmp_path, text.replace("FINISH", "CP,1,UY,9,10,12\nCP,2,ALL,9,11\nFINISH"))
+    links = read_mesh(tmp_path / "part.cdb", "mm").links
+    terms = [(link.nodes.tolist(), link.directions.tolist(), link.factors.tolist()) for link in links.items]
+    assert terms[:2] == [([8, 9], [1, 1], [1.0, -1.0]), ([8, 11], [1, 1], [1.0, -1.0])] and len(terms) == 5
+    written(tmp_path, text.replace("FINISH", "CP,       1,UY  ,       2\n       9,      10\nFINISH"))
+    with pytest.raises(UserError, match=r"part.cdb, line \d+: CP 1 couples"):
+        read_mesh(tmp_path / "part.cdb", "mm")
+
+
+@pytest.mark.parametrize("command", ["CE,1,0,9,UY,1,10,UY,-1", "CP,1,UY,9,10", "CERIG,9,10,UX"])
+def test_turned_nodes_in_constraints_are_refused(tmp_path, command):
+    lines = archive(BAR).splitlines()
+    at = next(i for i, line in enumerate(lines) if line.startswith(f"{9:9d}"))
+    lines[at] += f"{90.0:21.13E}"
+    written(tmp_path, "\n".join(lines).replace("FINISH", f"{command}\nFINISH"))
+    with pytest.raises(UserError, match=r"part.cdb, line \d+: .*directions of node 9, which are turned in NBLOCK"):
+        read_mesh(tmp_path / "part.cdb", "mm")
+
+
+def test_elements_with_mass_that_are_not_read_are_told(tmp_path):
+    """A point mass and an interface generator are warned of, a surface load element is not."""
+    lines = archive(BAR).replace("ET,2,154", "ET,2,154\nET,3,21").splitlines()
+    lines = [line.replace(f"SOLID,{2:10d},{2:10d}", f"SOLID,{4:10d},{4:10d}") for line in lines]
+    at = lines.index(f"{-1:10d}")
+    for kind, number, nodes in ((3, 98, [9]), (2, 99, [1, 2, 3, 4])):
+        words = [1, kind, 1, 1, 0, 0, 0, 0, len(nodes), 0, number, *nodes]
+        lines.insert(at, "".join(f"{w:10d}" for w in words))
+    written(tmp_path, "\n".join(lines).replace("FINISH", "CEINTF,0.25\nFINISH"))
+    read = read_mesh(tmp_path / "part.cdb", "mm")
+    assert [text.split(" is not read")[0].partition(", ")[2] for text in read.lost] == [
+        f"line {len(lines)}: CEINTF", "element 98: the Ansys type 21 (1 element)",
+    ]  # fmt: skip

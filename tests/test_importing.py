@@ -120,8 +120,6 @@ def test_supports_of_a_deck_become_supports_of_the_body(tmp_path, monkeypatch, c
 LEFT = {
     "a plane of symmetry alone": (["*BOUNDARY", "z0, ZSYMM"], "z0 in z; they do not hold the body", '#face = "z0"'),
     "a displacement": (["*BOUNDARY", "z0, 1, 3, 0.5"], "the line 'z0, 1, 3, 0.5' of *BOUNDARY", "free = true"),
-    "a set that is missing": (["*BOUNDARY", "z9, 1, 3"], "the node set 'z9', which is not defined", "free = true"),
-    "a node that is missing": (["*BOUNDARY", "999, 1, 3"], "node 999, which the file does not", "free = true"),
     "a velocity": (["*BOUNDARY, TYPE=VELOCITY", "z0, 1"], "a *BOUNDARY of the kind VELOCITY", "free = true"),
     "a local system": (["*TRANSFORM, NSET=z0", "1,0,0,0,1,0", "*BOUNDARY", "z0, 2"], "a local system", "free = true"),
 }
@@ -139,6 +137,33 @@ def test_what_cannot_be_a_support_is_told_and_the_body_runs_free(tmp_path, monke
     text = (tmp_path / "here" / "body.toml").read_text()
     assert written in text and "free = true" in text and "\n[[supports]]" not in text
     assert main(["modes", "here", "-q"]) == 0
+
+
+@pytest.mark.parametrize(
+    ("keywords", "told"),
+    [
+        (["*BOUNDARY", "z9, 1, 3"], "*BOUNDARY names the node set 'z9', which is not defined"),
+        (["*BOUNDARY", "999, 1, 3"], "*BOUNDARY names the node 999, which is not defined"),
+        (["*SURFACE, NAME=S", "1, S9"], "names the side 'S9', which no cell has"),
+        (["*SURFACE, NAME=S", "Nobody, S1"], "the element set 'Nobody', which is not defined"),
+        (["*SURFACE, NAME=S, TYPE=NODE", "Nobody"], "the node set 'Nobody', which is not defined"),
+        (["*NSET, NSET=N", "Nobody"], "the set 'Nobody', which is not defined"),
+        (["*SYSTEM", "0,0,0,0,0,0"], "the points of *SYSTEM lie on a line"),
+        (["*SOLID SECTION, ELSET=Nobody, MATERIAL=Steel"], "the element set 'Nobody', which is not defined"),
+        (
+            ["*SURFACE, NAME=S", "1, S1", "*CONTACT PAIR, INTERACTION=Nope", "S, S"],
+            "the interaction 'NOPE', which is not defined",
+        ),
+    ],
+)
+def test_names_that_nothing_answers_to_are_refused_with_their_line(tmp_path, monkeypatch, capsys, keywords, told):
+    monkeypatch.chdir(tmp_path)
+    lines = [*decks.mesh_lines(beam(), sets=("z0",)), *decks.MATERIAL, decks.section(), *keywords]
+    (tmp_path / "part.inp").write_text("\n".join(lines) + "\n")
+    assert main(["import", "part.inp", "here"]) == 2
+    said = capsys.readouterr().err
+    assert said.startswith("error: part.inp, line ") and told in said and "damaged" not in said
+    assert not (tmp_path / "here").exists()
 
 
 def test_a_deck_of_two_parts_is_refused_only_where_a_part_is_not_held(tmp_path, monkeypatch, capsys):

@@ -107,6 +107,12 @@ def test_first_order_bricks_lock_as_far_as_is_told(tmp_path, monkeypatch, capsys
         ("*End Assembly", "*Include, input=two.inp\n*End Assembly", "includes itself by way of two.inp"),
         ("*End Assembly", "*Include, input=none.inp\n*End Assembly", "none.inp cannot be read"),
         ("*Part, name=Vane", "*Part, name=Root", "the *PART 'Root' is there twice"),
+        ("*End Part\n", "", "the *PART has no *END PART before two.inp, line "),
+        ("*End Instance\n", "", "the *INSTANCE has no *END INSTANCE before two.inp, line "),
+        ("*End Assembly\n", "", "the *ASSEMBLY has no *END ASSEMBLY before the end"),
+        ("*Assembly, name=Assembly\n", "", "the *INSTANCE stands outside of an *ASSEMBLY"),
+        ("name=Root-1, part=Root", "name=Root-1", "names no PART and has no nodes"),
+        ("40.0, 5.0, 1.0", "40.0, nan, 1.0", "a number that is not finite"),
     ],
 )
 def test_wrong_assemblies_are_told_with_file_and_line(tmp_path, monkeypatch, capsys, old, new, text):
@@ -118,3 +124,61 @@ def test_wrong_assemblies_are_told_with_file_and_line(tmp_path, monkeypatch, cap
     said = capsys.readouterr().err
     assert text in said and "two.inp" in said and "line " in said
     assert not (tmp_path / "two").exists()
+
+
+CUBE = meshes.brick("hexahedron20", (2, 1, 1), (0.02, 0.01, 0.01))
+
+
+def stacked(*inside):
+    """Two cubes, one on the other, with nodes at the same places."""
+    part = instanced.part_lines("Cube", CUBE, SETS)
+    half = ["*Surface, type=ELEMENT, name=Half", "1, S1"]
+    lines = {"Cube": [*part[:-1], *half, part[-1]]}
+    return instanced.instanced(
+        lines, [Placed("A", "Cube"), Placed("B", "Cube", (0.0, 0.0, 10.0))], list(inside), [*decks.MATERIAL, *HOLD]
+    )
+
+
+HOLD = ["*BOUNDARY", "A.z0, ENCASTRE"]
+TIE = ("*Tie, name=T", "B.Half, A.S-z1")
+
+
+def test_touching_instances_tied_in_part_stay_apart_beside_the_tie(tmp_path, monkeypatch, capsys):
+    """Their coincident points are no mistake, for info, import and modes; unjoined ones are told as parts."""
+    write(tmp_path, "two", stacked(*TIE))
+    found = modes(tmp_path, "two", monkeypatch)
+    assert main(["info", "two.inp"]) == 0 and "coincide" not in "".join(capsys.readouterr())
+    write(tmp_path, "whole", stacked("*Tie, name=T", "B.S-z0, A.S-z1"))
+    assert found[0] < 0.95 * modes(tmp_path, "whole", monkeypatch)[0]  # merged nodes would give the whole's
+    write(tmp_path, "loose", stacked())
+    capsys.readouterr()
+    assert main(["info", "loose.inp"]) == 0 and "falls into 2 parts" in capsys.readouterr().err
+
+
+def test_a_bolt_that_is_one_body_with_what_it_holds_loses_its_preload_aloud(tmp_path, monkeypatch, capsys):
+    bolt = ["*Node, nset=P", "1, 0., 0., 0.", "*Surface, type=ELEMENT, name=Cut", "B.1, S2"]
+    bolt += ["*Pre-tension Section, surface=Cut, node=P"]
+    write(tmp_path, "a", [*stacked(*TIE, *bolt), "*STEP", "*CLOAD", "P, 1, 500.", "*END STEP"])
+    write(tmp_path, "b", stacked(*TIE, *bolt))
+    monkeypatch.chdir(tmp_path)
+    for name, text in (("a", "the preload of 500 N is not used: the bolt"), ("b", "has no *CLOAD on its node")):
+        assert main(["import", f"{name}.inp"]) == 0
+        assert any(text in t and t.startswith("warning: ") for t in capsys.readouterr().out.splitlines())
+
+
+def test_an_import_repeated_into_its_folder_changes_nothing(tmp_path, monkeypatch, capsys):
+    write(tmp_path, "two", stacked(*TIE))
+    monkeypatch.chdir(tmp_path)
+    assert main(["import", "two.inp", "Out"]) == 0
+    before = (tmp_path / "Out" / "body.toml").read_bytes()
+    capsys.readouterr()
+    assert main(["import", "two.inp", "Out"]) == 2
+    assert "Out/body.toml: is there already" in capsys.readouterr().err
+    assert before == (tmp_path / "Out" / "body.toml").read_bytes() and not (tmp_path / "two-Out").exists()
+
+
+def test_what_a_part_holds_is_held_in_each_of_its_instances(tmp_path):
+    lines = stacked(*TIE)
+    lines.insert(lines.index("*End Part"), "*Boundary\nx1, 2, 2")
+    write(tmp_path, "two", lines)
+    assert {"A.x1": "y", "B.x1": "y"}.items() <= dict(read_mesh(tmp_path / "two.inp", "mm").supports).items()

@@ -125,6 +125,27 @@ def test_modulus_over_temperature_becomes_a_factor(tmp_path):
     np.testing.assert_allclose(ratio, np.sqrt(0.875), rtol=1e-9)
 
 
+@pytest.mark.skipif(decks.CCX is None, reason="needs CalculiX")
+@pytest.mark.parametrize("axis", [1, 2, 3])
+def test_an_orientation_turned_about_one_of_its_axes_is_that_of_calculix(tmp_path, axis):
+    mesh = meshes.brick("hexahedron20", (1, 1, 2), (0.01, 0.012, 0.05))
+    lines = [*decks.mesh_lines(mesh, sets=("z0",)), *ORTHO[:-1], "1., .4, .1, -.3, 1., .2", f"{axis}, 25."]
+    lines.append(decks.section("EALL", "Wood", "GRAIN"))
+    theirs = decks.run(tmp_path, "ccx", [*lines, *HELD, *decks.frequency_step()])
+    basis, _ = made(tmp_path, lines)
+    np.testing.assert_allclose(basis.groups[0, 0].omega[:8] / 2 / np.pi, theirs[:8], rtol=1e-6)
+
+
+def test_a_material_in_axes_that_are_not_read_is_no_steel(tmp_path, monkeypatch, capsys):
+    lines = [*decks.mesh_lines(beam()), *ORTHO, decks.section("EALL", "Wood", "GRAIN")]
+    (tmp_path / "part.inp").write_text("\n".join(lines).replace("RECTANGULAR", "CYLINDRICAL") + "\n")
+    monkeypatch.chdir(tmp_path)
+    assert main(["import", "part.inp", "out"]) == 2
+    said = capsys.readouterr().err
+    assert "the material 'Wood' of the cells 'EALL' has *ORIENTATION, NAME=GRAIN of the system CYLINDRICAL" in said
+    assert not (tmp_path / "out").exists()
+
+
 @pytest.mark.parametrize(
     ("change", "text"),
     [

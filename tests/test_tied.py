@@ -205,6 +205,26 @@ def test_random_constraints_are_those_of_dense_algebra(data):
         (["*EQUATION", "2", "{A}, 1, 1., {B}, 1, -1.", "2", "{B}, 1, 1., {A}, 1, 2."], "leads in a circle"),
         (["*EQUATION", "3", "{A}, 1, 1., {B}, 1, -1."], "announces 3 terms"),
         (["*TRANSFORM, NSET=z1", "0,1,0,1,0,0", "*EQUATION", "2", "{A}, 1, 1., {B}, 1, -1."], "beside a *TRANSFORM"),
+        (["*MPC", "BEAM, {A}, {B}", "BEAM, {B}, {C}"], "moves node {B}, which leads others"),
+        (["*SURFACE, NAME=U, COMBINE=UNION", "S-z1, S-z9"], "names the surface 'S-z9', which is not defined"),
+        (["*MPC", "BEAMM, {A}, {B}"], "kind 'BEAMM' is not read"),
+        (["*MPC", "PIN, {A}"], "fewer than two nodes"),
+        (
+            [*REF, "*TRANSFORM, NSET=z1", "0,1,0,1,0,0", COUPLED[0].format("S-z1"), "*KINEMATIC", "1, 2"],
+            "beside a *TRANSFORM",
+        ),
+        (
+            [
+                *REF,
+                *REF[:1],
+                "9003, 1., 1., 99.",
+                "*SURFACE, NAME=L, TYPE=NODE",
+                "9003, 2.",
+                "*COUPLING, REF NODE=9001, SURFACE=L",
+                "*DISTRIBUTING",
+            ],
+            "node 9003, which no solid cell uses",
+        ),
         (["*MPC", "PIN, {A}, Nobody"], "'Nobody', which is not defined"),
         (["*EQUATION", "2", "{A}, 7, 1., {B}, 1, -1."], "'7' is no degree of freedom"),
         (["*EQUATION", "2", "{A}, 5, 1., {B}, 1, -1."], "takes in the rotation of node {A}, which has none"),
@@ -225,6 +245,65 @@ def test_wrong_constraints_are_told_with_file_and_line(tmp_path, monkeypatch, ca
     said = capsys.readouterr().err
     assert text.format(**words) in said and "part.inp, line " in said
     assert not (tmp_path / "part").exists()
+
+
+CHAINS = {
+    "kinematic": ["*KINEMATIC COUPLING, REF NODE=9002", "9001, 1, 6"],
+    "beam": ["*MPC", "BEAM, 9001, 9002"],
+    "rigid": ["*NSET, NSET=TIED", "9001,", "*RIGID BODY, TIE NSET=TIED, REF NODE=9002"],
+}
+
+
+@pytest.mark.parametrize("kind", CHAINS)
+def test_a_reference_node_that_follows_another_one_turns_with_it(tmp_path, kind):
+    """Rigid on rigid is rigid: the end held through a chain of two is the end held."""
+    found = []
+    for chain in ([], CHAINS[kind]):
+        lines = [*base(), *REF, "*NODE", "9002, 30., 0., 80.", *COUPLED, *chain]
+        (tmp_path / "a.inp").write_text("\n".join([line.format("S-z1") for line in lines]) + "\n")
+        mesh = linked(read_mesh(tmp_path / "a.inp", "mm"))[0]
+        last = 3 * mesh.n_points + 6 * (len(mesh.links.references) - 1) + np.arange(6)
+        found.append(solved(mesh, last, 6))
+    np.testing.assert_allclose(found[1], found[0], rtol=1e-9)
+
+
+WEIGHTS = ["*COUPLING, REF NODE=9001, SURFACE={}", "*DISTRIBUTING", "*BOUNDARY", "9001, 1, 3"]
+
+
+def test_a_distributing_coupling_weighs_by_area_or_by_its_numbers(tmp_path):
+    """Unequal facets: areas as the surface has them, as numbers written by hand, and one for all where none is."""
+    mesh = meshes.brick("hexahedron20", (2, 1, 1), (0.02, 0.01, 0.03), to=lambda x: x + np.maximum(x - [0.01, 1, 1], 0))
+    face = mesh.faces["z1"]["quad8"]
+    area = np.zeros(mesh.n_points)
+    for facet in face:
+        sides = np.ptp(mesh.points[facet[:4]], axis=0)
+        area[facet] += sides[0] * sides[1] * np.array([-1 / 12] * 4 + [1 / 3] * 4)
+    nodes = mesh.face_points("z1")
+    numbers = [f"{mesh.node_id[n]}, {1e6 * area[n]:.15g}" for n in nodes]
+    kinds = {
+        "S-z1": instanced.surfaces(mesh, ("z1",)),
+        "A": ["*SURFACE, NAME=A, TYPE=NODE", *numbers],
+        "B": ["*SURFACE, NAME=B, TYPE=NODE", *(f"{mesh.node_id[n]}," for n in nodes)],
+    }
+    found = {}
+    for name, lines in kinds.items():
+        text = [*decks.mesh_lines(mesh), *REF, *lines, *(line.format(name) for line in WEIGHTS)]
+        (tmp_path / "a.inp").write_text("\n".join(text) + "\n")
+        found[name] = linked(read_mesh(tmp_path / "a.inp", "mm"))[0].ties.rows.toarray()
+    np.testing.assert_allclose(found["A"], found["S-z1"], atol=1e-9 * abs(found["A"]).max())
+    assert abs(found["A"] - found["B"]).max() > 0.1
+
+
+def test_what_counts_and_is_not_read_is_a_warning_with_its_line(tmp_path, monkeypatch, capsys):
+    lines = ["*ELEMENT, TYPE=MASS, ELSET=M", "900, 1", "*MASS, ELSET=M", "0.1", "*EMBEDDED ELEMENT", "EALL"]
+    (tmp_path / "part.inp").write_text("\n".join([*base(), *lines, "*CLOAD", "1, 1, 2."]) + "\n")
+    monkeypatch.chdir(tmp_path)
+    assert main(["import", "part.inp"]) == 0
+    told = [line for line in capsys.readouterr().out.splitlines() if "frequencies will differ" in line]
+    assert [line.split(": ")[2].split(" is not")[0] for line in told] == [
+        "*ELEMENT, TYPE=MASS", "*MASS", "*EMBEDDED ELEMENT",
+    ]  # fmt: skip
+    assert all(line.startswith("warning: part.inp, line ") for line in told)
 
 
 def test_a_support_on_what_an_equation_gives_is_refused_with_its_line(tmp_path, monkeypatch, capsys):
@@ -255,7 +334,9 @@ def test_constraints_of_nastran_and_ansys_are_those_of_abaqus(tmp_path):
         *grid, *_listed("RBE2,1,901,123456", top), *_listed("RBE3,2,,902,123456,1.0,123", free),
         f"MPC,3,{free[0]},1,2.0,{free[1]},2,-1.0", "MPC,3,901,5,1.0,902,4,-0.5",
     ]  # fmt: skip
-    bulk = test_bdf.bulk(BEAM).replace("ENDDATA\n", "\n".join([*cards, "ENDDATA"]) + "\n")
+    bulk = (
+        test_bdf.bulk(BEAM).replace("CEND", "CEND\nMPC = 3").replace("ENDDATA\n", "\n".join([*cards, "ENDDATA"]) + "\n")
+    )
     (tmp_path / "a.bdf").write_text(bulk)
     two = linked(read_mesh(tmp_path / "a.bdf", "m"))[0]
     ours, theirs = solved(one, fixed, 6), solved(two, fixed, 6)

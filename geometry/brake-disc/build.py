@@ -34,9 +34,7 @@ def draw(parameters: dict, mesh: dict) -> None:
     gmsh.option.setNumber("Mesh.SecondOrderIncomplete", 1)
     rings = ["bore_radius", "pad_inner", "pad_outer", "outer_radius"]
     parts = [
-        part(p, p[inner], p[outer], *arc)
-        for inner, outer in zip(rings, rings[1:], strict=False)
-        for arc in arcs(p)
+        part(p, p[inner], p[outer], *arc) for inner, outer in zip(rings, rings[1:], strict=False) for arc in arcs(p)
     ]
     gmsh.model.occ.fragment(parts[:1], parts[1:])
     gmsh.model.occ.synchronize()

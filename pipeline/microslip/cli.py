@@ -898,8 +898,9 @@ def info(
         print(f"{file}: matrices {_words(matrix_names(file))}")
     else:
         from .mesh import mesh_problems, read_mesh
+        from .stages.meshing import linked_mesh
 
-        grid = read_mesh(file, unit)
+        grid = linked_mesh(file, read_mesh(file, unit))
         size = (grid.points.max(axis=0) - grid.points.min(axis=0)).tolist()
         kinds = ", ".join(f"{len(c)} {t}" for t, c in grid.cells.items())
         print(f"{file}: {grid.n_points} points, {kinds}, {size[0]:.4g} x {size[1]:.4g} x {size[2]:.4g} m")

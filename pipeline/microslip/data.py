@@ -101,7 +101,8 @@ class RigidLink:
     """Nodes that follow a reference node as a rigid body: u = u_r + theta_r x (x - x_r), in some directions.
 
     Attributes:
-        reference: node. members: nodes, or the face or point set that has them. directions: out of x, y, z.
+        reference: node. members: nodes, or the face that has them. directions: out of x, y, z, and of a, b, c
+            for members that are reference nodes and turn with it.
     """
 
     where: str
@@ -115,14 +116,14 @@ class AverageLink:
     """A reference node that follows nodes in the mean: the rigid motion that fits theirs best, by weights.
 
     Attributes:
-        reference: node. members: nodes, or the face or point set that has them. weights: (m,) of the members, or one
-            for all. directions: which of the reference node's x, y, z and rotations a, b, c follow.
+        reference: node. members: nodes, or the face that has them. weights: (m,) of the members; None: their tributary
+            areas of the face. directions: which of the reference node's x, y, z and rotations a, b, c follow.
     """
 
     where: str
     reference: int
     members: Indices | str
-    weights: Array
+    weights: Array | None
     directions: str = "xyzabc"
 
 
@@ -209,6 +210,7 @@ class Mesh:
         inner: name of a set of facets that cannot serve as a face -> (facets inside the volume, all of them).
         supports: point set -> directions that the file holds at zero, like ``xyz``. not_held: the file's constraints
             that are not among them, in words. unended: what the file lacks at its end, in words, or nothing.
+        lost: what carries mass, stiffness or a constraint in the file and is not read, in words.
         remarks: what of the file is read as something else or not used, in words. instances: name -> points.
         joints: faces that the file lets touch. preloads: of its bolts: where it stands, force in the file's unit.
         links: constraints of the file, and ties: the equations that `fem.links.linked` makes of them, or None.
@@ -227,6 +229,7 @@ class Mesh:
     supports: Mapping[str, str] = field(default_factory=dict)
     not_held: tuple[str, ...] = ()
     unended: str = ""
+    lost: tuple[str, ...] = ()
     remarks: tuple[str, ...] = ()
     instances: Mapping[str, Indices] = field(default_factory=dict)
     joints: tuple[Joint, ...] = ()

@@ -19,7 +19,7 @@ from scipy.spatial import cKDTree
 from ..data import Array, AverageLink, Equation, FaceTie, Indices, Links, Mesh, RigidLink, Ties, UserError
 from ..frames import rigid_fields
 from ..topology import FACET_CORNERS
-from .discretise import shape_functions
+from .discretise import face_blocks, shape_functions
 
 _NEAR = 0.05
 """Share of the size of a master's facets within which a node is tied where the deck gives no tolerance."""
@@ -101,10 +101,10 @@ def _members(mesh: Mesh, link: RigidLink | AverageLink) -> Indices:
     """
     if not isinstance(link.members, str):
         found = link.members
-    elif link.members in mesh.faces or link.members in mesh.point_sets:
-        found = mesh.set_points(link.members)
+    elif link.members in mesh.faces:
+        found = mesh.face_points(link.members)
     else:
-        raise UserError(f"{link.where} names '{link.members}', which is no face and no set of nodes of the mesh")
+        raise UserError(f"{link.where} names '{link.members}', which is no face of the mesh")
     if not len(found := found[found != link.reference]):
         raise UserError(f"{link.where} couples no nodes to its reference node; name a surface or set that has some")
     return found
@@ -123,18 +123,22 @@ def _equation(mesh: Mesh, link: Equation, rows: _Rows, number: int) -> str:
 def _rigid(mesh: Mesh, link: RigidLink, rows: _Rows, number: int) -> str:
     members = _members(mesh, link)
     r = _position(mesh, members) - _position(mesh, np.array([link.reference]))
-    for way in ["xyz".index(c) for c in link.directions]:
+    for way in ["xyz".index(c) for c in link.directions if c in "xyz"]:
         own = rows.dof(members, way)
         a, b = (way + 1) % 3, (way + 2) % 3  # (theta x r)_way = theta_a r_b - theta_b r_a
         base = [np.full(len(members), rows.dof(np.array(link.reference), c)) for c in (way, 3 + a, 3 + b)]
         factors = np.column_stack([np.ones(len(members)), -np.ones(len(members)), -r[:, b], r[:, a]])
         rows.add(number, np.column_stack([own, *base]), factors, own)
+    turning = members[members >= mesh.n_points]
+    for way in ["xyzabc".index(c) for c in link.directions if c in "abc"]:
+        given, leading = rows.dof(turning, way), np.full(len(turning), rows.dof(np.array(link.reference), way))
+        rows.add(number, np.column_stack([given, leading]), np.tile([1.0, -1.0], (len(turning), 1)), given)
     return f"{link.where}: {len(members)} nodes follow node {_number(mesh, link.reference)}"
 
 
 def _average(mesh: Mesh, link: AverageLink, rows: _Rows, number: int) -> str:
     members = _members(mesh, link)
-    weights = np.broadcast_to(link.weights, len(members)).astype(float)
+    weights = _weights(mesh, link, members)
     origin = _position(mesh, np.array([link.reference]))
     fields = rigid_fields(_position(mesh, members), origin[0])
     size = max(float(np.abs(_position(mesh, members) - origin).max()), 1e-300)
@@ -157,6 +161,27 @@ def _average(mesh: Mesh, link: AverageLink, rows: _Rows, number: int) -> str:
         columns, factors = np.concatenate([moved, own])[None], np.concatenate([[-1.0], fit[way].ravel()])[None]
         rows.add(number, columns, factors, moved)
     return f"{link.where}: node {_number(mesh, link.reference)} follows {len(members)} nodes in the mean"
+
+
+def _weights(mesh: Mesh, link: AverageLink, members: Indices) -> Array:
+    """(m,) weights as given, or the tributary areas int N_i dA of a face's nodes, m2.
+
+    Raises:
+        UserError: areas of what is no face, weights that add up to nothing.
+    """
+    if link.weights is not None and not isinstance(link.members, str):
+        kept = link.members != link.reference
+        weights = np.broadcast_to(link.weights, len(kept))[kept].astype(float)
+    elif isinstance(link.members, str) and link.members in mesh.faces:
+        area = np.zeros(mesh.n_points)
+        for block in face_blocks(mesh, link.members):
+            np.add.at(area, block.facets, np.linalg.norm(block.area, axis=2) @ block.N)
+        weights = area[members]
+    else:
+        raise UserError(f"{link.where} weighs nodes by areas of '{link.members}', which is no face of the mesh")
+    if not weights.sum() > 0:
+        raise UserError(f"{link.where} has weights whose sum is not above 0; correct them")
+    return weights
 
 
 def _number(mesh: Mesh, node: int) -> int:

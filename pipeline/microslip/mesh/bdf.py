@@ -8,7 +8,7 @@ sixteen columns or between commas.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +16,7 @@ import numpy as np
 from ..data import AverageLink, Equation, Indices, Link, RigidLink
 from ..elasticity import turned_strain
 from .materials import isotropic_rows
-from .raw import Damaged, DeckMaterial, Numbering, RawMesh
+from .raw import Damaged, DeckMaterial, Numbering, RawMesh, lost
 from .supports import Constraints, add_supports
 
 _BRICK20, _WEDGE15 = (*range(12), *range(16, 20), *range(12, 16)), (*range(9), *range(12, 15), *range(9, 12))
@@ -31,22 +31,14 @@ _SOLIDS["CPYRA"] = _SOLIDS["CPYRAM"]
 _SHELLS = {"CTRIA3": 3, "CTRIAR": 3, "CTRIA6": 3, "CQUAD4": 4, "CQUADR": 4, "CQUAD8": 4}
 _MATERIALS = {"MAT2", "MAT3", "MAT8", "MAT9", "MAT10", "MAT11"}
 _READ = {
-    "GRID",
-    "PSOLID",
-    "MAT1",
-    "PARAM",
-    "SET1",
-    "SPC",
-    "SPC1",
-    "SPCADD",
-    "RBE2",
-    "RBE3",
-    "MPC",
-    "MPCADD",
-    *_SOLIDS,
-    *_SHELLS,
-    *_MATERIALS,
-}
+    "GRID", "PSOLID", "MAT1", "PARAM", "SET1", "SPC", "SPC1", "SPCADD", "RBE2", "RBE3", "MPC", "MPCADD", *_SOLIDS,
+    *_SHELLS, *_MATERIALS,
+}  # fmt: skip
+_COUNTS = re.compile(
+    r"C(?!ORD|END)[A-Z]+\d?|R(?!FORCE|LOAD|AND|ING)[A-Z]+\d?|SUPORT1?|GENEL|DMIG|NSM[A-Z]*\d?|GRDSET|"
+    r"MATT\d+|BCTSET|PSHELL|PCOMPG?|BCONTACT|BOLT|SPCOFF1?|SPCR|SPLINE\d|ASET1?|AEQUAD4"
+)
+"""Cards that add mass, stiffness or constraints; those beside `_READ` are not read."""
 
 
 class _Card(list[str]):
@@ -60,6 +52,7 @@ class _Card(list[str]):
 
 
 Cards = dict[str, list[_Card]]
+_EVERY = ("xyz", "abc", "xyzabc")  # directions that mean the same in every system
 
 
 def read_bdf(path: Path) -> RawMesh:
@@ -84,8 +77,13 @@ def read_bdf(path: Path) -> RawMesh:
             members = np.array(_listed(card, first), dtype=np.int64)
             raw.add_points(f"{label} {card[1]}", numbering.positions(members, f"{name} {card[1]} names"))
     held = _constraints(cards, text)
-    raw.links = [*_rigid(cards, path.name, numbering), *_averages(cards, path.name, numbering)]
-    raw.links += _equations(cards, path.name, text, numbering, held)
+    raw.lost = [
+        lost(f"{path.name}, line {c[0].line}", f"{name} ({len(c)} card{'s' * (len(c) > 1)})")
+        for name, c in cards.items()
+        if name not in _READ and _COUNTS.fullmatch(name)
+    ]
+    raw.links = [*_rigid(cards, path.name, numbering, held), *_averages(cards, path.name, numbering, held)]
+    raw.links += _equations(cards, path.name, text, numbering, held, raw.lost)
     add_supports(raw, held, numbering)
     if not re.search(r"^\s*ENDDATA\b", text, re.IGNORECASE | re.MULTILINE):
         raw.unended = "no ENDDATA"  # a warning: decks are also kept as parts that others include
@@ -96,7 +94,7 @@ def read_bdf(path: Path) -> RawMesh:
 
 
 def _cards(text: str) -> Iterator[_Card]:
-    """Name and fields of every card that matters, its continuations joined."""
+    """Name and fields of every card, its continuations joined."""
     lines = text.splitlines()
     begin = next((i for i, line in enumerate(lines) if re.match(r"\s*BEGIN\s+BULK", line, re.IGNORECASE)), -1)
     card = _Card()
@@ -113,11 +111,11 @@ def _cards(text: str) -> Iterator[_Card]:
             if card:
                 card += words[1:]
             continue
-        if card and card[0] in _READ:
+        if card:
             yield card
         card = _Card([words[0].upper().rstrip("*").strip(), *words[1:]])
         card.line = number
-    if card and card[0] in _READ:
+    if card:
         yield card
 
 
@@ -221,7 +219,10 @@ def _material(cards: Cards, property_: int) -> DeckMaterial:
     if card is None:
         others = [c[0] for m in _MATERIALS for c in cards.get(m, []) if _at(c, 1) == str(number)]
         name = f"{(others or ['MAT1'])[0]} {number}"
-        return DeckMaterial(name + ("" if others else " (missing)"), None, None, np.zeros(6), None, where)
+        refused = "a form that is not read; write it as MAT1, or give density and stiffness in a body.toml"
+        if others:
+            return DeckMaterial(name, None, None, np.zeros(6), None, where, refused)
+        return DeckMaterial(f"{name} (missing)", None, None, np.zeros(6), None, where)
     E, G, nu = (_real(card, place) for place in (2, 3, 4))
     if E is None and G is not None and nu is not None:
         E = 2 * G * (1 + nu)
@@ -243,7 +244,7 @@ def _density(cards: Cards, card: list[str]) -> float | None:
 
 
 def _constraints(cards: Cards, text: str) -> Constraints:
-    """Zero displacements: GRID's own, and those of the sets that the case control chooses, or of the only one."""
+    """Zero displacements: GRID's own, and those of the sets that the case control chooses, or the only one."""
     held = Constraints(turned={_whole(c, 1) for c in cards["GRID"] if _whole(c, 6, 0) != 0})
     for card in cards["GRID"]:
         held.hold(_whole(card, 1), _directions(_at(card, 7)))
@@ -272,17 +273,38 @@ def _chosen(cards: Cards, text: str, held: Constraints, kind: str = "SPC") -> se
     pattern = re.compile(rf"^\s*{kind}\s*=\s*(\d{{1,9}})\b", re.IGNORECASE | re.MULTILINE)
     named = pattern.findall(control[0]) if len(control) > 1 else []
     every = {_whole(c, 1) for name in (kind, f"{kind}1") for c in cards.get(name, [])}
+    if not named and every and len(control) > 1:
+        sets = "the only set" if len(every) == 1 else "several sets"
+        held.left_out.append(
+            f"{sets} of {kind}, of which the case control chooses none: not held (write {kind} = {min(every)})"
+        )
+        return set()
     if not named and len(every) > 1:
-        held.left_out.append(f"several sets of {kind}, of which the case control chooses none")
+        held.left_out.append(f"several sets of {kind} without a case control that chooses")
         return set()
     chosen = {int(n) for n in named} if named else every
+    if len(set(named)) > 1:
+        held.left_out.append(
+            f"subcases choose several sets of {kind} ({', '.join(named)}); all of them hold here at once"
+        )
+    known = every | {_whole(c, 1) for c in cards.get(f"{kind}ADD", [])}
+    if unknown := sorted(chosen - known):
+        held.left_out.append(f"the set {kind} = {unknown[0]} of the case control is not defined, so it does not hold")
     for card in cards.get(f"{kind}ADD", []):
         if _whole(card, 1) in chosen:
             chosen |= set(_listed(card, 2))
     return chosen
 
 
-def _rigid(cards: Cards, name: str, numbering: Numbering) -> Iterator[Link]:
+def _refuse_turned(where: str, nodes: Iterable[int], held: Constraints) -> None:
+    """Raises `Damaged` if the directions of a node are those of a local system (CD)."""
+    if found := next((node for node in nodes if node in held.turned), None):
+        raise Damaged(
+            f"{where} takes single directions of GRID {found} in a local system (CD); write it in the basic one"
+        )
+
+
+def _rigid(cards: Cards, name: str, numbering: Numbering, held: Constraints) -> Iterator[Link]:
     """RBE2: points that follow one as a rigid body does, in some of its directions."""
     for card in cards.get("RBE2", []):
         where = f"{name}, {card.where}"
@@ -290,12 +312,14 @@ def _rigid(cards: Cards, name: str, numbering: Numbering) -> Iterator[Link]:
         if not members:
             raise Damaged(f"{where} couples no nodes to its node {_at(card, 2)}; add them")
         reference = numbering.positions(np.array([_whole(card, 2)]), f"{where} names")
-        moves = "".join(c for c in _directions(_at(card, 3)) if c in "xyz")
+        ways = _directions(_at(card, 3))
+        if ways not in _EVERY:
+            _refuse_turned(where, [_whole(card, 2), *members], held)
         positions = numbering.positions(np.array(members, dtype=np.int64), f"{where} names")
-        yield RigidLink(where, int(reference[0]), positions, moves)
+        yield RigidLink(where, int(reference[0]), positions, ways)
 
 
-def _averages(cards: Cards, name: str, numbering: Numbering) -> Iterator[Link]:
+def _averages(cards: Cards, name: str, numbering: Numbering, held: Constraints) -> Iterator[Link]:
     """RBE3: a point that follows others in the mean."""
     for card in cards.get("RBE3", []):
         where = f"{name}, {card.where}"
@@ -319,14 +343,20 @@ def _averages(cards: Cards, name: str, numbering: Numbering) -> Iterator[Link]:
                 place += 1
         if not members:
             raise Damaged(f"{where} follows no nodes; add them")
+        if _directions(_at(card, 4)) not in _EVERY:
+            _refuse_turned(where, [_whole(card, 3)], held)
         reference = numbering.positions(np.array([_whole(card, 3)]), f"{where} names")
         positions = numbering.positions(np.array(members, dtype=np.int64), f"{where} names")
         yield AverageLink(where, int(reference[0]), positions, np.array(weights), _directions(_at(card, 4)))
 
 
-def _equations(cards: Cards, name: str, text: str, numbering: Numbering, held: Constraints) -> Iterator[Link]:
-    """MPC of the sets that the case control chooses, or of the only one."""
-    chosen = _chosen(cards, text, held, "MPC")
+def _equations(
+    cards: Cards, name: str, text: str, numbering: Numbering, held: Constraints, left_out: list[str]
+) -> Iterator[Link]:
+    """MPC of the sets that the case control chooses, or of the only one of a file without case control."""
+    own = Constraints()
+    chosen = _chosen(cards, text, own, "MPC")
+    left_out += [f"{name}: {told}" for told in own.left_out]
     for card in cards.get("MPC", []):
         if _whole(card, 1) not in chosen:
             continue
@@ -336,6 +366,7 @@ def _equations(cards: Cards, name: str, text: str, numbering: Numbering, held: C
         ways = [_whole(card, p + 1, 0) - 1 for p in places]
         if not all(0 <= way < 6 for way in ways):
             raise Damaged(f"{where} names a component that no grid point has (1 to 6)")
+        _refuse_turned(where, [_whole(card, p) for p in places], held)
         yield Equation(where, nodes, np.array(ways), np.array([_real(card, p + 2) or 0.0 for p in places]))
 
 

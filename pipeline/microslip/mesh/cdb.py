@@ -17,13 +17,15 @@ import numpy as np
 from ..data import Array, Equation, Link, RigidLink
 from ..elasticity import turned_strain
 from .materials import isotropic_rows, orthotropic_row
-from .raw import Damaged, DeckMaterial, Numbering, RawMesh, is_number
+from .raw import Damaged, DeckMaterial, Numbering, RawMesh, is_number, lost
 from .supports import Constraints, add_supports
 
 _SOLIDS = {185: 8, 45: 8, 186: 20, 95: 20, 187: 10, 92: 10, 285: 4}
 """Element type -> number of nodes. Others that are known to hold no stiffness of a solid are left out."""
 _OTHERS = {14, 21, 156, 184, 188, 189, 200, 208, 209, 214, 281, 290}
 _OTHERS |= {*range(151, 155), *range(169, 176), *range(177, 182)}
+_HARMLESS = {*range(151, 157), 200}
+"""Those of `_OTHERS` without mass and stiffness: surface effects, cells to mesh from."""
 # corners I J K L M N O P are 0-7; mid-sides Q R S T U V W X Y Z A B are 8-19
 _FORMS: dict[int, dict[str, Sequence[int]]] = {
     8: {"hexahedron": range(8), "wedge": (0, 1, 2, 4, 5, 6), "pyramid": range(5), "tetra": (0, 1, 2, 4)},
@@ -38,7 +40,7 @@ _FORMS: dict[int, dict[str, Sequence[int]]] = {
 
 @dataclass
 class _Archive:
-    """What the commands have said. elements: (number, material, type, system, nodes)."""
+    """What the commands have said. elements: (number, material, type, system, nodes). places: of equations, by name."""
 
     node_id: list[int] = field(default_factory=list)
     points: list[list[float]] = field(default_factory=list)
@@ -53,8 +55,11 @@ class _Archive:
     nodal: dict[int, float] = field(default_factory=dict)
     held: Constraints = field(default_factory=Constraints)
     equations: dict[str, list[tuple[int, str, float]]] = field(default_factory=dict)
-    rigid: list[tuple[int, str, str]] = field(default_factory=list)
+    rigid: list[tuple[int, str, str, str]] = field(default_factory=list)
     open: str = ""
+    where: str = ""
+    places: dict[str, str] = field(default_factory=dict)
+    lost: list[str] = field(default_factory=list)
 
 
 def read_cdb(path: Path) -> RawMesh:
@@ -71,10 +76,17 @@ def read_cdb(path: Path) -> RawMesh:
         if command in ("NBLOCK", "EBLOCK", "CMBLOCK"):
             at = _BLOCKS[command](archive, words, lines, at + 1)
             continue
-        if command in _COMMANDS:
-            _COMMANDS[command](archive, words)
+        archive.where = f"{path.name}, line {at + 1}"
+        try:
+            if command in _COMMANDS:
+                _COMMANDS[command](archive, words)
+        except Damaged as error:
+            raise Damaged(f"{archive.where}: {error}") from None
+        if command in _NOT_READ:
+            archive.lost.append(lost(archive.where, command))
         at += 1
     raw = _assembled(archive)
+    raw.lost = [*archive.lost, *_other_elements(archive, path.name)]
     if not any(line.strip().upper() == "FINISH" for line in lines[-20:]):
         raw.unended = "no FINISH"  # a warning: archives that were shortened by hand have none
     return raw
@@ -293,7 +305,8 @@ def _read_equation(archive: _Archive, words: list[str]) -> None:
         number, constant, terms = (words[1:2] or [""])[0], (words[2:3] or [""])[0], words[3:]
     if constant and _number(constant, "CE") != 0:
         raise Damaged(f"the constraint equation CE {number} has the constant {constant}; only 0 is read")
-    found = archive.equations.setdefault(number, [])
+    archive.places.setdefault(f"CE {number}", f"{archive.where}: CE {number}")
+    found = archive.equations.setdefault(f"CE {number}", [])
     for place in range(0, len(terms) - 2, 3):
         node, label, factor = terms[place : place + 3]
         if node:
@@ -302,21 +315,40 @@ def _read_equation(archive: _Archive, words: list[str]) -> None:
             found.append((_whole(node, "CE"), _LABELS[label.upper()], _number(factor, "CE")))
 
 
+def _read_coupled(archive: _Archive, words: list[str]) -> None:
+    """CP, number, label, nodes: displacements that are equal."""
+    number, label, *nodes = [*words[1:], "", ""]
+    nodes, ways = [n for n in nodes if n], "xyz" if label.upper() == "ALL" else _LABELS.get(label.upper(), "")
+    if len(nodes) < 2 or not ways or not all(map(is_number, nodes)):
+        raise Damaged(f"CP {number} couples other things than {label or 'UX'} of two nodes or more in its line; use CE")
+    for node in nodes[1:]:
+        for way in ways:
+            terms = [(_whole(nodes[0], "CP"), way, 1.0), (_whole(node, "CP"), way, -1.0)]
+            name = f"CP {number}, {label} of node {node}, {way}"
+            archive.places[name], archive.equations[name] = f"{archive.where}: CP {number}", terms
+
+
 def _read_rigid(archive: _Archive, words: list[str]) -> None:
     """CERIG, master, slave node or component, directions."""
     master, slave, label = [*words[1:4], "", "", ""][:3]
-    ways = {"": "xyz", "ALL": "xyz", "UXYZ": "xyz", "RXYZ": ""}.get(label.upper(), _LABELS.get(label.upper(), "?"))
+    ways = {"": "xyzabc", "ALL": "xyzabc", "UXYZ": "xyz", "RXYZ": "abc"}.get(
+        label.upper(), _LABELS.get(label.upper(), "?")
+    )
     if ways == "?" or slave.upper() in ("ALL", ""):
         raise Damaged(f"CERIG,{master},{slave},{label} is not read; name one node or component, and ALL, UXYZ or UX")
-    archive.rigid.append((_whole(master, "CERIG"), slave, ways))
+    archive.rigid.append((_whole(master, "CERIG"), slave, ways, f"{archive.where}: CERIG,{master},{slave}"))
 
 
 _COMMANDS = {
-    "CE": _read_equation, "CERIG": _read_rigid,
+    "CE": _read_equation, "CERIG": _read_rigid, "CP": _read_coupled,
     "D": _read_displacement,
     "ET": _read_type, "MPTEMP": _read_temperatures, "MPDATA": _read_data, "MP": _read_constant, "TREF": _read_reference,
     "TUNIF": _read_uniform, "BFUNIF": _read_uniform, "BF": _read_body_force, "BFBLOCK": _refuse_temperatures,
 }  # fmt: skip
+
+
+_NOT_READ = ("RBE3", "CEINTF", "CPINTF", "CPNGEN", "CPLGEN", "CPCYC", "CECYC", "CESGEN", "CPSGEN", "MATWRITE")
+"""Commands that constrain and are not read."""
 
 
 # assembly ------------------------------------------------------------------------------------------------------------
@@ -350,23 +382,45 @@ def _assembled(archive: _Archive) -> RawMesh:
 def _links(archive: _Archive, numbering: Numbering) -> list[Link]:
     """Constraint equations, and nodes that follow one rigidly."""
     found: list[Link] = []
-    for number, terms in archive.equations.items():
-        where = f"CE {number}"
+    for name, terms in archive.equations.items():
+        where = archive.places[name]
         if not terms:
             raise Damaged(f"the constraint equation {where} has no terms")
         nodes = numbering.positions(np.array([t[0] for t in terms], dtype=np.int64), f"{where} names")
+        _refuse_turned(archive, where, [t[0] for t in terms])
         ways = np.array(["xyzabc".index(t[1]) for t in terms])
         found.append(Equation(where, nodes, ways, np.array([t[2] for t in terms])))
-    for master, slave, moves in archive.rigid:
-        where, members = f"CERIG,{master},{slave}", archive.components.get(slave, [])
+    for master, slave, moves, where in archive.rigid:
+        members = archive.components.get(slave, [])
         members = [int(slave)] if is_number(slave) else members
         if not members:
             raise Damaged(f"{where} couples no nodes: '{slave}' is no node and no component of nodes")
         reference = numbering.positions(np.array([master]), f"{where} names")
         positions = numbering.positions(np.array(members, dtype=np.int64), f"{where} names")
+        if moves not in ("xyz", "abc", "xyzabc"):
+            _refuse_turned(archive, where, [master, *members])
         if moves:
             found.append(RigidLink(where, int(reference[0]), positions, moves))
     return found
+
+
+def _refuse_turned(archive: _Archive, where: str, nodes: list[int]) -> None:
+    """Raises `Damaged` if the directions of a node are turned (angles of NBLOCK)."""
+    if found := next((node for node in nodes if node in archive.held.turned), None):
+        raise Damaged(f"{where} takes directions of node {found}, which are turned in NBLOCK; turn them back (NROTAT)")
+
+
+def _other_elements(archive: _Archive, name: str) -> list[str]:
+    """What is said of elements that are no solids but have mass or stiffness."""
+    first: dict[int, tuple[int, int]] = {}
+    for number, _, kind, _, _ in archive.elements:
+        ansys = archive.kinds.get(kind, 0)
+        if ansys in _OTHERS - _HARMLESS:
+            first[ansys] = (first.get(ansys, (number, 0))[0], first.get(ansys, (number, 0))[1] + 1)
+    return [
+        lost(f"{name}, element {number}", f"the Ansys type {kind} ({count} element{'s' * (count > 1)})")
+        for kind, (number, count) in first.items()
+    ]
 
 
 def _form(archive: _Archive, number: int, kind: int, nodes: list[int]) -> tuple[str, list[int]] | None:
@@ -415,8 +469,8 @@ def _material(archive: _Archive, number: int, system: int) -> DeckMaterial:
     table = None
     if "EY" in c and c["EY"] != c["EX"]:
         if system:
-            where = f"{name} (orthotropic in the element coordinate system {system}, which is not read)"
-            return DeckMaterial(where, None, _first(c, "DENS"), np.zeros(6))
+            text = f"directions of the element coordinate system {system}, which is not read; give it in body.toml"
+            return DeckMaterial(name, None, _first(c, "DENS"), np.zeros(6), refused=text)
         C: Array = orthotropic_row(name, _orthotropic(name, c))
     else:
         nu = c.get("PRXY") or c.get("NUXY") or {1: 0.3}  # 0.3 is what Ansys assumes

@@ -23,6 +23,7 @@ def joints_of(deck: Deck) -> list[Joint]:
         elif card.keyword == "FRICTION" and card.lines:
             friction[current] = _number(card, card.lines[0])
     known = {name.upper(): name for name, *_ in deck.surfaces}
+    laws = {card.parameters.get("NAME", "").upper() for card, _ in deck.links if card.keyword == "SURFACE INTERACTION"}
     found = []
     for card, space in deck.links:
         for line in card.lines if card.keyword == "CONTACT PAIR" else ():
@@ -32,7 +33,10 @@ def joints_of(deck: Deck) -> list[Joint]:
                 raise Damaged(
                     f"{card.where}: *CONTACT PAIR names '{line[:60]}', which are not two surfaces of the file"
                 )
-            mu = friction.get(card.parameters.get("INTERACTION", "").upper())
+            law = card.parameters.get("INTERACTION", "").upper()
+            if law and law not in laws:
+                raise Damaged(f"{card.where}: *CONTACT PAIR names the interaction '{law}', which is not defined")
+            mu = friction.get(law)
             found.append(Joint(f"{card.where}: *CONTACT PAIR", known[str(keys[0])], known[str(keys[1])], mu))
     return found
 
@@ -54,6 +58,15 @@ def preloads_of(deck: Deck) -> list[tuple[str, float]]:
         if forces:
             found.append((f"{card.where}: *PRE-TENSION SECTION", forces[-1]))
     return found
+
+
+def unpressed(deck: Deck) -> list[str]:
+    """What is said of sections without such a force."""
+    pressed = {where for where, _ in preloads_of(deck)}
+    every = [f"{card.where}: *PRE-TENSION SECTION" for card, _ in deck.links if card.keyword == "PRE-TENSION SECTION"]
+    return [
+        f"{w} has no *CLOAD on its node: its preload is not taken, write it yourself" for w in every if w not in pressed
+    ]
 
 
 def unused_loads(deck: Deck) -> list[str]:

@@ -10,7 +10,7 @@ import numpy as np
 from ..data import Array, AverageLink, Equation, FaceTie, Indices, Link, RigidLink
 from .cards import Card, fields
 from .deck import Deck
-from .raw import Damaged, Numbering, is_number
+from .raw import Damaged, Numbering, is_number, lost
 
 KEYWORDS = (
     "TIE", "EQUATION", "MPC", "KINEMATIC COUPLING", "DISTRIBUTING COUPLING", "COUPLING", "KINEMATIC", "DISTRIBUTING",
@@ -89,7 +89,7 @@ def _where(card: Card) -> str:
 
 def _tie(reading: _Reading, card: Card, space: str, following: Card | None) -> Iterator[Link]:
     if "CYCLIC SYMMETRY" in card.parameters:
-        reading.left_out.append(f"{_where(card)} of cyclic symmetry; write [cyclic] in body.toml")
+        reading.left_out.append(lost(card.where, "*TIE of CYCLIC SYMMETRY (write [cyclic] in body.toml)"))
         return
     text = card.parameters.get("POSITION TOLERANCE", "")
     tolerance = _number(text, "POSITION TOLERANCE") if text else None
@@ -139,9 +139,10 @@ def _mpc(reading: _Reading, card: Card, space: str, following: Card | None) -> I
     for line in card.lines:
         kind, *words = [*fields(line), ""]
         words = [word for word in words if word]
-        if kind.upper() not in ("PIN", "TIE", "BEAM", "LINK") or len(words) < 2:
-            reading.left_out.append(f"{card.where}: *MPC of the kind {kind}")
-            continue
+        if kind.upper() not in ("PIN", "TIE", "BEAM", "LINK"):
+            raise Damaged(f"*MPC of the kind '{kind}' is not read; PIN, TIE, BEAM and LINK are")
+        if len(words) < 2:
+            raise Damaged(f"*MPC {kind} names fewer than two nodes")
         members, other = reading.nodes(words[0], card, space), reading.nodes(words[1], card, space)
         if len(other) not in (1, len(members)):
             raise Damaged(f"*MPC {kind} names {len(members)} and {len(other)} nodes; give one to each, or one to all")
@@ -152,7 +153,7 @@ def _mpc(reading: _Reading, card: Card, space: str, following: Card | None) -> I
 
 def _pair(kind: str, where: str, a: int, b: int, along: Array) -> Iterator[Link]:
     if kind == "BEAM":
-        yield RigidLink(where, b, np.array([a]))
+        yield RigidLink(where, b, np.array([a]), _WAYS)
     elif kind == "LINK":
         if not along.any():
             raise Damaged("*MPC LINK between two nodes at one place has no direction; use PIN")
@@ -168,17 +169,19 @@ def _old_coupling(reading: _Reading, card: Card, space: str, following: Card | N
     reference = reading.node(card.parameters.get("REF NODE", ""), card, space)
     for line in card.lines:
         words = [word.strip() for word in line.split(",")]
-        yield RigidLink(_where(card), reference, reading.nodes(words[0], card, space), _ways([words[1:]])[0])
+        every = _ways([words[1:]])
+        _refuse_turned(reading, every)
+        yield RigidLink(_where(card), reference, reading.nodes(words[0], card, space), every)
     if not card.lines:
         raise Damaged("*KINEMATIC COUPLING couples no nodes to its reference node; add them")
 
 
 def _not_read(reading: _Reading, card: Card, space: str, following: Card | None) -> Iterator[Link]:
-    reading.left_out.append(f"{_where(card)} of elements DCOUP3D; write *COUPLING with *DISTRIBUTING")
+    reading.left_out.append(lost(card.where, "*DISTRIBUTING COUPLING (write *COUPLING with *DISTRIBUTING)"))
     return iter(())
 
 
-def _ways(lines: list[list[str]]) -> tuple[str, str]:
+def _ways(lines: list[list[str]]) -> str:
     """Directions x, y, z and rotations a, b, c of lines (first, last); all without any."""
     found: set[str] = set()
     for words in lines:
@@ -186,8 +189,12 @@ def _ways(lines: list[list[str]]) -> tuple[str, str]:
         if given:
             first = _direction(given[0])
             found |= set(_WAYS[first : _direction(given[-1]) + 1])
-    every = "".join(w for w in _WAYS if w in found) or _WAYS
-    return "".join(w for w in every if w in "xyz"), every
+    return "".join(w for w in _WAYS if w in found) or _WAYS
+
+
+def _refuse_turned(reading: _Reading, every: str) -> None:
+    if reading.deck.turned and every not in ("xyz", "xyzabc", "abc"):
+        raise Damaged("a coupling in single directions beside a *TRANSFORM may mean local ones; write global ones")
 
 
 def _coupling(reading: _Reading, card: Card, space: str, following: Card | None) -> Iterator[Link]:
@@ -196,16 +203,29 @@ def _coupling(reading: _Reading, card: Card, space: str, following: Card | None)
     if "INFLUENCE RADIUS" in card.parameters:
         raise Damaged("*COUPLING with INFLUENCE RADIUS is not read; name a surface of the nodes that it takes in")
     reference = reading.node(card.parameters.get("REF NODE", ""), card, space)
-    members = reading.surface(card.parameters.get("SURFACE", ""), card, space)
-    moves, every = _ways([[word.strip() for word in line.split(",")] for line in following.lines])
-    if "ORIENTATION" in card.parameters and (len(moves) < 3 or len(every) < 6):
+    members, weights = _weighed(reading, card, reading.surface(card.parameters.get("SURFACE", ""), card, space))
+    every = _ways([[word.strip() for word in line.split(",")] for line in following.lines])
+    if "ORIENTATION" in card.parameters and len(every) < 6:
         raise Damaged("*COUPLING in single directions of an ORIENTATION is not read; write *EQUATIONs")
+    _refuse_turned(reading, every)
     if following.keyword == "KINEMATIC":
-        yield RigidLink(_where(card), reference, members, moves)
+        yield RigidLink(_where(card), reference, members, every)
         return
     if following.parameters.get("WEIGHTING METHOD", "UNIFORM").upper() != "UNIFORM":
         raise Damaged("*DISTRIBUTING is read with WEIGHTING METHOD=UNIFORM alone")
-    yield AverageLink(_where(card), reference, members, np.ones(1), every)
+    yield AverageLink(_where(card), reference, members, weights, every)
+
+
+def _weighed(reading: _Reading, card: Card, surface: str) -> tuple[Indices | str, Array | None]:
+    """By the areas of a surface of facets, by the numbers that a surface of nodes has beside them (1 if none)."""
+    _, kind, rows, space, _ = next(s for s in reading.deck.surfaces if s[0] == surface)
+    if kind != "NODE":
+        return surface, None
+    weights: dict[int, float] = {}
+    for name, weight in ([*row, ""][:2] for row in rows):
+        number = _number(weight, f"a weight of the surface '{surface}'") if weight else 1.0
+        weights.update(dict.fromkeys(reading.nodes(name, card, space).tolist(), number))
+    return np.array(list(weights), dtype=np.int64), np.array(list(weights.values()))
 
 
 def _nothing(reading: _Reading, card: Card, space: str, following: Card | None) -> Iterator[Link]:
@@ -223,7 +243,12 @@ def _rigid_body(reading: _Reading, card: Card, space: str, following: Card | Non
             members.append(np.unique(cells.nodes[np.isin(cells.ids, chosen)]))
     every = np.unique(np.concatenate([np.zeros(0, dtype=np.int64), *members]))
     reference = reading.node(card.parameters.get("REF NODE", ""), card, space)
-    yield RigidLink(_where(card), reference, every[every != reference])
+    pinned = set() if "PIN NSET" not in card.parameters else {*reading.nodes(card.parameters["PIN NSET"], card, space)}
+    tied = np.array([node for node in every if node != reference and node not in pinned], dtype=np.int64)
+    if len(tied) or not pinned:
+        yield RigidLink(_where(card), reference, tied, _WAYS)
+    if pinned:
+        yield RigidLink(_where(card), reference, np.array(sorted(pinned), dtype=np.int64))
     if "ROT NODE" in card.parameters:
         turns = reading.node(card.parameters["ROT NODE"], card, space)
         for way in range(3):

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from ..data import Array, Indices, Mesh
+from ..data import Array, FaceTie, Indices, Mesh
 from ..topology import CELL_TYPES, FACET_CORNERS
 
 _FIRST_ORDER = {"tetra", "hexahedron", "wedge", "pyramid"}
@@ -26,9 +26,9 @@ def mesh_problems(mesh: Mesh) -> tuple[list[str], list[str]]:
     """Look for what would spoil a solution: (errors, warnings), each a sentence without the file's name.
 
     Errors: coincident points, repeated points in a cell, inside-out cells (by their corners; curved cells are
-    examined at the quadrature points when they are assembled). Warnings: a file without its end, first-order cells,
-    sets of facets that cannot serve as faces, parts that share no points (`modes.unconstrained` refuses those that
-    nothing holds).
+    examined at the quadrature points when they are assembled). Warnings: a file without its end, what of it is not
+    read, first-order cells, sets of facets that cannot serve as faces, parts that share no points
+    (`modes.unconstrained` refuses those that nothing holds).
     """
     errors, warnings = [], []
     for cell_type, cells in mesh.cells.items():
@@ -57,6 +57,7 @@ def mesh_problems(mesh: Mesh) -> tuple[list[str], list[str]]:
             )
     if mesh.unended:
         warnings.append(f"the file has {mesh.unended}, so it may be cut; write it again, or add that if it is whole")
+    warnings += mesh.lost
     warnings += [
         f"{inside} of {count} facets of the set '{name}' are not on the surface of the volume mesh; it is no face"
         for name, (inside, count) in mesh.inner.items()
@@ -64,6 +65,7 @@ def mesh_problems(mesh: Mesh) -> tuple[list[str], list[str]]:
     size = np.ptp(mesh.points, axis=0).max()
     pairs = cKDTree(mesh.points).query_pairs(1e-9 * size, output_type="ndarray")
     pairs = pairs[~np.isin(pairs, _hanging(mesh)).any(axis=1)]
+    pairs = pairs[~_meant(mesh, pairs)]
     parts = part_numbers(mesh, tied=True)
     if not errors and (overlapping := _overlapping(mesh)):
         errors.append(f"{overlapping} facets belong to more than two cells, so cells overlap; remesh")
@@ -136,6 +138,20 @@ def _hanging(mesh: Mesh) -> Indices:
         return np.zeros(0, dtype=np.int64)
     given = mesh.ties.dependent
     return np.unique(given[(given >= 0) & (given < 3 * mesh.n_points)] // 3)
+
+
+def _meant(mesh: Mesh, pairs: Indices) -> NDArray[np.bool_]:
+    """(p,) pairs of points that the file keeps apart: of two instances, of faces that it ties or lets touch."""
+    of = np.full(mesh.n_points, -1)
+    for number, points in enumerate(mesh.instances.values()):
+        of[points] = number
+    apart = (of[pairs] >= 0).all(axis=1) & (of[pairs[:, 0]] != of[pairs[:, 1]])
+    ties = [item for item in (mesh.links.items if mesh.links else ()) if isinstance(item, FaceTie)]
+    for names in [(tie.slave, tie.master) for tie in ties] + [(j.slave, j.master) for j in mesh.joints]:
+        if {*names} <= {*mesh.faces, *mesh.point_sets}:
+            one, other = (np.isin(pairs, mesh.set_points(name)) for name in names)
+            apart |= (one & other[:, ::-1]).any(axis=1)
+    return apart
 
 
 def longest_over_shortest(mesh: Mesh) -> float:

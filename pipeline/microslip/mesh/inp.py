@@ -16,15 +16,16 @@ import numpy as np
 
 from ..data import Array, Indices
 from ..elasticity import turned, turned_strain
+from ..frames import rotation
 from .cards import Card, data_of, fields, read_cards
 from .deck import Cells, Deck, DeckConstants
 from .deck_joints import KEYWORDS as JOINTS
-from .deck_joints import joints_of, preloads_of, unused_loads
+from .deck_joints import joints_of, preloads_of, unpressed, unused_loads
 from .deck_links import KEYWORDS as LINKS
 from .deck_links import links_of
 from .instances import local_system, numbered, outline, place, placement, places
 from .materials import isotropic_rows, orthotropic_row
-from .raw import Damaged, DeckMaterial, Numbering, RawMesh, joined, refuse_twice
+from .raw import Damaged, DeckMaterial, Numbering, RawMesh, joined, lost, refuse_twice
 from .supports import Constraints, add_supports
 
 _SOLIDS = {
@@ -120,6 +121,8 @@ def _part(path: Path, parts: dict[str, list[Card]], instance: Card, own: list[Ca
     name = instance.parameters.get("PART", "")
     if "LIBRARY" in instance.parameters or name.upper() not in {*parts, ""}:
         raise Damaged(f"{instance.where}: *INSTANCE names the part '{name}', which the file does not define")
+    if not name and not any(card.keyword == "NODE" for card in own):
+        raise Damaged(f"{instance.where}: the *INSTANCE names no PART and has no nodes of its own")
     deck = Deck()
     _read(path, deck, [*parts.get(name.upper(), ()), *own])
     return deck
@@ -135,10 +138,16 @@ def _read(path: Path, deck: Deck, cards: list[Card]) -> None:
         if card.keyword in (*LINKS, *JOINTS):
             deck.links.append((card, ""))
         if card.keyword not in _READERS:
-            if card.keyword not in (*_SILENT, *LINKS, *JOINTS):
+            if _COUNTS.fullmatch(card.keyword):
+                deck.lost.append(lost(card.where, f"*{card.keyword}"))
+            elif card.keyword not in (*_SILENT, *LINKS, *JOINTS):
                 deck.ignored.append(card.keyword)
             continue
+        deck.where = card.where
         _told(card, lambda c: _READERS[c.keyword](deck, c.parameters, c.lines))
+        kind = card.parameters.get("TYPE", "").upper()
+        if card.keyword == "ELEMENT" and card.lines and not _cell_type(kind) and kind != "DCOUP3D":
+            deck.lost.append(lost(card.where, f"*ELEMENT, TYPE={kind}"))
 
 
 def _told(card: Card, work: Callable[[Card], Any]) -> Any:
@@ -191,10 +200,17 @@ def _read_system(deck: Deck, parameters: dict[str, str], lines: list[str]) -> No
     deck.system = local_system(_table(lines, "*SYSTEM"))
 
 
+def _cell_type(kind: str) -> re.Match[str] | None:
+    """Family and number of nodes of a solid or a facet; None of other elements."""
+    return re.match(r"(D?C3D|AC3D|CPS|CPE|CAX|M3D|SFM3D|R3D|STRI|DS|S|DC2D)(\d+)", kind)
+
+
 def _read_elements(deck: Deck, parameters: dict[str, str], lines: list[str]) -> None:
     kind = parameters.get("TYPE", "").upper()
-    match = re.match(r"(D?C3D|AC3D|CPS|CPE|CAX|M3D|SFM3D|R3D|STRI|DS|S|DC2D)(\d+)", kind)
+    match = _cell_type(kind)
+    deck.kinds.append(kind)
     if match is None:
+        deck.add(deck.cell_sets, parameters.get("ELSET", ""))
         return  # beams, springs, masses and the like
     solid = match[1] in ("C3D", "DC3D", "AC3D")
     count = 6 if match[0] == "STRI65" else int(match[2])
@@ -241,7 +257,9 @@ def _read_set(
         for word in words:
             if not word.isdecimal():
                 found = deck.cells(word, space) if of_cells else deck.nodes(word, space)
-                members += [] if found is None else [found]
+                if found is None:
+                    raise Damaged(f"{what} names the set '{word}', which is not defined")
+                members.append(found)
 
 
 def _generated(words: list[str], known: Indices, what: str) -> Indices:
@@ -258,7 +276,10 @@ def _read_surface(deck: Deck, parameters: dict[str, str], lines: list[str]) -> N
     if name:
         kind = parameters.get("COMBINE", kind).upper()
         rows = [words for line in lines if (words := [w.strip() for w in line.split(",")]) and any(words)]
-        deck.surfaces.append((name, kind, rows, ""))
+        for row in rows if kind == "ELEMENT" else ():
+            if not re.fullmatch("|S[1-6]|SPOS|SNEG|E[1-4]|END[12]|EDGE", (side := [*row, ""][1]).upper()):
+                raise Damaged(f"*SURFACE, NAME={name} names the side '{side}', which no cell has")
+        deck.surfaces.append((name, kind, rows, "", deck.where))
         deck.written.setdefault(name.upper(), name)
 
 
@@ -329,7 +350,7 @@ def _read_expansion(deck: Deck, parameters: dict[str, str], lines: list[str]) ->
 def _read_section(deck: Deck, parameters: dict[str, str], lines: list[str]) -> None:
     keys = ("ELSET", "MATERIAL", "ORIENTATION")
     words = [parameters.get(key, "") for key in keys]
-    deck.sections.append((words[0], words[1], words[2], ""))
+    deck.sections.append((words[0], words[1], words[2], "", deck.where))
 
 
 def _read_orientation(deck: Deck, parameters: dict[str, str], lines: list[str]) -> None:
@@ -339,9 +360,6 @@ def _read_orientation(deck: Deck, parameters: dict[str, str], lines: list[str]) 
         deck.orientations[key] = f"*ORIENTATION, NAME={name} of the system {system}"
         return
     rows = _table(lines, f"*ORIENTATION, NAME={name}")
-    if len(rows) > 1 and len(rows[1]) > 1 and rows[1][1]:
-        deck.orientations[key] = f"*ORIENTATION, NAME={name} with an additional rotation"
-        return
     if not rows or len(rows[0]) not in (6, 9):
         raise Damaged(f"*ORIENTATION, NAME={name} needs the six coordinates of two points")
     origin = np.array(rows[0][6:9]) if len(rows[0]) == 9 else np.zeros(3)
@@ -350,7 +368,12 @@ def _read_orientation(deck: Deck, parameters: dict[str, str], lines: list[str]) 
     if not np.linalg.norm(normal) > 1e-9 * np.linalg.norm(a) * np.linalg.norm(b):
         raise Damaged(f"the points of *ORIENTATION, NAME={name} lie on a line")
     x, z = a / np.linalg.norm(a), normal / np.linalg.norm(normal)
-    deck.orientations[key] = np.array([x, np.cross(z, x), z])
+    axes = np.array([x, np.cross(z, x), z])
+    if len(rows) > 1 and len(rows[1]) > 1 and rows[1][1]:
+        if rows[1][0] not in (1, 2, 3):
+            raise Damaged(f"*ORIENTATION, NAME={name} turns about the axis {rows[1][0]:g}, which is none of 1, 2, 3")
+        axes = axes @ rotation(axes[int(rows[1][0]) - 1], np.radians(rows[1][1])).T
+    deck.orientations[key] = axes
 
 
 def _read_temperature(deck: Deck, parameters: dict[str, str], lines: list[str], column: int = 1) -> None:
@@ -389,7 +412,7 @@ def _read_boundary(deck: Deck, parameters: dict[str, str], lines: list[str]) -> 
         words = [word.strip() for word in line.split(",")] + 3 * [""]
         try:
             directions = _HELD.get(words[1].upper()) or _zeros(words)
-            deck.held.append((words[0].strip('"'), directions))
+            deck.held.append((words[0].strip('"'), directions, deck.where))
         except ValueError:
             deck.not_held.append(f"the line '{line[:60]}' of *BOUNDARY")
 
@@ -413,6 +436,14 @@ _SILENT = {
     "INSTANCE", "END INSTANCE", "STATIC", "FREQUENCY", "INCLUDE", "MONITOR", "SECTION PRINT", "CONTACT FILE",
 }  # fmt: skip
 """Keywords that say nothing of the body."""
+
+_COUNTS = re.compile(
+    "MASS|ROTARY INERTIA|NONSTRUCTURAL MASS|SPRING|DASHPOT|GAP|JOINT|CONNECTOR [A-Z]+|EMBEDDED ELEMENT|"
+    "SHELL TO SOLID COUPLING|FASTENER|MATRIX (INPUT|ASSEMBLE)|SUBSTRUCTURE [A-Z]+|USER ELEMENT|UEL PROPERTY|"
+    "CONTACT|COHESIVE BEHAVIOR|CYCLIC SYMMETRY MODEL|HYPERELASTIC|HYPERFOAM|MODEL CHANGE|FOUNDATION|"
+    "(BEAM|BEAM GENERAL|SHELL|SHELL GENERAL|MEMBRANE|FRAME|COHESIVE|GASKET|CONNECTOR) SECTION"
+)
+"""Keywords that add mass, stiffness or constraints and are not read."""
 
 _READERS: dict[str, Callable[[Deck, dict[str, str], list[str]], None]] = {
     "SYSTEM": _read_system,
@@ -444,6 +475,9 @@ def _assembled(deck: Deck) -> RawMesh:
     node_id, points = _unique_nodes(np.concatenate(deck.node_id), np.concatenate(deck.points))
     numbering = Numbering(node_id)
     raw = RawMesh(points, node_id)
+    if deck.kinds and not deck.solids:
+        kinds = ", ".join(dict.fromkeys(deck.kinds))
+        raise Damaged(f"it holds no volume cells (C3D4 to C3D27), only {kinds}; mesh the volume first")
     for cells in deck.solids:
         cells.nodes = numbering.positions(cells.nodes, "*ELEMENT names")
         raw.blocks.append((cells.kind, cells.nodes))
@@ -457,9 +491,9 @@ def _assembled(deck: Deck) -> RawMesh:
             name = deck.written[key]
             raw.add_points(name, numbering.positions(members, f"the node set '{name}' names"))
     raw.links, left_out = links_of(deck, numbering, points)
+    raw.lost = [*deck.lost, *left_out, *unpressed(deck)]
     raw.joints, raw.preloads = joints_of(deck), preloads_of(deck)
     raw.instances = {name: numbering.positions(np.unique(ids), "") for name, ids in deck.instances.items()}
-    deck.not_held += left_out
     add_supports(raw, _constraints(deck), numbering)
     for cells in deck.facets:
         cells.nodes = numbering.positions(cells.nodes[:, : _CORNERS[cells.nodes.shape[1]]], "*ELEMENT names")
@@ -468,13 +502,13 @@ def _assembled(deck: Deck) -> RawMesh:
         for cells in deck.facets:
             if (inside := np.isin(cells.ids, chosen)).any():
                 raw.facets.setdefault(deck.written[key], []).append(cells.nodes[inside])
-    for name, kind, rows, space in deck.surfaces:
+    for name, kind, rows, space, where in deck.surfaces:
         if kind == "NODE":
-            _node_surface(deck, raw, numbering, name, rows, space)
+            _node_surface(deck, raw, numbering, name, rows, space, where)
         elif kind == "ELEMENT":
-            _element_surface(deck, raw, name, rows, space)
+            _element_surface(deck, raw, name, rows, space, where)
         elif kind in ("UNION", "INTERSECTION", "DIFFERENCE"):
-            _combined(raw, deck, name, kind, [word for row in rows for word in row if word])
+            _combined(raw, deck, name, kind, [word for row in rows for word in row if word], where)
     return raw
 
 
@@ -494,13 +528,16 @@ def _assign_materials(deck: Deck, raw: RawMesh) -> None:
         return
     raw.regions = [np.full(len(cells.ids), -1) for cells in deck.solids]
     known: dict[tuple[str, str], int] = {}
-    for name_of_set, material, orientation, space in deck.sections:
+    for name_of_set, material, orientation, space, where in deck.sections:
         if material.upper() not in deck.materials:
-            raise Damaged(f"*SOLID SECTION, ELSET={name_of_set} names the material '{material}', which is not defined")
+            raise Damaged(
+                f"{where}: *SOLID SECTION, ELSET={name_of_set} names the material '{material}', which is not defined"
+            )
         axes = deck.key(deck.orientations, orientation, space) if orientation else ""
         if axes is None:
             raise Damaged(
-                f"*SOLID SECTION, ELSET={name_of_set} names the orientation '{orientation}', which is not defined"
+                f"{where}: *SOLID SECTION, ELSET={name_of_set} names the orientation '{orientation}', which is not "
+                "defined"
             )
         key = (material.upper(), axes)
         if key not in known:
@@ -508,7 +545,7 @@ def _assign_materials(deck: Deck, raw: RawMesh) -> None:
             raw.materials.append(_deck_material(deck, key, name_of_set))
         chosen = deck.cells(name_of_set, space)
         if chosen is None:
-            raise Damaged(f"*SOLID SECTION names the element set '{name_of_set}', which is not defined")
+            raise Damaged(f"{where}: *SOLID SECTION names the element set '{name_of_set}', which is not defined")
         for cells, region in zip(deck.solids, raw.regions, strict=True):
             region[np.isin(cells.ids, chosen)] = known[key]
     bare = [cells.ids[region < 0] for cells, region in zip(deck.solids, raw.regions, strict=True)]
@@ -524,8 +561,8 @@ def _deck_material(deck: Deck, key: tuple[str, str], where: str) -> DeckMaterial
     turn = deck.orientations[key[1]] if key[1] else None
     axes = None if isinstance(turn, str) else turn
     if refused := found.refused or (turn if isinstance(turn, str) else ""):
-        name = f"{found.name} ({refused}, which is not read)"
-        return DeckMaterial(name, None, found.density, np.zeros(6), None, where)
+        text = f"{refused}, which is not read; write another form, or give density and stiffness in a body.toml"
+        return DeckMaterial(found.name, None, found.density, np.zeros(6), None, where, text)
     C, table = None, None
     if found.isotropic is not None:
         C, table = isotropic_rows(found.name, found.isotropic)
@@ -563,28 +600,38 @@ def _assign_temperatures(deck: Deck, raw: RawMesh, numbering: Numbering) -> None
 def _constraints(deck: Deck) -> Constraints:
     """What *BOUNDARY holds, its sets by the names they were written with."""
     held = Constraints(all_turned=deck.turned, left_out=list(deck.not_held))
-    for word, directions in deck.held:
+    known = set(joined(deck.node_id).tolist())
+    for word, directions, where in deck.held:
         key, found = deck.key(deck.node_sets, word), deck.nodes(word)
         if found is None:
-            held.left_out.append(f"*BOUNDARY names the node set '{word}', which is not defined")
-        elif key is not None:
+            raise Damaged(f"{where}: *BOUNDARY names the node set '{word}', which is not defined")
+        if not known.issuperset(found.tolist()):
+            raise Damaged(f"{where}: *BOUNDARY names the node {word}, which is not defined")
+        if key is not None:
             held.hold(deck.written[key], directions)
         else:
             held.hold(int(found[0]), directions)
     return held
 
 
-def _node_surface(deck: Deck, raw: RawMesh, numbering: Numbering, name: str, rows: list[list[str]], space: str) -> None:
+def _node_surface(
+    deck: Deck, raw: RawMesh, numbering: Numbering, name: str, rows: list[list[str]], space: str, where: str
+) -> None:
     for row in rows:
-        if (found := deck.nodes(row[0], space)) is not None:
+        found = deck.nodes(row[0], space)
+        if found is None:
+            raise Damaged(f"{where}: the surface '{name}' names the node set '{row[0]}', which is not defined")
+        if len(found):
             raw.add_points(name, numbering.positions(found, f"the surface '{name}' names"))
 
 
-def _combined(raw: RawMesh, deck: Deck, name: str, way: str, words: list[str]) -> None:
+def _combined(raw: RawMesh, deck: Deck, name: str, way: str, words: list[str], where: str) -> None:
     """A surface of others: all of their facets, those that they have in common, or those of the first alone."""
     parts = []
     for word in words:
         at, tail = deck.place(word)
+        if not {at.prefix + tail, tail} & {known for known, *_ in deck.surfaces}:
+            raise Damaged(f"{where}: the surface '{name}' names the surface '{word}', which is not defined")
         parts.append(raw.facets.get(at.prefix + tail) or raw.facets.get(tail) or [])
     if way == "UNION":
         raw.facets[name] = [block for part in parts for block in part]
@@ -595,20 +642,22 @@ def _combined(raw: RawMesh, deck: Deck, name: str, way: str, words: list[str]) -
         raw.facets.setdefault(name, []).append(block[inside if way == "INTERSECTION" else ~inside])
 
 
-def _element_surface(deck: Deck, raw: RawMesh, name: str, rows: list[list[str]], space: str) -> None:
+def _element_surface(deck: Deck, raw: RawMesh, name: str, rows: list[list[str]], space: str, where: str) -> None:
     """Faces S1 ... S6 of cells given by number or set; without a face the free ones."""
     for row in rows:
         everything = joined(c.ids for c in (*deck.solids, *deck.facets))
         chosen = deck.cells(row[0], space) if row[0] else everything
         face = row[1].upper() if len(row) > 1 else ""
         if chosen is None:
-            continue
+            raise Damaged(f"{where}: the surface '{name}' names the element set '{row[0]}', which is not defined")
         for cells in deck.solids:
             nodes = cells.nodes[np.isin(cells.ids, chosen)]
             sides = _sides(cells.kind)
             if not len(nodes) or not sides:
                 continue
-            if re.fullmatch(r"S[1-6]", face) and int(face[1]) <= len(sides):
+            if re.fullmatch(r"S[1-6]", face):
+                if int(face[1]) > len(sides):
+                    raise Damaged(f"{where}: the surface '{name}' names the side {face} of cells {cells.written}")
                 raw.facets.setdefault(name, []).append(nodes[:, list(sides[int(face[1]) - 1])])
             elif not face:
                 for corners in sorted({len(side) for side in sides}):

@@ -26,17 +26,19 @@ class Outline:
 
 
 def outline(cards: list[Card]) -> Outline:
-    """The cards of parts, of instances and of everything else; a deck without instances is all rest.
+    """The cards of parts, of instances and of everything else; a deck without parts and instances is all rest.
 
     Raises:
         Damaged: two parts or instances of one name, an end without a beginning.
     """
-    if not any(card.keyword == "INSTANCE" for card in cards):
+    if not any(card.keyword in ("PART", "INSTANCE") for card in cards):
         return Outline(rest=cards)
     found, into = Outline(), None
     names: set[str] = set()
+    opened: list[Card] = []
     for card in cards:
         name = card.parameters.get("NAME", "").upper()
+        _nested(card, opened)
         if card.keyword == "PART":
             if name in found.parts:
                 raise Damaged(f"{card.where}: the *PART '{card.parameters['NAME']}' is there twice")
@@ -55,7 +57,33 @@ def outline(cards: list[Card]) -> Outline:
             found.rest.append(card)
         else:
             into.append(card)
+    _nested(Card("STEP", where="the end"), opened)
+    if not found.instances:
+        return Outline(rest=cards)
     return found
+
+
+_INSIDE = {"PART": "", "ASSEMBLY": "", "STEP": "", "INSTANCE": "ASSEMBLY"}
+
+
+def _nested(card: Card, opened: list[Card]) -> None:
+    """Keep what is open (part, assembly, instance) in mind.
+
+    Raises:
+        Damaged: something begins before another one has ended, or ends without a beginning.
+    """
+    begins, last = card.keyword in _INSIDE, opened[-1] if opened else None
+    if card.keyword.startswith("END ") and card.keyword[4:] in _INSIDE and card.keyword != "END STEP":
+        if last is None or last.keyword != card.keyword[4:]:
+            told = f"; the *{last.keyword} of {last.where} has no *END {last.keyword}" if last else ""
+            raise Damaged(f"{card.where}: *{card.keyword} without a beginning{told}")
+        opened.pop()
+    elif begins and last is not None and last.keyword != _INSIDE[card.keyword]:
+        raise Damaged(f"{last.where}: the *{last.keyword} has no *END {last.keyword} before {card.where}; add it")
+    elif begins and last is None and _INSIDE[card.keyword]:
+        raise Damaged(f"{card.where}: the *{card.keyword} stands outside of an *{_INSIDE[card.keyword]}")
+    elif begins and card.keyword != "STEP":
+        opened.append(card)
 
 
 @dataclass(frozen=True)
@@ -74,6 +102,8 @@ def placement(lines: list[list[float]]) -> Placement:
     """
     if len(lines) > 2 or (lines and len(lines[0]) > 3) or (len(lines) == 2 and len(lines[1]) != 7):
         raise Damaged("*INSTANCE needs a line of three numbers, then perhaps one of two points and an angle")
+    if not np.isfinite([value for line in lines for value in line]).all():
+        raise Damaged("*INSTANCE holds a number that is not finite")
     shift = np.array([*lines[0], 0.0, 0.0, 0.0][:3]) if lines else np.zeros(3)
     if len(lines) < 2:
         return Placement(np.eye(3), shift)
@@ -90,7 +120,7 @@ def local_system(rows: list[list[float]]) -> Array | None:
     Raises:
         Damaged: points on a line.
     """
-    if not rows or not any(rows[0]):
+    if not rows or (len(rows[0]) <= 3 and not any(rows[0])):
         return None
     first = [*rows[0], *[0.0] * 6][:6]
     origin, x = np.array(first[:3]), np.array(first[3:])
@@ -142,7 +172,13 @@ def place(whole: Deck, part: Deck, name: str, at: Placement, space: Space) -> No
     for word, axes in part.orientations.items():
         turned = axes if isinstance(axes, str) else axes @ at.turn.T
         whole.orientations[space.prefix.upper() + word] = turned
-    whole.sections += [(*section[:3], key) for section in part.sections]
-    whole.surfaces += [(space.prefix + surface[0], *surface[1:3], key) for surface in part.surfaces]
+    whole.sections += [(*section[:3], key, section[4]) for section in part.sections]
+    whole.surfaces += [(space.prefix + s[0], *s[1:3], key, s[4]) for s in part.surfaces]
     whole.links += [(card, key) for card, _ in part.links]
     whole.ignored += part.ignored
+    whole.kinds += part.kinds
+    whole.lost += [text for text in part.lost if text not in whole.lost]
+    whole.held += [(f"{name}.{word}", directions, where) for word, directions, where in part.held]
+    whole.temperatures += [(column, f"{name}.{word}", value) for column, word, value in part.temperatures]
+    whole.not_held += part.not_held
+    whole.turned |= part.turned

@@ -26,6 +26,7 @@ def renumbered(raw: RawMesh, points: Array, number: Indices, metres: float) -> L
         return None
     found = _References(raw, number)
     items = [item for link in raw.links for item in found.of(link, metres)]
+    found.refuse_chains()
     at = np.array(list(found.known), dtype=np.int64)
     sets = {name: np.flatnonzero(np.isin(at, s) & (number[at] < 0)) for name, s in raw.point_sets.items()}
     return Links(tuple(items), points[at], raw.node_id[at], {name: s for name, s in sets.items() if len(s)})
@@ -55,6 +56,17 @@ class _References:
         one = np.array([1.0, -1.0])
         return [*(Equation(f"{link.where}, reference", pair, np.array([w, w]), one) for w in range(3)), made]
 
+    def refuse_chains(self) -> None:
+        """Raises `Damaged` if a node of cells follows a node and leads others, which would take its rotations."""
+        for link in self.raw.links:
+            if isinstance(link, RigidLink) and not isinstance(link.members, str) and set(link.directions) & set("abc"):
+                for node in link.members[self.number[link.members] >= 0]:
+                    if int(node) in self.known and node != link.reference:
+                        raise Damaged(
+                            f"{link.where} moves node {self.raw.node_id[node]}, which leads others and belongs to "
+                            "solid cells; let these others follow the first node themselves"
+                        )
+
     def _reference(self, position: int) -> int:
         return int(self.number.max()) + 1 + self.known.setdefault(position, len(self.known))
 
@@ -72,5 +84,8 @@ class _References:
         if isinstance(link.members, str):
             return link.members
         there = self.number[link.members] >= 0
-        others = [self._reference(int(p)) for p in link.members[~there] if isinstance(link, RigidLink)]
+        if isinstance(link, AverageLink) and not there.all():
+            loose = self.raw.node_id[link.members[~there][0]]
+            raise Damaged(f"{link.where} takes in node {loose}, which no solid cell uses; name nodes of cells")
+        others = [self._reference(int(p)) for p in link.members[~there]]
         return np.concatenate([self.number[link.members[there]], np.array(others, dtype=np.int64)])

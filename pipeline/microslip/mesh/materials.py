@@ -7,7 +7,7 @@ import numpy as np
 from ..data import Array, Material
 from ..elasticity import isotropic, orthotropic
 from ..units import density, stress
-from .raw import Damaged, DeckMaterial
+from .raw import Damaged, DeckMaterial, Unread
 
 _SAME = 1e-6
 
@@ -53,11 +53,13 @@ def in_si(found: DeckMaterial, system: str, zero: float = 0.0) -> Material:
         system: of units, a key of `units.SYSTEMS`. zero: K of the file's temperature 0.
 
     Raises:
-        Damaged: it is incomplete.
+        Damaged: it is incomplete. Unread: it is of another kind.
     """
     at = f" of the cells '{found.where}'" if found.where else ""
     if not found.name:
         raise Damaged(f"the cells '{found.where}' have no material" if found.where else "cells have no material")
+    if found.refused:
+        raise Unread(f"the material '{found.name}'{at} has {found.refused}")
     if found.elasticity is None:
         raise Damaged(f"the material '{found.name}'{at} has no elastic constants that are read (iso- or orthotropic)")
     if found.density is None:

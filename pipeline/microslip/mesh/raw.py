@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import numpy as np
 
@@ -21,6 +22,10 @@ class Damaged(ValueError):
     """A mesh file that contradicts itself or ends too early. The text says how, without the file's name."""
 
 
+class Unread(Damaged):
+    """A material of a kind that is not read. Another one in its place would be wrong."""
+
+
 @dataclass(frozen=True)
 class DeckMaterial:
     """A material as a file writes it, in the file's units.
@@ -28,7 +33,8 @@ class DeckMaterial:
     Attributes:
         name: as in the file. elasticity: (6, 6) Hooke matrix in the order `VOIGT`, in body axes; None: missing.
         density: None: missing. expansion: (6,) thermal strain per degree. temperature: (t, 2) temperature and factor on
-            the elasticity, or None. where: the set of cells that it was given to.
+            the elasticity, or None. where: the set of cells that it was given to. refused: what of it is not read, in
+            words, and what to do.
     """
 
     name: str
@@ -37,6 +43,7 @@ class DeckMaterial:
     expansion: Array
     temperature: Array | None = None
     where: str = ""
+    refused: str = ""
 
 
 @dataclass
@@ -55,6 +62,7 @@ class RawMesh:
         supports: point set -> directions out of x, y, z held at zero. not_held: constraints not read, in words.
         links: constraints between nodes, by positions in `points`, tolerances in the file's unit.
         unended: what the file lacks at its end, in words: it may be cut there. Nothing if it tells that it is whole.
+        lost: what carries mass, stiffness or a constraint and is not read, in words.
         remarks: what was read as something else or not used, in words. instances: name -> positions. joints: pairs of
             faces in contact. preloads: of bolts: where it stands, force in the file's unit.
     """
@@ -72,6 +80,7 @@ class RawMesh:
     not_held: list[str] = field(default_factory=list)
     links: list[Link] = field(default_factory=list)
     unended: str = ""
+    lost: list[str] = field(default_factory=list)
     remarks: list[str] = field(default_factory=list)
     instances: dict[str, Indices] = field(default_factory=dict)
     joints: list[Joint] = field(default_factory=list)
@@ -96,6 +105,16 @@ class RawMesh:
             self.cell_id.append(ids)
             self.regions.append(regions)
         refuse_twice(self.cell_id, "element")
+
+
+def in_file(path: Path, text: str) -> str:
+    """A sentence about a file, with its name once: ``deck/a.inp, line 3: ...`` of ``a.inp, line 3: ...``."""
+    return f"{path}{text.removeprefix(path.name)}" if text.startswith(f"{path.name}, ") else f"{path}: {text}"
+
+
+def lost(where: str, what: str) -> str:
+    """What is said of something that is not read although it counts; `where`: file and line."""
+    return f"{where}: {what} is not read: the mass, stiffness or constraint is missing, so frequencies will differ"
 
 
 def joined(parts: Iterable[Indices]) -> Indices:

@@ -28,7 +28,7 @@ from .linking import renumbered
 from .materials import in_si
 from .med import read_med
 from .msh import is_msh41, read_msh41
-from .raw import NODES, Damaged, RawMesh
+from .raw import NODES, Damaged, RawMesh, in_file
 from .surface import boundary_facets, faces_from_points, match_facets
 from .unv import read_unv
 
@@ -67,9 +67,15 @@ def read_mesh(path: Path | str, unit: str, system: str | None = None, zero: floa
         mesh = _mesh_of(raw, UNITS[unit], path)
         return replace(mesh, materials=materials, regions=mesh.regions if materials else {})
     except Damaged as error:
-        raise UserError(f"{path}: is damaged or cannot be used ({error}); write it again") from error
+        raise UserError(_refused(path, str(error))) from error
     except OSError as error:
         raise UserError(f"{path}: cannot be read ({error.strerror}); correct the path") from error
+
+
+def _refused(path: Path, text: str) -> str:
+    """What is wrong with a file, its name once before the line, and what to do."""
+    told = text if text.startswith(f"{path.name}, ") else f"cannot be used: {text}"
+    return in_file(path, told) + ("" if "; " in text else "; correct it or write it again")
 
 
 _READERS: dict[str, Callable[[Path], RawMesh]] = {
@@ -259,7 +265,8 @@ def _assemble_mesh(raw: RawMesh, points: Array, cells: dict[str, Indices], metre
     supports = {n: directions for n, directions in raw.supports.items() if n in known}
     return replace(
         mesh, faces=faces, inner=inner, supports=supports, not_held=tuple(raw.not_held), unended=raw.unended,
-        links=links, remarks=tuple(raw.remarks), joints=tuple(raw.joints), preloads=tuple(raw.preloads),
+        links=links, lost=tuple(raw.lost), remarks=tuple(raw.remarks), joints=tuple(raw.joints),
+        preloads=tuple(raw.preloads),
         instances={n: kept for n, s in raw.instances.items() if len(kept := _kept(renumber[s]))},
     )  # fmt: skip
 

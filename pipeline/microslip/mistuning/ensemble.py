@@ -87,9 +87,7 @@ class Ensemble:
             told.append(f"the tuned ring may be {_missed(top.missed)}")
         ends, off = int(np.nansum(self.column("at_end"))), self.column("missed") > UNSURE
         if ends:
-            told.append(
-                f"in {counted(ends, 'sample')} the highest is at an end of the band; widen the sweep."
-            )
+            told.append(f"in {counted(ends, 'sample')} the highest is at an end of the band; widen the sweep.")
         if off.any():
             most = float(self.column("missed")[off].max())
             told.append(f"{counted(int(off.sum()), 'sample')} may be {_missed(most)}")

@@ -14,6 +14,7 @@ from .plots import COLOURS, empty_figure, plain_axes, save_figure, single_panel
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+
 def diagram_picture(found: Diagram, path: Path, title: str, axis: str, read_out: int = 0) -> Path:
     """Half of the way from the smallest to the largest value of a read-out over the parameter."""
     figure, axes = single_panel(10.5, 5.4)

@@ -44,9 +44,9 @@ def import_deck(file: Path, folder: Path | None, unit: str) -> Imported:
         told += import_file(file, part.body.parent, unit, group).told[:-1]
         add_lines(part, _interfaces(number, patches, joints))
     told += [_sentence(parts, patch, joint, unit) for patch, (joint, _) in zip(patches, joints, strict=True)]
-    if not flat:
-        return Imported(home, (*told, "warning: none of the contact pairs is flat, so no case is written"))
     force, texts = _pressed(mesh)
+    if not flat:
+        return Imported(home, (*told, *texts, "warning: none of the contact pairs is flat, so no case is written"))
     rows = drive(parts[flat[0].parts[0]], shapes[flat[0].parts[0]].points, flat[0])
     lines = case_lines(home, parts, flat, shapes, unit, rows, force)
     write_text(home / "case.toml", "\n".join(lines) + "\n")

@@ -19,6 +19,7 @@ from ..data import Mesh, UserError
 from ..files.store import ordinary, write_text
 from ..mesh import UNITS, mesh_problems, read_mesh
 from ..mesh.chosen import of_instances
+from ..mesh.raw import Unread, in_file
 from ..units import SYSTEMS, usual_system
 from .meshing import run_apart
 
@@ -162,7 +163,7 @@ def _tied(file: Path, mesh: Mesh) -> tuple[Mesh, list[str]]:
     Raises:
         UserError: with file and line, what is wrong with one.
     """
-    if mesh.links is None:
+    if (links := mesh.links) is None:
         return mesh, []
     from ..fem.discretise import discretise
     from ..fem.links import linked
@@ -172,7 +173,11 @@ def _tied(file: Path, mesh: Mesh) -> tuple[Mesh, list[str]]:
         mesh, told = linked(mesh)
         tied_upper(discretise(mesh).pattern, np.zeros(0, dtype=np.int64), mesh.ties)
     except UserError as error:
-        raise UserError(f"{file}: {error}") from None
+        raise UserError(in_file(file, str(error))) from None
+    said: dict[str, list[str]] = {}
+    for link, text in zip(links.items, told, strict=True):
+        said.setdefault(link.where, []).append(text)
+    told = [texts[0] if len(texts) == 1 else f"{where}: {len(texts)} constraints" for where, texts in said.items()]
     return mesh, told if len(told) <= 12 else [*told[:10], f"and {len(told) - 10} constraints more"]
 
 
@@ -254,6 +259,8 @@ def _mesh(file: Path, folder: Path, unit: str, instances: Sequence[str] = ()) ->
     try:
         mesh = read_mesh(file, unit, system)
     except UserError as error:
+        if isinstance(error.__cause__, Unread):  # steel in its place would be wrong
+            raise
         mesh = read_mesh(file, unit)  # its materials alone may be at fault
         told.append(f"warning: {error}")
     joints = [f"{j.where}: '{j.slave}' on '{j.master}': make them interfaces and a contact" for j in mesh.joints]
@@ -263,7 +270,7 @@ def _mesh(file: Path, folder: Path, unit: str, instances: Sequence[str] = ()) ->
     told.insert(0, f"{file}: {mesh.n_points} points, {kinds}")
     told += [f"warning: {text}" for texts in mesh_problems(mesh) for text in texts]
     told += [f"note: {text}" for text in mesh.remarks]
-    told += [*ties, *(joints if not instances else ())]
+    told += [*ties, *((*joints, *_pressed(mesh)) if not instances else ())]
     held, said = _supports(mesh)
     told += said
     lines = [] if "[[supports]]" in held else ["free = true               # nothing is held yet"]
@@ -282,6 +289,15 @@ def _mesh(file: Path, folder: Path, unit: str, instances: Sequence[str] = ()) ->
         lines += ["", "#[temperature]", '#from = "mesh"', '#scale = "C"']
         told.append("temperatures: used only once [temperature] of body.toml is uncommented")
     return [*lines, *held, *_sets(mesh, bool(held)), *_END], told
+
+
+def _pressed(mesh: Mesh) -> list[str]:
+    """Preloads of bolts that are one body with all that they hold: no contact takes them."""
+    return [
+        f"warning: {where}: the preload of {force:g} N is not used: the bolt and all that it holds are one "
+        "body; tie it to one side alone, with a *CONTACT PAIR on the other"
+        for where, force in mesh.preloads
+    ]
 
 
 def _matrices(file: Path, folder: Path, unit: str) -> tuple[list[str], list[str]]:

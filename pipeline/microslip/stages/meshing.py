@@ -16,6 +16,7 @@ from ..data import Indices, Material, Mesh, UserError
 from ..files import store
 from ..mesh import mesh_problems, part_numbers, read_mesh
 from ..mesh.chosen import of_instances
+from ..mesh.raw import in_file
 from ..settings.body import FaceRule, MaterialSettings, implausible
 from ..units import SYSTEMS, usual_system
 from .job import Job
@@ -187,19 +188,19 @@ def load_mesh(job: Job, path: Path | None = None) -> tuple[Mesh, list[str]]:
             raise UserError(f"{job.path}: geometry.instances: {path} {error}") from None
     if job.settings.geometry.mesh is not None:
         mesh = _faces_by_rule(job, mesh)
-    mesh = _linked(path, mesh)
+    mesh = linked_mesh(path, mesh)
     errors, warnings = mesh_problems(mesh)
     if job.settings.cyclic is not None and part_numbers(mesh, tied=True).max() > 0:
         errors.append("the mesh of a cyclic sector falls into parts that share no points; join them")
     if errors:
         raise UserError("\n".join(f"{path}: {e}" for e in errors))
     size = float(np.ptp(mesh.points, axis=0).max())
-    warnings = [f"{path}: {w}" for w in (*warnings, *told)]
+    warnings = [in_file(path, w) for w in (*warnings, *told)]
     warnings += [f"{job.path}: {w}" for w in implausible(job.settings, size)]
     return mesh, warnings
 
 
-def _linked(path: Path, mesh: Mesh) -> Mesh:
+def linked_mesh(path: Path, mesh: Mesh) -> Mesh:
     """The mesh with the equations that its file ties it by.
 
     Raises:
@@ -212,7 +213,7 @@ def _linked(path: Path, mesh: Mesh) -> Mesh:
     try:
         return linked(mesh)[0]
     except UserError as error:
-        raise UserError(f"{path}: {error}") from None
+        raise UserError(in_file(path, str(error))) from None
 
 
 def _read_with_materials(job: Job, path: Path) -> tuple[Mesh, list[str]]:

@@ -19,6 +19,7 @@ from ..data import Array, UserError
 from ..files.store import ordinary, write_text
 from ..mesh import UNITS, boundary_facets, read_mesh
 from ..mesh.touching import touches
+from ..settings.body import load_toml
 from .importing import CAD, MATRICES, Imported, body_name, cad_result, import_file
 
 NORMAL_STIFFNESS, TANGENTIAL_STIFFNESS = 4e11, 2e11
@@ -116,6 +117,7 @@ def _parts(files: Sequence[Path], folder: Path | None) -> tuple[Path, list[Part]
     for file in files:
         if not (file / "body.toml" if file.is_dir() else ordinary(file)).is_file():
             raise UserError(f"{file}: there is no such file, or no body.toml in this folder; correct the path")
+        _refuse_again(file, files)
     names = [body_name(f.resolve().name if f.is_dir() else f.stem) for f in files]
     home = folder or Path("-".join(names)[:64].rstrip("-._"))
     parts = [_part(f, n, home) for f, n in zip(files, names, strict=True)]
@@ -126,6 +128,19 @@ def _parts(files: Sequence[Path], folder: Path | None) -> tuple[Path, list[Part]
         if new.exists():
             raise UserError(f"{new}: is there already; give another folder as last argument (nothing was changed)")
     return home, parts
+
+
+def _refuse_again(folder: Path, files: Sequence[Path]) -> None:
+    """Refuse a folder whose body is around one of the files: that import is repeated."""
+    if not folder.is_dir():
+        return
+    geometry = load_toml(folder / "body.toml").get("geometry", {})
+    own = {(folder / geometry[k]).resolve() for k in ("cad", "mesh") if isinstance(geometry.get(k), str)}
+    if again := [file for file in files if file.resolve() in own]:
+        raise UserError(
+            f"{folder / 'body.toml'}: is there already, made of {again[0]}; give another folder as last argument "
+            "(nothing was changed)"
+        )
 
 
 def _refuse_named(parts: Sequence[Part], patches: Sequence[Patch]) -> None:

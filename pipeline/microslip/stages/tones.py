@@ -82,9 +82,7 @@ def _work(
     store.write_text(folder / "two_tones.csv", rows_csv(list(columns), cells))
     found.save(folder / "two_tones.h5")
     drawn = _pictures(found, best, folder / "pictures", settings.name) if pictures else []
-    store.write_text(
-        folder / "two_tones.html", tones_html(f"{settings.name}: two tones", found, best, messages, drawn)
-    )
+    store.write_text(folder / "two_tones.html", tones_html(f"{settings.name}: two tones", found, best, messages, drawn))
     made = [*(folder / f"two_tones.{end}" for end in ("html", "csv", "h5")), *drawn]
     told = {
         "files": [str(path.relative_to(folder)) for path in made],
