@@ -59,7 +59,7 @@ build/%/basis.h5: meshes/%.msh geometry/%/body.toml $(SOURCES) | $(READY)
 build/%/report.html: build/%/basis.h5 $$(wildcard pipeline/cases/$$*.toml) $(SOURCES) | $(READY)
 	@$(RUN) run geometry/$*
 
-test: $(READY) ## the quick tests, about ten minutes on two cores, to be five
+test: $(READY) ## the quick tests, about eight minutes on two cores, to be five
 	@$(PYTEST)
 
 test-slow: $(READY) ## only the slow ones and the peers (CalculiX, if it is installed)
