@@ -176,8 +176,8 @@ def _cause(at: AtFrequency, point: Point) -> str:
 
 
 def _ways(problem: Problem, at: AtFrequency, starts: list[Array], slope: Any) -> Iterator[Callable[[], Point]]:
-    rises = RISES if len(problem.slices) == 1 else 0  # of several bodies some contact always leads the wrong way
-    most = AMONG if _many(problem) and pseudo_transient.serves(problem) else 60
+    rises = _rises(problem)
+    most = 60 if rises or not pseudo_transient.serves(problem) else AMONG
     yield from (partial(newton, at, x, most=most, slope=slope, rises=rises) for x in starts)
     if pseudo_transient.serves(problem):
         yield partial(from_rest, problem, at.Omega)
@@ -188,12 +188,9 @@ AMONG = 20
 """Steps of Newton's method at most among many bodies, where pseudo-time serves: what arrives takes some five."""
 
 
-MANY = 8
-"""Bodies from which on that is so."""
-
-
-def _many(problem: Problem) -> bool:
-    return len(problem.slices) >= MANY
+def _rises(problem: Problem) -> int:
+    """How often |R| may rise: of many bodies some contact always leads the wrong way."""
+    return RISES if len(problem.slices) == 1 else 0
 
 
 def from_rest(problem: Problem, Omega: float, most: int = 60) -> Point:
@@ -204,12 +201,11 @@ def from_rest(problem: Problem, Omega: float, most: int = 60) -> Point:
     Args:
         most: steps of pseudo-time.
     """
-    at, spent, rate = problem.at(Omega), 0, FIRST * Omega
-    short: dict[str, int] = {"most": 10, "rises": 0} if _many(problem) else {"most": 20}
+    at, spent, rate, rises = problem.at(Omega), 0, FIRST * Omega, _rises(problem)
     q, point = pseudo_transient.at_rest(problem), Point(Omega, np.zeros(problem.size), "", np.inf, 0)
     for count in range(most):
         step = pseudo_transient.slowly(at, rate, q)
-        trial = newton(step, point.x, TOLERANCE, slope=point.slope, **short)
+        trial = newton(step, point.x, TOLERANCE, most=20 if rises else 10, slope=point.slope, rises=rises)
         spent += trial.iterations
         if not trial.converged:
             rate, point = 4 * rate, replace(point, slope=None)
@@ -237,8 +233,8 @@ TOLERANCE = 1e-9
 
 def _ended(at: AtFrequency, point: Point, q: pseudo_transient.Places) -> Point:
     """Newton's method where pseudo-time ends; where that fails, with the place of what nothing holds left as it is."""
-    short: dict[str, int] = {"most": 10, "rises": 0} if _many(at.problem) else {"most": 20}
-    found = newton(at, point.x, slope=point.slope, **short)
+    rises = _rises(at.problem)
+    found = newton(at, point.x, most=20 if rises else 10, slope=point.slope, rises=rises)
     if found.converged or not pseudo_transient.unheld(at.problem):
         return found
     held = pseudo_transient.in_place(at, q)
