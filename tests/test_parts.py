@@ -152,6 +152,7 @@ def test_where_drawn_parts_touch(drawn):
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("compiled_for_users")
 def test_solids_of_one_file_are_set_apart_and_run(drawn, capsys):
     assert main(["import", "all.step", "three", "--apart"]) == 0
     said = capsys.readouterr().out
