@@ -2,29 +2,26 @@
 
 from __future__ import annotations
 
-import json
 from importlib.util import find_spec
 from pathlib import Path
 
 from ..contact.friction import OfTable
-from ..data import UserError
+from ..errors import told_of
 from ..files import store
 from ..files.tables import columns_csv, rows_csv
 from ..report.rolling import rolling_html
 from ..rolling.settings import RollingCase, load_rolling
 from ..rolling.study import Studied, rows_of_patches, study
 from ..rolling.table import creep_table, write_creep_table
-from .stage import Made, Report, Stage
+from .answer import Answer, answered
+from .stage import Report, Stage
 
 
 def rolling_stage(
     case_path: Path, root: Path = Path("build"), assignments: list[str] | None = None, force: bool = False,
     report: Report = lambda _: None, pictures: bool = True,
-) -> tuple[list[Path], list[str]]:  # fmt: skip
+) -> Answer:  # fmt: skip
     """What a rolling case asks for, in ``root/NAME``.
-
-    Returns:
-        The files, the page first, and sentences.
 
     Raises:
         UserError: mistakes of the case or its profiles.
@@ -35,22 +32,15 @@ def rolling_stage(
     files += [case_path.parent / case.friction.file] if isinstance(case.friction, OfTable) else []
     profiles = [store.hash_file(file) for file in files if file.is_file()]
     inputs = {"case": raw, "profiles": profiles, "pictures": pictures}
-    stage.make(inputs, lambda: _work(stage, case, case_path, pictures))
-    told = json.loads(stage.product.read_text())
-    return [stage.product.parent / name for name in told["files"]], told["sentences"]
+    return answered(stage, inputs, lambda: _work(stage, case, case_path, pictures))
 
 
-def _work(stage: Stage, case: RollingCase, case_path: Path, pictures: bool) -> Made:
+def _work(stage: Stage, case: RollingCase, case_path: Path, pictures: bool) -> Answer:
     folder = stage.product.parent
     stage.report("patches and creep curve")
-    try:
+    with told_of(case_path):
         found = study(case, case_path.parent)
-    except UserError as error:
-        raise UserError(f"{case_path}: {error}") from error
-    former = json.loads(stage.product.read_text())["files"] if stage.product.is_file() else []
     stage.begin()
-    for name in former:  # what this run does not write again would be of another case
-        (folder / name).unlink(missing_ok=True)
     sentences = found.sentences()
     made = _tables(found, folder)
     if case.table is not None:
@@ -68,10 +58,7 @@ def _work(stage: Stage, case: RollingCase, case_path: Path, pictures: bool) -> M
     store.write_text(
         page, rolling_html(f"{case.name}: rolling contact", found, [p for p in drawn if p.suffix == ".png"])
     )
-    made = [page, *made, *drawn]
-    told = {"files": [str(path.relative_to(folder)) for path in made], "sentences": sentences}
-    store.write_text(stage.product, json.dumps(told, indent=1) + "\n")
-    return Made(made)
+    return Answer([page, *made, *drawn], sentences)
 
 
 def _tables(found: Studied, folder: Path) -> list[Path]:
@@ -93,7 +80,6 @@ def _tables(found: Studied, folder: Path) -> list[Path]:
 def _pictures(found: Studied, folder: Path, name: str) -> list[Path]:
     from ..pictures.rolling import curve_picture, traction_picture, write_tractions_vtu
 
-    folder.mkdir(parents=True, exist_ok=True)
     drawn = [
         curve_picture(found, folder / "creep.png", f"{name}: creep curve"),
         traction_picture(found, folder / "tractions.png", name),
