@@ -8,12 +8,12 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from test_assembly import sector
-from test_harmonic_balance_laws import body, value
-from test_harmonic_balance_time import group, held
+from test_harmonic_balance_laws import body
+from test_harmonic_balance_time import slider
 
 import microslip as ms
 from microslip.contact.friction import Coulomb
-from microslip.contact.normal import Penalty, Preload
+from microslip.contact.normal import Penalty
 from microslip.contact.patch import Patch, grid
 from microslip.contact.point import PointContact
 from microslip.data import UserError
@@ -28,11 +28,7 @@ ONE = np.array([1.0])
 
 
 def sliding(harmonics=1, samples=1024, ratio=0.02, force=1.0):
-    """1 kg, 100 rad/s, a Jenkins element of 2e4 N/m that slides at 0.6 N: 30 um."""
-    rows = {"face": np.outer([0, 1, 0, 0, 0, 0], ONE), "push": ONE, "tip": ONE}
-    law = PointContact(Preload(value(2.0)), Coulomb(value(0.3)), value(2e4))
-    assembly = held(group(np.array([100.0]), rows, ratio), law, [1], np.zeros(1), np.zeros(1), force)
-    return balance.of(assembly, harmonics=harmonics, samples=samples, length=3e-5)
+    return slider(harmonics, samples, ratio, force)
 
 
 @pytest.mark.parametrize(
