@@ -32,7 +32,7 @@ def moving_bodies(found: Sequence[tuple[str, Orbit]], built: Built, folder: Path
     from ..pictures import can_draw
     from ..pictures.moving import moving_gif
 
-    made, scenes = list[Path](), can_draw() is None
+    made = list[Path]()
     for i, (name, one) in enumerate(found, 1):
         if len(one.time) < one.samples:
             continue
@@ -43,7 +43,7 @@ def moving_bodies(found: Sequence[tuple[str, Orbit]], built: Built, folder: Path
                 continue
             moved = _moved(body, classification.of_body(one, j, at))
             made += write_motion(body.basis, one.time[at], moved, folder / "motion" / f"{component.name}_{i}.pvd")
-            if scenes:
+            if can_draw() is None:
                 path = folder / "pictures" / f"moving_{i}_{component.name}.gif"
                 title = f"{built.settings.name}: {name}, one period of the excitation"
                 made.append(moving_gif(body.basis, moved, path, title))
