@@ -12,7 +12,8 @@ import pytest
 import small
 
 from microslip.data import UserError
-from microslip.settings.body import BodySettings, implausible, load_body, load_toml, override, validate
+from microslip.settings.body import BodySettings, implausible, load_body, validate
+from microslip.settings.toml import load_toml, override
 
 ROOT = Path(__file__).resolve().parents[1]
 NAN, INF = float("nan"), float("inf")

@@ -31,7 +31,8 @@ from microslip.cli import main
 from microslip.data import UserError
 from microslip.mesh import mesh_problems, read_mesh
 from microslip.modal.compute import modal_basis
-from microslip.settings.body import BodySettings, load_body, override, validate
+from microslip.settings.body import BodySettings, load_body, validate
+from microslip.settings.toml import override
 from microslip.system import system_basis
 
 pytestmark = pytest.mark.usefixtures("undrawn", "unjudged")

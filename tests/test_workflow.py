@@ -14,7 +14,7 @@ from box import edit, write_box
 from microslip.basis import read_basis
 from microslip.data import UserError
 from microslip.files import store
-from microslip.settings.body import load_toml
+from microslip.settings.toml import load_toml
 from microslip.stages import meshing, modal, places, response, running
 from microslip.stages.job import Job, open_job
 from microslip.stages.stage import PACKAGE, _imported, hash_of_code

@@ -11,8 +11,8 @@ from .basis import read_basis
 from .case.assemble import Built, build, swept
 from .case.settings import CaseSettings
 from .data import ModalBasis, UserError
-from .settings.body import load_toml
 from .settings.mistakes import bounded, validate
+from .settings.toml import load_toml
 from .stages.job import job_of, open_job
 from .stages.places import modal_files
 

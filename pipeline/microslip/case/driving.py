@@ -11,17 +11,7 @@ import numpy as np
 from pydantic import BeforeValidator, Field, model_validator
 
 from ..data import Array, Interface, ModalGroup, UserError
-from ..settings.body import (
-    Direction,
-    Model,
-    NotNegative,
-    Number,
-    Numbers,
-    Positive,
-    Vector,
-    _finite_vector,
-    _tuple,
-)
+from ..settings.numbers import Direction, Model, NotNegative, Number, Numbers, Positive, Vector, _finite_vector, _tuple
 from ..system.assembly import Load
 from ..system.component import Component, Ring
 from ..system.damping import read_aerodynamics, structural, unstable, with_ratios

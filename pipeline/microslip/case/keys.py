@@ -6,7 +6,7 @@ from typing import Annotated
 
 from pydantic import BeforeValidator, Field
 
-from ..settings.body import Positive, _finite_vector, _tuple
+from ..settings.numbers import Positive, _finite_vector, _tuple
 
 Count = Annotated[int, Field(ge=1, le=1000)]
 Address = Annotated[str, Field(pattern=r"^[A-Za-z0-9_.-]+(:[A-Za-z0-9_.-]+)?$", max_length=200)]

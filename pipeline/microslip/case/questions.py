@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import BeforeValidator, Field, model_validator
 
 from ..data import Array
-from ..settings.body import Coefficient, Model, Name, NotNegative, Number, Positive, Ratios, _finite_vector, _tuple
+from ..settings.numbers import Coefficient, Model, Name, NotNegative, Number, Positive, Ratios, _finite_vector, _tuple
 from .keys import Orders, Positives
 
 NotNegatives = Annotated[tuple[NotNegative, ...], BeforeValidator(_finite_vector)]

@@ -14,7 +14,8 @@ from ..contact.point import OfPoint
 from ..contact.settings import ContactLaw
 from ..operating.fatigue import MaterialLimits
 from ..reduced.compliance import BULK_AND_SURFACE
-from ..settings.body import (
+from ..settings.body import validate
+from ..settings.numbers import (
     Model,
     Name,
     NotNegative,
@@ -27,10 +28,8 @@ from ..settings.body import (
     _finite_vector,
     _float,
     _tuple,
-    load_toml,
-    override,
-    validate,
 )
+from ..settings.toml import load_toml, override
 from ..system.excitation import Turning
 from .driving import ROTATION, ExcitationOfCase, GroundOfCase, SpringOfCase, base_of
 from .keys import GROUND as GROUND

@@ -17,8 +17,8 @@ from pydantic import Field
 from scipy.interpolate import PchipInterpolator
 
 from ..errors import UserError
-from ..settings.body import Coefficient, NotNegative, Number, Positive
 from ..settings.mistakes import bounded
+from ..settings.numbers import Coefficient, NotNegative, Number, Positive
 from .curves import read_table
 from .heights import Heights
 from .keys import Columns, FileName

@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import BeforeValidator, Field
 
-from ..settings.body import NotNegative, Number, Positive, _finite_vector, _tuple
+from ..settings.numbers import NotNegative, Number, Positive, _finite_vector, _tuple
 from .layer import BOUNDARIES
 
 NotNegativeLength = Annotated[NotNegative, "length"]

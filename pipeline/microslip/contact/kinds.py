@@ -21,7 +21,8 @@ from pydantic import Field
 
 from ..data import UserError
 from ..files.store import ordinary
-from ..settings.body import Model, load_toml
+from ..settings.numbers import Model
+from ..settings.toml import load_toml
 
 if TYPE_CHECKING:
     from .composed import ContactModel

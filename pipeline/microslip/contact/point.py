@@ -17,7 +17,7 @@ import numpy as np
 from jax.custom_derivatives import SymbolicZero
 
 from ..reduced.compliance import BULK_AND_SURFACE
-from ..settings.body import NotNegative, Positive, PositiveLength
+from ..settings.numbers import NotNegative, Positive, PositiveLength
 from .friction import Friction
 from .kinds import LawKind
 from .law import Array, Law, Step, norm, number, ratio, root, settings, static, value

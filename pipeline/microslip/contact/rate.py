@@ -13,7 +13,7 @@ import jax
 import jax.numpy as jnp
 
 from ..reduced.compliance import BULK_AND_SURFACE
-from ..settings.body import NotNegative, Positive
+from ..settings.numbers import NotNegative, Positive
 from .friction import Friction, Scattered, creep
 from .law import Array, Law, Step, norm, number, settings, static, value
 from .normal import Normal

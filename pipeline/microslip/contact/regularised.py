@@ -19,7 +19,7 @@ from scipy.integrate import solve_ivp
 
 from ..errors import NotConverged
 from ..reduced.compliance import BULK_AND_SURFACE
-from ..settings.body import NotNegative, Positive
+from ..settings.numbers import NotNegative, Positive
 from .friction import Friction, creep
 from .law import Array, Law, Step, norm, number, ratio, settings, static, value
 from .normal import Normal

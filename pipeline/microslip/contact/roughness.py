@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from ..data import UserError
-from ..settings.body import Numbers, Positive, PositiveLength
+from ..settings.numbers import Numbers, Positive, PositiveLength
 from . import topography
 from .curves import read_table
 from .heights import Cut, Exponential, Gaussian, Heights, Linear, Polynomial, combined, tabulated

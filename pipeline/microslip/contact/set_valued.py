@@ -14,7 +14,7 @@ import numpy as np
 from pydantic import Field
 
 from ..errors import UserError
-from ..settings.body import Number
+from ..settings.numbers import Number
 from .friction import Friction
 from .kinds import LawKind
 from .law import Array, Law, Step, number, settings, value

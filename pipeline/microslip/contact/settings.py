@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from pydantic import BaseModel, BeforeValidator, Field, model_validator
 
 from ..mesh import UNITS
-from ..settings.body import (
+from ..settings.body import _is_length, _scaled, validate
+from ..settings.numbers import (
     Coefficient,
     Model,
     Name,
@@ -21,13 +22,9 @@ from ..settings.body import (
     Positive,
     PositiveLength,
     Positives,
-    _is_length,
-    _scaled,
-    load_toml,
     only_one,
-    override,
-    validate,
 )
+from ..settings.toml import load_toml, override
 from .friction import (
     FrictionKind,
     OfCoulomb,

@@ -17,7 +17,7 @@ from pydantic import Field
 
 from ..errors import UserError
 from ..reduced.compliance import BULK_AND_SURFACE
-from ..settings.body import NotNegative, Number
+from ..settings.numbers import NotNegative, Number
 from .friction import Coulomb, OfCoulomb
 from .heights import Heights, as_table
 from .kinds import LawKind

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..basis import read_basis
 from ..data import UserError
-from ..settings.body import Name, NotNegative, Number, Positive, PositiveLength
+from ..settings.numbers import Name, NotNegative, Number, Positive, PositiveLength
 from .curves import FORCES, LENGTHS, read_curve
 from .hertz import Hertz, half_curvatures
 from .keys import Boundary, Columns, FileName, OneOrTwo, Poisson, Radii

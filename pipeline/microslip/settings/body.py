@@ -6,193 +6,54 @@ build and CAD meshers are handed the file's own numbers (`BodySettings.raw`), in
 
 from __future__ import annotations
 
-import math
-import tomllib
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import (
-    AfterValidator,
     BaseModel,
     BeforeValidator,
-    ConfigDict,
     Discriminator,
     Field,
     Tag,
     model_validator,
 )
 
-from ..data import Array, Material, UserError
+from ..data import Array, Material
 from ..elasticity import isotropic, orthotropic, turned_strain
-from ..files.store import ordinary
 from ..mesh import UNITS
 from .mistakes import validate
-
-_LENGTH = "length"  # metadata that marks a number as a length in the file's unit
-
-
-def _tuple(value: Any) -> Any:
-    return tuple(value) if isinstance(value, list) else value
-
-
-def _finite_vector(value: Any) -> Any:
-    return tuple(map(_float, value)) if isinstance(value, list) else value
-
-
-def _float(value: Any) -> Any:
-    """Whole numbers stand for numbers; true and false do not."""
-    if isinstance(value, bool) or not isinstance(value, int):
-        return value
-    try:
-        return float(value)
-    except OverflowError:
-        return math.inf
-
-
-def _whole(value: Any) -> Any:
-    if isinstance(value, bool):
-        raise ValueError("must be a whole number, not true or false")
-    return value
-
-
-def _nodal_diameters(value: Any) -> Any:
-    if value == "all":
-        return value
-    listed = value if isinstance(value, list | tuple) else [None]
-    if any(isinstance(v, bool) or not isinstance(v, int) or v < 0 for v in listed):
-        raise ValueError('must be "all" or a list of whole numbers, none negative; write [0, 3] for 0 and 3')
-    return tuple(value)
-
-
-def has_length(value: tuple[float, ...]) -> tuple[float, ...]:
-    """A direction as it is, if it is one.
-
-    Raises:
-        ValueError: it has no length.
-    """
-    if not any(value):
-        raise ValueError("a direction must not be [0, 0, 0]")
-    of_sensible_size(max(map(abs, value)))
-    return value
-
-
-def of_sensible_size(value: float) -> float:
-    """A number as it is, if its square and products with others neither overflow nor vanish, as no quantity's do.
-
-    Raises:
-        ValueError: they do.
-    """
-    if value and math.isfinite(value) and not 1 / BEYOND <= abs(value) <= BEYOND:
-        raise ValueError(f"{value:g} is beyond all bounds; write 0, or a number between {1 / BEYOND:g} and {BEYOND:g}")
-    return value
-
-
-def not_too_large(value: float) -> float:
-    """A component of a vector as it is, if it is small enough; what is left of zero by rounding is none too small.
-
-    Raises:
-        ValueError: it is larger than any quantity.
-    """
-    return of_sensible_size(value) if abs(value) > 1 else value
-
-
-BEYOND = 1e30
-"""Size of a number, in any unit that files are written in, that is a mistake; its inverse too."""
-
-
-def damping_ratio(value: float) -> float:
-    """A damping ratio as it is, if a vibration with it swings at all.
-
-    Raises:
-        ValueError: it does not.
-    """
-    if not 0 <= value < 1:
-        raise ValueError(f"a damping ratio of {value:g} must lie below 1 and not below 0; 0.01 is 1 % of the critical")
-    return value
-
-
-MOST_FRICTION = 5.0
-"""Rubber on a rough road reaches 2 to 4, metals in air stay below 2: what is larger is a percentage or an angle."""
-
-
-def _friction(value: float) -> float:
-    if value > MOST_FRICTION:
-        raise ValueError(
-            f"a friction coefficient of {value:g} must not be greater than {MOST_FRICTION:g}; 0.3 is usual of dry "
-            "metals, and a contact sticks if it is pressed harder"
-        )
-    return value
-
-
-NodalDiameters = Annotated[Literal["all"] | tuple[int, ...], BeforeValidator(_nodal_diameters)]
-Number = Annotated[float, BeforeValidator(_float), Field(allow_inf_nan=False), AfterValidator(of_sensible_size)]
-Component = Annotated[float, BeforeValidator(_float), Field(allow_inf_nan=False), AfterValidator(not_too_large)]
-Positive = Annotated[Number, Field(gt=0)]
-NotNegative = Annotated[Number, Field(ge=0)]
-Ratio = Annotated[NotNegative, AfterValidator(damping_ratio), Field(lt=1)]
-Coefficient = Annotated[NotNegative, AfterValidator(_friction), Field(le=MOST_FRICTION)]
-Length = Annotated[Number, _LENGTH]
-PositiveLength = Annotated[Positive, _LENGTH]
-Vector = Annotated[tuple[Component, Component, Component], BeforeValidator(_finite_vector)]
-Direction = Annotated[
-    tuple[Component, Component, Component], BeforeValidator(_finite_vector), AfterValidator(has_length)
-]
-Point = Annotated[tuple[Component, Component, Component], BeforeValidator(_finite_vector), _LENGTH]
-Box = Annotated[
-    tuple[Component, Component, Component, Component, Component, Component], BeforeValidator(_finite_vector), _LENGTH
-]
-Numbers = Annotated[tuple[Number, ...], BeforeValidator(_finite_vector)]
-Positives = Annotated[tuple[Positive, ...], BeforeValidator(_finite_vector)]
-Ratios = Annotated[tuple[Ratio, ...], BeforeValidator(_finite_vector)]
-Directions = Literal["x", "y", "z", "xy", "xz", "yz", "xyz"]
-Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$", max_length=64)]
-FaceName = Annotated[str, Field(min_length=1, max_length=200)]  # as other programs name their sets
-
-
-Byte = Annotated[int, Field(ge=0, le=255)]
-NodeNumber = Annotated[int, Field(ge=1)]
-EngineOrder = Annotated[int, Field(ge=1, le=10000)]
-
-
-class Model(BaseModel):
-    """Strict, frozen, no unknown keys."""
-
-    model_config = ConfigDict(strict=True, extra="forbid", frozen=True)
-
-
-def only_one(model: Model, *keys: str, what: str = "") -> None:
-    """Refuse a section that does not give exactly one of some keys; an empty text is none.
-
-    Args:
-        what: who needs it, if the section's name does not tell.
-
-    Raises:
-        ValueError: none, or several.
-    """
-    given = [k for k in keys if getattr(model, k) not in (None, "")]
-    if len(given) != 1:
-        has, do = (" and ".join(given), "keep") if given else ("none", "give")
-        raise ValueError(f"{what}needs exactly one of {', '.join(keys)}, and has {has}; {do} one")
-
-
-def named_once(settings: Any, *groups: str) -> None:
-    """Refuse two entries of lists of tables under one name: the second would take the place of the first.
-
-    Args:
-        groups: keys of lists whose entries have a name; several in one text, apart by blanks, share their names.
-
-    Raises:
-        ValueError: with the list and the name.
-    """
-    for group in groups:
-        names: set[str] = set()
-        for key in group.split():
-            for item in getattr(settings, key):
-                if item.name in names:
-                    raise ValueError(f"{key}: the name '{item.name}' is used twice; rename one")
-                names.add(item.name)
-
+from .numbers import (
+    LENGTH,
+    Box,
+    Byte,
+    Direction,
+    Directions,
+    EngineOrder,
+    FaceName,
+    Length,
+    Model,
+    Name,
+    NodalDiameters,
+    NodeNumber,
+    NotNegative,
+    Number,
+    Numbers,
+    Point,
+    Positive,
+    PositiveLength,
+    Positives,
+    Ratio,
+    Ratios,
+    Vector,
+    _finite_vector,
+    _float,
+    _tuple,
+    _whole,
+    named_once,
+    only_one,
+)
+from .toml import load_toml, override
 
 GROUND = "ground"
 """Name of the rigid plane a face may press on."""
@@ -315,7 +176,7 @@ class Meshing(Model):
     its volume.
     """
 
-    size: Annotated[Positive | None, _LENGTH] = None
+    size: Annotated[Positive | None, LENGTH] = None
     order: Annotated[Literal[1, 2], BeforeValidator(_whole)] = 2
     integration: Literal["full", "reduced"] = "full"
     local: dict[str, Positive] = Field(default_factory=dict)
@@ -785,76 +646,6 @@ class BodySettings(Model):
             raise ValueError(f"values.{unknown[0]}: no matrix scales with it here; {way}")
 
 
-def load_toml(path: Path | str) -> dict[str, Any]:
-    """Read a TOML file (UTF-8, with or without a byte-order mark).
-
-    Raises:
-        UserError: missing, unreadable or not TOML.
-    """
-    path = Path(path)
-    try:
-        return tomllib.loads(ordinary(path).read_bytes().decode("utf-8-sig"))
-    except UnicodeDecodeError as error:
-        raise UserError(f"{path}: is not UTF-8 text (byte {error.start + 1}); save it as UTF-8") from error
-    except OSError as error:
-        raise UserError(f"{path}: cannot be read ({error.strerror}); correct the path") from error
-    except tomllib.TOMLDecodeError as error:
-        raise UserError(f"{path}: is not valid TOML ({_one_line(error)}); correct that place") from error
-    except (ValueError, RecursionError) as error:  # a number of thousands of digits, brackets without end
-        raise UserError(f"{path}: cannot be read ({_one_line(error)}); is it a settings file?") from error
-
-
-def _one_line(error: BaseException) -> str:
-    text = " ".join(str(error).split())
-    return text[:1].lower() + text[1:120]
-
-
-def override(table: dict[str, Any], assignments: list[str], path: Path) -> dict[str, Any]:
-    """Apply ``key.subkey=value`` texts (value in TOML's notation, or bare text) to a settings table."""
-    for text in assignments:
-        key, equals, value = text.partition("=")
-        key = " ".join(key.split())
-        steps = [step.strip() for step in key.split(".")]
-        if not equals or not all(steps):
-            raise UserError(f"--set {key + equals}: is no setting; write --set key.subkey=value")
-        place: Any = table
-        for number, step in enumerate(steps[:-1]):
-            if isinstance(place, list):
-                place = _entry(place, step, key, path)
-            else:
-                place = place.setdefault(step, {})
-            if not isinstance(place, dict | list):
-                above = ".".join(steps[: number + 1])
-                raise UserError(f"--set {key}: '{above}' in {path} is a value, not a table; correct the key")
-        if isinstance(place, list):
-            above = ".".join(steps[:-1])
-            raise UserError(f"--set {key}: name the entry and its key; write --set {above}.NAME.KEY=value")
-        place[steps[-1]] = _parsed(value)
-    return table
-
-
-def _parsed(value: str) -> Any:
-    """A value in TOML's notation, or the bare text."""
-    try:
-        table = tomllib.loads(f"v = {value}")
-    except (ValueError, RecursionError):
-        return value.strip()
-    return table["v"] if set(table) == {"v"} else value.strip()
-
-
-_NAMES = ("name", "face", "interface", "row", "monitor")
-"""Keys by which an entry of a list may be addressed, the first it has."""
-
-
-def _entry(items: list[Any], name: str, key: str, path: Path) -> Any:
-    for number, item in enumerate(items):
-        if isinstance(item, dict) and name in (*(item.get(k) for k in _NAMES), str(number)):
-            return item
-    tables = [(number, item) for number, item in enumerate(items) if isinstance(item, dict)]
-    known = [str(next((item[k] for k in _NAMES if item.get(k)), number)) for number, item in tables]
-    raise UserError(f"--set {key}: {path} has no entry '{name}' there; choose one of {', '.join(known) or 'none'}")
-
-
 def load_body(path: Path | str, assignments: list[str] | None = None) -> tuple[BodySettings, dict[str, Any]]:
     """Read and check a body file.
 
@@ -901,7 +692,7 @@ def _to_metres(model: Any, scale: float) -> Any:
 
 
 def _is_length(field: Any) -> bool:
-    return _LENGTH in field.metadata or f"'{_LENGTH}'" in str(field.annotation)
+    return LENGTH in field.metadata or f"'{LENGTH}'" in str(field.annotation)
 
 
 def _scaled(value: Any, scale: float) -> Any:

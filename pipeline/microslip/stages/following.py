@@ -25,8 +25,8 @@ from ..files.tables import rows_csv
 from ..harmonic_balance.readout import measured
 from ..results import read_response
 from ..results.checks import checked, largest
-from ..settings.body import load_toml, override
 from ..settings.mistakes import validate
+from ..settings.toml import load_toml, override
 from ..units import METRES, Quantity
 from .stage import Report
 

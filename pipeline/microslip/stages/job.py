@@ -8,7 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from ..data import UserError
-from ..settings.body import BodySettings, body_settings, load_body, load_toml
+from ..settings.body import BodySettings, body_settings, load_body
+from ..settings.toml import load_toml
 
 _NO_SETTINGS = set(".step .stp .brep .iges .igs .inp .cdb .msh .med .unv .bdf .mtx .mat".split())
 

@@ -19,7 +19,7 @@ from ..data import Array, UserError
 from ..files.store import ordinary, write_text
 from ..mesh import UNITS, boundary_facets, read_mesh
 from ..mesh.touching import touches
-from ..settings.body import load_toml
+from ..settings.toml import load_toml
 from .importing import CAD, MATRICES, Imported, body_name, cad_result, import_file
 
 NORMAL_STIFFNESS, TANGENTIAL_STIFFNESS = 4e11, 2e11

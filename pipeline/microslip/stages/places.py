@@ -13,7 +13,7 @@ from ..case import CaseSettings
 from ..case.settings import BodyOfCase
 from ..data import UserError
 from ..files import store
-from ..settings.body import load_toml
+from ..settings.toml import load_toml
 from .job import ASKED, open_job, system_file
 from .modal import modes_stage, system_stage
 from .stage import Report

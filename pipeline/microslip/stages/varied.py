@@ -11,8 +11,8 @@ from typing import Any
 from ..case import CaseSettings
 from ..case.assemble import build
 from ..data import ModalBasis, UserError
-from ..settings.body import override
 from ..settings.mistakes import validate
+from ..settings.toml import override
 from ..system.assembly import Assembly
 from ..system.lumped import load_system
 from .places import lumped

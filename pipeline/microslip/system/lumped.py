@@ -23,7 +23,9 @@ from pydantic import BeforeValidator, Field, model_validator
 from ..data import INTERFACE_ROWS, Array, Compliance, Interface, Mesh, ModalBasis, ModalGroup, Rows, UserError
 from ..frames import skew
 from ..linalg.canonical import signs, turn_clusters
-from ..settings.body import (
+from ..settings.body import validate
+from ..settings.mistakes import bounded
+from ..settings.numbers import (
     Direction,
     Model,
     Name,
@@ -37,13 +39,10 @@ from ..settings.body import (
     _tuple,
     damping_ratio,
     has_length,
-    load_toml,
     named_once,
     not_too_large,
-    override,
-    validate,
 )
-from ..settings.mistakes import bounded
+from ..settings.toml import load_toml, override
 
 GROUND = "ground"
 DIRECTIONS = ("x", "y", "z", "rx", "ry", "rz")
