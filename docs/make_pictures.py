@@ -32,7 +32,7 @@ from pages import (
 
 from microslip.basis import read_basis
 from microslip.case import CaseSettings, load_case, run_case
-from microslip.case.assemble import sized
+from microslip.case.contacts import sized
 from microslip.case.settings import ContactSettings
 from microslip.cli import main as typed
 from microslip.data import Array, ModalBasis, ModalGroup, SpeedRange

@@ -18,8 +18,9 @@ from attack import toml
 
 from microslip.basis import write_basis
 from microslip.case import CaseSettings, run_case
-from microslip.case.assemble import build, memory_of
+from microslip.case.assemble import build
 from microslip.case.checkpoint import files_of, of_points
+from microslip.case.contacts import memory_of
 from microslip.case.curves import curves
 from microslip.cli import main
 from microslip.contact.curved import Line, foundation_of_line
@@ -430,7 +431,7 @@ def test_what_does_not_fit_into_the_memory_is_refused(tmp_path, monkeypatch, cap
     many = {"contacts.right.points": [1000, 1000], "harmonics": 20, "samples": 400} if len(keys) == 1 else keys
     words = sample_case(tmp_path, monkeypatch, **many)
     with monkeypatch.context() as patched:
-        patched.setattr("microslip.case.assemble.of_this_machine", lambda: 0.5 * 2.0**40)
+        patched.setattr("microslip.case.contacts.of_this_machine", lambda: 0.5 * 2.0**40)
         assert main(["respond", *words]) == 2
     said = capsys.readouterr().err
     assert "contacts.right: points" in said and "memory_limit = " in said
@@ -442,7 +443,7 @@ def test_the_limit_of_the_memory_is_ones_own(tmp_path, monkeypatch, capsys) -> N
     assert main(["respond", *words]) == 2 and "memory_limit is 0.4" in capsys.readouterr().err
     settings = made(table(**STIFF, law="smooth", points=[6, 5]) | {"harmonics": 4})
     assert 0.5 < memory_of(settings, 30, 6) / 2**30 < 0.6
-    monkeypatch.setattr("microslip.case.assemble.of_this_machine", lambda: 0.5 * 2.0**30)
+    monkeypatch.setattr("microslip.case.contacts.of_this_machine", lambda: 0.5 * 2.0**30)
     with pytest.raises(UserError, match="this machine has 0.5;"):
         build(settings, {"small": small.basis()}, PATH)
     build(settings.model_copy(update={"memory_limit": 3.0}), {"small": small.basis()}, PATH)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import scipy.linalg
 
-from microslip.case.assemble import on_weak_springs
+from microslip.case.loaded import on_weak_springs
 from microslip.data import UserError
 from microslip.system import Body, Contact, Force, Monitor, Spring, System
 

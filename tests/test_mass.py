@@ -13,7 +13,7 @@ from small import basis, beam, table
 
 from microslip.basis import read_basis
 from microslip.case import load_case, run_case
-from microslip.case.assemble import load_bodies
+from microslip.case.loaded import load_bodies
 from microslip.case.settings import BodyOfCase
 from microslip.case.thrown import normal_forces
 from microslip.cli import main

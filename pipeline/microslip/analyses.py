@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from .case.assemble import Built, swept
+from .case.assemble import Built
+from .case.contacts import swept
 from .case.problem import problem_of
 from .continuation import Settings
 from .data import UserError

@@ -8,7 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from .basis import read_basis
-from .case.assemble import Built, build, swept
+from .case.assemble import Built, build
+from .case.contacts import swept
 from .case.settings import CaseSettings
 from .data import ModalBasis, UserError
 from .settings.mistakes import bounded, validate

@@ -21,7 +21,8 @@ from ..harmonic_balance.response import traced
 from ..operating.contact_maps import ContactMap, contact_map
 from ..results import Body
 from ..results.names import exact
-from .assemble import Built, Loaded
+from .assemble import Built
+from .loaded import Loaded
 from .problem import problem_of
 from .settings import CaseSettings
 

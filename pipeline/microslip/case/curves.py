@@ -22,7 +22,8 @@ from ..harmonic_balance.readout import measured
 from ..results import Journal
 from ..results.names import exact
 from ..units import METRES, Quantity
-from .assemble import Built, build, swept
+from .assemble import Built, build
+from .contacts import swept
 from .problem import normal_forces, problem_of
 from .questions import CurveOfCase
 from .settings import CaseSettings

@@ -13,7 +13,8 @@ from ..harmonic_balance.book import BookPatch, book_patch
 from ..harmonic_balance.problem import Forces, Problem
 from ..harmonic_balance.solver import newton
 from ..system.assembly import Assembly
-from .assemble import Built, swept
+from .assemble import Built
+from .contacts import swept
 from .settings import CaseSettings, ContactSettings
 
 

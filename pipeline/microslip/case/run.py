@@ -28,8 +28,9 @@ from ..results.checks import cause
 from ..system.assembly import Assembly, Linear
 from ..units import Quantity, counted, percent
 from . import edges
-from .assemble import Built, build, memory_of, swept
+from .assemble import Built, build
 from .checkpoint import series_name
+from .contacts import memory_of, swept
 from .edges import Rising
 from .problem import book_models, normal_forces, pressed_by, problem_of
 from .readouts import Readout, readouts

@@ -13,7 +13,8 @@ import numpy as np
 
 from ..basis import read_basis
 from ..case import CaseSettings
-from ..case.assemble import Built, build, swept
+from ..case.assemble import Built, build
+from ..case.contacts import swept
 from ..case.problem import book_models
 from ..case.questions import MistuningOfCase, ScatterOfCase
 from ..data import Array, UserError

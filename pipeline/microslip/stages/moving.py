@@ -7,7 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ..case.assemble import Built, Loaded
+from ..case.assemble import Built
+from ..case.loaded import Loaded
 from ..data import Array, ComplexArray, ModalBasis, ModalGroup
 from ..exchange.vtu import write_motion
 from ..operating.cycle import longest

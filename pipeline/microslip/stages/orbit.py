@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from ..case import CaseSettings
-from ..case.assemble import Built, swept
+from ..case.assemble import Built
+from ..case.contacts import swept
 from ..case.problem import problem_of
 from ..case.questions import OrbitOfCase, RunUpOfCase
 from ..data import UserError

@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from ..case.assemble import Built, place_of
+from ..case.assemble import Built
+from ..case.loaded import place_of
 from ..data import Array
 from ..frames import rotation
 from ..operating.cycle import at_time, farthest_at
