@@ -20,8 +20,6 @@ from microslip.fem.discretise import REDUCED, discretise, face_blocks
 from microslip.fem.loads import pressure
 from microslip.fem.operators import stiffness
 from microslip.rolling.brush import Brush, fitted, jump, parabola, reached
-from microslip.rolling.half_space import rolled, shifted, steady_rolling
-from microslip.rolling.half_space_influence import Grid, Pair
 from microslip.rolling.slip import row
 from microslip.stages.job import open_job
 from microslip.stages.modal import modes_stage
@@ -92,28 +90,6 @@ def test_the_row_of_a_patch_finds_the_ellipse_through_pressures_that_swing() -> 
     exact = np.diff(np.arcsin(edge) + edge * np.sqrt(1 - edge**2)) / np.pi
     np.testing.assert_allclose(found.share, exact, atol=3e-3)
     assert found.share.sum() == pytest.approx(1, rel=1e-12)
-
-
-@pytest.mark.slow
-def test_a_shift_of_cattaneo_becomes_steady_rolling_of_carter() -> None:
-    """Half-spaces of one row: pressed and shifted, then rolled under the same force; the reference prints no number of
-    the way, so its two ends are tried: the shift at first, and what `steady_rolling` finds, after 4 a."""
-    half, n, R, mu = 1e-3, 40, 0.5, 0.3
-    grid, pair = Grid(int(1.3 * n), 1, 2 * half / n, 0.2), Pair(82e9, 0.28)
-    h, load = grid.x**2 / (2 * R), 35780.0
-    force = -0.64 * mu * load
-    now = shifted(h, grid, pair, mu, force=load, tangential=(force, None))
-    steady = steady_rolling(h, grid, pair, mu, force=load, tangential=(force, None))
-    symmetric = now.traction[0]
-    np.testing.assert_allclose(symmetric, symmetric[::-1], atol=1e-3 * np.abs(symmetric).max())
-    off, way = [], []
-    for k in range(2 * n):
-        now = rolled(now, h, mu, force=load, tangential=(force, None))
-        off.append(np.abs(now.traction[0] - steady.traction[0]).max() / (mu * now.pressure.max()))
-        way.append(now.motion[0])
-        assert now.force[0] == pytest.approx(force, rel=1e-5), k
-    assert off[-1] < 0.02 and off[0] > 0.2
-    assert way[-1] == pytest.approx(steady.motion[0], rel=0.02)
 
 
 # --- the wheel -----------------------------------------------------------------------------------------------------
