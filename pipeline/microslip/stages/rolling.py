@@ -10,6 +10,7 @@ from ..errors import told_of
 from ..files import store
 from ..files.tables import columns_csv, rows_csv
 from ..report.rolling import rolling_html
+from ..rolling.contact_table import contact_table, write_contact_table
 from ..rolling.settings import RollingCase, load_rolling
 from ..rolling.study import Studied, rows_of_patches, study
 from ..rolling.table import creep_table, write_creep_table
@@ -39,7 +40,10 @@ def _work(stage: Stage, case: RollingCase, case_path: Path, pictures: bool) -> A
     folder = stage.product.parent
     stage.report("patches and creep curve")
     with told_of(case_path):
-        found = study(case, case_path.parent)
+        found, contacts = study(case, case_path.parent), None
+        if case.contacts is not None:
+            stage.report("table of contacts")
+            contacts = contact_table(found.track, case.vertical_force, **case.contacts.model_dump())
     stage.begin()
     sentences = found.sentences()
     made = _tables(found, folder)
@@ -53,6 +57,9 @@ def _work(stage: Stage, case: RollingCase, case_path: Path, pictures: bool) -> A
             f"mean; 95 % of {table.checked} states are below {100 * table.error[:, 1].max():.2g} %, the largest "
             f"error is {100 * table.error[:, 2].max():.2g} %."
         )
+    if contacts is not None:
+        made.append(write_contact_table(folder / "contact_table.h5", contacts))
+        sentences.append(contacts.sentence())
     drawn = _pictures(found, folder / "pictures", case.name) if pictures and found.forces is not None else []
     page = folder / "rolling.html"
     store.write_text(
