@@ -188,8 +188,8 @@ class Studied:
         if self.row.places >= ENOUGH:
             return []
         return [
-            f"warning: only {self.row.places} rows of points of the mesh lie along the patch, so its length is known to "
-            "a few per cent; take a smaller mesh.size of the body."
+            f"warning: only {self.row.places} rows of points of the mesh lie along the patch, so its length is known "
+            "to a few per cent; take a smaller mesh.size of the body."
         ]
 
 
