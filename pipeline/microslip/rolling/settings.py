@@ -164,6 +164,14 @@ class ContactsOfCase(Model):
     points: Annotated[tuple[Count, Fineness], BeforeValidator(_tuple)] = SHIFTS
 
 
+class ElasticOfCase(Model):
+    """wheel, rail: bodies whose modal files are taken or made. face: their interface at the patch, t2 along rolling."""
+
+    wheel: Name = "wheel"
+    rail: Name = "rail"
+    face: Name = "patch"
+
+
 class HeatOfCase(Model):
     """Steel if not given; each a number, or two, of wheel and rail.
 
@@ -204,6 +212,7 @@ class RollingCase(Model):
     model: ModelOfCase = ModelOfCase()
     table: TableOfCase | None = None
     contacts: ContactsOfCase | None = None
+    elastic: ElasticOfCase | None = None
     heat: HeatOfCase | None = None
     wear: WearOfCase | None = None
 
@@ -256,13 +265,18 @@ class RollingCase(Model):
             raise UserError("friction: is 0 at all speeds; the creep force is a part of it, so give more than 0")
         return found
 
+    @property
+    def solids(self) -> tuple[Solid, Solid]:
+        """Of wheel and rail."""
+        return Solid(self.wheel.young, self.wheel.poisson), Solid(self.rail.young, self.rail.poisson)
+
     def track(self, folder: Path) -> Track:
         """Of files beside the case.
 
         Raises:
             UserError: profiles that are none.
         """
-        elastic = combined(*(Solid(s.young, s.poisson) for s in (self.wheel, self.rail)))
+        elastic = combined(*self.solids)
         rail = self.rail.made(folder, 1.0).turned(self.rail.inclination)
         return Track(self.wheel.made(folder, -1.0), rail, self.wheel.radius, self.wheel.at, self.rail.at, elastic)
 
