@@ -115,8 +115,8 @@ class Cyclic:
 
 
 def _around(D: Array, behind: Array, before: Array, r: Array) -> Array:
-    """(n, s) x of a ring, D_i x_i + behind_i x_(i+1) + before_i x_(i-1) = r_i, by cyclic reduction: of parts that do not
-    know each other, every second one, all are eliminated at once, and what is left is a ring of half as many."""
+    """(n, s) x of a ring, D_i x_i + behind_i x_(i+1) + before_i x_(i-1) = r_i, by cyclic reduction: every second part
+    is eliminated, all at once as they do not know each other, and what is left is a ring of half as many."""
     n, s = r.shape
     if n <= FEW:
         A, at = np.zeros((n, s, n, s)), np.arange(n)

@@ -195,7 +195,7 @@ class Problem:
     @cached_property
     def ranks(self) -> list[Indices]:
         """Of each group, places of its contacts among all that are there, in the order of the assembly."""
-        numbers = np.sort(np.concatenate([g.contacts for g in self.groups] or [[]]))
+        numbers = sorted(i for g in self.groups for i in g.contacts)
         return [np.searchsorted(numbers, g.contacts) for g in self.groups]
 
     @cached_property
