@@ -110,7 +110,7 @@ class Sliding:
     def __call__(self, frequency: float) -> Array | None:
         """(w,) m."""
         Omega = 2 * np.pi * frequency
-        return self._kept(frequency, solve(self.problem, Omega, self._starts(Omega), self.slope))
+        return self._kept(frequency, solve(self.problem, Omega, self._starts(Omega), self.slope, along_load=False))
 
     def follow(self, frequency: float, behind: float) -> Array | None:
         """(w,) m of the solution that Newton's method finds from the one at another frequency; the known one stays
