@@ -148,9 +148,11 @@ def _shortened(
     return x + share * step, left, shown
 
 
-def solve(problem: Problem, Omega: float, starts: list[Array], slope: Any = None) -> Point:
+def solve(
+    problem: Problem, Omega: float, starts: list[Array], slope: Any = None, along_load: bool = True
+) -> Point:  # fmt: skip
     """Newton's method from one start after the other, then from the sticking contact, then from rest in
-    pseudo-time, then along the load.
+    pseudo-time, then along the load, which of many bodies takes minutes.
 
     Raises:
         UserError: a frequency that is not positive.
@@ -158,7 +160,7 @@ def solve(problem: Problem, Omega: float, starts: list[Array], slope: Any = None
     bounded("frequency", Omega / (2 * np.pi), gt=0)
     at, spent, status = problem.at(Omega), 0, ""
     history: tuple[float, ...] = ()
-    for way in _ways(problem, at, [*starts, at.reference], slope):
+    for way in _ways(problem, at, [*starts, at.reference], slope, along_load):
         point = way()
         spent, history = spent + point.iterations, (*history, *point.history)
         if point.converged or point.away:
@@ -183,13 +185,19 @@ def _cause(at: AtFrequency, point: Point) -> str:
     return "fold" if TURNS in point.status else "iteration limit"
 
 
-def _ways(problem: Problem, at: AtFrequency, starts: list[Array], slope: Any) -> Iterator[Callable[[], Point]]:
+def _ways(
+    problem: Problem, at: AtFrequency, starts: list[Array], slope: Any, along_load: bool
+) -> Iterator[Callable[[], Point]]:  # fmt: skip
     rises = _rises(problem)
-    way = partial(newton, rises=rises) if rises or not pseudo_transient.serves(problem) else among
+    patient = rises or not pseudo_transient.serves(problem)
+    way = partial(newton, rises=rises) if patient else among
     yield from (partial(way, at, x, slope=slope) for x in starts)
+    if not patient:
+        yield from (partial(newton, at, x, rises=rises) for x in starts[:PATIENT])
     if pseudo_transient.serves(problem):
         yield partial(from_rest, problem, at.Omega)
-    yield partial(_raised, problem, at.Omega)
+    if along_load:
+        yield partial(_raised, problem, at.Omega)
 
 
 AMONG, PATIENCE = 20, 8
@@ -200,6 +208,11 @@ before: what arrives takes some five."""
 def among(at: AtFrequency, x: Array, slope: Any = None) -> Point:
     """Newton's method among many bodies."""
     return newton(at, x, most=AMONG, slope=slope, rises=0, patience=PATIENCE)
+
+
+PATIENT = 2
+"""Starts from which all steps are taken before pseudo-time, which costs more: where many contacts begin to slide at
+once |R| may stay what it is for twenty steps and then fall."""
 
 
 def _rises(problem: Problem) -> int:

@@ -106,13 +106,11 @@ class Sliding:
         self.problem, self.tuned = problem, tuned
         self.known: dict[float, Point] = {}
         self.slope: Any = None
-        self.vain: tuple[float, int] | None = None  # Hz, and how many were known where no start led to a solution
 
     def __call__(self, frequency: float) -> Array | None:
         """(w,) m."""
         Omega = 2 * np.pi * frequency
-        starts = [] if self.vain == (frequency, len(self.known)) else self._starts(Omega)
-        return self._kept(frequency, solve(self.problem, Omega, starts, self.slope))
+        return self._kept(frequency, solve(self.problem, Omega, self._starts(Omega), self.slope, along_load=False))
 
     def at_once(self, frequency: float) -> Array | None:
         """(w,) m, by Newton's method from what is known nearby or not at all."""
@@ -121,7 +119,6 @@ class Sliding:
             point = among(self.problem.at(Omega), x, self.slope)
             if point.converged:
                 return self._kept(frequency, point)
-        self.vain = frequency, len(self.known)
         return None
 
     def follow(self, frequency: float, behind: float) -> Array | None:
