@@ -222,7 +222,9 @@ def crossing_frequency(time: Array, signal: Array) -> float:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("peer", "head"), [("pyharm", "pyHarm"), ("exudyn", "Exudyn"), ("fmpy", "FMU")])
+@pytest.mark.parametrize(
+    ("peer", "form", "head"), [("pyharm", "pyharm", "pyHarm"), ("exudyn", "exudyn", "Exudyn"), ("fmpy", "fmu", "FMU")]
+)
 def test_the_readers_lines_of_the_page_run(peer: str, form: str, head: str, tmp_path: Path) -> None:
     if interpreter(peer) is None:
         pytest.skip(f"{peer} is not installed: make peers")
