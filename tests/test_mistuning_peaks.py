@@ -86,6 +86,22 @@ def test_what_is_missed_is_said(kind: Callable[..., tuple[Curve, float]], added:
     assert np.mean(points) <= added
 
 
+@pytest.mark.parametrize("width", [0.01, 0.1])
+def test_points_without_a_solution(width: float) -> None:
+    """None at the peak, where a parabola promises it, nor at the sweep's next point: the search goes on beside them, up
+    to what has a solution, and says what may be between."""
+    w, D = 102.0, 0.005
+    grid = np.arange(95.0, 110.0, 0.5) + 0.1
+    at_peak = w * np.sqrt(1 - 2 * D * D)
+
+    def respond(f: float) -> np.ndarray | None:
+        return None if abs(f - at_peak) < width or f == grid[14] else np.array([resonance(f, w, D)])
+
+    found, truth = highest(respond, grid), 1 / (2 * D * np.sqrt(1 - D * D))
+    assert grid[14] in found.failed and len(found.failed) <= 4
+    assert truth / found.amplitude - 1 <= found.missed < 0.05
+
+
 @pytest.mark.slow
 def test_a_contact_that_opens() -> None:
     """Five vanes whose contacts open, so that there are two solutions beside the peak and sweeps jump: a coarse one

@@ -32,6 +32,9 @@ LEFT = 1e-3
 MOST = 15
 """Points added at most."""
 
+FAILING = 3
+"""Points without a solution among them."""
+
 STEADY = 0.9
 """Amplitude over that of the neighbouring point above which no other solution is looked for between them."""
 
@@ -55,25 +58,36 @@ class Highest:
 
 
 def highest(
-    respond: Respond, frequency: Array, tolerance: float = TOLERANCE, most: int = MOST, follow: Follow | None = None
-) -> Highest:
+    respond: Respond, frequency: Array, tolerance: float = TOLERANCE, most: int = MOST, follow: Follow | None = None,
+    at_once: Respond | None = None,
+) -> Highest:  # fmt: skip
     """The highest amplitude of all read-outs in a band.
 
     Args:
         frequency: (f,) Hz, rising, a sweep that sees every resonance. tolerance, most: see `TOLERANCE`, `MOST`. follow:
-            where it is given, a sweep that jumps goes back on the higher side.
+            where it is given, a sweep that jumps goes back on the higher side. at_once: where it is given, what is
+            found with little work from what is known: the sweep goes up as far as that leads, then down from its other
+            end, and the rest is looked for in what is between.
     """
     known: dict[float, Array] = {}
     failed: list[float] = []
     tried: set[tuple[float, float, float]] = set()
 
-    def look(f: float) -> bool:
+    def look(f: float) -> None:
         y = respond(f)
         if y is None:
             failed.append(f)
-            return False
-        known[f] = y
-        return True
+        else:
+            known[f] = y
+
+    def leads(frequencies: list[float]) -> int:
+        """How many in their order are found at once."""
+        for count, f in enumerate(frequencies):
+            y = None if at_once is None else at_once(f)
+            if y is None:
+                return count
+            known[f] = y
+        return len(frequencies)
 
     def goes_on(low: float, high: float) -> bool:
         """Whether the higher of two points leads to more at the other one than is known there."""
@@ -88,20 +102,24 @@ def highest(
         known[far] = y
         return True
 
-    for f in frequency:
-        look(float(f))
+    rest = [float(f) for f in frequency]
+    if at_once is not None:
+        rest = rest[leads(rest) :][::-1]
+        rest = rest[leads(rest) :]
+    for f in rest:
+        look(f)
     before = np.inf  # what was left where a parabola placed the last point
-    count = 0 if known else most
-    while count < most:
+    count, may_fail = 0, len(failed) + FAILING
+    while known and count < most and len(failed) < may_fail:
         top = max(float(y.max()) for y in known.values())
         told, (more, low, high) = told_by(known) or (0.0, 0.0), may_be(known)
         promised = told[0] > top * (1 + tolerance) and more - top <= 0.5 * before
+        promised = promised and not _beside(told[1], known, failed)
         if more <= top * (1 + (tolerance if promised else LEFT)):
             break
         if goes_on(low, high):
             continue
-        if not look(told[1] if promised else 0.5 * (low + high)):
-            break
+        look(told[1] if promised else _middle(low, high, failed))
         count, before = count + 1, more - top if promised else np.inf
     if not known:
         return Highest(-1, np.nan, np.nan, np.nan, np.zeros(0), np.zeros((0, 0)), tuple(failed), False)
@@ -110,6 +128,19 @@ def highest(
     missed = max(may_be(known)[0] / y.max() - 1, 0.0)
     ends = x[i] in (min(frequency), max(frequency))
     return Highest(int(output), float(x[i]), float(y.max()), missed, x, y, tuple(failed), bool(ends))
+
+
+def _beside(f: float, known: dict[float, Array], failed: list[float]) -> bool:
+    """Whether a point without a solution is between the known ones about a frequency."""
+    low, high = max((x for x in known if x < f), default=-np.inf), min((x for x in known if x > f), default=np.inf)
+    return any(low < x < high for x in failed)
+
+
+def _middle(low: float, high: float, failed: list[float]) -> float:
+    """Of the widest part of an interval between points that have no solution."""
+    x = np.array([low, *sorted(f for f in failed if low < f < high), high])
+    i = int(np.diff(x).argmax())
+    return float(0.5 * (x[i] + x[i + 1]))
 
 
 def _table(known: dict[float, Array]) -> tuple[Array, Array]:
