@@ -16,7 +16,7 @@ from microslip.case import load_case
 from microslip.case.assemble import build
 from microslip.data import UserError
 from microslip.system.assembly import Assembly
-from microslip.system.lumped import load_system
+from microslip.system.settings import load_system
 
 CASES = Path(__file__).parents[1] / "pipeline" / "cases"
 KEYS = ("contacts.sole-1.normal_force", "contacts.sole-2.normal_force")

@@ -417,7 +417,7 @@ def test_a_killed_run_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, u
 def test_moving_ground(tmp_path: Path) -> None:
     """A mass on a belt that slides under it all the time, pushed with two frequencies: as in time."""
     from microslip.case.assemble import build
-    from microslip.system.lumped import load_system
+    from microslip.system.settings import load_system
 
     (tmp_path / "system.toml").write_text(SYSTEM)
     rate = 'law = { kind = "rate", slope = 10.0 }\nground = { velocity = 1.0 }'

@@ -202,7 +202,7 @@ def system_stage(
     from ..system import load_system, system_basis
 
     system = load_system(path, assignments)
-    stage = Stage(output or root / "build" / system.name / "basis.h5", ("system.lumped", "basis"), force, report)
+    stage = Stage(output or root / "build" / system.name / "basis.h5", ("system.settings", "basis"), force, report)
 
     def work() -> Made:
         write_basis(stage.product, system_basis(path, assignments))

@@ -14,7 +14,7 @@ from ..data import ModalBasis, UserError
 from ..settings.mistakes import validate
 from ..settings.toml import override
 from ..system.assembly import Assembly
-from ..system.lumped import load_system
+from ..system.settings import load_system
 from .places import lumped
 
 OF_SYSTEM = "system."

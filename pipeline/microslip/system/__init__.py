@@ -9,5 +9,5 @@ from .lumped import Link as Link
 from .lumped import Monitor as Monitor
 from .lumped import Spring as Spring
 from .lumped import System as System
-from .lumped import load_system as load_system
-from .lumped import system_basis as system_basis
+from .settings import load_system as load_system
+from .settings import system_basis as system_basis
