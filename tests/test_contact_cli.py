@@ -139,7 +139,7 @@ def test_quiet_means_quiet(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -
 
 
 @pytest.fixture(scope="module")
-def done(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def done(tmp_path_factory: pytest.TempPathFactory, undrawn_file: None) -> Path:
     folder = tmp_path_factory.mktemp("contact")
     assert main(["contact", str(write(folder)), "-o", str(folder / "out")]) == 0
     return folder / "out"

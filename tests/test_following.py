@@ -16,6 +16,8 @@ from microslip.cli import main
 from microslip.harmonic_balance import peak
 from microslip.stages import following
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 
 @pytest.fixture(scope="module")
 def place(tmp_path_factory: pytest.TempPathFactory) -> Path:

@@ -39,7 +39,7 @@ def run_chain(folder: Path, assignments: list[str] | None = None) -> set[str]:
 
 
 @pytest.fixture(scope="module")
-def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def finished(tmp_path_factory: pytest.TempPathFactory, unjudged_file: None) -> Path:
     folder = write_box(tmp_path_factory.mktemp("finished") / "box")
     assert run_chain(folder) == {MESH, BASIS, RESPONSE}
     return folder
@@ -387,7 +387,7 @@ def test_what_a_path_means(tmp_path, monkeypatch):
         places.meant(Path("geometry"), case=True)
 
 
-FEW = ["sweep.start=350.0", "sweep.stop=420.0", "sweep.points=15", "sweep.normal_forces=[100.0]", "harmonics=1"]
+FEW = ["sweep.start=350.0", "sweep.stop=420.0", "sweep.points=5", "sweep.normal_forces=[100.0]", "harmonics=1"]
 
 
 def resonance(at: Path, how: response.Wanted) -> dict[str, float]:
