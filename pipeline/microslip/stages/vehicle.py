@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
+from collections.abc import Iterator, Mapping
 from pathlib import Path
+from typing import Any
 
 from ..data import UserError
 from ..files import store
 from ..files.tables import columns_csv
 from ..report.vehicle import recorded_html, vehicle_html
+from ..results import Journal, open_journal
 from ..vehicle.kinematics import recorded
 from ..vehicle.settings import VehicleCase, load_kinematics, load_vehicle
 from ..vehicle.study import Studied, study
-from .stage import Made, Report, Stage
+from .stage import Made, Report, Stage, hash_of_code
 
 
 def vehicle_stage(
@@ -31,7 +35,7 @@ def vehicle_stage(
     stage = Stage(root / case.name / "unround.json", ("stages.vehicle",), force, report)
     files = [case_path.parent / s.profile for s in (case.wheel, case.rail) if isinstance(s.profile, str)]
     inputs = {"case": raw, "profiles": [store.hash_file(f) for f in files if f.is_file()], "pictures": pictures}
-    stage.make(inputs, lambda: _work(stage, case, case_path, pictures))
+    stage.make(inputs, lambda: _work(stage, case, case_path, pictures, inputs))
     told = json.loads(stage.product.read_text())
     return [stage.product.parent / name for name in told["files"]], told["sentences"], told["ended"]
 
@@ -55,10 +59,8 @@ def kinematics_stage(
     inputs = {"case": raw, "files": [store.hash_file(f) for f in files if f.is_file()], "pictures": pictures}
 
     def work() -> Made:
-        try:
-            found = recorded(case, case_path.parent)
-        except UserError as error:
-            raise UserError(f"{case_path}: {error}") from error
+        with _kept(stage, case_path, inputs) as journal:
+            found = recorded(case, case_path.parent, report, journal)
         stage.begin()
         folder, drawn = stage.product.parent, []
         store.write_text(folder / "circumference.csv", columns_csv(found.circumference(), 10))
@@ -72,6 +74,7 @@ def kinematics_stage(
         made = [page, folder / "circumference.csv", *drawn]
         told = {"files": [str(p.relative_to(folder)) for p in made], "sentences": found.sentences()}
         store.write_text(stage.product, json.dumps(told, indent=1) + "\n")
+        _points(stage).unlink()
         return Made(made)
 
     stage.make(inputs, work)
@@ -79,12 +82,27 @@ def kinematics_stage(
     return [stage.product.parent / name for name in told["files"]], told["sentences"]
 
 
-def _work(stage: Stage, case: VehicleCase, case_path: Path, pictures: bool) -> Made:
+def _points(stage: Stage) -> Path:
+    return stage.product.with_suffix(".points")
+
+
+@contextlib.contextmanager
+def _kept(stage: Stage, case_path: Path, inputs: Mapping[str, Any]) -> Iterator[Journal]:
+    """A journal of what is finished, until all that is made of it is there; mistakes are told with the case."""
+    depends = store.hash_settings({**inputs, "pictures": None, "code": hash_of_code(stage.code)})
+    with open_journal(_points(stage), depends, {"case": str(case_path)}, stage.force) as journal:
+        try:
+            yield journal
+        except UserError as error:
+            if not journal.series:
+                _points(stage).unlink()
+            raise UserError(f"{case_path}: {error}") from error
+
+
+def _work(stage: Stage, case: VehicleCase, case_path: Path, pictures: bool, inputs: Mapping[str, Any]) -> Made:
     folder = stage.product.parent
-    try:
-        found = study(case, case_path.parent, stage.report)
-    except UserError as error:
-        raise UserError(f"{case_path}: {error}") from error
+    with _kept(stage, case_path, inputs) as journal:
+        found = study(case, case_path.parent, stage.report, journal)
     former = json.loads(stage.product.read_text())["files"] if stage.product.is_file() else []
     stage.begin()
     for name in former:  # what this run does not write again would be of another case
@@ -97,6 +115,7 @@ def _work(stage: Stage, case: VehicleCase, case_path: Path, pictures: bool) -> M
     files = [str(path.relative_to(folder)) for path in made]
     told = {"files": files, "sentences": found.sentences(), "ended": found.ended}
     store.write_text(stage.product, json.dumps(told, indent=1) + "\n")
+    _points(stage).unlink()
     return Made(made)
 
 
