@@ -462,6 +462,9 @@ WRONG = {
     "wear that adds": ("wear.coefficient=-1", "wear.coefficient"),
     "a table of contacts without a load": ("contacts={lateral=0.004, yaw=0.01}; vertical_force=0", "contacts: "),
     "contacts beyond the rail": ("contacts={lateral=0.04, yaw=0.01, points=[4, 4]}; model.exact=0", "smaller reach"),
+    "profiles renewed by nothing": ("wear={coefficient=1e-13, updates=3}", "passages"),
+    "a roll that follows": ('pose={side="both", roll=0.001}', "pose.roll"),
+    "two wheels that wear": ('pose.side="both"; wear={coefficient=1e-13, updates=3, passages=1e5}', "wear.updates"),
     "a table of constant friction": ("table={}; heat.limit=300", "table"),
 }
 

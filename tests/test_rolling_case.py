@@ -17,6 +17,7 @@ from microslip.rolling.rolled import COLD
 from microslip.rolling.settings import load_rolling
 from microslip.rolling.study import Studied, study
 from microslip.rolling.temperature import falling
+from microslip.rolling.wearing import wearing
 
 CASE = Path(__file__).parents[1] / "pipeline" / "cases" / "wheel-rail.toml"
 FEW = ("creep.points=3", "creep.stop=0.02", "model.exact=0")
@@ -103,6 +104,61 @@ def test_tables_and_page_hold_temperature_and_wear(
     (tmp_path / "mu.csv").write_text("speed,mu\n0.01,0.2\n0.1,0.15\n1,0.1\n")
     assert main(["roll", "case.toml", *sets, "--no-pictures"]) == 0
     assert f"{hot:.4g} degrees C hot" not in capsys.readouterr().out
+
+
+def test_both_wheels_of_an_axle() -> None:
+    """Each carries the vertical force; forces about the axle are those of its wheels, and mirror with the pose."""
+    one, other = (
+        studied("pose.side='both'", f"pose.lateral={0.003 * s}", f"pose.yaw={0.001 * s}", "wear.coefficient=1e-14")
+        for s in (1, -1)
+    )
+    assert [p.side for p in one.patches] != [p.side for p in other.patches] and len(one.patches) == 2
+    felt = [{p.side: np.array(row[2:], float) for row, p in zip(f.generalised()[1][::2], f.patches, strict=True)}
+            for f in (one, other)]  # fmt: skip
+    np.testing.assert_allclose([felt[0][side][2] for side in felt[0]], -1e5, rtol=2e-2)  # creep lifts a little as well
+    np.testing.assert_allclose([p.normal_force * np.cos(p.angle) for p in one.patches], 1e5, rtol=1e-5)
+    np.testing.assert_allclose(felt[0]["left"], felt[1]["right"] * [1, -1, 1, -1, 1, -1], rtol=1e-6, atol=1e-2)
+    assert sum("wheel feels" in s for s in one.sentences()) == 2 and len(set(one.worn()["patch"])) == 2
+
+
+def test_profiles_that_wear_are_run_on_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The first update is the wear of a passage times their number; a case that takes the worn profiles has the
+    pressure of the last row."""
+    shutil.copy(CASE, tmp_path / "case.toml")
+    monkeypatch.chdir(tmp_path)
+    wear = "wear={coefficient=2e-13, updates=4, passages=4e5}"
+    sets = [w for s in ("creep.points=3", "model.exact=0") for w in ("--set", s)]
+    assert main(["roll", "case.toml", *sets, "--set", wear, "--no-pictures"]) == 0
+    assert "After 4e+05 passages" in capsys.readouterr().out
+    folder = tmp_path / "build" / "wheel-rail"
+    for name in ("wheel_worn", "rail_worn"):
+        shutil.copy(folder / f"{name}.csv", tmp_path)
+    rows, once = (list(csv.DictReader((folder / f"{name}.csv").open())) for name in ("wearing", "wear"))
+    assert float(rows[1]["deepest_wheel_m"]) == pytest.approx(1e5 * max(float(r["depth_m"]) for r in once), rel=0.02)
+    again = ["wheel.profile='wheel_worn.csv'", "rail.profile='rail_worn.csv'", "wheel.at=0.75", "rail.at=0.75"]
+    assert main(["roll", "case.toml", *sets, *(w for s in again for w in ("--set", s)), "--no-pictures", "-q"]) == 0
+    patch = next(csv.DictReader((folder / "patches.csv").open()))
+    assert float(patch["largest_pressure_Pa"]) == pytest.approx(float(rows[-1]["largest_pressure_Pa"]), rel=1e-3)
+    assert float(rows[-1]["largest_pressure_Pa"]) < 0.97 * float(rows[0]["largest_pressure_Pa"])
+
+
+def test_worn_volume_and_mirror() -> None:
+    """Off both bodies, the coefficient times the work of friction; the left wheel of the mirrored pose wears alike."""
+    wear = "wear={coefficient=2e-13, updates=3, passages=3e5, lateral=[%g, %g]}"
+    case, mirror = (
+        load_rolling(CASE, [*FEW, wear % (0.002 * s, 0.004 * s), f"pose.yaw={0.001 * s}", f"pose.side='{side}'"])[0]
+        for s, side in ((1, "right"), (-1, "left"))
+    )
+    one, other = (wearing(c, c.track(CASE.parent), c.characteristic(CASE.parent)) for c in (case, mirror))
+    assert one.moments[-1].volume == pytest.approx(2 * 2e-13 * one.work, rel=1e-9)
+    np.testing.assert_allclose(other.wheel.depth, one.wheel.depth, atol=1e-9 * one.wheel.depth.max())
+    few = load_rolling(CASE, [*FEW, "wear={coefficient=2e-13, updates=1, passages=3e5, smoothing=0}"])[0]
+    assert (
+        "warning: an update takes so much"
+        in wearing(few, case.track(CASE.parent), case.characteristic(CASE.parent)).warning()
+    )
 
 
 # --- bodies behind the patch -----------------------------------------------------------------------------------------
