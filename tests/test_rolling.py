@@ -479,6 +479,8 @@ WRONG = {
     "profiles renewed by nothing": ("wear={coefficient=1e-13, updates=3}", "passages"),
     "a roll that follows": ('pose={side="both", roll=0.001}', "pose.roll"),
     "two wheels that wear": ('pose.side="both"; wear={coefficient=1e-13, updates=3, passages=1e5}', "wear.updates"),
+    "rough by nothing": ("roughness=0", "roughness"),
+    "a table of smooth bodies": ("table={}; roughness=1e-5", "table"),
     "a table of constant friction": ("table={}; heat.limit=300", "table"),
 }
 

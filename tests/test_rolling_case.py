@@ -6,13 +6,20 @@ import csv
 import shutil
 from pathlib import Path
 
+import jax.numpy as jnp
 import numpy as np
 import pytest
 from scipy.integrate import quad
+from scipy.optimize import brentq
 
+import microslip as ms
 from microslip.cli import main
+from microslip.contact.friction import Coulomb
+from microslip.contact.heights import Polynomial
+from microslip.contact.law import value
 from microslip.contact.solids import Solid
 from microslip.rolling.behind import even
+from microslip.rolling.laws import Surface
 from microslip.rolling.rolled import COLD
 from microslip.rolling.settings import load_rolling
 from microslip.rolling.study import Studied, study
@@ -84,6 +91,14 @@ def test_worn_volume_is_the_coefficient_times_the_work_of_friction() -> None:
         assert found.of_pose is not None and (worn["depth_m"] >= 0).all()
         assert worn["depth_m"] @ worn["width_m"] == pytest.approx(2e-14 * found.of_pose.power.sum(), rel=1e-10)
         assert any("times the power of the creepages" in s for s in found.warnings())
+
+
+def test_a_rough_case_has_its_own_curve() -> None:
+    """A number is R_Z in m of the polynomial; models without roughness do not stand beside it."""
+    smooth, rough = studied("creep.stop=0.002"), studied("creep.stop=0.002", "roughness=2e-5")
+    assert smooth.forces is not None and rough.forces is not None
+    assert (np.abs(rough.forces.x[1]) < 0.99 * np.abs(smooth.forces.x[1])) and rough.reference is None
+    assert any("know no roughness" in s for s in rough.sentences())
 
 
 def test_tables_and_page_hold_temperature_and_wear(
@@ -159,6 +174,35 @@ def test_worn_volume_and_mirror() -> None:
         "warning: an update takes so much"
         in wearing(few, case.track(CASE.parent), case.characteristic(CASE.parent)).warning()
     )
+
+
+# --- roughness -------------------------------------------------------------------------------------------------------
+
+PATCH = {"a": 8e-3, "b": 4e-3, "normal_force": 82e3, "friction": Coulomb(value(0.3)), "speed": 20.0, "shear": 82e9,
+         "poisson": 0.28}  # fmt: skip
+
+
+def test_rough_bodies_carry_the_same_force_and_are_softer() -> None:
+    """Without slip, by quadrature: area that comes into contact carries nothing yet, t' = -k h s, and what is lost
+    takes its part along, (t/h)' = -k s, with (3.3-4) for h and the depth that makes the force F_N. Smooth bodies are
+    the limit; all that slides carries mu F_N."""
+    smooth = ms.creep_forces([1e-9, 2e-3, 5e-2], 0, 0, 8e-3, 4e-3, 82e3, 0.3, 82e9, 0.28)
+    rough = [ms.forces_by_characteristic([1e-9, 2e-3, 5e-2], 0, 0, **PATCH, surface=Surface(Polynomial(), value(R)))
+             for R in (1e-13, 9.267e-5 / 2)]  # fmt: skip
+    np.testing.assert_allclose(rough[0].x, smooth.x, rtol=1e-6)
+    np.testing.assert_allclose(rough[1].x[2], -0.3 * 82e3, rtol=1e-6)
+    reach = np.cos(np.pi * (np.arange(100) + 0.5) / 200)[:, None]  # of strips, over a; their width goes with it too
+    x = reach * (1 - (np.arange(400) + 0.5) / 200)  # from the leading edge on
+    u, dx, area = 2 * (reach**2 - x**2), reach / 200, reach**2 * np.ones_like(x)  # u: of smooth bodies, over R_Z
+
+    def missing(more: float) -> float:
+        return float(np.sum((np.asarray(Polynomial().volume(jnp.asarray(more * u))) - u) * area))
+
+    h = np.asarray(Polynomial().area(jnp.asarray(brentq(missing, 1, 3) * u)))
+    front = np.cumsum(h * dx, axis=1)[:, :200]
+    rear = h[:, 200:] * (front[:, -1:] / h[:, 199:200] + np.arange(1, 201) * dx)
+    slope = np.sum(np.hstack([front, rear]) * area) / np.sum((reach - x) * area)
+    assert rough[1].x[0] / smooth.x[0] == pytest.approx(slope, rel=0.01)
 
 
 # --- bodies behind the patch -----------------------------------------------------------------------------------------

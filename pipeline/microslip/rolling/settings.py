@@ -11,7 +11,8 @@ from pydantic import BeforeValidator, Field, model_validator
 
 from ..contact.friction import Friction
 from ..contact.keys import FileName, OneOrTwo, Poisson
-from ..contact.settings import AnyFriction, _short
+from ..contact.law import value
+from ..contact.settings import AnyFriction, AnyRoughness, _short
 from ..contact.solids import Solid
 from ..data import UserError
 from ..settings.body import (
@@ -30,6 +31,7 @@ from ..settings.mistakes import validate
 from .contact_table import POINTS as SHIFTS
 from .ellipse import combined
 from .kalker import Coefficients
+from .laws import Surface
 from .profiles import EVERYWHERE, WIDTH, Mirror, Profile, circle, has_arc, polynomial, read_profile
 from .rolled import Heat
 from .strips import Distribution, Spin
@@ -233,6 +235,7 @@ class RollingCase(Model):
     wheel: Wheel
     rail: Rail
     friction: Annotated[AnyFriction, _short("coulomb", "mu", AnyFriction)]
+    roughness: Annotated[AnyRoughness | None, _short("polynomial", "R_Z", AnyRoughness)] = None
     vertical_force: NotNegative
     pose: PoseOfCase = PoseOfCase()
     creep: Creep
@@ -261,8 +264,11 @@ class RollingCase(Model):
             )
         if self.contacts is not None and not self.vertical_force > 0:
             raise ValueError("contacts: is a table for the vertical force of the case; give vertical_force above 0")
-        if self.table is not None and not self.is_constant:
-            raise ValueError("table: is of constant friction; give a number, without heat.limit, or remove the table")
+        if self.table is not None and not (self.is_constant and self.roughness is None):
+            raise ValueError(
+                "table: is of constant friction on smooth bodies; give a number, without heat.limit and roughness, or "
+                "remove the table"
+            )
         return self
 
     def _stands(self) -> None:
@@ -295,6 +301,17 @@ class RollingCase(Model):
         if not np.max(found.highest(jnp.ones(1))) > 0:
             raise UserError("friction: is 0 at all speeds; the creep force is a part of it, so give more than 0")
         return found
+
+    def surface(self, folder: Path) -> Surface | None:
+        """Rough, if it is asked.
+
+        Raises:
+            UserError: a file that is none.
+        """
+        if self.roughness is None:
+            return None
+        heights, R_Z = self.roughness.heights(folder / "case.toml", 1.0)
+        return Surface(heights, value(R_Z))
 
     @property
     def solids(self) -> tuple[Solid, Solid]:

@@ -124,6 +124,8 @@ class Studied:
             told.append(
                 f"FASTSIM as published, at {len(i)} points of the curve, is at most {100 * off:.2g} % of mu F_N away."
             )
+        elif self.case.is_constant:
+            told.append("FASTSIM and exact half-spaces know no roughness, so that neither stands beside this curve.")
         else:
             told.append(
                 f"mu is the highest coefficient, {self.highest:.4g}; FASTSIM and exact half-spaces know none that "
@@ -253,10 +255,11 @@ def study(case: RollingCase, folder: Path) -> Studied:
     n = len(over)
     kept = np.array([shown, *range(n, len(speed))])
     heat = case.heat.made() if case.heat else None
-    states = rolled(given, friction, speed, kept, heat, **case.model.model_dump(exclude={"exact"}))
+    rough, how = case.surface(folder), case.model.model_dump(exclude={"exact"})
+    states = rolled(given, friction, speed, kept, heat, rough, **how)
     forces, of_pose = (Forces(*(v[part] for v in states.forces)) for part in (slice(n), slice(n, None)))
     reference, beside, missed = None, None, ""
-    if case.is_constant:
+    if case.is_constant and rough is None:
         at = np.unique(np.linspace(0, n - 1, 13).astype(int))
         totals = [fastsim(*s[:6], highest, *s[6:])[0] for s in given[:, at].T]  # type: ignore[call-arg]
         reference = at, np.array([np.hypot(f.x, f.y) for f in totals]) / (highest * p.normal_force)

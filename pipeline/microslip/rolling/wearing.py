@@ -11,6 +11,7 @@ import numpy as np
 from ..contact.friction import Friction
 from ..data import Array, UserError
 from .ellipse import ellipses
+from .laws import Surface
 from .profiles import Profile
 from .rolled import rolled, sources
 from .settings import RollingCase
@@ -101,8 +102,9 @@ class Wearing:
 
 
 def wearing(
-    case: RollingCase, track: Track, friction: Friction, report: Callable[[str], None] = lambda _: None
-) -> Wearing:
+    case: RollingCase, track: Track, friction: Friction, surface: Surface | None = None,
+    report: Callable[[str], None] = lambda _: None,
+) -> Wearing:  # fmt: skip
     """Updates of a case; wheel and rail are passed equally often.
 
     Raises:
@@ -112,23 +114,24 @@ def wearing(
     assert asked is not None and asked.passages is not None
     bodies = [Body.of(track.wheel, -1.0), Body.of(track.rail, 1.0)]
     each, moments, work, least = asked.passages / asked.updates, [], 0.0, 0.0
+    shifts = asked.lateral or (case.pose.lateral,)
     for k in range(asked.updates + 1):
         if k % max(1, asked.updates // 10) == 0:
             report(f"profiles that wear: {k} of {asked.updates} updates")
         wheel, rail = (body.profile(asked.smoothing) for body in bodies)
         seen = replace(track, wheel=wheel, rail=rail)
-        runs = [one for lateral in asked.lateral or (case.pose.lateral,) for one in _run(case, seen, friction, lateral)]
+        runs = [one for lateral in shifts for one in _run(case, seen, friction, surface, lateral)]
         moments.append(_moment(k * each, runs, bodies))
         if k == asked.updates:
             break
-        share = each / len(asked.lateral or (0,))
+        share = each / len(shifts)
         bodies = [_worn(body, runs, asked.coefficient * share, case.pose.side) for body in bodies]
         work += share * sum(float(one.width @ one.work) for one in runs)
         least = least or _shortest(runs, sum(body.depth.max() for body in bodies), track)
     return Wearing(bodies[0], bodies[1], moments, work, asked.smoothing, least)
 
 
-def _run(case: RollingCase, track: Track, friction: Friction, lateral: float) -> list[Strips]:
+def _run(case: RollingCase, track: Track, friction: Friction, surface: Surface | None, lateral: float) -> list[Strips]:
     """A passage in a pose."""
     found = patches(track, replace(case.posed(), lateral=lateral), case.pose.side, case.vertical_force)
     if not found:

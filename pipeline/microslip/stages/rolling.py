@@ -127,7 +127,7 @@ def _contacts(stage: Stage, found: Studied) -> ContactTable | None:
 def _wearing(stage: Stage, found: Studied, folder: Path) -> Wearing | None:
     if found.case.wear is None or not found.case.wear.updates:
         return None
-    return wearing(found.case, found.track, found.case.characteristic(folder), stage.report)
+    return wearing(found.case, found.track, found.case.characteristic(folder), found.case.surface(folder), stage.report)
 
 
 def _worn_tables(worn: Wearing, folder: Path) -> list[Path]:
