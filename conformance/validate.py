@@ -18,6 +18,7 @@ import os
 import re
 import subprocess
 import sys
+from functools import cache
 from itertools import product
 from pathlib import Path
 
@@ -89,6 +90,7 @@ class Schema:
         self.table = json.loads(path.read_text(encoding="utf-8"))
         self.entries = {e["path"]: e for e in self.table["entries"]}
         self.patterns = [(self._pattern(p), e) for p, e in self.entries.items()]
+        self.find = cache(self._find)
 
     @staticmethod
     def _pattern(path):
@@ -99,11 +101,14 @@ class Schema:
             text = r"(?P<S>/speed_\d+/nd_\d+|/range/nd_\d+/sample_\d+)" + text[1:]
         return re.compile(text.replace(r"_(?P<i>[^/]+)", r"_(?P<i>\d+)").replace(r"_(?P<k>[^/]+)", r"_(?P<k>\d+)"))
 
-    def find(self, path, attribute=False):
+    def _find(self, path, attribute=False):
         """Entry and words of a path (an attribute is path@name); literal names win."""
         of_kind = ((p, e) for p, e in self.patterns if attribute == (e["kind"] == "attribute"))
         found = [(m.groupdict(), e) for p, e in of_kind if (m := p.fullmatch(path))]
         return min(found, key=lambda f: f[1]["path"].count("<"), default=({}, None))
+
+
+known_schema = cache(Schema)
 
 
 def check_schema(file, places, schema):
@@ -510,7 +515,7 @@ def validate(path, answers=None):
             places = inspect(file, path.stat().st_size)
             if file.attrs.get("format") != "microslip-modal-basis":
                 raise Refused("its attribute 'format' does not say microslip-modal-basis")
-            found += check_schema(file, places, Schema())
+            found += check_schema(file, places, known_schema())
             with np.errstate(all="ignore"):  # absurd numbers are findings, not warnings
                 if not found:
                     found += check_numbers(file)

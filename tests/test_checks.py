@@ -33,12 +33,12 @@ pytestmark = pytest.mark.usefixtures("undrawn")
 CLOSED = CASE.replace('law = "smooth"\npoints = [2, 2]', 'law = "jenkins"')
 
 
-@pytest.fixture(scope="module")
-def answered(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[str]]:
+@pytest.fixture(scope="module", params=["jenkins", pytest.param("smooth", marks=pytest.mark.slow)])
+def answered(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[str]]:
     """The folder of a case, and what was told."""
     folder = tmp_path_factory.mktemp("checks")
     shutil.copy(SAMPLES / "basis.h5", folder)
-    (folder / "case.toml").write_text(CASE)
+    (folder / "case.toml").write_text(CLOSED if request.param == "jenkins" else CASE)
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(folder)
         patch.setattr(making, "_can_draw", lambda: "not in this test")

@@ -35,7 +35,7 @@ from microslip.files.hdf5 import seal  # noqa: E402
 from microslip.modal.compute import modal_basis  # noqa: E402
 
 SMALL = [n for n in bodies.SAMPLES if n not in bodies.LARGE]
-SCHEMA = validate.Schema()
+SCHEMA = validate.known_schema()
 
 
 @cache

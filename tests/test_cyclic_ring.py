@@ -358,6 +358,7 @@ def test_coriolis_waves_converge_to_the_rings():
 # ---------------------------------------------------------------- neighbours in contact
 
 
+@cache
 def coupled_ring(stiffness: float):
     """K of the ring with springs (N/m, all directions) between the mean motions of facing contacts."""
     full = whole()

@@ -1,8 +1,8 @@
 """Exports in the programs they are for: Octave, pyHarm and Exudyn build the body and compute with it.
 
-pyHarm and Exudyn live in environments of their own, made by ``make peers`` (tests/peers/setup.sh); elsewhere their
-interpreters may be named by MICROSLIP_PYHARM and MICROSLIP_EXUDYN. Without them the tests are skipped, or fail with
-MICROSLIP_PEERS=required, as in CI.
+pyHarm, Exudyn and FMPy (`test_exchange_fmu`) live in environments of their own, made by ``make peers``
+(tests/peers/setup.sh); elsewhere their interpreters may be named by MICROSLIP_PYHARM and so on. Without them the tests
+are skipped, or fail with MICROSLIP_PEERS=required, as in CI.
 """
 
 from __future__ import annotations
@@ -222,11 +222,13 @@ def crossing_frequency(time: Array, signal: Array) -> float:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("peer", "head"), [("pyharm", "pyHarm"), ("exudyn", "Exudyn")])
-def test_the_readers_lines_of_the_page_run(peer: str, head: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("peer", "form", "head"), [("pyharm", "pyharm", "pyHarm"), ("exudyn", "exudyn", "Exudyn"), ("fmpy", "fmu", "FMU")]
+)
+def test_the_readers_lines_of_the_page_run(peer: str, form: str, head: str, tmp_path: Path) -> None:
     if interpreter(peer) is None:
         pytest.skip(f"{peer} is not installed: make peers")
-    writer(peer)(body("craig-bampton"), tmp_path / f"basis{formats()[peer].ending}")
+    writer(form)(body("craig-bampton"), tmp_path / f"basis{formats()[form].ending}")
     environment = {k: v for k, v in os.environ.items() if k not in ("PYTHONPATH", "PYTHONHOME")}
     done = subprocess.run(
         [str(interpreter(peer)), "-c", blocks()[head]],

@@ -108,6 +108,15 @@ def cantilever() -> Assembly:
     return held(group(np.sqrt(squares), rows, 0.03), law, [1], np.zeros(1), np.zeros(1), 0.3)
 
 
+def slider(harmonics: int, samples: int, ratio: float = 0.02, force: float = 1.0) -> balance.Problem:
+    """1 kg, 100 rad/s, a Jenkins element of 2e4 N/m that slides at 0.6 N, after 30 um."""
+    one = np.ones(1)
+    rows = {"face": np.outer([0, 1, 0, 0, 0, 0], one), "push": one, "tip": one}
+    law = PointContact(Preload(jnp.asarray(2.0)), Coulomb(jnp.asarray(0.3)), jnp.asarray(2e4))
+    rubs = held(group(np.array([100.0]), rows, ratio), law, [1], np.zeros(1), np.zeros(1), force)
+    return balance.of(rubs, harmonics, samples, length=3e-5)
+
+
 def beam_in_space() -> Assembly:
     """Two planes of bending, of another stiffness each, and one axial mode; the tip is pressed down with 1.
 

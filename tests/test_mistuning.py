@@ -380,6 +380,7 @@ scatter = [
 
 def test_a_case_leaves_its_samples(tmp_path: Path) -> None:
     """The table holds the samples of the ring, more of them go on, and measured frequencies are shuffled."""
+    from microslip.stages.answer import CaseJob
     from microslip.stages.mistuning import mistuning_stage
 
     path, files, told = tmp_path / "case.toml", {"vane": ms.sample()}, list[str]()
@@ -388,7 +389,8 @@ def test_a_case_leaves_its_samples(tmp_path: Path) -> None:
     rows = {}
     for samples in (4, 8):
         path.write_text(CASE.format(file=ms.sample(), samples=samples, sector=2))
-        made, sentences, fine = mistuning_stage(path, files, tmp_path, report=told.append, pictures=False, workers=1)
+        job = CaseJob(path, files, tmp_path, report=told.append, pictures=False)
+        made, sentences, fine = mistuning_stage(job, workers=1)
         rows[samples] = (tmp_path / "samples.csv").read_text().splitlines()
     assert fine
     assert rows[8][:5] == rows[4]
@@ -404,7 +406,7 @@ def test_a_case_leaves_its_samples(tmp_path: Path) -> None:
         if words == "other.h5":
             (tmp_path / "other.h5").unlink()
         with pytest.raises(UserError, match=words):
-            mistuning_stage(path, files, tmp_path, pictures=False, workers=1)
+            mistuning_stage(CaseJob(path, files, tmp_path, pictures=False), workers=1)
     assert (tmp_path / "samples.csv").read_text().splitlines() == rows[8]
 
 

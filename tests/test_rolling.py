@@ -21,6 +21,8 @@ from microslip.contact.law import value
 from microslip.contact.point import opposed, slide, weight
 from microslip.contact.solids import Solid
 from microslip.data import UserError
+from microslip.rolling.contact_table import ContactTable
+from microslip.rolling.contact_table import forces as contact_forces
 from microslip.rolling.ellipse import combined, ellipses
 from microslip.rolling.profiles import Profile, polynomial
 from microslip.rolling.strips import forces, poses
@@ -309,6 +311,58 @@ def test_two_patches_share_the_vertical_force_by_their_stiffness() -> None:
     np.testing.assert_allclose([p.approach for p in found], exact.approach, rtol=1e-2)
 
 
+@pytest.fixture(scope="module")
+def contacts() -> ContactTable:
+    return ms.contact_table(track(), 1e5, 4e-3, 0.02, points=(6, 2), checked=6)
+
+
+def test_a_table_of_contacts_is_the_axle_between_its_poses(contacts: ContactTable, tmp_path: Path) -> None:
+    """Patches, creepages, forces and moments of both wheels at a pose beside those of `axle`, through a file."""
+    table = ms.read_contact_table(ms.write_contact_table(tmp_path / "t.h5", contacts))
+    left, right, pose = ms.axle(track(), ms.Pose(2.9e-3, -0.013, 0.0, 20.0, 44.0), 2e5, even=True)
+    read = table.forces([2.9e-3, 0.0], -0.013, 20.0, MU, turning=44.0)
+    assert read.roll[0] == pytest.approx(pose.roll, abs=1e-8) and not read.jumps.any()
+    for k, (p,) in enumerate((left, right)):
+        got = [v[0, k, 0] for v in (read.patches.ahead, read.patches.y, read.patches.z, read.xi, read.eta, read.phi)]
+        np.testing.assert_allclose(got, [*p.place, p.xi, p.eta, p.phi], rtol=1e-4, atol=1e-7)
+        f = ms.creep_forces(p.xi, p.eta, p.phi, p.a, p.b, p.normal_force, MU, G, NU)
+        felt = p.felt(f.x[0], f.y[0], f.moment[0], np.array([0.0, *p.axle]))
+        np.testing.assert_allclose(read.felt[0, k, :3], felt[:3], atol=1e-4 * MU * 1e5)
+        np.testing.assert_allclose(read.felt[0, k, 3:], felt[3:], atol=1e-4 * MU * 1e5)
+    assert (table.error[3, 2], table.checked, table.jumping) < (1e-3, 12, 1e-9)
+
+
+def test_a_table_of_contacts_is_read_for_other_loads_and_creepages(contacts: ContactTable) -> None:
+    """Hertz' axes of the load on each wheel; creepages add; mirrored poses; no load, no force; as a pure function."""
+    y, yaw = np.array([3e-3, -3e-3]), np.array([0.01, -0.01])
+    read = contacts.forces(y, yaw, 20.0, MU, load=[8e5, 0.0], xi=1e-3)
+    plain = contacts.forces(y, yaw, 20.0, MU)
+    np.testing.assert_allclose(read.patches.a[:, 0], 2 * plain.patches.a[:, 0], rtol=1e-12)
+    np.testing.assert_allclose(read.xi, plain.xi + 1e-3, rtol=1e-12)
+    assert (read.felt[:, 1] == 0).all()
+    np.testing.assert_allclose(plain.felt[0, 0], plain.felt[1, 1] * [1, -1, 1, -1, 1, -1], rtol=1e-9, atol=1e-6)
+    flat = [np.full(2, v) for v in (20.0, MU, 20 / 0.46, 0.0, 0.0, 0.0)]
+    pure = jax.jit(lambda y: contact_forces(contacts, y, yaw, *flat, np.full((2, 2), 1e5)).felt)
+    np.testing.assert_allclose(pure(y), plain.felt, rtol=1e-9, atol=1e-6)
+    for wrong, said in (({"lateral": 5e-3}, "lateral: is 0.005"), ({"speed": 0.0}, "speed"), ({"load": -1.0}, "load")):
+        with pytest.raises(UserError, match=said):
+            contacts.forces(**{"lateral": 0.0, "yaw": 0.0, "speed": 20.0, "friction": MU} | wrong)
+
+
+def test_jumps_are_flagged_and_not_read_across() -> None:
+    """A rail with two crowns below a convex wheel, which touches both in the middle and one of them on either side."""
+    y = np.linspace(-0.03, 0.03, 1201)
+    z = np.minimum((y - 0.012) ** 2, (y + 0.012) ** 2) / 0.2
+    two = track(polynomial([-1.0]), Profile(y, np.minimum(z, 6e-4)))
+    table = ms.contact_table(two, 2e4, 3e-3, 0.01, points=(5, 2), checked=3)
+    read = table.forces(np.linspace(-3e-3, 3e-3, 25), 0.0, 1.0, MU)
+    there = read.patches.normal_force > 0
+    assert set(there.sum(axis=-1).ravel()) == {1, 2} and 0 < read.jumps.mean() < 0.5
+    assert (np.abs(np.abs(read.patches.on_rail[there]) - 0.01) < 1e-3).all()  # between the crowns there is none
+    changes = (np.diff(there.sum(axis=-1), axis=0) != 0).any(axis=1)
+    assert (read.jumps[1:].any(axis=1) | read.jumps[:-1].any(axis=1))[changes].all()
+
+
 def test_wheels_off_the_rail_have_no_patch() -> None:
     assert ms.patches(track(), ms.Pose(), "right", 0.0) == []
 
@@ -406,6 +460,8 @@ WRONG = {
     "lighter than nothing": ("heat.density=-1", "heat.density"),
     "below absolute zero": ("heat.start=-300", "heat.start"),
     "wear that adds": ("wear.coefficient=-1", "wear.coefficient"),
+    "a table of contacts without a load": ("contacts={lateral=0.004, yaw=0.01}; vertical_force=0", "contacts: "),
+    "contacts beyond the rail": ("contacts={lateral=0.04, yaw=0.01, points=[4, 4]}; model.exact=0", "smaller reach"),
     "a table of constant friction": ("table={}; heat.limit=300", "table"),
 }
 

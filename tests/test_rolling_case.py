@@ -11,6 +11,8 @@ import pytest
 from scipy.integrate import quad
 
 from microslip.cli import main
+from microslip.contact.solids import Solid
+from microslip.rolling.behind import even
 from microslip.rolling.rolled import COLD
 from microslip.rolling.settings import load_rolling
 from microslip.rolling.study import Studied, study
@@ -101,3 +103,46 @@ def test_tables_and_page_hold_temperature_and_wear(
     (tmp_path / "mu.csv").write_text("speed,mu\n0.01,0.2\n0.1,0.15\n1,0.1\n")
     assert main(["roll", "case.toml", *sets, "--no-pictures"]) == 0
     assert f"{hot:.4g} degrees C hot" not in capsys.readouterr().out
+
+
+# --- bodies behind the patch -----------------------------------------------------------------------------------------
+
+
+def test_an_even_traction_on_a_square() -> None:
+    """Mean of 1/r over a square of side 1: 4 ln(1 + sqrt 2) - 4 (sqrt 2 - 1)/3; normal (1 - nu)/(2 pi G) of it, along a
+    side the mean of both Cerruti terms, (1 - nu/2)/(2 pi G)."""
+    mean = 4 * np.log(1 + np.sqrt(2)) - 4 * (np.sqrt(2) - 1) / 3
+    normal, along, across = even(Solid(2.1e11, 0.28), 0.02, 0.02) * 2 * np.pi * Solid(2.1e11, 0.28).shear * 0.02
+    assert normal == pytest.approx(0.72 * mean, rel=5e-4)
+    np.testing.assert_allclose([along, across], 0.86 * mean, rtol=5e-4)
+
+
+@pytest.mark.slow
+def test_what_yields_behind_a_patch_is_counted_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A rail whose modes hold little and one whose basis holds all, with patches of unlike size: the same stiffness, to
+    1 %; only the spring that belongs beside the modes differs. A patch that is too small is refused."""
+    shutil.copytree(CASE.parents[2] / "geometry" / "rail", tmp_path / "geometry" / "rail")
+    shutil.copy(CASE, tmp_path / "case.toml")
+    body = tmp_path / "geometry" / "rail" / "body.toml"
+    one = body.read_text().replace("size = 30.0", "size = 40.0")
+    wide = one.replace("patch_length = 30.0", "patch_length = 40.0").replace("patch_width = 26.0", "patch_width = 34.0")
+    monkeypatch.chdir(tmp_path)
+    rows = []
+    for text in (one, 'reduction = "rubin"\n' + wide):
+        body.write_text(text)
+        sets = ["--set", 'elastic={wheel="rail"}', "--set", "model.exact=0", "--set", "creep.points=3"]
+        assert main(["roll", "case.toml", *sets, "--no-pictures"]) == 0
+        assert "as elastic bodies the sticking patch" in capsys.readouterr().out
+        with (tmp_path / "build" / "wheel-rail" / "stiffness.csv").open() as file:
+            rows.append({r["direction"]: {k: float(v) for k, v in r.items() if k != "direction"}
+                         for r in csv.DictReader(file)})  # fmt: skip
+    for name in ("normal", "along", "across"):
+        of = [r[name] for r in rows]
+        assert of[1]["stiffness_N_per_m"] == pytest.approx(of[0]["stiffness_N_per_m"], rel=0.01)
+        assert of[0]["stiffness_N_per_m"] < 0.9 * of[0]["stiffness_half_spaces_N_per_m"]
+        assert of[1]["rail_beyond_modes_nm_per_kN"] < 0 < of[0]["rail_modes_nm_per_kN"]
+    assert rows[1]["normal"]["spring_beside_modes_N_per_m"] > 1.2 * rows[0]["normal"]["spring_beside_modes_N_per_m"]
+    assert main(["roll", "case.toml", *sets, "--set", "vertical_force=4e6", "-q"]) == 2
+    assert "larger than the face" in capsys.readouterr().err

@@ -25,6 +25,7 @@ from microslip.cli import main
 from microslip.linalg.quadratic import Window, every_root, every_value
 from microslip.roots.spectrum import spectrum
 from microslip.roots.waves import waves
+from microslip.stages.answer import CaseJob
 from microslip.stages.moving import moving_shape
 from microslip.stages.places import modal_files
 from microslip.stages.squeal import State, moving, shapes, squeal_stage, state_of
@@ -185,7 +186,7 @@ def test_a_killed_run_goes_on_and_motions_in_time_swing_as_limit_cycles(belt: Pa
                 raise KeyboardInterrupt
 
         with contextlib.suppress(KeyboardInterrupt):
-            squeal_stage(belt, files, Path(folder), report=report, pictures=False)
+            squeal_stage(CaseJob(belt, files, Path(folder), report=report, pictures=False))
         return said
 
     assert len(run("a", "3 of 5")) == 3
@@ -196,7 +197,7 @@ def test_a_killed_run_goes_on_and_motions_in_time_swing_as_limit_cycles(belt: Pa
     }  # fmt: skip
     assert not Path("a/stability.points").exists()
     told = json.loads(Path("a/stability.json").read_text())  # four points do not reach the end
-    assert not told["complete"] and sum("lost at" in line and "points: 4" in line for line in told["lines"]) == 3
+    assert not told["whole"] and sum("lost at" in line and "points: 4" in line for line in told["said"]) == 3
     for table, checks in (("stability_cycle_1.csv", 3), ("stability_relief.csv", 6)):
         rows = np.genfromtxt(Path("a", table), delimiter=",", names=True)
         rows = rows[np.isfinite(rows["in_time_leaves_by"])]

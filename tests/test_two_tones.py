@@ -374,6 +374,7 @@ def test_case(tmp_path: Path) -> None:
 def test_a_killed_run_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, undrawn: None) -> None:
     """What was found before is not solved for again, and the table is that of a run without a break; another case
     begins anew; a refused one leaves nothing."""
+    from microslip.stages.answer import CaseJob
     from microslip.stages.places import modal_files
     from microslip.stages.tones import tones_stage
 
@@ -394,20 +395,22 @@ def test_a_killed_run_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, u
 
     monkeypatch.setattr(tones, "solve", counted)
     with pytest.raises(KeyboardInterrupt):
-        tones_stage(case, files, tmp_path / "a", report=killed, pictures=False)
+        tones_stage(CaseJob(case, files, tmp_path / "a", report=killed, pictures=False))
     assert solved == pytest.approx([0.14, 0.145]) and not (tmp_path / "a" / "two_tones.csv").exists()
     solved.clear()
-    assert tones_stage(case, files, tmp_path / "a", pictures=False)[2]
+    assert tones_stage(CaseJob(case, files, tmp_path / "a", pictures=False))[2]
     assert solved[0] == pytest.approx(0.15) and not (tmp_path / "a" / "two_tones.points").exists()
-    tones_stage(case, files, tmp_path / "b", pictures=False)
+    tones_stage(CaseJob(case, files, tmp_path / "b", pictures=False))
     assert (tmp_path / "a" / "two_tones.csv").read_bytes() == (tmp_path / "b" / "two_tones.csv").read_bytes()
     with pytest.raises(KeyboardInterrupt):
-        tones_stage(case, files, tmp_path / "a", ["excitations.0.amplitude=0.4"], report=killed, pictures=False)
+        tones_stage(
+            CaseJob(case, files, tmp_path / "a", ["excitations.0.amplitude=0.4"], report=killed, pictures=False)
+        )
     solved.clear()
-    tones_stage(case, files, tmp_path / "a", ["excitations.0.amplitude=0.45"], pictures=False)
+    tones_stage(CaseJob(case, files, tmp_path / "a", ["excitations.0.amplitude=0.45"], pictures=False))
     assert solved[0] == pytest.approx(0.14)
     with pytest.raises(UserError, match="two_tones"):
-        tones_stage(case, files, tmp_path / "c", ["excitations.1.tone=1"], pictures=False)
+        tones_stage(CaseJob(case, files, tmp_path / "c", ["excitations.1.tone=1"], pictures=False))
     assert not list((tmp_path / "c").glob("two_tones*"))
 
 

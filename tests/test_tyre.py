@@ -9,19 +9,20 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from meshes import pipe
+from meshes import body, brick, graded, pipe
 from scipy.sparse.linalg import spsolve
 
 from microslip.basis import read_basis
 from microslip.cli import main
-from microslip.data import UserError
+from microslip.data import ContactState, Mesh, UserError
 from microslip.elasticity import isotropic
-from microslip.fem.discretise import REDUCED, discretise, face_blocks
+from microslip.fem.contact import Grip, Plane, coupled_points, make_pair
+from microslip.fem.discretise import REDUCED, discretise, face_blocks, free_upper
 from microslip.fem.loads import pressure
 from microslip.fem.operators import stiffness
+from microslip.linalg import eigen
+from microslip.modal.equilibrium import equilibrium, make_model
 from microslip.rolling.brush import Brush, fitted, jump, parabola, reached
-from microslip.rolling.half_space import rolled, shifted, steady_rolling
-from microslip.rolling.half_space_influence import Grid, Pair
 from microslip.rolling.slip import row
 from microslip.stages.job import open_job
 from microslip.stages.modal import modes_stage
@@ -79,41 +80,20 @@ def test_numbers_that_are_none_of_a_brush() -> None:
             replace(BRUSH, **change)
 
 
-def test_the_row_of_a_patch_finds_the_ellipse_through_pressures_that_swing() -> None:
-    """Length and shares of Hertz' pressure of which points of a mesh are a fifth off, to and fro."""
+def test_the_row_of_a_patch_is_the_half_ellipse_of_its_pressure() -> None:
+    """Force, centre and second moment are those of the pressure; (6.4-39) is that of Hertz."""
     x = np.linspace(-8e-3, 8e-3, 49)
-    p = 2e5 * np.sqrt(np.maximum(1 - ((x - 5e-4) / 6e-3) ** 2, 0)) * (1 + 0.2 * np.cos(np.pi * np.arange(49)))
+    p = 2e5 * np.sqrt(np.maximum(1 - ((x - 5e-4) / 6e-3) ** 2, 0))
     points = np.array([[v, y, 0.0] for v in x for y in (-5e-3, 5e-3)])
-    load = 0.02 * np.pi / 2 * 6e-3 * 2e5
-    state = SimpleNamespace(points=points, areas=np.ones(98), pressure=np.repeat(p, 2), normal_force=load)
+    load = 0.01 * np.pi / 2 * 6e-3 * 2e5
+    spread = np.diag([6e-3**2 / 4, 1e-2**2 / 12, 0.0])
+    state = SimpleNamespace(points=points, areas=np.full(98, 0.01 * 0.016 / 98), pressure=np.repeat(p, 2),
+                            normal_force=load, centre=np.array([5e-4, 0, 0]), spread=spread)  # fmt: skip
     found = row(state, np.array([1.0, 0.0, 0.0]), 20)  # type: ignore[arg-type]
-    assert found.length == pytest.approx(12e-3, rel=0.03) and found.force == load
-    edge = np.linspace(-1, 1, 21)
-    exact = np.diff(np.arcsin(edge) + edge * np.sqrt(1 - edge**2)) / np.pi
-    np.testing.assert_allclose(found.share, exact, atol=3e-3)
+    assert found.length == pytest.approx(12e-3, rel=1e-12) and found.highest == pytest.approx(2e5, rel=1e-12)
+    at = np.linspace(0.95, -0.95, 20)
     assert found.share.sum() == pytest.approx(1, rel=1e-12)
-
-
-@pytest.mark.slow
-def test_a_shift_of_cattaneo_becomes_steady_rolling_of_carter() -> None:
-    """Half-spaces of one row: pressed and shifted, then rolled under the same force; the reference prints no number of
-    the way, so its two ends are tried: the shift at first, and what `steady_rolling` finds, after 4 a."""
-    half, n, R, mu = 1e-3, 40, 0.5, 0.3
-    grid, pair = Grid(int(1.3 * n), 1, 2 * half / n, 0.2), Pair(82e9, 0.28)
-    h, load = grid.x**2 / (2 * R), 35780.0
-    force = -0.64 * mu * load
-    now = shifted(h, grid, pair, mu, force=load, tangential=(force, None))
-    steady = steady_rolling(h, grid, pair, mu, force=load, tangential=(force, None))
-    symmetric = now.traction[0]
-    np.testing.assert_allclose(symmetric, symmetric[::-1], atol=1e-3 * np.abs(symmetric).max())
-    off, way = [], []
-    for k in range(2 * n):
-        now = rolled(now, h, mu, force=load, tangential=(force, None))
-        off.append(np.abs(now.traction[0] - steady.traction[0]).max() / (mu * now.pressure.max()))
-        way.append(now.motion[0])
-        assert now.force[0] == pytest.approx(force, rel=1e-5), k
-    assert off[-1] < 0.02 and off[0] > 0.2
-    assert way[-1] == pytest.approx(steady.motion[0], rel=0.02)
+    assert found.share @ at**2 == pytest.approx(0.25, rel=1e-2) and found.places == 36
 
 
 # --- the wheel -----------------------------------------------------------------------------------------------------
@@ -147,13 +127,97 @@ def test_a_thick_pipe_that_keeps_its_volume_is_that_of_lame() -> None:
     assert bore(2, 0.4999, None) > 0.5 and found[0.4999][1] < 3e-4
 
 
-def pressed(tmp_path: Path, *changes: str) -> float:
-    """N by which a coarse wheel is pressed when it is lowered by 0.5 mm."""
+def disc(half: float, fine: int, coarse: int) -> Mesh:
+    """A quarter of a disc of radius 1 that stands on z = 0, but for a hole of 0.01 about its axle: `fine` boxes to 1.3
+    times the half width of the contact, then `coarse` ones that grow, along the rim and into the depth."""
+    s, grown = np.linspace(0, 1, fine + coarse + 1), graded(coarse, 60.0)(np.linspace(0, 1, coarse + 1))
+    depth, angle = (
+        np.concatenate([1.3 * half * np.arange(fine) / fine, 1.3 * half + (end - 1.3 * half) * grown])
+        for end in (0.99, np.pi / 2)
+    )
+
+    def to(p: np.ndarray) -> np.ndarray:
+        r, t = 1 - np.interp(1 - p[:, 0], s, depth), np.interp(p[:, 1], s, angle)
+        return np.column_stack([r * np.sin(t), -p[:, 2], 1 - r * np.cos(t)])
+
+    return brick("hexahedron20", (fine + coarse, fine + coarse, 1), (1, 1, 0.2 * half), to=to)
+
+
+def standing(
+    mesh: Mesh, held: str, young: float, poisson: float, degree: dict[str, int] | None, approach: float
+) -> Grip:
+    """Half of a wheel in plane strain, whose outside `x1` is lowered on z = 0; held: faces and their directions."""
+    pair = make_pair(mesh, "ground", "x1", Plane(np.zeros(3), np.array([0, 0, 1.0])), young, interference=approach)
+    d = discretise(mesh, degree, coupled=[coupled_points(pair)])
+    sides = [(face, "xyz".index(c)) for face, cs in (s.split(":") for s in held.split()) for c in cs]
+    fixed = np.unique(np.concatenate([3 * mesh.face_points(face) + k for face, k in sides]))
+    rubber = body({"density": 1.0, "young": young, "poisson": poisson, "unusual": True}).material.material()
+    free, none = free_upper(d.pattern, fixed), np.zeros((mesh.n_points, 3))
+    model = make_model(d, rubber, free, fixed, np.array([0, 1.0, 0]), np.zeros(3), None, 293.15, none, True)
+    solver = eigen.new_solver()
+    state = equilibrium(replace(model, contacts=(pair,)), 0.0, "nonlinear", solver)
+    solver.close()
+    return state.contacts[0]
+
+
+def lowered(half: float, fine: int, coarse: int, poisson: float, degree: dict[str, int] | None) -> float:
+    """Relative error of the approach of a disc's axle to the ground, plane strain, for the force that it makes.
+
+    Johnson, Contact Mechanics (1985), 5.6, a disc between two plates: d = P/(pi E*) (2 ln(4 R/a) - 1), a^2 = 4 P R/(pi
+    E*); E* = 1 here. It is lowered so that a is about `half`.
+    """
+    approach = half**2 / 4 * (2 * np.log(4 / half) - 1)
+    g = standing(disc(half, fine, coarse), "y0:x y1:z z0:y z1:y", 1 - poisson**2, poisson, degree, approach)
+    force = 2 * g.force[:, 2].sum() / (0.2 * half)
+    width = np.sqrt(4 * force / np.pi)
+    return float(approach / (force / np.pi * (2 * np.log(4 / width) - 1)) - 1)
+
+
+@pytest.mark.parametrize(("poisson", "degree"), [(0.3, None), (0.499, REDUCED)])
+def test_a_disc_is_lowered_as_the_closed_form_says(poisson: float, degree: dict[str, int] | None) -> None:
+    """A contact a fiftieth of the radius wide: 0.1 % measured."""
+    assert abs(lowered(0.01, 4, 6, poisson, degree)) < 3e-3
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("poisson", "degree"), [(0.3, None), (0.499, REDUCED), (0.4999, REDUCED)])
+def test_the_approach_of_a_disc_converges(poisson: float, degree: dict[str, int] | None) -> None:
+    """Of third order in the size (2.9 to 3.6). What is left, 0.25 %, is of the finite strains: twice as wide a contact
+    has twice as much, and without them 0.1 % is left. Elements that lock would show: with all points the coarsest mesh
+    is off by 14 % at 0.499, with eight by 4 %."""
+    finest = lowered(0.01, 4, 10, poisson, degree)
+    off = [abs(lowered(0.01, 2, n, poisson, degree) - finest) for n in (3, 5)]
+    assert np.log(off[0] / off[1]) / np.log(5 / 3) > 2.7 and off[0] < 0.05
+    assert abs(finest) < 4e-3
+    assert abs(2 * finest - lowered(0.02, 4, 10, poisson, degree)) < 2e-3
+
+
+@pytest.mark.slow
+def test_the_length_of_a_patch_converges() -> None:
+    """4 times the root of the second moment of the pressure, plane strain: where edges lie in their elements matters
+    little, 1 % with five elements along it, 0.1 % with thirteen."""
+    found = []
+    for size in (2.5e-3, 1.75e-3, 1e-3, 0.75e-3):
+        n = (int(np.ceil(0.0125 / size)), int(np.ceil(0.035 / size)), 1)
+        whole = pipe("hexahedron20", n, 0.025, 0.05, size, 0.7)
+        flat = whole.points
+        points = np.column_stack([flat[:, 1], -flat[:, 2], 0.05 - flat[:, 0]])  # stands on the cut y0
+        wheel = Mesh(points, whole.cells, whole.faces, {}, whole.node_id)
+        g = standing(wheel, "x0:xyz y0:x z0:y z1:y", 3e6, 0.499, REDUCED, 1e-3)
+        x = np.concatenate([np.einsum("pk,pk->p", p.N, points[p.slave][..., 0]) for p in g.cut.points])
+        weight = g.point_weight * g.point_pressure
+        found.append(4 * np.sqrt(weight @ x**2 / weight.sum()))
+    off = np.abs(np.array(found[:-1]) / found[-1] - 1)
+    assert off[0] < 0.015 and off[1] < 0.004 and off[2] < 0.0015
+
+
+def pressed(tmp_path: Path, *changes: str) -> ContactState:
+    """How a coarse wheel is pressed when it is lowered by 0.5 mm."""
     given = ("closures=[{name='ground', face='tread', against='ground', point=[0.0, 0.0, -50.0], "
              "normal=[0.0, 0.0, 1.0], interference=0.5}]", "modes.count=1", "output.gauss=false",
              "output.nodal_stress=false", "output.shapes=false")  # fmt: skip
     basis = read_basis(modes_stage(open_job(ROOT / "geometry" / "tyre", [*given, *changes], tmp_path))[0])
-    return float(basis.groups[0, 0].contacts["ground"].normal_force)
+    return basis.groups[0, 0].contacts["ground"]
 
 
 @pytest.mark.slow
@@ -164,7 +228,7 @@ def test_rubber_that_keeps_its_volume_does_not_lock(tmp_path: Path) -> None:
         (rule, size): pressed(
             tmp_path / f"{rule}{size}", f"mesh.size={size}", "material.poisson=0.4999", "material.young=2.9998e6",
             f'mesh.integration="{rule}"',
-        )
+        ).normal_force
         for rule, size in (("reduced", 7.0), ("reduced", 5.0), ("full", 7.0), ("full", 5.0))
     }  # fmt: skip
     best = forces["reduced", 5.0]

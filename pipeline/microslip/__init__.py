@@ -36,6 +36,7 @@ PUBLIC = {
     "rolling.fastsim": "fastsim",
     "rolling.table": "creep_table write_creep_table read_creep_table",
     "rolling.wheelset": "Track Pose patches axle",
+    "rolling.contact_table": "contact_table write_contact_table read_contact_table",
 }
 """Module -> the names of it that are public."""
 

@@ -14,7 +14,8 @@ import shutil
 import signal
 import sys
 import threading
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -28,7 +29,9 @@ if TYPE_CHECKING:
     from .basis.checks import Check
     from .data import ModalBasis
     from .results import Response
+    from .stages.answer import Answer, CaseJob
     from .stages.following import Case
+    from .stages.stage import Report
 
 app = App(
     name="microslip",
@@ -385,19 +388,40 @@ def orbit(
         case: a case.toml, the folder that holds it, its name, or its products.
         basis: see respond.
     """
-    from .case import load_case
     from .stages.orbit import orbit_stage
     from .stages.places import existing_files
 
     case = _case_file(case)
     with progress(f"orbit {case}", quiet) as report:
-        settings, _ = load_case(case, list(set_))
-        files = existing_files(settings, case, basis, Path("."))
-        folder = Path("build") / settings.name
-        made, sentences, fine = orbit_stage(case, files, folder, list(set_), force, report, not no_pictures)
-    _say("\n".join([*sentences, *(str(path) for path in made if path.suffix != ".vtu")]), quiet)
-    if not fine:
-        raise NotConverged(f"a motion diverged; {made[0]} holds what was found until then")
+        there = partial(existing_files, basis_file=basis)
+        found = orbit_stage(_case_job(case, set_, force, report, no_pictures, there))
+    _tell(found, quiet, "a motion diverged; {page} holds what was found until then")
+
+
+def _case_job(
+    case: Path, set_: Sequence[str], force: bool, report: Report, no_pictures: bool,
+    find: Callable[..., dict[str, Path]] | None = None,
+) -> CaseJob:  # fmt: skip
+    """A case on its way. find: its modal files; they are made where they are not up to date if not given."""
+    from .case import load_case
+    from .stages.answer import CaseJob
+    from .stages.places import modal_files
+
+    settings, _ = load_case(case, list(set_))
+    files = (find or partial(modal_files, report=report))(settings, case, root=Path("."))
+    return CaseJob(case, files, Path("build") / settings.name, set_, force, report, not no_pictures)
+
+
+def _tell(found: Answer, quiet: bool, lost: str) -> None:
+    """What is said of an answer, and its files; those of a motion's moments are named in its .pvd.
+
+    Raises:
+        NotConverged: something is lost: what, with the {page} that says more.
+    """
+    named = (str(p) for p in found.files if p.suffix != ".vtu" or p.parent.name != "motion")
+    _say("\n".join([*found.said, *named]), quiet)
+    if not found.whole:
+        raise NotConverged(lost.format(page=found.files[0]))
 
 
 @app.command
@@ -412,18 +436,12 @@ def bifurcate(
     Args:
         case: a case.toml, the folder that holds it, its name, or its products.
     """
-    from .case import load_case
     from .stages.bifurcation import bifurcation_stage
-    from .stages.places import modal_files
 
     case = _case_file(case)
     with progress(f"bifurcate {case}", quiet) as report:
-        settings, _ = load_case(case, list(set_))
-        files, folder = modal_files(settings, case, Path("."), report), Path("build") / settings.name
-        made, sentences, whole = bifurcation_stage(case, files, folder, list(set_), force, report, not no_pictures)
-    _say("\n".join([*sentences, *map(str, made)]), quiet)
-    if not whole:
-        raise NotConverged(f"some branches could not be followed to their end; {made[0]} says where and why")
+        found = bifurcation_stage(_case_job(case, set_, force, report, no_pictures))
+    _tell(found, quiet, "some branches could not be followed to their end; {page} says where and why")
 
 
 @app.command
@@ -436,18 +454,12 @@ def two_tones(
     Args:
         case: a case.toml, the folder that holds it, its name, or its products.
     """
-    from .case import load_case
-    from .stages.places import modal_files
     from .stages.tones import tones_stage
 
     case = _case_file(case)
     with progress(f"two tones of {case}", quiet) as report:
-        settings, _ = load_case(case, list(set_))
-        files, folder = modal_files(settings, case, Path("."), report), Path("build") / settings.name
-        made, sentences, fine = tones_stage(case, files, folder, list(set_), force, report, not no_pictures)
-    _say("\n".join([*sentences, *map(str, made)]), quiet)
-    if not fine:
-        raise NotConverged(f"some points did not converge; {made[0]} says which and why")
+        found = tones_stage(_case_job(case, set_, force, report, no_pictures))
+    _tell(found, quiet, "some points did not converge; {page} says which and why")
 
 
 @app.command
@@ -465,21 +477,15 @@ def mistune(
         rare: further samples, chosen by a linear ring, for the 99.9 % quantile.
         workers: processes; as many as there are cores if not given. Samples are the same for any number.
     """
-    from .case import load_case
     from .stages.mistuning import mistuning_stage
-    from .stages.places import modal_files
 
     case = _case_file(case)
     asked = [*set_] + [f"mistuning.samples={samples}"] * (samples is not None)
     asked += [f"mistuning.until={_share(until)}"] if until is not None else []
     asked += [f"mistuning.rare={rare}"] if rare is not None else []
     with progress(f"mistuning of {case}", quiet) as report:
-        settings, _ = load_case(case, asked)
-        files, folder = modal_files(settings, case, Path("."), report), Path("build") / settings.name
-        made, sentences, fine = mistuning_stage(case, files, folder, asked, force, report, not no_pictures, workers)
-    _say("\n".join([*sentences, *map(str, made)]), quiet)
-    if not fine:
-        raise NotConverged("some samples have no solution; samples.csv has no amplitude for them")
+        found = mistuning_stage(_case_job(case, asked, force, report, no_pictures), workers)
+    _tell(found, quiet, "some samples have no solution; samples.csv has no amplitude for them")
 
 
 @app.command
@@ -497,20 +503,12 @@ def roll(
     from .stages.tyre import tyre_stage
     from .stages.vehicle import kinematics_stage, vehicle_stage
 
-    case, ended = _case_file(case), ""
-    given = (case, Path("build"), list(set_), force)
+    case = _case_file(case)
+    kinds = ((is_vehicle, vehicle_stage), (is_kinematics, kinematics_stage), (is_tyre, tyre_stage))
+    stage = next((stage for is_kind, stage in kinds if is_kind(case)), rolling_stage)
     with progress(f"roll {case}", quiet) as report:
-        if is_vehicle(case):
-            made, sentences, ended = vehicle_stage(*given, report, not no_pictures)
-        elif is_kinematics(case):
-            made, sentences = kinematics_stage(*given, report, not no_pictures)
-        elif is_tyre(case):
-            made, sentences = tyre_stage(*given, report, not no_pictures)
-        else:
-            made, sentences = rolling_stage(*given, report, not no_pictures)
-    _say("\n".join([*sentences, *map(str, made)]), quiet)
-    if ended:
-        raise NotConverged(f"the run ended early, because {ended}; {made[0]} holds what was found")
+        found = stage(case, Path("build"), list(set_), force, report, not no_pictures)
+    _tell(found, quiet, "the run ended early; {page} says why, and holds what was found")
 
 
 def _share(text: str) -> float:
@@ -533,8 +531,7 @@ def stability(
             whose contacts slide, with [stability].
         speed: of a modal file, or a body with a mesh: which of its speeds, counted from 0; the first if not given.
     """
-    from .case import load_case
-    from .stages.places import is_case, meant, modal_files
+    from .stages.places import is_case, meant
     from .stages.squeal import squeal_stage
     from .stages.stability import stability_stage
 
@@ -545,14 +542,10 @@ def stability(
         if is_case(path):
             if speed is not None:
                 raise UserError(f"{path}: --speed {speed}: is of a modal file; a case has bodies.speed")
-            case, _ = load_case(path, list(set_))
-            files, folder = modal_files(case, path, Path("."), report), Path("build") / case.name
-            made, lines, complete = squeal_stage(path, files, folder, list(set_), force, report, not no_pictures)
+            found = squeal_stage(_case_job(path, set_, force, report, no_pictures))
         else:
-            made, lines, complete = stability_stage(path, list(set_), force, report, not no_pictures, speed)
-    _say("\n".join([*lines, *(str(path) for path in made if path.suffix != ".vtu")]), quiet)
-    if not complete:
-        raise NotConverged(f"not all was found, roots in the window or limit cycles; {made[0]} says what")
+            found = stability_stage(path, list(set_), force, report, not no_pictures, speed)
+    _tell(found, quiet, "not all was found, roots in the window or limit cycles; {page} says what")
 
 
 @app.command

@@ -572,6 +572,10 @@ class ContactState:
     pressure: Annotated[Array, Stored("point", "Pa", "areas @ pressure is its integral")]
     gap: Annotated[Array, Stored("point", "m", "the interference counted, negative where points overlap")]
     areas: Annotated[Array, Stored("point", "m^2", "of the points")]
+    spread: Annotated[Array | None, Stored(
+        "axis axis", "m^2", "second moment of the pressure about its centre, over the force; in the reference geometry",
+        when="something touches",
+    )] = None  # fmt: skip
 
 
 @dataclass(frozen=True, repr=False)

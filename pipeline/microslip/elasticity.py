@@ -6,6 +6,7 @@ import numpy as np
 
 from .data import Array
 
+VOIGT_AXES = np.array([0, 1, 2, 0, 1, 0]), np.array([0, 1, 2, 1, 2, 2])
 PAIR = np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2]])
 """Tensor index pair -> Voigt index (xx yy zz xy yz xz)."""
 

@@ -1,5 +1,8 @@
 """How things go wrong: the two exceptions the command line turns into one sentence and an exit code."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+
 
 class UserError(Exception):
     """A mistake in the input. Its text is one sentence naming file, key, what is wrong and what to do."""
@@ -7,3 +10,12 @@ class UserError(Exception):
 
 class NotConverged(Exception):
     """A solve or a check that did not succeed although the input is well formed (exit code 1)."""
+
+
+@contextmanager
+def told_of(what: object) -> Iterator[None]:
+    """A mistake that is found here is one of a file, or of a key in it: its sentence begins with that."""
+    try:
+        yield
+    except UserError as error:
+        raise UserError(f"{what}: {error}") from error

@@ -105,6 +105,42 @@ def test_from_cattaneo_to_carter() -> None:
     assert c.sticking[-3] and not c.sticking[2]  # it sticks from the leading edge on
 
 
+ONSET = """
+1 1.824E-03 422 199 1.472E-05 -1.188E-04   2 1.882E-03 420 201 1.474E-05 -1.266E-04
+3 1.955E-03 416 205 1.476E-05 -1.373E-04   4 2.050E-03 406 215 1.478E-05 -1.519E-04
+5 2.140E-03 405 216 1.480E-05 -1.655E-04   6 2.221E-03 395 226 1.482E-05 -1.792E-04
+7 2.334E-03 390 231 1.483E-05 -1.987E-04   8 2.428E-03 382 239 1.485E-05 -2.155E-04
+9 2.551E-03 375 246 1.486E-05 -2.385E-04   10 2.676E-03 365 256 1.487E-05 -2.631E-04
+11 2.801E-03 352 269 1.487E-05 -2.892E-04  12 2.968E-03 346 275 1.487E-05 -3.240E-04
+13 3.184E-03 323 298 1.487E-05 -3.739E-04  14 3.403E-03 319 302 1.486E-05 -4.277E-04
+15 3.402E-03 330 291 1.485E-05 -4.250E-04  16 3.334E-03 328 293 1.484E-05 -4.075E-04
+17 3.241E-03 341 280 1.483E-05 -3.827E-04  18 3.192E-03 341 280 1.483E-05 -3.699E-04
+19 3.123E-03 343 278 1.483E-05 -3.528E-04  20 3.112E-03 348 273 1.483E-05 -3.497E-04
+21 3.088E-03 348 273 1.483E-05 -3.438E-04  22 3.072E-03 350 271 1.483E-05 -3.400E-04
+23 3.064E-03 350 271 1.483E-05 -3.379E-04  24 3.062E-03 350 271 1.483E-05 -3.373E-04
+25 3.064E-03 348 273 1.483E-05 -3.376E-04  26 3.070E-03 348 273 1.483E-05 -3.390E-04
+27 3.077E-03 348 273 1.483E-05 -3.406E-04
+"""
+"""Step, creepage, elements that stick and slip, elastic energy (J), power of friction (W at 1000 mm/s)."""
+
+
+def test_onset_of_rolling_as_printed() -> None:
+    """From the shift of Cattaneo to steady rolling, step by step of an element for a patch's length: `catt_to_cart` of
+    the same program, after Kalker (1990) 5.2.2.5, Fig. 5.25. A ball, 28 elements over the patch, G = 1, F_x =
+    -0.657 mu F_n all the way; the creepage overshoots by a ninth on its way."""
+    grid, mu, load = Grid(35, 33, 0.25, 0.25), 0.4013, 0.4705
+    now = {"distance": 0.002963 * (grid.x**2 + grid.y**2), "friction": mu, "force": load,
+           "tangential": (-0.657 * mu * load, None)}  # fmt: skip
+    c = shifted(grid=grid, pair=Pair(1.0, 0.28), **now)
+    assert elements(c) == (621, 305, 316)
+    agrees({"shift": c.motion[0], "approach": c.approach, "p_max": c.pressure.max(), "energy": 1e-3 * c.energy,
+            "work": 1e-3 * c.work}, "1.774E-02 7.258E-02 1.834E-02 1.470E-05 -1.261E-07")  # fmt: skip
+    for step, creepage, stick, slip, energy, power in np.reshape(ONSET.split(), (-1, 6)):
+        c = rolled(c, **now)
+        assert elements(c) == (621, int(stick), int(slip)), step
+        agrees({"xi": c.motion[0], "energy": 1e-3 * c.energy, "power": c.work}, f"{creepage} {energy} {power}")
+
+
 # Cattaneo ----------------------------------------------------------------------------------------------------------
 
 

@@ -12,6 +12,7 @@ import numpy as np
 
 from ..contact.friction import OfCoulomb
 from ..data import Array, ModalBasis, UserError
+from ..errors import told_of
 from ..harmonic_balance import envelope, speed_line
 from ..harmonic_balance.envelope import Envelope, OverOrders
 from ..harmonic_balance.identification import Identified, Measured, NodalDiagram, identify, nodal_diagram
@@ -196,9 +197,7 @@ def identification(settings: CaseSettings, bases: Bases, path: Path | str) -> tu
     if wrong:
         raise UserError(f"{path}: identification: nodal diameter {wrong[0]}: the ring has 0 to {most}; correct it")
     fit, *others = (Measured(m.nodal_diameter, m.frequency, m.mode - 1) for m in (asked.fit, *asked.measured))
-    try:
+    with told_of(path):
         found = identify(a, fit, asked.ratio, others)
-    except UserError as error:
-        raise UserError(f"{path}: {error}") from error
     drawn = sorted({*asked.stiffnesses, found.stiffness})
     return found, [nodal_diagram(a, c, asked.ratio, modes=asked.modes) for c in drawn]

@@ -120,7 +120,7 @@ def of_contact(contact: Hertz | RoundContact, largest: float, count: int = 81) -
         raise UserError(f"largest: {largest:g} N; give the largest force the curve is to reach")
     u = float(contact.approach(largest)) * np.linspace(0, 1, count) ** 2
     loads = contact.force(u)
-    slopes = contact.normal_stiffness(loads)
+    slopes = contact.stiffness_at(u)
     slopes[0] = 0.0  # of a stamp it is not, whose force then sets in within the first interval
     return NormalCurve(u, loads, slopes, BULK, f"{type(contact).__name__} to {largest:g} N")
 

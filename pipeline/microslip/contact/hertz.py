@@ -176,6 +176,10 @@ class Hertz:
         a, b = self.semi_axes(force)
         return np.pi * self.modulus * np.maximum(a, b) / ellipse_integrals(self.ratio)[0]
 
+    def stiffness_at(self, approach: ArrayLike) -> Array:
+        """dF/d(delta), N/m, at an approach (m, any shape)."""
+        return self.normal_stiffness(self.force(approach))
+
     # tangential ----------------------------------------------------------------------------------------------------
 
     @property

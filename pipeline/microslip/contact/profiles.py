@@ -310,6 +310,10 @@ class RoundContact:
         """dF/d(approach) = 2 E* a, N/m, whatever the profile."""
         return 2 * self.modulus * self.radius(force)
 
+    def stiffness_at(self, approach: ArrayLike) -> Array:
+        """dF/d(approach), N/m, at an approach (m, any shape), without a search for the force's."""
+        return 2 * self.modulus * self.radius_at(approach)
+
     def tangential_stiffness(self, force: ArrayLike) -> tuple[Array, Array]:
         """(x, y): 2 G* a, N/m, of the sticking contact, the same along both (Mindlin 1949; Jaeger 1995)."""
         k = 2 * self.shear_modulus * self.radius(force)

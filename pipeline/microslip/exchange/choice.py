@@ -102,6 +102,30 @@ def with_shapes(basis: ModalBasis, group: ModalGroup, form: str) -> ModalGroup:
     return group
 
 
+def whole_body(basis: ModalBasis, form: str) -> None:
+    """Nothing, of a whole body.
+
+    Raises:
+        UserError: a cyclic sector.
+    """
+    if basis.sectors > 1:
+        raise UserError(f"{basis.name}: export --to {form}: a cyclic sector is no whole body; mesh the whole body")
+
+
+def whole_in_modes(basis: ModalBasis, g: ModalGroup, form: str) -> ModalGroup:
+    """The group in its modes, if they are all it has.
+
+    Raises:
+        UserError: part of its flexibility stands in coordinates without mass, in forces or in residual shapes.
+    """
+    if len(g.omega) < g.n_modes or g.residual is not None:
+        raise UserError(
+            f'{basis.name}: export --to {form}: reduction = "{basis.reduction}" keeps flexibility beside the modes, '
+            'which would be lost; compute it with reduction = "craig-bampton", "rubin" or "eigenmodes"'
+        )
+    return in_modes(g)
+
+
 def body_in_motion(basis: ModalBasis, form: str) -> ModalGroup:
     """The one real group at rest in its elastic modes, with inertia integrals: what multibody programs take.
 
@@ -109,8 +133,7 @@ def body_in_motion(basis: ModalBasis, form: str) -> ModalGroup:
         UserError: a cyclic sector, a group at speed, several groups, no inertia integrals in the file, no elastic mode.
     """
     group = only_group(basis, form)
-    if basis.sectors > 1:
-        raise UserError(f"{basis.name}: export --to {form}: a cyclic sector is no whole body; mesh the whole body")
+    whole_body(basis, form)
     if group.speed:
         raise UserError(
             f"{basis.name}: export --to {form}: the modes at {rpm_text(group.speed)} hold the stiffness "

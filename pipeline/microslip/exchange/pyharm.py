@@ -42,7 +42,7 @@ def pyharm_tables(basis: ModalBasis, g: ModalGroup) -> dict[str, Any]:
     Raises:
         UserError: interface displacements are not coordinates.
     """
-    nodes, order = physical_first(basis, g)
+    nodes, order = physical_first(basis, g, "pyharm")
     N = np.zeros_like(g.K_r) if g.N_r is None else g.N_r
     some, faces = np.ix_(order, order), [g.interfaces[name] for name in nodes]
     loads = [rows.rows for rows in g.excitations.values()]
@@ -68,8 +68,8 @@ def _symmetric(A: Array) -> Array:
     return (A + A.T) / 2
 
 
-def physical_first(basis: ModalBasis, g: ModalGroup) -> tuple[list[str], Indices]:
-    """Names of the interfaces that are nodes, and (m,) the coordinates in pyHarm's order: six a node, then the others.
+def physical_first(basis: ModalBasis, g: ModalGroup, form: str) -> tuple[list[str], Indices]:
+    """Names of the interfaces that are nodes, and (m,) the coordinates in their order: six a node, then the others.
 
     Raises:
         UserError: interface displacements are not coordinates.
@@ -78,7 +78,7 @@ def physical_first(basis: ModalBasis, g: ModalGroup) -> tuple[list[str], Indices
     nodes = [name for name in g.interfaces if all(f"{name}:{row}" in column for row in INTERFACE_ROWS)]
     if not nodes:
         raise UserError(
-            f"{basis.name}: export --to pyharm: pyHarm wants the displacements of the interfaces as coordinates; give "
+            f"{basis.name}: export --to {form}: it wants the displacements of the interfaces as coordinates; give "
             f'the body [[interfaces]] and compute it with reduction = "craig-bampton" or "massless-boundary" '
             f'(the file has "{basis.reduction}")'
         )

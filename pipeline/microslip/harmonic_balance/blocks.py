@@ -96,50 +96,53 @@ class Cyclic:
         return Cyclic([d.T for d in self.diagonal], behind, [turn(self.behind[i - 1]) for i in range(n)], self.order)
 
     def solve(self, right: Array) -> Array:
-        """See `Matrix`. Block elimination; what goes round the ring is carried along as one more block column."""
-        begins = np.cumsum([0, *(len(d) for d in self.diagonal)])
-        pieces = [right[self.order[a:b]] for a, b in zip(begins[:-1], begins[1:], strict=True)]
-        found = np.empty_like(right)
-        found[self.order] = np.concatenate(self._eliminated(pieces))
+        """See `Matrix`. Blocks of less than the largest size are filled up by a unit matrix."""
+        sizes = np.array([len(d) for d in self.diagonal])
+        n, most = len(sizes), sizes.max(initial=0)
+        filled = np.arange(most) < sizes[:, None]
+        D, after, before = (np.zeros((n, most, most)) for _ in range(3))
+        D[~filled, np.nonzero(~filled)[1]] = 1.0
+        for blocks, out in ((self.diagonal, D), (self.behind, after), (self.before, before)):
+            for one, block in zip(out, blocks, strict=True):
+                if block is not None:
+                    one[: len(block), : block.shape[1]] = block
+        r, found = np.zeros((n, most)), np.empty_like(right)
+        r[filled] = right[self.order]
+        found[self.order] = _around(D, after, before, r)[filled]
         if np.isfinite(found).all() and np.abs(found).max() < 1e10 * np.abs(right).max(initial=1e-300):
             return found
         return Dense(self.dense()).solve(right)
 
-    def _eliminated(self, r: list[Array]) -> list[Array]:
-        """x by parts. Parts 0 to n - 2 are a chain, the last one closes it."""
-        n, diagonal = len(r), self.diagonal[0]
-        X: list[Array] = []  # of each part: columns of its own right side, of the last part, of the one behind
-        for i in range(n - 1):
-            right = np.column_stack([r[i], self._closing(i)])
-            lower, upper = self.before[i] if i else None, self.behind[i] if i < n - 2 else None
-            if i:
-                diagonal = self.diagonal[i]
-            if lower is not None:
-                width = right.shape[1]
-                right = right - lower @ X[-1][:, :width]
-                if X[-1].shape[1] > width:
-                    diagonal = diagonal - lower @ X[-1][:, width:]
-            X.append(_solved(diagonal, right if upper is None else np.column_stack([right, upper])))
-        width = 1 + len(self.diagonal[-1])
-        for i in range(n - 3, -1, -1):
-            X[i] = X[i][:, :width] - (X[i][:, width:] @ X[i + 1][:, :width] if X[i].shape[1] > width else 0.0)
-        last, value = self.diagonal[-1], r[-1]
-        for i, block in ((0, self.behind[-1]), (n - 2, self.before[-1])):
-            if block is not None:
-                last, value = last - block @ X[i][:, 1:], value - block @ X[i][:, 0]
-        end = _solved(last, value)
-        return [*(x[:, 0] - x[:, 1:] @ end for x in X), end]
 
-    def _closing(self, i: int) -> Array:
-        """(s_i, s_last) block from part i to the last one."""
-        n = len(self.diagonal)
-        out = np.zeros((len(self.diagonal[i]), len(self.diagonal[-1])))
-        if i == 0 and self.before[0] is not None:
-            out += self.before[0]
-        behind = self.behind[n - 2]
-        if i == n - 2 and behind is not None:
-            out += behind
-        return out
+def _around(D: Array, behind: Array, before: Array, r: Array) -> Array:
+    """(n, s) x of a ring, D_i x_i + behind_i x_(i+1) + before_i x_(i-1) = r_i, by cyclic reduction: every second part
+    is eliminated, all at once as they do not know each other, and what is left is a ring of half as many."""
+    n, s = r.shape
+    if n <= FEW:
+        A, at = np.zeros((n, s, n, s)), np.arange(n)
+        for block, to in ((D, at), (behind, (at + 1) % n), (before, (at - 1) % n)):
+            A[at, :, to] += block
+        return _solved(A.reshape(n * s, n * s), r.ravel()).reshape(n, s)
+    out, kept = np.arange(1, n - n % 2, 2), np.arange(0, n, 2)
+    X = _solved(D[out], np.concatenate([r[out, :, None], before[out], behind[out]], axis=2))
+    own, to_before, to_behind = X[..., 0], X[..., 1 : 1 + s], X[..., 1 + s :]
+    D, r, behind, before = D[kept].copy(), r[kept].copy(), behind[kept].copy(), before[kept].copy()
+    m = len(out)  # the part behind the kept ones 0 to m - 1, and before those 1 to m, on from 0 if there is none
+    up, down = np.arange(m), np.arange(1, m + 1) % len(kept)
+    for at, block in ((up, behind), (down, before)):
+        r[at] -= (block[at] @ own[..., None])[..., 0]
+    D[up] -= behind[up] @ to_before
+    D[down] -= before[down] @ to_behind
+    behind[up], before[down] = -behind[up] @ to_behind, -before[down] @ to_before
+    x = np.empty((n, s))
+    x[kept] = _around(D, behind, before, r)
+    between = np.concatenate([x[out - 1], x[(out + 1) % n]], axis=1)[..., None]
+    x[out] = own - (X[..., 1:] @ between)[..., 0]
+    return x
+
+
+FEW = 3
+"""Parts of a ring that are solved for together."""
 
 
 def _solved(A: Array, B: Array) -> Array:

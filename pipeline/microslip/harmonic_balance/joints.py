@@ -14,7 +14,7 @@ singular where that is at resonance without damping: then the sides are solved f
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -28,30 +28,70 @@ LEFT = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
-class Side:
-    """A side of a contact: number of the contact, of the body, its coordinates among the body's, and its sign."""
+class Sides:
+    """The m sides of n contacts, of k coordinates at most.
 
-    contact: int
-    part: int
-    at: slice
-    sign: float
+    Attributes:
+        contact, part: (m,) numbers of theirs. sign: (m,). at: (m, k) their coordinates among all, whose number where
+            there are fewer. own: (m, k) the same among those of the part, -1 where there are fewer.
+    """
+
+    contact: Indices
+    part: Indices
+    sign: Array
+    at: Indices
+    own: Indices
+
+    def pairs(self, parts: Indices) -> tuple[Indices, Indices]:
+        """(2, q) sides of one of the parts, each with each, and (q,) which of the parts."""
+        one, other = np.nonzero((self.part[:, None] == self.part) & np.isin(self.part, parts)[:, None])
+        return np.array([one, other]), np.searchsorted(parts, self.part[one])
 
 
-Alone = tuple[ComplexArray, ComplexArray]
-"""(H + 1, c_i, c_i) A^-1 and A^-1 D of a part."""
+@dataclass(frozen=True, eq=False)
+class Alone:
+    """What p parts with as many coordinates do without contacts.
+
+    Attributes:
+        places: (p, c) their coordinates among all. inverse, loose: (p, H + 1, c, c) A^-1 and A^-1 D. pairs: (2, q) see
+            `Sides`. between: (q, W k, W k) `loose` from forces on the second of a pair to motions of the first.
+    """
+
+    places: Indices
+    inverse: ComplexArray
+    loose: ComplexArray
+    pairs: Indices
+    between: Array
 
 
-def alone(compliance: Sequence[ComplexArray], stiffness: Sequence[Array]) -> list[Alone] | None:
-    """What the parts do without contacts, from (H + 1, c_i, c_i) D and (c_i, c_i) k of each; None where one is at
-    resonance there."""
-    found = list[Alone]()
-    for D, k in zip(compliance, stiffness, strict=True):
-        try:
-            inverse = np.linalg.inv(np.eye(len(k)) - D @ k).astype(complex)
-        except np.linalg.LinAlgError:
-            return None
-        found.append((inverse, inverse @ D))
-    return found
+def alone(places: Indices, parts: Indices, D: ComplexArray, k: Array, sides: Sides) -> Alone | None:
+    """What parts do without contacts; None where one is at resonance there.
+
+    Args:
+        places: (p, c), see `Alone`. parts: (p,) numbers, rising. D: (p, H + 1, c, c). k: (p, c, c).
+    """
+    try:
+        inverse = np.linalg.inv(np.eye(k.shape[-1]) - D @ k[:, None]).astype(complex)
+    except np.linalg.LinAlgError:
+        return None
+    loose, (pairs, which) = inverse @ D, sides.pairs(parts)
+    own = sides.own[pairs]
+    rows, columns = own[0][:, None, :, None], own[1][:, None, None, :]
+    wide = np.pad(loose, ((0, 0), (0, 0), (0, 1), (0, 1)))
+    met = wide[which[:, None, None, None], np.arange(D.shape[1])[:, None, None], rows, columns]
+    return Alone(places, inverse, loose, pairs, _of_coefficients(met))
+
+
+def _of_coefficients(M: ComplexArray) -> Array:
+    """(q, W k, W k) real matrices of (q, H + 1, k, k) those of the harmonics."""
+    q, H, k, _ = M.shape
+    out = np.zeros((q, 2 * H - 1, k, 2 * H - 1, k))
+    out[:, 0, :, 0] = M[:, 0].real
+    for h in range(1, H):
+        cos, sin = 2 * h - 1, 2 * h
+        out[:, cos, :, cos] = out[:, sin, :, sin] = M[:, h].real
+        out[:, cos, :, sin], out[:, sin, :, cos] = M[:, h].imag, -M[:, h].imag
+    return out.reshape(q, (2 * H - 1) * k, -1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,21 +99,19 @@ class Joints:
     """1 + D (E^T S E - k), see above.
 
     Attributes:
-        alone: of each part, see `alone`; None: of one there is nothing. slopes: of each contact (k, W, k, W) S.
-        sides: of all contacts. slices: coordinates of each part. scale: (c,) of a unit of x. blocks: the same matrix,
-            of the sides.
+        alone: of all parts, see `alone`; None: of one there is nothing. slopes: (n, k, W, k, W) S of the contacts.
+        sides: theirs. scale: (c,) of a unit of x. blocks: the same matrix, of the sides.
     """
 
     alone: list[Alone] | None
-    slopes: list[Array]
-    sides: list[Side]
-    slices: list[slice]
+    slopes: Array
+    sides: Sides
     scale: Array
     blocks: Callable[[], Matrix]
 
     @property
     def coefficients(self) -> int:
-        return self.slopes[0].shape[1]
+        return self.slopes.shape[2]
 
     def dense(self) -> Array:
         return self._of_sides.dense()
@@ -99,93 +137,65 @@ class Joints:
         """(W, c) dv of (W, c) A dv + D E^T S E dv = R; None where it is not found this way."""
         if self.alone is None:
             return None
-        free = self._of_parts(0, R)
-        force = self._across(self._relative.solve(_flat(self._felt(free))))
+        free = np.empty_like(R)
+        for one in self.alone:
+            free[:, one.places] = _applied(one.inverse, R[:, one.places])
+        force = self._across(self._relative.solve(self._felt(free).ravel()))
         dv = free - self._answered(force)
-        again = self._across(_flat(self._felt(dv)))
-        off, size = _flat([f - g for f, g in zip(force, again, strict=True)]), _flat(force)
-        return dv if np.abs(off).max(initial=0.0) <= LEFT * np.abs(size).max(initial=0.0) else None
+        off = force - self._across(self._felt(dv))
+        return dv if np.abs(off).max(initial=0.0) <= LEFT * np.abs(force).max(initial=0.0) else None
 
     @cached_property
-    def _active(self) -> list[Indices]:
-        """Of each contact the coordinates that its forces feel."""
-        return [np.flatnonzero(np.abs(S).max(axis=(0, 1, 3)) > 0) for S in self.slopes]
+    def _active(self) -> Indices:
+        """(a,) coordinates that the forces of any contact feel."""
+        return np.flatnonzero(np.abs(self.slopes).max(axis=(0, 1, 2, 4), initial=0.0) > 0)
 
-    def _felt(self, v: Array) -> list[Array]:
-        """Of each contact (W, a) relative motions that it feels, from (W, c)."""
-        out = [np.zeros((self.coefficients, len(a))) for a in self._active]
-        for one in self.sides:
-            out[one.contact] += one.sign * v[:, self.slices[one.part]][:, one.at][:, self._active[one.contact]]
+    def _felt(self, v: Array) -> Array:
+        """(n, W, a) relative motions that the contacts feel, from (W, c)."""
+        s = self.sides
+        own = np.hstack([v, np.zeros((len(v), 1))])[:, s.at[:, self._active]].transpose(1, 0, 2)
+        out = np.zeros((len(self.slopes), *own.shape[1:]))
+        np.add.at(out, s.contact, s.sign[:, None, None] * own)
         return out
 
     @cached_property
-    def _felt_slopes(self) -> list[Array]:
-        """Of each contact (W k, W a) S, both ordered by harmonics."""
-        W = self.coefficients
-        return [
-            S[:, :, a].transpose(1, 0, 3, 2).reshape(W * len(S), W * len(a))
-            for S, a in zip(self.slopes, self._active, strict=True)
-        ]
+    def _felt_slopes(self) -> Array:
+        """(n, W k, W a) S, both ordered by harmonics."""
+        n, k, W, *_ = self.slopes.shape
+        return self.slopes[:, :, :, self._active].transpose(0, 2, 1, 4, 3).reshape(n, W * k, -1)
 
-    def _across(self, d: Array) -> list[Array]:
-        """Of each contact (W, k) forces S d."""
-        ends = np.cumsum([S.shape[1] for S in self._felt_slopes])[:-1]
-        pairs = zip(self._felt_slopes, np.split(d, ends), strict=True)
-        return [(S @ own).reshape(self.coefficients, -1) for S, own in pairs]
+    def _across(self, d: Array) -> Array:
+        """(n, W, k) forces S d."""
+        force = self._felt_slopes @ d.reshape(len(self.slopes), -1, 1)
+        return force.reshape(len(self.slopes), self.coefficients, -1)
 
-    def _answered(self, force: list[Array]) -> Array:
+    def _answered(self, force: Array) -> Array:
         """(W, c) A^-1 D E^T of forces."""
-        out = np.zeros((self.coefficients, self.slices[-1].stop))
-        for one in self.sides:
-            out[:, self.slices[one.part]][:, one.at] += one.sign * force[one.contact]
-        return self._of_parts(1, out)
-
-    @cached_property
-    def _alike(self) -> list[tuple[list[int], list[list[Side]]]]:
-        """Parts whose sides stand and feel alike, and of each its sides."""
-        by_part: dict[int, list[Side]] = {i: [] for i in range(len(self.slices))}
-        for one in self.sides:
-            by_part[one.part].append(one)
-        found: dict[tuple[object, ...], list[int]] = {}
-        for i, own in by_part.items():
-            stands = ((x.at.start, x.at.stop, self._active[x.contact].tobytes()) for x in own)
-            found.setdefault((self.slices[i].stop - self.slices[i].start, *stands), []).append(i)
-        return [(parts, [by_part[i] for i in parts]) for parts in found.values()]
-
-    def _of_parts(self, which: int, v: Array) -> Array:
-        """(W, c) what every part makes of its own, by one of the matrices in `alone`."""
-        out = np.empty_like(v)
-        for parts, _ in self._alike:
-            D = np.array([(self.alone or [])[i][which] for i in parts])
-            own = np.array([v[:, self.slices[i]] for i in parts])
-            for i, one in zip(parts, applied(D, own[..., None])[..., 0], strict=True):
-                out[:, self.slices[i]] = one
+        s = self.sides
+        given = np.zeros((self.coefficients, len(self.scale) + 1))
+        given[:, s.at] = (s.sign[:, None, None] * force[s.contact]).transpose(1, 0, 2)
+        out = np.empty((self.coefficients, len(self.scale)))
+        for one in self.alone or []:
+            out[:, one.places] = _applied(one.loose, given[:, one.places])
         return out
 
     @cached_property
     def _relative(self) -> Matrix:
         """1 + E A^-1 D E^T S, contact by contact."""
         pieces: dict[tuple[int, int], Array] = {}
-        W = self.coefficients
-        for parts, sides in self._alike:
-            feel = [self._active[one.contact] for one in sides[0]]
-            rows = np.concatenate([one.at.start + a for one, a in zip(sides[0], feel, strict=True)] or [[]]).astype(int)
-            loose = np.array([(self.alone or [])[i][1][:, rows] for i in parts])
-            ends = np.cumsum([len(a) for a in feel])[:-1]
-            for n, by in enumerate(sides[0]):
-                S = np.array([self._felt_slopes[own[n].contact] for own in sides])
-                moved = applied(loose[..., by.at], S.reshape(len(parts), W, S.shape[1] // W, S.shape[2]))
-                for m, block in enumerate(np.split(moved, ends, axis=2)):
-                    block = block.reshape(len(parts), W * len(feel[m]), S.shape[2])
-                    for own, one in zip(sides, block, strict=True):
-                        key = own[m].contact, own[n].contact
-                        one = one if own[m].sign == own[n].sign else -one
-                        pieces[key] = pieces[key] + one if key in pieces else one
-        return one_plus(pieces, [len(a) for a in self._active], W, by_parts=True)
+        (n, k, W, *_), s, active = self.slopes.shape, self.sides, self._active
+        for one in self.alone or []:
+            i, j = s.contact[one.pairs]
+            felt = one.between.reshape(-1, W, k, W * k)[:, :, active].reshape(len(i), -1, W * k)
+            found = felt @ (np.prod(s.sign[one.pairs], axis=0)[:, None, None] * self._felt_slopes[j])
+            for key, block in zip(zip(i.tolist(), j.tolist(), strict=True), found, strict=True):
+                pieces[key] = pieces[key] + block if key in pieces else block
+        return one_plus(pieces, [len(active)] * n, W, by_parts=True)
 
 
-def _flat(values: list[Array]) -> Array:
-    return np.concatenate([v.ravel() for v in values])
+def _applied(D: ComplexArray, v: Array) -> Array:
+    """(W, p, c) what matrices (p, H + 1, c, c) make of (W, p, c)."""
+    return applied(D, v.transpose(1, 0, 2)[..., None])[..., 0].transpose(1, 0, 2)
 
 
 def applied(D: ComplexArray, V: Array) -> Array:

@@ -22,7 +22,7 @@ from ..system.assembly import Assembly, Linear
 from . import blocks, by_hand, reduced
 from .blocks import Matrix
 from .forces import Forces
-from .joints import Alone, Joints, Side, alone, applied
+from .joints import Alone, Joints, Sides, alone, applied
 from .point_cycles import Cycle, Traced
 from .reduced import Eliminated, Seen, View
 
@@ -62,6 +62,10 @@ class Group:
     def _turned(self) -> bool:
         return bool(self.phase.any())
 
+    @cached_property
+    def _known_turns(self) -> dict[int, Array]:
+        return {}
+
     def relative(self, v: Array) -> Array:
         """(n, k, W) displacements, preloaded state included, from (W, c) those of the coordinates."""
         d = v[:, self.first] if self.second is None else v[:, self.first] - v[:, self.second]
@@ -77,8 +81,9 @@ class Group:
         """See `forces.Forces`."""
         F, S = self.model.forces(self._back(u), period)
         if self._turned:
-            turn = self._turns(S.shape[2])
-            S = np.einsum("nkwlz,nwy,nzx->nkylx", S, turn, turn, optimize=True)
+            (n, k, W, *_), turn = S.shape, self._turns(S.shape[2])
+            half = turn.transpose(0, 2, 1)[:, None] @ S.reshape(n, k, W, k * W)
+            S = (half.reshape(n, k * W * k, W) @ turn).reshape(S.shape)
         return self._ahead(F), S
 
     def rate(self, u: Array, period: float) -> Array | None:
@@ -102,7 +107,9 @@ class Group:
 
     def _turns(self, coefficients: int) -> Array:
         """(n, W, W) from harmonics of a signal to those of the same signal later by the phase."""
-        out = np.zeros((len(self.phase), coefficients, coefficients))
+        if coefficients in self._known_turns:
+            return self._known_turns[coefficients]
+        out = self._known_turns[coefficients] = np.zeros((len(self.phase), coefficients, coefficients))
         out[:, 0, 0] = 1.0
         for h in range(1, coefficients // 2 + 1):
             cos, sin = np.cos(h * self.phase), np.sin(h * self.phase)
@@ -186,16 +193,25 @@ class Problem:
         return [_places(g, np.array(self.begins)) for g in self.groups]
 
     @cached_property
-    def sides(self) -> list[Side]:
-        """Of all contacts."""
-        numbers, found, begins = sorted(i for g in self.groups for i in g.contacts), list[Side](), np.array(self.begins)
-        for g in self.groups:
+    def ranks(self) -> list[Indices]:
+        """Of each group, places of its contacts among all that are there, in the order of the assembly."""
+        numbers = sorted(i for g in self.groups for i in g.contacts)
+        return [np.searchsorted(numbers, g.contacts) for g in self.groups]
+
+    @cached_property
+    def sides(self) -> Sides:
+        """Of all contacts, counted as in `ranks`."""
+        begins, of = np.array(self.begins), list[tuple[int, float, Indices]]()
+        for g, ranks in zip(self.groups, self.ranks, strict=True):
             for coordinates, sign in ((g.first, 1.0), (g.second, -1.0)):
-                for i, own in zip(g.contacts, coordinates if coordinates is not None else (), strict=False):
-                    part = int(np.searchsorted(begins, own[0], "right")) - 1
-                    at = slice(int(own[0]) - self.begins[part], int(own[-1]) + 1 - self.begins[part])
-                    found.append(Side(numbers.index(i), part, at, sign))
-        return found
+                if coordinates is not None:
+                    of += [(int(i), sign, own) for i, own in zip(ranks, coordinates, strict=True)]
+        at = np.full((len(of), max((len(own) for *_, own in of), default=0)), self.count)
+        for row, (*_, own) in zip(at, of, strict=True):
+            row[: len(own)] = own
+        part = np.searchsorted(begins, at[:, 0], "right") - 1
+        inside = np.where(at < self.count, at - begins[part, None], -1)
+        return Sides(np.array([i for i, *_ in of]), part, np.array([sign for _, sign, _ in of]), at, inside)
 
     @cached_property
     def without(self) -> list[Array]:
@@ -342,15 +358,23 @@ class AtFrequency:
     def jacobian(self, slopes: list[Array]) -> Matrix:
         """(size, size) dR/dx for derivatives of the contact forces, those of `forces` or ones found near by."""
         p = self.problem
-        if len(p.slices) == 1 and len(p.sides) <= RELATIVE_AT_MOST:
+        if len(p.slices) == 1 and len(p.sides.contact) <= RELATIVE_AT_MOST:
             return self._of_sides(slopes)
-        each = {i: own for g, S in zip(p.groups, slopes, strict=True) for i, own in zip(g.contacts, S, strict=True)}
-        ordered = [each[i] for i in sorted(each)]
-        return Joints(self._alone, ordered, p.sides, p.slices, p.scale, partial(self._of_sides, slopes))
+        n, k, W = sum(map(len, p.ranks)), p.sides.at.shape[1], p.coefficients
+        S = np.zeros((n, k, W, k, W))
+        for i, own in zip(p.ranks, slopes, strict=True):
+            S[i, : own.shape[1], :, : own.shape[1]] = own
+        return Joints(self._alone, S, p.sides, p.scale, partial(self._of_sides, slopes))
 
     @cached_property
     def _alone(self) -> list[Alone] | None:
-        return alone([view.compliance[0] for view in self.views], self.problem.stiffness)
+        p, found = self.problem, list[Alone]()
+        for parts, at, both in self._views:
+            one = alone(at, parts, both[:, 0, :, :, 1:], np.array([p.stiffness[i] for i in parts]), p.sides)
+            if one is None:
+                return None
+            found.append(one)
+        return found
 
     def _of_sides(self, slopes: list[Array]) -> Matrix:
         p = self.problem
@@ -435,7 +459,7 @@ class AtFrequency:
     def _applied(self, force: Array, which: slice, driven: float = 1.0) -> Array:
         """(n, W, c) D, its derivative or both, applied to (W, c), less the reference times a factor."""
         out = np.empty((which.stop, *force.shape))
-        for at, both in self._views:
+        for _, at, both in self._views:
             V = np.zeros((len(at), 1, len(force), 1 + at.shape[1], 1))
             V[:, 0, 0, 0], V[:, 0, 1::2, 0] = -driven, -driven * self.problem.share
             V[:, 0, :, 1:, 0] = force[:, at].transpose(1, 0, 2)
@@ -443,13 +467,16 @@ class AtFrequency:
         return out
 
     @cached_property
-    def _views(self) -> list[tuple[Indices, ComplexArray]]:
-        """Of parts with as many coordinates (n, c) these, and (n, 2, H + 1, c, 1 + c) their `View.both`."""
+    def _views(self) -> list[tuple[Indices, Indices, ComplexArray]]:
+        """Of n parts with as many coordinates their numbers, (n, c) these, and (n, 2, H + 1, c, 1 + c) `View.both`."""
         found: dict[int, list[int]] = {}
         for i, s in enumerate(self.problem.slices):
             found.setdefault(s.stop - s.start, []).append(i)
-        begins, both = np.array(self.problem.begins), [view.both for view in self.views]
-        return [(begins[parts, None] + np.arange(c), np.array([both[i] for i in parts])) for c, parts in found.items()]
+        begins, each = np.array(self.problem.begins), [(np.array(parts), c) for c, parts in found.items()]
+        return [
+            (parts, begins[parts, None] + np.arange(c), np.array([self.views[i].both for i in parts]))
+            for parts, c in each
+        ]
 
     def _scaled(self, block: Array, rows: slice, columns: slice) -> Array:
         """A block (W, a, W, b) as a matrix, in units of x."""

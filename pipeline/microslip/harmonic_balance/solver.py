@@ -76,8 +76,9 @@ there the next derivative leads on."""
 
 
 def newton(
-    at: AtFrequency, x: Array, tolerance: float = 1e-10, most: int = 60, slope: Any = None, rises: int = RISES
-) -> Point:
+    at: AtFrequency, x: Array, tolerance: float = 1e-10, most: int = 60, slope: Any = None, rises: int = RISES,
+    patience: int | None = None,
+) -> Point:  # fmt: skip
     """Newton's method; derivatives of the forces are used again while they serve.
 
     The contact forces are continuous with a piecewise continuous derivative. Where a step crosses to other pieces |R|
@@ -87,9 +88,11 @@ def newton(
     Args:
         x: start. tolerance: of the largest entry of R over that of x, which counts within 1e-3 and 1e3 of the
             reference's; no less than what `ROUNDING` leaves.
-        slope: derivative of the forces somewhere near, to begin with. rises: how often |R| may rise.
+        slope: derivative of the forces somewhere near, to begin with. rises: how often |R| may rise. patience: steps
+            that may go by before R is half of what it was; None: all.
     """
     start, fresh, history, left_over = x, False, list[float](), rises
+    halved, last = np.inf, 0
     R, seen = at.tried(x)
     reference, error = float(np.abs(at.reference).max(initial=0.0)) or 1.0, np.inf  # where nothing drives, the length
     for count in range(most):
@@ -100,6 +103,11 @@ def newton(
             return Point(at.Omega, x, at.undefined(x) or "not a number", error, count, history=tuple(history))
         if error <= max(tolerance, min(ROUNDING * at.rounding / size, AT_MOST)):
             return Point(at.Omega, x, CONVERGED, error, count, slope=slope, history=tuple(history))
+        if error < 0.5 * halved:
+            halved, last = error, count
+        elif patience is not None and count - last >= patience:
+            words = f"|R|/|x| = {halved:.1e} was not halved in {patience} steps"
+            return Point(at.Omega, x, words, error, count, history=tuple(history))
         if slope is None:
             slope, fresh = at.forces(x)[1], True
             if not all(np.isfinite(S).all() for S in slope):
@@ -181,9 +189,10 @@ def _ways(
     problem: Problem, at: AtFrequency, starts: list[Array], slope: Any, along_load: bool
 ) -> Iterator[Callable[[], Point]]:  # fmt: skip
     rises = _rises(problem)
-    most = 60 if rises or not pseudo_transient.serves(problem) else AMONG
-    yield from (partial(newton, at, x, most=most, slope=slope, rises=rises) for x in starts)
-    if most == AMONG:
+    patient = rises or not pseudo_transient.serves(problem)
+    way = partial(newton, rises=rises) if patient else among
+    yield from (partial(way, at, x, slope=slope) for x in starts)
+    if not patient:
         yield from (partial(newton, at, x, rises=rises) for x in starts[:PATIENT])
     if pseudo_transient.serves(problem):
         yield partial(from_rest, problem, at.Omega)
@@ -191,8 +200,15 @@ def _ways(
         yield partial(_raised, problem, at.Omega)
 
 
-AMONG = 20
-"""Steps of Newton's method at most among many bodies, where pseudo-time serves: what arrives takes some five."""
+AMONG, PATIENCE = 20, 8
+"""Steps of Newton's method at most among many bodies, where pseudo-time serves, and those without half of the residual
+before: what arrives takes some five."""
+
+
+def among(at: AtFrequency, x: Array, slope: Any = None) -> Point:
+    """Newton's method among many bodies."""
+    return newton(at, x, most=AMONG, slope=slope, rises=0, patience=PATIENCE)
+
 
 PATIENT = 2
 """Starts from which all steps are taken before pseudo-time, which costs more: where many contacts begin to slide at

@@ -35,6 +35,10 @@ class DirectSolver:
         """Factorise; the first call also analyses the pattern, later ones must have the same pattern."""
         raise NotImplementedError
 
+    def factorise_definite(self, upper: sp.csr_matrix) -> None:
+        """The same for a matrix that is positive definite unless the body is unstable: no pivots need be sought."""
+        self.factorise(upper)
+
     def solve(self, b: Array) -> Array:
         """Solve for one (n,) or several (n, r) right-hand sides."""
         raise NotImplementedError
@@ -75,6 +79,11 @@ class Pardiso(DirectSolver):
         self._ia = self._ja = np.zeros(0, dtype=np.int32)
 
     def factorise(self, upper: sp.csr_matrix) -> None:
+        self._mkl.set_iparm(21, 1)  # stays as it is for the solves
+        self._call(self._phase(upper), np.zeros(upper.shape[0]))
+
+    def factorise_definite(self, upper: sp.csr_matrix) -> None:
+        self._mkl.set_iparm(21, 0)  # a quarter faster
         self._call(self._phase(upper), np.zeros(upper.shape[0]))
 
     def _phase(self, upper: sp.csr_matrix) -> int:
@@ -280,7 +289,7 @@ def search(
     Raises:
         Unstable: eigenvalues below `shift`. NotConverged: Lanczos failed.
     """
-    pencil.solver.factorise(pencil.shifted(shift))
+    pencil.solver.factorise_definite(pencil.shifted(shift))
     if negative := pencil.solver.negative():
         raise Unstable(negative)
     known = np.zeros((pencil.n, 0), dtype=pencil.dtype) if rigid is None else rigid

@@ -58,13 +58,16 @@ class Highest:
 
 
 def highest(
-    respond: Respond, frequency: Array, tolerance: float = TOLERANCE, most: int = MOST, follow: Follow | None = None
-) -> Highest:
+    respond: Respond, frequency: Array, tolerance: float = TOLERANCE, most: int = MOST, follow: Follow | None = None,
+    at_once: Respond | None = None,
+) -> Highest:  # fmt: skip
     """The highest amplitude of all read-outs in a band.
 
     Args:
         frequency: (f,) Hz, rising, a sweep that sees every resonance. tolerance, most: see `TOLERANCE`, `MOST`. follow:
-            where it is given, a sweep that jumps goes back on the higher side.
+            where it is given, a sweep that jumps goes back on the higher side. at_once: where it is given, what is
+            found with little work from what is known: the sweep goes up as far as that leads, then down from its other
+            end, and the rest is looked for in what is between.
     """
     known: dict[float, Array] = {}
     failed: list[float] = []
@@ -76,6 +79,15 @@ def highest(
             failed.append(f)
         else:
             known[f] = y
+
+    def leads(frequencies: list[float]) -> int:
+        """How many in their order are found at once."""
+        for count, f in enumerate(frequencies):
+            y = None if at_once is None else at_once(f)
+            if y is None:
+                return count
+            known[f] = y
+        return len(frequencies)
 
     def goes_on(low: float, high: float) -> bool:
         """Whether the higher of two points leads to more at the other one than is known there."""
@@ -90,8 +102,12 @@ def highest(
         known[far] = y
         return True
 
-    for f in frequency:
-        look(float(f))
+    rest = [float(f) for f in frequency]
+    if at_once is not None:
+        rest = rest[leads(rest) :][::-1]
+        rest = rest[leads(rest) :]
+    for f in rest:
+        look(f)
     before = np.inf  # what was left where a parabola placed the last point
     count, may_fail = 0, len(failed) + FAILING
     while known and count < most and len(failed) < may_fail:

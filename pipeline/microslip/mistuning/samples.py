@@ -15,7 +15,7 @@ from ..harmonic_balance import reduced
 from ..harmonic_balance.forces import Forces
 from ..harmonic_balance.problem import AtFrequency, Problem
 from ..harmonic_balance.reduced import Seen
-from ..harmonic_balance.solver import Point, carried, newton, solve, sweep
+from ..harmonic_balance.solver import Point, among, carried, solve, sweep
 from ..system.assembly import Assembly
 from .peaks import Highest, highest
 from .ring import Deviations, Tuned
@@ -86,7 +86,7 @@ def sample(asked: Asked, number: int) -> Sample:
 def of_ring(asked: Asked, ring: Assembly, number: int = 0) -> Sample:
     """A whole ring: its highest blade over the frequency."""
     respond = Sticking(ring) if asked.stuck else Sliding(asked.problem(ring), asked.tuned_points)
-    top = highest(respond, asked.frequency, follow=respond.follow)
+    top = highest(respond, asked.frequency, follow=respond.follow, at_once=respond.at_once)
     grid = np.full((len(asked.frequency), asked.tuned.sectors), np.nan)
     places = {f: i for i, f in enumerate(top.frequencies)}
     for row, f in enumerate(asked.frequency):
@@ -112,6 +112,15 @@ class Sliding:
         Omega = 2 * np.pi * frequency
         return self._kept(frequency, solve(self.problem, Omega, self._starts(Omega), self.slope, along_load=False))
 
+    def at_once(self, frequency: float) -> Array | None:
+        """(w,) m, by Newton's method from what is known nearby or not at all."""
+        Omega = 2 * np.pi * frequency
+        for x in self._starts(Omega):
+            point = among(self.problem.at(Omega), x, self.slope)
+            if point.converged:
+                return self._kept(frequency, point)
+        return None
+
     def follow(self, frequency: float, behind: float) -> Array | None:
         """(w,) m of the solution that Newton's method finds from the one at another frequency; the known one stays
         where that is higher."""
@@ -119,7 +128,7 @@ class Sliding:
         beyond = [self.known[f] for f in self.known if (f - behind) * (frequency - behind) <= 0]
         side = sorted(beyond, key=lambda p: abs(p.Omega - Omega))
         for count in (2, 1):
-            point = newton(self.problem.at(Omega), carried(side[:count], Omega), most=20, rises=0)
+            point = among(self.problem.at(Omega), carried(side[:count], Omega))
             y = self._kept(frequency, point)
             if y is not None and (before is None or y.max() > np.abs(amplitudes(self.problem, before)).max()):
                 return y
@@ -141,10 +150,14 @@ class Sliding:
         return at.modal(point.x, at.force(point.x))[1]
 
     def _starts(self, Omega: float) -> list[Array]:
-        """Where Newton's method may begin: the two that leave least, of those carried on and the tuned ring's."""
-        starts = [carried(points, Omega) for points in (self._near(Omega, 2), self._near(Omega, 4)) if points]
-        starts += [carried(sorted(self.tuned, key=lambda p: abs(p.Omega - Omega))[:3], Omega)] if self.tuned else []
-        at = self.problem.at(Omega)
+        """Where Newton's method may begin: the two that leave least, of those carried on from either side, which may be
+        those of a jump, and from both, and the tuned ring's."""
+        near, at = self._near(Omega, 4), self.problem.at(Omega)
+        sides = [[p for p in near if (p.Omega > Omega) is above] for above in (False, True)]
+        told = [points[:n] for points, most in ((sides[0], 3), (sides[1], 3), (near, 4)) for n in (2, most)]
+        told.append(sorted(self.tuned, key=lambda p: abs(p.Omega - Omega))[:3])
+        different = {tuple(map(id, points)): points for points in told if points}.values()
+        starts = [carried(points, Omega) for points in different]
         return sorted(starts, key=lambda x: float(np.linalg.norm(at.residual(x))))[:2]
 
     def _near(self, Omega: float, most: int) -> list[Point]:
@@ -177,7 +190,7 @@ class Sticking:
         force = self.k @ found.reference
         return np.abs(reduced.monitored(self.part, found.modal, force))
 
-    follow = None  # of linear equations there is one solution
+    follow = at_once = None  # of linear equations there is one solution, found alike everywhere
 
     def coordinates(self, frequency: float) -> list[ComplexArray]:
         """See `Sliding`."""

@@ -148,6 +148,7 @@ def _state(mesh: Mesh, c: Closure, of_face: dict[str, str], g: Grip) -> ContactS
     total = float(weight.sum())
     pressed = np.concatenate([np.einsum("pk,pki->pi", p.N, mesh.points[p.slave]) for p in g.cut.points])
     centre = weight @ pressed / total if total > 0 else areas @ points / areas.sum()
+    spread = (weight * (pressed - centre).T) @ (pressed - centre) / total if total > 0 else None
     pressure = node_values(g.pair, g.pressure, places)
     pressure *= total / (areas @ pressure) if total > 0 else 0.0  # the points' rule misses kinks inside a facet
     return ContactState(
@@ -155,7 +156,7 @@ def _state(mesh: Mesh, c: Closure, of_face: dict[str, str], g: Grip) -> ContactS
         normal_force=float(np.linalg.norm(force)), force=force, centre=centre, points=points, areas=areas,
         pressure=pressure, gap=gap_at(g, places),
         closed_share=float(g.area[g.pressure > 0].sum() / areas.sum()), penetration=g.penetration,
-        penalty=float(g.pair.penalty.max()), interference=c.interference, modes=c.modes,
+        penalty=float(g.pair.penalty.max()), interference=c.interference, modes=c.modes, spread=spread,
     )  # fmt: skip
 
 

@@ -134,7 +134,7 @@ def _stress_sets(
         if settings.output.gauss:
             found["gauss"] = gauss_set(model, state, shapes)
         if settings.output.nodal_stress:
-            found["nodes"] = nodal_set(model, state, shapes, harmonic)
+            found["nodes"] = nodal_set(model, state, shapes, harmonic, found.get("gauss"))
     return found
 
 

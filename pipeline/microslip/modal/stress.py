@@ -6,29 +6,31 @@ import numpy as np
 import scipy.sparse as sp
 
 from ..data import Array, StressSet
-from ..elasticity import pushed
+from ..elasticity import VOIGT_AXES, pushed
 from ..fem.cyclic import CutFaces, CyclicUpper
 from ..fem.discretise import Block
-from ..fem.operators import engineering
 from ..topology import CELL_TYPES
 from .equilibrium import BodyModel, StaticState, cauchy, thermal_stretch
 
 
-def modal_strain(block: Block, phi: Array, F: Array | None) -> Array:
-    """(e, q, 6, m) strain of shapes (n, 3, m) about a state: the symmetric part of the gradient in the deformed body.
+_CHUNK = 2_000_000
+"""Numbers of a gradient made at a time: it stays in the caches."""
+
+
+def modal_strain(block: Block, phi: Array, F: Array | None, out: Array) -> None:
+    """Strain of shapes (n, 3, m) about a state: the symmetric part of the gradient in the deformed body.
 
     Args:
-        F: (e, q, 3, 3) deformation gradient of the static state, None for the reference geometry.
+        F: (e, q, 3, 3) deformation gradient of the static state, None for the reference geometry. out: (e, q, 6, m).
     """
     e, q = block.dx.shape
-    out = np.empty((e, q, 6, phi.shape[2]), dtype=phi.dtype)
-    inverse = None if F is None else np.linalg.inv(F)
-    for j in range(phi.shape[2]):
-        g = np.matmul(phi[block.cells, :, j].transpose(0, 2, 1)[:, None], block.grad.transpose(0, 1, 3, 2))
-        if inverse is not None:
-            g = np.matmul(g, inverse)
-        out[..., j] = engineering(0.5 * (g + np.swapaxes(g, -1, -2)))
-    return out
+    k, m = block.cells.shape[1], phi.shape[2]
+    size = max(_CHUNK // max(9 * q * m, 1), 1)
+    for c in (slice(start, start + size) for start in range(0, e, size)):
+        grad = block.grad[c] if F is None else np.matmul(np.linalg.inv(F[c]).swapaxes(-1, -2), block.grad[c])
+        H = np.matmul(grad.reshape(-1, 3 * q, k), phi[block.cells[c]].reshape(-1, k, 3 * m)).reshape(-1, q, 3, 3, m)
+        for i, (a, b) in enumerate(zip(*VOIGT_AXES, strict=True)):  # H_ab = du_b / dx_a
+            out[c, :, i] = H[:, :, a, b] if a == b else H[:, :, a, b] + H[:, :, b, a]
 
 
 def gauss_set(model: BodyModel, state: StaticState, phi: Array) -> StressSet:
@@ -37,22 +39,20 @@ def gauss_set(model: BodyModel, state: StaticState, phi: Array) -> StressSet:
     About a nonlinear state everything is in the axes of space, for the deformed body: static Cauchy stress,
     strain and stress modes; else in the reference geometry.
     """
-    strain, stress = [], []
-    for i, block in enumerate(model.d.blocks):
+    blocks, m, first = model.d.blocks, phi.shape[2], 0
+    strain = np.empty((sum(b.dx.size for b in blocks), 6, m), dtype=phi.dtype)
+    stress = np.empty_like(strain)
+    for i, block in enumerate(blocks):
         F = np.eye(3) + state.H[i] if state.H is not None and state.prestress == "nonlinear" else None
-        strain.append(modal_strain(block, phi, F))
-        stress.append(_hooke(model, i, strain[-1], F))
-    points = [np.einsum("qk,eki->eqi", b.N, model.d.mesh.points[b.cells]) for b in model.d.blocks]
-    static = [cauchy(state, i) for i in range(len(model.d.blocks))]
-    m = phi.shape[2]
-    return StressSet(
-        "gauss",
-        np.concatenate([p.reshape(-1, 3) for p in points]),
-        np.concatenate([s.reshape(-1, 6, m) for s in strain]),
-        np.concatenate([s.reshape(-1, 6, m) for s in stress]),
-        np.concatenate([s.reshape(-1, 6) for s in static]),
-        np.concatenate([b.dx.reshape(-1) for b in model.d.blocks]),
-    )
+        own = slice(first, first + block.dx.size)
+        part = strain[own].reshape(*block.dx.shape, 6, m)
+        modal_strain(block, phi, F, part)
+        stress[own] = _hooke(model, i, part, F).reshape(-1, 6, m)
+        first += block.dx.size
+    points = [np.einsum("qk,eki->eqi", b.N, model.d.mesh.points[b.cells]).reshape(-1, 3) for b in blocks]
+    static = [cauchy(state, i).reshape(-1, 6) for i in range(len(blocks))]
+    volumes = np.concatenate([b.dx.reshape(-1) for b in blocks])
+    return StressSet("gauss", np.concatenate(points), strain, stress, np.concatenate(static), volumes)
 
 
 def _hooke(model: BodyModel, block: int, strain: Array, F: Array | None) -> Array:
@@ -98,8 +98,10 @@ def _polynomials(x: Array, corners: int) -> Array:
     return np.column_stack([ones, a, b, c, a * b, b * c, a * c, a * b * c])
 
 
-def nodal_set(model: BodyModel, state: StaticState, phi: Array, harmonic: int = 0, batch: int = 8) -> StressSet:
-    """The Gauss-point set smoothed to the nodes (location ``nodal-averaged``), `batch` modes at a time.
+def nodal_set(
+    model: BodyModel, state: StaticState, phi: Array, harmonic: int = 0, gauss: StressSet | None = None, batch: int = 8
+) -> StressSet:
+    """The Gauss-point set smoothed to the nodes (location ``nodal-averaged``), made `batch` modes at a time if not given.
 
     On the cut faces of a cyclic sector the neighbour's cells count too, turned and in the phase of the nodal diameter
     `harmonic`.
@@ -120,9 +122,9 @@ def nodal_set(model: BodyModel, state: StaticState, phi: Array, harmonic: int = 
 
     phase = 1.0 if cut is None else cut.phase(harmonic)
     strain, stress = np.empty((n, 6, m), dtype=phi.dtype), np.empty((n, 6, m), dtype=phi.dtype)
-    for start in range(0, m, batch):
-        part = gauss_set(model, state, phi[:, :, start : start + batch])
-        some = slice(start, start + batch)
+    size = m if gauss else batch
+    for some in (slice(start, start + size) for start in range(0, m, size)):
+        part = gauss or gauss_set(model, state, phi[:, :, some])
         strain[:, :, some], stress[:, :, some] = smooth(part.strain, 2.0, phase), smooth(part.stress, 1.0, phase)
     static = np.concatenate([cauchy(state, i).reshape(-1, 6) for i in range(len(model.d.blocks))])
     share = model.d.volume * volumes / volumes.sum()
@@ -131,7 +133,7 @@ def nodal_set(model: BodyModel, state: StaticState, phi: Array, harmonic: int = 
 
 def turned_voigt(rotation: Array, shear: float) -> Array:
     """(6, 6) turn of stresses (shear = 1) or strains with engineering shear (shear = 2) in the order `VOIGT`."""
-    i, j = np.array([0, 1, 2, 0, 1, 0]), np.array([0, 1, 2, 1, 2, 2])
+    i, j = VOIGT_AXES
     turn = rotation[i[:, None], i[None]] * rotation[j[:, None], j[None]]
     turn[:, 3:] += rotation[i[:, None], j[None, 3:]] * rotation[j[:, None], i[None, 3:]]
     size = np.where(np.arange(6) < 3, 1.0, shear)

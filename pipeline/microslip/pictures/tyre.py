@@ -19,7 +19,9 @@ def tyre_picture(found: Studied, path: Path, title: str) -> Path:
         plain_axes(axes)
     r, b = found.row, found.brush
     patch.plot(1e3 * r.x, 1e-3 * r.pressure, ".", color="0.6", label="points of the mesh")
-    patch.plot(1e3 * r.smooth[:, 0], 1e-3 * r.smooth[:, 1], color=COLOURS[0], label="of the row")
+    xi = np.linspace(-1, 1, 201)
+    ellipse = 1e-3 * r.highest * np.sqrt(1 - xi**2)
+    patch.plot(1e3 * (r.middle + 0.5 * r.length * xi), ellipse, color=COLOURS[0], label="of the row")
     patch.legend(fontsize=8)
     half = 0.7e3 * r.length
     patch.set(xlabel="x in mm, rolling to the right", ylabel="kPa", xlim=(-half, half), title="pressure of the patch")
@@ -36,12 +38,13 @@ def tyre_picture(found: Studied, path: Path, title: str) -> Path:
     one.set(xlabel="time in s", ylabel="force over normal force", title="a jump and back")
     one.legend(fontsize=8)
     c = found.constants
-    for i, (way, name) in enumerate((("up", "from 0 to the slip"), ("down", "from the slip to 0"))):
+    for i, (way, name) in enumerate((("up", "from 0"), ("down", "back to 0"))):
         constants.plot(100 * c["slip"], c[f"{way}_fitted_s"], "o-", markersize=3, color=COLOURS[i], label=name)
         constants.plot(
             100 * c["slip"], c[f"rigid_{way}_fitted_s"], "--", color=COLOURS[i], label=f"{name}, rigid wheel"
         )
-    constants.set(xlabel="slip in %", ylabel="time constant in s", ylim=(0, None), title="time constants")
-    constants.legend(fontsize=8)
+    constants.set(xlabel="slip in %", ylabel="time constant in s", title="time constants")
+    constants.set_ylim(0, 1.5 * max(np.nanmax(c[f"{way}_fitted_s"]) for way in ("up", "down")))  # room for four names
+    constants.legend(fontsize=8, loc="upper right", ncols=2)
     figure.suptitle(title)
     return save_figure(figure, path)

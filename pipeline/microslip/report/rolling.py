@@ -15,10 +15,10 @@ READ_AS = (
 )
 
 
-def rolling_html(title: str, found: Studied, pictures: Sequence[Path]) -> str:
-    """The page."""
+def rolling_html(title: str, found: Studied, pictures: Sequence[Path], more: Sequence[str] = ()) -> str:
+    """The page; `more` sentences are of what was made beside."""
     warnings = found.warnings()
-    lead = [s for s in found.sentences() if s not in warnings]
+    lead = [*(s for s in found.sentences() if s not in warnings), *more]
     pieces = [say(*lead, tone="lead"), say(*warnings, tone="warn"), *Album({p.name: p for p in pictures}).begun("")]
     return page(title, [piece for piece in [*pieces, _patches(found), say(READ_AS, tone="note")] if piece])
 

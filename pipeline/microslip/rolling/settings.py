@@ -27,6 +27,7 @@ from ..settings.body import (
     override,
 )
 from ..settings.mistakes import validate
+from .contact_table import POINTS as SHIFTS
 from .ellipse import combined
 from .kalker import Coefficients
 from .profiles import EVERYWHERE, WIDTH, Mirror, Profile, circle, has_arc, polynomial, read_profile
@@ -154,6 +155,23 @@ class TableOfCase(Model):
     elements: Annotated[tuple[Count, Count], BeforeValidator(_tuple)] = ELEMENTS
 
 
+class ContactsOfCase(Model):
+    """lateral, yaw: to either side of a table of contacts, m and rad. points: of the shift to one side, and of the yaw,
+    see `contact_table.ContactTable`; it is made for the vertical force of the case on each wheel."""
+
+    lateral: Annotated[Positive, Field(le=0.05)]
+    yaw: Annotated[Positive, Field(le=0.2)]
+    points: Annotated[tuple[Count, Fineness], BeforeValidator(_tuple)] = SHIFTS
+
+
+class ElasticOfCase(Model):
+    """wheel, rail: bodies whose modal files are taken or made. face: their interface at the patch, t2 along rolling."""
+
+    wheel: Name = "wheel"
+    rail: Name = "rail"
+    face: Name = "patch"
+
+
 class HeatOfCase(Model):
     """Steel if not given; each a number, or two, of wheel and rail.
 
@@ -193,6 +211,8 @@ class RollingCase(Model):
     creep: Creep
     model: ModelOfCase = ModelOfCase()
     table: TableOfCase | None = None
+    contacts: ContactsOfCase | None = None
+    elastic: ElasticOfCase | None = None
     heat: HeatOfCase | None = None
     wear: WearOfCase | None = None
 
@@ -208,6 +228,8 @@ class RollingCase(Model):
             raise ValueError("friction.deviation: rolling is steady, and friction random in time is not; remove it")
         if self.table is not None and self.model.spin == "book":
             raise ValueError('table: is made with model.spin = "kalker"; take that, or remove the table')
+        if self.contacts is not None and not self.vertical_force > 0:
+            raise ValueError("contacts: is a table for the vertical force of the case; give vertical_force above 0")
         if self.table is not None and not self.is_constant:
             raise ValueError("table: is of constant friction; give a number, without heat.limit, or remove the table")
         return self
@@ -243,13 +265,18 @@ class RollingCase(Model):
             raise UserError("friction: is 0 at all speeds; the creep force is a part of it, so give more than 0")
         return found
 
+    @property
+    def solids(self) -> tuple[Solid, Solid]:
+        """Of wheel and rail."""
+        return Solid(self.wheel.young, self.wheel.poisson), Solid(self.rail.young, self.rail.poisson)
+
     def track(self, folder: Path) -> Track:
         """Of files beside the case.
 
         Raises:
             UserError: profiles that are none.
         """
-        elastic = combined(*(Solid(s.young, s.poisson) for s in (self.wheel, self.rail)))
+        elastic = combined(*self.solids)
         rail = self.rail.made(folder, 1.0).turned(self.rail.inclination)
         return Track(self.wheel.made(folder, -1.0), rail, self.wheel.radius, self.wheel.at, self.rail.at, elastic)
 

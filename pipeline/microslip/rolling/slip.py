@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -10,7 +9,6 @@ from typing import Annotated, Any
 
 import numpy as np
 from pydantic import BeforeValidator, Field, model_validator
-from scipy.optimize import minimize_scalar
 
 from ..data import Array, ContactState, ModalGroup, UserError
 from ..settings.body import Model, Name, NotNegative, Positive, _tuple, load_toml, override
@@ -18,6 +16,8 @@ from ..settings.mistakes import validate
 from .brush import Brush, fitted, jump, reached
 
 Slip = Annotated[float, Field(gt=0, le=1)]
+ENOUGH = 18
+"""Places along the patch, three an element, from which on its length is off by less than 1 %."""
 
 
 class TyreOfCase(Model):
@@ -75,28 +75,30 @@ def load_tyre(path: Path, assignments: list[str] | None = None) -> tuple[TyreCas
 @dataclass(frozen=True)
 class Row:
     """The middle of the patch along rolling. Attributes: x: (k,) places, m. pressure: (k,) Pa, the mean over the width.
-    smooth: (l, 2) places and the smooth pressure that fits it. share: (n,) of elements, from the leading edge on.
-    length: m. force: of the patch, N. area: m2."""
+    middle, length: of the half ellipse that stands for it, m. share: (n,) of elements, from the leading edge on. force:
+    of the patch, N. width: m."""
 
     x: Array
     pressure: Array
-    smooth: Array
-    share: Array
+    middle: float
     length: float
+    share: Array
     force: float
-    area: float
+    width: float
 
     @property
-    def spacing(self) -> float:
-        """m, the largest step from one point that is pressed to the next."""
-        return float(np.diff(self.x[self.pressure > 1e-6 * self.pressure.max()]).max())
+    def highest(self) -> float:
+        """Pa, of the half ellipse."""
+        return 4 * self.force / (np.pi * self.length * self.width)
+
+    @property
+    def places(self) -> int:
+        """How many of x lie along the patch."""
+        return int((np.abs(self.x - self.middle) < 0.5 * self.length).sum())
 
 
 def row(state: ContactState, along: Array, elements: int) -> Row:
-    """Of a static contact, pressures of points that lie side by side taken together.
-
-    Within an element of the mesh a pressure at points swings, so the row has the smooth one that fits best: the root
-    of 1 - xi^2 times a parabola, between ends that fit best, with the same force.
+    """Of a static contact: the half ellipse with the force, the centre and the second moment of its pressure.
 
     Args:
         along: (3,) direction of rolling.
@@ -104,7 +106,7 @@ def row(state: ContactState, along: Array, elements: int) -> Row:
     Raises:
         UserError: nothing touches; the patch reaches the end of its face.
     """
-    if not state.normal_force > 0:
+    if not state.normal_force > 0 or state.spread is None:
         raise UserError("tyre.contact: the wheel does not touch the ground; give more interference")
     x, where = np.unique(np.round(state.points @ along, 7), return_inverse=True)
     areas = np.bincount(where, state.areas)
@@ -112,31 +114,11 @@ def row(state: ContactState, along: Array, elements: int) -> Row:
     near = np.flatnonzero(p > 1e-6 * p.max())
     if near[0] == 0 or near[-1] == len(x) - 1:
         raise UserError("tyre.contact: the patch reaches the end of its face and is cut off; make the face longer")
-    middle = float(areas @ (x * p) / (areas @ p))
-    reach = max(x[near[-1] + 1] - middle, middle - x[near[0] - 1])
-    half = minimize_scalar(
-        lambda a: _fitted(x - middle, p, areas, a)[1], bounds=(0.5 * reach, reach), method="bounded"
-    ).x
-    shape, _ = _fitted(x - middle, p, areas, half)
-    fine = np.linspace(-1, 1, 200 * elements + 1)
-    fit = shape(fine)
-    sums = np.add.reduceat(0.5 * (fit[1:] + fit[:-1]), np.arange(0, 200 * elements, 200))
-    length = 2 * float(half)
-    width = float(areas.sum()) / (x[-1] - x[0])
-    scale = state.normal_force / (sums.sum() / (200 * elements) * length * width)
-    smooth = np.column_stack([middle + half * fine, scale * fit])
-    return Row(x, p, smooth, sums[::-1] / sums.sum(), length, state.normal_force, length * width)
-
-
-def _fitted(x: Array, p: Array, weight: Array, half: float) -> tuple[Callable[[Array], Array], float]:
-    """Pressure over xi = x/half, and the sum of its squared errors."""
-    xi = x / half
-    root = np.sqrt(np.maximum(1 - xi**2, 0))
-    basis = root[:, None] * xi[:, None] ** np.arange(3)
-    by = np.sqrt(weight)
-    found = np.linalg.lstsq(by[:, None] * basis, by * p, rcond=None)[0]
-    error = float((weight * (basis @ found - p) ** 2).sum())
-    return lambda t: np.maximum(np.sqrt(np.maximum(1 - t**2, 0)) * np.polyval(found[::-1], t), 0.0), error
+    length = 4 * float(along @ state.spread @ along) ** 0.5
+    edge = np.linspace(1, -1, elements + 1)
+    share = -np.diff(np.arcsin(edge) + edge * np.sqrt(1 - edge**2)) / np.pi
+    width = float(areas.sum()) / float(x[-1] - x[0])
+    return Row(x, p, float(state.centre @ along), length, share, state.normal_force, width)
 
 
 @dataclass(frozen=True)
@@ -189,8 +171,8 @@ class Studied:
         up, down = c["up_fitted_s"], c["down_fitted_s"]
         return [
             f"The wheel stands with {r.force:.4g} N on a patch {1e3 * r.length:.3g} mm long, at most "
-            f"{r.smooth[:, 1].max() / 1e3:.3g} kPa in the mean over its width; it is passed in {pass_time:.3g} s. "
-            f"Points of the mesh stand up to {1e3 * r.spacing:.2g} mm apart there, which the length is known to.",
+            f"{r.highest / 1e3:.3g} kPa in the mean over its width; it is passed in {pass_time:.3g} s.",
+            *self._coarse(),
             f"After a jump of the slip from 0 the force follows with a time constant of {up[0]:.3g} s at a target of "
             f"{c['slip'][0]:g} and {up[-1]:.3g} s at {c['slip'][-1]:g}.",
             f"After a jump back to 0 it is {down.min():.3g} to {down.max():.3g} s.",
@@ -199,6 +181,15 @@ class Studied:
             "1 - exp(-1/2) = 0.3935).",
             f"The mode at {self.frequency:.4g} Hz gives way by {1e6 * b.compliance:.3g} um/N along rolling and makes "
             f"the smallest jump {c['up_reached_s'][0] / c['rigid_up_reached_s'][0]:.3g} times as slow.",
+        ]
+
+    def _coarse(self) -> list[str]:
+        """A length that the mesh does not tell."""
+        if self.row.places >= ENOUGH:
+            return []
+        return [
+            f"warning: only {self.row.places} rows of points of the mesh lie along the patch, so its length is known "
+            "to a few per cent; take a smaller mesh.size of the body."
         ]
 
 
@@ -219,7 +210,7 @@ def study(case: TyreCase, group: ModalGroup) -> Studied:
     yields = np.real(face.rows[2]) ** 2 / np.where(group.omega > 0, group.omega, np.inf) ** 2
     k = int(yields.argmax())
     brush = Brush(
-        found.share, found.length, t.stiffness * found.area, t.friction, t.speed,
+        found.share, found.length, t.stiffness * found.length * found.width, t.friction, t.speed,
         0.0 if t.rigid else float(yields[k]), float(group.omega[k]), max(float(group.damping_ratio[k]), 0.0),
     )  # fmt: skip
     return Studied(case, found, brush, float(group.omega[k]) / (2 * np.pi))

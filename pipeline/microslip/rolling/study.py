@@ -8,7 +8,7 @@ from pathlib import Path
 import jax.numpy as jnp
 import numpy as np
 
-from ..contact.solids import Solid, mismatch
+from ..contact.solids import mismatch
 from ..data import Array, UserError
 from .exact import Exact, exact
 from .fastsim import fastsim
@@ -190,7 +190,7 @@ class Studied:
         told = []
         if self.highest > STEEPEST:
             told.append(f"warning: friction is {self.highest:g}; steel on steel has 0.05 to 0.6.")
-        beta = mismatch(*(Solid(s.young, s.poisson) for s in (self.case.wheel, self.case.rail)))
+        beta = mismatch(*self.case.solids)
         if abs(beta) > UNLIKE:
             told.append(
                 f"warning: wheel and rail are unlike (Dundurs' beta {beta:.2g}): their pressure alone shears them, "
@@ -276,9 +276,8 @@ def _exact(
     at = np.unique(np.searchsorted(way, np.linspace(0, way[-1], case.model.exact)))
     if not len(at):
         return None, ""
-    bodies = Solid(case.wheel.young, case.wheel.poisson), Solid(case.rail.young, case.rail.poisson)
     try:
-        return exact(bodies, p, across(track, case.posed(), case.pose.side, p), friction, creep, at), ""
+        return exact(case.solids, p, across(track, case.posed(), case.pose.side, p), friction, creep, at), ""
     except UserError as error:
         return None, str(error)
 

@@ -114,7 +114,7 @@ def axle(track: Track, pose: Pose, vertical: float, even: bool = False) -> tuple
 
     Args:
         vertical: N, on both wheels together; the roll of the pose shares it, and a wheel may be off its rail. even: the
-            axle rolls until both carry the same, whatever the roll of the pose.
+            axle rolls until both carry the same, and the roll of the pose is where the search for it begins.
 
     Raises:
         UserError: wheel and rail lie nowhere above each other; no roll within 0.05 rad shares the force evenly.
@@ -133,9 +133,10 @@ def axle(track: Track, pose: Pose, vertical: float, even: bool = False) -> tuple
     if not vertical > 0:
         return [], [], pose
     if even:
-        near, far = 0.0, -1e-3 if uneven(0.0) > 0 else 1e-3
-        while uneven(far) * far < 0:
-            near, far = far, 2 * far
+        near = pose.roll
+        step = -1e-5 if uneven(near) > 0 else 1e-5
+        while uneven(far := near + step) * step < 0:
+            near, step = far, 4 * step
             if abs(far) > STEEPEST:
                 raise UserError(
                     f"pose: no roll below {STEEPEST:g} rad shares the vertical force evenly; correct the pose"

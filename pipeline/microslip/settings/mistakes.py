@@ -30,6 +30,8 @@ _WORDS = {
     "literal_error": "must be {expected}",
     "tuple_type": "must be a list in [brackets]",
     "list_type": "must be a list in [brackets]",
+    "too_short": "must hold {min_length} values or more",
+    "too_long": "must hold {max_length} values or fewer",
 }
 _SCALAR = {"float_type", "int_type", "bool_type", "string_type"}
 _NO_TABLE = {"model_type", "model_attributes_type", "dict_type"}

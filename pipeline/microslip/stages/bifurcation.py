@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,11 +10,10 @@ from typing import Any
 import numpy as np
 
 from .. import sliding
-from ..basis import read_basis
 from ..bifurcation import branches, mechanics
 from ..bifurcation.diagram import Asked, Diagram, diagram
 from ..bifurcation.recorded import Branches, write_bifurcation
-from ..case import CaseSettings, checkpoint, load_case
+from ..case import CaseSettings, checkpoint
 from ..case.questions import BifurcationOfCase
 from ..data import NotConverged, UserError
 from ..files import store
@@ -23,8 +21,8 @@ from ..files.tables import rows_csv
 from ..report.bifurcation import bifurcation_html
 from ..system.assembly import Assembly
 from ..units import counted
-from .checkpoint import inputs_of
-from .stage import Made, Report, Stage, hash_of_code
+from .answer import Answer, CaseJob
+from .stage import Stage, hash_of_code
 from .varied import Varied
 
 
@@ -45,40 +43,22 @@ class Changed:
         return self.varied.under(values, f"bifurcation.{self.asked.name}.keys")
 
 
-def bifurcation_stage(
-    case_path: Path, files: Mapping[str, Path], folder: Path, assignments: list[str] | None = None,
-    force: bool = False, report: Report = lambda _: None, pictures: bool = True,
-) -> tuple[list[Path], list[str], bool]:  # fmt: skip
-    """The diagrams that a case asks for, in a folder; finished branches are kept there.
-
-    Args:
-        files: body of the case -> its modal file.
-
-    Returns:
-        The files, sentences, and whether every branch was followed to its end.
+def bifurcation_stage(case: CaseJob) -> Answer:
+    """The diagrams that a case asks for, whole if every branch was followed to its end; finished branches are kept.
 
     Raises:
         UserError: the case asks for none; a key that is none; no equilibrium to begin with.
     """
-    settings, raw = load_case(case_path, assignments)
-    if not settings.bifurcation:
-        raise UserError(f"{case_path}: bifurcation: is missing; add [[bifurcation]] with keys, start and stop")
-    stage = Stage(folder / "bifurcation.json", ("stages.bifurcation",), force, report)
-    inputs = {**inputs_of(raw, settings, case_path, files), "pictures": pictures}
-    own = {key: value for key, value in checkpoint.without_defaults(raw).items() if key != "bifurcation"}
-    depends = {**inputs, "case": own, "pictures": None, "code": hash_of_code(stage.code)}
-    stage.make(inputs, lambda: _work(stage, settings, raw, case_path, files, pictures, depends))
-    answer = json.loads(stage.product.read_text())
-    return [folder / name for name in answer["files"]], answer["sentences"], not answer["lost"]
+    if not case.settings.bifurcation:
+        raise UserError(f"{case.path}: bifurcation: is missing; add [[bifurcation]] with keys, start and stop")
+    return case.answer("bifurcation", "stages.bifurcation", _work)
 
 
-def _work(
-    stage: Stage, settings: CaseSettings, raw: Mapping[str, Any], case_path: Path, files: Mapping[str, Path],
-    pictures: bool, inputs: Mapping[str, Any],
-) -> Made:  # fmt: skip
-    folder = stage.product.parent
-    bases = {name: read_basis(file) for name, file in files.items()}
-    changed = [Changed(Varied(case_path, raw, bases), asked) for asked in settings.bifurcation]
+def _work(stage: Stage, case: CaseJob) -> Answer:
+    folder, settings = case.folder, case.settings
+    changed = [Changed(Varied(case.path, case.raw, case.bases), asked) for asked in settings.bifurcation]
+    own = {key: value for key, value in checkpoint.without_defaults(case.raw).items() if key != "bifurcation"}
+    inputs = {**case.inputs, "case": own, "code": hash_of_code(stage.code)}
     for one in changed:  # what is wrong in a later diagram is said before the first one is made
         one.at(one.asked.start)
         one.at(one.asked.stop)
@@ -88,14 +68,12 @@ def _work(
     both = zip(settings.bifurcation, found, strict=True)
     whole = [Branches(one.name, one.parameter, one.unit, drawn.branches) for one, drawn in both]
     made.append(write_bifurcation(folder / "bifurcation.h5", whole))
-    drawn = _pictures(folder / "pictures", settings, found) if pictures else []
+    drawn = _pictures(folder / "pictures", settings, found) if case.pictures else []
     sentences = [s for asked, one in zip(settings.bifurcation, found, strict=True) for s in told(asked, one)]
     page = bifurcation_html(f"{settings.name}: bifurcations", settings.bifurcation, found, sentences, drawn)
     store.write_text(folder / "bifurcation.html", page)
-    names = [str(p.relative_to(folder)) for p in (folder / "bifurcation.html", *made, *drawn)]
-    answer = {"files": names, "sentences": sentences, "lost": any(b.lost for one in found for b in one.branches)}
-    store.write_text(stage.product, json.dumps(answer, indent=1) + "\n")
-    return Made([folder / name for name in names])
+    lost = any(b.lost for one in found for b in one.branches)
+    return Answer([folder / "bifurcation.html", *made, *drawn], sentences, not lost)
 
 
 def _diagram(one: Changed, folder: Path, depends: Mapping[str, Any], stage: Stage) -> Diagram:
@@ -109,7 +87,6 @@ def _diagram(one: Changed, folder: Path, depends: Mapping[str, Any], stage: Stag
     def file(branch: str) -> Path:
         return folder / f"{name}, {branch}.h5".replace(", ", "_").replace(" ", "_")
 
-    folder.mkdir(parents=True, exist_ok=True)
     fields = Asked.__dataclass_fields__
     given = Asked(**{key: getattr(asked, key) for key in fields})
     try:
@@ -136,7 +113,6 @@ def _table(folder: Path, asked: BifurcationOfCase, found: Diagram) -> Path:
 def _pictures(folder: Path, settings: CaseSettings, found: Sequence[Diagram]) -> list[Path]:
     from ..pictures.bifurcation import diagram_picture, portraits_picture
 
-    folder.mkdir(exist_ok=True)
     drawn = list[Path]()
     for asked, one in zip(settings.bifurcation, found, strict=True):
         title, axis = f"{settings.name}: {asked.parameter}", f"{asked.parameter} in {asked.unit}".removesuffix(" in ")

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from ..data import UserError
+from ..errors import told_of
 from ..files import store
 from ..mesh import UNITS
 from ..units import from_rpm
@@ -40,12 +41,10 @@ def closure_stage(
     mesh, warnings = load_mesh(job, mesh_stage(job, report=report))
     for warning in warnings:
         report(f"warning: {warning}")
-    try:
+    with told_of(job.path):
         settings, temperature = with_temperature(job, mesh)
         levels = np.linspace(low, high, points) * scale
         curve = closure_curve(mesh, settings, chosen, levels, from_rpm(rpm), temperature, report)
-    except UserError as error:
-        raise UserError(f"{job.path}: {error}") from error
     folder = output or job.basis_file.parent
     table, picture = folder / f"closure_{chosen}.csv", folder / f"closure_{chosen}.png"
     with store.making(table, report):

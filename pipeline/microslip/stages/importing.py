@@ -301,17 +301,18 @@ def _pressed(mesh: Mesh) -> list[str]:
 
 
 def _matrices(file: Path, folder: Path, unit: str) -> tuple[list[str], list[str]]:
-    from ..exchange.matrices import matrix_names
+    from ..exchange.matrices import matrix_names, own_nodes
 
     names = matrix_names(file)
     told = [f"{file}: matrices {', '.join(names) or 'none'}"]
     mass = _mass_of(file, names)
-    nodes = _nodes_of(file)
+    own, generalised = own_nodes(file)
+    nodes = file if own else _nodes_of(file)
     lines = ["free = true               # nothing is held yet", "", "[geometry.matrices]"]
     lines.append(f"stiffness = {_beside(file, folder)}")
     lines.append(f"mass = {_beside(mass, folder)}")
     upper = {n.upper() for n in names}
-    for key, usual in (("damping", ("C", "BAA", "C_R")), ("gyroscopic", ("G", "G_R"))):
+    for key, usual in (("damping", ("C", "BAA", "BAAX", "C_R")), ("gyroscopic", ("G", "G_R"))):
         if upper & set(usual) and mass == file:
             lines.append(f"#{key} = {_beside(file, folder)}")
     if nodes is None:
@@ -320,6 +321,8 @@ def _matrices(file: Path, folder: Path, unit: str) -> tuple[list[str], list[str]
     else:
         lines.append(f"nodes = {_beside(nodes, folder)}")
         told.append(f"nodes from {nodes}")
+    if generalised:
+        lines.append("superelement = true        # rows without a node are its generalised coordinates")
     lines.append("#grounded = true          # the supports are in the matrices already (then remove free = true)")
     if usual_system(unit) is None:
         lines.append(f'units = "m-kg-s"          # of the matrices: {", ".join(SYSTEMS)}')

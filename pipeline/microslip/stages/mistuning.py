@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import json
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import partial
@@ -13,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from ..basis import read_basis
-from ..case import CaseSettings, load_case
+from ..case import CaseSettings
 from ..case.assemble import Built, build, swept
 from ..case.problem import book_models
 from ..case.questions import MistuningOfCase, ScatterOfCase
@@ -30,80 +29,59 @@ from ..mistuning.statistics import SHARES, fits
 from ..report.mistuning import mistuning_html
 from ..system.assembly import Assembly, Contact
 from ..units import counted
-from .checkpoint import inputs_of
-from .stage import Made, Report, Stage, hash_of_code
+from .answer import Answer, CaseJob
+from .stage import Stage, hash_of_code
 
 
-def mistuning_stage(
-    case_path: Path, files: Mapping[str, Path], folder: Path, assignments: list[str] | None = None,
-    force: bool = False, report: Report = lambda _: None, pictures: bool = True, workers: int | None = None,
-) -> tuple[list[Path], list[str], bool]:  # fmt: skip
-    """What a case asks for in [mistuning], in a folder.
+def mistuning_stage(case: CaseJob, workers: int | None = None) -> Answer:
+    """What a case asks for in [mistuning]; whole if every sample has a solution.
 
     Args:
-        files: body of the case -> its modal file. workers: see `mistuning.ensemble.run`.
-
-    Returns:
-        The files, sentences, and whether every sample has a solution.
+        workers: see `mistuning.ensemble.run`.
 
     Raises:
         UserError: the case asks for none; a scatter of what is not there, or that leaves nothing of it.
     """
-    settings, raw = load_case(case_path, assignments)
-    if settings.mistuning is None:
-        raise UserError(f"{case_path}: mistuning: is missing; add [[mistuning.scatter]] with of and deviation")
-    stage = Stage(folder / "mistuning.json", ("stages.mistuning",), force, report)
-    inputs = {**inputs_of(raw, settings, case_path, files), "pictures": pictures}
-    stage.make(inputs, lambda: _work(stage, settings, inputs, case_path, files, workers, pictures))
-    told = json.loads(stage.product.read_text())
-    return [folder / name for name in told["files"]], told["sentences"], told["solved"]
+    if case.settings.mistuning is None:
+        raise UserError(f"{case.path}: mistuning: is missing; add [[mistuning.scatter]] with of and deviation")
+    return case.answer("mistuning", "stages.mistuning", partial(_work, workers=workers))
 
 
-def _work(
-    stage: Stage, settings: CaseSettings, inputs: Mapping[str, Any], case_path: Path, files: Mapping[str, Path],
-    workers: int | None, pictures: bool,
-) -> Made:  # fmt: skip
-    folder, asked = stage.product.parent, settings.mistuning
+def _work(stage: Stage, case: CaseJob, workers: int | None) -> Answer:
+    folder, settings, built = case.folder, case.settings, case.built()
+    asked = settings.mistuning
     assert asked is not None
-    built = build(settings, {name: read_basis(file) for name, file in files.items()}, case_path)
     kept = folder / "mistuning.npz"
-    if stage.force:
+    if case.force:
         for old in (kept, folder / "rare.npz"):
             old.unlink(missing_ok=True)
-    known = _of_samples(inputs)
+    known = _of_samples(case.inputs)
     try:
-        what = asked_of(built, settings, case_path)
+        what = asked_of(built, settings, case.path)
         ready(what, asked.samples, asked.rare)
-        found = run(what, asked.samples, asked.until, workers, kept, known, report=stage.report)
+        found = run(what, asked.samples, asked.until, workers, kept, known, report=case.report)
         if asked.rare:
-            found.rare = choose(found, asked.rare, workers, folder / "rare.npz", known, report=stage.report)
+            found.rare = choose(found, asked.rare, workers, folder / "rare.npz", known, report=case.report)
     except UserError as error:
-        text = str(error).removeprefix(f"{case_path}: ").removeprefix("mistuning: ")
-        raise UserError(f"{case_path}: mistuning: {text}") from error
+        text = str(error).removeprefix(f"{case.path}: ").removeprefix("mistuning: ")
+        raise UserError(f"{case.path}: mistuning: {text}") from error
     stage.begin()
     first = next((s for s in what.scatter if s.of == "frequency" and s.deviation), None)
     lone = first is not None and what.tuned.body(first).sectors == 1 and settings.stuck_ratios is None
     near = approximation(what, first) if first and lone and not what.stuck else None
     sentences = [*said(found), *built.messages]
     made = _written(found, near, folder)
-    drawn = _pictures(found, near, folder / "pictures", settings.name) if pictures else []
+    drawn = _pictures(found, near, folder / "pictures", settings.name) if case.pictures else []
     page = folder / "mistuning.html"
     store.write_text(page, mistuning_html(f"{settings.name}: mistuned", found, sentences, drawn))
-    made = [page, *made, *drawn]
-    told = {
-        "files": [str(path.relative_to(folder)) for path in made],
-        "sentences": sentences,
-        "solved": bool(found.solved.all()),
-    }
-    store.write_text(stage.product, json.dumps(told, indent=1) + "\n")
-    return Made(made)
+    return Answer([page, *made, *drawn], sentences, bool(found.solved.all()))
 
 
 def _of_samples(inputs: Mapping[str, Any]) -> str:
     """Hash of what one sample depends on: not how many there are."""
     case = dict(inputs["case"])
     case["mistuning"] = {k: v for k, v in case["mistuning"].items() if k not in ("samples", "until", "rare")}
-    return store.fingerprint({**inputs, "case": case, "pictures": None}, hash_of_code(("mistuning.samples",)))
+    return store.fingerprint({**inputs, "case": case}, hash_of_code(("mistuning.samples",)))
 
 
 def asked_of(built: Built, case: CaseSettings, path: Path) -> Asked:
@@ -277,7 +255,6 @@ def _written(found: Ensemble, near: Approximation | None, folder: Path) -> list[
 def _pictures(found: Ensemble, near: Approximation | None, folder: Path, case: str) -> list[Path]:
     from ..pictures.mistuning import amplification_picture, envelope_picture, sensitivity_picture, worst_picture
 
-    folder.mkdir(parents=True, exist_ok=True)
     if not found.solved.any():
         return []
     drawn = [sensitivity_picture(near, folder / "sensitivity.png", f"{case}: sensitivities")] if near else []

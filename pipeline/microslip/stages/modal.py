@@ -13,6 +13,7 @@ import numpy as np
 from .. import __version__
 from ..basis import write_basis
 from ..data import Array, Mesh, ModalBasis, UserError
+from ..errors import told_of
 from ..files import store
 from ..mesh import UNITS
 from ..mesh.cards import files_of
@@ -63,11 +64,9 @@ def basis_of(job: Job, mesh_file: Path, report: Report) -> tuple[ModalBasis, lis
     mesh, warnings = load_mesh(job, mesh_file)
     for warning in warnings:
         report(f"warning: {warning}")
-    try:
+    with told_of(job.path):
         settings, temperature = with_temperature(job, mesh)
         return modal_basis(mesh, settings, temperature, report, provenance(job, mesh_file)), warnings
-    except UserError as error:
-        raise UserError(f"{job.path}: {error}") from error
 
 
 def _from_matrices(job: Job, given: MatrixFiles, report: Report) -> tuple[ModalBasis, list[str]]:

@@ -42,7 +42,6 @@ def moving_bodies(found: Sequence[tuple[str, Orbit]], built: Built, folder: Path
             if body is None or not body.basis.mesh.n_cells or not all(len(g.phi) for g in body.groups.values()):
                 continue
             moved = _moved(body, classification.of_body(one, j, at))
-            (folder / "motion").mkdir(exist_ok=True)
             made += write_motion(body.basis, one.time[at], moved, folder / "motion" / f"{component.name}_{i}.pvd")
             if scenes:
                 path = folder / "pictures" / f"moving_{i}_{component.name}.gif"
@@ -71,8 +70,6 @@ def moving_shape(
     scale = SIZE / max(float(longest(u).max()) for u in shape.values())
     for name, u in shape.items():
         moved = scale * np.real(np.exp(2j * np.pi * part)[:, None, None, None] * u)
-        for kind in ("motion", "pictures"):
-            (folder / kind).mkdir(parents=True, exist_ok=True)
         made += write_motion(bases[name], part / frequency, moved, folder / "motion" / f"root_{number}_{name}.pvd")
         if scenes and name in animated:
             path = folder / "pictures" / f"root_{number}_{name}.gif"

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ..basis import read_basis
-from ..case import CaseSettings, load_case
-from ..case.assemble import Built, build, swept
+from ..case import CaseSettings
+from ..case.assemble import Built, swept
 from ..case.problem import problem_of
 from ..case.questions import OrbitOfCase, RunUpOfCase
 from ..data import UserError
@@ -24,64 +22,38 @@ from ..time_domain.classification import Exponent
 from ..time_domain.orbit import Orbit
 from ..time_domain.ramp import Ramp
 from ..units import METRES, counted, percent
-from .checkpoint import inputs_of
+from .answer import Answer, CaseJob
 from .moving import moving_bodies
-from .stage import Made, Report, Stage, hash_of_code
+from .stage import Stage
 
 
-def orbit_stage(
-    case_path: Path, files: Mapping[str, Path], folder: Path, assignments: list[str] | None = None,
-    force: bool = False, report: Report = lambda _: None, pictures: bool = True,
-) -> tuple[list[Path], list[str], bool]:  # fmt: skip
-    """The motions in time that a case asks for, in a folder.
-
-    Args:
-        files: body of the case -> its modal file.
-
-    Returns:
-        The files, a sentence a motion, and whether none diverged.
+def orbit_stage(case: CaseJob) -> Answer:
+    """The motions in time that a case asks for, a sentence a motion; whole if none diverged.
 
     Raises:
         UserError: the case asks for none.
     """
-    settings, raw = load_case(case_path, assignments)
-    if settings.orbit is None:
-        raise UserError(f"{case_path}: orbit: is missing; add [orbit] with frequency (Hz), Omega (rad/s) or run_up")
-    stage = Stage(folder / "orbit.json", ("stages.orbit",), force, report)
-    inputs = {**inputs_of(raw, settings, case_path, files), "pictures": pictures}
-    told = store.hash_settings({**inputs, "code": hash_of_code(stage.code)})
-    stage.make(inputs, lambda: _work(stage, settings, case_path, files, pictures, told))
-    told = json.loads(stage.product.read_text())
-    return [folder / name for name in told["files"]], told["sentences"], not told["diverged"]
+    if case.settings.orbit is None:
+        raise UserError(f"{case.path}: orbit: is missing; add [orbit] with frequency (Hz), Omega (rad/s) or run_up")
+    return case.answer("orbit", "stages.orbit", _work)
 
 
-def _work(
-    stage: Stage, settings: CaseSettings, case_path: Path, files: Mapping[str, Path], pictures: bool, inputs: str
-) -> Made:  # fmt: skip
-    folder = stage.product.parent
-    built = build(settings, {name: read_basis(file) for name, file in files.items()}, case_path)
-    motions = _asked(settings, built, case_path)
+def _work(stage: Stage, case: CaseJob) -> Answer:
+    folder, name, built = case.folder, case.settings.name, case.built()
+    motions = _asked(case.settings, built, case.path)
     stage.begin()
-    found = [(m.name, m) for m in recorded.run(folder / "orbit.h5", motions, inputs, stage.force, stage.report)]
+    ran = recorded.run(folder / "orbit.h5", motions, case.made_by(stage), case.force, case.report)
+    found = [(m.name, m) for m in ran]
     notes, messages = _notes(found), _messages(found, built)
     store.write_text(folder / "orbit.csv", columns_csv(_table(found), 8))
-    drawn = _pictures(found, folder / "pictures", settings.name) if pictures else []
-    moving = moving_bodies(found, built, folder) if pictures else []
+    drawn = _pictures(found, folder / "pictures", name) if case.pictures else []
+    moving = moving_bodies(found, built, folder) if case.pictures else []
     drawn += [path for path in moving if path.suffix == ".gif"]
-    rows = [
-        {"name": name, "kind": KIND.get(kind := classification.kind(one), kind), **_row(one)} for name, one in found
-    ]
-    page = orbit_html(f"{settings.name}: motion in time", rows, notes, messages, drawn)
+    rows = [{"name": m, "kind": KIND.get(kind := classification.kind(one), kind), **_row(one)} for m, one in found]
+    page = orbit_html(f"{name}: motion in time", rows, notes, messages, drawn)
     store.write_text(folder / "orbit.html", page)
-    made = [folder / name for name in ("orbit.html", "orbit.csv", "orbit.h5")]
-    made += dict.fromkeys(drawn + moving)
-    told = {
-        "files": [str(path.relative_to(folder)) for path in made],
-        "sentences": [*notes, *messages],
-        "diverged": [name for name, one in found if np.isfinite(one.diverged)],
-    }
-    store.write_text(stage.product, json.dumps(told, indent=1) + "\n")
-    return Made(made)
+    made = [*(folder / f"orbit.{end}" for end in ("html", "csv", "h5")), *dict.fromkeys(drawn + moving)]
+    return Answer(made, [*notes, *messages], not any(np.isfinite(one.diverged) for _, one in found))
 
 
 def _asked(settings: CaseSettings, built: Built, case_path: Path) -> list[recorded.Asked]:
@@ -162,7 +134,6 @@ def _pictures(found: Sequence[tuple[str, Orbit]], folder: Path, case: str) -> li
     """Phase portraits together, a sheet a motion, and one more for each contact that chatters."""
     from ..pictures.orbit import chatter_picture, orbit_picture, portraits
 
-    folder.mkdir(exist_ok=True)
     seen, drawn = [(name, one) for name, one in found if len(one.time)], list[Path]()
     if len(seen) > 1:  # one that diverges as it settles leaves nothing to draw
         drawn.append(portraits(seen, folder / "phase_portraits.png", f"{case}: phase portraits"))

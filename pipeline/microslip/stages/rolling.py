@@ -2,29 +2,32 @@
 
 from __future__ import annotations
 
-import json
 from importlib.util import find_spec
 from pathlib import Path
 
+from ..basis import read_basis
 from ..contact.friction import OfTable
-from ..data import UserError
+from ..errors import told_of
 from ..files import store
 from ..files.tables import columns_csv, rows_csv
 from ..report.rolling import rolling_html
+from ..rolling.behind import ROWS, Behind, behind
+from ..rolling.contact_table import ContactTable, contact_table, write_contact_table
 from ..rolling.settings import RollingCase, load_rolling
 from ..rolling.study import Studied, rows_of_patches, study
 from ..rolling.table import creep_table, write_creep_table
-from .stage import Made, Report, Stage
+from .answer import Answer, answered
+from .job import open_job
+from .modal import modes_stage
+from .places import find_body
+from .stage import Report, Stage
 
 
 def rolling_stage(
     case_path: Path, root: Path = Path("build"), assignments: list[str] | None = None, force: bool = False,
     report: Report = lambda _: None, pictures: bool = True,
-) -> tuple[list[Path], list[str]]:  # fmt: skip
+) -> Answer:  # fmt: skip
     """What a rolling case asks for, in ``root/NAME``.
-
-    Returns:
-        The files, the page first, and sentences.
 
     Raises:
         UserError: mistakes of the case or its profiles.
@@ -34,44 +37,73 @@ def rolling_stage(
     files = [case_path.parent / s.profile for s in (case.wheel, case.rail) if isinstance(s.profile, str)]
     files += [case_path.parent / case.friction.file] if isinstance(case.friction, OfTable) else []
     profiles = [store.hash_file(file) for file in files if file.is_file()]
-    inputs = {"case": raw, "profiles": profiles, "pictures": pictures}
-    stage.make(inputs, lambda: _work(stage, case, case_path, pictures))
-    told = json.loads(stage.product.read_text())
-    return [stage.product.parent / name for name in told["files"]], told["sentences"]
+    bodies = _bodies(case, case_path, report)
+    inputs = {"case": raw, "profiles": profiles, "pictures": pictures, "bodies": [store.hash_file(b) for b in bodies]}
+    return answered(stage, inputs, lambda: _work(stage, case, case_path, bodies, pictures))
 
 
-def _work(stage: Stage, case: RollingCase, case_path: Path, pictures: bool) -> Made:
+def _bodies(case: RollingCase, case_path: Path, report: Report) -> list[Path]:
+    """Modal files of wheel and rail, made where they are not up to date."""
+    if case.elastic is None:
+        return []
+    jobs = [open_job(find_body(case_path, name, Path("."))) for name in (case.elastic.wheel, case.elastic.rail)]
+    return [modes_stage(job, report=report)[0] for job in jobs]
+
+
+def _work(stage: Stage, case: RollingCase, case_path: Path, bodies: list[Path], pictures: bool) -> Answer:
     folder = stage.product.parent
     stage.report("patches and creep curve")
-    try:
+    with told_of(case_path):
         found = study(case, case_path.parent)
-    except UserError as error:
-        raise UserError(f"{case_path}: {error}") from error
-    former = json.loads(stage.product.read_text())["files"] if stage.product.is_file() else []
+        elastic = _behind(found, bodies)
+        contacts = _contacts(stage, found)
     stage.begin()
-    for name in former:  # what this run does not write again would be of another case
-        (folder / name).unlink(missing_ok=True)
-    sentences = found.sentences()
     made = _tables(found, folder)
+    beside, more = _beside(stage, found, elastic, contacts)
+    drawn = _pictures(found, folder / "pictures", case.name) if pictures and found.forces is not None else []
+    page = folder / "rolling.html"
+    shown = [p for p in drawn if p.suffix == ".png"]
+    store.write_text(page, rolling_html(f"{case.name}: rolling contact", found, shown, more))
+    return Answer([page, *made, *beside, *drawn], [*found.sentences(), *more])
+
+
+def _beside(
+    stage: Stage, found: Studied, elastic: Behind | None, contacts: ContactTable | None
+) -> tuple[list[Path], list[str]]:
+    """Files of what is asked beside the curve, and what is said of them."""
+    folder, case, made, more = stage.product.parent, found.case, [], []
+    if elastic is not None:
+        rows = zip(ROWS, *(map("{:.8g}".format, v) for v in elastic.columns().values()), strict=True)
+        made.append(folder / "stiffness.csv")
+        store.write_text(made[-1], rows_csv(["direction", *elastic.columns()], rows))
+        more.append(elastic.sentence())
     if case.table is not None:
         stage.report("table of creep forces")
         how = case.model.model_dump(include={"distribution", "coefficients"})
         table = creep_table(found.track.elastic.poisson, **case.table.model_dump(), **how)
         made.append(write_creep_table(folder / "creep_table.h5", table))
-        sentences.append(
-            f"Between the points of the table forces are off by {100 * table.error[:, 0].max():.2g} % of mu F_N in the "
-            f"mean; 95 % of {table.checked} states are below {100 * table.error[:, 1].max():.2g} %, the largest "
-            f"error is {100 * table.error[:, 2].max():.2g} %."
-        )
-    drawn = _pictures(found, folder / "pictures", case.name) if pictures and found.forces is not None else []
-    page = folder / "rolling.html"
-    store.write_text(
-        page, rolling_html(f"{case.name}: rolling contact", found, [p for p in drawn if p.suffix == ".png"])
-    )
-    made = [page, *made, *drawn]
-    told = {"files": [str(path.relative_to(folder)) for path in made], "sentences": sentences}
-    store.write_text(stage.product, json.dumps(told, indent=1) + "\n")
-    return Made(made)
+        more.append(table.sentence())
+    if contacts is not None:
+        made.append(write_contact_table(folder / "contact_table.h5", contacts))
+        more.append(contacts.sentence())
+    return made, more
+
+
+def _behind(found: Studied, bodies: list[Path]) -> Behind | None:
+    elastic = found.case.elastic
+    if elastic is None or not found.patches:
+        return None
+    files = [read_basis(file) for file in bodies]
+    groups, methods = [b.groups[0, 0] for b in files], [b.reduction for b in files]
+    return behind(found.patches[0], found.case.solids, groups, elastic.face, methods)
+
+
+def _contacts(stage: Stage, found: Studied) -> ContactTable | None:
+    asked = found.case.contacts
+    if asked is None:
+        return None
+    stage.report("table of contacts")
+    return contact_table(found.track, found.case.vertical_force, **asked.model_dump())
 
 
 def _tables(found: Studied, folder: Path) -> list[Path]:
@@ -93,7 +125,6 @@ def _tables(found: Studied, folder: Path) -> list[Path]:
 def _pictures(found: Studied, folder: Path, name: str) -> list[Path]:
     from ..pictures.rolling import curve_picture, traction_picture, write_tractions_vtu
 
-    folder.mkdir(parents=True, exist_ok=True)
     drawn = [
         curve_picture(found, folder / "creep.png", f"{name}: creep curve"),
         traction_picture(found, folder / "tractions.png", name),

@@ -17,6 +17,7 @@ from ..results import read_response
 from ..results.names import apart
 from ..results.series import unit_of
 from ..units import Quantity, amplitude_of
+from .answer import CaseJob
 from .bifurcation import bifurcation_stage
 from .job import Job, open_job
 from .mistuning import mistuning_stage
@@ -64,13 +65,14 @@ def _answered(
     response, converged = None, True
     if not case.is_only_in_time and not case.is_only_followed and not case.mistuning:
         response, converged = response_stage(path, files, folder, assignments, force, report, wanted=wanted)
+    job = CaseJob(path, files, folder, assignments or (), force, report, wanted.pictures)
     answers = (
         (case.orbit, orbit_stage), (case.stability, squeal_stage), (case.bifurcation, bifurcation_stage),
         (case.two_tones, tones_stage), (case.mistuning, mistuning_stage),
     )  # fmt: skip
     for asked, stage in answers:
         if asked:
-            converged = stage(path, files, folder, assignments, force, report, wanted.pictures)[2] and converged
+            converged = stage(job).whole and converged
     return response, converged
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -12,8 +11,7 @@ from typing import Any
 import numpy as np
 
 from .. import sliding
-from ..basis import read_basis
-from ..case import CaseSettings, load_case
+from ..case import CaseSettings
 from ..case.questions import Cycle, Over, StabilityOfCase
 from ..case.settings import GROUND
 from ..data import Array, ComplexArray, ModalBasis, NotConverged, UserError
@@ -30,14 +28,14 @@ from ..roots.spectrum import Spectrum, spectrum
 from ..roots.waves import waves
 from ..sliding import Sliding, Tangent
 from ..system.assembly import Assembly
-from .checkpoint import inputs_of
+from .answer import Answer, CaseJob
 from .cycles import Born, born, sentence_of_relief, sentences_of
 from .job import open_job
 from .meshing import load_mesh, mesh_stage
 from .moving import moving_shape
 from .places import find_body, lumped
 from .stability import table_csv, table_lines, window_of, write_roots
-from .stage import Made, Report, Stage, hash_of_code
+from .stage import Report, Stage
 from .varied import Varied
 
 
@@ -79,65 +77,43 @@ FASTEST = 4
 """Roots that grow whose shapes are written as motions."""
 
 
-def squeal_stage(
-    case_path: Path, files: Mapping[str, Path], folder: Path, assignments: list[str] | None = None,
-    force: bool = False, report: Report = lambda _: None, pictures: bool = True,
-) -> tuple[list[Path], list[str], bool]:  # fmt: skip
-    """Roots of a case about steady sliding, in a folder.
-
-    Args:
-        files: body of the case -> its modal file.
-
-    Returns:
-        The files, sentences and lines of a table, and whether the roots are proved complete and no limit cycle is lost.
+def squeal_stage(case: CaseJob) -> Answer:
+    """Roots of a case about steady sliding; whole if they are proved complete and no limit cycle is lost.
 
     Raises:
         UserError: the case asks for none; nothing slides; a contact that lifts off; what `sliding.of` refuses.
     """
-    settings, raw = load_case(case_path, assignments)
-    if settings.stability is None:
-        raise UserError(f"{case_path}: stability: is missing; add [stability] with frequency = [0.0, HIGHEST] in Hz")
-    stage = Stage(folder / "stability.json", ("stages.squeal",), force, report)
-    inputs = {**inputs_of(raw, settings, case_path, files), "pictures": pictures}
-    depends = store.hash_settings({**inputs, "pictures": None, "code": hash_of_code(stage.code)})
-    stage.make(inputs, lambda: _work(stage, settings, raw, case_path, files, pictures, depends))
-    told = json.loads(stage.product.read_text())
-    return [folder / name for name in told["files"]], told["lines"], told["complete"]
+    if case.settings.stability is None:
+        raise UserError(f"{case.path}: stability: is missing; add [stability] with frequency = [0.0, HIGHEST] in Hz")
+    return case.answer("stability", "stages.squeal", _work)
 
 
-def _work(
-    stage: Stage, settings: CaseSettings, raw: Mapping[str, Any], path: Path, files: Mapping[str, Path],
-    pictures: bool, inputs: str,
-) -> Made:  # fmt: skip
+def _work(stage: Stage, case: CaseJob) -> Answer:
     """What is finished stays in a journal until all that is made of it is there."""
-    asked, folder = settings.stability, stage.product.parent
+    settings, asked, folder = case.settings, case.settings.stability, case.folder
     assert asked is not None
-    varied = Varied(path, raw, {name: read_basis(file) for name, file in files.items()})
-    state = state_of(varied, {}, path)
+    varied = Varied(case.path, case.raw, case.bases)
+    state = state_of(varied, {}, case.path)
     found = spectrum(state.matrices, window_of(asked), accuracy=asked.accuracy, neutral=asked.neutral)
     axes = _map_of(varied, asked) if asked.over else None
     points = folder / "stability.points"
-    folder.mkdir(parents=True, exist_ok=True)
     over, full, cycles = None, list[Compared](), Born((), ())
-    with open_journal(points, inputs, {"case": settings.name}, stage.force) as journal:
+    with open_journal(points, case.made_by(stage), {"case": settings.name}, case.force) as journal:
         if axes is not None:
-            over = over_map(*axes, window_of(asked), asked.neutral, stage.report, journal)
-            full = _in_full(varied, asked, over, settings, path, stage.report, journal) if asked.full else []
+            over = over_map(*axes, window_of(asked), asked.neutral, case.report, journal)
+            full = _in_full(varied, asked, over, settings, case.path, case.report, journal) if asked.full else []
         if asked.cycle:
-            cycles = born(varied, asked.cycle, window_of(asked).omega, journal, stage.report)
+            cycles = born(varied, asked.cycle, window_of(asked).omega, journal, case.report)
     stage.begin()
     told = [*shapes(state, found, varied.bases, settings), *pressed(state)]
     said = [found.sentence, *told, *([over.sentence] if over else []), *_told(full)]
     if asked.cycle:
         said += [words for c in cycles.own for words in sentences_of(c, asked.cycle)]
         said += sentence_of_relief(cycles, asked.cycle)
-    moves = moving(state, found, varied.bases, settings, folder) if pictures else []
-    names = _written(folder, settings.name, found, over, full, said, pictures, (cycles, asked.cycle), moves)
+    moves = moving(state, found, varied.bases, settings, folder) if case.pictures else []
+    names = _written(folder, settings.name, found, over, full, said, case.pictures, (cycles, asked.cycle), moves)
     complete = found.complete and all(one.complete for one in full) and cycles.whole
-    answer = {"files": names, "lines": [*table_lines(found), *said], "complete": complete}
-    store.write_text(stage.product, json.dumps(answer, indent=1) + "\n")
-    points.unlink()
-    return Made([folder / name for name in names])
+    return Answer([folder / name for name in names], [*table_lines(found), *said], complete)
 
 
 def state_of(varied: Varied, values: Mapping[str, float], path: Path, where: str = "stability") -> State:
@@ -315,7 +291,6 @@ def _pictures(
 ) -> dict[str, Path]:  # fmt: skip
     from ..pictures.roots import cycles_picture, map_picture, plane_picture, relief_picture
 
-    folder.mkdir(exist_ok=True)
     drawn = {"plane": plane_picture(found, folder / "roots.png")}
     if over is not None:
         drawn["map"] = map_picture(over, [(one.x, one.y, one.full) for one in full], folder / "roots_map.png")

@@ -13,6 +13,7 @@ import numpy as np
 from ..basis import read_basis
 from ..case.questions import StabilityOfCase
 from ..data import UserError
+from ..errors import told_of
 from ..exchange.choice import select
 from ..files import hdf5, store
 from ..files.tables import columns_csv, rows_csv
@@ -25,9 +26,10 @@ from ..roots.diagram import Diagram, diagram
 from ..roots.spectrum import Spectrum, spectrum
 from ..settings.body import StabilitySettings
 from ..units import rpm_text
+from .answer import Answer, answered
 from .job import Job, open_job
 from .modal import matrices_inputs, modes_stage
-from .stage import Made, Report, Stage
+from .stage import Report, Stage
 
 
 @dataclass(frozen=True)
@@ -60,23 +62,19 @@ class Question:
 def stability_stage(
     path: Path, assignments: list[str], force: bool = False, report: Report = lambda _: None, pictures: bool = True,
     speed: int | None = None,
-) -> tuple[list[Path], list[str], bool]:  # fmt: skip
-    """Roots of a body or of a modal file, and over a range of a parameter where [stability] asks for it.
+) -> Answer:  # fmt: skip
+    """Roots of a body or of a modal file, and over a range of a parameter where [stability] asks for it; whole if they
+    are proved complete.
 
     Args:
         speed: which of the modal file's, counted from 0.
-
-    Returns:
-        The files, sentences and lines of a table, and whether the roots are proved complete.
 
     Raises:
         UserError: no window, a parameter that there is not, a case.
     """
     q = question(path, assignments, report, speed)
     stage = Stage(q.folder / "stability.json", ("stages.stability",), force, report)
-    stage.make({**q.inputs, "pictures": pictures}, lambda: _work(stage, q, pictures))
-    told = json.loads(stage.product.read_text())
-    return [q.folder / name for name in told["files"]], told["lines"], told["complete"]
+    return answered(stage, {**q.inputs, "pictures": pictures}, lambda: _work(stage, q, pictures))
 
 
 def question(
@@ -144,14 +142,12 @@ def family(job: Job) -> Family:
         raise UserError(text if text.startswith(str(job.folder)) else f"{job.path}: {text}") from error
 
 
-def _work(stage: Stage, q: Question, pictures: bool) -> Made:
+def _work(stage: Stage, q: Question, pictures: bool) -> Answer:
     matrices, asked, report = q.family(), q.asked, stage.report
-    try:
+    with told_of(q.where):
         for value in asked.range or ():
             matrices.values({**q.at, asked.over: value}, asked.over)
         Q = matrices.at(q.at)
-    except UserError as error:
-        raise UserError(f"{q.where}: {error}") from error
     found = spectrum(
         Q, q.window, accuracy=asked.accuracy, neutral=asked.neutral, certify=asked.certify, report=report
     )  # fmt: skip
@@ -163,13 +159,8 @@ def _work(stage: Stage, q: Question, pictures: bool) -> Made:
         )  # fmt: skip
     stage.begin()
     names = _written(q, found, over, pictures)
-    told = {
-        "files": names,
-        "lines": [*table_lines(found), found.sentence, *([over.sentence] if over else []), *_which(q)],
-        "complete": found.complete or not asked.certify,
-    }
-    store.write_text(stage.product, json.dumps(told, indent=1) + "\n")
-    return Made([q.folder / name for name in names])
+    said = [*table_lines(found), found.sentence, *([over.sentence] if over else []), *_which(q)]
+    return Answer([q.folder / name for name in names], said, found.complete or not asked.certify)
 
 
 def _which(q: Question) -> list[str]:
@@ -219,7 +210,6 @@ def write_roots(path: Path, found: Spectrum, over: Diagram | None, values: Mappi
 def _pictures(found: Spectrum, over: Diagram | None, folder: Path) -> dict[str, Path]:
     from ..pictures.roots import over_picture, plane_picture
 
-    folder.mkdir(exist_ok=True)
     drawn = {"plane": plane_picture(found, folder / "roots.png")}
     if over is not None:
         drawn["over"] = over_picture(over, folder / "roots_over.png")

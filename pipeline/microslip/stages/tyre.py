@@ -2,29 +2,26 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 from ..basis import read_basis
-from ..data import UserError
+from ..errors import told_of
 from ..files import store
 from ..files.tables import columns_csv
 from ..report.tyre import tyre_html
 from ..rolling.slip import Studied, TyreCase, load_tyre, study
+from .answer import Answer, answered
 from .job import open_job
 from .modal import modes_stage
 from .places import find_body
-from .stage import Made, Report, Stage
+from .stage import Report, Stage
 
 
 def tyre_stage(
     case_path: Path, root: Path = Path("build"), assignments: list[str] | None = None, force: bool = False,
     report: Report = lambda _: None, pictures: bool = True,
-) -> tuple[list[Path], list[str]]:  # fmt: skip
+) -> Answer:  # fmt: skip
     """What a case of a tyre asks for, in ``root/NAME``; the modal file of its body is made where it is not up to date.
-
-    Returns:
-        The files, the page first, and sentences.
 
     Raises:
         UserError: mistakes of the case or its body.
@@ -34,27 +31,20 @@ def tyre_stage(
     basis, _ = modes_stage(job, report=report)
     stage = Stage(root / case.name / "tyre.json", ("stages.tyre",), force, report)
     inputs = {"case": raw, "basis": store.hash_file(basis), "pictures": pictures}
-    stage.make(inputs, lambda: _work(stage, case, case_path, basis, pictures))
-    told = json.loads(stage.product.read_text())
-    return [stage.product.parent / name for name in told["files"]], told["sentences"]
+    return answered(stage, inputs, lambda: _work(stage, case, case_path, basis, pictures))
 
 
-def _work(stage: Stage, case: TyreCase, case_path: Path, basis: Path, pictures: bool) -> Made:
+def _work(stage: Stage, case: TyreCase, case_path: Path, basis: Path, pictures: bool) -> Answer:
     folder = stage.product.parent
     stage.report("jumps of slip and load")
-    try:
+    with told_of(case_path):
         found = study(case, read_basis(basis).groups[0, 0])
-    except UserError as error:
-        raise UserError(f"{case_path}: {error}") from error
     stage.begin()
     made = _tables(found, folder)
     drawn = [_picture(found, folder / "pictures", case.name)] if pictures else []
     page = folder / "tyre.html"
     store.write_text(page, tyre_html(f"{case.name}: unsteady rolling", found, drawn))
-    made = [page, *made, *drawn]
-    told = {"files": [str(path.relative_to(folder)) for path in made], "sentences": found.sentences()}
-    store.write_text(stage.product, json.dumps(told, indent=1) + "\n")
-    return Made(made)
+    return Answer([page, *made, *drawn], found.sentences())
 
 
 def _tables(found: Studied, folder: Path) -> list[Path]:
@@ -71,5 +61,4 @@ def _tables(found: Studied, folder: Path) -> list[Path]:
 def _picture(found: Studied, folder: Path, name: str) -> Path:
     from ..pictures.tyre import tyre_picture
 
-    folder.mkdir(parents=True, exist_ok=True)
     return tyre_picture(found, folder / "tyre.png", name)

@@ -2,27 +2,24 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
-from ..data import UserError
+from ..errors import told_of
 from ..files import store
 from ..files.tables import columns_csv
 from ..report.vehicle import recorded_html, vehicle_html
 from ..vehicle.kinematics import recorded
 from ..vehicle.settings import VehicleCase, load_kinematics, load_vehicle
 from ..vehicle.study import Studied, study
-from .stage import Made, Report, Stage
+from .answer import Answer, answered
+from .stage import Report, Stage
 
 
 def vehicle_stage(
     case_path: Path, root: Path = Path("build"), assignments: list[str] | None = None, force: bool = False,
     report: Report = lambda _: None, pictures: bool = True,
-) -> tuple[list[Path], list[str], str]:  # fmt: skip
-    """What a case of a vehicle asks for, in ``root/NAME``.
-
-    Returns:
-        The files, the page first, sentences, and why it ended early, if it did.
+) -> Answer:  # fmt: skip
+    """What a case of a vehicle asks for, in ``root/NAME``; whole if it did not end early.
 
     Raises:
         UserError: mistakes of the case or its profiles.
@@ -31,19 +28,14 @@ def vehicle_stage(
     stage = Stage(root / case.name / "unround.json", ("stages.vehicle",), force, report)
     files = [case_path.parent / s.profile for s in (case.wheel, case.rail) if isinstance(s.profile, str)]
     inputs = {"case": raw, "profiles": [store.hash_file(f) for f in files if f.is_file()], "pictures": pictures}
-    stage.make(inputs, lambda: _work(stage, case, case_path, pictures))
-    told = json.loads(stage.product.read_text())
-    return [stage.product.parent / name for name in told["files"]], told["sentences"], told["ended"]
+    return answered(stage, inputs, lambda: _work(stage, case, case_path, pictures))
 
 
 def kinematics_stage(
     case_path: Path, root: Path = Path("build"), assignments: list[str] | None = None, force: bool = False,
     report: Report = lambda _: None, pictures: bool = True,
-) -> tuple[list[Path], list[str]]:  # fmt: skip
+) -> Answer:  # fmt: skip
     """Wear of a wheel by the kinematics of a file, in ``root/NAME``.
-
-    Returns:
-        The files, the page first, and sentences.
 
     Raises:
         UserError: mistakes of the case or its files.
@@ -54,50 +46,33 @@ def kinematics_stage(
     files = [case_path.parent / name for name in names]
     inputs = {"case": raw, "files": [store.hash_file(f) for f in files if f.is_file()], "pictures": pictures}
 
-    def work() -> Made:
-        try:
+    def work() -> Answer:
+        with told_of(case_path):
             found = recorded(case, case_path.parent)
-        except UserError as error:
-            raise UserError(f"{case_path}: {error}") from error
         stage.begin()
         folder, drawn = stage.product.parent, []
         store.write_text(folder / "circumference.csv", columns_csv(found.circumference(), 10))
         if pictures:
             from ..pictures.vehicle import recorded_picture
 
-            (folder / "pictures").mkdir(parents=True, exist_ok=True)
             drawn = [recorded_picture(found, folder / "pictures" / "circumference.png", case.name)]
         page = folder / "unround.html"
         store.write_text(page, recorded_html(f"{case.name}: wear of a wheel", found.sentences(), drawn))
-        made = [page, folder / "circumference.csv", *drawn]
-        told = {"files": [str(p.relative_to(folder)) for p in made], "sentences": found.sentences()}
-        store.write_text(stage.product, json.dumps(told, indent=1) + "\n")
-        return Made(made)
+        return Answer([page, folder / "circumference.csv", *drawn], found.sentences())
 
-    stage.make(inputs, work)
-    told = json.loads(stage.product.read_text())
-    return [stage.product.parent / name for name in told["files"]], told["sentences"]
+    return answered(stage, inputs, work)
 
 
-def _work(stage: Stage, case: VehicleCase, case_path: Path, pictures: bool) -> Made:
+def _work(stage: Stage, case: VehicleCase, case_path: Path, pictures: bool) -> Answer:
     folder = stage.product.parent
-    try:
+    with told_of(case_path):
         found = study(case, case_path.parent, stage.report)
-    except UserError as error:
-        raise UserError(f"{case_path}: {error}") from error
-    former = json.loads(stage.product.read_text())["files"] if stage.product.is_file() else []
     stage.begin()
-    for name in former:  # what this run does not write again would be of another case
-        (folder / name).unlink(missing_ok=True)
     made = _tables(found, folder)
     drawn = _pictures(found, folder / "pictures", case.name) if pictures else []
     page = folder / "unround.html"
     store.write_text(page, vehicle_html(f"{case.name}: unround wheels", found, drawn))
-    made = [page, *made, *drawn]
-    files = [str(path.relative_to(folder)) for path in made]
-    told = {"files": files, "sentences": found.sentences(), "ended": found.ended}
-    store.write_text(stage.product, json.dumps(told, indent=1) + "\n")
-    return Made(made)
+    return Answer([page, *made, *drawn], found.sentences(), not found.ended)
 
 
 def _tables(found: Studied, folder: Path) -> list[Path]:
@@ -115,7 +90,6 @@ def _tables(found: Studied, folder: Path) -> list[Path]:
 def _pictures(found: Studied, folder: Path, name: str) -> list[Path]:
     from ..pictures.vehicle import circumference_picture, growth_picture
 
-    folder.mkdir(parents=True, exist_ok=True)
     return [
         circumference_picture(found, folder / "circumference.png", name),
         growth_picture(found, folder / "growth.png", name),

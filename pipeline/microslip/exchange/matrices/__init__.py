@@ -126,6 +126,18 @@ def matrix_names(path: Path) -> list[str]:
         raise UserError(f"{path}: {_told(error)}; write it again") from error
 
 
+def own_nodes(path: Path) -> tuple[bool, bool]:
+    """Whether a file of matrices holds its nodes as well, and rows without a node: a superelement of Nastran's."""
+    if _reader(path) is not nastran or path.suffix.lower() == ".op4":
+        return False, False
+    try:
+        nastran.grids(path)
+        dofs = nastran.read(path, nastran.names(path)[0]).dofs
+    except Unreadable:
+        return False, False
+    return True, dofs is not None and bool((dofs[:, 1] == 0).any())
+
+
 def _reader(path: Path) -> ModuleType:
     if path.suffix.lower() not in READERS:
         raise UserError(

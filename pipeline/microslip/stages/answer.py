@@ -1,0 +1,120 @@
+"""A case on its way to an answer, and what an answer is: files, and what is said of them."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from ..basis import read_basis
+from ..case import CaseSettings, load_case
+from ..case.assemble import Built, build
+from ..data import ModalBasis
+from ..files import store
+from .checkpoint import inputs_of
+from .stage import Made, Report, Stage, hash_of_code
+
+
+class Answer(NamedTuple):
+    """What a stage leaves for a reader.
+
+    Attributes:
+        files: the page first. said: sentences, and lines of a table. whole: whether nothing of it was lost.
+    """
+
+    files: Sequence[Path]
+    said: Sequence[str]
+    whole: bool = True
+
+
+def answered(stage: Stage, inputs: Mapping[str, Any], work: Callable[[], Answer]) -> Answer:
+    """The answer that a stage's product (JSON) holds, made where it is not up to date; see `Stage.make`.
+
+    Files of the answer before, which this one has not, are removed.
+    """
+    folder = stage.product.parent
+
+    def make() -> Made:
+        former = _files_of(stage.product)
+        found = work()
+        for path in former - set(found.files):
+            path.unlink(missing_ok=True)
+        names = [str(path.relative_to(folder)) for path in found.files]
+        told = {"files": names, "said": list(found.said), "whole": bool(found.whole)}
+        store.write_text(stage.product, json.dumps(told, indent=1) + "\n")
+        return Made(found.files)
+
+    stage.make(inputs, make)
+    told = json.loads(stage.product.read_text())
+    return Answer([folder / name for name in told["files"]], told["said"], told["whole"])
+
+
+def _files_of(product: Path) -> set[Path]:
+    """Files of a product that stands there, in its folder or below."""
+    try:
+        names = [Path(name) for name in json.loads(product.read_text())["files"]]
+    except (OSError, ValueError, KeyError, TypeError):  # none, or not ours
+        return set()
+    return {product.parent / name for name in names if not name.is_absolute() and ".." not in name.parts}
+
+
+@dataclass(frozen=True)
+class CaseJob:
+    """One case on its way to an answer.
+
+    Attributes:
+        path: the case file. files: body of the case -> its modal file. folder: of the answer. assignments: keys that
+            have other values. force, report: see `Stage`. pictures: whether they are wanted.
+    """
+
+    path: Path
+    files: Mapping[str, Path]
+    folder: Path
+    assignments: Sequence[str] = ()
+    force: bool = False
+    report: Report = lambda _: None
+    pictures: bool = True
+
+    @cached_property
+    def _loaded(self) -> tuple[CaseSettings, dict[str, Any]]:
+        return load_case(self.path, list(self.assignments))
+
+    @property
+    def settings(self) -> CaseSettings:
+        return self._loaded[0]
+
+    @property
+    def raw(self) -> dict[str, Any]:
+        """The case as a table."""
+        return self._loaded[1]
+
+    @cached_property
+    def bases(self) -> dict[str, ModalBasis]:
+        """Body of the case -> its modal basis."""
+        return {name: read_basis(file) for name, file in self.files.items()}
+
+    def built(self) -> Built:
+        """The case's assembly."""
+        return build(self.settings, self.bases, self.path)
+
+    @cached_property
+    def inputs(self) -> dict[str, Any]:
+        """What the answer depends on, besides pictures."""
+        return inputs_of(self.raw, self.settings, self.path, self.files)
+
+    def made_by(self, stage: Stage) -> str:
+        """Hash of what all that is computed depends on."""
+        return store.hash_settings({**self.inputs, "code": hash_of_code(stage.code)})
+
+    def answer(self, name: str, module: str, work: Callable[[Stage, CaseJob], Answer]) -> Answer:
+        """The answer that ``name.json`` holds, made by a module's `work` where it is not up to date.
+
+        What `work` keeps in ``name.points`` until then is removed.
+        """
+        stage = Stage(self.folder / f"{name}.json", (module,), self.force, self.report)
+        found = answered(stage, {**self.inputs, "pictures": self.pictures}, lambda: work(stage, self))
+        stage.product.with_suffix(".points").unlink(missing_ok=True)
+        return found
