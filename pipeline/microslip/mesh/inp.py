@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -170,17 +171,28 @@ def _numbers(text: str, what: str) -> Indices:
 
 
 def _read_nodes(deck: Deck, parameters: dict[str, str], lines: list[str]) -> None:
-    rows = [line.split(",") for line in lines]
-    ids = _numbers(",".join(row[0] for row in rows), "*NODE") + deck.spaces[""].nodes
-    if len(ids) != len(rows):
-        raise Damaged("*NODE holds a line without a number")
-    values = _table([",".join(row[1:4]) for row in rows], "*NODE")
+    ids, points = _numbered_points(lines)
+    ids = ids + deck.spaces[""].nodes
     deck.node_id.append(ids)
-    points = np.array([v + [0.0] * (3 - len(v)) for v in values]).reshape(-1, 3)
     points = _cartesian(points, parameters.get("SYSTEM", "R").upper()[:1] or "R")
     deck.points.append(points if deck.system is None else points @ deck.system[:3] + deck.system[3])
     if "NSET" in parameters:
         deck.add(deck.node_sets, parameters["NSET"]).append(ids)
+
+
+def _numbered_points(lines: list[str]) -> tuple[Indices, Array]:
+    """Numbers (n,) and coordinates (n, 3) of the lines of *NODE; short lines end in zeros."""
+    if lines and all("." not in line.partition(",")[0] for line in lines):
+        with suppress(ValueError, OverflowError):  # empty places, Fortran's exponents, short lines
+            table = np.loadtxt(lines, dtype="i8,f8,f8,f8", delimiter=",", comments=None, ndmin=1)
+            if table["f0"].min() > 0:
+                return table["f0"], np.column_stack([table[name] for name in ("f1", "f2", "f3")])
+    rows = [line.split(",") for line in lines]
+    ids = _numbers(",".join(row[0] for row in rows), "*NODE")
+    if len(ids) != len(rows):
+        raise Damaged("*NODE holds a line without a number")
+    values = _table([",".join(row[1:4]) for row in rows], "*NODE")
+    return ids, np.array([v + [0.0] * (3 - len(v)) for v in values]).reshape(-1, 3)
 
 
 def _cartesian(points: Array, system: str) -> Array:
