@@ -144,6 +144,8 @@ def test_complex_modes_in_uff_keep_phase_and_eigenvalue(tmp_path: Path) -> None:
         np.testing.assert_allclose(shape, g.phi[:, :, j], rtol=0, atol=6e-6 * np.abs(g.phi).max())
         D, w = g.damping_ratio[j], g.omega[j]
         np.testing.assert_allclose(mode["eig"], w * (-D + 1j * np.sqrt(1 - D**2)), rtol=2e-5)
+        np.testing.assert_allclose(mode["modal_a"], 2 * mode["eig"] * g.M_r[j, j] + g.C_r[j, j], rtol=2e-5)
+        np.testing.assert_allclose(mode["modal_b"], g.K_r[j, j] - mode["eig"] ** 2 * g.M_r[j, j], rtol=2e-5)
 
 
 # --- SID: a reader from the description of the format -----------------------------------------------------------------
@@ -314,6 +316,7 @@ def test_mbdyn_fem_holds_the_body(tmp_path: Path) -> None:
     m = g.n_modes
     np.testing.assert_array_equal(read[1], [4, m, 0, 0, 0])
     np.testing.assert_array_equal(read[2], [1, 2, 3, 4])
+    assert not read[3].any() and not read[4].any() and len(read[3]) == len(read[4]) == m, "at rest"
     where = np.stack([read[5], read[6], read[7]], axis=1)
     face = g.interfaces["right"]
     close(where[0], face.origin - v.point)
@@ -391,6 +394,22 @@ def test_pyharm_puts_characteristic_coordinates_among_the_modal_ones(tmp_path: P
     answer = np.linalg.solve(read["K"], np.eye(g.n_modes)[dof])[dof]
     i = g.compliance.labels.index(f"interface:{read['nodes'][1]}:u_t1")
     assert answer == pytest.approx(g.compliance.static[i, i], rel=1e-8)
+
+
+def test_pyharms_c_holds_the_gyroscopic_matrix_of_a_spinning_body(tmp_path: Path) -> None:
+    """pyHarm adds C times the frequency, and G times its square, to the balance of cosines and sines."""
+    table = small.table(reduction="craig-bampton", rotation={"speeds_rpm": [3000.0], "axis": [1.0, 0.0, 0.0]})
+    basis = modal_basis(small.beam((1, 1, 2)), BodySettings.model_validate(table), provenance=SOURCE)
+    g, w = basis.groups[0, 0], 9e3
+    writer("pyharm")(basis, tmp_path / "b.mat")
+    read, turn = loadmat(tmp_path / "b.mat"), np.array([[0.0, 1.0], [-1.0, 0.0]])
+    xc, xs = np.random.default_rng(2).normal(size=(2, g.n_modes))
+    terms = w**2 * np.kron(turn @ turn, read["M"]) + w * np.kron(turn, read["C"]) + w**2 * np.kron(turn, read["G"])
+    found = (terms + np.kron(np.eye(2), read["K"])) @ np.r_[xc, xs]
+    gyroscopic = 1j * w * g.G_r @ (xc - 1j * xs)
+    wanted = (-(w**2) * g.M_r + 1j * w * g.C_r + g.K_r) @ (xc - 1j * xs) + gyroscopic
+    assert np.linalg.norm(gyroscopic) > 1e-8 * np.linalg.norm(wanted), "it must show"
+    close(found, np.r_[wanted.real, -wanted.imag])
 
 
 # --- xarray -----------------------------------------------------------------------------------------------------------
