@@ -566,6 +566,29 @@ def test_multibody_formats_want_a_whole_body_at_rest(form: str, tmp_path: Path) 
         writer(form)(replace(small.basis(), groups={(0, 0): replace(group, invariants=None)}), tmp_path / "x")
 
 
+@pytest.mark.parametrize("form", MOTION)
+def test_flexibility_beside_the_modes_is_not_lost_in_silence(form: str, tmp_path: Path) -> None:
+    """Coordinates without mass, forces and residual shapes hold part of the static answer: not in modes alone."""
+    for reduction in ("massless-boundary", "dual-craig-bampton", "macneal"):
+        with pytest.raises(UserError, match=f'reduction = "{reduction}" keeps flexibility beside the modes'):
+            writer(form)(body(reduction=reduction), tmp_path / "x")
+    assert not any(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("reduction", ["craig-bampton", "rubin"])
+def test_sid_holds_the_static_answer_of_the_interfaces(reduction: str, tmp_path: Path) -> None:
+    basis = body(reduction=reduction)
+    g = basis.groups[0, 0]
+    writer("sid")(basis, tmp_path / "b.SID_FEM")
+    _, modal = read_sid(tmp_path / "b.SID_FEM")
+    nodes, K = modal["frame"].inside, modal["Ke"].taylor()[0]
+    face = g.interfaces["left"]
+    T = face.rotation @ nodes[1]["phi"].taylor()[0]
+    at = [g.compliance.labels.index(f"interface:left:{row}") for row in INTERFACE_ROWS[:3]]
+    wanted = g.compliance.static[np.ix_(at, at)]
+    close(T @ np.linalg.solve(K, T.T), wanted, 1e-8)
+
+
 @pytest.mark.parametrize("form", ["mbdyn", "sid"])
 def test_a_body_without_points_to_attach(form: str, tmp_path: Path) -> None:
     group = replace(small.basis().groups[0, 0], interfaces={}, monitors={})

@@ -85,7 +85,7 @@ def compiled(files: Mapping[str, bytes], ending: str) -> bytes:
             "-lm",
         ]  # no path of this machine in the binary
         done = subprocess.run(command, cwd=folder, capture_output=True, text=True, errors="replace")
-        if done.returncode:
+        if done.returncode or not Path(folder, f"body{ending}").is_file():
             said = " ".join(done.stderr.split())[:200] or f"exit code {done.returncode}"
             raise UserError(f"export --to fmu: the C compiler {compiler[0]} fails ({said}); name another one in CC")
         return Path(folder, f"body{ending}").read_bytes()
