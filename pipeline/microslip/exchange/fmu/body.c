@@ -53,7 +53,8 @@ typedef struct {
 } Body;
 
 /* value references: q, q', q'', damping ratios, forces, what is read, its rate */
-enum { Q = 0, V = MODES, A = 2 * MODES, D = 3 * MODES, F = 4 * MODES, U = F + INPUTS, W = U + OUTPUTS, END = W + OUTPUTS };
+enum { Q = 0, V = MODES, A = 2 * MODES, D = 3 * MODES, F = 4 * MODES };
+enum { U = F + INPUTS, W = U + OUTPUTS, END = W + OUTPUTS };
 
 static fmi2Status refuse(Body *b, const char *why)
 {
@@ -182,7 +183,8 @@ FMI2_Export fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2St
 
 FMI2_Export void fmi2FreeInstance(fmi2Component c) { free(c); }
 CALL fmi2SetDebugLogging(fmi2Component c, fmi2Boolean on, size_t n, const fmi2String category[]) READY
-CALL fmi2SetupExperiment(fmi2Component c, fmi2Boolean known, fmi2Real tolerance, fmi2Real start, fmi2Boolean ends, fmi2Real stop)
+CALL fmi2SetupExperiment(fmi2Component c, fmi2Boolean known, fmi2Real tolerance, fmi2Real start, fmi2Boolean ends,
+                         fmi2Real stop)
 {
     STATE->time = start;
     return fmi2OK;
@@ -235,7 +237,11 @@ CALL fmi2GetFMUstate(fmi2Component c, fmi2FMUstate *copy)
 }
 CALL fmi2SetFMUstate(fmi2Component c, fmi2FMUstate copy) { memcpy(STATE, copy, sizeof(State)); return fmi2OK; }
 CALL fmi2FreeFMUstate(fmi2Component c, fmi2FMUstate *copy) { free(*copy); *copy = NULL; return fmi2OK; }
-CALL fmi2SerializedFMUstateSize(fmi2Component c, fmi2FMUstate copy, size_t *size) { *size = sizeof(State); return fmi2OK; }
+CALL fmi2SerializedFMUstateSize(fmi2Component c, fmi2FMUstate copy, size_t *size)
+{
+    *size = sizeof(State);
+    return fmi2OK;
+}
 CALL fmi2SerializeFMUstate(fmi2Component c, fmi2FMUstate copy, fmi2Byte to[], size_t size)
 {
     return size < sizeof(State) ? fmi2Error : (memcpy(to, copy, sizeof(State)), fmi2OK);
@@ -247,8 +253,8 @@ CALL fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte from[], size_t size
     memcpy(*copy, from, sizeof(State));
     return fmi2OK;
 }
-CALL fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReference u[], size_t nu, const fmi2ValueReference k[], size_t nk,
-      const fmi2Real dk[], fmi2Real du[]) NEVER
+CALL fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReference u[], size_t nu,
+                                  const fmi2ValueReference k[], size_t nk, const fmi2Real dk[], fmi2Real du[]) NEVER
 
 /* model exchange */
 #define COPY(to, from) { return n == 2 * MODES ? (memcpy(to, from, sizeof STATE->x), fmi2OK) : fmi2Error; }
