@@ -141,7 +141,7 @@ def test_co_simulation_answers_a_step_exactly(reduction: str, run: Callable[[Mod
         one.step(t, h)
         t += h
     q, v = step_response(g, load, t)
-    rounding = 1e-11 * np.abs(step_response(g, load, period / 3)[0] * g.omega).max()  # in the norm of omega q, q'
+    rounding = 1e-12 * np.abs(step_response(g, load, period / 3)[0] * g.omega).max()  # in the norm of omega q, q'
     np.testing.assert_allclose(
         one.state() * np.r_[g.omega, np.ones_like(v)], np.r_[g.omega * q, v], atol=rounding, rtol=0
     )
