@@ -7,6 +7,7 @@ import re
 import shutil
 import subprocess
 import sys
+import tempfile
 import zipfile
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
@@ -335,6 +336,7 @@ def test_the_description_tells_units_names_and_what_depends_on_what(tmp_path: Pa
     assert [variables[i - 1][0].get("derivative") for i in derivatives] == [str(i + 1) for i in range(2 * g.n_modes)]
     units = {v.get("name"): v[0].get("unit") for v in variables}
     assert units[names[4 * g.n_modes]] == "N" and units["gauge.root.strain_rate"] == "1/s"
+    assert root.get("description", "").startswith("Läufer & <Sohn> 1 at 0 rpm")
     assert "SI units" in root.get("description", "") and "exact solution to rounding" in source
 
 
@@ -377,6 +379,11 @@ def test_what_cannot_become_a_unit_is_refused(tmp_path: Path, monkeypatch: pytes
     for compiler in ("false", "true"):  # fails; does nothing
         with environment(monkeypatch, CC=compiler), pytest.raises(UserError, match=f"C compiler {compiler} fails"):
             writer("fmu")(basis, tmp_path / "x.fmu")
+    with environment(monkeypatch, CC='gcc "'), pytest.raises(UserError, match="see to CC"):
+        writer("fmu")(basis, tmp_path / "x.fmu")
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "nowhere"))
+    with pytest.raises(UserError, match="TMPDIR"):
+        writer("fmu")(basis, tmp_path / "x.fmu")
     assert not any(tmp_path.iterdir())
 
 
