@@ -1,8 +1,8 @@
 """Exports in the programs they are for: Octave, pyHarm and Exudyn build the body and compute with it.
 
-pyHarm, Exudyn and FMPy (`test_exchange_fmu`) live in environments of their own, made by ``make peers``
-(tests/peers/setup.sh); elsewhere their interpreters may be named by MICROSLIP_PYHARM and so on. Without them the tests
-are skipped, or fail with MICROSLIP_PEERS=required, as in CI.
+pyHarm and Exudyn, FMPy (`test_exchange_fmu`) and pyNastran (`test_exchange_dmig`) live in environments of their own,
+made by ``make peers`` (tests/peers/setup.sh); elsewhere their interpreters may be named by MICROSLIP_PYHARM and so on.
+Without them the tests are skipped, or fail with MICROSLIP_PEERS=required, as in CI.
 """
 
 from __future__ import annotations
