@@ -482,7 +482,7 @@ def test_a_body_that_knows_points_only_is_shown_as_points(tmp_path: Path) -> Non
 # --- what is refused --------------------------------------------------------------------------------------------------
 
 MOTION = ("exudyn", "mbdyn", "sid")
-COMPILER = pytest.mark.skipif(shutil.which("cc") is None, reason="there is no C compiler")
+COMPILER = pytest.mark.skipif(shutil.which("cc") is None, reason="a C compiler is not installed")
 ALL = [pytest.param(form, marks=COMPILER) if form == "fmu" else form for form in formats()]
 
 

@@ -28,7 +28,7 @@ from microslip.exchange import writer
 from microslip.exchange.choice import select
 from microslip.reduced.coordinates import in_modes
 
-pytestmark = pytest.mark.skipif(shutil.which("cc") is None, reason="there is no C compiler")
+pytestmark = pytest.mark.skipif(shutil.which("cc") is None, reason="a C compiler is not installed")
 LINUX = pytest.mark.skipif(sys.platform != "linux", reason="the binary is looked for where Linux has it")
 
 

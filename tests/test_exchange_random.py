@@ -216,7 +216,7 @@ def test_the_tables_of_sid_are_the_sums_over_the_points(
     close(T["Oe"][1] @ products, np.einsum("p,pak,ab,pbq->qk", masses, g.phi, turned, g.phi), 1e-9)
 
 
-@pytest.mark.skipif(shutil.which("cc") is None, reason="there is no C compiler")
+@pytest.mark.skipif(shutil.which("cc") is None, reason="a C compiler is not installed")
 @settings(max_examples=5)
 @given(bodies())
 def test_a_unit_holds_every_bit_under_names_of_its_own(
