@@ -68,7 +68,7 @@ test-slow: $(READY) ## only the slow ones and the peers (CalculiX, if it is inst
 test-all: $(READY) ## both
 	@$(PYTEST) -m "slow or not slow"
 
-peers: $(READY) ## environments of pyHarm, Exudyn, FMPy and tamaas for the slow tests (build/peers)
+peers: $(READY) ## environments of pyHarm, Exudyn, FMPy, pyNastran and tamaas for the slow tests (build/peers)
 	@sh tests/peers/setup.sh
 
 lint: $(READY) ## ruff and mypy

@@ -1156,10 +1156,13 @@ def identification() -> None:
 
 
 def rolling() -> None:
-    """A wheel on a rail: creep curve and tractions."""
+    """A wheel on a rail: creep curve and tractions; profiles that wear."""
     from microslip.stages.rolling import rolling_stage
 
-    for file in rolling_stage(ROOT / "pipeline" / "cases" / "wheel-rail.toml", BUILD)[0]:
+    wear = ["name=wheel-rail-worn", "wear={coefficient=2e-13, updates=20, passages=1e6}", "model.exact=0"]
+    case = ROOT / "pipeline" / "cases" / "wheel-rail.toml"
+    worn = [file for file in rolling_stage(case, BUILD, wear)[0] if file.stem == "wearing"]
+    for file in [*rolling_stage(case, BUILD)[0], *worn]:
         if file.suffix == ".png":
             save(from_file(file), f"rolling_{file.stem}", colours=LINES)
 

@@ -144,6 +144,8 @@ def test_complex_modes_in_uff_keep_phase_and_eigenvalue(tmp_path: Path) -> None:
         np.testing.assert_allclose(shape, g.phi[:, :, j], rtol=0, atol=6e-6 * np.abs(g.phi).max())
         D, w = g.damping_ratio[j], g.omega[j]
         np.testing.assert_allclose(mode["eig"], w * (-D + 1j * np.sqrt(1 - D**2)), rtol=2e-5)
+        np.testing.assert_allclose(mode["modal_a"], 2 * mode["eig"] * g.M_r[j, j] + g.C_r[j, j], rtol=2e-5)
+        np.testing.assert_allclose(mode["modal_b"], g.K_r[j, j] - mode["eig"] ** 2 * g.M_r[j, j], rtol=2e-5)
 
 
 # --- SID: a reader from the description of the format -----------------------------------------------------------------
@@ -314,6 +316,7 @@ def test_mbdyn_fem_holds_the_body(tmp_path: Path) -> None:
     m = g.n_modes
     np.testing.assert_array_equal(read[1], [4, m, 0, 0, 0])
     np.testing.assert_array_equal(read[2], [1, 2, 3, 4])
+    assert not read[3].any() and not read[4].any() and len(read[3]) == len(read[4]) == m, "at rest"
     where = np.stack([read[5], read[6], read[7]], axis=1)
     face = g.interfaces["right"]
     close(where[0], face.origin - v.point)
@@ -393,6 +396,22 @@ def test_pyharm_puts_characteristic_coordinates_among_the_modal_ones(tmp_path: P
     assert answer == pytest.approx(g.compliance.static[i, i], rel=1e-8)
 
 
+def test_pyharms_c_holds_the_gyroscopic_matrix_of_a_spinning_body(tmp_path: Path) -> None:
+    """pyHarm adds C times the frequency, and G times its square, to the balance of cosines and sines."""
+    table = small.table(reduction="craig-bampton", rotation={"speeds_rpm": [3000.0], "axis": [1.0, 0.0, 0.0]})
+    basis = modal_basis(small.beam((1, 1, 2)), BodySettings.model_validate(table), provenance=SOURCE)
+    g, w = basis.groups[0, 0], 9e3
+    writer("pyharm")(basis, tmp_path / "b.mat")
+    read, turn = loadmat(tmp_path / "b.mat"), np.array([[0.0, 1.0], [-1.0, 0.0]])
+    xc, xs = np.random.default_rng(2).normal(size=(2, g.n_modes))
+    terms = w**2 * np.kron(turn @ turn, read["M"]) + w * np.kron(turn, read["C"]) + w**2 * np.kron(turn, read["G"])
+    found = (terms + np.kron(np.eye(2), read["K"])) @ np.r_[xc, xs]
+    gyroscopic = 1j * w * g.G_r @ (xc - 1j * xs)
+    wanted = (-(w**2) * g.M_r + 1j * w * g.C_r + g.K_r) @ (xc - 1j * xs) + gyroscopic
+    assert np.linalg.norm(gyroscopic) > 1e-8 * np.linalg.norm(wanted), "it must show"
+    close(found, np.r_[wanted.real, -wanted.imag])
+
+
 # --- xarray -----------------------------------------------------------------------------------------------------------
 
 
@@ -463,7 +482,7 @@ def test_a_body_that_knows_points_only_is_shown_as_points(tmp_path: Path) -> Non
 # --- what is refused --------------------------------------------------------------------------------------------------
 
 MOTION = ("exudyn", "mbdyn", "sid")
-COMPILER = pytest.mark.skipif(shutil.which("cc") is None, reason="there is no C compiler")
+COMPILER = pytest.mark.skipif(shutil.which("cc") is None, reason="a C compiler is not installed")
 ALL = [pytest.param(form, marks=COMPILER) if form == "fmu" else form for form in formats()]
 
 
@@ -545,6 +564,29 @@ def test_multibody_formats_want_a_whole_body_at_rest(form: str, tmp_path: Path) 
     group = small.basis().groups[0, 0]
     with pytest.raises(UserError, match="no inertia integrals"):
         writer(form)(replace(small.basis(), groups={(0, 0): replace(group, invariants=None)}), tmp_path / "x")
+
+
+@pytest.mark.parametrize("form", MOTION)
+def test_flexibility_beside_the_modes_is_not_lost_in_silence(form: str, tmp_path: Path) -> None:
+    """Coordinates without mass, forces and residual shapes hold part of the static answer: not in modes alone."""
+    for reduction in ("massless-boundary", "dual-craig-bampton", "macneal"):
+        with pytest.raises(UserError, match=f'reduction = "{reduction}" keeps flexibility beside the modes'):
+            writer(form)(body(reduction=reduction), tmp_path / "x")
+    assert not any(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("reduction", ["craig-bampton", "rubin"])
+def test_sid_holds_the_static_answer_of_the_interfaces(reduction: str, tmp_path: Path) -> None:
+    basis = body(reduction=reduction)
+    g = basis.groups[0, 0]
+    writer("sid")(basis, tmp_path / "b.SID_FEM")
+    _, modal = read_sid(tmp_path / "b.SID_FEM")
+    nodes, K = modal["frame"].inside, modal["Ke"].taylor()[0]
+    face = g.interfaces["left"]
+    T = face.rotation @ nodes[1]["phi"].taylor()[0]
+    at = [g.compliance.labels.index(f"interface:left:{row}") for row in INTERFACE_ROWS[:3]]
+    wanted = g.compliance.static[np.ix_(at, at)]
+    close(T @ np.linalg.solve(K, T.T), wanted, 1e-8)
 
 
 @pytest.mark.parametrize("form", ["mbdyn", "sid"])

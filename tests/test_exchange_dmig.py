@@ -16,6 +16,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 from test_exchange import body
+from test_exchange_peers import ask, needs
 
 from microslip.cli import main
 from microslip.data import INTERFACE_ROWS, Array, ModalBasis, UserError
@@ -120,6 +121,20 @@ def test_matrices_and_grids_are_those_of_the_body(free: bool, tmp_path: Path) ->
         assert [tuple(i) for i in frame.index] == rows
         np.testing.assert_array_equal(frame.values, tables[name.upper()][1])
     np.testing.assert_array_equal(bulk.rdgrids(str(path))[:, [0, 2, 3, 4]], [[n, *x] for n, x in grids.items()])
+
+
+@needs("pynastran")
+@pytest.mark.slow
+def test_pynastran_reads_the_same_matrices(tmp_path: Path) -> None:
+    basis = turned(free=True)
+    writer("dmig")(basis, tmp_path / "b.pch")
+    grids, tables, rows = read_columns(tmp_path / "b.pch")
+    ask("pynastran", "pynastran_dmig.py", tmp_path / "b.pch", tmp_path / "out.npz")
+    found = np.load(tmp_path / "out.npz")
+    for name, (_, table) in tables.items():
+        np.testing.assert_array_equal(found[name], table)
+        assert [tuple(r) for r in found[f"{name}_rows"].tolist()] == rows
+    np.testing.assert_array_equal(found["GRID"], [[n, *x] for n, x in grids.items()])
 
 
 def test_frequencies_with_free_and_with_fixed_interfaces(tmp_path: Path) -> None:

@@ -7,6 +7,7 @@ import re
 import shutil
 import subprocess
 import sys
+import tempfile
 import zipfile
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
@@ -27,7 +28,7 @@ from microslip.exchange import writer
 from microslip.exchange.choice import select
 from microslip.reduced.coordinates import in_modes
 
-pytestmark = pytest.mark.skipif(shutil.which("cc") is None, reason="there is no C compiler")
+pytestmark = pytest.mark.skipif(shutil.which("cc") is None, reason="a C compiler is not installed")
 LINUX = pytest.mark.skipif(sys.platform != "linux", reason="the binary is looked for where Linux has it")
 
 
@@ -141,7 +142,7 @@ def test_co_simulation_answers_a_step_exactly(reduction: str, run: Callable[[Mod
         one.step(t, h)
         t += h
     q, v = step_response(g, load, t)
-    rounding = 1e-11 * np.abs(step_response(g, load, period / 3)[0] * g.omega).max()  # in the norm of omega q, q'
+    rounding = 1e-12 * np.abs(step_response(g, load, period / 3)[0] * g.omega).max()  # in the norm of omega q, q'
     np.testing.assert_allclose(
         one.state() * np.r_[g.omega, np.ones_like(v)], np.r_[g.omega * q, v], atol=rounding, rtol=0
     )
@@ -335,6 +336,7 @@ def test_the_description_tells_units_names_and_what_depends_on_what(tmp_path: Pa
     assert [variables[i - 1][0].get("derivative") for i in derivatives] == [str(i + 1) for i in range(2 * g.n_modes)]
     units = {v.get("name"): v[0].get("unit") for v in variables}
     assert units[names[4 * g.n_modes]] == "N" and units["gauge.root.strain_rate"] == "1/s"
+    assert root.get("description", "").startswith("Läufer & <Sohn> 1 at 0 rpm")
     assert "SI units" in root.get("description", "") and "exact solution to rounding" in source
 
 
@@ -374,7 +376,13 @@ def test_what_cannot_become_a_unit_is_refused(tmp_path: Path, monkeypatch: pytes
         pytest.raises(UserError, match="no C compiler no-such-co"),
     ):
         writer("fmu")(basis, tmp_path / "x.fmu")
-    with environment(monkeypatch, CC="false"), pytest.raises(UserError, match="the C compiler false fails"):
+    for compiler in ("false", "true"):  # fails; does nothing
+        with environment(monkeypatch, CC=compiler), pytest.raises(UserError, match=f"C compiler {compiler} fails"):
+            writer("fmu")(basis, tmp_path / "x.fmu")
+    with environment(monkeypatch, CC='gcc "'), pytest.raises(UserError, match="see to CC"):
+        writer("fmu")(basis, tmp_path / "x.fmu")
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "nowhere"))
+    with pytest.raises(UserError, match="TMPDIR"):
         writer("fmu")(basis, tmp_path / "x.fmu")
     assert not any(tmp_path.iterdir())
 

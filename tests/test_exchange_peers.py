@@ -1,8 +1,8 @@
 """Exports in the programs they are for: Octave, pyHarm and Exudyn build the body and compute with it.
 
-pyHarm, Exudyn and FMPy (`test_exchange_fmu`) live in environments of their own, made by ``make peers``
-(tests/peers/setup.sh); elsewhere their interpreters may be named by MICROSLIP_PYHARM and so on. Without them the tests
-are skipped, or fail with MICROSLIP_PEERS=required, as in CI.
+pyHarm and Exudyn, FMPy (`test_exchange_fmu`) and pyNastran (`test_exchange_dmig`) live in environments of their own,
+made by ``make peers`` (tests/peers/setup.sh); elsewhere their interpreters may be named by MICROSLIP_PYHARM and so on.
+Without them the tests are skipped, or fail with MICROSLIP_PEERS=required, as in CI.
 """
 
 from __future__ import annotations
@@ -54,10 +54,9 @@ def ask(name: str, script: str, *words: str | Path) -> None:
 
 
 @cache
-def body(reduction: str = "eigenmodes") -> ModalBasis:
-    table = small.table(
-        reduction=reduction, damping={"ratio": 0.01}, rotation={"speeds_rpm": [0.0], "point": [0.0, 0.01, -0.2]}
-    )
+def body(reduction: str = "eigenmodes", rpm: float = 0.0) -> ModalBasis:
+    rotation = {"speeds_rpm": [rpm], "axis": [1.0, 0.0, 0.0], "point": [0.0, 0.01, -0.2]}
+    table = small.table(reduction=reduction, damping={"ratio": 0.01}, rotation=rotation)
     source = {"settings": "small", "mesh_sha256": "0" * 64}
     return modal_basis(small.beam(), BodySettings.model_validate(table), provenance=source)
 
@@ -138,14 +137,18 @@ def ask_octave(folder: Path, command: str) -> None:
 
 @needs("pyharm")
 @pytest.mark.slow
-@pytest.mark.parametrize(("friction", "limit", "tolerance"), [(0.0, 0.0, 1e-8), (4e6, 6.0, 2e-3)])
-def test_pyharm_solves_the_bodys_equations(friction: float, limit: float, tolerance: float, tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("friction", "limit", "tolerance", "rpm"), [(0.0, 0.0, 1e-8, 0.0), (4e6, 6.0, 2e-3, 0.0), (0.0, 0.0, 1e-8, 3000.0)]
+)
+def test_pyharm_solves_the_bodys_equations(
+    friction: float, limit: float, tolerance: float, rpm: float, tmp_path: Path
+) -> None:
     """What pyHarm finds for the exported body satisfies the equations of the modal file.
 
     Without friction to pyHarm's own tolerance; with a Jenkins element the one-harmonic force is the closed form here
     and 256 samples a period there: 1 / 256 of a period in the instant of sticking is some 1e-3 of the force.
     """
-    basis = body("craig-bampton")
+    basis = body("craig-bampton", rpm)
     g, job = basis.groups[0, 0], {"force": 10.0, "stiffness": friction, "limit": limit, "direction": 0, "samples": 256}
     job |= {"low": 0.9 * g.omega[0], "high": 1.2 * g.omega[0]}
     writer("pyharm")(basis, tmp_path / "b.mat")
@@ -154,15 +157,17 @@ def test_pyharm_solves_the_bodys_equations(friction: float, limit: float, tolera
     found = np.load(tmp_path / "out.npz")
     assert len(found["omega"]) >= 12
     left, right = 6, 0  # u_n of each; in the file the interfaces stand in this order
-    slipped = 0
+    slipped, turning = 0, 0.0
     for w, x in zip(found["omega"], found["x"], strict=True):
-        rest = (-(w**2) * g.M_r + 1j * w * g.C_r + g.K_r) @ x
+        rest = (-(w**2) * g.M_r + 1j * w * (g.C_r + g.G_r) + g.K_r) @ x
+        turning += np.abs(w * g.G_r @ x).max()
         rest[right] -= job["force"]
         if friction:
             stuck, _ = jenkins_harmonic(np.abs(x[[left]]), friction, limit)
             slipped += bool(np.abs(x[left]) * friction > limit)
             rest[left] += stuck[0] * x[left]
         assert np.abs(rest).max() < tolerance * job["force"]
+    assert not rpm or turning > 1e-2 * job["force"], "the gyroscopic matrix must show"
     assert not friction or 0 < slipped < len(found["omega"]), "it must stick at one frequency and slip at another"
 
 

@@ -7,7 +7,11 @@ written out here. Names are random text. Bits where the format holds them, print
 from __future__ import annotations
 
 import csv
+import re
+import shutil
+import zipfile
 from dataclasses import replace
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -210,6 +214,35 @@ def test_the_tables_of_sid_are_the_sums_over_the_points(
     position = basis.mesh.points - g.invariants.point  # type: ignore[union-attr]
     close(T["Oe"][0] @ products, np.einsum("p,pak,ab,pb->k", masses, g.phi, turned, position), 1e-9)
     close(T["Oe"][1] @ products, np.einsum("p,pak,ab,pbq->qk", masses, g.phi, turned, g.phi), 1e-9)
+
+
+@pytest.mark.skipif(shutil.which("cc") is None, reason="a C compiler is not installed")
+@settings(max_examples=5)
+@given(bodies())
+def test_a_unit_holds_every_bit_under_names_of_its_own(
+    tmp_path_factory: pytest.TempPathFactory, basis: ModalBasis
+) -> None:
+    """The numbers of its source, a full damping matrix among them, and as many names as rows."""
+    path, g = tmp_path_factory.mktemp("fmu") / "b.fmu", basis.groups[0, 0]
+    writer("fmu")(basis, path)
+    with zipfile.ZipFile(path) as archive:
+        text = re.sub(r"/\*.*?\*/", "", archive.read("sources/numbers.h").decode("ascii"))
+        root = ElementTree.fromstring(archive.read("modelDescription.xml"))
+    tables = dict(re.findall(r"(\w+)\[\w[\w *]*\](?:\[\w+\])? = \{(.*?)\};", text, flags=re.S))
+    tables = {name: np.array(re.split(r"[{},\s]+", rows.strip("{}, \n"))) for name, rows in tables.items()}
+    m, pairs = g.n_modes, tables["PAIR"].reshape(-1, 4)
+    K, C = np.zeros((2, m, m))
+    at = tuple(pairs[:, :2].T.astype(int))
+    K[at], C[at] = pairs[:, 2:].T.astype(float)
+    np.testing.assert_array_equal(K, g.K_r)
+    np.testing.assert_array_equal(C, g.C_r)
+    contacts = [i.rows for i in g.interfaces.values()]
+    load = np.vstack([*contacts, *(r.rows for r in g.excitations.values())])
+    read = np.vstack([*contacts, *(r.rows for r in g.monitors.values())])
+    np.testing.assert_array_equal(tables["LOAD"].astype(float).reshape(-1, m), load)
+    np.testing.assert_array_equal(tables["READ"].astype(float).reshape(-1, m), read)
+    names = [v.get("name") for v in root.iter("ScalarVariable")]
+    assert len({*names}) == len(names) == 4 * m + len(load) + 2 * len(read)
 
 
 @EXAMPLES

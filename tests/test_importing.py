@@ -64,6 +64,24 @@ def test_a_deck_without_material_says_so(tmp_path, monkeypatch, capsys):
     assert main(["modes", "here", "-q"]) == 0
 
 
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("*DENSITY\n7.85e-9\n", "", "part.inp, line 27: the material 'Steel' of the cells 'EALL' has no density"),
+        ("*ELASTIC\n210000., 0.3\n", "", "part.inp, line 27: the material 'Steel' of the cells 'EALL' has no elastic"),
+    ],
+)
+def test_a_material_that_is_not_whole_is_no_steel(tmp_path, monkeypatch, capsys, old, new, words):
+    """A frequency by a guessed density would be wrong; CalculiX stops as well."""
+    monkeypatch.chdir(tmp_path)
+    lines = "\n".join([*decks.mesh_lines(beam()), *decks.MATERIAL, decks.section()]) + "\n"
+    assert old in lines
+    (tmp_path / "part.inp").write_text(lines.replace(old, new))
+    line = lines[: lines.index("*MATERIAL")].count("\n") + 1
+    assert main(["import", "part.inp", "here"]) == 2
+    assert words.replace("27", str(line)) in capsys.readouterr().err and not (tmp_path / "here").exists()
+
+
 def test_a_surface_with_a_face_inside_matters_to_nobody_who_does_not_use_it(tmp_path, monkeypatch, capsys):
     """The upper face of the lowest cell lies between two cells; the other face of the set is on the surface."""
     monkeypatch.chdir(tmp_path)

@@ -334,7 +334,7 @@ def test_one_instance_is_the_part_itself(tmp_path: Path) -> None:
 DAMAGED_INP = {
     "an unknown node": ("24\n  2,", "77\n  2,", "names node 77"),
     "an unknown node in a set": (" 34\n*ELSET", " 35\n*ELSET", "the node set 'Both' names node 35"),
-    "a node at two places": ("  12, 1.,", "  11, 1.,", "node 11 is defined twice"),
+    "a node at two places": ("  12, 1.,", "  11, 1.,", "node 11 is there already"),
     "a cell twice": ("  2, 21,", "  1, 21,", "cell 1 is defined twice"),
     "half a cell": ("31, 32, 33, 34\n*ELEMENT", "31, 32, 33\n*ELEMENT", "another number of nodes"),
     "a word in a cell": ("31, 32, 33, 34\n*ELEMENT", "31, 32, x, 34\n*ELEMENT", "no whole number"),

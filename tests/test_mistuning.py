@@ -30,6 +30,8 @@ RUB = {
     "normal_stiffness": 2e5, "tangential_stiffness": 4e5, "friction": 0.2, "points": [1, 1],
 }  # fmt: skip
 FINE = {"harmonics": 1, "samples": 32}
+SLIPS = 337.0
+"""Hz, where friction holds the amplitude back; below 330 Hz and from 345 Hz contacts of six vanes stick."""
 
 
 def sector(
@@ -52,7 +54,7 @@ def test_no_scatter_is_the_sector(tuned: Tuned, of: str) -> None:
     s = Scatter(of, 1e-3, at="probe" if of == "added_mass" else None)
     ring = tuned.mistuned([(s, np.full((6, tuned.modes(s)), 1e-13))])
     lone, whole = balance.of(tuned.sector, **FINE), balance.of(ring, form="sides", **FINE)
-    Omega = 2 * np.pi * 287.0
+    Omega = 2 * np.pi * SLIPS
     a, b = (np.abs(amplitudes(p, solve(p, Omega, []))) for p in (lone, whole))
     assert b == pytest.approx(a[0], rel=1e-9)
 
@@ -144,7 +146,7 @@ def test_each_contact_counts_its_own_numbers(tuned: Tuned) -> None:
     ring = tuned.mistuned([(x, rng.uniform(-0.2, 0.2, (6, 1))) for x in s])
     together = balance.of(ring, form="relative", **FINE)
     assert len(together.groups) == 1
-    Omega, x = 2 * np.pi * 287.0, rng.normal(size=together.size)
+    Omega, x = 2 * np.pi * SLIPS, rng.normal(size=together.size)
     force, v = together.at(Omega).force(x), together.displacement(x)
     for contact, own in zip(ring.contacts, together.groups[0].first, strict=True):
         alone = balance.of(replace(ring, contacts=(contact,)), form="relative", **FINE)
@@ -156,7 +158,7 @@ def test_steps_by_relative_motions_are_those_of_the_sides(tuned: Tuned) -> None:
     """The step of Newton's method by the relative motions solves the system of the sides: 1e-9."""
     ring = tuned.mistuned([(Scatter("frequency", 0.01), np.random.default_rng(0).normal(0, 0.01, (6, 2)))])
     p = balance.of(ring, form="sides", **FINE)
-    rng, at = np.random.default_rng(2), p.at(2 * np.pi * 287.0)
+    rng, at = np.random.default_rng(2), p.at(2 * np.pi * SLIPS)
     J = at.jacobian(at.forces(2 * rng.normal(size=p.size))[1])
     right = rng.normal(size=p.size)
     assert J.dense() @ J.solve(right) == pytest.approx(right, abs=1e-9)
@@ -165,7 +167,7 @@ def test_steps_by_relative_motions_are_those_of_the_sides(tuned: Tuned) -> None:
 def test_steps_of_a_ring_with_a_gaping_contact(tuned: Tuned) -> None:
     """A contact that stands open feels nothing; the step still solves the system of the sides: 1e-9."""
     p = balance.of(tuned.mistuned([(Scatter("gap", 1.0), np.eye(6)[:, :1] * 1e-2)]), form="sides", **FINE)
-    rng, at = np.random.default_rng(2), p.at(2 * np.pi * 287.0)
+    rng, at = np.random.default_rng(2), p.at(2 * np.pi * SLIPS)
     slopes = at.forces(np.zeros(p.size))[1]
     assert not slopes[0][0].any()
     right = rng.normal(size=p.size)
@@ -215,13 +217,21 @@ def test_modal_files_of_single_blades_in_a_flow() -> None:
     assert found == pytest.approx(Sticking(ring.whole)(287.0), rel=1e-12)
 
 
+def _sliding(asked: Asked) -> bool:
+    """Whether friction changes what the tuned ring does."""
+    lone = Sticking(asked.tuned.whole)(float(asked.frequency[0]))
+    now = np.abs(amplitudes(asked.problem(asked.tuned.whole), asked.tuned_points[0]))
+    return bool(np.abs(now / lone - 1).max() > 0.01)
+
+
 @pytest.mark.parametrize("blade, flowing", [(0, False), (1, False), (5, False), (1, True)])
 def test_sensitivities_are_differences(tuned: Tuned, blade: int, flowing: bool) -> None:
     """Central differences of Newton solutions with friction: 1e-6 (no contact switches between them)."""
     tuned = flown() if flowing else tuned
     s = Scatter("frequency", 0.003, together=0.0)
-    asked = Asked(tuned, (s,), np.array([287.3]), balance=FINE)
+    asked = Asked(tuned, (s,), np.array([SLIPS]), balance=FINE)
     point = asked.tuned_points[0]
+    assert _sliding(asked)
     _, found = sensitivities(asked, s, point)
     h, moved = 1e-6, []
     for sign in (1, -1):
@@ -297,7 +307,7 @@ def test_stress_at_the_worst_node(stuck: bool) -> None:
     g = one.components[0].groups[0]
     gauge = {"root": replace(g.gauges["root"], rows=np.array([[3.0, -2.0]]))}  # its own feels nothing
     tuned = Tuned(replace(one, components=(replace(one.components[0], groups={0: replace(g, gauges=gauge)}),)), {})
-    asked = Asked(tuned, (s,), np.linspace(284, 290, 5), balance=FINE, stuck=stuck)
+    asked = Asked(tuned, (s,), np.linspace(335, 339, 5), balance=FINE, stuck=stuck)
     ring = tuned.mistuned(asked.deviations(0))
     found, respond = sample(asked, 0), Sticking(ring) if stuck else Sliding(asked.problem(ring))
     respond(found.top.frequency)
@@ -404,7 +414,7 @@ def test_a_case_leaves_its_samples(tmp_path: Path) -> None:
 def test_one_transposed_solution_holds_all_sensitivities(tuned: Tuned, of: str) -> None:
     """From the left (one solution) as from the right (one a mode): all modes of a blade to 1e-9."""
     s, body = Scatter(of, 0.003, together=0.0), 2
-    asked = Asked(tuned, (s,), np.array([287.3]), balance=FINE)
+    asked = Asked(tuned, (s,), np.array([SLIPS]), balance=FINE)
     now = Linearised.of(asked.problem(tuned.whole), asked.tuned_points[0])
     _, found = sensitivities(asked, s, asked.tuned_points[0])
     for mode in range(2):
@@ -437,7 +447,7 @@ def test_the_linear_ring_is_the_ring_that_sticks(tuned: Tuned) -> None:
 
 def test_the_linear_ring_answers_as_contacts_do_on_average(tuned: Tuned) -> None:
     """k u is the mean over all phases of the tangent's force, turned back: 1e-12."""
-    asked = Asked(tuned, (Scatter("frequency", 0.002),), np.array([287.3]), balance=FINE)
+    asked = Asked(tuned, (Scatter("frequency", 0.002),), np.array([SLIPS]), balance=FINE)
     now = Linearised.of(asked.problem(tuned.whole), asked.tuned_points[0])
     k, turns = answer(now.at, now.slopes), np.exp(2j * np.pi * np.arange(8) / 8)
     u, S = np.random.default_rng(0).normal(size=(6, 2)) @ [1, 1j], now.slopes[0][0]

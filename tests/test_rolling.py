@@ -121,6 +121,20 @@ def test_strips_converge_with_their_order() -> None:
     assert error[1].max() < 2e-3
 
 
+def test_what_pure_spin_leaves_of_a_lateral_force() -> None:
+    """Where all slides the exact one is 0; a slip that is taken half an element ahead leaves -1/n int p x_A y^2/r^3 dA,
+    here by quadrature: an error of first order that two grids take out."""
+    for ratio in (1.0, 2.0):
+        a, b = ratio * PATCH["b"], PATCH["b"]
+        f = [ms.creep_forces(0, 0, 1e5, **PATCH | {"a": a}, elements=(n, 60)).y[0] / HELD for n in (20, 40)]
+        r, turn = ((np.arange(200) + 0.5) / 200)[:, None], 2 * np.pi * (np.arange(400) + 0.5) / 400
+        x, y = a * r * np.cos(turn), b * r * np.sin(turn)
+        ahead = a * np.sqrt(1 - (y / b) ** 2) * y**2 / np.hypot(x, y) ** 3
+        limit = np.sum(2 / np.pi * (1 - r**2) * ahead * r) * 2 * np.pi / 400 / 200
+        assert -20 * f[0] == pytest.approx(limit, rel=0.05)
+        assert abs(2 * f[1] - f[0]) < 1e-3
+
+
 def test_friction_takes_the_power_of_the_creepages() -> None:
     """Of the constant distribution, with errors of second order; the slip of (6.5-16), which leaves p' out, takes less:
     what mu p s_M is over the slip zone, here by quadrature of the closed form."""
@@ -462,6 +476,11 @@ WRONG = {
     "wear that adds": ("wear.coefficient=-1", "wear.coefficient"),
     "a table of contacts without a load": ("contacts={lateral=0.004, yaw=0.01}; vertical_force=0", "contacts: "),
     "contacts beyond the rail": ("contacts={lateral=0.04, yaw=0.01, points=[4, 4]}; model.exact=0", "smaller reach"),
+    "profiles renewed by nothing": ("wear={coefficient=1e-13, updates=3}", "passages"),
+    "a roll that follows": ('pose={side="both", roll=0.001}', "pose.roll"),
+    "two wheels that wear": ('pose.side="both"; wear={coefficient=1e-13, updates=3, passages=1e5}', "wear.updates"),
+    "rough by nothing": ("roughness=0", "roughness"),
+    "a table of smooth bodies": ("table={}; roughness=1e-5", "table"),
     "a table of constant friction": ("table={}; heat.limit=300", "table"),
 }
 

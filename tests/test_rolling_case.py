@@ -6,17 +6,25 @@ import csv
 import shutil
 from pathlib import Path
 
+import jax.numpy as jnp
 import numpy as np
 import pytest
 from scipy.integrate import quad
+from scipy.optimize import brentq
 
+import microslip as ms
 from microslip.cli import main
+from microslip.contact.friction import Coulomb
+from microslip.contact.heights import Polynomial
+from microslip.contact.law import value
 from microslip.contact.solids import Solid
 from microslip.rolling.behind import even
+from microslip.rolling.laws import Surface
 from microslip.rolling.rolled import COLD
 from microslip.rolling.settings import load_rolling
 from microslip.rolling.study import Studied, study
 from microslip.rolling.temperature import falling
+from microslip.rolling.wearing import wearing
 
 CASE = Path(__file__).parents[1] / "pipeline" / "cases" / "wheel-rail.toml"
 FEW = ("creep.points=3", "creep.stop=0.02", "model.exact=0")
@@ -85,6 +93,14 @@ def test_worn_volume_is_the_coefficient_times_the_work_of_friction() -> None:
         assert any("times the power of the creepages" in s for s in found.warnings())
 
 
+def test_a_rough_case_has_its_own_curve() -> None:
+    """A number is R_Z in m of the polynomial; models without roughness do not stand beside it."""
+    smooth, rough = studied("creep.stop=0.002"), studied("creep.stop=0.002", "roughness=2e-5")
+    assert smooth.forces is not None and rough.forces is not None
+    assert (np.abs(rough.forces.x[1]) < 0.99 * np.abs(smooth.forces.x[1])) and rough.reference is None
+    assert any("know no roughness" in s for s in rough.sentences())
+
+
 def test_tables_and_page_hold_temperature_and_wear(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -103,6 +119,90 @@ def test_tables_and_page_hold_temperature_and_wear(
     (tmp_path / "mu.csv").write_text("speed,mu\n0.01,0.2\n0.1,0.15\n1,0.1\n")
     assert main(["roll", "case.toml", *sets, "--no-pictures"]) == 0
     assert f"{hot:.4g} degrees C hot" not in capsys.readouterr().out
+
+
+def test_both_wheels_of_an_axle() -> None:
+    """Each carries the vertical force; forces about the axle are those of its wheels, and mirror with the pose."""
+    one, other = (
+        studied("pose.side='both'", f"pose.lateral={0.003 * s}", f"pose.yaw={0.001 * s}", "wear.coefficient=1e-14")
+        for s in (1, -1)
+    )
+    assert [p.side for p in one.patches] != [p.side for p in other.patches] and len(one.patches) == 2
+    felt = [{p.side: np.array(row[2:], float) for row, p in zip(f.generalised()[1][::2], f.patches, strict=True)}
+            for f in (one, other)]  # fmt: skip
+    np.testing.assert_allclose([felt[0][side][2] for side in felt[0]], -1e5, rtol=2e-2)  # creep lifts a little as well
+    np.testing.assert_allclose([p.normal_force * np.cos(p.angle) for p in one.patches], 1e5, rtol=1e-5)
+    np.testing.assert_allclose(felt[0]["left"], felt[1]["right"] * [1, -1, 1, -1, 1, -1], rtol=1e-6, atol=1e-2)
+    assert sum("wheel feels" in s for s in one.sentences()) == 2 and len(set(one.worn()["patch"])) == 2
+
+
+def test_profiles_that_wear_are_run_on_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The first update is the wear of a passage times their number; a case that takes the worn profiles has the
+    pressure of the last row."""
+    shutil.copy(CASE, tmp_path / "case.toml")
+    monkeypatch.chdir(tmp_path)
+    wear = "wear={coefficient=2e-13, updates=4, passages=4e5}"
+    sets = [w for s in ("creep.points=3", "model.exact=0") for w in ("--set", s)]
+    assert main(["roll", "case.toml", *sets, "--set", wear, "--no-pictures"]) == 0
+    assert "After 4e+05 passages" in capsys.readouterr().out
+    folder = tmp_path / "build" / "wheel-rail"
+    for name in ("wheel_worn", "rail_worn"):
+        shutil.copy(folder / f"{name}.csv", tmp_path)
+    rows, once = (list(csv.DictReader((folder / f"{name}.csv").open())) for name in ("wearing", "wear"))
+    assert float(rows[1]["deepest_wheel_m"]) == pytest.approx(1e5 * max(float(r["depth_m"]) for r in once), rel=0.02)
+    again = ["wheel.profile='wheel_worn.csv'", "rail.profile='rail_worn.csv'", "wheel.at=0.75", "rail.at=0.75"]
+    assert main(["roll", "case.toml", *sets, *(w for s in again for w in ("--set", s)), "--no-pictures", "-q"]) == 0
+    patch = next(csv.DictReader((folder / "patches.csv").open()))
+    assert float(patch["largest_pressure_Pa"]) == pytest.approx(float(rows[-1]["largest_pressure_Pa"]), rel=1e-3)
+    assert float(rows[-1]["largest_pressure_Pa"]) < 0.97 * float(rows[0]["largest_pressure_Pa"])
+
+
+def test_worn_volume_and_mirror() -> None:
+    """Off both bodies, the coefficient times the work of friction; the left wheel of the mirrored pose wears alike."""
+    wear = "wear={coefficient=2e-13, updates=3, passages=3e5, lateral=[%g, %g]}"
+    case, mirror = (
+        load_rolling(CASE, [*FEW, wear % (0.002 * s, 0.004 * s), f"pose.yaw={0.001 * s}", f"pose.side='{side}'"])[0]
+        for s, side in ((1, "right"), (-1, "left"))
+    )
+    one, other = (wearing(c, c.track(CASE.parent), c.characteristic(CASE.parent)) for c in (case, mirror))
+    assert one.moments[-1].volume == pytest.approx(2 * 2e-13 * one.work, rel=1e-9)
+    np.testing.assert_allclose(other.wheel.depth, one.wheel.depth, atol=1e-9 * one.wheel.depth.max())
+    few = load_rolling(CASE, [*FEW, "wear={coefficient=2e-13, updates=1, passages=3e5, smoothing=0}"])[0]
+    assert (
+        "warning: an update takes so much"
+        in wearing(few, case.track(CASE.parent), case.characteristic(CASE.parent)).warning()
+    )
+
+
+# --- roughness -------------------------------------------------------------------------------------------------------
+
+PATCH = {"a": 8e-3, "b": 4e-3, "normal_force": 82e3, "friction": Coulomb(value(0.3)), "speed": 20.0, "shear": 82e9,
+         "poisson": 0.28}  # fmt: skip
+
+
+def test_rough_bodies_carry_the_same_force_and_are_softer() -> None:
+    """Without slip, by quadrature: area that comes into contact carries nothing yet, t' = -k h s, and what is lost
+    takes its part along, (t/h)' = -k s, with (3.3-4) for h and the depth that makes the force F_N. Smooth bodies are
+    the limit; all that slides carries mu F_N."""
+    smooth = ms.creep_forces([1e-9, 2e-3, 5e-2], 0, 0, 8e-3, 4e-3, 82e3, 0.3, 82e9, 0.28)
+    rough = [ms.forces_by_characteristic([1e-9, 2e-3, 5e-2], 0, 0, **PATCH, surface=Surface(Polynomial(), value(R)))
+             for R in (1e-13, 9.267e-5 / 2)]  # fmt: skip
+    np.testing.assert_allclose(rough[0].x, smooth.x, rtol=1e-6)
+    np.testing.assert_allclose(rough[1].x[2], -0.3 * 82e3, rtol=1e-6)
+    reach = np.cos(np.pi * (np.arange(100) + 0.5) / 200)[:, None]  # of strips, over a; their width goes with it too
+    x = reach * (1 - (np.arange(400) + 0.5) / 200)  # from the leading edge on
+    u, dx, area = 2 * (reach**2 - x**2), reach / 200, reach**2 * np.ones_like(x)  # u: of smooth bodies, over R_Z
+
+    def missing(more: float) -> float:
+        return float(np.sum((np.asarray(Polynomial().volume(jnp.asarray(more * u))) - u) * area))
+
+    h = np.asarray(Polynomial().area(jnp.asarray(brentq(missing, 1, 3) * u)))
+    front = np.cumsum(h * dx, axis=1)[:, :200]
+    rear = h[:, 200:] * (front[:, -1:] / h[:, 199:200] + np.arange(1, 201) * dx)
+    slope = np.sum(np.hstack([front, rear]) * area) / np.sum((reach - x) * area)
+    assert rough[1].x[0] / smooth.x[0] == pytest.approx(slope, rel=0.01)
 
 
 # --- bodies behind the patch -----------------------------------------------------------------------------------------

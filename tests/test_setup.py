@@ -271,6 +271,7 @@ def test_the_wheel_holds_the_package_and_the_bodies_and_nothing_else(tmp_path: P
     for body in ("blade", "shroud", "pendulum", "half-pipe"):
         assert {f"microslip/bodies/{body}/body.toml", f"microslip/bodies/{body}/build.py"} <= set(names)
     assert {"microslip/cases/blade.toml", "microslip/py.typed", "microslip/cad/__main__.py"} <= set(names)
+    assert "microslip/exchange/fmu/body.c" in names
     assert {f"microslip/report/templates/{n}" for n in ("page.html", "pieces.html", "style.css")} <= set(names)
     assert [n for n in names if n.endswith((".msh", ".h5", ".pyc"))] == ["microslip/samples/basis.h5"]
 

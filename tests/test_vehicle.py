@@ -6,12 +6,14 @@ import csv
 import tomllib
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from microslip.cli import main
 from microslip.files.tables import columns_csv
+from microslip.results import Journal, open_journal, read_journal
 from microslip.rolling.table import creep_table
 from microslip.rolling.wheelset import Pose, patches
 from microslip.vehicle import motion, wearing
@@ -145,6 +147,20 @@ def test_worn_volume_is_the_coefficient_times_the_work(rolling: wearing.Rolling)
     assert found[-1][0].turns == pytest.approx(1e5)
 
 
+def test_jumps_of_a_journal_go_on_to_the_same_bits(rolling: wearing.Rolling, tmp_path: Path) -> None:
+    """Three jumps kept in a file, read again and gone on with, against jumps that nothing interrupts."""
+    whole = list(wearing.jumps(rolling, 1e5, 1e-9, 2e4))
+    with open_journal(tmp_path / "points", "of these", {}) as journal:
+        for now, jump in whole[:3]:
+            journal.keep("jumps", now.turns, wearing.point_of(now, jump))
+    known = [wearing.of_point(p) for p in read_journal(tmp_path / "points")[1]["jumps"].values()]
+    rest = list(wearing.jumps(rolling, 1e5, 1e-9, 2e4, known=known))
+    assert len(rest) == len(whole) - 3 > 0
+    for (now, jump), (then, other) in zip(whole[3:], rest, strict=True):
+        assert (jump.size, jump.error, now.turns) == (other.size, other.error, then.turns)
+        assert (now.depth == then.depth).all() and (now.radius == then.radius).all() and (jump.work == other.work).all()
+
+
 @pytest.mark.slow
 def test_jumps_are_of_second_order(rolling: wearing.Rolling) -> None:
     """Radii after as many turns, by jumps of a half, a quarter, ... of them."""
@@ -195,6 +211,60 @@ def test_a_case_from_the_command_line(tmp_path: Path, monkeypatch: pytest.Monkey
     assert len(list(csv.DictReader((folder / "circumference.csv").open()))) == 48
 
 
+class Stopped(Exception):
+    """As a killed process."""
+
+
+def stopped_after(count: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Journals that keep so many points more, and then stop the run."""
+    kept = []
+
+    def keep(self: Journal, *given: Any) -> None:
+        if len(kept) == count:
+            raise Stopped
+        kept.append(None)
+        real(self, *given)
+
+    real = Journal.keep
+    monkeypatch.setattr(Journal, "keep", keep)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("of", ["vehicle", "kinematics"])
+def test_a_run_that_is_killed_goes_on(
+    of: str,
+    rolling: wearing.Rolling,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """Stopped among the jumps, then among the speeds, or among the turns of a file: the third run has the bytes of one
+    that nothing stops, and leaves no journal."""
+    name, stops, made = "given", (2, 1), ("circumference.csv", "unround.html")
+    given = ["roll", str(written(tmp_path, table(rolling, 4)[0])), "--no-pictures"]
+    if of == "vehicle":
+        name, stops, made = "unround-wheel", (3, 5), ("growth.csv", "circumference.csv", "speeds.csv", "unround.html")
+        given = [a for a in asked("running.speeds=[40.0,60.0]", "running.turns=2e5") if a != "-q"]
+    folders = [tmp_path / "whole" / "build" / name, tmp_path / "stopped" / "build" / name]
+    for folder in folders:
+        folder.parents[1].mkdir()
+    monkeypatch.chdir(tmp_path / "whole")
+    assert main(given) == 0
+    monkeypatch.chdir(tmp_path / "stopped")
+    for count in stops:
+        with monkeypatch.context() as patch, pytest.raises(Stopped):
+            stopped_after(count, patch)
+            main(given)
+        assert (folders[1] / "unround.points").is_file() and not (folders[1] / made[0]).exists()
+    capsys.readouterr()
+    assert main(given) == 0
+    said = capsys.readouterr().err
+    assert ("turn 4 of 4" in said and "turn 3 of 4" not in said) if of == "kinematics" else "goes on after" in said
+    for file in made:
+        assert (folders[0] / file).read_bytes() == (folders[1] / file).read_bytes()
+    assert not (folders[1] / "unround.points").exists()
+
+
 @pytest.mark.parametrize(
     ("change", "key"),
     [
@@ -210,7 +280,7 @@ def test_bad_input(
     """A vehicle that hunts, a wheel that leaves its rail, too few places, a reach beyond the profile: exit 2."""
     monkeypatch.chdir(tmp_path)
     assert main(asked(change)) == 2
-    assert key in capsys.readouterr().err and not (tmp_path / "build" / "unround-wheel" / "growth.csv").exists()
+    assert key in capsys.readouterr().err and not list((tmp_path / "build" / "unround-wheel").glob("[!.]*"))
 
 
 @pytest.mark.slow

@@ -22,7 +22,7 @@ make_one() { # name
 }
 
 failed=0
-for name in ${1:-pyharm exudyn fmpy tamaas}; do
+for name in ${1:-pyharm exudyn fmpy pynastran tamaas}; do
     if make_one "$name"; then
         echo "$name: build/peers/$name"
     else

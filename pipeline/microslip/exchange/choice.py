@@ -130,7 +130,8 @@ def body_in_motion(basis: ModalBasis, form: str) -> ModalGroup:
     """The one real group at rest in its elastic modes, with inertia integrals: what multibody programs take.
 
     Raises:
-        UserError: a cyclic sector, a group at speed, several groups, no inertia integrals in the file, no elastic mode.
+        UserError: a cyclic sector, a group at speed, several groups, no inertia integrals in the file, flexibility
+            beside the modes, no elastic mode.
     """
     group = only_group(basis, form)
     whole_body(basis, form)
@@ -144,7 +145,7 @@ def body_in_motion(basis: ModalBasis, form: str) -> ModalGroup:
             f"{basis.name}: export --to {form}: the file holds no inertia integrals, as measured modes and older files "
             "do; compute the body on a mesh"
         )
-    return elastic(in_modes(real(group, form)), form)
+    return elastic(whole_in_modes(basis, real(group, form), form), form)
 
 
 def elastic(g: ModalGroup, form: str) -> ModalGroup:

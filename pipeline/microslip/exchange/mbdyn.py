@@ -1,4 +1,4 @@
-"""MBDyn: the .fem file of its modal joint, record groups 1, 2, 5 to 10 and 12 to 18 of the published layout.
+"""MBDyn: the .fem file of its modal joint, record groups 1 to 10 and 12 to 18 of the published layout.
 
 Nodes are the attachment points (interfaces by their rigid fit, monitors), six components each in body axes; the body
 frame has the axes of the mesh and its origin at the reference point of the inertia integrals. Groups 12 (mass, centre,
@@ -32,6 +32,8 @@ def _lines(basis: ModalBasis, g: ModalGroup, nodes: Sequence[Attachment]) -> lis
     where = np.array([a.position for a in nodes])
     lines = _head(basis, g, nodes)
     lines += ["** RECORD GROUP 2, FINITE ELEMENT NODE LIST", *_integers(range(1, len(nodes) + 1)), "**"]
+    for number, what in ((3, "DISPLACEMENTS"), (4, "VELOCITIES")):  # older versions want them
+        lines += [f"** RECORD GROUP {number}, INITIAL MODAL {what}", *_rows(np.zeros((1, g.n_modes))), "**"]
     for number, axis in ((5, "X"), (6, "Y"), (7, "Z")):
         lines += [f"** RECORD GROUP {number}, NODAL {axis} COORDINATES", *_rows(where[:, [number - 5]]), "**"]
     lines.append("** RECORD GROUP 8, MODE SHAPES")

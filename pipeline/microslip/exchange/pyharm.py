@@ -3,9 +3,11 @@
 pyHarm counts ``ndofs`` physical coordinates a node, node by node, then modal ones: its dictionary is ``{"filename":
 ..., "ndofs": 6, "nmodes": nmodes}``, and all these numbers stand in the file. Node i is the i-th name in ``nodes``;
 its coordinates 0 to 5 are u_n, u_t1, u_t2, phi_n, phi_t1, phi_t2 in the frame of the interface. Characteristic
-coordinates stand among the modal ones. So the body must be reduced to interface displacements, by Craig-Bampton or
-with a massless boundary; a place where a force is to act or a displacement to be read must be an interface (role
-``load``).
+coordinates stand among the modal ones. pyHarm's G is a gyroscopic matrix per rad/s of a shaft that turns at the
+frequency of the vibration; of a body at its own speed it stands in C, ``C = C_r + G_r``, and G is 0.
+
+So the body must be reduced to interface displacements, by Craig-Bampton or with a massless boundary; a place where a
+force is to act or a displacement to be read must be an interface (role ``load``).
 """
 
 from __future__ import annotations
@@ -48,7 +50,8 @@ def pyharm_tables(basis: ModalBasis, g: ModalGroup) -> dict[str, Any]:
     loads = [rows.rows for rows in g.excitations.values()]
     names = [f"{name}:{label}" for name, rows in g.excitations.items() for label in rows.labels]
     return {
-        "M": _symmetric(g.M_r[some]), "K": _symmetric(g.K_r[some]) + N[some], "C": g.C_r[some], "G": g.G_r[some],
+        "M": _symmetric(g.M_r[some]), "K": _symmetric(g.K_r[some]) + N[some], "C": (g.C_r + g.G_r)[some],
+        "G": np.zeros_like(g.G_r),
         "ndofs": 6.0, "nnodes": float(len(nodes)), "nmodes": float(g.n_modes - 6 * len(nodes)),
         "nodes": np.array(nodes, dtype=object).reshape(-1, 1),
         "dofs": np.array(INTERFACE_ROWS, dtype=object).reshape(-1, 1),
@@ -60,6 +63,7 @@ def pyharm_tables(basis: ModalBasis, g: ModalGroup) -> dict[str, Any]:
         "omega": g.omega, "Omega": g.speed,
         "readme": f"{basis.name}: {STATEMENT}. Physical coordinates first: for each of nodes the six dofs in its frame "
         "(rotation has n, t1, t2 as rows, n outwards), then nmodes modal ones. "
+        "C holds damping and the gyroscopic matrix at Omega. "
         "Check: eigenvalues of (K, M) are omega^2 (without the massless coordinates).",
     }  # fmt: skip
 

@@ -4,8 +4,8 @@ Written to the published descriptions of the data sets: 151 header, 164 units (S
 the surface as triangles and quadrilaterals to draw, one 55 a mode. A data set 55 prints six digits, for frequency,
 damping and shape alike. Real shapes are normal modes (analysis type 2: frequency in Hz, modal mass 1, viscous damping
 ratio); the complex ones of a sector are complex eigenvalues (type 3) with eigenvalue -D omega + i omega sqrt(1 - D^2),
-1/s, and modal A = phi^H (2 lambda M + C) phi = 2 i omega sqrt(1 - D^2). Components are displacements along x, y, z of
-the mesh's frame, kg^-1/2.
+1/s, and modal A = phi^H (2 lambda M + C) phi = 2 i omega sqrt(1 - D^2), B = phi^H (K - lambda^2 M) phi = -lambda A.
+Components are displacements along x, y, z of the mesh's frame, kg^-1/2.
 
 The speed's number counted from 1 stands as the load case; ID line 4 tells speed and nodal diameter.
 """
@@ -109,7 +109,7 @@ def _parameters(g: ModalGroup, j: int, speed: int, complex_shapes: bool) -> list
         numbers = [omega / (2 * np.pi), 1.0, D, 0.0]
     else:
         damped = omega * np.sqrt(max(1 - D**2, 0.0))
-        numbers = [-D * omega, damped, 0.0, 2 * damped, 0.0, 0.0]
+        numbers = [-D * omega, damped, 0.0, 2 * damped, 2 * damped**2, 2 * D * omega * damped]
     head = f"{2:10d}{len(numbers):10d}{speed + 1:10d}{j + 1:10d}"
     return [head, "".join(f"{v:13.5e}" for v in numbers)]
 

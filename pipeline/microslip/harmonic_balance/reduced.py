@@ -155,16 +155,26 @@ class Eliminated:
         """Harmonic -> (m,) amplitudes of the coordinates at a frequency (rad/s), under a share of the loads that are
         not steady and (H + 1, c) contact forces beyond those of the stiffness k."""
         out: dict[int, ComplexArray] = {}
-        for same in self._same:
+        for same, held, driven, given in self._driven:
             part, h = self.parts[same[0]], np.array(same)
-            T, B, k, w = part.rows, part.yielding, self.stiffness, h[:, None, None] * Omega
-            P, W = (np.linalg.inv(np.eye(part.count) + a) for a in (B @ k, k @ B))
-            held = k @ P
-            driven = np.array([self.parts[i].load - T.conj().T @ (held @ self.parts[i].given) for i in same])
-            right = driven * np.where(h, share, 1.0)[:, None] - g[h] @ (T.conj().T @ W).T
-            A = part.stiff - w**2 * part.M + 1j * w * part.C + T.conj().T @ held @ T
+            w = h[:, None, None] * Omega
+            right = driven * np.where(h, share, 1.0)[:, None] - g[h] @ given
+            A = held - w**2 * part.M + 1j * w * part.C
             out |= zip(same, np.linalg.solve(A, right[..., None])[..., 0], strict=True)
         return [out[i] for i in range(len(self.parts))]
+
+    @cached_property
+    def _driven(self) -> list[tuple[list[int], ComplexArray, ComplexArray, ComplexArray]]:
+        """Harmonics by equal matrices, their stiffness K + T^H k' T (m, m), loads (harmonics, m), and (c, m) what
+        contact forces beyond those of k do."""
+        found = []
+        for same in self._same:
+            part, T, k = self.parts[same[0]], self.parts[same[0]].rows, self.stiffness
+            P, W = (np.linalg.inv(np.eye(part.count) + a) for a in (part.yielding @ k, k @ part.yielding))
+            held = k @ P
+            loads = np.array([self.parts[i].load - T.conj().T @ (held @ self.parts[i].given) for i in same])
+            found.append((same, part.stiff + T.conj().T @ held @ T, loads, (T.conj().T @ W).T))
+        return found
 
     def directly(self, Omega: float) -> View:
         """The same from the equations themselves: at a single frequency less work than the eigenvalues."""

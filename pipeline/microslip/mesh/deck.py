@@ -13,19 +13,21 @@ from .raw import Damaged, is_number, joined
 
 @dataclass
 class Cells:
-    """Cells of one type. `ids` (e,), `nodes` (e, k) node numbers. `written`: the type in the file."""
+    """Cells of one type. `ids` (e,), `nodes` (e, k) node numbers. `written`: its type in the file, `where` it is."""
 
     kind: str
     ids: Indices
     nodes: Indices
     written: str = ""
+    where: str = ""
 
 
 @dataclass
 class DeckConstants:
-    """Constants as written: name; (t, 3) E, nu, T or 9 engineering constants, or text why they are not read."""
+    """Constants as written: name, place; (t, 3) E, nu, T or 9 engineering constants, or why they are not read."""
 
     name: str
+    where: str = ""
     isotropic: Array | None = None
     orthotropic: Array | None = None
     stiffness: Array | None = None
@@ -55,6 +57,7 @@ class Deck:
     """
 
     node_id: list[Indices] = field(default_factory=list)
+    node_where: list[str] = field(default_factory=list)
     points: list[Array] = field(default_factory=list)
     solids: list[Cells] = field(default_factory=list)
     facets: list[Cells] = field(default_factory=list)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +26,7 @@ from .deck_links import KEYWORDS as LINKS
 from .deck_links import links_of
 from .instances import local_system, numbered, outline, place, placement, places
 from .materials import isotropic_rows, orthotropic_row
-from .raw import Damaged, DeckMaterial, Numbering, RawMesh, joined, lost, refuse_twice
+from .raw import Damaged, DeckMaterial, Numbering, RawMesh, joined, lost
 from .supports import Constraints, add_supports
 
 _SOLIDS = {
@@ -170,17 +171,29 @@ def _numbers(text: str, what: str) -> Indices:
 
 
 def _read_nodes(deck: Deck, parameters: dict[str, str], lines: list[str]) -> None:
-    rows = [line.split(",") for line in lines]
-    ids = _numbers(",".join(row[0] for row in rows), "*NODE") + deck.spaces[""].nodes
-    if len(ids) != len(rows):
-        raise Damaged("*NODE holds a line without a number")
-    values = _table([",".join(row[1:4]) for row in rows], "*NODE")
+    ids, points = _numbered_points(lines)
+    ids = ids + deck.spaces[""].nodes
     deck.node_id.append(ids)
-    points = np.array([v + [0.0] * (3 - len(v)) for v in values]).reshape(-1, 3)
+    deck.node_where.append(deck.where)
     points = _cartesian(points, parameters.get("SYSTEM", "R").upper()[:1] or "R")
     deck.points.append(points if deck.system is None else points @ deck.system[:3] + deck.system[3])
     if "NSET" in parameters:
         deck.add(deck.node_sets, parameters["NSET"]).append(ids)
+
+
+def _numbered_points(lines: list[str]) -> tuple[Indices, Array]:
+    """Numbers (n,) and coordinates (n, 3) of the lines of *NODE; short lines end in zeros."""
+    if lines and all("." not in line.partition(",")[0] for line in lines):
+        with suppress(ValueError, OverflowError):  # empty places, Fortran's exponents, short lines
+            table = np.loadtxt(lines, dtype="i8,f8,f8,f8", delimiter=",", comments=None, ndmin=1)
+            if table["f0"].min() > 0:
+                return table["f0"], np.column_stack([table[name] for name in ("f1", "f2", "f3")])
+    rows = [line.split(",") for line in lines]
+    ids = _numbers(",".join(row[0] for row in rows), "*NODE")
+    if len(ids) != len(rows):
+        raise Damaged("*NODE holds a line without a number")
+    values = _table([",".join(row[1:4]) for row in rows], "*NODE")
+    return ids, np.array([v + [0.0] * (3 - len(v)) for v in values]).reshape(-1, 3)
 
 
 def _cartesian(points: Array, system: str) -> Array:
@@ -224,7 +237,7 @@ def _read_elements(deck: Deck, parameters: dict[str, str], lines: list[str]) -> 
         raise Damaged(f"*ELEMENT, TYPE={kind} holds another number of nodes than its cells need")
     table, own = table.reshape(-1, count + 1), deck.spaces[""]
     nodes = (table[:, 1:] if not (solid and count == 27) else table[:, 1:][:, _BRICK27]) + own.nodes
-    cells = Cells(_SOLIDS[count] if solid else "facet", table[:, 0] + own.cells, nodes, kind)
+    cells = Cells(_SOLIDS[count] if solid else "facet", table[:, 0] + own.cells, nodes, kind, deck.where)
     (deck.solids if solid else deck.facets).append(cells)
     if "ELSET" in parameters:
         deck.add(deck.cell_sets, parameters["ELSET"]).append(cells.ids)
@@ -297,7 +310,7 @@ def _read_material(deck: Deck, parameters: dict[str, str], lines: list[str]) -> 
     if not name:
         raise Damaged("a *MATERIAL has no name")
     deck.current = name.upper()
-    deck.materials[deck.current] = DeckConstants(name)
+    deck.materials[deck.current] = DeckConstants(name, deck.where)
 
 
 def _of(deck: Deck, keyword: str) -> DeckConstants:
@@ -472,7 +485,7 @@ _READERS: dict[str, Callable[[Deck, dict[str, str], list[str]], None]] = {
 def _assembled(deck: Deck) -> RawMesh:
     if not deck.node_id:
         raise Damaged("there is no *NODE")
-    node_id, points = _unique_nodes(np.concatenate(deck.node_id), np.concatenate(deck.points))
+    node_id, points = _unique_nodes(deck)
     numbering = Numbering(node_id)
     raw = RawMesh(points, node_id)
     if deck.kinds and not deck.solids:
@@ -482,7 +495,10 @@ def _assembled(deck: Deck) -> RawMesh:
         cells.nodes = numbering.positions(cells.nodes, "*ELEMENT names")
         raw.blocks.append((cells.kind, cells.nodes))
     raw.cell_id = [cells.ids for cells in deck.solids]
-    refuse_twice(raw.cell_id, "cell")
+    ids, count = np.unique(joined(raw.cell_id), return_counts=True)
+    if (count > 1).any():
+        twice = ids[count > 1][0]
+        raise Damaged(f"{_last(twice, raw.cell_id, [c.where for c in deck.solids])}cell {twice} is defined twice")
     _assign_materials(deck, raw)
     _assign_temperatures(deck, raw, numbering)
     for key, parts in deck.node_sets.items():
@@ -512,14 +528,21 @@ def _assembled(deck: Deck) -> RawMesh:
     return raw
 
 
-def _unique_nodes(node_id: Indices, points: Array) -> tuple[Indices, Array]:
+def _unique_nodes(deck: Deck) -> tuple[Indices, Array]:
     """Nodes that are defined twice alike count once."""
+    node_id, points = np.concatenate(deck.node_id), np.concatenate(deck.points)
     _, first, inverse = np.unique(node_id, return_index=True, return_inverse=True)
     differs = (points != points[first][inverse]).any(axis=1) & np.isfinite(points).all(axis=1)
     if differs.any():
-        raise Damaged(f"node {node_id[differs][0]} is defined twice, at different places")
+        twice = node_id[differs][0]
+        raise Damaged(f"{_last(twice, deck.node_id, deck.node_where)}node {twice} is there already, at another place")
     keep = np.sort(first)
     return node_id[keep], points[keep]
+
+
+def _last(number: int, numbers: list[Indices], where: list[str]) -> str:
+    """The last of the cards that have a number, as the beginning of a sentence."""
+    return [f"{place}: " for ids, place in zip(numbers, where, strict=True) if (ids == number).any()][-1]
 
 
 def _assign_materials(deck: Deck, raw: RawMesh) -> None:
@@ -572,7 +595,9 @@ def _deck_material(deck: Deck, key: tuple[str, str], where: str) -> DeckMaterial
         C = _orthotropic_stiffness(found.name, found.stiffness)
     if C is not None and axes is not None:
         C = turned(C, axes)
-    return DeckMaterial(found.name, C, found.density, turned_strain(found.expansion, axes), table, where)
+    return DeckMaterial(
+        found.name, C, found.density, turned_strain(found.expansion, axes), table, where, line=found.where
+    )
 
 
 def _orthotropic_stiffness(name: str, d: Array) -> Array:

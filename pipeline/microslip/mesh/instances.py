@@ -160,9 +160,10 @@ def place(whole: Deck, part: Deck, name: str, at: Placement, space: Space) -> No
     whole.spaces[key] = space
     whole.instances[name] = joined(part.node_id) + space.nodes
     whole.node_id += [ids + space.nodes for ids in part.node_id]
+    whole.node_where += part.node_where
     whole.points += [points @ at.turn.T + at.shift for points in part.points]
     for into, cells in ((whole.solids, part.solids), (whole.facets, part.facets)):
-        into += [Cells(c.kind, c.ids + space.cells, c.nodes + space.nodes, c.written) for c in cells]
+        into += [Cells(c.kind, c.ids + space.cells, c.nodes + space.nodes, c.written, c.where) for c in cells]
     for own, sets, more in (
         (part.node_sets, whole.node_sets, space.nodes),
         (part.cell_sets, whole.cell_sets, space.cells),

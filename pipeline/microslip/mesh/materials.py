@@ -53,17 +53,19 @@ def in_si(found: DeckMaterial, system: str, zero: float = 0.0) -> Material:
         system: of units, a key of `units.SYSTEMS`. zero: K of the file's temperature 0.
 
     Raises:
-        Damaged: it is incomplete. Unread: it is of another kind.
+        Damaged: impossible or none. Unread: it is of another kind, or lacks constants or density.
     """
-    at = f" of the cells '{found.where}'" if found.where else ""
+    at, line = f" of the cells '{found.where}'" if found.where else "", f"{found.line}: " if found.line else ""
     if not found.name:
         raise Damaged(f"the cells '{found.where}' have no material" if found.where else "cells have no material")
     if found.refused:
         raise Unread(f"the material '{found.name}'{at} has {found.refused}")
     if found.elasticity is None:
-        raise Damaged(f"the material '{found.name}'{at} has no elastic constants that are read (iso- or orthotropic)")
+        raise Unread(
+            f"{line}the material '{found.name}'{at} has no elastic constants that are read (iso- or orthotropic)"
+        )
     if found.density is None:
-        raise Damaged(f"the material '{found.name}'{at} has no density")
+        raise Unread(f"{line}the material '{found.name}'{at} has no density; give it one, no other can stand for it")
     if not 0 < found.density < np.inf:
         raise Damaged(f"the material '{found.name}'{at} has a density of {found.density:g}")
     if not (np.isfinite(found.expansion).all() and np.isfinite(found.elasticity).all()):

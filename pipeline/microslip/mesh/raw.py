@@ -23,7 +23,7 @@ class Damaged(ValueError):
 
 
 class Unread(Damaged):
-    """A material of a kind that is not read. Another one in its place would be wrong."""
+    """A material that is not read or not whole. Another one in its place would be wrong."""
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,7 @@ class DeckMaterial:
         name: as in the file. elasticity: (6, 6) Hooke matrix in the order `VOIGT`, in body axes; None: missing.
         density: None: missing. expansion: (6,) thermal strain per degree. temperature: (t, 2) temperature and factor on
             the elasticity, or None. where: the set of cells that it was given to. refused: what of it is not read, in
-            words, and what to do.
+            words, and what to do. line: its place in the file, ``part.inp, line 12``, if known.
     """
 
     name: str
@@ -44,6 +44,7 @@ class DeckMaterial:
     temperature: Array | None = None
     where: str = ""
     refused: str = ""
+    line: str = ""
 
 
 @dataclass

@@ -29,7 +29,10 @@ COLUMNS = "amplitude", "frequency_Hz", "sector", "localisation", "missed", "unso
 """Of a sample, after its number."""
 
 EACH = 4
-"""Samples a worker gets before what is known is written."""
+"""Samples a worker gets, at least, before what is known is written."""
+
+SHARE = 0.01
+"""Of the samples that are known: so many are solved, at least, before those are sorted and written again."""
 
 RARE = 0.999
 """Share of the samples below the quantile that samples are chosen for."""
@@ -133,12 +136,12 @@ def run(
     workers = workers or min(_cores(), -(-samples // EACH))
     with _computed(asked, workers, executor) as of:
         while len(found) < samples and not _narrow(found, until):
-            numbers = range(len(found), min(samples, len(found) + EACH * workers))
-            made = []
-            for one in of(numbers):
+            more = max(EACH * workers, int(SHARE * len(found)))
+            made, told = list[list[float]](), _told(found)
+            for one in of(range(len(found), min(samples, len(found) + more))):
                 found.envelope.add(one.grid)
                 made.append(_row(one))
-                report(_said(found, len(found) + len(made), samples))
+                report(f"{len(found) + len(made)} of {samples} samples{told}")
             found.rows = np.vstack([found.rows, made])
             if file is not None:
                 _keep(file, inputs, found)
@@ -226,11 +229,11 @@ def _narrow(found: Ensemble, until: float | None) -> bool:
     return until is not None and len(found) >= EACH and found.quantile(WATCHED).width <= until
 
 
-def _said(found: Ensemble, done: int, samples: int) -> str:
-    said = f"{done} of {samples} samples"
-    if len(found) >= EACH:
-        said += f": {100 * WATCHED:g} % quantile of the amplification {found.quantile(WATCHED)}"
-    return said
+def _told(found: Ensemble) -> str:
+    """The quantile that is watched, of the samples that are known."""
+    if len(found) < EACH:
+        return ""
+    return f": {100 * WATCHED:g} % quantile of the amplification {found.quantile(WATCHED)}"
 
 
 def _cores() -> int:

@@ -106,6 +106,7 @@ class Sliding:
         self.problem, self.tuned = problem, tuned
         self.known: dict[float, Point] = {}
         self.slope: Any = None
+        self.last: AtFrequency | None = None
 
     def __call__(self, frequency: float) -> Array | None:
         """(w,) m."""
@@ -116,7 +117,7 @@ class Sliding:
         """(w,) m, by Newton's method from what is known nearby or not at all."""
         Omega = 2 * np.pi * frequency
         for x in self._starts(Omega):
-            point = among(self.problem.at(Omega), x, self.slope)
+            point = among(self._at(Omega), x, self.slope)
             if point.converged:
                 return self._kept(frequency, point)
         return None
@@ -128,7 +129,7 @@ class Sliding:
         beyond = [self.known[f] for f in self.known if (f - behind) * (frequency - behind) <= 0]
         side = sorted(beyond, key=lambda p: abs(p.Omega - Omega))
         for count in (2, 1):
-            point = among(self.problem.at(Omega), carried(side[:count], Omega))
+            point = among(self._at(Omega), carried(side[:count], Omega))
             y = self._kept(frequency, point)
             if y is not None and (before is None or y.max() > np.abs(amplitudes(self.problem, before)).max()):
                 return y
@@ -141,7 +142,7 @@ class Sliding:
         if not point.converged:
             return None
         self.known[frequency] = replace(point, slope=None)
-        return np.abs(amplitudes(self.problem, point))
+        return np.abs(_amplitudes(self._at(point.Omega), point))
 
     def coordinates(self, frequency: float) -> list[ComplexArray]:
         """(m,) first harmonics of the coordinates, part by part, at a frequency that was solved for."""
@@ -152,7 +153,7 @@ class Sliding:
     def _starts(self, Omega: float) -> list[Array]:
         """Where Newton's method may begin: the two that leave least, of those carried on from either side, which may be
         those of a jump, and from both, and the tuned ring's."""
-        near, at = self._near(Omega, 4), self.problem.at(Omega)
+        near, at = self._near(Omega, 4), self._at(Omega)
         sides = [[p for p in near if (p.Omega > Omega) is above] for above in (False, True)]
         told = [points[:n] for points, most in ((sides[0], 3), (sides[1], 3), (near, 4)) for n in (2, most)]
         told.append(sorted(self.tuned, key=lambda p: abs(p.Omega - Omega))[:3])
@@ -160,15 +161,24 @@ class Sliding:
         starts = [carried(points, Omega) for points in different]
         return sorted(starts, key=lambda x: float(np.linalg.norm(at.residual(x))))[:2]
 
+    def _at(self, Omega: float) -> AtFrequency:
+        """The balance at a frequency, the last one kept."""
+        if self.last is None or self.last.Omega != Omega:
+            self.last = self.problem.at(Omega)
+        return self.last
+
     def _near(self, Omega: float, most: int) -> list[Point]:
         return sorted(self.known.values(), key=lambda p: abs(p.Omega - Omega))[:most]
 
 
-def amplitudes(problem: Problem, point: Point, harmonic: int = 1) -> Array:
+def amplitudes(problem: Problem, point: Point, harmonic: int = 1) -> ComplexArray:
     """(w,) complex 0-peak amplitudes of all read-outs at a solution, m."""
-    at = problem.at(point.Omega)
+    return _amplitudes(problem.at(point.Omega), point, harmonic)
+
+
+def _amplitudes(at: AtFrequency, point: Point, harmonic: int = 1) -> ComplexArray:
     force = at.force(point.x)
-    return read(at, at.modal(point.x, force)[harmonic], force, problem.share, harmonic)
+    return read(at, at.modal(point.x, force)[harmonic], force, at.problem.share, harmonic)
 
 
 def read(at: AtFrequency, q: list[ComplexArray], force: Array, share: float, harmonic: int = 1) -> ComplexArray:

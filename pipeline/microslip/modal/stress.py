@@ -12,7 +12,6 @@ from ..fem.discretise import Block
 from ..topology import CELL_TYPES
 from .equilibrium import BodyModel, StaticState, cauchy, thermal_stretch
 
-
 _CHUNK = 2_000_000
 """Numbers of a gradient made at a time: it stays in the caches."""
 
@@ -101,7 +100,7 @@ def _polynomials(x: Array, corners: int) -> Array:
 def nodal_set(
     model: BodyModel, state: StaticState, phi: Array, harmonic: int = 0, gauss: StressSet | None = None, batch: int = 8
 ) -> StressSet:
-    """The Gauss-point set smoothed to the nodes (location ``nodal-averaged``), made `batch` modes at a time if not given.
+    """The set at Gauss points smoothed to the nodes (location ``nodal-averaged``), made `batch` modes at a time.
 
     On the cut faces of a cyclic sector the neighbour's cells count too, turned and in the phase of the nodal diameter
     `harmonic`.

@@ -11,6 +11,7 @@ from ..data import Array
 from ..exchange import vtu
 from ..rolling.strips import Tractions
 from ..rolling.study import Studied
+from ..rolling.wearing import Wearing
 from .plots import COLOURS, empty_figure, plain_axes, save_figure, single_panel
 
 if TYPE_CHECKING:
@@ -65,6 +66,25 @@ def traction_picture(found: Studied, path: Path, title: str) -> Path:
     right.legend(fontsize=9)
     over = LABELS[found.case.creep.over].split(" in ")[0]
     figure.suptitle(f"{title}: {over} {found.over[found.shown]:.4g}")
+    return save_figure(figure, path)
+
+
+def wearing_picture(worn: Wearing, path: Path, title: str) -> Path:
+    """What is worn off both profiles, and the largest pressure over the passages."""
+    figure = empty_figure(9.6, 4.2)
+    left, right = figure.subplots(1, 2)
+    for i, (name, body) in enumerate((("wheel", worn.wheel), ("rail", worn.rail))):
+        plain_axes((left, right)[i])
+        left.plot(1e3 * body.y, 1e6 * body.depth, color=COLOURS[i], label=name)
+    touched = [1e3 * body.y[body.depth > 0] for body in (worn.wheel, worn.rail)]
+    ends = min(y.min() for y in touched) - 3, max(y.max() for y in touched) + 3
+    left.set(xlim=ends, xlabel="y of the profile in mm", ylabel="worn off in um")
+    left.invert_yaxis()
+    left.legend(fontsize=9)
+    over = worn.columns()
+    right.plot(over["passages"], over["largest_pressure_Pa"] / 1e6, ".-", color=COLOURS[2])
+    right.set(xlabel="passages", ylabel="largest pressure in MPa")
+    figure.suptitle(f"{title}: profiles that wear")
     return save_figure(figure, path)
 
 

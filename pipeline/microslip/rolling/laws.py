@@ -4,7 +4,7 @@ sliding (Sextro, 6.5 with 3.6 and 3.7). A hundred times the work of constant fri
 from __future__ import annotations
 
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -12,8 +12,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..contact.friction import Friction
+from ..contact.heights import Heights
+from ..contact.hertz import ellipse_integrals
 from ..contact.law import program, settings
-from ..contact.normal import Preload
+from ..contact.normal import Normal, Preload, Rough
 from ..contact.point import PointContact
 from .kalker import Coefficients
 from .strips import Array, Distribution, Forces, Poses, Spin, Tractions, broadcast, grid, over_elements, posed
@@ -33,11 +35,52 @@ class Warmed(Friction):
         return self.left * self.cold.highest(pressed, time)
 
 
+class Surface(NamedTuple):
+    """Of both bodies together. Attributes: heights. roughness: R_Z, m."""
+
+    heights: Heights
+    roughness: Array
+
+
+def approach(a: Array, b: Array, force: Array, modulus: Array) -> Array:
+    """Of Hertz' bodies with these half axes (m) under a force (N), m; modulus: E*, Pa."""
+    K = ellipse_integrals(np.minimum(a, b) / np.maximum(a, b))[0]
+    return 3 * force * K / (2 * np.pi * modulus * np.maximum(a, b))
+
+
+def sunk(surface: Surface, smooth: Array, depth: Array) -> tuple[Array, Array]:
+    """Springs, and how deep elements are pressed in, so that rough ones carry together what smooth ones did (3.3-21).
+
+    Args:
+        smooth: (nx, ny, n) N that smooth elements carry. depth: likewise, m, of them. All of a state sink deeper by one
+            factor, found by Newton's method from above: the force is convex.
+
+    Returns:
+        N/m and m.
+    """
+    heights, R = surface
+    springs, goal = smooth / depth, smooth.sum(axis=(0, 1))
+
+    def nearer(_: int, more: Array) -> Array:
+        u = more * depth / R
+        force, slope = springs * R * heights.volume(u), smooth * heights.area(u)
+        return more - (force.sum(axis=(0, 1)) - goal) / slope.sum(axis=(0, 1))
+
+    above = 1 + R * springs.sum(axis=(0, 1)) / goal
+    return springs, jax.lax.fori_loop(0, NEWTON, nearer, above) * depth
+
+
+NEWTON = 40
+"""Steps; a quarter of them is enough where peaks are finite."""
+
+
 @partial(program, static_argnames=("elements", "distribution"))
 def _marched(
-    pose: Poses, friction: Friction, speed: Array, left: Array, elements: tuple[int, int], distribution: Distribution
+    pose: Poses, friction: Friction, speed: Array, left: Array, surface: Surface | None, depth: Array,
+    elements: tuple[int, int], distribution: Distribution,
 ) -> tuple[Forces, tuple[Array, ...]]:  # fmt: skip
-    """left: (nx, ny n) share of the friction, from the leading edge on. Forces, and what `over_elements` takes."""
+    """left: (nx, ny n) share of the friction, from the leading edge on. depth: (n,) approach of smooth bodies, m.
+    Forces, and what `over_elements` takes."""
     g = grid(elements, distribution)
     ny, n = len(g.y), len(pose.a)
     flat = lambda v: jnp.broadcast_to(v, (ny, n)).ravel()  # noqa: E731
@@ -48,32 +91,41 @@ def _marched(
     by = chord ** g.powers[1] / (pose.a * g.sprung)
     springs = [flat(c * by) * area for c in (pose.stiffness_x, pose.stiffness_y)]
     along = flat(pose.xi) - flat(pose.phi_x) * across
+    smooth = jnp.asarray(g.pressure)[:, None] * pressed
+    springs_n, sinks = jnp.zeros_like(smooth), jnp.zeros_like(smooth)
+    if surface is not None:
+        parabola = depth * chord**2 * (1 - jnp.asarray(g.x)[:, None, None] ** 2)
+        found = sunk(surface, smooth.reshape(-1, ny, n), parabola)
+        springs_n, sinks = (v.reshape(smooth.shape) for v in found)
+
+    def normal(p: Array, spring: Array) -> Normal:
+        return Preload(p) if surface is None else Rough(spring, surface.roughness, surface.heights)
 
     def step(carry: Any, element: Any) -> tuple[Any, tuple[Array, ...]]:
         state, before, sum_ = carry
-        x, way, p, share, changed, warm = element
+        x, way, p, share, changed, warm, spring, sink = element
         x, h = reach * x, length * way
-        law = PointContact(Preload(pressed * p), Warmed(friction, warm), springs[0] * share, springs[1] * share)
+        law = PointContact(normal(p, spring), Warmed(friction, warm), springs[0] * share, springs[1] * share)
         state = state._replace(elastic=state.elastic * changed)
         moved = h * jnp.stack([along, flat(pose.eta) + flat(pose.phi_y) * (x + 0.5 * h)])
-        u = jnp.concatenate([jnp.zeros_like(h)[None], state.tangential + moved]).T
+        u = jnp.concatenate([sink[None], state.tangential + moved]).T
         found, after = law.step(u, u / h[:, None], h / flat(speed), state)
         t, slid = -found.T[1:], after.slipped - state.slipped
         work = -0.5 * jnp.sum((before + t) * slid, axis=0) / length
         slides = jnp.sum(slid**2, axis=0) > 1e-18 * jnp.sum(moved**2, axis=0)
         added = t[0], t[1], x * t[1] - across * t[0], work, jnp.where(slides, area, 0.0)
-        shown = x, pressed * p / area, *t / area, *t / (jnp.stack(springs) * share)
+        shown = x, found.T[0] / area, *t / area, *(after.slipped - after.tangential)
         return (after, t, Forces(*(s + a for s, a in zip(sum_, added, strict=True)))), shown
 
-    one = PointContact(Preload(pressed), friction, springs[0], springs[1]).init(ny * n)
+    one = PointContact(normal(pressed, pressed), friction, springs[0], springs[1]).init(ny * n)
     none = jnp.zeros(ny * n)
     changed = np.concatenate([[1.0], g.stiffness[1:] / g.stiffness[:-1]])
-    per_element = tuple(map(jnp.asarray, (g.x, g.way, g.pressure, g.stiffness, changed, left)))
+    per_element = tuple(map(jnp.asarray, (g.x, g.way, smooth, g.stiffness, changed, left, springs_n, sinks)))
     start = one, jnp.stack([none, none]), Forces(*[none] * 5)
-    (_, t, sum_), found = jax.lax.scan(step, start, per_element)
+    (last, t, sum_), found = jax.lax.scan(step, start, per_element)
     h = 0.5 * length  # to the trailing edge, as in `strips.forces`
     rigid = along, flat(pose.eta) - flat(pose.phi_y) * (reach - 0.5 * h)
-    work = sum(f * (f / (k * g.stiffness[-1]) - h * s) for f, k, s in zip(t, springs, rigid, strict=True))
+    work = sum(f * (u - h * s) for f, u, s in zip(t, last.slipped - last.tangential, rigid, strict=True))
     sum_ = sum_._replace(power=sum_.power + 0.5 * work / length)
     x, y, moment, power, slides = (v.reshape(ny, n).sum(axis=0) for v in sum_)
     fields = (jnp.moveaxis(v.reshape(-1, ny, n), 1, 0) for v in found)
@@ -82,14 +134,15 @@ def _marched(
 
 
 def rolled_by_characteristic(
-    *given: ArrayLike, friction: Friction, speed: ArrayLike, left: Array | None = None,
+    *given: ArrayLike, friction: Friction, speed: ArrayLike, left: Array | None = None, surface: Surface | None = None,
     elements: tuple[int, int] = (20, 20), distribution: Distribution = "constant", **how: Any,
 ) -> tuple[Forces, Tractions]:  # fmt: skip
     """Forces and tractions, see `forces_by_characteristic`.
 
     Args:
         given: xi, eta, phi, a, b, normal_force, shear, poisson. left: (n, ny, nx) share of the friction that heat has
-            left, all of it if not given.
+            left, all of it if not given. surface: rough elements carry the same force together, by the share of their
+            area that touches, deeper pressed in; the ellipse stays.
     """
     *state, V = broadcast(*given, speed)
     highest = np.full_like(V, np.max(friction.highest(jnp.ones(1))))
@@ -98,7 +151,8 @@ def rolled_by_characteristic(
     nx, ny = elements
     share = jnp.ones((len(V), ny, nx)) if left is None else left[..., ::-1]
     share = jnp.transpose(share, (2, 1, 0)).reshape(nx, -1)
-    forces, fields = _marched(pose, friction, V, share, elements=elements, distribution=distribution)
+    depth = approach(state[3], state[4], state[5], state[6] / (1 - state[7]))
+    forces, fields = _marched(pose, friction, V, share, surface, depth, elements=elements, distribution=distribution)
     over = over_elements(Poses(*map(np.asarray, pose)), grid(elements, distribution), *fields)
     return Forces(*map(np.asarray, forces)), over
 
@@ -107,15 +161,16 @@ def forces_by_characteristic(
     xi: ArrayLike, eta: ArrayLike, phi: ArrayLike, a: ArrayLike, b: ArrayLike, normal_force: ArrayLike,
     friction: Friction, speed: ArrayLike, shear: ArrayLike, poisson: ArrayLike, *,
     elements: tuple[int, int] = (20, 20), distribution: Distribution = "constant",
-    coefficients: Coefficients = "table", spin: Spin = "kalker",
+    coefficients: Coefficients = "table", spin: Spin = "kalker", surface: Surface | None = None,
 ) -> Forces:  # fmt: skip
-    """`strips.creep_forces` with a coefficient over the speed of sliding.
+    """`strips.creep_forces` with a coefficient over the speed of sliding, and rough surfaces.
 
     Args:
-        friction: a characteristic of `contact.friction`. speed: of rolling, m/s. The rest as there.
+        friction: a characteristic of `contact.friction`. speed: of rolling, m/s. surface: `Surface` of both bodies'
+            heights and R_Z. The rest as there.
     """
     given = xi, eta, phi, a, b, normal_force, shear, poisson
-    how: dict[str, Any] = {"coefficients": coefficients, "spin": spin}
+    how: dict[str, Any] = {"coefficients": coefficients, "spin": spin, "surface": surface}
     return rolled_by_characteristic(
         *given, friction=friction, speed=speed, elements=elements, distribution=distribution, **how
     )[0]

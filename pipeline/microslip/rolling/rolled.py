@@ -10,7 +10,7 @@ import numpy as np
 
 from ..contact.friction import Friction
 from ..data import Array
-from .laws import rolled_by_characteristic
+from .laws import Surface, rolled_by_characteristic
 from .strips import BLOCK, Forces, Tractions, creep_forces, tractions
 from .temperature import Conductor, conducted, falling, heat_share, settled
 
@@ -58,23 +58,27 @@ def sources(t: Tractions, speed: Array) -> tuple[Array, Array]:
     return t.power * speed[:, None, None], t.x[..., 1] - t.x[..., 0]
 
 
-def rolled(given: Array, friction: Friction, speed: Array, kept: Array, heat: Heat | None = None, **how: Any) -> States:
+def rolled(
+    given: Array, friction: Friction, speed: Array, kept: Array, heat: Heat | None = None,
+    surface: Surface | None = None, **how: Any,
+) -> States:  # fmt: skip
     """Forces, heat and some of the tractions.
 
     Args:
         given: (8, n) xi, eta, phi, a, b, normal_force, shear, poisson, as `strips.creep_forces`. speed: (n,) of
-            rolling, m/s. kept: (k,) indices of states whose tractions are wanted. how: as `strips.creep_forces`.
+            rolling, m/s. kept: (k,) indices of states whose tractions are wanted. surface: of rough bodies. how: as
+            `strips.creep_forces`.
 
     Raises:
         UserError: friction and temperature do not settle.
     """
-    if friction.constant and heat is None:
+    if friction.constant and heat is None and surface is None:
         of = _with_constant(given, friction)
         return States(creep_forces(*of, **how), None, tractions(*(v[kept] for v in of), **how))
     blocks = [np.arange(i, min(i + BLOCK, len(speed))) for i in range(0, len(speed), BLOCK)]
     parts, hottest, some = [], [], []
     for block in blocks:
-        f, t = _rolled(given[:, block], friction, speed[block], heat, how)
+        f, t = _rolled(given[:, block], friction, speed[block], heat, surface, how)
         parts.append(f)
         some.append([v[np.isin(block, kept)] for v in t])
         if heat is not None:
@@ -90,15 +94,15 @@ def _with_constant(given: Array, friction: Friction) -> list[Array]:
 
 
 def _rolled(
-    given: Array, friction: Friction, speed: Array, heat: Heat | None, how: dict[str, Any]
+    given: Array, friction: Friction, speed: Array, heat: Heat | None, surface: Surface | None, how: dict[str, Any]
 ) -> tuple[Forces, Tractions]:  # fmt: skip
     warm = heat is not None and heat.limit is not None
-    if friction.constant and not warm:
+    if friction.constant and not warm and surface is None:
         of = _with_constant(given, friction)
         return creep_forces(*of, **how), tractions(*of, **how)
 
     def march(left: Array | None = None) -> tuple[Forces, Tractions]:
-        return rolled_by_characteristic(*given, friction=friction, speed=speed, left=left, **how)
+        return rolled_by_characteristic(*given, friction=friction, speed=speed, left=left, surface=surface, **how)
 
     if not warm:
         return march()

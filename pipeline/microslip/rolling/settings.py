@@ -11,7 +11,8 @@ from pydantic import BeforeValidator, Field, model_validator
 
 from ..contact.friction import Friction
 from ..contact.keys import FileName, OneOrTwo, Poisson
-from ..contact.settings import AnyFriction, _short
+from ..contact.law import value
+from ..contact.settings import AnyFriction, AnyRoughness, _short
 from ..contact.solids import Solid
 from ..data import UserError
 from ..settings.body import (
@@ -30,6 +31,7 @@ from ..settings.mistakes import validate
 from .contact_table import POINTS as SHIFTS
 from .ellipse import combined
 from .kalker import Coefficients
+from .laws import Surface
 from .profiles import EVERYWHERE, WIDTH, Mirror, Profile, circle, has_arc, polynomial, read_profile
 from .rolled import Heat
 from .strips import Distribution, Spin
@@ -104,14 +106,22 @@ class Rail(Section):
 
 
 class PoseOfCase(Model):
-    """lateral: to the right, m. yaw, roll: rad. speed: m/s. turning: of the axle, rad/s; it rolls if not given."""
+    """lateral: to the right, m. yaw, roll: rad. speed: m/s. turning: of the axle, rad/s; it rolls if not given. side:
+    "both" is the whole axle, which rolls until both wheels carry the same; the curve is of the patch that carries most.
+    """
 
     lateral: Number = 0.0
     yaw: Annotated[Number, Field(ge=-0.2, le=0.2)] = 0.0
     roll: Annotated[Number, Field(ge=-0.2, le=0.2)] = 0.0
     speed: Positive = 20.0
     turning: Positive | None = None
-    side: Literal["left", "right"] = "right"
+    side: Literal["left", "right", "both"] = "right"
+
+    @model_validator(mode="after")
+    def _rolls(self) -> PoseOfCase:
+        if self.side == "both" and "roll" in self.model_fields_set:
+            raise ValueError('pose.roll: with side = "both" the axle rolls until both wheels carry the same; remove it')
+        return self
 
 
 class Creep(Model):
@@ -194,9 +204,28 @@ class HeatOfCase(Model):
 
 
 class WearOfCase(Model):
-    """coefficient: of wheel and rail each, worn volume over frictional work, m3/J."""
+    """What a passage wears, and profiles that are renewed by it.
+
+    Attributes:
+        coefficient: of wheel and rail each, worn volume over frictional work, m3/J. updates: of both profiles, 0 for
+            none. passages: in all of them, of the wheel over every place of the rail and of the rail under every place
+            of the wheel. smoothing: standard deviation of the Gaussian that the contact sees worn depths through, m.
+            lateral: shifts of the wheelset that share the passages, m; that of the pose if not given.
+    """
 
     coefficient: Positive
+    updates: Annotated[int, Field(ge=0, le=1000)] = 0
+    passages: Positive | None = None
+    smoothing: Annotated[NotNegative, Field(le=0.02)] = 1e-3
+    lateral: Numbers | None = None
+
+    @model_validator(mode="after")
+    def _renews(self) -> WearOfCase:
+        if (self.updates > 0) != (self.passages is not None):
+            raise ValueError("wear: give both updates and passages for profiles that are renewed, or neither")
+        if self.lateral is not None and not (self.updates and self.lateral):
+            raise ValueError("wear.lateral: shares the passages of updates; give shifts and updates, or remove it")
+        return self
 
 
 class RollingCase(Model):
@@ -206,6 +235,7 @@ class RollingCase(Model):
     wheel: Wheel
     rail: Rail
     friction: Annotated[AnyFriction, _short("coulomb", "mu", AnyFriction)]
+    roughness: Annotated[AnyRoughness | None, _short("polynomial", "R_Z", AnyRoughness)] = None
     vertical_force: NotNegative
     pose: PoseOfCase = PoseOfCase()
     creep: Creep
@@ -228,10 +258,17 @@ class RollingCase(Model):
             raise ValueError("friction.deviation: rolling is steady, and friction random in time is not; remove it")
         if self.table is not None and self.model.spin == "book":
             raise ValueError('table: is made with model.spin = "kalker"; take that, or remove the table')
+        if self.wear is not None and self.wear.updates and self.pose.side == "both":
+            raise ValueError(
+                'wear.updates: renew the profiles of one wheel and its rail; set pose.side to "right" or "left"'
+            )
         if self.contacts is not None and not self.vertical_force > 0:
             raise ValueError("contacts: is a table for the vertical force of the case; give vertical_force above 0")
-        if self.table is not None and not self.is_constant:
-            raise ValueError("table: is of constant friction; give a number, without heat.limit, or remove the table")
+        if self.table is not None and not (self.is_constant and self.roughness is None):
+            raise ValueError(
+                "table: is of constant friction on smooth bodies; give a number, without heat.limit and roughness, or "
+                "remove the table"
+            )
         return self
 
     def _stands(self) -> None:
@@ -264,6 +301,17 @@ class RollingCase(Model):
         if not np.max(found.highest(jnp.ones(1))) > 0:
             raise UserError("friction: is 0 at all speeds; the creep force is a part of it, so give more than 0")
         return found
+
+    def surface(self, folder: Path) -> Surface | None:
+        """Rough, if it is asked.
+
+        Raises:
+            UserError: a file that is none.
+        """
+        if self.roughness is None:
+            return None
+        heights, R_Z = self.roughness.heights(folder / "case.toml", 1.0)
+        return Surface(heights, value(R_Z))
 
     @property
     def solids(self) -> tuple[Solid, Solid]:

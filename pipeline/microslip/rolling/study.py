@@ -17,7 +17,7 @@ from .settings import RollingCase
 from .strips import Forces, Tractions
 from .temperature import speed_parameter
 from .wear import strip_depth
-from .wheelset import Patch, Track, across, patches
+from .wheelset import Patch, Pose, Track, across, axle, patches
 
 UNITS = {"longitudinal": "1", "lateral": "1", "spin": "1_per_m"}
 UNLIKE = 0.02
@@ -70,7 +70,7 @@ class Studied:
         for k, p in enumerate(self.patches):
             assert self.of_pose is not None
             x, y, moment = (float(v[k]) for v in self.of_pose[:3])
-            side = 1.0 if self.case.pose.side == "right" else -1.0
+            side = 1.0 if p.side == "right" else -1.0
             places = {"wheel": np.array([0.0, *p.axle]), "rail": np.array([0.0, side * self.track.rail_at, 0.0])}
             for sign, (body, about) in zip((1.0, -1.0), places.items(), strict=True):
                 felt = without_rounding(sign * p.felt(x, y, moment, about), ROUNDING * p.normal_force)
@@ -105,12 +105,11 @@ class Studied:
         if not self.patches or self.forces is None:
             return ["The wheel does not touch the rail: all forces are zero."]
         p, told = self.patches[0], []
+        sides = sorted({q.side for q in self.patches})
         if len(self.patches) > 1:
-            told.append(f"The wheel touches the rail in {len(self.patches)} patches; the curve is of the most loaded.")
-        wheel = np.sum([row[2:] for row in self.generalised()[1] if row[1] == "wheel"], axis=0)
-        along, across = ("forward", "backward")[int(wheel[0] < 0)], ("right", "left")[int(wheel[1] < 0)]
-        told.append(f"In its pose the wheel feels {abs(wheel[0]):.4g} N {along}, {abs(wheel[1]):.4g} N to the {across} "
-                    f"and {-wheel[2]:.5g} N upward.")  # fmt: skip
+            who = "The wheel touches the rail" if len(sides) == 1 else "The wheels touch the rails"
+            told.append(f"{who} in {len(self.patches)} patches; the curve is of the most loaded.")
+        told += [self._felt(side, "the wheel" if len(sides) == 1 else f"the {side} wheel") for side in sides]
         told.append(
             f"The patch is {2e3 * p.a:.3g} mm long and {2e3 * p.b:.3g} mm wide, under {p.normal_force:.5g} N with at "
             f"most {p.pressure / 1e6:.4g} MPa."
@@ -125,12 +124,21 @@ class Studied:
             told.append(
                 f"FASTSIM as published, at {len(i)} points of the curve, is at most {100 * off:.2g} % of mu F_N away."
             )
+        elif self.case.is_constant:
+            told.append("FASTSIM and exact half-spaces know no roughness, so that neither stands beside this curve.")
         else:
             told.append(
                 f"mu is the highest coefficient, {self.highest:.4g}; FASTSIM and exact half-spaces know none that "
                 "changes, so that neither stands beside this curve."
             )
         return [*told, *self._beside_exact(), *self._heated(), *self._worn(), *self.warnings()]
+
+    def _felt(self, side: str, name: str) -> str:
+        rows = [row for row in self.generalised()[1] if row[1] == "wheel"]
+        parts = [row[2:] for row, p in zip(rows, self.patches, strict=True) if p.side == side]
+        x, y, z = np.sum(np.array(parts, dtype=float), axis=0)[:3]
+        along, across = ("forward", "backward")[int(x < 0)], ("right", "left")[int(y < 0)]
+        return f"In its pose {name} feels {abs(x):.4g} N {along}, {abs(y):.4g} N to the {across} and {-z:.5g} N upward."
 
     def _heated(self) -> list[str]:
         if self.hottest is None:
@@ -235,7 +243,7 @@ def study(case: RollingCase, folder: Path) -> Studied:
         UserError: profiles that are none, or do not overlap.
     """
     track = case.track(folder)
-    found = patches(track, case.posed(), case.pose.side, case.vertical_force)
+    found, pose = _touching(case, track)
     creep = _creep(case, found[0] if found else None)
     if not found:
         return Studied(case, track, found, creep, None, None, None, 0, None, None)
@@ -247,17 +255,27 @@ def study(case: RollingCase, folder: Path) -> Studied:
     n = len(over)
     kept = np.array([shown, *range(n, len(speed))])
     heat = case.heat.made() if case.heat else None
-    states = rolled(given, friction, speed, kept, heat, **case.model.model_dump(exclude={"exact"}))
+    rough, how = case.surface(folder), case.model.model_dump(exclude={"exact"})
+    states = rolled(given, friction, speed, kept, heat, rough, **how)
     forces, of_pose = (Forces(*(v[part] for v in states.forces)) for part in (slice(n), slice(n, None)))
     reference, beside, missed = None, None, ""
-    if case.is_constant:
+    if case.is_constant and rough is None:
         at = np.unique(np.linspace(0, n - 1, 13).astype(int))
         totals = [fastsim(*s[:6], highest, *s[6:])[0] for s in given[:, at].T]  # type: ignore[call-arg]
         reference = at, np.array([np.hypot(f.x, f.y) for f in totals]) / (highest * p.normal_force)
-        beside, missed = _exact(case, track, p, creep, np.hypot(forces.x, forces.y), highest)
+        beside, missed = _exact(case, track, pose, p, creep, np.hypot(forces.x, forces.y), highest)
     patch, of_patches = (Tractions(*(v[part] for v in states.tractions)) for part in (0, slice(1, None)))
     return Studied(case, track, found, creep, forces, reference, beside, shown, patch, of_pose, missed, highest,
                    states.hottest, of_patches)  # fmt: skip
+
+
+def _touching(case: RollingCase, track: Track) -> tuple[list[Patch], Pose]:
+    """Patches, the one that carries most first, and the pose; an axle rolls until both wheels carry the same."""
+    pose, side, vertical = case.posed(), case.pose.side, case.vertical_force
+    if side != "both":
+        return patches(track, pose, side, vertical), pose
+    left, right, pose = axle(track, pose, 2 * vertical, even=True)
+    return sorted([*left, *right], key=lambda p: -p.normal_force), pose
 
 
 def _states(track: Track, found: list[Patch], creep: Array) -> tuple[Array, Array]:
@@ -269,7 +287,7 @@ def _states(track: Track, found: list[Patch], creep: Array) -> tuple[Array, Arra
 
 
 def _exact(
-    case: RollingCase, track: Track, p: Patch, creep: Array, size: Array, friction: float
+    case: RollingCase, track: Track, pose: Pose, p: Patch, creep: Array, size: Array, friction: float
 ) -> tuple[Exact | None, str]:  # fmt: skip
     """At so many states of the curve as the case wants, in equal steps of the (n,) force; why not if there is none."""
     way = np.cumsum(np.abs(np.diff(size, prepend=size[:1])))
@@ -277,7 +295,7 @@ def _exact(
     if not len(at):
         return None, ""
     try:
-        return exact(case.solids, p, across(track, case.posed(), case.pose.side, p), friction, creep, at), ""
+        return exact(case.solids, p, across(track, pose, p.side, p), friction, creep, at), ""
     except UserError as error:
         return None, str(error)
 

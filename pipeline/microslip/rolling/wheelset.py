@@ -79,6 +79,11 @@ class Patch(NamedTuple):
     conformal: bool
     axle: Array
 
+    @property
+    def side(self) -> str:
+        """Of the track, "left" or "right"."""
+        return "right" if self.place[1] > 0 else "left"
+
     def felt(self, force_x: float, force_y: float, moment: float, about: Array) -> Array:
         """(6,) force and moment about a point (m) that the wheel feels, in track axes (6.5-24 to 6.5-37); the rail
         feels the opposite.

@@ -16,6 +16,7 @@ from ..rolling.contact_table import ContactTable, contact_table, write_contact_t
 from ..rolling.settings import RollingCase, load_rolling
 from ..rolling.study import Studied, rows_of_patches, study
 from ..rolling.table import creep_table, write_creep_table
+from ..rolling.wearing import Wearing, wearing
 from .answer import Answer, answered
 from .job import open_job
 from .modal import modes_stage
@@ -57,10 +58,14 @@ def _work(stage: Stage, case: RollingCase, case_path: Path, bodies: list[Path], 
         found = study(case, case_path.parent)
         elastic = _behind(found, bodies)
         contacts = _contacts(stage, found)
+        worn = _wearing(stage, found, case_path.parent)
     stage.begin()
     made = _tables(found, folder)
     beside, more = _beside(stage, found, elastic, contacts)
-    drawn = _pictures(found, folder / "pictures", case.name) if pictures and found.forces is not None else []
+    if worn is not None:
+        beside += _worn_tables(worn, folder)
+        more += [worn.sentence(), *filter(None, [worn.warning()])]
+    drawn = _pictures(found, worn, folder / "pictures", case.name) if pictures and found.forces is not None else []
     page = folder / "rolling.html"
     shown = [p for p in drawn if p.suffix == ".png"]
     store.write_text(page, rolling_html(f"{case.name}: rolling contact", found, shown, more))
@@ -106,6 +111,21 @@ def _contacts(stage: Stage, found: Studied) -> ContactTable | None:
     return contact_table(found.track, found.case.vertical_force, **asked.model_dump())
 
 
+def _wearing(stage: Stage, found: Studied, folder: Path) -> Wearing | None:
+    if found.case.wear is None or not found.case.wear.updates:
+        return None
+    return wearing(found.case, found.track, found.case.characteristic(folder), found.case.surface(folder), stage.report)
+
+
+def _worn_tables(worn: Wearing, folder: Path) -> list[Path]:
+    """Over the passages, and both profiles as tables in mm that a case takes."""
+    tables = {"wearing.csv": worn.columns()}
+    tables |= {f"{name}_worn.csv": getattr(worn, name).columns(worn.smoothing) for name in ("wheel", "rail")}
+    for name, columns in tables.items():
+        store.write_text(folder / name, columns_csv(columns, 10))
+    return [folder / name for name in tables]
+
+
 def _tables(found: Studied, folder: Path) -> list[Path]:
     head, rows = rows_of_patches(found.patches)
     store.write_text(folder / "patches.csv", rows_csv(head, ([f"{v:.8g}" for v in row] for row in rows)))
@@ -122,13 +142,15 @@ def _tables(found: Studied, folder: Path) -> list[Path]:
     return [folder / name for name in (*written, "patches.csv", "forces.csv")]
 
 
-def _pictures(found: Studied, folder: Path, name: str) -> list[Path]:
-    from ..pictures.rolling import curve_picture, traction_picture, write_tractions_vtu
+def _pictures(found: Studied, worn: Wearing | None, folder: Path, name: str) -> list[Path]:
+    from ..pictures.rolling import curve_picture, traction_picture, wearing_picture, write_tractions_vtu
 
     drawn = [
         curve_picture(found, folder / "creep.png", f"{name}: creep curve"),
         traction_picture(found, folder / "tractions.png", name),
     ]
+    if worn is not None:
+        drawn.append(wearing_picture(worn, folder / "wearing.png", name))
     if found.tractions is not None and find_spec("meshio"):
         drawn.append(folder.parent / "tractions.vtu")
         write_tractions_vtu(found.tractions, drawn[-1])

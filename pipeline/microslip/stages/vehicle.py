@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+import contextlib
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
+from typing import Any
 
+from ..data import UserError
 from ..errors import told_of
 from ..files import store
 from ..files.tables import columns_csv
 from ..report.vehicle import recorded_html, vehicle_html
+from ..results import Journal, open_journal
 from ..vehicle.kinematics import recorded
 from ..vehicle.settings import VehicleCase, load_kinematics, load_vehicle
 from ..vehicle.study import Studied, study
 from .answer import Answer, answered
-from .stage import Report, Stage
+from .stage import Report, Stage, hash_of_code
 
 
 def vehicle_stage(
@@ -28,7 +33,7 @@ def vehicle_stage(
     stage = Stage(root / case.name / "unround.json", ("stages.vehicle",), force, report)
     files = [case_path.parent / s.profile for s in (case.wheel, case.rail) if isinstance(s.profile, str)]
     inputs = {"case": raw, "profiles": [store.hash_file(f) for f in files if f.is_file()], "pictures": pictures}
-    return answered(stage, inputs, lambda: _work(stage, case, case_path, pictures))
+    return _answered(stage, inputs, lambda: _work(stage, case, case_path, pictures, inputs))
 
 
 def kinematics_stage(
@@ -47,8 +52,8 @@ def kinematics_stage(
     inputs = {"case": raw, "files": [store.hash_file(f) for f in files if f.is_file()], "pictures": pictures}
 
     def work() -> Answer:
-        with told_of(case_path):
-            found = recorded(case, case_path.parent)
+        with _kept(stage, case_path, inputs) as journal:
+            found = recorded(case, case_path.parent, report, journal)
         stage.begin()
         folder, drawn = stage.product.parent, []
         store.write_text(folder / "circumference.csv", columns_csv(found.circumference(), 10))
@@ -60,13 +65,36 @@ def kinematics_stage(
         store.write_text(page, recorded_html(f"{case.name}: wear of a wheel", found.sentences(), drawn))
         return Answer([page, folder / "circumference.csv", *drawn], found.sentences())
 
-    return answered(stage, inputs, work)
+    return _answered(stage, inputs, work)
 
 
-def _work(stage: Stage, case: VehicleCase, case_path: Path, pictures: bool) -> Answer:
+def _points(stage: Stage) -> Path:
+    return stage.product.with_suffix(".points")
+
+
+def _answered(stage: Stage, inputs: Mapping[str, Any], work: Callable[[], Answer]) -> Answer:
+    found = answered(stage, inputs, work)
+    _points(stage).unlink(missing_ok=True)
+    return found
+
+
+@contextlib.contextmanager
+def _kept(stage: Stage, case_path: Path, inputs: Mapping[str, Any]) -> Iterator[Journal]:
+    """A journal of what is finished, until all that is made of it is there; mistakes are told with the case."""
+    depends = store.hash_settings({**inputs, "pictures": None, "code": hash_of_code(stage.code)})
+    with told_of(case_path), open_journal(_points(stage), depends, {"case": str(case_path)}, stage.force) as journal:
+        try:
+            yield journal
+        except UserError:
+            if not journal.series:
+                _points(stage).unlink()
+            raise
+
+
+def _work(stage: Stage, case: VehicleCase, case_path: Path, pictures: bool, inputs: Mapping[str, Any]) -> Answer:
     folder = stage.product.parent
-    with told_of(case_path):
-        found = study(case, case_path.parent, stage.report)
+    with _kept(stage, case_path, inputs) as journal:
+        found = study(case, case_path.parent, stage.report, journal)
     stage.begin()
     made = _tables(found, folder)
     drawn = _pictures(found, folder / "pictures", case.name) if pictures else []

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -10,6 +11,7 @@ import numpy as np
 
 from ..data import Array, UserError
 from ..files import store
+from ..results import Journal
 from ..rolling.wheelset import Pose, Track, patches
 from .motion import Contacts
 from .settings import KinematicsCase, track_of
@@ -202,8 +204,17 @@ class Recorded:
         ]
 
 
-def recorded(case: KinematicsCase, folder: Path) -> Recorded:
+TURNS = "turns"
+"""Series of the journal."""
+
+
+def recorded(
+    case: KinematicsCase, folder: Path, report: Callable[[str], None] = lambda _: None, journal: Journal | None = None
+) -> Recorded:
     """Wear of a case whose files stand in a folder.
+
+    Args:
+        journal: where finished turns are kept, and known ones found.
 
     Raises:
         UserError: see `read_kinematics` and `contacts_of`.
@@ -214,5 +225,12 @@ def recorded(case: KinematicsCase, folder: Path) -> Recorded:
     way = 2 * np.pi * track.radius / asked.places
     t = Tread(y, way, case.wear.coefficient, case.how, (1,) if asked.side == "right" else (-1,))
     elastic = case.friction, track.elastic.shear, track.elastic.poisson
-    taken = np.array([t.taken(one, *elastic)[0] for one in on])
-    return Recorded(case, t, taken, np.array([t.work(one, *elastic)[0] for one in on]), on)
+    known = {} if journal is None else journal.of(TURNS)
+    for n, one in enumerate(on):
+        if n not in known:
+            report(f"turn {n + 1} of {len(on)}")
+            known[n] = {"taken": t.taken(one, *elastic)[0], "work": float(t.work(one, *elastic)[0])}
+            if journal is not None:
+                journal.keep(TURNS, n, known[n])
+    taken, work = (np.array([known[n][name] for n in range(len(on))]) for name in ("taken", "work"))
+    return Recorded(case, t, taken, work, on)

@@ -9,12 +9,13 @@ from pathlib import Path
 import numpy as np
 
 from ..data import Array, UserError
+from ..results import Journal
 from ..rolling.table import CreepTable, creep_table
 from .creep import Creep, linear, of_strips, of_table
 from .motion import Vehicle, critical_speed, hunting, roots, steady
 from .settings import VehicleCase
 from .touch import at
-from .wearing import Jump, LeavesTheRail, Now, Rolling, growth, jumps, orders_of, tread
+from .wearing import Jump, LeavesTheRail, Now, Rolling, growth, jumps, of_point, orders_of, point_of, tread
 
 WHEELS = ("right", "left")
 SMALL = 1e-6
@@ -162,8 +163,13 @@ class Studied:
         return f"{told}; the critical speed of hunting is {self.critical:.4g} m/s."
 
 
-def study(case: VehicleCase, folder: Path, report: Callable[[str], None] = lambda _: None) -> Studied:
+def study(
+    case: VehicleCase, folder: Path, report: Callable[[str], None] = lambda _: None, journal: Journal | None = None
+) -> Studied:
     """Wear of a case whose files stand in a folder.
+
+    Args:
+        journal: where finished jumps and speeds are kept, and known ones found.
 
     Raises:
         UserError: profiles that do not reach, a vehicle that has no running that comes back on new wheels.
@@ -179,9 +185,9 @@ def study(case: VehicleCase, folder: Path, report: Callable[[str], None] = lambd
     t = tread(v, case.running.places, case.wear.coefficient, case.how)
     r = Rolling.of(v, creep, t, case.shape())
     report("wear by jumps over many turns")
-    history, ended = _worn(case, r, report)
+    history, ended = _worn(case, r, report, journal)
     wheel = int(np.abs(r.shape).max(axis=0).argmax())
-    grown = [_grown(case, v, creep, speed, wheel, report) for speed in case.running.speeds]
+    grown = _all_grown(case, v, creep, wheel, report, journal)
     speeds = [s for s, g in zip(case.running.speeds, grown, strict=True) if g is not None]
     table_of = np.array([g for g in grown if g is not None]).reshape(len(speeds), case.running.orders)
     critical = critical_speed(v, 1.0, FASTEST)
@@ -199,18 +205,44 @@ def _creep(case: VehicleCase, v: Vehicle, report: Callable[[str], None]) -> tupl
     return of_table(table), table
 
 
-def _worn(case: VehicleCase, r: Rolling, report: Callable[[str], None]) -> tuple[list[tuple[Now, Jump]], str]:
-    history: list[tuple[Now, Jump]] = []
+JUMPS, SPEEDS = "jumps", "speeds"
+"""Series of the journal."""
+
+
+def _worn(
+    case: VehicleCase, r: Rolling, report: Callable[[str], None], journal: Journal | None
+) -> tuple[list[tuple[Now, Jump]], str]:
+    history = [] if journal is None else [of_point(p) for p in journal.of(JUMPS).values()]
     turns = case.running.turns
+    if history:
+        report(f"goes on after {history[-1][0].turns:.0f} turns of a run that did not end")
     try:
-        for now, jump in jumps(r, turns, case.wear.tolerance, min(1e3, turns)):
+        for now, jump in jumps(r, turns, case.wear.tolerance, min(1e3, turns), known=history):
             history.append((now, jump))
+            if journal is not None:
+                journal.keep(JUMPS, now.turns, point_of(now, jump))
             report(f"{now.turns:.0f} of {turns:.0f} turns")
     except LeavesTheRail as stop:
         if not history:
             raise UserError(f"running, unround: already on new wheels {stop}; run slower or give less") from stop
         return history, str(stop)
     return history, ""
+
+
+def _all_grown(
+    case: VehicleCase, v: Vehicle, creep: Creep, wheel: int, report: Callable[[str], None], journal: Journal | None
+) -> list[Array | None]:
+    """Of each speed (orders,) per turn; None where it does not run."""
+    known = {} if journal is None else journal.of(SPEEDS)
+    found = []
+    for speed in case.running.speeds:
+        if speed not in known:
+            grown = _grown(case, v, creep, speed, wheel, report)
+            known[speed] = {} if grown is None else {"grown": grown}
+            if journal is not None:
+                journal.keep(SPEEDS, speed, known[speed])
+        found.append(known[speed].get("grown"))
+    return found
 
 
 def _grown(

@@ -5,7 +5,7 @@ Places are equal angles of a wheel from its mark on; fields over the tread have 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -205,20 +205,27 @@ class Jump:
     work: Array
 
 
-def jumps(r: Rolling, turns: float, tolerance: float, first: float, fixed: bool = False) -> Iterator[tuple[Now, Jump]]:
+def jumps(
+    r: Rolling, turns: float, tolerance: float, first: float, fixed: bool = False,
+    known: Sequence[tuple[Now, Jump]] = (),
+) -> Iterator[tuple[Now, Jump]]:  # fmt: skip
     """Wear over many turns by jumps of second order (Heun); a jump is as long as its error allows.
 
     Args:
         turns: in all. tolerance: of a jump, m of radius. first: size of the first, turns. fixed: all are as long.
+            known: what was yielded before, with which it goes on.
 
     Raises:
         LeavesTheRail: see `running`; what came before was yielded.
     """
     v, t = r.vehicle, r.tread
     places, n = len(r.shape), len(t.y)
-    now = running(r, np.zeros((2, places, n)), 0.0)
-    yield now, Jump(0.0, 0.0, 0.0, np.zeros(2), np.zeros(2))
-    size = min(first, turns)
+    if known:
+        now, jump = known[-1]
+    else:
+        now, jump = running(r, np.zeros((2, places, n)), 0.0), Jump(0.0, 0.0, 0.0, np.zeros(2), np.zeros(2))
+        yield now, jump
+    size = min(first, turns) if fixed or not jump.size else _next(jump, tolerance)
     while now.turns < turns * (1 - 1e-12):
         size = min(size, turns - now.turns)
         then = running(r, now.depth + size * now.taken, now.turns + size, now)
@@ -229,9 +236,34 @@ def jumps(r: Rolling, turns: float, tolerance: float, first: float, fixed: bool 
             continue
         work = [size * 0.5 * t.work(one.on, v.friction, v.shear, v.poisson) for one in (now.one, then.one)]
         now = running(r, now.depth + size * mean, now.turns + size, then)
-        yield now, Jump(now.turns, size, error, t.volume(size * mean), work[0] + work[1])
+        jump = Jump(now.turns, size, error, t.volume(size * mean), work[0] + work[1])
+        yield now, jump
         if not fixed:
-            size *= min(3.0, 0.9 * (tolerance / max(error, 1e-3 * tolerance)) ** 0.5)
+            size = _next(jump, tolerance)
+
+
+def _next(jump: Jump, tolerance: float) -> float:
+    """Turns of the jump after one."""
+    return jump.size * min(3.0, 0.9 * (tolerance / max(jump.error, 1e-3 * tolerance)) ** 0.5)
+
+
+def point_of(now: Now, jump: Jump) -> dict[str, Any]:
+    """Names -> arrays of running and the jump to it, for a journal."""
+    point = {f"jump/{k}": v for k, v in vars(jump).items()}
+    point |= {f"on/{k}": v for k, v in now.one.on._asdict().items()}
+    point |= {f"one/{k}": v for k, v in now.one._asdict().items() if k != "on"}
+    return point | {k: v for k, v in vars(now).items() if k != "one" and v is not None}
+
+
+def of_point(point: Mapping[str, Any]) -> tuple[Now, Jump]:
+    """What `point_of` took apart, to the last bit."""
+
+    def part(name: str) -> dict[str, Any]:
+        return {k.removeprefix(name): v for k, v in point.items() if k.startswith(name)}
+
+    own = {k: v for k, v in point.items() if "/" not in k}
+    one = Turn(on=Contacts(**part("on/")), **part("one/"))
+    return Now(one=one, **{"map_": None, **own}), Jump(**part("jump/"))
 
 
 def growth(r: Rolling, orders: Array, amplitude: float, wheel: int) -> Array:

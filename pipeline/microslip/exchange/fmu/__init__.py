@@ -65,9 +65,19 @@ def compiled(files: Mapping[str, bytes], ending: str) -> bytes:
     """The shared library of ``body.c``, by the compiler that CC names, else cc.
 
     Raises:
-        UserError: there is none, or it fails.
+        UserError: there is none, or it fails, or there is no folder for temporary files.
     """
-    compiler = shlex.split(os.environ.get("CC", "")) or ["cc"]
+    try:
+        compiler = shlex.split(os.environ.get("CC", "")) or ["cc"]
+        return _built(compiler, files, ending)
+    except (OSError, ValueError) as error:
+        raise UserError(
+            f"export --to fmu: the C compiler cannot be run ({error}); see to CC, which names it, and to TMPDIR, the "
+            "folder of temporary files"
+        ) from error
+
+
+def _built(compiler: list[str], files: Mapping[str, bytes], ending: str) -> bytes:
     if shutil.which(compiler[0]) is None:
         raise UserError(
             f"export --to fmu: there is no C compiler {compiler[0]}, which makes the binary; install gcc, or name "
@@ -85,7 +95,7 @@ def compiled(files: Mapping[str, bytes], ending: str) -> bytes:
             "-lm",
         ]  # no path of this machine in the binary
         done = subprocess.run(command, cwd=folder, capture_output=True, text=True, errors="replace")
-        if done.returncode:
+        if done.returncode or not Path(folder, f"body{ending}").is_file():
             said = " ".join(done.stderr.split())[:200] or f"exit code {done.returncode}"
             raise UserError(f"export --to fmu: the C compiler {compiler[0]} fails ({said}); name another one in CC")
         return Path(folder, f"body{ending}").read_bytes()

@@ -9,7 +9,6 @@ from xml.etree.ElementTree import Element, SubElement
 import numpy as np
 
 from ... import __version__
-from ..choice import one_line
 from .unit import Unit
 
 _CAN = {name: "true" for name in ("canGetAndSetFMUstate", "canSerializeFMUstate")}
@@ -27,7 +26,7 @@ def description(unit: Unit, name: str, guid: str, said: str) -> bytes:
         name: identifier of the model. said: what it is, in words.
     """
     root = Element("fmiModelDescription", {
-        "fmiVersion": "2.0", "modelName": name, "guid": guid, "description": one_line(said), "version": "1",
+        "fmiVersion": "2.0", "modelName": name, "guid": guid, "description": _line(said), "version": "1",
         "generationTool": f"microslip {__version__}", "variableNamingConvention": "structured",
         "numberOfEventIndicators": "0",
     })  # fmt: skip
@@ -44,6 +43,11 @@ def description(unit: Unit, name: str, guid: str, said: str) -> bytes:
     _structure(SubElement(root, "ModelStructure"), unit)
     ElementTree.indent(root)
     return ElementTree.tostring(root, encoding="utf-8", xml_declaration=True) + b"\n"
+
+
+def _line(text: str) -> str:
+    """What XML may hold of a text, on one line."""
+    return "".join(c for c in " ".join(text.split()) if c.isprintable())
 
 
 def _units(root: Element, unit: Unit) -> None:
@@ -80,7 +84,7 @@ def _variables(place: Element, unit: Unit) -> None:
 def _add(place: Element, name: str, said: str, role: str, **real: str) -> None:
     """A variable; its value reference is its place. role: causality, and how it begins."""
     cause, _, initial = role.partition(" ")
-    about = {"name": name, "valueReference": str(len(place)), "description": one_line(said), "causality": cause}
+    about = {"name": name, "valueReference": str(len(place)), "description": _line(said), "causality": cause}
     about |= {"variability": "tunable" if cause == "parameter" else "continuous"}
     SubElement(SubElement(place, "ScalarVariable", about | ({"initial": initial} if initial else {})), "Real", real)
 
