@@ -11,6 +11,7 @@ from typing import Any, Literal
 import numpy as np
 
 from ..data import CENTRIFUGAL, Array, ModalBasis, ModalGroup, UserError
+from ..errors import told_of
 from ..reduced.compliance import SURFACE
 from ..system.assembly import Assembly, Contact, Load, Output
 from ..system.component import Component, Ring
@@ -203,10 +204,8 @@ def _loads(
             if not x.is_zero and _is_still(b, "excitation", row):
                 raise UserError(f"{path}: excitation: '{x.row}' moves nothing: it acts where '{b.basis.name}' is held; "
                                 "give it another point, or direction, in the body.toml")  # fmt: skip
-        try:
+        with told_of(f"{path}: excitations.{x.row or x.face}"):
             found += loads_of(x, body, row, base, blades, turning)
-        except UserError as error:
-            raise UserError(f"{path}: excitations.{x.row or x.face}: {error}") from error
     moved = [(*settings.address(s.row), s.stiffness * s.motion) for s in settings.springs if s.motion]
     return tuple(named.values()), (*found, *(Load(*one) for one in moved)), said
 

@@ -16,6 +16,7 @@ from ..contact.law import Law
 from ..contact.settings import ContactLaw, load_contact
 from ..contact.stiffness import Given
 from ..data import Array, Interface, UserError
+from ..errors import told_of
 from ..files.store import ordinary
 from ..harmonic_balance.accuracy import more
 from ..harmonic_balance.cost import GIB, aft_bytes, of_this_machine
@@ -179,10 +180,8 @@ def _nodal(
 
 def _in_contact(path: Path | str, c: ContactSettings, make: Callable[[], T]) -> T:
     """What is made, or its mistake with the contact's place in the case file."""
-    try:
+    with told_of(f"{path}: contacts.{c.interface}"):
         return make()
-    except UserError as error:
-        raise UserError(f"{path}: contacts.{c.interface}: {error}") from error
 
 
 def _faces(settings: CaseSettings, c: ContactSettings, loaded: list[Loaded]) -> list[Face]:

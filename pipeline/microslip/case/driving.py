@@ -11,6 +11,7 @@ import numpy as np
 from pydantic import BeforeValidator, Field, model_validator
 
 from ..data import Array, Interface, ModalGroup, UserError
+from ..errors import told_of
 from ..settings.numbers import Direction, Model, NotNegative, Number, Numbers, Positive, Vector, _finite_vector, _tuple
 from ..system.assembly import Load
 from ..system.component import Component, Ring
@@ -297,12 +298,10 @@ def with_field(
         UserError: a file, a face or a unit that does not fit.
     """
     file = Path(path).parent / str(x.field)
-    try:
+    with told_of(f"{path}: excitations.{x.face}.field"):
         field = read_field(file, str(x.length_unit), x.time_factor == "-")
         found = on_face(field, load_face(component, face), face)
         return with_pressure(component, name, found), found.sentence()
-    except UserError as error:
-        raise UserError(f"{path}: excitations.{x.face}.field: {error}") from error
 
 
 def damped(groups: Mapping[int, ModalGroup], ratios: float | Sequence[float], where: str) -> dict[int, ModalGroup]:
@@ -311,10 +310,8 @@ def damped(groups: Mapping[int, ModalGroup], ratios: float | Sequence[float], wh
     Raises:
         UserError: no ratio.
     """
-    try:
+    with told_of(where):
         return {k: with_ratios(g, ratios) for k, g in groups.items()}
-    except UserError as error:
-        raise UserError(f"{where}: {error}") from error
 
 
 def as_asked(component: Component, kind: str, viscous: bool) -> Component:
@@ -334,10 +331,8 @@ def flow_of(file: Path, blades: int, turning: Turning, where: str) -> dict[int, 
     Raises:
         UserError: a file that does not fit the ring.
     """
-    try:
+    with told_of(where):
         return read_aerodynamics(file, blades, turning)
-    except UserError as error:
-        raise UserError(f"{where}: {error}") from error
 
 
 def messages_of(

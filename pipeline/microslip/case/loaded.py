@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from ..data import Interface, ModalBasis, ModalGroup, UserError
+from ..errors import told_of
 from ..frames import rotation
 from ..modal.speed_range import basis_at
 from ..reduced.compliance import has_residual
@@ -99,10 +100,8 @@ def _of_mass(groups: dict[int, ModalGroup], mass: float, basis: ModalBasis, key:
     """
     if basis.mass <= 0:
         raise UserError(f"{key}: the modal file of '{basis.name}' does not know the body's mass; leave it out")
-    try:
+    with told_of(key):
         return {k: of_density(g, mass / basis.mass) for k, g in groups.items()}
-    except UserError as error:
-        raise UserError(f"{key}: {error}") from error
 
 
 def on_weak_springs(group: ModalGroup, frequency: float, key: str) -> ModalGroup:
@@ -125,19 +124,15 @@ def _at_speed(b: BodyOfCase, basis: ModalBasis, path: Path | str, key: str) -> d
     """Nodal diameter -> group of a stored speed (a number), or of one in rpm, stored or in the body's range."""
     speed = b.speed
     if b.speed_rpm is not None:
-        try:
+        with told_of(f"{path}: {key}speed_rpm"):
             basis, speed = basis_at(basis, b.speed_rpm), 0
-        except UserError as error:
-            raise UserError(f"{path}: {key}speed_rpm: {error}") from error
     found = {k: g for (s, k), g in basis.groups.items() if s == speed}
     if not found:
         count = len({s for s, _ in basis.groups})
         known = "one speed, number 0" if count == 1 else f"{count} speeds, numbers 0 to {count - 1}"
         raise UserError(f"{path}: {key}speed: the modal file of '{basis.name}' has {known}; correct it")
-    try:
+    with told_of(f"{path}: {key}modes"):
         return found if b.modes is None else {k: first_modes(g, b.modes) for k, g in found.items()}
-    except UserError as error:
-        raise UserError(f"{path}: {key}modes: {error}") from error
 
 
 def body_of(bodies: Mapping[str, Loaded], name: str, path: Path | str, key: str) -> Loaded:

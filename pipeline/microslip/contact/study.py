@@ -13,7 +13,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from ..errors import UserError
+from ..errors import UserError, told_of
 from . import microslip
 from . import settings as S
 from .composed import ContactModel, compose
@@ -392,10 +392,8 @@ def _wear(c: ContactModel, found: _Findings) -> None:
     energy = mu * given.normal_force * given.speed * time
     coefficient = _wear_coefficient(given, mu)
     stars = dimensionless_time(energy, coefficient, law, c.area, np.asarray(given.normal_force))
-    try:
+    with told_of(c.path):
         worn = course(c.heights, given.normal_force / (c.normal_0 * c.roughness), stars)
-    except UserError as error:
-        raise UserError(f"{c.path}: {error}") from error
     scale = c.normal_0 * c.roughness / c.area
     share = worn.area
     found.tables["wear"] = {

@@ -18,7 +18,8 @@ from ..bifurcation.cycles import PERIODS, Checked, Cycles, checked, cycles
 from ..bifurcation.dynamics import Dynamics
 from ..bifurcation.equilibria import Hopf
 from ..case.questions import Cycle
-from ..data import Array, UserError
+from ..data import Array
+from ..errors import told_of
 from ..results import Journal
 from ..system.assembly import Assembly
 from .stage import Report
@@ -86,10 +87,8 @@ class _Work:
         if known is not None:
             return [_unpacked(known, f"{i}/", system) for i in range(int(known["count"]))]
         begin = sliding.equilibrium(sliding.of(make(asked.start)))
-        try:
+        with told_of(f"{self.varied.path}: stability.cycle: {asked.parameter}"):
             found = cycles(system, begin, asked.start, asked.stop, harmonics, self.band, asked.points, self.report)
-        except UserError as error:
-            raise UserError(f"{self.varied.path}: stability.cycle: {asked.parameter}: {error}") from error
         point: dict[str, Any] = {"count": len(found)}
         for i, c in enumerate(found):
             point |= _packed(c, f"{i}/")

@@ -18,6 +18,7 @@ from ..case.contacts import swept
 from ..case.problem import book_models
 from ..case.questions import MistuningOfCase, ScatterOfCase
 from ..data import Array, UserError
+from ..errors import told_of
 from ..files import store
 from ..files.tables import columns_csv, rows_csv
 from ..harmonic_balance.readout import measured
@@ -147,11 +148,9 @@ def _scatter(s: ScatterOfCase, number: int, built: Built, path: Path, others: Ma
     if contact is not None and s.of in OF_CONTACTS:
         named = {c.interface: x.name for c, x in zip(built.contacts, built.assembly.contacts, strict=True)}
         contact = named.get(contact, contact)
-    try:
+    with told_of(where):
         return Scatter(s.of, s.deviation, s.distribution, values, others, s.arrangement, s.body, contact, s.at,
                        s.together, s.neighbours)  # fmt: skip
-    except UserError as error:
-        raise UserError(f"{where}: {error}") from error
 
 
 def _measured(file: Path, of: str) -> tuple[float, ...]:

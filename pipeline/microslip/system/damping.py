@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from ..data import Array, ModalGroup, UserError
+from ..errors import told_of
 from ..files.store import ordinary
 from ..reduced.coordinates import own_stiffness
 from ..ring.expansion import BACKWARD, FORWARD
@@ -86,10 +87,8 @@ def read_aerodynamics(path: Path | str, blades: int, turning: Turning = 1) -> di
     for line, row in enumerate(_table(path), 2):
         where = f"{path}: line {line}"
         k, value, sense = _row(row, where)
-        try:
+        with told_of(where):
             waves = {index_of(k, s, blades, turning) for s in ((FORWARD, BACKWARD) if sense == BOTH else (sense,))}
-        except UserError as error:
-            raise UserError(f"{where}: {error}") from error
         again = waves & set(found)
         if again:
             raise UserError(f"{where}: nodal diameter {k}, {sense}, is given twice; remove one")
