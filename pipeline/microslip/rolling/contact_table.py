@@ -130,9 +130,9 @@ class ContactTable(NamedTuple):
         if not (np.isfinite([*given, *loads.T]).all() and (given[2] > 0).all() and least >= 0):
             raise UserError("speed, friction, load: must be finite, speed positive, friction and load 0 or more")
         size = POSES if n > 1 else 1
-        blocks = [np.minimum(np.arange(i, i + size), n - 1) for i in range(0, n, size)]
-        found = [_rolling(self, *(v[block] for v in given), loads[block]) for block in blocks]
-        return jax.tree.map(lambda *parts: np.concatenate(parts)[:n], *found)
+        which = np.minimum(np.arange(-(-n // size) * size), n - 1).reshape(-1, size)
+        found = [_rolling(self, *(v[which[run]] for v in (*given, loads))) for run in strips.runs(n, size)]
+        return jax.tree.map(lambda *parts: np.concatenate([p.reshape(-1, *p.shape[2:]) for p in parts])[:n], *found)
 
     def sentence(self) -> str:
         """What it is worth."""
@@ -167,7 +167,10 @@ def forces(
     return _rolled(patches, pose, speed, turning, friction, (xi, eta, phi), table.shear, table.poisson, weights[-1])
 
 
-_rolling = program(forces)
+@program
+def _rolling(table: ContactTable, *given: Array) -> Rolling:
+    """Of (blocks, n) arrays, block after block."""
+    return jax.lax.map(lambda of: forces(table, *of), given)
 
 
 def _mirrored(p: Patches) -> Patches:
