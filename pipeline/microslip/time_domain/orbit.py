@@ -417,10 +417,10 @@ def march(
     stepper = Stepper(equations, 2 * np.pi / equations.Omega / (each * samples))
     first = on_its_way(stepper, start) if isinstance(start, Periodic) else stepper.start(*begun(equations, start))
     now, done = kept.begun(first)
-    many, told = 1, time.monotonic()
+    many, reported = 1, time.monotonic()
     while done < settle + keep:
         before, dense = now, done >= settle
-        ahead = 1 if dense else min(many, settle - done, samples)
+        ahead = 1 if dense else min(many, settle - done)
         rows = np.full(samples, each) if dense else np.where(np.arange(samples) < ahead, each * samples, 0)
         now, seen, listed, count = stepper.run(now, rows)
         done += ahead
@@ -430,10 +430,10 @@ def march(
         if dense:
             kept.keep(kept_samples.of_period(equations, seen), listed, count - len(listed))
         kept.mark(now, done)
-        if (late := time.monotonic() - told >= PAUSE) or done in (settle, settle + keep):
+        if (late := time.monotonic() - reported >= PAUSE) or done in (settle, settle + keep):
             report(f"period {done} of {settle + keep}, {float(now.time):.6g} s")
-            told = time.monotonic()
-        many = max(1, many // 2) if late else 4 * many
+            reported = time.monotonic()
+        many = max(1, many // 2) if late else min(4 * many, samples)
     error, told = _error(stepper, now, samples, each, settle + keep)
     exponent = _exponent(stepper, now, kept, samples, each, settle + keep)
     more = tuple(text for text in (told, exponent.message if exponent else "") if text)
