@@ -417,13 +417,13 @@ def march(
     stepper = Stepper(equations, 2 * np.pi / equations.Omega / (each * samples))
     first = on_its_way(stepper, start) if isinstance(start, Periodic) else stepper.start(*begun(equations, start))
     now, done = kept.begun(first)
-    many, reported = 1, time.monotonic()
+    many, happened, reported = 1, 0, time.monotonic()
     while done < settle + keep:
         before, dense = now, done >= settle
         ahead = 1 if dense else min(many, settle - done)
         rows = np.full(samples, each) if dense else np.where(np.arange(samples) < ahead, each * samples, 0)
         now, seen, listed, count = stepper.run(now, rows)
-        done += ahead
+        done, happened = done + ahead, happened + count
         if not np.isfinite(seen.mechanical[-1]):
             when, why = _divergence(stepper, before, seen, kept if dense else None)
             return Ended(each * samples, diverged=when, messages=(why,))
@@ -431,7 +431,8 @@ def march(
             kept.keep(kept_samples.of_period(equations, seen), listed, count - len(listed))
         kept.mark(now, done)
         if (late := time.monotonic() - reported >= PAUSE) or done in (settle, settle + keep):
-            report(f"period {done} of {settle + keep}, {float(now.time):.6g} s")
+            met = counted(happened, "event")
+            report(f"period {done} of {settle + keep}, {float(now.time):.6g} s, {met}")
             reported = time.monotonic()
         many = max(1, many // 2) if late else min(4 * many, samples)
     error, told = _error(stepper, now, samples, each, settle + keep)
