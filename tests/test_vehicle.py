@@ -176,8 +176,10 @@ def test_jumps_are_of_second_order(rolling: wearing.Rolling) -> None:
 @pytest.mark.slow
 def test_profiles_are_renewed_as_they_wear(case: VehicleCase, rolling: wearing.Rolling) -> None:
     """Of an order between one and two, 0.04 um off in one jump; the volume is the coefficient times the work.
-    The contact widens, so that three crests wear off faster than on wheels that touch as new ones; a groove that splits the
-    contact ends it."""
+
+    The contact widens, so that three crests wear off faster than on wheels that touch as new ones; a groove that splits
+    the contact ends it.
+    """
     renewed = replace(rolling, profile=case.profiles(CASE.parent, rolling.tread.y))
     far, ends = 3e5, []
     for count in (1, 2, 4):
