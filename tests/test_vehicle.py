@@ -175,17 +175,20 @@ def test_jumps_are_of_second_order(rolling: wearing.Rolling) -> None:
 
 @pytest.mark.slow
 def test_profiles_are_renewed_as_they_wear(case: VehicleCase, rolling: wearing.Rolling) -> None:
-    """Second order too, and the volume is the work; the contact grows wider, so that three crests wear off faster than
-    on wheels that touch as new ones; a groove that splits the contact ends it."""
+    """Of an order between one and two, 0.04 um off in one jump; the volume is the coefficient times the work.
+
+    The contact widens, so that three crests wear off faster than on wheels that touch as new ones; a groove that splits
+    the contact ends it.
+    """
     renewed = replace(rolling, profile=case.profiles(CASE.parent, rolling.tread.y))
-    far, ends = 4e5, []
-    for count in (2, 4, 12):
+    far, ends = 3e5, []
+    for count in (1, 2, 4):
         *_, (last, jump) = wearing.jumps(renewed, far, 1.0, far / count, fixed=True)
         ends.append(last.radius[:, 0])
         np.testing.assert_allclose(jump.volume, rolling.tread.coefficient * jump.work, rtol=1e-10)
     off = [np.abs(e - ends[-1]).max() for e in ends[:-1]]
-    assert np.log2(off[0] / off[1]) > 1.6
-    *_, (kept, _) = wearing.jumps(rolling, far, 1.0, far / 4, fixed=True)
+    assert off[0] < 1e-7 and off[0] / off[1] > 3.1  # 3 of first order, 5 of second
+    *_, (kept, _) = wearing.jumps(rolling, far, 1.0, far, fixed=True)
     assert last.one.on.b.mean() > 1.1 * kept.one.on.b.mean()
     worn = [
         wearing.orders_of(rolling.shape, 3)[2, 0] - wearing.orders_of(r, 3)[2, 0] for r in (last.radius, kept.radius)
