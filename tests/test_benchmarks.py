@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -43,6 +44,12 @@ def test_the_ring_benchmark_certifies_its_made_up_ring(tmp_path):
     dof, ring_dof, modes = (int(v) for v in said.splitlines()[-1].split("|")[1:4])
     assert ring_dof == 24 * dof and modes == 288  # 12 modes at each k, counted twice but for k = 0 and 12: 12 * 24
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(shutil.which("ccx") is None, reason="needs CalculiX")
+def test_the_deck_benchmark_runs_both_programs():
+    assert len(printed("deck.py").splitlines()[-1].split("|")) == 6
 
 
 @pytest.mark.slow

@@ -413,7 +413,7 @@ def _lanczos(pencil: Pencil, count: int, shift: float, tolerance: float, known: 
         T[new, last] = R
         if done < look:
             continue
-        look = max(done + block, int(1.1 * done))  # the small eigenproblem is not looked at in every step
+        look = done + block if done < 160 else int(1.1 * done)  # a large one is not looked at in every step
         theta, S = np.linalg.eigh(0.5 * (T[:done, :done] + T[:done, :done].conj().T))
         theta, S = theta[::-1][:wanted], S[:, ::-1][:, :wanted]
         if (np.linalg.norm(R @ S[last], axis=0) < tolerance * np.abs(theta)).all():
