@@ -86,15 +86,15 @@ def test_the_mean_at_the_peak_is_less_than_that_of_first_order() -> None:
 def test_larger_scatter_lets_blades_vibrate_higher_and_localise() -> None:
     """Figs. 5.6-5 and 5.6-6: "the exponent k of the approximate method reaches nearly k = 1": ours k = 1.3, samples
     2.3 and elsewhere. "The amplitudes increase as well": on the flanks the highest do, up to three times; the highest
-    peak does not, it is 1.08 times the tuned one on average, after 1.17 with the small scatter."""
+    peak does not, it is 1.08 times the tuned one on average, after 1.175 with the small scatter."""
     small, large = of(ENVELOPES, SMALL), of(ENVELOPES, LARGE)
     assert large["first_order_weibull_exponent"].min() == pytest.approx(1.27, abs=0.02)
     assert large["weibull_exponent"].min() == pytest.approx(2.3, abs=0.02)
     assert (large["weibull_exponent"] < small["weibull_exponent"]).all()
     assert (large["highest_m"] > 1.15 * small["highest_m"])[np.abs(small["frequency_Hz"] - 109) > 2].all()
     amplified = [of(SAMPLES, scatter)["amplification"].mean() for scatter in (SMALL, LARGE)]
-    assert amplified == pytest.approx([1.166, 1.079], abs=0.002)
-    assert of(SAMPLES, LARGE)["localisation"].mean() > 1.8 * of(SAMPLES, SMALL)["localisation"].mean()
+    assert amplified == pytest.approx([1.175, 1.081], abs=0.002)
+    assert of(SAMPLES, LARGE)["localisation"].mean() > 1.6 * of(SAMPLES, SMALL)["localisation"].mean()
 
 
 @pytest.mark.slow
