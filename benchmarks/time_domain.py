@@ -125,9 +125,9 @@ def impact(periods: int, rounds: int) -> None:
 
     print(f"\n## Impact oscillator, {periods} periods\n")
     exact = lsoda(1e-12, atol=1e-17, hmax=T / 100)
-    tolerances = 10.0 ** -np.arange(3, 11)
-    compared(exact, [("microslip", 2.0 ** np.arange(7, 17), own), ("LSODA", tolerances, lsoda),
-                     ("Radau", tolerances[:6], radau)], rounds)  # fmt: skip
+    tolerances = 10.0 ** -np.arange(3, 11, 0.5)
+    compared(exact, [("microslip", SAMPLES * np.array([2.0, 3, 4, 5, 6, 8, 16, 32, 64]), own),
+                     ("LSODA", tolerances, lsoda), ("Radau", tolerances[:8], radau)], rounds)  # fmt: skip
 
 
 def ring(blades: int, periods: int, rounds: int) -> None:
@@ -159,8 +159,10 @@ def ring(blades: int, periods: int, rounds: int) -> None:
 
     exact = read(reference.solve(rates, begin, times[1:], 1e-10).y[1:].T)
     print(f"\n## Ring of {blades} blades, {periods} periods, {len(begin)} unknowns\n")
-    compared(exact, [("microslip", 2.0 ** np.arange(6, 18), own), ("LSODA", 10.0 ** -np.arange(3, 9), scipy("LSODA")),
-                     ("Radau", 10.0 ** -np.arange(3, 8), scipy("Radau"))], rounds)  # fmt: skip
+    tolerances = 10.0 ** -np.arange(3, 9, 0.5)
+    compared(exact, [("microslip", SAMPLES * np.array([1.0, 2, 3, 4, 6, 8]), own),
+                     ("LSODA", tolerances, scipy("LSODA")),
+                     ("Radau", tolerances[:6], scipy("Radau"))], rounds)  # fmt: skip
 
 
 def rub(revolutions: int, rounds: int) -> None:

@@ -361,6 +361,32 @@ def test_inertia_from_mbdyns_invariants_is_that_of_the_deformed_body(tmp_path: P
     close(J0 + first + first.T - second, inertia(b, q), 1e-11)
 
 
+def test_equations_of_motion_from_mbdyns_groups_are_those_of_the_floating_frame(tmp_path: Path) -> None:
+    """The terms of the modal joint's equations in its local frame, by the invariants, against Sextro (2.3-23)."""
+    basis = body()
+    writer("mbdyn")(basis, tmp_path / "b.fem")
+    read, b = read_fem(tmp_path / "b.fem"), floating_body(basis, stiffened=False)
+    m, rng = b.n_modes, np.random.default_rng(8)
+    q, velocity, w = 1e-3 * rng.normal(size=m), rng.normal(size=m), 100 * rng.normal(size=3)
+    mass, centre, about = read[12][0], read[12][1:4], read[12][4:].reshape(3, 3)
+    Inv3, Inv4, Inv5 = read[14].reshape(3, m), read[15].reshape(3, m), read[17].reshape(3, m, m)
+    Inv8, Inv9 = read[16].reshape(3, m, 3).transpose(1, 0, 2), read[18].reshape(3, m, m, 3).transpose(1, 2, 0, 3)
+    S, T = mass * centre + Inv3 @ q, Inv4 + np.einsum("akl,k->al", Inv5, q)
+    bent = Inv8 - np.einsum("jlab,j->lab", Inv9, q)  # -(r + phi q)~ phi~_l over the mass
+    J = about + mass * (centre @ centre * np.eye(3) - np.outer(centre, centre))
+    J = J + np.einsum("lab,l->ab", Inv8 + Inv8.transpose(0, 2, 1), q) - np.einsum("jlab,j,l->ab", Inv9, q, q)
+    M = mass_matrix(b, q)
+    close(M[3:6, :3], skew(S))
+    close(M[3:6, 3:6], J, 1e-11)
+    close(M[6:, 3:6].T, T)
+    rest, turn = -right_side(b, w, q, velocity), skew(w)
+    close(rest[:3], turn @ turn @ S + 2 * turn @ Inv3 @ velocity)
+    close(rest[3:6], turn @ J @ w + 2 * np.einsum("lab,l,b->a", bent, velocity, w), 1e-11)
+    centrifugal = -np.einsum("a,kba,b->k", w, bent, w)
+    coriolis = -2 * np.einsum("akl,l,a->k", Inv5, velocity, w)
+    close(rest[6:], centrifugal + coriolis + read[10] @ q + read[13] @ velocity, 1e-11)
+
+
 # --- pyHarm -----------------------------------------------------------------------------------------------------------
 
 

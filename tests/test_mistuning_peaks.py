@@ -114,7 +114,21 @@ def test_a_contact_that_opens() -> None:
         walks.append(np.array([0.0 if (y := walk(f)) is None else y.max() for f in grid]))
     top = max(walk.max() for walk in walks)
     ring = Sliding(asked.problem(tuned.whole))
-    found = highest(ring, np.arange(342.0, 358.0, 5.0), follow=ring.follow)
+    found = highest(ring, np.arange(342.0, 358.0, 5.0), follow=ring.follow, at_once=ring.at_once)
     assert found.missed < 0.1
     assert top / found.amplitude - 1 <= found.missed
     assert max(walks[0]) < 0.8 * top
+
+
+def test_a_sweep_goes_from_both_ends_to_where_nothing_leads_further() -> None:
+    """What is between is looked for from above, and the peak is that of a plain sweep."""
+    curve, truth = one(101.3, 0.01, np.random.default_rng(0))
+    grid, looked = np.arange(95.0, 110.0, 1.0), list[float]()
+
+    def respond(f: float) -> np.ndarray:
+        looked.append(f)
+        return curve(f)
+
+    found = highest(respond, grid, at_once=lambda f: None if 100.5 < f < 103.5 else curve(f))
+    assert looked[:3] == [103.0, 102.0, 101.0] and not set(looked[3:]) & set(grid)
+    assert found.amplitude == highest(curve, grid).amplitude == pytest.approx(truth, rel=1e-4)

@@ -173,6 +173,32 @@ def test_jumps_are_of_second_order(rolling: wearing.Rolling) -> None:
     assert order == pytest.approx(2, abs=0.35)
 
 
+@pytest.mark.slow
+def test_profiles_are_renewed_as_they_wear(case: VehicleCase, rolling: wearing.Rolling) -> None:
+    """Of an order between one and two, 0.04 um off in one jump; the volume is the coefficient times the work.
+
+    The contact widens, so that three crests wear off faster than on wheels that touch as new ones; a groove that splits
+    the contact ends it.
+    """
+    renewed = replace(rolling, profile=case.profiles(CASE.parent, rolling.tread.y))
+    far, ends = 3e5, []
+    for count in (1, 2, 4):
+        *_, (last, jump) = wearing.jumps(renewed, far, 1.0, far / count, fixed=True)
+        ends.append(last.radius[:, 0])
+        np.testing.assert_allclose(jump.volume, rolling.tread.coefficient * jump.work, rtol=1e-10)
+    off = [np.abs(e - ends[-1]).max() for e in ends[:-1]]
+    assert off[0] < 1e-7 and off[0] / off[1] > 3.1  # 3 of first order, 5 of second
+    *_, (kept, _) = wearing.jumps(rolling, far, 1.0, far, fixed=True)
+    assert last.one.on.b.mean() > 1.1 * kept.one.on.b.mean()
+    worn = [
+        wearing.orders_of(rolling.shape, 3)[2, 0] - wearing.orders_of(r, 3)[2, 0] for r in (last.radius, kept.radius)
+    ]
+    assert worn[0] > 2 * worn[1] > 0
+    depth = 1.3 * wearing.deepest(rolling.vehicle) / last.depth.max() * last.depth
+    with pytest.raises(wearing.LeavesTheRail, match="groove"):
+        renewed.renewed(depth)
+
+
 def test_three_crests_wear_as_the_figure_says(rolling: wearing.Rolling) -> None:
     """Fig. 6.9-1: wear shows three maxima, shifted against those of the wheel, and three more of the creepage."""
     now = wearing.running(rolling, np.zeros((2, PLACES, len(rolling.tread.y))), 0.0)
@@ -193,7 +219,8 @@ def test_a_round_wheel_stays_round(rolling: wearing.Rolling) -> None:
 
 # --- the command line ----------------------------------------------------------------------------------------------
 
-SHORT = ("running.places=48", "running.orders=6", "running.speeds=[]", 'running.creep="linear"', "running.turns=1e5")
+SHORT = ("running.places=48", "running.orders=6", "running.speeds=[]", 'running.creep="linear"', "running.turns=1e5",
+         'wear.profile="kept"')  # fmt: skip
 
 
 def asked(*changes: str) -> list[str]:

@@ -29,7 +29,7 @@ LEFT = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class Sides:
-    """The m sides of n contacts, of k coordinates at most.
+    """The m sides of n contacts, of k coordinates at most that the contacts feel.
 
     Attributes:
         contact, part: (m,) numbers of theirs. sign: (m,). at: (m, k) their coordinates among all, whose number where
@@ -91,7 +91,7 @@ def _of_coefficients(M: ComplexArray) -> Array:
         cos, sin = 2 * h - 1, 2 * h
         out[:, cos, :, cos] = out[:, sin, :, sin] = M[:, h].real
         out[:, cos, :, sin], out[:, sin, :, cos] = M[:, h].imag, -M[:, h].imag
-    return out.reshape(q, (2 * H - 1) * k, -1)
+    return out.reshape(q, (2 * H - 1) * k, (2 * H - 1) * k)
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,29 +145,24 @@ class Joints:
         off = force - self._across(self._felt(dv))
         return dv if np.abs(off).max(initial=0.0) <= LEFT * np.abs(force).max(initial=0.0) else None
 
-    @cached_property
-    def _active(self) -> Indices:
-        """(a,) coordinates that the forces of any contact feel."""
-        return np.flatnonzero(np.abs(self.slopes).max(axis=(0, 1, 2, 4), initial=0.0) > 0)
-
     def _felt(self, v: Array) -> Array:
-        """(n, W, a) relative motions that the contacts feel, from (W, c)."""
+        """(n, W, k) relative motions that the contacts feel, from (W, c)."""
         s = self.sides
-        own = np.hstack([v, np.zeros((len(v), 1))])[:, s.at[:, self._active]].transpose(1, 0, 2)
+        own = np.hstack([v, np.zeros((len(v), 1))])[:, s.at].transpose(1, 0, 2)
         out = np.zeros((len(self.slopes), *own.shape[1:]))
         np.add.at(out, s.contact, s.sign[:, None, None] * own)
         return out
 
     @cached_property
-    def _felt_slopes(self) -> Array:
-        """(n, W k, W a) S, both ordered by harmonics."""
+    def _matrices(self) -> Array:
+        """(n, W k, W k) S, ordered by harmonics."""
         n, k, W, *_ = self.slopes.shape
-        return self.slopes[:, :, :, self._active].transpose(0, 2, 1, 4, 3).reshape(n, W * k, -1)
+        return self.slopes.transpose(0, 2, 1, 4, 3).reshape(n, W * k, W * k)
 
     def _across(self, d: Array) -> Array:
         """(n, W, k) forces S d."""
-        force = self._felt_slopes @ d.reshape(len(self.slopes), -1, 1)
-        return force.reshape(len(self.slopes), self.coefficients, -1)
+        n, k, W, *_ = self.slopes.shape
+        return (self._matrices @ d.reshape(n, W * k, 1)).reshape(n, W, k)
 
     def _answered(self, force: Array) -> Array:
         """(W, c) A^-1 D E^T of forces."""
@@ -183,14 +178,13 @@ class Joints:
     def _relative(self) -> Matrix:
         """1 + E A^-1 D E^T S, contact by contact."""
         pieces: dict[tuple[int, int], Array] = {}
-        (n, k, W, *_), s, active = self.slopes.shape, self.sides, self._active
+        (n, k, W, *_), s = self.slopes.shape, self.sides
         for one in self.alone or []:
             i, j = s.contact[one.pairs]
-            felt = one.between.reshape(-1, W, k, W * k)[:, :, active].reshape(len(i), -1, W * k)
-            found = felt @ (np.prod(s.sign[one.pairs], axis=0)[:, None, None] * self._felt_slopes[j])
+            found = one.between @ (np.prod(s.sign[one.pairs], axis=0)[:, None, None] * self._matrices[j])
             for key, block in zip(zip(i.tolist(), j.tolist(), strict=True), found, strict=True):
                 pieces[key] = pieces[key] + block if key in pieces else block
-        return one_plus(pieces, [len(active)] * n, W, by_parts=True)
+        return one_plus(pieces, [k] * n, W, by_parts=True)
 
 
 def _applied(D: ComplexArray, v: Array) -> Array:

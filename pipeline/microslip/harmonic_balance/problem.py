@@ -173,6 +173,12 @@ class Problem:
         return out
 
     @cached_property
+    def felt(self) -> list[Array]:
+        """Of each group (n, k) whether a coordinate moves points of the patch."""
+        patches = [[self.assembly.contacts[i].patch for i in g.contacts] for g in self.groups]
+        return [np.array([np.abs(one.kinematics).max(axis=(0, 1)) > 0 for one in each]) for each in patches]
+
+    @cached_property
     def eliminated(self) -> tuple[Eliminated, ...]:
         """Of each part, what does not depend on the frequency."""
         return tuple(Eliminated(one, k) for one, k in zip(zip(*self.parts, strict=True), self.stiffness, strict=True))
@@ -199,8 +205,14 @@ class Problem:
         return [np.searchsorted(numbers, g.contacts) for g in self.groups]
 
     @cached_property
+    def ways(self) -> Indices:
+        """(a,) which coordinates of a contact move points of any patch."""
+        most = max((f.shape[1] for f in self.felt), default=0)
+        return np.flatnonzero([any(f[:, i : i + 1].any() for f in self.felt) for i in range(most)])
+
+    @cached_property
     def sides(self) -> Sides:
-        """Of all contacts, counted as in `ranks`."""
+        """Of all contacts, counted as in `ranks`, with the coordinates of `ways`."""
         begins, of = np.array(self.begins), list[tuple[int, float, Indices]]()
         for g, ranks in zip(self.groups, self.ranks, strict=True):
             for coordinates, sign in ((g.first, 1.0), (g.second, -1.0)):
@@ -210,6 +222,7 @@ class Problem:
         for row, (*_, own) in zip(at, of, strict=True):
             row[: len(own)] = own
         part = np.searchsorted(begins, at[:, 0], "right") - 1
+        at = at[:, self.ways]
         inside = np.where(at < self.count, at - begins[part, None], -1)
         return Sides(np.array([i for i, *_ in of]), part, np.array([sign for _, sign, _ in of]), at, inside)
 
@@ -302,12 +315,13 @@ class AtFrequency:
     def secant(self, slopes: list[Array], before: Tried, after: Tried) -> list[Array]:
         """Derivatives of the contact forces that tell the change of each contact's force from one motion to another.
 
-        Broyden's update: of all derivatives that do, the nearest, coordinates counted in units of x. Contacts know of
-        no frequency, so what a contact shows here serves at the next one too.
+        Broyden's update: of all derivatives that do, the nearest, coordinates counted in units of x, those left out
+        that move no point of the patch. Contacts know of no frequency, so what a contact shows here serves at the next
+        one too.
         """
-        out = []
-        for g, S, (u_0, F_0), (u_1, F_1) in zip(self.problem.groups, slopes, before, after, strict=True):
-            way = (u_1 - u_0) / (unit := self.problem.scale[g.first][..., None])
+        out, p = [], self.problem
+        for g, felt, S, (u_0, F_0), (u_1, F_1) in zip(p.groups, p.felt, slopes, before, after, strict=True):
+            way = felt[..., None] * (u_1 - u_0) / (unit := p.scale[g.first][..., None])
             size = np.sum(way**2, axis=(1, 2), keepdims=True)
             along = np.divide(way, size * unit, out=np.zeros_like(way), where=size > 0)
             missed = F_1 - F_0 - np.einsum("nkwlz,nlz->nkw", S, u_1 - u_0)
@@ -360,10 +374,11 @@ class AtFrequency:
         p = self.problem
         if len(p.slices) == 1 and len(p.sides.contact) <= RELATIVE_AT_MOST:
             return self._of_sides(slopes)
-        n, k, W = sum(map(len, p.ranks)), p.sides.at.shape[1], p.coefficients
-        S = np.zeros((n, k, W, k, W))
+        n, a, W = sum(map(len, p.ranks)), len(p.ways), p.coefficients
+        S = np.zeros((n, a, W, a, W))
         for i, own in zip(p.ranks, slopes, strict=True):
-            S[i, : own.shape[1], :, : own.shape[1]] = own
+            has = p.ways[p.ways < own.shape[1]]
+            S[i, : len(has), :, : len(has)] = own[:, has][:, :, :, has]
         return Joints(self._alone, S, p.sides, p.scale, partial(self._of_sides, slopes))
 
     @cached_property

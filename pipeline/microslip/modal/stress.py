@@ -12,8 +12,8 @@ from ..fem.discretise import Block
 from ..topology import CELL_TYPES
 from .equilibrium import BodyModel, StaticState, cauchy, thermal_stretch
 
-_CHUNK = 2_000_000
-"""Numbers of a gradient made at a time: it stays in the caches."""
+_CHUNK = 250_000
+"""Numbers of a gradient made at a time: it stays in the caches, and fresh memory is dear."""
 
 
 def modal_strain(block: Block, phi: Array, F: Array | None, out: Array) -> None:
@@ -46,7 +46,7 @@ def gauss_set(model: BodyModel, state: StaticState, phi: Array) -> StressSet:
         own = slice(first, first + block.dx.size)
         part = strain[own].reshape(*block.dx.shape, 6, m)
         modal_strain(block, phi, F, part)
-        stress[own] = _hooke(model, i, part, F).reshape(-1, 6, m)
+        _hooke(model, i, part, F, stress[own].reshape(part.shape))
         first += block.dx.size
     points = [np.einsum("qk,eki->eqi", b.N, model.d.mesh.points[b.cells]).reshape(-1, 3) for b in blocks]
     static = [cauchy(state, i).reshape(-1, 6) for i in range(len(blocks))]
@@ -54,15 +54,16 @@ def gauss_set(model: BodyModel, state: StaticState, phi: Array) -> StressSet:
     return StressSet("gauss", np.concatenate(points), strain, stress, np.concatenate(static), volumes)
 
 
-def _hooke(model: BodyModel, block: int, strain: Array, F: Array | None) -> Array:
+def _hooke(model: BodyModel, block: int, strain: Array, F: Array | None, out: Array) -> None:
     """Stress of modal strain. About a nonlinear state with the Hooke matrix of the deformed body: the change of the
     Cauchy stress seen by the material (Truesdell's rate), which adds to the static Cauchy stress. Heat alone does not
     deform the material, so that its part in F is taken out."""
     C = model.materials[block].elasticity
     if F is not None:
         C = pushed(C, F if model.thermal_strain is None else F @ np.linalg.inv(thermal_stretch(model, block)))
-    stress = np.matmul(C, strain)
-    return stress if model.factor is None else stress * model.factor[block][:, :, None, None]
+    np.matmul(C, strain, out=out)
+    if model.factor is not None:
+        out *= model.factor[block][:, :, None, None]
 
 
 def smoother(block: Block, n_points: int) -> tuple[sp.csr_matrix, Array]:

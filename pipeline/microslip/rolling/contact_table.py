@@ -6,6 +6,7 @@ and half of the yaw, as a yaw to the other side turns only what is ahead.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -130,9 +131,9 @@ class ContactTable(NamedTuple):
         if not (np.isfinite([*given, *loads.T]).all() and (given[2] > 0).all() and least >= 0):
             raise UserError("speed, friction, load: must be finite, speed positive, friction and load 0 or more")
         size = POSES if n > 1 else 1
-        blocks = [np.minimum(np.arange(i, i + size), n - 1) for i in range(0, n, size)]
-        found = [_rolling(self, *(v[block] for v in given), loads[block]) for block in blocks]
-        return jax.tree.map(lambda *parts: np.concatenate(parts)[:n], *found)
+        which = np.minimum(np.arange(-(-n // size) * size), n - 1).reshape(-1, size)
+        found = [_rolling(self, *(v[which[run]] for v in (*given, loads))) for run in strips.runs(n, size)]
+        return jax.tree.map(lambda *parts: np.concatenate([p.reshape(-1, *p.shape[2:]) for p in parts])[:n], *found)
 
     def sentence(self) -> str:
         """What it is worth."""
@@ -167,7 +168,10 @@ def forces(
     return _rolled(patches, pose, speed, turning, friction, (xi, eta, phi), table.shear, table.poisson, weights[-1])
 
 
-_rolling = program(forces)
+@program
+def _rolling(table: ContactTable, *given: Array) -> Rolling:
+    """Of (blocks, n) arrays, block after block."""
+    return jax.lax.map(lambda of: forces(table, *of), given)
 
 
 def _mirrored(p: Patches) -> Patches:
@@ -236,13 +240,13 @@ def _mean(values: Array, weights: tuple[Array, ...]) -> Array:
 
 def contact_table(
     track: Track, load: float, lateral: float, yaw: float, *, points: tuple[int, int] = POINTS, checked: int = 100,
-    seed: int = 0,
+    seed: int = 0, report: Callable[[str], None] = lambda _: None,
 ) -> ContactTable:  # fmt: skip
     """A table over poses, and its error at random ones.
 
     Args:
         load: vertical, on each wheel, N. lateral, yaw: reach to either side, m and rad. points: of the shift to one
-            side from 0, and of the yaw. checked: poses.
+            side from 0, and of the yaw. checked: poses. report: told every tenth of the work.
 
     Raises:
         UserError: a pose in which the profiles do not touch, or touch where one ends.
@@ -251,7 +255,7 @@ def contact_table(
         raise UserError("load, lateral, yaw: must be positive; points: four or more of the shift, two of the yaw")
     shifts, turns = np.linspace(0.0, lateral, points[0]), yaw * np.sqrt(np.linspace(0.0, 1.0, points[1]))
     turns[0] = LEAST * yaw
-    p, roll, down = _found(track, load, np.tile(shifts, points[1]), np.repeat(turns, points[0]))
+    p, roll, down = _found(track, load, np.tile(shifts, points[1]), np.repeat(turns, points[0]), report=report)
     by_yaw = [v.reshape(*points[::-1], *v.shape[1:]) for v in (*p, roll, down)]
     *sides, roll, down = by_yaw
     whole = Patches(*(np.concatenate([v[:, :0:-1, 0], v[:, :, 1]], axis=1) for v in sides))
@@ -267,11 +271,14 @@ LEAST = 1e-3
 
 
 def _found(
-    track: Track, load: float, lateral: Array, yaw: Array, rolls: Array | None = None
-) -> tuple[Patches, Array, Array]:
+    track: Track, load: float, lateral: Array, yaw: Array, rolls: Array | None = None,
+    report: Callable[[str], None] = lambda _: None,
+) -> tuple[Patches, Array, Array]:  # fmt: skip
     """`Patches` (n, 2, k) of n poses, both as right wheels, the left one's of the mirrored pose; roll and down (n,)."""
     found, roll = [], 0.0
     for k, (y, turn) in enumerate(zip(lateral, yaw, strict=True)):
+        if k % -(-len(lateral) // 10) == 0:
+            report(f"table of contacts: {k} of {len(lateral)} poses")
         try:
             left, right, pose = axle(track, Pose(y, turn, roll if rolls is None else rolls[k]), 2 * load, even=True)
         except UserError as error:

@@ -107,8 +107,7 @@ def _contacts(stage: Stage, found: Studied) -> ContactTable | None:
     asked = found.case.contacts
     if asked is None:
         return None
-    stage.report("table of contacts")
-    return contact_table(found.track, found.case.vertical_force, **asked.model_dump())
+    return contact_table(found.track, found.case.vertical_force, **asked.model_dump(), report=stage.report)
 
 
 def _wearing(stage: Stage, found: Studied, folder: Path) -> Wearing | None:

@@ -20,7 +20,8 @@ class Bodies(NamedTuple):
             braking: of friction that follows the velocity alone, None: there is none. F_0: (c,). D: (c, m) and
             D_o (c, n): d of the contact coordinates. rate: (n, n) o' over o. kick: (m, c) velocities per force.
         omega2: (b, p). steady: (b, 2 p, n) of the periodic motion without contacts. reach: (points,) norm of their
-            motion by modes, drift: (points,) m/s of the steady motion at most: see `_leap`. loads: (b, p, n) modal
+            motion by modes, and m/s of the steady motion at most; bends: the same of how their velocities change,
+            1/s and m/s2: see `loop`. loads: (b, p, n) modal
             forces of o that kick, of a run-up. enough: see `fourth`.
     """
 
@@ -34,8 +35,8 @@ class Bodies(NamedTuple):
     rate: Any
     omega2: Any
     steady: Any
-    reach: Any
-    drift: Any
+    reach: tuple[Any, Any]
+    bends: tuple[Any, Any]
     loads: Any
     kick: Any
     enough: Any
@@ -50,7 +51,7 @@ class Now(NamedTuple):
         energy: (6,) J since the start: given by loads, taken by dampers, done on contacts, lost there for good, what
             contacts store now, and what moving ground gave them. worst: m, the largest residual of an implicit contact.
         met: (4, contacts) the events of the last step, at: when, s. memory: of `fourth`, what the laws' differential
-            equations remember (k, n) and its rate, group by group, and (b, p) how the accelerations were bent, m/s4.
+            equations remember (k, n) and its rate, group by group, and how the accelerations were bent.
             level: of `fourth`, k of the next step's 2^k.
     """
 

@@ -73,36 +73,29 @@ def _whole(move: Array, turn: Array) -> Array:
 
 
 def _one_step(e: Equations, tau: float, b: int, p: int) -> tuple[Array, ...]:
-    """move (b, 2 p, 2 p + n), turn, and both quadratic forms of one step."""
-    n = e.turning.shape[0]
-    modes = np.arange(b * p).reshape(b, p)
-    moves, S, L = list[Array](), list[Array](), list[Array]()
-    for at in modes:
-        A = np.zeros((2 * p + n, 2 * p + n))
-        A[:p, p : 2 * p] = np.eye(p)
-        A[p : 2 * p, :p] = -np.diag(e.omega2[at])
-        A[p : 2 * p, p : 2 * p] = -e.C[np.ix_(at, at)]
-        A[p : 2 * p, 2 * p :] = e.B[at]
-        A[2 * p :, 2 * p :] = e.turning
-        lost, given = np.zeros_like(A), np.zeros_like(A)
-        lost[p : 2 * p, p : 2 * p] = e.C[np.ix_(at, at)]
-        given[p : 2 * p, 2 * p :] = e.B[at]
-        full = scipy.linalg.expm(A * tau)
-        moves.append(full[: 2 * p])
-        for kept, Q in ((S, given), (L, lost)):
-            kept.append(_integral(A, 0.5 * (Q + Q.T), tau))
-    return np.array(moves), scipy.linalg.expm(e.turning * tau), np.array(S), np.array(L)
+    """move (b, 2 p, 2 p + n), turn, and both quadratic forms of one step, of all blocks together."""
+    s, q, v, o = 2 * p + e.turning.shape[0], slice(p), slice(p, 2 * p), slice(2 * p, None)
+    at = np.arange(b * p).reshape(b, p)
+    C, A = e.C[at[:, :, None], at[:, None, :]], np.zeros((b, s, s))
+    A[:, q, v], A[:, v, q] = np.eye(p), -e.omega2[at][:, :, None] * np.eye(p)
+    A[:, v, v], A[:, v, o], A[:, o, o] = -C, e.B[at], e.turning
+    lost, given = np.zeros_like(A), np.zeros_like(A)
+    lost[:, v, v], given[:, v, o] = C, e.B[at]
+    full = scipy.linalg.expm(A * tau)
+    S, L = (_integral(A, 0.5 * (Q + Q.transpose(0, 2, 1)), tau) for Q in (given, lost))
+    return full[:, : 2 * p], scipy.linalg.expm(e.turning * tau), S, L
 
 
 def _integral(A: Array, Q: Array, tau: float) -> Array:
-    """The integral of expm(A^T s) Q expm(A s) over tau: by doubling from a step so short that its series converges."""
-    n = len(A)
-    halvings = max(0, int(np.ceil(np.log2(max(np.abs(A).sum(axis=1).max(initial=0.0) * tau, 1e-300)))) + 1)
+    """The integrals of expm(A^T s) Q expm(A s) over tau: by doubling from a step so short that its series converges."""
+    n = A.shape[1]
+    halvings = max(0, int(np.ceil(np.log2(max(np.abs(A).sum(axis=2).max(initial=0.0) * tau, 1e-300)))) + 1)
     short = tau / 2**halvings
-    both = scipy.linalg.expm(np.block([[-A.T, Q], [np.zeros((n, n)), A]]) * short)
-    step = both[n:, n:]
-    found = step.T @ both[:n, n:]
+    rows = np.concatenate([-A.transpose(0, 2, 1), Q], axis=2), np.concatenate([0 * A, A], axis=2)
+    both = scipy.linalg.expm(np.concatenate(rows, axis=1) * short)
+    step = both[:, n:, n:]
+    found = step.transpose(0, 2, 1) @ both[:, :n, n:]
     for _ in range(halvings):
-        found = found + step.T @ found @ step
+        found = found + step.transpose(0, 2, 1) @ found @ step
         step = step @ step
-    return 0.5 * (found + found.T)
+    return 0.5 * (found + found.transpose(0, 2, 1))

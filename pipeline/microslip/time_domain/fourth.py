@@ -6,10 +6,11 @@ The flow between kicks being exact, with N the accelerations by contacts,
 
 are the weights of the classical Runge-Kutta method in the coordinates that flow (J. D. Lawson, SIAM J. Numer. Anal. 4,
 1967); N_2 to N_4 are what contacts say in its stages, and what they remember goes along with the same weights. N_5,
-where the step ends, is N_1 of the next one. What the step misses is estimated by h (N_4 - N_5) / 6, of third order, and
-by how much N is bent otherwise than in the step before: so a kink is seen wherever in the step a contact closes, opens
-or begins to slide. Where that is too much the step is done again in halves, down to a 512th, so that no more is
-lost there than in a step of the smooth motion.
+where the step ends, is N_1 of the next one. What the step misses is estimated by h (N_4 - N_5) / 6, of third order, to
+the power that makes it one of fourth; and by how much N is bent otherwise than in the steps before: a jump of N within
+a step, h (N_1 - N_2 - N_3 + N_5) / 3, is what Simpson's weights miss of it at most. So a kink is seen wherever in the
+step a contact closes, opens or begins to slide. Where that is too much the step is done again in halves, down to a
+512th, so that no more is lost there than in a step of the smooth motion.
 """
 
 from __future__ import annotations
@@ -31,7 +32,6 @@ MISSED = 1e-3
 GROWS = 40.0
 """How many times smaller than it may be the estimate of a step is after which the next one is twice as long."""
 
-
 SLOW = 0.03
 """Over the fastest frequency, s: laws that follow the motion more quickly would make steps too short."""
 
@@ -47,6 +47,15 @@ class Answer(NamedTuple):
     v: Any
 
 
+class Bent(NamedTuple):
+    """bent: (b, p) second differences of the accelerations in the last step, m/s4, slope: how they change, m/s5; h: s,
+    that step."""
+
+    bent: Any
+    slope: Any
+    h: Any
+
+
 def begun(groups: tuple[Group, ...], B: Bodies, now: Now) -> Now:
     """With what the contacts remember, and their forces by that."""
     x = tuple(
@@ -55,7 +64,13 @@ def begun(groups: tuple[Group, ...], B: Bodies, now: Now) -> Now:
     )
     first = _answer(groups, B, now.y, now.o, x, now.time)
     held = now.held._replace(force=joined(groups, first.points), forces=first.points)
-    return now._replace(push=first.push, held=held, memory=(x, first.rates, 0 * first.push), level=jnp.full((), 1, int))
+    straight = Bent(0 * first.push, 0 * first.push, jnp.zeros(()))
+    return now._replace(push=first.push, held=held, memory=(x, first.rates, straight), level=jnp.full((), 1, int))
+
+
+def forgotten(memory: tuple) -> tuple:
+    """Of contacts that were open all along."""
+    return jax.tree_util.tree_map(jnp.zeros_like, memory)
 
 
 def _answer(groups: tuple[Group, ...], B: Bodies, y: Any, o: Any, x: tuple[Any, ...], time: Any) -> Answer:
@@ -74,7 +89,7 @@ def _answer(groups: tuple[Group, ...], B: Bodies, y: Any, o: Any, x: tuple[Any, 
 def step(options: Options, groups: tuple[Group, ...], B: Bodies, k: Any, now: Now) -> tuple[Any, Now]:
     """Whether 2^k steps were done, and where the motion is then; where they were not, what is to be tried."""
     p, h, half = B.omega2.shape[1], B.flow.length[k], B.flow.length[k - 1]
-    x, rates, bent_before = now.memory
+    x, rates, _ = now.memory
     o = times(B.flow.turn[k - 1], now.o), times(B.flow.turn[k], now.o)
     stack = B.flow.stack[k - 1]
     moves = stack[:, : 2 * p]
@@ -102,10 +117,10 @@ def step(options: Options, groups: tuple[Group, ...], B: Bodies, k: Any, now: No
     x = grown(h / 6, rates, two.rates, two.rates, three.rates, three.rates, four.rates)
     last = _answer(groups, B, y, o[1], x, now.time + h)
     held = _held(options, groups, h, now, last, x)
-    bent = (now.push - two.push - three.push + last.push) / h**2
-    missed = h / 6 * jnp.sqrt(jnp.sum((four.push - last.push) ** 2) + jnp.sum((0.5 * h**2 * (bent - bent_before)) ** 2))
-    size = jnp.sqrt(jnp.sum(y[:, p:] ** 2 + jnp.abs(B.omega2) * y[:, :p] ** 2))
-    done, level = _judged(options, k, now.level, missed, B.enough * size)
+    size = _norm(jnp.concatenate([y[:, p:], jnp.sqrt(jnp.abs(B.omega2)) * y[:, :p]])) + 1e-300
+    bent, third, kink = _missed(h, now, two.push + three.push, four.push, last.push)
+    third = third / size
+    done, level = _judged(options, k, now.level, 2 * third * jnp.sqrt(jnp.sqrt(third)) + kink / size, B.enough)
     energy = now.energy.at[:3].add(energy).at[3].add(held.lost).at[4].set(held.stored).at[5].add(held.given)
     after = now._replace(
         y=y, o=o[1], time=now.time + h, push=last.push, held=held, energy=energy, memory=(x, last.rates, bent)
@@ -114,10 +129,29 @@ def step(options: Options, groups: tuple[Group, ...], B: Bodies, k: Any, now: No
     return done, after._replace(level=level)
 
 
+def exponent(x: Any) -> Any:
+    """Largest k with 2^k <= x, x > 0: the binary exponent of a float64, which costs less than its logarithm."""
+    bits = jax.lax.bitcast_convert_type(jnp.asarray(x, float), jnp.int64)
+    return (bits >> 52) - 1023
+
+
+def _norm(x: Any) -> Any:
+    return jnp.sqrt(jnp.sum(x**2))
+
+
+def _missed(h: Any, now: Now, middle: Any, four: Any, five: Any) -> tuple[Bent, Any, Any]:
+    """How N is bent in a step; what the step misses of velocities by third order, and by a kink."""
+    before, between = now.memory[2], 0.5 * (h + now.memory[2].h)
+    bent = (now.push - middle + five) / h**2
+    as_before = [0.0, before.bent, before.bent + between * before.slope]
+    kink = h**3 / 3 * jnp.min(jnp.stack([_norm(bent - expected) for expected in as_before]))
+    return Bent(bent, (bent - before.bent) / between, h), h / 6 * _norm(four - five), kink
+
+
 def _judged(options: Options, k: Any, level: Any, missed: Any, enough: Any) -> tuple[Any, Any]:
     """Whether a step is good, and which one is to be tried then."""
     done = ~(missed > enough) | (k <= 1)
-    fewer = jnp.clip(jnp.floor(0.25 * jnp.log2(enough / (missed + 1e-300))), -4, -1).astype(int)
+    fewer = jnp.clip(exponent(jnp.sqrt(jnp.sqrt(enough / (missed + 1e-300)))), -4, -1)
     longer = jnp.where(GROWS * missed < enough, jnp.maximum(level, k + 1), level)
     return done, jnp.clip(jnp.where(done, longer, k + fewer), 1, options.halvings)
 

@@ -1,7 +1,8 @@
 """The compiled loop: steps from sample to sample, leaps where nothing touches, and events.
 
 Where nothing touches, the gap is at least g, and no point comes nearer faster than V by the energy of the motion about
-the steady one: a leap of g / V is exact and misses no impact, however fast the bodies ring.
+the steady one, nor does its velocity change faster than A: leaps of g / V, or of t with closing t + A t^2 / 2 = g, are
+exact and miss no impact, however fast the bodies ring (gaps are convex in the way of a point).
 """
 
 from __future__ import annotations
@@ -14,7 +15,13 @@ import jax.numpy as jnp
 
 from . import fourth, kicks
 from .bodies import Bodies, Listed, Now, Options, Seen
-from .contacts import Group, Held, times
+from .contacts import Group, Held, moved, parts, times
+
+LEAST = 4.0
+"""Shortest steps that are leapt over at once; nearer to a contact they are gone one by one."""
+
+ROUNDING = 1e-6
+"""Share of a leap that is left out, so that rounding does not bring it into contact."""
 
 
 @partial(jax.jit, static_argnums=0)
@@ -55,27 +62,59 @@ def run(
 
 def one_step(options: Options, groups: tuple[Group, ...], B: Bodies, left: Any, now: Now) -> tuple[Any, Now]:
     """A step, or a leap over as many as no contact is met in, of those that are left; and what is left then."""
-    k = _leap(groups, B, left, now) if options.leaps else 0
+    steps = _free(groups, B, now) if options.leaps else jnp.zeros(())
+    far = _floor(steps, left)
     if not options.halvings:
-        after = kicks.step(options, groups, B, k, now)
-        met, at = _met(now, after.held, B.flow.length[k])
-        return left - 2**k, after._replace(met=met, at=at)
-    k = jnp.maximum(k, jnp.minimum(now.level, jnp.floor(jnp.log2(left) + 1e-12).astype(int)))
-    done, after = fourth.step(options, groups, B, k, now)
-    met, at = _met(now, after.held, B.flow.length[k])
-    return left - jnp.where(done, 2**k, 0), after._replace(met=met & done, at=at)
+        return left - 2**far, _told(B, far, now, kicks.step(options, groups, B, far, now))
+    near = jnp.minimum(now.level, fourth.exponent(left))
+
+    def leap(now: Now) -> tuple[Any, Now]:
+        after = kicks.step(options, groups, B, far, now)
+        return 2**far, _told(B, far, now, after._replace(memory=fourth.forgotten(now.memory)))
+
+    def step(now: Now) -> tuple[Any, Now]:
+        done, after = fourth.step(options, groups, B, near, now)
+        return jnp.where(done, 2**near, 0), _told(B, near, now, after, done)
+
+    done, after = jax.lax.cond(steps >= LEAST, leap, step, now) if options.leaps else step(now)
+    return left - done, after
 
 
-def _leap(groups: tuple[Group, ...], B: Bodies, left: Any, now: Now) -> Any:
-    """k of the longest leap of 2^k steps, of those that are left, that no point of contact can close its gap in."""
+def _floor(steps: Any, left: Any) -> Any:
+    """k of the longest 2^k steps, one at least, that are no more than these and those that are left."""
+    return fourth.exponent(jnp.minimum(jnp.maximum(steps, 1.0), left))
+
+
+def _free(groups: tuple[Group, ...], B: Bodies, now: Now) -> Any:
+    """Steps in which no point of contact can close its gap."""
     p = B.omega2.shape[1]
     z = now.y - times(B.steady, now.o)
     swings = jnp.sqrt(jnp.sum(z[:, p:] ** 2 + B.omega2 * z[:, :p] ** 2))
-    gaps = -jnp.concatenate([g.law.overlap(u) for g, u in zip(groups, now.held.places, strict=True)])
-    steps = jnp.min(gaps / (B.reach * swings + B.drift + 1e-300)) / B.flow.length[0]
-    longest = jnp.minimum(jnp.maximum(steps, 1.0), left)
-    k = jnp.floor(jnp.log2(longest) + 1e-12).astype(int)
-    return jnp.clip(k, 0, len(B.flow.length) - 1)
+    fastest, bent = (swings * by_swing + steady for by_swing, steady in (B.reach, B.bends))
+    w = times(B.D, now.y[:, p:].reshape(-1)) + times(B.D_o, times(B.rate, now.o))
+    begin, free = 0, []
+    for g, u, rate in zip(groups, now.held.places, parts(groups, w), strict=True):
+        own = slice(begin, begin + len(u))
+        free.append(_unmet(g.law.overlap, u, moved(g, rate), fastest[own], bent[own]))
+        begin += len(u)
+    return jnp.minimum(jnp.min(jnp.concatenate(free)) / B.flow.length[0], 2.0 ** (len(B.flow.length) - 1))
+
+
+def _unmet(overlap: Any, u: Any, w: Any, fastest: Any, bent: Any) -> Any:
+    """(n,) s in which points at u (n, 3) with velocities w meet nothing, if they move no faster and turn no more."""
+    a, closing = jax.jvp(overlap, (u,), (w,))
+    gap, a = jnp.maximum(-a, 0.0), bent + 1e-300
+    root = jnp.sqrt(closing**2 + 2 * a * gap)
+    ahead = (1 - ROUNDING) * jnp.where(closing > 0, 2 * gap / (closing + root + 1e-300), (root - closing) / a)
+    past = overlap(u + ahead[:, None] * w) + 0.5 * a * ahead**2
+    sure = gap / (fastest + 1e-300)
+    return jnp.where(past <= 0, jnp.maximum(ahead, sure), sure)
+
+
+def _told(B: Bodies, k: Any, now: Now, after: Now, done: Any = True) -> Now:
+    """With the events of a step that was done."""
+    met, at = _met(now, after.held, B.flow.length[k])
+    return after._replace(met=met & done, at=at)
 
 
 def _met(before: Now, held: Held, dt: Any) -> tuple[Any, Any]:

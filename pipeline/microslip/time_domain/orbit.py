@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -42,8 +43,8 @@ OF_PERIOD = 512
 STABLE = 1.8
 """Steps times the rate of the contacts above which kicks may grow; they do above 2."""
 
-CHUNK = 16
-"""Periods between two reports."""
+PAUSE = 0.5
+"""s between two reports, about: as long as periods that are left to themselves are done in one call."""
 
 PENETRATES = 1e-6
 """Share of an interference by which a contact may be pressed deeper than it is under the steady loads."""
@@ -416,20 +417,24 @@ def march(
     stepper = Stepper(equations, 2 * np.pi / equations.Omega / (each * samples))
     first = on_its_way(stepper, start) if isinstance(start, Periodic) else stepper.start(*begun(equations, start))
     now, done = kept.begun(first)
+    many, happened, reported = 1, 0, time.monotonic()
     while done < settle + keep:
         before, dense = now, done >= settle
-        ahead = 1 if dense else min(CHUNK, settle - done, samples)
+        ahead = 1 if dense else min(many, settle - done)
         rows = np.full(samples, each) if dense else np.where(np.arange(samples) < ahead, each * samples, 0)
         now, seen, listed, count = stepper.run(now, rows)
-        done += ahead
+        done, happened = done + ahead, happened + count
         if not np.isfinite(seen.mechanical[-1]):
             when, why = _divergence(stepper, before, seen, kept if dense else None)
             return Ended(each * samples, diverged=when, messages=(why,))
         if dense:
             kept.keep(kept_samples.of_period(equations, seen), listed, count - len(listed))
         kept.mark(now, done)
-        if done % CHUNK == 0 or done in (settle, settle + keep):
-            report(f"period {done} of {settle + keep}, {float(now.time):.6g} s")
+        if (late := time.monotonic() - reported >= PAUSE) or done in (settle, settle + keep):
+            met = counted(happened, "event")
+            report(f"period {done} of {settle + keep}, {float(now.time):.6g} s, {met}")
+            reported = time.monotonic()
+        many = max(1, many // 2) if late else min(4 * many, samples)
     error, told = _error(stepper, now, samples, each, settle + keep)
     exponent = _exponent(stepper, now, kept, samples, each, settle + keep)
     more = tuple(text for text in (told, exponent.message if exponent else "") if text)
@@ -485,7 +490,7 @@ def _error(stepper: Stepper, now: Now, samples: int, each: int, done: int) -> tu
     y = [kept_samples.read(e, seen) for _, seen in found]
     size, order = np.abs(y[1]).max(initial=0.0), 4 if stepper.options.halvings else 2
     share = float(np.abs(y[0] - y[1]).max(initial=0.0) / (size or 1.0)) * 2**order / (2**order - 1)
-    parts = _separations(stepper, found[0][0], found[1][0], samples, each, min(AFTER, done // 8))
+    parts = _separations(stepper, found[0][0], found[1][0], samples, each, min(AFTER, done // 8, samples))
     half = len(parts) // 2
     if not half or not np.isfinite(parts).all():
         return min(1.0, share * done), ""
@@ -513,11 +518,14 @@ def _separations(stepper: Stepper, a: Now, b: Now, samples: int, each: int, peri
     if not far(a.y - b.y) > 0 or classification.whole(a.held.states):
         return np.zeros(0)
     b = classification.between(a, b, APART * far(a.y) / far(a.y - b.y))
-    begin, rows, found = far(a.y - b.y), np.where(np.arange(samples) < 1, samples * each, 0), []
-    for _ in range(periods):
-        a, b = (stepper.run(one, rows)[0] for one in (a, b))
-        found.append(far(a.y - b.y) / begin)
-    return np.array(found)
+    begin, rows = far(a.y - b.y), np.where(np.arange(samples) < periods, samples * each, 0)
+    one, other = (_phases(stepper, stepper.run(now, rows)[1])[:periods] for now in (a, b))
+    return np.linalg.norm(one - other, axis=1) / begin
+
+
+def _phases(stepper: Stepper, seen: Seen) -> Array:
+    """(s, 2 m) modal displacements times their frequencies, and velocities."""
+    return np.concatenate([seen.q * np.sqrt(np.abs(stepper.equations.omega2)), seen.q_dot], axis=1)
 
 
 def steps_of_a_sample(e: Equations, samples: int, steps: int | None) -> int:

@@ -107,12 +107,13 @@ class Stepper:
         steady[:, :p] = still.reshape(b, p, n)
         steady[:, p:] = (still @ e.turning).reshape(b, p, n)
         moved, given = self._points
-        reach = np.linalg.norm(moved, axis=(1, 2))
-        drift = np.linalg.norm(np.abs((moved @ still + given) @ e.turning).sum(axis=2), axis=1)
+        sways, w = (moved @ still + given) @ e.turning, np.sqrt(np.abs(e.omega2))
+        reach = np.linalg.norm(moved, axis=(1, 2)), _most(sways)
+        bends = sum(np.linalg.norm(x, axis=(1, 2)) for x in (moved * w, moved @ e.C)), _most(sways @ e.turning)
         D, D_o, F_0 = e.D[rows], e.D_o[rows], jax.device_put(e.F_0[rows])
         R, share = (jax.device_put(x[np.ix_(rows, rows)]) for x in (e.R, e.yields))
         loads = (np.zeros((b * p, n)) if e.push is None else e.push).reshape(b, p, n)
-        arrays = (D, D_o, e.turning, e.omega2.reshape(b, p), steady, reach, drift, loads, -D.T)
+        arrays = (D, D_o, e.turning, e.omega2.reshape(b, p), steady, reach, bends, loads, -D.T)
         halvings = self.options.halvings
         flows = flow(e, self.tau / 2**halvings, halvings + (DOUBLINGS if self.options.leaps else 0))
         yielding = Yielding(R, share, F_0) if e.R.any() else None
@@ -212,6 +213,11 @@ class Stepper:
         rows[:, 1] = self.numbers[rows[:, 1].astype(int)] if len(rows) else 0
         seen = Seen._make(map(np.asarray, seen))
         return now, seen._replace(d=seen.d[:, back], force=seen.force[:, back]), rows, count
+
+
+def _most(rates: Array) -> Array:
+    """(points,) largest size of rows (points, 3, n) times o."""
+    return np.linalg.norm(np.abs(rates).sum(axis=2), axis=1)
 
 
 def static_force(stepper: Stepper) -> Callable[[Array], tuple[Array, Array]]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -12,13 +14,14 @@ from ..contact.keys import FileName
 from ..contact.solids import Solid
 from ..data import Array
 from ..rolling.ellipse import combined
+from ..rolling.profiles import Profile
 from ..rolling.settings import ModelOfCase, Rail, TableOfCase, WearOfCase, Wheel
 from ..rolling.wheelset import Track
 from ..settings.body import Model, Name, NotNegative, Number, Positive, _tuple, load_toml, override
 from ..settings.mistakes import validate
 from ..system.lumped import Body, Link, System
 from .motion import Vehicle, sunk
-from .touch import at, touching
+from .touch import Touch, at, touching
 
 Three = Annotated[tuple[NotNegative, NotNegative, NotNegative], BeforeValidator(_tuple)]
 Inertia = Annotated[tuple[Positive, Positive, Positive], BeforeValidator(_tuple)]
@@ -74,9 +77,11 @@ class Unround(Model):
 
 
 class WearOfVehicle(WearOfCase):
-    """tolerance: of the radius, of each jump over many turns, m."""
+    """tolerance: of the radius, of each jump over many turns, m. profile: whether wheels touch by the profile that they
+    have worn to, in the mean over both and their circumference, or by that of new ones."""
 
     tolerance: Positive = 1e-7
+    profile: Literal["renewed", "kept"] = "renewed"
 
 
 class KinematicsOfCase(Model):
@@ -153,6 +158,20 @@ class VehicleCase(Model):
         held = K[1, 1] * sunk(at(found.over, found.reach, 0.0), each, K)[0]  # of the suspension, as it has sunk
         return Vehicle(M, C, K, spin, self.vehicle.load + held, self.running.torque, self.running.speed, found.over,
                        found.reach, each, self.friction, elastic.shear, elastic.poisson)  # fmt: skip
+
+    def profiles(self, folder: Path, y: Array) -> Callable[[Array], Touch] | None:
+        """Depth (n,) m on strips about y (n,) m of both wheels' profile -> where they touch; see `made`."""
+        if self.wear.profile == "kept":
+            return None
+        track, each = track_of(self, folder), 0.5 * self.vehicle.load
+        fine = np.arange(track.wheel.y[0], track.wheel.y[-1], y[1] - y[0])
+        new = track.wheel.height(fine)
+
+        def touch(depth: Array) -> Touch:
+            worn = Profile(fine, new - np.interp(fine, y, depth, left=0.0, right=0.0), track.wheel.name)
+            return touching(replace(track, wheel=worn), each, self.running.reach).over
+
+        return touch
 
     def lumped(self) -> System:
         """Wheelset, suspension and rails, the coordinates those of `motion`."""

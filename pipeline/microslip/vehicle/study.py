@@ -14,8 +14,7 @@ from ..rolling.table import CreepTable, creep_table
 from .creep import Creep, linear, of_strips, of_table
 from .motion import Vehicle, critical_speed, hunting, roots, steady
 from .settings import VehicleCase
-from .touch import at
-from .wearing import Jump, LeavesTheRail, Now, Rolling, growth, jumps, of_point, orders_of, point_of, tread
+from .wearing import Jump, LeavesTheRail, Now, Rolling, deepest, growth, jumps, of_point, orders_of, point_of, tread
 
 WHEELS = ("right", "left")
 SMALL = 1e-6
@@ -144,15 +143,15 @@ class Studied:
         ]
 
     def _deep(self) -> list[str]:
-        """What is worn may be deeper than the bodies approach."""
-        v = self.vehicle
-        t = at(v.over, v.reach, 0.0)
-        approach = float((v.each / t.spring[0]) ** (2 / 3))
-        deepest = float(self.history[-1][0].depth.max())
+        """What is worn may be deeper than what the contacts know."""
+        most, depth = deepest(self.vehicle), float(self.history[-1][0].depth.mean(axis=1).max())
+        told = f"The groove is {1e3 * depth:.2g} mm deep; "
+        if depth <= most:
+            return [f"{told}the contact is one ellipse up to {1e3 * most:.2g} mm."]
         return [
-            f"warning: a groove of {1e3 * deepest:.3g} mm is deeper than wheel and rail approach, {1e3 * approach:.2g} "
-            "mm, and the profile across is not renewed: what follows from there on is a guess."
-        ] if deepest > approach else []  # fmt: skip
+            f"warning: {told.lower()}from {1e3 * most:.2g} mm on it splits the contact, and the profile across is "
+            "kept: what follows from there on is a guess."
+        ]
 
     def _hunts(self) -> str:
         root = hunting(self.vehicle)
@@ -183,11 +182,11 @@ def study(
         )
     creep, table = _creep(case, v, report)
     t = tread(v, case.running.places, case.wear.coefficient, case.how)
-    r = Rolling.of(v, creep, t, case.shape())
+    r = Rolling.of(v, creep, t, case.shape(), case.profiles(folder, t.y))
     report("wear by jumps over many turns")
     history, ended = _worn(case, r, report, journal)
     wheel = int(np.abs(r.shape).max(axis=0).argmax())
-    grown = _all_grown(case, v, creep, wheel, report, journal)
+    grown = _all_grown(case, r, wheel, report, journal)
     speeds = [s for s, g in zip(case.running.speeds, grown, strict=True) if g is not None]
     table_of = np.array([g for g in grown if g is not None]).reshape(len(speeds), case.running.orders)
     critical = critical_speed(v, 1.0, FASTEST)
@@ -230,14 +229,14 @@ def _worn(
 
 
 def _all_grown(
-    case: VehicleCase, v: Vehicle, creep: Creep, wheel: int, report: Callable[[str], None], journal: Journal | None
+    case: VehicleCase, r: Rolling, wheel: int, report: Callable[[str], None], journal: Journal | None
 ) -> list[Array | None]:
     """Of each speed (orders,) per turn; None where it does not run."""
     known = {} if journal is None else journal.of(SPEEDS)
     found = []
     for speed in case.running.speeds:
         if speed not in known:
-            grown = _grown(case, v, creep, speed, wheel, report)
+            grown = _grown(case, r, speed, wheel, report)
             known[speed] = {} if grown is None else {"grown": grown}
             if journal is not None:
                 journal.keep(SPEEDS, speed, known[speed])
@@ -245,18 +244,15 @@ def _all_grown(
     return found
 
 
-def _grown(
-    case: VehicleCase, v: Vehicle, creep: Creep, speed: float, wheel: int, report: Callable[[str], None]
-) -> Array | None:  # fmt: skip
+def _grown(case: VehicleCase, r: Rolling, speed: float, wheel: int, report: Callable[[str], None]) -> Array | None:
     """(orders,) per turn; None where it does not run."""
     report(f"growth at {speed:g} m/s")
-    at = v._replace(speed=speed)
+    at = r.vehicle._replace(speed=speed)
     if roots(at)[0].real.max() > 0 or not np.isfinite(steady(at)).all():
         report(f"warning: the wheelset hunts at {speed:g} m/s, which is left out")
         return None
-    t = tread(at, case.running.places, case.wear.coefficient, case.how)
     try:
-        r = Rolling.of(at, creep, t, np.zeros((case.running.places, 2)))
+        r = Rolling.of(at, r.creep, r.tread, np.zeros_like(r.shape), r.profile)
         return growth(r, np.arange(1, case.running.orders + 1), SMALL, wheel)
     except LeavesTheRail as stop:
         report(f"warning: at {speed:g} m/s {stop}; it is left out")

@@ -5,16 +5,17 @@ Places are equal angles of a wheel from its mark on; fields over the tread have 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from ..data import Array
+from ..data import Array, UserError
 from ..rolling.strips import creep_forces, tractions
-from ..rolling.wear import deposited
+from ..rolling.wear import deposited, smoothed
 from .motion import LEAST, Contacts, Q, Turn, Vehicle, resampled, steady, steps_of_a_turn, turned
+from .touch import Touch, at
 
 STRIP = 2.5e-4
 """m, width of a strip of the tread."""
@@ -91,6 +92,9 @@ class LeavesTheRail(Exception):
     """A motion that goes no further; its text is a sentence."""
 
 
+SMOOTHING = 2 * STRIP
+"""m, standard deviation by which the worn profile is smoothed for where it touches: with half axes of some mm the waves
+of the strips then die out in jumps of up to 40 um, see `rolling.wear.shortest_smoothing`."""
 SETTLED = np.array([1e-9] * Q + [1e-6] * Q + [1e-6])
 """By which states of one turn and the next may differ: m and rad, m/s and rad/s."""
 TURNS = 40
@@ -103,6 +107,7 @@ class Rolling:
 
     Attributes:
         vehicle, creep, tread. shape: (places, 2) deviation of new radii, right wheel first, m. steps: of a turn.
+        profile: depth (n,) m on the strips of the tread -> where wheels of such a profile touch; None: as new ones.
     """
 
     vehicle: Vehicle
@@ -110,10 +115,30 @@ class Rolling:
     tread: Tread
     shape: Array
     steps: int
+    profile: Callable[[Array], Touch] | None = None
 
     @staticmethod
-    def of(vehicle: Vehicle, creep: Any, tread: Tread, shape: Array) -> Rolling:
-        return Rolling(vehicle, creep, tread, shape, steps_of_a_turn(vehicle, len(shape)))
+    def of(
+        vehicle: Vehicle, creep: Any, tread: Tread, shape: Array, profile: Callable[[Array], Touch] | None = None
+    ) -> Rolling:
+        return Rolling(vehicle, creep, tread, shape, steps_of_a_turn(vehicle, len(shape)), profile)
+
+    def renewed(self, depth: Array) -> Rolling:
+        """With the profile across that both wheels have in the mean over their circumference.
+
+        Raises:
+            LeavesTheRail: a groove that is deeper than `deepest`; such wheels do not stay on their rails.
+        """
+        if self.profile is None or not depth.any():
+            return self
+        mean = smoothed(depth.mean(axis=(0, 1)), STRIP, SMOOTHING)
+        if (most := deepest(self.vehicle)) < mean.max():
+            raise LeavesTheRail(f"a groove of more than {1e3 * most:.2g} mm splits the contact")
+        try:
+            over = self.profile(mean)
+        except UserError as error:
+            raise LeavesTheRail(f"where the worn wheels touch is not known any more ({error})") from error
+        return replace(self, vehicle=self.vehicle._replace(over=over))
 
     def turn(self, x: Array, radius: Array) -> Turn:
         """One turn from a state, on wheels of such radii (places, 2)."""
@@ -152,6 +177,12 @@ class Rolling:
         return np.array(columns).T
 
 
+def deepest(v: Vehicle) -> float:
+    """m, of a groove that fills the gap which new wheels have at the edge of their contact: half of the approach (of a
+    circle, Hertz). Deeper ones turn the curvature in the middle, and the contact splits."""
+    return 0.5 * float((v.each / at(v.over, v.reach, 0.0).spring[0]) ** (2 / 3))
+
+
 def _stays_on(one: Turn, v: Vehicle) -> None:
     off = np.asarray(one.on.vertical) <= LEAST * v.each
     for k, side in enumerate(("right", "left")):
@@ -183,11 +214,13 @@ def running(r: Rolling, depth: Array, turns: float, near: Now | None = None) -> 
     Raises:
         LeavesTheRail: see `Rolling.periodic`.
     """
+    r = r.renewed(depth)
     v = r.vehicle
     x, map_ = (steady(v), None) if near is None else (near.start, near.map_)
     on = r.turn(x, np.zeros_like(r.shape)).on if near is None else near.one.on
     half = float(np.mean(np.asarray(on.a)))
-    radius = filtered(r.shape - r.tread.seen(depth, on), half, float(v.over.radius.mean()))
+    told = 0.0 if r.profile is None else depth.mean(axis=(0, 1))  # by the profile already
+    radius = filtered(r.shape - r.tread.seen(depth - told, on), half, float(v.over.radius.mean()))
     one, x, map_ = r.periodic(x, radius, map_)
     taken = r.tread.taken(one.on, v.friction, v.shear, v.poisson)
     return Now(turns, depth, radius, one, taken, x, map_)
