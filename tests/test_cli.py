@@ -236,7 +236,7 @@ MISTAKES = [
     (["modes", "box", "extra"], "extra"),
     (["modes", "box", "--colour"], "--colour"),
     (["export", "build/box/basis.h5"], "--to requires an argument"),
-    (["export", "build/box/basis.h5", "--to", "docx"], "unknown format; choose one of exudyn (Exudyn), mat (MATLAB"),
+    (["export", "build/box/basis.h5", "--to", "docx"], "unknown format; choose one of dmig (Nastran"),
     (["export", "build/box/basis.h5", "--to", "mat", "-o", "body.toml/x.mat"], "body.toml/x.mat: there is no folder"),
     (["modes", "gone"], "gone: cannot be read"),
     (["modes", "gone.toml"], "gone.toml: cannot be read"),
