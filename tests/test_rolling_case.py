@@ -176,6 +176,28 @@ def test_worn_volume_and_mirror() -> None:
     )
 
 
+def test_profiles_of_rough_bodies_wear_as_a_rough_passage() -> None:
+    """Two ways to a passage in the pose: that of `wear.csv` and that of the first update."""
+    given = (*FEW, "roughness=5e-5", "pose.yaw=0.003", "wear={coefficient=1e-13, updates=1, passages=1.0}")
+    case = load_rolling(CASE, given)[0]
+    worn = study(case, CASE.parent).worn()
+    found = wearing(case, case.track(CASE.parent), case.characteristic(CASE.parent), case.surface(CASE.parent))
+    assert found.moments[-1].volume == pytest.approx(2 * worn["depth_m"] @ worn["width_m"], rel=1e-3)
+
+
+def test_another_table_of_heights_is_another_curve(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A file of roughness is an input like a profile."""
+    shutil.copy(CASE, tmp_path / "case.toml")
+    monkeypatch.chdir(tmp_path)
+    found = []
+    for middle in (0.2, 0.8):
+        (tmp_path / "heights.csv").write_text(f"0,0\n2e-5,{middle}\n4e-5,1\n")
+        sets = [w for s in ('roughness={kind="table", file="heights.csv"}', *FEW) for w in ("--set", s)]
+        assert main(["roll", "case.toml", *sets, "--no-pictures", "-q"]) == 0
+        found.append((tmp_path / "build" / "wheel-rail" / "creep.csv").read_text())
+    assert found[0] != found[1]
+
+
 # --- roughness -------------------------------------------------------------------------------------------------------
 
 PATCH = {"a": 8e-3, "b": 4e-3, "normal_force": 82e3, "friction": Coulomb(value(0.3)), "speed": 20.0, "shear": 82e9,

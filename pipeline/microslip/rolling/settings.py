@@ -287,6 +287,12 @@ class RollingCase(Model):
                 )
 
     @property
+    def files(self) -> list[str]:
+        """Names of all that stand beside the case: profiles, and tables of friction and of heights."""
+        tables = [getattr(table, "file", None) for table in (self.friction, self.roughness)]
+        return [name for name in (self.wheel.profile, self.rail.profile, *tables) if isinstance(name, str)]
+
+    @property
     def is_constant(self) -> bool:
         """Whether one coefficient of friction holds everywhere."""
         return self.friction.kind == "coulomb" and (self.heat is None or self.heat.limit is None)

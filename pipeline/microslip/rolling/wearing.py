@@ -140,9 +140,8 @@ def _run(case: RollingCase, track: Track, friction: Friction, surface: Surface |
     given = np.array([[p.xi, p.eta, p.phi, p.a, p.b, p.normal_force, e.shear, e.poisson] for p in found]).T
     speed = np.array([p.speed for p in found])
     heat = case.heat.made() if case.heat else None
-    t = rolled(
-        given, friction, speed, np.arange(len(found)), heat, **case.model.model_dump(exclude={"exact"})
-    ).tractions
+    how = case.model.model_dump(exclude={"exact"})
+    t = rolled(given, friction, speed, np.arange(len(found)), heat, surface, **how).tractions
     q, dx = sources(t, speed)
     return [Strips(p, t.area[i, :, 0] / dx[i], strip_depth(q[i].T, dx[i], 1.0, speed[i])) for i, p in enumerate(found)]
 

@@ -6,7 +6,6 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from ..basis import read_basis
-from ..contact.friction import OfTable
 from ..errors import told_of
 from ..files import store
 from ..files.tables import columns_csv, rows_csv
@@ -35,8 +34,7 @@ def rolling_stage(
     """
     case, raw = load_rolling(case_path, assignments)
     stage = Stage(root / case.name / "rolling.json", ("stages.rolling",), force, report)
-    files = [case_path.parent / s.profile for s in (case.wheel, case.rail) if isinstance(s.profile, str)]
-    files += [case_path.parent / case.friction.file] if isinstance(case.friction, OfTable) else []
+    files = [case_path.parent / name for name in case.files]
     profiles = [store.hash_file(file) for file in files if file.is_file()]
     bodies = _bodies(case, case_path, report)
     inputs = {"case": raw, "profiles": profiles, "pictures": pictures, "bodies": [store.hash_file(b) for b in bodies]}
