@@ -36,7 +36,7 @@ from microslip.stages.moving import whole_ring
 from microslip.system import Body, Contact, Force, Monitor, Spring, System
 from microslip.system.assembly import Assembly, ContactFace, Load, Output, Ring, preloaded_contact
 from microslip.system.component import Component
-from microslip.time_domain import classification, equations, orbit, recorded, samples, starts
+from microslip.time_domain import classification, equations, loop, orbit, recorded, samples, starts
 from microslip.time_domain.stepper import Stepper
 from microslip.units import METRES
 
@@ -137,6 +137,21 @@ def test_leaps_over_flights_change_nothing() -> None:
         _, seen, *_ = s.run(s.start(np.zeros(3), np.zeros(3)), np.full(128, 128))
         found.append(np.asarray(seen.q))
     np.testing.assert_allclose(found[0], found[1], atol=1e-9 * np.abs(found[1]).max())
+
+
+def test_what_parts_is_not_leapt_over_before_it_is_apart() -> None:
+    """The spring still pushes a mass that leaves its stop: at the edge of the stop, and through many impacts of two
+    masses with steps as fine as one likes, to what finer ones leave of the energy."""
+    law = ms.stop(40.0, 0.1).law
+    u, w = jnp.array([[0.0, 0.1 + 1e-9, 0.0], [0.0, 0.1 - 1e-9, 0.0]]), jnp.array([[0.0, -1.0, 0.0]] * 2)
+    touching, apart = loop._unmet(law.overlap, u, w, jnp.full(2, 2.0), jnp.full(2, 3.0))
+    assert touching == 0.0 and apart > 0.5
+    two = {"elements": [ms.stop(2000.0, 0.3, at=[1.0, -1.0])], "output": [0, 1], "damping_ratio": 0.0}
+    masses = ms.structure(np.eye(2), np.diag([1.0, 4.0]), np.diag([0.01, 0.04]), force={0: 1.0}, **two)
+    coarse, fine = (
+        ms.integrate(masses, 1.05, unit="rad/s", settle=0, keep=4, samples=64, steps=n).y for n in (16384, 32768)
+    )
+    np.testing.assert_allclose(coarse, fine, atol=2e-8)
 
 
 def test_energy_is_kept_to_rounding_and_what_contacts_do_with_it_to_second_order() -> None:
@@ -447,6 +462,9 @@ def test_a_static_start_is_the_balance_of_steady_loads_and_contact() -> None:
     e = equations.of(pressed, 10.0)
     assert (e.output @ q)[0] == pytest.approx(2.0 / (3e5 + STIFFNESS), rel=1e-9)
     assert jnp.isfinite(q).all()
+    wedged = ms.structure(1.0, 1.0, 0.05, force={0: 1.0}, elements=[ms.stop(0.3, -0.2)])
+    q, _ = orbit.begun(equations.of(wedged, 1.3), "static")
+    assert q == pytest.approx(-0.06 / 1.3, rel=1e-9)
 
 
 # starts ------------------------------------------------------------------------------------------------------------

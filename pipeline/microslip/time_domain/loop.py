@@ -101,14 +101,15 @@ def _free(groups: tuple[Group, ...], B: Bodies, now: Now) -> Any:
 
 
 def _unmet(overlap: Any, u: Any, w: Any, fastest: Any, bent: Any) -> Any:
-    """(n,) s in which points at u (n, 3) with velocities w meet nothing, if they move no faster and turn no more."""
-    a, closing = jax.jvp(overlap, (u,), (w,))
-    gap, a = jnp.maximum(-a, 0.0), bent + 1e-300
+    """(n,) s in which points at u (n, 3) with velocities w meet nothing, if they move no faster and turn no more; 0
+    where they touch, though they part."""
+    deep, closing = jax.jvp(overlap, (u,), (w,))
+    gap, a = jnp.maximum(-deep, 0.0), bent + 1e-300
     root = jnp.sqrt(closing**2 + 2 * a * gap)
     ahead = (1 - ROUNDING) * jnp.where(closing > 0, 2 * gap / (closing + root + 1e-300), (root - closing) / a)
     past = overlap(u + ahead[:, None] * w) + 0.5 * a * ahead**2
     sure = gap / (fastest + 1e-300)
-    return jnp.where(past <= 0, jnp.maximum(ahead, sure), sure)
+    return jnp.where((past <= 0) & (deep <= 0), jnp.maximum(ahead, sure), sure)
 
 
 def _told(B: Bodies, k: Any, now: Now, after: Now, done: Any = True) -> Now:

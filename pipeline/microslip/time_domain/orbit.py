@@ -10,13 +10,16 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
+import jax.numpy as jnp
 import numpy as np
 import scipy.linalg
 
+from ..contact.set_valued import SetValued
 from ..data import Array, NotConverged, UserError
 from ..files.hdf5 import create, put, refuse_foreign, seal
 from ..files.store import complete_or_absent
 from ..settings.mistakes import bounded
+from ..system.assembly import Contact
 from ..units import METRES, counted
 from . import classification
 from . import samples as kept_samples
@@ -561,9 +564,17 @@ def begun(e: Equations, start: Start) -> tuple[Array, Array]:
         return zero, zero
     if start != "static":
         raise UserError(f"start: '{start}' is none of static, rest, balance")
-    if not e.still[0].any() and not any(tight):
+    if not e.still[0].any() and not any(tight) and not any(map(_closed, e.contacts)):
         return zero, zero  # preloads are in balance there
     return _static(e), zero
+
+
+def _closed(contact: Contact) -> bool:
+    """Whether a law whose gap is its own presses at q = 0, without a preload that balances it."""
+    if contact.preload.any() or isinstance(contact.patch.law, SetValued):
+        return False
+    overlap = contact.patch.law.overlap(jnp.asarray(contact.patch.kinematics @ contact.offset))
+    return bool((np.asarray(overlap) > 0).any())
 
 
 def _refuse_penetration(e: Equations, q: Array) -> None:
