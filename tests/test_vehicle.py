@@ -153,7 +153,7 @@ def test_jumps_of_a_journal_go_on_to_the_same_bits(rolling: wearing.Rolling, tmp
     with open_journal(tmp_path / "points", "of these", {}) as journal:
         for now, jump in whole[:3]:
             journal.keep("jumps", now.turns, wearing.point_of(now, jump))
-    known = [wearing.of_point(p) for p in read_journal(tmp_path / "points")[1]["jumps"].values()]
+    known = [wearing.of_point(p, wearing.Now.of) for p in read_journal(tmp_path / "points")[1]["jumps"].values()]
     rest = list(wearing.jumps(rolling, 1e5, 1e-9, 2e4, known=known))
     assert len(rest) == len(whole) - 3 > 0
     for (now, jump), (then, other) in zip(whole[3:], rest, strict=True):
@@ -201,7 +201,7 @@ def test_profiles_are_renewed_as_they_wear(case: VehicleCase, rolling: wearing.R
 
 def test_three_crests_wear_as_the_figure_says(rolling: wearing.Rolling) -> None:
     """Fig. 6.9-1: wear shows three maxima, shifted against those of the wheel, and three more of the creepage."""
-    now = wearing.running(rolling, np.zeros((2, PLACES, len(rolling.tread.y))), 0.0)
+    now = rolling.at(rolling.new(), 0.0)
     worn = np.fft.rfft(rolling.tread.seen(now.taken, now.one.on)[:, 0])
     size = np.abs(worn[1:])
     assert set(np.argsort(-size)[:2] + 1) == {3, 6}
@@ -327,7 +327,7 @@ def test_a_run_that_ends_keeps_what_it_has(
 
 def table(rolling: wearing.Rolling, turns: int = 2) -> tuple[dict[str, np.ndarray], wearing.Now]:
     """What the package's own vehicle would write of its right wheel, and that running."""
-    now = wearing.running(rolling, np.zeros((2, PLACES, len(rolling.tread.y))), 0.0)
+    now = rolling.at(rolling.new(), 0.0)
     on, n = now.one.on, turns * PLACES + 1
     pick = np.arange(n) % PLACES
     columns = {

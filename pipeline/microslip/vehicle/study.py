@@ -14,7 +14,20 @@ from ..rolling.table import CreepTable, creep_table
 from .creep import Creep, linear, of_strips, of_table
 from .motion import Vehicle, critical_speed, hunting, roots, steady
 from .settings import VehicleCase
-from .wearing import Jump, LeavesTheRail, Now, Rolling, deepest, growth, jumps, of_point, orders_of, point_of, tread
+from .wearing import (
+    FIRST,
+    Jump,
+    LeavesTheRail,
+    Now,
+    Rolling,
+    columns_of,
+    deepest,
+    error_of,
+    growth,
+    orders_of,
+    tread,
+    worn,
+)
 
 WHEELS = ("right", "left")
 SMALL = 1e-6
@@ -72,13 +85,7 @@ class Studied:
 
     def growing(self) -> dict[str, Array]:
         """Of the table over the distance."""
-        turns = np.array([now.turns for now, _ in self.history])
-        columns = {"turns": turns, "distance_km": 1e-3 * turns * self.way}
-        columns["jump_turns"] = np.array([j.size for _, j in self.history])
-        columns["error_m"] = np.array([j.error for _, j in self.history])
-        for k, name in enumerate(WHEELS):
-            columns[f"{name}_volume_m3"] = np.array([j.volume[k] for _, j in self.history])
-            columns[f"{name}_friction_work_J"] = np.array([j.work[k] for _, j in self.history])
+        columns = columns_of(self.history, self.way, WHEELS)
         found = self.amplitudes()
         for k, name in enumerate(WHEELS):
             columns |= {f"{name}_order_{n + 1}_m": found[:, n, k] for n in range(self.orders)}
@@ -109,11 +116,7 @@ class Studied:
             if last[m] - first[m] > 1e-9:
                 told.append(f"Of the others order {m + 1} grows most, to {1e6 * last[m]:.3g} um." if m != n else "")
         told += self._shifted()
-        error = sum(j.error for _, j in self.history)
-        told.append(
-            f"{len(self.history) - 1} jumps: their errors, each less than its difference to a jump of first order, "
-            f"are together below {1e6 * error:.2g} um of the radius."
-        )
+        told.append(error_of(self.history))
         told += [self._hunts(), *self._deep()]
         if self.table is not None:
             told.append(f"Creep forces of the motion are read from a table, {100 * self.table.error[:, 0].max():.2g} % "
@@ -184,7 +187,11 @@ def study(
     t = tread(v, case.running.places, case.wear.coefficient, case.how)
     r = Rolling.of(v, creep, t, case.shape(), case.profiles(folder, t.y))
     report("wear by jumps over many turns")
-    history, ended = _worn(case, r, report, journal)
+    turns = case.running.turns
+    try:
+        history, ended = worn(r, Now.of, turns, case.wear.tolerance, min(FIRST, turns), report, journal)
+    except LeavesTheRail as stop:
+        raise UserError(f"running, unround: already on new wheels {stop}; run slower or give less") from stop
     wheel = int(np.abs(r.shape).max(axis=0).argmax())
     grown = _all_grown(case, r, wheel, report, journal)
     speeds = [s for s, g in zip(case.running.speeds, grown, strict=True) if g is not None]
@@ -204,28 +211,8 @@ def _creep(case: VehicleCase, v: Vehicle, report: Callable[[str], None]) -> tupl
     return of_table(table), table
 
 
-JUMPS, SPEEDS = "jumps", "speeds"
+SPEEDS = "speeds"
 """Series of the journal."""
-
-
-def _worn(
-    case: VehicleCase, r: Rolling, report: Callable[[str], None], journal: Journal | None
-) -> tuple[list[tuple[Now, Jump]], str]:
-    history = [] if journal is None else [of_point(p) for p in journal.of(JUMPS).values()]
-    turns = case.running.turns
-    if history:
-        report(f"goes on after {history[-1][0].turns:.0f} turns of a run that did not end")
-    try:
-        for now, jump in jumps(r, turns, case.wear.tolerance, min(1e3, turns), known=history):
-            history.append((now, jump))
-            if journal is not None:
-                journal.keep(JUMPS, now.turns, point_of(now, jump))
-            report(f"{now.turns:.0f} of {turns:.0f} turns")
-    except LeavesTheRail as stop:
-        if not history:
-            raise UserError(f"running, unround: already on new wheels {stop}; run slower or give less") from stop
-        return history, str(stop)
-    return history, ""
 
 
 def _all_grown(

@@ -7,11 +7,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
 
 from ..data import Array, UserError
+from ..results import Journal
 from ..rolling.strips import creep_forces, tractions
 from ..rolling.wear import deposited, smoothed
 from .motion import LEAST, Contacts, Q, Turn, Vehicle, resampled, steady, steps_of_a_turn, turned
@@ -102,6 +103,33 @@ TURNS = 40
 
 
 @dataclass(frozen=True, eq=False)
+class Now:
+    """Running at one amount of wear. Attributes: turns: so far. depth: (2, places, n) m. radius: (places, 2) deviation
+    that the contacts see, m. one: a turn. taken: (2, places, n) m in it. start, map_: for the next one."""
+
+    turns: float
+    depth: Array
+    radius: Array
+    one: Turn
+    taken: Array
+    start: Array
+    map_: Array | None
+
+    def point(self) -> dict[str, Any]:
+        """Names -> arrays, for a journal."""
+        point = {f"on/{k}": v for k, v in self.one.on._asdict().items()}
+        point |= {f"one/{k}": v for k, v in self.one._asdict().items() if k != "on"}
+        return point | {k: v for k, v in vars(self).items() if k != "one" and v is not None}
+
+    @staticmethod
+    def of(point: Mapping[str, Any]) -> Now:
+        """What `point` took apart, to the last bit."""
+        own = {k: v for k, v in point.items() if "/" not in k}
+        one = Turn(on=Contacts(**part(point, "on/")), **part(point, "one/"))
+        return Now(one=one, **{"map_": None, **own})
+
+
+@dataclass(frozen=True, eq=False)
 class Rolling:
     """A vehicle on wheels that are out of round.
 
@@ -139,6 +167,36 @@ class Rolling:
         except UserError as error:
             raise LeavesTheRail(f"where the worn wheels touch is not known any more ({error})") from error
         return replace(self, vehicle=self.vehicle._replace(over=over))
+
+    def new(self) -> Array:
+        """(2, places, n) m of new wheels."""
+        return np.zeros((2, len(self.shape), len(self.tread.y)))
+
+    def at(self, depth: Array, turns: float, near: Now | None = None) -> Now:
+        """Periodic motion on worn wheels.
+
+        Raises:
+            LeavesTheRail: see `periodic` and `renewed`.
+        """
+        r = self.renewed(depth)
+        v = r.vehicle
+        x, map_ = (steady(v), None) if near is None else (near.start, near.map_)
+        on = r.turn(x, np.zeros_like(r.shape)).on if near is None else near.one.on
+        half = float(np.mean(np.asarray(on.a)))
+        told = 0.0 if r.profile is None else depth.mean(axis=(0, 1))  # by the profile already
+        radius = filtered(r.shape - r.tread.seen(depth - told, on), half, float(v.over.radius.mean()))
+        one, x, map_ = r.periodic(x, radius, map_)
+        taken = r.tread.taken(one.on, v.friction, v.shear, v.poisson)
+        return Now(turns, depth, radius, one, taken, x, map_)
+
+    def seen(self, depth: Array, now: Now) -> Array:
+        """(places, 2) m that a running sees of it."""
+        return self.tread.seen(depth, now.one.on)
+
+    def work(self, now: Now) -> Array:
+        """(2,) J of friction in a turn."""
+        v = self.vehicle
+        return self.tread.work(now.one.on, v.friction, v.shear, v.poisson)
 
     def turn(self, x: Array, radius: Array) -> Turn:
         """One turn from a state, on wheels of such radii (places, 2)."""
@@ -194,42 +252,10 @@ def _stays_on(one: Turn, v: Vehicle) -> None:
         raise LeavesTheRail(f"the wheelset moves {1e3 * far:.3g} mm to a side, beyond running.reach: it derails")
 
 
-@dataclass(frozen=True, eq=False)
-class Now:
-    """Running at one amount of wear. Attributes: turns: so far. depth: (2, places, n) m. radius: (places, 2) deviation
-    that the contacts see, m. one: a turn. taken: (2, places, n) m in it. start, map_: for the next one."""
-
-    turns: float
-    depth: Array
-    radius: Array
-    one: Turn
-    taken: Array
-    start: Array
-    map_: Array | None
-
-
-def running(r: Rolling, depth: Array, turns: float, near: Now | None = None) -> Now:
-    """Periodic motion on worn wheels.
-
-    Raises:
-        LeavesTheRail: see `Rolling.periodic`.
-    """
-    r = r.renewed(depth)
-    v = r.vehicle
-    x, map_ = (steady(v), None) if near is None else (near.start, near.map_)
-    on = r.turn(x, np.zeros_like(r.shape)).on if near is None else near.one.on
-    half = float(np.mean(np.asarray(on.a)))
-    told = 0.0 if r.profile is None else depth.mean(axis=(0, 1))  # by the profile already
-    radius = filtered(r.shape - r.tread.seen(depth - told, on), half, float(v.over.radius.mean()))
-    one, x, map_ = r.periodic(x, radius, map_)
-    taken = r.tread.taken(one.on, v.friction, v.shear, v.poisson)
-    return Now(turns, depth, radius, one, taken, x, map_)
-
-
 @dataclass(frozen=True)
 class Jump:
-    """Attributes: turns: at its end. size: turns. error: of the seen radius against a first-order jump, m. volume: (2,)
-    worn of each wheel, m3. work: (2,) of friction, J."""
+    """Attributes: turns: at its end. size: turns. error: of the seen radius against a first-order jump, m. volume:
+    (wheels,) worn of each, m3. work: (wheels,) of friction, J."""
 
     turns: float
     size: float
@@ -238,10 +264,37 @@ class Jump:
     work: Array
 
 
+class State(Protocol):
+    """Of what wears. Attributes: turns: so far. depth: (wheels, places, n) m. taken: in one turn, m."""
+
+    @property
+    def turns(self) -> float: ...
+    @property
+    def depth(self) -> Array: ...
+    @property
+    def taken(self) -> Array: ...
+    def point(self) -> dict[str, Any]: ...
+
+
+S = TypeVar("S", bound=State)
+
+
+class Wears(Protocol[S]):
+    """What jumps go over: `at` an amount of wear it has a state; `seen` is depth as that state's contacts see it (m),
+    `work` of friction in a turn (J). `at` may raise `LeavesTheRail`."""
+
+    @property
+    def tread(self) -> Tread: ...
+    def new(self) -> Array: ...
+    def at(self, depth: Array, turns: float, near: S | None = None) -> S: ...
+    def seen(self, depth: Array, now: S) -> Array: ...
+    def work(self, now: S) -> Array: ...
+
+
 def jumps(
-    r: Rolling, turns: float, tolerance: float, first: float, fixed: bool = False,
-    known: Sequence[tuple[Now, Jump]] = (),
-) -> Iterator[tuple[Now, Jump]]:  # fmt: skip
+    r: Wears[S], turns: float, tolerance: float, first: float, fixed: bool = False,
+    known: Sequence[tuple[S, Jump]] = (),
+) -> Iterator[tuple[S, Jump]]:  # fmt: skip
     """Wear over many turns by jumps of second order (Heun); a jump is as long as its error allows.
 
     Args:
@@ -249,26 +302,26 @@ def jumps(
             known: what was yielded before, with which it goes on.
 
     Raises:
-        LeavesTheRail: see `running`; what came before was yielded.
+        LeavesTheRail: see `Wears`; what came before was yielded.
     """
-    v, t = r.vehicle, r.tread
-    places, n = len(r.shape), len(t.y)
+    t = r.tread
     if known:
         now, jump = known[-1]
     else:
-        now, jump = running(r, np.zeros((2, places, n)), 0.0), Jump(0.0, 0.0, 0.0, np.zeros(2), np.zeros(2))
+        now = r.at(r.new(), 0.0)
+        jump = Jump(0.0, 0.0, 0.0, np.zeros(len(t.sides)), np.zeros(len(t.sides)))
         yield now, jump
     size = min(first, turns) if fixed or not jump.size else _next(jump, tolerance)
     while now.turns < turns * (1 - 1e-12):
         size = min(size, turns - now.turns)
-        then = running(r, now.depth + size * now.taken, now.turns + size, now)
+        then = r.at(now.depth + size * now.taken, now.turns + size, now)
         mean = 0.5 * (now.taken + then.taken)
-        error = float(np.abs(t.seen(0.5 * size * (then.taken - now.taken), now.one.on)).max())
+        error = float(np.abs(r.seen(0.5 * size * (then.taken - now.taken), now)).max())
         if error > tolerance and not fixed:
             size *= max(0.2, 0.9 * (tolerance / error) ** 0.5)
             continue
-        work = [size * 0.5 * t.work(one.on, v.friction, v.shear, v.poisson) for one in (now.one, then.one)]
-        now = running(r, now.depth + size * mean, now.turns + size, then)
+        work = [size * 0.5 * r.work(one) for one in (now, then)]
+        now = r.at(now.depth + size * mean, now.turns + size, then)
         jump = Jump(now.turns, size, error, t.volume(size * mean), work[0] + work[1])
         yield now, jump
         if not fixed:
@@ -280,23 +333,74 @@ def _next(jump: Jump, tolerance: float) -> float:
     return jump.size * min(3.0, 0.9 * (tolerance / max(jump.error, 1e-3 * tolerance)) ** 0.5)
 
 
-def point_of(now: Now, jump: Jump) -> dict[str, Any]:
-    """Names -> arrays of running and the jump to it, for a journal."""
-    point = {f"jump/{k}": v for k, v in vars(jump).items()}
-    point |= {f"on/{k}": v for k, v in now.one.on._asdict().items()}
-    point |= {f"one/{k}": v for k, v in now.one._asdict().items() if k != "on"}
-    return point | {k: v for k, v in vars(now).items() if k != "one" and v is not None}
+FIRST = 1e3
+"""Turns of the first jump, or all if they are less."""
+JUMPS = "jumps"
+"""Series of the journal."""
 
 
-def of_point(point: Mapping[str, Any]) -> tuple[Now, Jump]:
-    """What `point_of` took apart, to the last bit."""
+def worn(
+    r: Wears[S], of: Callable[[Mapping[str, Any]], S], turns: float, tolerance: float, first: float,
+    report: Callable[[str], None], journal: Journal | None,
+) -> tuple[list[tuple[S, Jump]], str]:  # fmt: skip
+    """All of `jumps`, each kept in a journal and found there, and why they end early, or nothing.
 
-    def part(name: str) -> dict[str, Any]:
-        return {k.removeprefix(name): v for k, v in point.items() if k.startswith(name)}
+    Args:
+        of: the state that its `point` was.
 
-    own = {k: v for k, v in point.items() if "/" not in k}
-    one = Turn(on=Contacts(**part("on/")), **part("one/"))
-    return Now(one=one, **{"map_": None, **own}), Jump(**part("jump/"))
+    Raises:
+        LeavesTheRail: already of new wheels.
+    """
+    history = [] if journal is None else [of_point(p, of) for p in journal.of(JUMPS).values()]
+    if history:
+        report(f"goes on after {history[-1][0].turns:.0f} turns of a run that did not end")
+    try:
+        for now, jump in jumps(r, turns, tolerance, first, known=history):
+            history.append((now, jump))
+            if journal is not None:
+                journal.keep(JUMPS, now.turns, point_of(now, jump))
+            report(f"{now.turns:.0f} of {turns:.0f} turns")
+    except LeavesTheRail as stop:
+        if not history:
+            raise
+        return history, str(stop)
+    return history, ""
+
+
+def columns_of(history: Sequence[tuple[State, Jump]], way: float, wheels: Sequence[str]) -> dict[str, Array]:
+    """Of a table over the jumps; way: of a turn, m."""
+    turns = np.array([now.turns for now, _ in history])
+    columns = {"turns": turns, "distance_km": 1e-3 * turns * way}
+    columns["jump_turns"] = np.array([j.size for _, j in history])
+    columns["error_m"] = np.array([j.error for _, j in history])
+    for k, name in enumerate(wheels):
+        columns[f"{name}_volume_m3"] = np.array([j.volume[k] for _, j in history])
+        columns[f"{name}_friction_work_J"] = np.array([j.work[k] for _, j in history])
+    return columns
+
+
+def error_of(history: Sequence[tuple[State, Jump]]) -> str:
+    """A sentence."""
+    error = sum(j.error for _, j in history)
+    return (
+        f"{len(history) - 1} jumps: their errors, each less than its difference to a jump of first order, "
+        f"are together below {1e6 * error:.2g} um of the radius."
+    )
+
+
+def part(point: Mapping[str, Any], name: str) -> dict[str, Any]:
+    """What stands below a name."""
+    return {k.removeprefix(name): v for k, v in point.items() if k.startswith(name)}
+
+
+def point_of(now: State, jump: Jump) -> dict[str, Any]:
+    """Names -> arrays of a state and the jump to it, for a journal."""
+    return {f"jump/{k}": v for k, v in vars(jump).items()} | now.point()
+
+
+def of_point(point: Mapping[str, Any], of: Callable[[Mapping[str, Any]], S]) -> tuple[S, Jump]:
+    """What `point_of` took apart, to the last bit; of: the state that its `point` was."""
+    return of({k: v for k, v in point.items() if not k.startswith("jump/")}), Jump(**part(point, "jump/"))
 
 
 def growth(r: Rolling, orders: Array, amplitude: float, wheel: int) -> Array:
@@ -304,16 +408,16 @@ def growth(r: Rolling, orders: Array, amplitude: float, wheel: int) -> Array:
     the same with the opposite sign, so that what goes with their square drops out.
 
     Raises:
-        LeavesTheRail: see `running`.
+        LeavesTheRail: see `Rolling.at`.
     """
     angle = 2 * np.pi * np.arange(len(r.shape)) / len(r.shape)
     phases = np.pi * orders * (orders - 1) / max(len(orders), 1)  # no high crest where all meet
     shape = np.zeros_like(r.shape)
     shape[:, wheel] = (amplitude * np.cos(np.outer(angle, orders) + phases)).sum(axis=1)
-    near = running(replace(r, shape=np.zeros_like(shape)), np.zeros((2, len(shape), len(r.tread.y))), 0.0)
-    up, down = (running(replace(r, shape=s * shape), near.depth, 0.0, near) for s in (1, -1))
-    worn = r.tread.seen(0.5 * (up.taken - down.taken), near.one.on)[:, wheel]
-    return -np.real(np.fft.rfft(worn)[orders] / np.fft.rfft(shape[:, wheel])[orders])
+    near = replace(r, shape=np.zeros_like(shape)).at(r.new(), 0.0)
+    up, down = (replace(r, shape=s * shape).at(near.depth, 0.0, near) for s in (1, -1))
+    change = r.seen(0.5 * (up.taken - down.taken), near)[:, wheel]
+    return -np.real(np.fft.rfft(change)[orders] / np.fft.rfft(shape[:, wheel])[orders])
 
 
 def orders_of(radius: Array, most: int) -> Array:
