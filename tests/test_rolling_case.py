@@ -170,10 +170,10 @@ def test_worn_volume_and_mirror() -> None:
     assert one.moments[-1].volume == pytest.approx(2 * 2e-13 * one.work, rel=1e-9)
     np.testing.assert_allclose(other.wheel.depth, one.wheel.depth, atol=1e-9 * one.wheel.depth.max())
     few = load_rolling(CASE, [*FEW, "wear={coefficient=2e-13, updates=1, passages=3e5, smoothing=0}"])[0]
-    assert (
-        "warning: an update takes so much"
-        in wearing(few, case.track(CASE.parent), case.characteristic(CASE.parent)).warning()
-    )
+    told = wearing(few, case.track(CASE.parent), case.characteristic(CASE.parent)).warnings()
+    assert len(told) == 1 and "warning: an update takes so much" in told[0]
+    deep = load_rolling(CASE, [*FEW, "wear={coefficient=2e-13, updates=2, passages=2.5e6}"])[0]
+    assert any("the grooves" in s for s in wearing(deep, case.track(CASE.parent), Coulomb(value(0.3))).warnings())
 
 
 def test_profiles_of_rough_bodies_wear_as_a_rough_passage() -> None:

@@ -296,12 +296,14 @@ def test_a_run_that_is_killed_goes_on(
         pytest.param("unround=[{order=3, amplitude=4e-3}]", "unround", marks=pytest.mark.slow),
         ("running.places=30", "running.places"),
         ("running.reach=0.04", "pose.lateral"),
+        ("wear.updates=5", "wear.updates"),
     ],
 )
 def test_bad_input(
     change: str, key: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """A vehicle that hunts, a wheel that leaves its rail, too few places, a reach beyond the profile: exit 2."""
+    """A vehicle that hunts, a wheel that leaves its rail, too few places, a reach beyond the profile, a key
+    of rolling cases that wheels out of round have not: exit 2."""
     monkeypatch.chdir(tmp_path)
     assert main(asked(change)) == 2
     assert key in capsys.readouterr().err and not list((tmp_path / "build" / "unround-wheel").glob("[!.]*"))
