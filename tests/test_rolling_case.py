@@ -268,3 +268,5 @@ def test_what_yields_behind_a_patch_is_counted_once(
     assert rows[1]["normal"]["spring_beside_modes_N_per_m"] > 1.2 * rows[0]["normal"]["spring_beside_modes_N_per_m"]
     assert main(["roll", "case.toml", *sets, "--set", "vertical_force=4e6", "-q"]) == 2
     assert "larger than the face" in capsys.readouterr().err
+    assert main(["roll", "case.toml", *sets, "--set", "rail.young=1e11", "-q"]) == 2
+    assert "rail.young" in capsys.readouterr().err
