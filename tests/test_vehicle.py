@@ -6,6 +6,7 @@ import csv
 import tomllib
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -20,6 +21,7 @@ from microslip.vehicle import motion, wearing
 from microslip.vehicle.creep import linear, of_strips, of_table
 from microslip.vehicle.kinematics import recorded
 from microslip.vehicle.settings import VehicleCase, load_kinematics, load_vehicle, track_of
+from microslip.vehicle.study import Studied
 
 CASE = Path(__file__).parents[1] / "pipeline" / "cases" / "unround-wheel.toml"
 PLACES = 48
@@ -287,6 +289,19 @@ def test_a_run_that_is_killed_goes_on(
     for file in made:
         assert (folders[0] / file).read_bytes() == (folders[1] / file).read_bytes()
     assert not (folders[1] / "unround.points").exists()
+
+
+def test_a_groove_is_told_of_the_profile_that_touches(rolling: wearing.Rolling) -> None:
+    """That of both wheels in the mean where it is renewed, as what ends a run; that of the deepest where it is kept."""
+    t, most = rolling.tread, wearing.deepest(rolling.vehicle)
+    depth = np.array([1.1, 0.5])[:, None, None] * most * np.ones((2, PLACES, len(t.y)))
+    said = {}
+    for profile in (None, lambda depth: None):
+        of = SimpleNamespace(vehicle=rolling.vehicle, rolling=SimpleNamespace(profile=profile))
+        of.history = [(SimpleNamespace(depth=depth), None)]
+        said[profile is not None] = Studied._deep(of)[0]  # type: ignore[arg-type]
+    assert said[False].startswith("warning: ") and f"{1.1e3 * most:.2g} mm" in said[False]
+    assert not said[True].startswith("warning: ") and f"{0.8e3 * most:.2g} mm" in said[True]
 
 
 @pytest.mark.parametrize(

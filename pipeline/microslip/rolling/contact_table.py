@@ -119,7 +119,8 @@ class ContactTable(NamedTuple):
             UserError: a pose beyond the table, or a value that none has.
         """
         speed = np.asarray(speed, float)
-        added = [v if np.ndim(v) > 1 else np.atleast_1d(np.asarray(v, float))[:, None] for v in (xi, eta, phi)]
+        added = [np.asarray(v, float) for v in (xi, eta, phi)]
+        added = [v if v.ndim > 1 else np.atleast_1d(v)[:, None] for v in added]
         given = strips.broadcast(lateral, yaw, speed, friction, speed / self.radius if turning is None else turning)
         n = np.broadcast_shapes(given[0].shape, *((len(v),) for v in added))[0]
         given = [np.broadcast_to(v, n) for v in given] + [np.broadcast_to(v, (n, 2)) for v in added]

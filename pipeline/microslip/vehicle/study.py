@@ -14,7 +14,20 @@ from ..rolling.table import CreepTable, creep_table
 from .creep import Creep, linear, of_strips, of_table
 from .motion import Vehicle, critical_speed, hunting, roots, steady
 from .settings import VehicleCase
-from .wearing import Jump, LeavesTheRail, Now, Rolling, deepest, growth, jumps, of_point, orders_of, point_of, tread
+from .wearing import (
+    Jump,
+    LeavesTheRail,
+    Now,
+    Rolling,
+    deepest,
+    groove,
+    growth,
+    jumps,
+    of_point,
+    orders_of,
+    point_of,
+    tread,
+)
 
 WHEELS = ("right", "left")
 SMALL = 1e-6
@@ -144,7 +157,9 @@ class Studied:
 
     def _deep(self) -> list[str]:
         """What is worn may be deeper than what the contacts know."""
-        most, depth = deepest(self.vehicle), float(self.history[-1][0].depth.mean(axis=1).max())
+        most, worn = deepest(self.vehicle), self.history[-1][0].depth
+        renewed = self.rolling.profile is not None
+        depth = float((groove(worn) if renewed else worn.mean(axis=1)).max())
         told = f"The groove is {1e3 * depth:.2g} mm deep; "
         if depth <= most:
             return [f"{told}the contact is one ellipse up to {1e3 * most:.2g} mm."]
