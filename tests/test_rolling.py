@@ -353,6 +353,10 @@ def test_a_table_of_contacts_is_read_for_other_loads_and_creepages(contacts: Con
     plain = contacts.forces(y, yaw, 20.0, MU)
     np.testing.assert_allclose(read.patches.a[:, 0], 2 * plain.patches.a[:, 0], rtol=1e-12)
     np.testing.assert_allclose(read.xi, plain.xi + 1e-3, rtol=1e-12)
+    yawing = contacts.forces(y, yaw, 20.0, MU, xi=[[1e-3, -1e-3]])
+    np.testing.assert_allclose(yawing.xi[..., 0], plain.xi[..., 0] + [1e-3, -1e-3], rtol=1e-12)
+    alone = contacts.forces(y, yaw, 20.0, MU, xi=-1e-3)
+    np.testing.assert_allclose(yawing.felt[:, 1], alone.felt[:, 1], rtol=1e-12)
     assert (read.felt[:, 1] == 0).all()
     np.testing.assert_allclose(plain.felt[0, 0], plain.felt[1, 1] * [1, -1, 1, -1, 1, -1], rtol=1e-9, atol=1e-6)
     flat = [np.full(2, v) for v in (20.0, MU, 20 / 0.46, 0.0, 0.0, 0.0)]
@@ -480,6 +484,7 @@ WRONG = {
     "a roll that follows": ('pose={side="both", roll=0.001}', "pose.roll"),
     "two wheels that wear": ('pose.side="both"; wear={coefficient=1e-13, updates=3, passages=1e5}', "wear.updates"),
     "rough by nothing": ("roughness=0", "roughness"),
+    "rough in um": ("roughness=5", "roughness: R_Z"),
     "a table of smooth bodies": ("table={}; roughness=1e-5", "table"),
     "a table of constant friction": ("table={}; heat.limit=300", "table"),
 }

@@ -170,10 +170,10 @@ def test_worn_volume_and_mirror() -> None:
     assert one.moments[-1].volume == pytest.approx(2 * 2e-13 * one.work, rel=1e-9)
     np.testing.assert_allclose(other.wheel.depth, one.wheel.depth, atol=1e-9 * one.wheel.depth.max())
     few = load_rolling(CASE, [*FEW, "wear={coefficient=2e-13, updates=1, passages=3e5, smoothing=0}"])[0]
-    assert (
-        "warning: an update takes so much"
-        in wearing(few, case.track(CASE.parent), case.characteristic(CASE.parent)).warning()
-    )
+    told = wearing(few, case.track(CASE.parent), case.characteristic(CASE.parent)).warnings()
+    assert len(told) == 1 and "warning: an update takes so much" in told[0]
+    deep = load_rolling(CASE, [*FEW, "wear={coefficient=2e-13, updates=2, passages=2.5e6}"])[0]
+    assert any("the grooves" in s for s in wearing(deep, case.track(CASE.parent), Coulomb(value(0.3))).warnings())
 
 
 def test_profiles_of_rough_bodies_wear_as_a_rough_passage() -> None:
@@ -268,3 +268,5 @@ def test_what_yields_behind_a_patch_is_counted_once(
     assert rows[1]["normal"]["spring_beside_modes_N_per_m"] > 1.2 * rows[0]["normal"]["spring_beside_modes_N_per_m"]
     assert main(["roll", "case.toml", *sets, "--set", "vertical_force=4e6", "-q"]) == 2
     assert "larger than the face" in capsys.readouterr().err
+    assert main(["roll", "case.toml", *sets, "--set", "rail.young=1e11", "-q"]) == 2
+    assert "rail.young" in capsys.readouterr().err

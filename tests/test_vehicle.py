@@ -6,6 +6,7 @@ import csv
 import tomllib
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -20,6 +21,7 @@ from microslip.vehicle import motion, wearing
 from microslip.vehicle.creep import linear, of_strips, of_table
 from microslip.vehicle.kinematics import recorded
 from microslip.vehicle.settings import VehicleCase, load_kinematics, load_vehicle, track_of
+from microslip.vehicle.study import Studied
 
 CASE = Path(__file__).parents[1] / "pipeline" / "cases" / "unround-wheel.toml"
 PLACES = 48
@@ -292,6 +294,19 @@ def test_a_run_that_is_killed_goes_on(
     assert not (folders[1] / "unround.points").exists()
 
 
+def test_a_groove_is_told_of_the_profile_that_touches(rolling: wearing.Rolling) -> None:
+    """That of both wheels in the mean where it is renewed, as what ends a run; that of the deepest where it is kept."""
+    t, most = rolling.tread, wearing.deepest(rolling.vehicle)
+    depth = np.array([1.1, 0.5])[:, None, None] * most * np.ones((2, PLACES, len(t.y)))
+    said = {}
+    for profile in (None, lambda depth: None):
+        of = SimpleNamespace(vehicle=rolling.vehicle, rolling=SimpleNamespace(profile=profile))
+        of.history = [(SimpleNamespace(depth=depth), None)]
+        said[profile is not None] = Studied._deep(of)[0]  # type: ignore[arg-type]
+    assert said[False].startswith("warning: ") and f"{1.1e3 * most:.2g} mm" in said[False]
+    assert not said[True].startswith("warning: ") and f"{0.8e3 * most:.2g} mm" in said[True]
+
+
 @pytest.mark.parametrize(
     ("change", "key"),
     [
@@ -299,12 +314,14 @@ def test_a_run_that_is_killed_goes_on(
         pytest.param("unround=[{order=3, amplitude=4e-3}]", "unround", marks=pytest.mark.slow),
         ("running.places=30", "running.places"),
         ("running.reach=0.04", "pose.lateral"),
+        ("wear.updates=5", "wear.updates"),
     ],
 )
 def test_bad_input(
     change: str, key: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """A vehicle that hunts, a wheel that leaves its rail, too few places, a reach beyond the profile: exit 2."""
+    """A vehicle that hunts, a wheel that leaves its rail, too few places, a reach beyond the profile, a key
+    of rolling cases that wheels out of round have not: exit 2."""
     monkeypatch.chdir(tmp_path)
     assert main(asked(change)) == 2
     assert key in capsys.readouterr().err and not list((tmp_path / "build" / "unround-wheel").glob("[!.]*"))

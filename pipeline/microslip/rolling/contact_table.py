@@ -112,23 +112,25 @@ class ContactTable(NamedTuple):
         Args:
             lateral: to the right, m. yaw: rad. speed: m/s. friction: coefficient. turning: of the axle, rad/s; None: it
                 rolls. load: vertical, N, broadcasts to (n, 2); places and roll stay those of the table's. xi, eta, phi:
-                what motion of the wheelset adds to the creepages of its pose, 1/m of phi.
+                what motion of the wheelset adds to the creepages of its pose, 1/m of phi; (n,), or (n, 2) of the left
+                and of the right wheel, as yawing adds to one what it takes from the other.
 
         Raises:
             UserError: a pose beyond the table, or a value that none has.
         """
         speed = np.asarray(speed, float)
-        given = strips.broadcast(
-            lateral, yaw, speed, friction, speed / self.radius if turning is None else turning, xi, eta, phi
-        )
-        n = len(given[0])
+        added = [np.asarray(v, float) for v in (xi, eta, phi)]
+        added = [v if v.ndim > 1 else np.atleast_1d(v)[:, None] for v in added]
+        given = strips.broadcast(lateral, yaw, speed, friction, speed / self.radius if turning is None else turning)
+        n = np.broadcast_shapes(given[0].shape, *((len(v),) for v in added))[0]
+        given = [np.broadcast_to(v, n) for v in given] + [np.broadcast_to(v, (n, 2)) for v in added]
         loads = np.broadcast_to(np.asarray(self.load if load is None else load, float), (n, 2))
         for name, v, reach in zip(("lateral", "yaw"), given, self.reach, strict=False):
             worst = v[np.argmax(np.abs(v))]
             if not abs(worst) <= reach * (1 + 1e-9):
                 raise UserError(f"{name}: is {worst:.4g}, and the table goes from {-reach:.4g} to {reach:.4g}")
         least = min(given[3].min(), loads.min())
-        if not (np.isfinite([*given, *loads.T]).all() and (given[2] > 0).all() and least >= 0):
+        if not (all(np.isfinite(v).all() for v in (*given, loads)) and (given[2] > 0).all() and least >= 0):
             raise UserError("speed, friction, load: must be finite, speed positive, friction and load 0 or more")
         size = POSES if n > 1 else 1
         which = np.minimum(np.arange(-(-n // size) * size), n - 1).reshape(-1, size)
@@ -152,7 +154,8 @@ def forces(
     table: ContactTable, lateral: Array, yaw: Array, speed: Array, friction: Array, turning: Array, xi: Array,
     eta: Array, phi: Array, load: Array,
 ) -> Rolling:  # fmt: skip
-    """`ContactTable.forces` as a pure function of arrays (n,) and load (n, 2), for `jax.jit`, `vmap` and `grad`."""
+    """`ContactTable.forces` as a pure function of arrays (n,) and load (n, 2), for `jax.jit`, `vmap` and `grad`; xi,
+    eta and phi are (n,) or (n, 2)."""
     side = jnp.array([-1.0, 1.0])
     weights = _weights(table, lateral[:, None] * side, yaw[:, None])
     patches = Patches(*(_mean(jnp.asarray(v), weights) for v in table.patches))
@@ -186,7 +189,7 @@ def _rolled(
 ) -> Rolling:  # fmt: skip
     """Creepages as `wheelset.patches` has them, forces of the strips, and what the wheels feel of it."""
     lateral, yaw, roll, down = pose
-    each = [v[:, None, None] for v in (lateral, yaw, roll, speed, turning, *more)]
+    each = [v.reshape(len(v), -1, 1) for v in (lateral, yaw, roll, speed, turning, *more)]
     lateral, yaw, roll, speed, turning = each[:5]
     rim = turning * p.radius * jnp.cos(yaw)
     V = 0.5 * (speed + rim)

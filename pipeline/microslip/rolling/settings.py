@@ -50,6 +50,10 @@ BIGGEST = 5.0
 """m: a wheel's radius, or half a track, above this is given in another unit."""
 
 
+ROUGHEST = 1e-3
+"""m: R_Z above this is given in another unit."""
+
+
 class Section(Model):
     """A cross-section.
 
@@ -203,17 +207,22 @@ class HeatOfCase(Model):
         return Heat((wheel, rail), start, self.limit)
 
 
-class WearOfCase(Model):
+class WearOfBody(Model):
+    """coefficient: of wheel and rail each, worn volume over frictional work, m3/J."""
+
+    coefficient: Positive
+
+
+class WearOfCase(WearOfBody):
     """What a passage wears, and profiles that are renewed by it.
 
     Attributes:
-        coefficient: of wheel and rail each, worn volume over frictional work, m3/J. updates: of both profiles, 0 for
-            none. passages: in all of them, of the wheel over every place of the rail and of the rail under every place
-            of the wheel. smoothing: standard deviation of the Gaussian that the contact sees worn depths through, m.
-            lateral: shifts of the wheelset that share the passages, m; that of the pose if not given.
+        updates: of both profiles, 0 for none. passages: in all of them, of the wheel over every place of the rail and
+            of the rail under every place of the wheel. smoothing: standard deviation of the Gaussian that the contact
+            sees worn depths through, m. lateral: shifts of the wheelset that share the passages, m; that of the pose if
+            not given.
     """
 
-    coefficient: Positive
     updates: Annotated[int, Field(ge=0, le=1000)] = 0
     passages: Positive | None = None
     smoothing: Annotated[NotNegative, Field(le=0.02)] = 1e-3
@@ -312,11 +321,13 @@ class RollingCase(Model):
         """Rough, if it is asked.
 
         Raises:
-            UserError: a file that is none.
+            UserError: a file that is none, heights of another unit.
         """
         if self.roughness is None:
             return None
         heights, R_Z = self.roughness.heights(folder / "case.toml", 1.0)
+        if R_Z > ROUGHEST:
+            raise UserError(f"roughness: R_Z = {float(R_Z):g} m is no roughness; give it in m, worn rails have 1e-5")
         return Surface(heights, value(R_Z))
 
     @property

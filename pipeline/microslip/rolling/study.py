@@ -108,7 +108,8 @@ class Studied:
         sides = sorted({q.side for q in self.patches})
         if len(self.patches) > 1:
             who = "The wheel touches the rail" if len(sides) == 1 else "The wheels touch the rails"
-            told.append(f"{who} in {len(self.patches)} patches; the curve is of the most loaded.")
+            where = "" if len(sides) == 1 else f", on the {p.side} rail"
+            told.append(f"{who} in {len(self.patches)} patches; the curve is of the most loaded{where}.")
         told += [self._felt(side, "the wheel" if len(sides) == 1 else f"the {side} wheel") for side in sides]
         told.append(
             f"The patch is {2e3 * p.a:.3g} mm long and {2e3 * p.b:.3g} mm wide, under {p.normal_force:.5g} N with at "

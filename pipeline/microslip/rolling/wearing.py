@@ -70,7 +70,8 @@ class Moment(NamedTuple):
 @dataclass(frozen=True)
 class Wearing:
     """Attributes: wheel, rail: in the end. moments: before, and after every update. work: of friction between them, J
-    per m of the way. smoothing: of the worn depth, m. least: with which no wave of it grows at the first update, m."""
+    per m of the way. smoothing: of the worn depth, m. least: with which no wave of it grows at the first update, m.
+    approach: of new bodies, m."""
 
     wheel: Body
     rail: Body
@@ -78,6 +79,7 @@ class Wearing:
     work: float
     smoothing: float
     least: float
+    approach: float
 
     def columns(self) -> dict[str, Array]:
         """Of a table over the passages."""
@@ -92,13 +94,20 @@ class Wearing:
             f"{first.pressure / 1e6:.4g} to {last.pressure / 1e6:.4g} MPa."
         )
 
-    def warning(self) -> str:
-        if self.smoothing >= self.least:
-            return ""
-        return (
-            f"warning: an update takes so much that waves of the worn profile amplify themselves: smooth over "
-            f"{1e3 * self.least:.2g} mm or more (wear.smoothing), or take more updates (wear.updates)."
-        )
+    def warnings(self) -> list[str]:
+        told, last = [], self.moments[-1]
+        if self.smoothing < self.least:
+            told.append(
+                f"warning: an update takes so much that waves of the worn profile amplify themselves: smooth over "
+                f"{1e3 * self.least:.2g} mm or more (wear.smoothing), or take more updates (wear.updates)."
+            )
+        if last.wheel + last.rail > self.approach:
+            told.append(
+                f"warning: the grooves of wheel and rail are together {1e3 * (last.wheel + last.rail):.2g} mm deep, "
+                f"more than the bodies approach each other, {1e3 * self.approach:.2g} mm: no ellipse is what touches "
+                "in them, and the numbers are a guess; take fewer passages, or share them over shifts (wear.lateral)."
+            )
+        return told
 
 
 def wearing(
@@ -113,7 +122,7 @@ def wearing(
     asked = case.wear
     assert asked is not None and asked.passages is not None
     bodies = [Body.of(track.wheel, -1.0), Body.of(track.rail, 1.0)]
-    each, moments, work, least = asked.passages / asked.updates, [], 0.0, 0.0
+    each, moments, work, least, approach = asked.passages / asked.updates, [], 0.0, 0.0, 0.0
     shifts = asked.lateral or (case.pose.lateral,)
     for k in range(asked.updates + 1):
         if k % max(1, asked.updates // 10) == 0:
@@ -122,13 +131,14 @@ def wearing(
         seen = replace(track, wheel=wheel, rail=rail)
         runs = [one for lateral in shifts for one in _run(case, seen, friction, surface, lateral)]
         moments.append(_moment(k * each, runs, bodies))
+        approach = approach or max(one.patch.approach for one in runs)
         if k == asked.updates:
             break
         share = each / len(shifts)
         bodies = [_worn(body, runs, asked.coefficient * share, case.pose.side) for body in bodies]
         work += share * sum(float(one.width @ one.work) for one in runs)
         least = least or _shortest(runs, sum(body.depth.max() for body in bodies), track)
-    return Wearing(bodies[0], bodies[1], moments, work, asked.smoothing, least)
+    return Wearing(bodies[0], bodies[1], moments, work, asked.smoothing, least, approach)
 
 
 def _run(case: RollingCase, track: Track, friction: Friction, surface: Surface | None, lateral: float) -> list[Strips]:

@@ -6,18 +6,18 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from ..basis import read_basis
-from ..errors import told_of
+from ..errors import UserError, told_of
 from ..files import store
 from ..files.tables import columns_csv, rows_csv
 from ..report.rolling import rolling_html
 from ..rolling.behind import ROWS, Behind, behind
 from ..rolling.contact_table import ContactTable, contact_table, write_contact_table
-from ..rolling.settings import RollingCase, load_rolling
+from ..rolling.settings import RollingCase, Section, load_rolling
 from ..rolling.study import Studied, rows_of_patches, study
 from ..rolling.table import creep_table, write_creep_table
 from ..rolling.wearing import Wearing, wearing
 from .answer import Answer, answered
-from .job import open_job
+from .job import Job, open_job
 from .modal import modes_stage
 from .places import find_body
 from .stage import Report, Stage
@@ -45,8 +45,22 @@ def _bodies(case: RollingCase, case_path: Path, report: Report) -> list[Path]:
     """Modal files of wheel and rail, made where they are not up to date."""
     if case.elastic is None:
         return []
-    jobs = [open_job(find_body(case_path, name, Path("."))) for name in (case.elastic.wheel, case.elastic.rail)]
-    return [modes_stage(job, report=report)[0] for job in jobs]
+    named = {"wheel": case.elastic.wheel, "rail": case.elastic.rail}
+    jobs = {key: open_job(find_body(case_path, name, Path("."))) for key, name in named.items()}
+    for key, job in jobs.items():
+        _of_one_material(case_path, key, job, getattr(case, key))
+    return [modes_stage(job, report=report)[0] for job in jobs.values()]
+
+
+def _of_one_material(case_path: Path, key: str, job: Job, section: Section) -> None:
+    """A body and the half-space that stands for its contact, of which one is taken out and the other put in."""
+    own = [getattr(job.settings.material, name, None) for name in ("young", "poisson")]
+    asked = [section.young, section.poisson]
+    if None not in own and own != asked:
+        raise UserError(
+            f"{case_path}: {key}.young, {key}.poisson: {asked} in the case and {own} in {job.path}; with [elastic] "
+            "they must be the same, correct one"
+        )
 
 
 def _work(stage: Stage, case: RollingCase, case_path: Path, bodies: list[Path], pictures: bool) -> Answer:
@@ -62,7 +76,7 @@ def _work(stage: Stage, case: RollingCase, case_path: Path, bodies: list[Path], 
     beside, more = _beside(stage, found, elastic, contacts)
     if worn is not None:
         beside += _worn_tables(worn, folder)
-        more += [worn.sentence(), *filter(None, [worn.warning()])]
+        more += [worn.sentence(), *worn.warnings()]
     drawn = _pictures(found, worn, folder / "pictures", case.name) if pictures and found.forces is not None else []
     page = folder / "rolling.html"
     shown = [p for p in drawn if p.suffix == ".png"]

@@ -15,7 +15,7 @@ from ..contact.solids import Solid
 from ..data import Array
 from ..rolling.ellipse import combined
 from ..rolling.profiles import Profile
-from ..rolling.settings import ModelOfCase, Rail, TableOfCase, WearOfCase, Wheel
+from ..rolling.settings import ModelOfCase, Rail, TableOfCase, WearOfBody, Wheel
 from ..rolling.wheelset import Track
 from ..settings.body import Model, Name, NotNegative, Number, Positive, _tuple, load_toml, override
 from ..settings.mistakes import validate
@@ -76,7 +76,7 @@ class Unround(Model):
     angle: Number = 0.0
 
 
-class WearOfVehicle(WearOfCase):
+class WearOfVehicle(WearOfBody):
     """tolerance: of the radius, of each jump over many turns, m. profile: whether wheels touch by the profile that they
     have worn to, in the mean over both and their circumference, or by that of new ones."""
 
@@ -102,7 +102,7 @@ class KinematicsCase(Model):
     wheel: Wheel
     rail: Rail
     kinematics: KinematicsOfCase
-    wear: WearOfCase
+    wear: WearOfBody
     model: ModelOfCase = ModelOfCase(exact=0)
 
     @property

@@ -23,6 +23,7 @@ from .wearing import (
     columns_of,
     deepest,
     error_of,
+    groove,
     growth,
     orders_of,
     tread,
@@ -147,7 +148,9 @@ class Studied:
 
     def _deep(self) -> list[str]:
         """What is worn may be deeper than what the contacts know."""
-        most, depth = deepest(self.vehicle), float(self.history[-1][0].depth.mean(axis=1).max())
+        most, worn = deepest(self.vehicle), self.history[-1][0].depth
+        renewed = self.rolling.profile is not None
+        depth = float((groove(worn) if renewed else worn.mean(axis=1)).max())
         told = f"The groove is {1e3 * depth:.2g} mm deep; "
         if depth <= most:
             return [f"{told}the contact is one ellipse up to {1e3 * most:.2g} mm."]

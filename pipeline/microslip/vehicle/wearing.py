@@ -159,7 +159,7 @@ class Rolling:
         """
         if self.profile is None or not depth.any():
             return self
-        mean = smoothed(depth.mean(axis=(0, 1)), STRIP, SMOOTHING)
+        mean = groove(depth)
         if (most := deepest(self.vehicle)) < mean.max():
             raise LeavesTheRail(f"a groove of more than {1e3 * most:.2g} mm splits the contact")
         try:
@@ -233,6 +233,11 @@ class Rolling:
             moved[i] += small
             columns.append((np.asarray(self.turn(moved, radius).end) - end) / small)
         return np.array(columns).T
+
+
+def groove(depth: Array) -> Array:
+    """(n,) m across, of depths (wheels, places, n), as `Rolling.renewed` has it."""
+    return smoothed(depth.mean(axis=(0, 1)), STRIP, SMOOTHING)
 
 
 def deepest(v: Vehicle) -> float:
