@@ -365,8 +365,10 @@ _COMMANDS = {
 }  # fmt: skip
 
 
-_NOT_READ = ("RBE3", "CEINTF", "CPINTF", "CPNGEN", "CPLGEN", "CPCYC", "CECYC", "CESGEN", "CPSGEN", "MATWRITE")
-_NOT_READ += ("EGEN", "ENGEN", "EMODIF", "MPCHG", "INISTATE")
+_NOT_READ = {
+    "RBE3", "CEINTF", "CPINTF", "CPNGEN", "CPLGEN", "CPCYC", "CECYC", "CESGEN", "CPSGEN", "MATWRITE", "EGEN", "ENGEN",
+    "EMODIF", "MPCHG", "INISTATE",
+}  # fmt: skip
 """Commands that constrain, or add or change elements, and are not read."""
 
 
