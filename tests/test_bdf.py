@@ -85,7 +85,16 @@ def test_equations_hold_where_the_case_control_chooses_them(tmp_path):
 
 @pytest.mark.parametrize(
     "card",
-    ["CONM2,70,9,,1.-4", "RBAR,60,9,10,123456", "RBE1,61,9,123456", "CELAS2,62,1.+6,9,1,10,1", "CBUSH,63,1,9,10"],
+    [
+        "CONM2,70,9,,1.-4",
+        "RBAR,60,9,10,123456",
+        "RBE1,61,9,123456",
+        "CELAS2,62,1.+6,9,1,10,1",
+        "CBUSH,63,1,9,10",
+        "BGSET,1,2,3",
+        "BCTABL1,1,2",
+        "MFLUID,5,,,1.-9",
+    ],
 )
 def test_cards_that_count_and_are_not_read_are_told_with_their_line(tmp_path, card):
     read = constrained(tmp_path, [card, "FORCE,1,9,0,1.0,1.0,0.0,0.0", "CORD2R,3,,0.,0.,0.,0.,0.,1."])

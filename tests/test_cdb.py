@@ -232,6 +232,25 @@ def test_displacements_that_are_zero_are_supports(tmp_path):
 BAR = meshes.brick("hexahedron", (1, 1, 2), (0.02, 0.01, 0.03))
 
 
+def test_one_command_holds_several_directions_and_nodes(tmp_path):
+    """D, node, label, value, , last node, step, further labels."""
+    text = archive(BAR).replace("FINISH", "D,1,UX,0,,4,,UY,UZ\nD,9,UZ,,,11,2\nFINISH")
+    read = read_mesh(written(tmp_path, text), "mm")
+    held = {ways: read.node_id[read.point_sets[name]].tolist() for name, ways in dict(read.supports).items()}
+    assert held == {"xyz": [1, 2, 3, 4], "z": [9, 11]}
+
+
+@pytest.mark.parametrize("more", ["E,9\nE,10", "EN,98,9\nEN,99,10", "EBLOCK,10,,,2\n(15i9)\n{0}\n{0}\n       -1"])
+def test_elements_outside_the_block_of_solids_are_told(tmp_path, more):
+    """Point masses by commands or in a short block, of the type before them; surface loads there say nothing."""
+    line = "".join(f"{w:9d}" for w in (98, 1, 1, 1, 0, 9))
+    more = f"TYPE,3\n{more.format(line)}\nTYPE,2\nE,1,2,3,4\nEMODIF,2,MAT,3\n"
+    text = archive(BAR).replace("ET,2,154", "ET,2,154\nET,3,MASS21").replace("FINISH", f"{more}FINISH")
+    read = read_mesh(written(tmp_path, text), "mm")
+    said = [told.split(" is not read")[0].partition(": ")[2] for told in read.lost]
+    assert said == ["EMODIF", "the Ansys type 21 (2 elements)"]
+
+
 def test_coupled_nodes_are_equations(tmp_path):
     """CP as the CE that say the same; one whose nodes are not in its line is refused."""
     text = archive(BAR)

@@ -152,6 +152,21 @@ def test_a_body_of_few_nodes_is_solved_densely(cell_type, what):
 # ---------------------------------------------------------------- repeated eigenvalues and the certificate
 
 
+def test_rows_of_unlike_units_lose_no_mode():
+    """Congruence by D keeps eigenvalues; with D = 1e-7 for rotations in N, mm, t none of them is massless."""
+    rng = np.random.default_rng(5)
+    A = rng.normal(size=(6, 6))
+    K, M, D = A @ A.T + np.eye(6), np.diag(rng.uniform(1, 2, 6)), np.diag([1, 1, 1, 1e-7, 1e-7, 1e-7])
+    wanted = scipy.linalg.eigvalsh(K, M)
+    K, M = sp.csr_matrix(D @ K @ D), sp.csr_matrix(D @ M @ D)
+
+    def shifted(s: float) -> sp.csr_matrix:
+        return sp.csr_matrix(sp.triu(K - s * M))
+
+    pencil = eigen.Pencil(shifted, K.dot, M.dot, 6, abs(K).max(), abs(M).max(), eigen.new_solver("superlu"))
+    np.testing.assert_allclose(eigen.search(pencil, 6).values, wanted, rtol=1e-10)
+
+
 def test_a_cube_on_rollers_shows_all_its_repeated_waves():
     """A cube has P and S waves three, six, ... times; none may be missing and none cut off (closed form)."""
     cube = brick("hexahedron27", (3, 3, 3))

@@ -25,6 +25,7 @@ from microslip.exchange.choice import select
 from microslip.exchange.dmig import number
 from microslip.exchange.matrices import read_matrices
 from microslip.modal.compute import modal_basis
+from microslip.modal.foreign import foreign_basis
 from microslip.settings.body import BodySettings, MatrixFiles
 
 LAST = 5e-11
@@ -247,6 +248,39 @@ def test_the_punch_file_is_imported_as_a_superelement(tmp_path: Path, monkeypatc
     assert m.damping is not None
     assert list(m.component) == [0, 1, 2, 3, 4, 5] * 2 + [-1] * 6 and list(m.node) == [0] * 6 + [1] * 6 + [-1] * 6
     same_spectrum(m.stiffness.toarray(), m.mass.toarray(), basis.groups[0, 0].omega ** 2)
+
+
+@pytest.mark.parametrize("unit", ["m", "mm"])
+def test_a_floating_superelement_of_two_nodes_comes_back(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, unit: str
+) -> None:
+    """Quadratic displacements of two nodes are rigid, and in mm a rotation of the shaft weighs 1e-13 of a displacement.
+    The numbers said to be of another system are those of a body with the same frequencies."""
+    pytest.importorskip("pyyeti")
+    mesh = small.beam(size=(0.01, 0.008, 0.1))
+    table = small.table(
+        reduction="craig-bampton", excitations=[], gauges=[], monitors=[], supports=[], free=True, modes={"count": 6}
+    )
+    basis = modal_basis(mesh, BodySettings.model_validate(table), provenance={})
+    monkeypatch.chdir(tmp_path)
+    writer("dmig")(basis, "b.pch")
+    shared = {"stiffness": "b.pch", "mass": "b.pch", "nodes": "b.pch", "superelement": True}
+    given = BodySettings.model_validate(
+        {"name": "b", "length_unit": unit, "free": True, "geometry": {"matrices": shared}, "modes": {"count": 20}}
+    )
+    body = read_matrices(MatrixFiles(**shared), tmp_path, unit)
+    found, _ = foreign_basis(body, given)
+    wanted = basis.groups[0, 0].frequency
+    np.testing.assert_allclose(found.groups[0, 0].frequency, wanted, rtol=1e-7, atol=1e-3)
+
+
+def test_import_knows_that_the_file_is_in_si_and_what_it_holds(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Said to be in mm it would weigh a thousand times as much."""
+    pytest.importorskip("pyyeti")
+    monkeypatch.chdir(tmp_path)
+    writer("dmig")(turned(), "b.pch")
+    assert main(["import", "b.pch", "wing"]) == 0
+    assert tomllib.loads(Path("wing/body.toml").read_text())["length_unit"] == "m"
 
 
 def test_what_it_cannot_hold_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -69,6 +69,7 @@ def test_a_deck_without_material_says_so(tmp_path, monkeypatch, capsys):
     [
         ("*DENSITY\n7.85e-9\n", "", "part.inp, line 27: the material 'Steel' of the cells 'EALL' has no density"),
         ("*ELASTIC\n210000., 0.3\n", "", "part.inp, line 27: the material 'Steel' of the cells 'EALL' has no elastic"),
+        ("7.85e-9\n", "0.\n", "part.inp, line 27: the material 'Steel' of the cells 'EALL' has a density of 0"),
     ],
 )
 def test_a_material_that_is_not_whole_is_no_steel(tmp_path, monkeypatch, capsys, old, new, words):

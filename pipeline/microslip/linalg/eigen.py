@@ -485,18 +485,22 @@ def _dense(pencil: Pencil, count: int, known: Array) -> tuple[Array, Array]:
     """Tiny problems, where Lanczos has no room: dense eigenproblem on the M-orthogonal complement of `known`.
 
     The four-point mass of a few ten-node tetrahedra is singular; what has no mass is condensed (an infinite
-    eigenvalue), so that only finite eigenvalues are returned.
+    eigenvalue), so that only finite eigenvalues are returned. Rows are brought to one size before anything is called
+    massless: a rotation in N, mm and t weighs 1e-13 of a displacement.
     """
     eye = np.eye(pencil.n, dtype=pencil.dtype)
     K, M = pencil.K(eye), pencil.M(eye)
+    each = np.diag(M).real
+    size = 1 / np.sqrt(np.where(each > 1e-18 * each.max(), each, 1.0))
+    K, M = (A * np.outer(size, size) for A in (K, M))
     weight, Q = np.linalg.eigh(0.5 * (M + M.conj().T))
     heavy = weight > 1e-12 * weight[-1]
     X, light = Q[:, heavy] / np.sqrt(weight[heavy]), Q[:, ~heavy]
     if light.shape[1]:
         X = X - light @ np.linalg.solve(light.conj().T @ K @ light, light.conj().T @ (K @ X))
     if known.shape[1]:
-        away = np.linalg.qr(X.conj().T @ (M @ known), mode="complete")[0]
+        away = np.linalg.qr(X.conj().T @ (M @ (known / size[:, None])), mode="complete")[0]
         X = X @ away[:, known.shape[1] :]
     inner = X.conj().T @ K @ X
     values, S = np.linalg.eigh(0.5 * (inner + inner.conj().T))
-    return values[:count], X @ S[:, :count]
+    return values[:count], size[:, None] * (X @ S[:, :count])

@@ -36,7 +36,7 @@ _READ = {
 }  # fmt: skip
 _COUNTS = re.compile(
     r"C(?!ORD|END)[A-Z]+\d?|R(?!FORCE|LOAD|AND|ING)[A-Z]+\d?|SUPORT1?|GENEL|DMIG|NSM[A-Z]*\d?|GRDSET|"
-    r"MATT\d+|BCTSET|PSHELL|PCOMPG?|BCONTACT|BOLT|SPCOFF1?|SPCR|SPLINE\d|ASET1?|AEQUAD4"
+    r"MATT\d+|MFLUID|BCTSET|BGSET|BCTABL[E1]|BCBODY1?|PSHELL|PCOMPG?|BCONTACT|BOLT|SPCOFF1?|SPCR|SPLINE\d|ASET1?|AEQUAD4"
 )
 """Cards that add mass, stiffness or constraints; those beside `_READ` are not read."""
 

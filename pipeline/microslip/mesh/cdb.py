@@ -40,7 +40,9 @@ _FORMS: dict[int, dict[str, Sequence[int]]] = {
 
 @dataclass
 class _Archive:
-    """What the commands have said. elements: (number, material, type, system, nodes). places: of equations, by name."""
+    """What the commands have said. elements: (number, material, type, system, nodes). places: of equations, by name.
+    kind: of the elements that follow (TYPE). outside: kind -> where, and how many elements, beside EBLOCK,,SOLID.
+    """
 
     node_id: list[int] = field(default_factory=list)
     points: list[list[float]] = field(default_factory=list)
@@ -59,6 +61,8 @@ class _Archive:
     open: str = ""
     where: str = ""
     places: dict[str, str] = field(default_factory=dict)
+    kind: int = 1
+    outside: dict[int, tuple[str, int]] = field(default_factory=dict)
     lost: list[str] = field(default_factory=list)
 
 
@@ -73,10 +77,10 @@ def read_cdb(path: Path) -> RawMesh:
     while at < len(lines):
         words = [word.strip() for word in lines[at].split("!")[0].split(",")]
         command = words[0].upper()
+        archive.where = f"{path.name}, line {at + 1}"
         if command in ("NBLOCK", "EBLOCK", "CMBLOCK"):
             at = _BLOCKS[command](archive, words, lines, at + 1)
             continue
-        archive.where = f"{path.name}, line {at + 1}"
         try:
             if command in _COMMANDS:
                 _COMMANDS[command](archive, words)
@@ -163,6 +167,7 @@ def _read_elements(archive: _Archive, words: list[str], lines: list[str], at: in
             raise Damaged("EBLOCK has an empty line instead of -1 at its end, the file is truncated")
         at += 1
         if not solid:
+            _leave_out(archive, words)
             continue
         if len(first) < 12:
             raise Damaged(f"EBLOCK holds the line '{lines[at - 1].strip()[:60]}', which is too short")
@@ -217,6 +222,17 @@ def _read_type(archive: _Archive, words: list[str]) -> None:
     if len(words) > 2 and words[1].isdecimal():
         number = re.search(r"\d+$", words[2])
         archive.kinds[_whole(words[1], "ET")] = int(number[0]) if number else 0
+
+
+def _read_current(archive: _Archive, words: list[str]) -> None:
+    if len(words) > 1 and words[1].isdecimal():
+        archive.kind = _whole(words[1], "TYPE")
+
+
+def _leave_out(archive: _Archive, words: list[str]) -> None:
+    """An element of the current type that no EBLOCK,,SOLID holds: E, EN, or a line of a short block."""
+    where, count = archive.outside.get(archive.kind, (archive.where, 0))
+    archive.outside[archive.kind] = where, count + 1
 
 
 def _read_temperatures(archive: _Archive, words: list[str]) -> None:
@@ -276,15 +292,17 @@ def _refuse_temperatures(archive: _Archive, words: list[str]) -> None:
 
 
 def _read_displacement(archive: _Archive, words: list[str]) -> None:
-    """D, node or component, UX or UY or UZ or ALL, value."""
-    where, label, value = [*words[1:4], "", "", ""][:3]
-    directions = _LABELS.get(label.upper(), "") if label.upper() != "ALL" else "xyzabc"
+    """D, node or component, UX or UY or UZ or ALL, value, its imaginary part, last node, step, further labels."""
+    where, label, value, _, last, step, *more = [*words[1:], *7 * [""]]
+    directions = "".join("xyzabc" if w.upper() == "ALL" else _LABELS.get(w.upper(), "") for w in (label, *more))
     if not directions:
         return
     if value and _number(value, "D") != 0:
         archive.held.left_out.append(f"D,{where},{label} prescribes a displacement")
     elif is_number(where):
-        archive.held.hold(int(where), directions)
+        first, end = int(where), _whole(last, "D") if last else int(where)
+        for node in range(first, min(end, first + 10**8) + 1, max(_whole(step or "1", "D"), 1)):
+            archive.held.hold(node, directions)
     else:
         archive.held.left_out.append(f"D,{where},{label} names no node by its number")
 
@@ -341,14 +359,17 @@ def _read_rigid(archive: _Archive, words: list[str]) -> None:
 
 _COMMANDS = {
     "CE": _read_equation, "CERIG": _read_rigid, "CP": _read_coupled,
-    "D": _read_displacement,
+    "D": _read_displacement, "E": _leave_out, "EN": _leave_out, "TYPE": _read_current,
     "ET": _read_type, "MPTEMP": _read_temperatures, "MPDATA": _read_data, "MP": _read_constant, "TREF": _read_reference,
     "TUNIF": _read_uniform, "BFUNIF": _read_uniform, "BF": _read_body_force, "BFBLOCK": _refuse_temperatures,
 }  # fmt: skip
 
 
-_NOT_READ = ("RBE3", "CEINTF", "CPINTF", "CPNGEN", "CPLGEN", "CPCYC", "CECYC", "CESGEN", "CPSGEN", "MATWRITE")
-"""Commands that constrain and are not read."""
+_NOT_READ = {
+    "RBE3", "CEINTF", "CPINTF", "CPNGEN", "CPLGEN", "CPCYC", "CECYC", "CESGEN", "CPSGEN", "MATWRITE", "EGEN", "ENGEN",
+    "EMODIF", "MPCHG", "INISTATE",
+}  # fmt: skip
+"""Commands that constrain, or add or change elements, and are not read."""
 
 
 # assembly ------------------------------------------------------------------------------------------------------------
@@ -417,10 +438,10 @@ def _other_elements(archive: _Archive, name: str) -> list[str]:
         ansys = archive.kinds.get(kind, 0)
         if ansys in _OTHERS - _HARMLESS:
             first[ansys] = (first.get(ansys, (number, 0))[0], first.get(ansys, (number, 0))[1] + 1)
-    return [
-        lost(f"{name}, element {number}", f"the Ansys type {kind} ({count} element{'s' * (count > 1)})")
-        for kind, (number, count) in first.items()
-    ]
+    found = [(kind, f"{name}, element {number}", count) for kind, (number, count) in first.items()]
+    beside = [(archive.kinds.get(kind, 0), where, count) for kind, (where, count) in archive.outside.items()]
+    found += [one for one in beside if one[0] not in _HARMLESS]
+    return [lost(where, f"the Ansys type {kind} ({count} element{'s' * (count > 1)})") for kind, where, count in found]
 
 
 def _form(archive: _Archive, number: int, kind: int, nodes: list[int]) -> tuple[str, list[int]] | None:

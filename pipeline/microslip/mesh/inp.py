@@ -403,6 +403,8 @@ def _read_temperature(deck: Deck, parameters: dict[str, str], lines: list[str], 
 def _read_initial(deck: Deck, parameters: dict[str, str], lines: list[str]) -> None:
     if parameters.get("TYPE", "").upper() == "TEMPERATURE":
         _read_temperature(deck, parameters, lines, column=0)
+    elif parameters.get("TYPE", "").upper() in ("STRESS", "PLASTIC STRAIN"):
+        deck.lost.append(lost(deck.where, f"*INITIAL CONDITIONS, TYPE={parameters['TYPE'].upper()}"))
 
 
 def _read_step(deck: Deck, parameters: dict[str, str], lines: list[str]) -> None:

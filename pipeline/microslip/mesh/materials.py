@@ -67,7 +67,7 @@ def in_si(found: DeckMaterial, system: str, zero: float = 0.0) -> Material:
     if found.density is None:
         raise Unread(f"{line}the material '{found.name}'{at} has no density; give it one, no other can stand for it")
     if not 0 < found.density < np.inf:
-        raise Damaged(f"the material '{found.name}'{at} has a density of {found.density:g}")
+        raise Unread(f"{line}the material '{found.name}'{at} has a density of {found.density:g}; correct it")
     if not (np.isfinite(found.expansion).all() and np.isfinite(found.elasticity).all()):
         raise Damaged(f"the material '{found.name}'{at} holds a number that is not finite")
     table = None if found.temperature is None else found.temperature + np.array([zero, 0.0])

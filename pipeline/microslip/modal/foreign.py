@@ -66,7 +66,7 @@ def foreign_basis(
             check_held(body.mesh, settings, centre, spread)
         if settings.free and any(settings.rotation.speeds_rpm):
             raise UserError("rotation.speeds_rpm: matrices tell no balance of a free body at speed; use speed 0")
-        shift = _shift(body, motions, free, pencil) if R.shape[1] else 0.0
+        shift = _shift(body, R, free, pencil) if R.shape[1] else 0.0
         s = _search(settings, pencil, unknowns, R, shift, rows, report)
         place = np.concatenate([canonical.by_place(body.mesh.points), np.arange(3 * body.mesh.n_points, layout.width)])
         solved = reduced_on(place, layout.width // 3, settings, s, rows)
@@ -330,23 +330,46 @@ def _on(A: sp.csr_matrix, pattern: sp.csr_matrix) -> Array:
 
 
 def _shift(body: Matrices, R: Array, free: Indices, pencil: eigen.Pencil) -> float:
-    """Negative shift for a free body: a tenth of the lowest elastic Rayleigh quotient of quadratic displacements."""
+    """Negative shift for a free body with rigid motions R: a tenth of its lowest elastic Rayleigh quotient.
+
+    Of quadratic displacements, which of one or two nodes are rigid ones: then of its first rotations and generalised
+    coordinates, one by one. At least ten times what the digits of K leave of the stiffness of R.
+    """
+    R = rigid.mass_orthonormal(R, pencil.M)
+    least = 10 * float(np.linalg.norm(R.T @ pencil.K(R), 2))
+    others = np.flatnonzero((body.component < 0) | (body.component >= 3))[:_SINGLE]
+    for shapes in (_quadratic(body), np.eye(body.count)[:, others] if len(others) else np.zeros((body.count, 0))):
+        elastic = _quotients(pencil, shapes[free], R)
+        if len(elastic):
+            return -max(0.1 * float(elastic[0]), least)
+    return -max(1e-6 * pencil.k_norm / pencil.m_norm, least)
+
+
+_SINGLE = 60
+"""Of so many rows the lowest quotient is a guess that is good enough."""
+
+
+def _quadratic(body: Matrices) -> Array:
+    """(m, 18) displacements of the rows that are products of two coordinates."""
     x = body.mesh.points - body.mesh.points.mean(axis=0)
     x = x / max(float(np.abs(x).max()), 1e-30)
-    shapes = [R[free]]
-    for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2)):
-        f = np.zeros((body.count, 3))
-        moves = (body.component >= 0) & (body.component < 3)
-        f[moves, body.component[moves]] = (x[:, i] * x[:, j])[body.node[moves]]
-        shapes.append(f[free])
-    F = np.hstack(shapes)
-    F = F / np.maximum(np.linalg.norm(F, axis=0), 1e-300)
+    F = np.zeros((body.count, 6, 3))
+    moves = np.flatnonzero((body.component >= 0) & (body.component < 3))
+    for k, (i, j) in enumerate(((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2))):
+        F[moves, k, body.component[moves]] = (x[:, i] * x[:, j])[body.node[moves]]
+    return F.reshape(body.count, 18)
+
+
+def _quotients(pencil: eigen.Pencil, F: Array, R: Array) -> Array:
+    """Elastic Rayleigh-Ritz values of shapes F (f, c) beside M-orthonormal rigid motions R, ascending; perhaps none."""
+    size = np.sqrt(np.maximum(np.einsum("ij,ij->j", F, pencil.M(F)), 0.0))
+    F = F[:, size > 0] / size[size > 0]
+    F = F - R @ (R.T @ pencil.M(F))
     gram = F.T @ pencil.M(F)
     w, Q = np.linalg.eigh(0.5 * (gram + gram.T))
-    Q = Q[:, w > 1e-10 * w[-1]] / np.sqrt(w[w > 1e-10 * w[-1]])
+    Q = Q[:, w > 1e-10] / np.sqrt(w[w > 1e-10])
     ritz = np.linalg.eigvalsh(Q.T @ (F.T @ pencil.K(F)) @ Q)
-    elastic = ritz[ritz > 1e-7 * ritz[-1]]
-    return -0.1 * float(elastic[0]) if len(elastic) else -1e-6 * pencil.k_norm / pencil.m_norm
+    return ritz[ritz > 1e-7 * ritz[-1]] if len(ritz) else ritz
 
 
 def _search(

@@ -98,7 +98,8 @@ def indicators(
     found = _static_errors(labels, static, held)
     low = np.sqrt(certified[rigid : rigid + COUNT])
     for i, (a, b) in enumerate(zip(reduced.omega[rigid:], low, strict=False), 1):
-        found[f"free_error_{i}"] = float(abs(a / b - 1))
+        if b > 0:  # not of a mechanism that is none of the rigid motions
+            found[f"free_error_{i}"] = float(abs(a / b - 1))
     at = [i for i, label in enumerate(labels) if label.startswith("interface:")]
     if not len(stuck):
         return found

@@ -66,6 +66,8 @@ def import_file(file: Path, folder: Path | None, unit: str, instances: Sequence[
         raise UserError(f"{target}: is there already; give another folder as second argument (nothing was changed)")
     kind = file.suffix.lower()
     made = _matrices if kind in MATRICES else _cad if kind in CAD else partial(_mesh, instances=instances)
+    if made is _matrices and _in_metres(file):
+        unit = "m"
     lines, told = made(file, target.parent, unit)
     head = [f'name = "{name}"', f'length_unit = "{unit}"']
     write_text(target, "\n".join([*head, *lines]) + "\n")
@@ -300,6 +302,13 @@ def _pressed(mesh: Mesh) -> list[str]:
     ]
 
 
+def _in_metres(file: Path) -> bool:
+    """Whether bulk data says that it was written by `exchange.dmig`, in SI."""
+    with file.open("rb") as stream:
+        head = stream.read(800)
+    return head.startswith(b"$ Superelement ") and b"by microslip" in head and b"$ SI units" in head
+
+
 def _matrices(file: Path, folder: Path, unit: str) -> tuple[list[str], list[str]]:
     from ..exchange.matrices import matrix_names, own_nodes
 
@@ -312,7 +321,11 @@ def _matrices(file: Path, folder: Path, unit: str) -> tuple[list[str], list[str]
     lines.append(f"stiffness = {_beside(file, folder)}")
     lines.append(f"mass = {_beside(mass, folder)}")
     upper = {n.upper() for n in names}
-    for key, usual in (("damping", ("C", "BAA", "BAAX", "C_R")), ("gyroscopic", ("G", "G_R"))):
+    for key, usual in (
+        ("damping", ("C", "BAA", "BAAX", "C_R")),
+        ("gyroscopic", ("G", "GAAX", "G_R")),
+        ("circulatory", ("NAAX", "N_R")),
+    ):
         if upper & set(usual) and mass == file:
             lines.append(f"#{key} = {_beside(file, folder)}")
     if nodes is None:

@@ -33,8 +33,8 @@ USUAL = {
     "stiffness": ("K", "KAA", "KAAX", "KXX", "KGG", "K2GG", "STIFFNESS", "K_R"),
     "mass": ("M", "MAA", "MAAX", "MXX", "MGG", "M2GG", "MASS", "M_R"),
     "damping": ("C", "B", "BAA", "BAAX", "BXX", "BGG", "B2GG", "DAMPING", "C_R"),
-    "gyroscopic": ("G", "GYRO", "GYROSCOPIC", "G_R"),
-    "circulatory": ("N", "KR", "CIRCULATORY", "N_R"),
+    "gyroscopic": ("G", "GYRO", "GYROSCOPIC", "GAAX", "G_R"),
+    "circulatory": ("N", "KR", "CIRCULATORY", "NAAX", "N_R"),
 }
 """What programs call a matrix."""
 
