@@ -53,7 +53,7 @@ def recorded_picture(found: Recorded, path: Path, title: str) -> Path:
     for axes in (force, worn):
         plain_axes(axes)
     force.plot(columns["angle_deg"], 1e-3 * columns["normal_force_N"], color=COLOURS[1])
-    force.set(ylabel="normal force in kN", title=f"{title}: {found.case.kinematics.turns:g} turns")
+    force.set(ylabel="normal force in kN", title=f"{title}: {found.history[-1][0].turns:.4g} turns")
     worn.plot(columns["angle_deg"], 1e6 * columns["depth_m"], color=COLOURS[2])
     worn.set(ylabel="worn in µm", xlabel="angle from the mark in degrees", xlim=(0, 360), xticks=range(0, 361, 60))
     return save_figure(figure, path)

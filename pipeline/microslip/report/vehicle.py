@@ -11,8 +11,7 @@ from .page import Album, page, say
 READ_AS = (
     "Angles count from the mark of the wheel: what stands at 90 degrees rolls over the rail a quarter of a turn after "
     "the mark. Radii are those that the contact sees, means weighted by its pressure. Wear is "
-    "the coefficient times the frictional work over each strip (Sextro, 6.8-6), laid over the strips of the tread; the "
-    "shape of the profile is not renewed."
+    "the coefficient times the frictional work over each strip (Sextro, 6.8-6), laid over the strips of the tread."
 )
 
 

@@ -56,14 +56,16 @@ def kinematics_stage(
             found = recorded(case, case_path.parent, report, journal)
         stage.begin()
         folder, drawn = stage.product.parent, []
-        store.write_text(folder / "circumference.csv", columns_csv(found.circumference(), 10))
+        made = [folder / "circumference.csv", folder / "wear.csv"]
+        for path, columns in zip(made, (found.circumference(), found.jumped()), strict=True):
+            store.write_text(path, columns_csv(columns, 10))
         if pictures:
             from ..pictures.vehicle import recorded_picture
 
             drawn = [recorded_picture(found, folder / "pictures" / "circumference.png", case.name)]
         page = folder / "unround.html"
         store.write_text(page, recorded_html(f"{case.name}: wear of a wheel", found.sentences(), drawn))
-        return Answer([page, folder / "circumference.csv", *drawn], found.sentences())
+        return Answer([page, *made, *drawn], found.sentences(), not found.ended)
 
     return _answered(stage, inputs, work)
 

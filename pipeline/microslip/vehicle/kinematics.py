@@ -3,19 +3,35 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from ..data import Array, UserError
 from ..files import store
 from ..results import Journal
+from ..rolling.wear import smoothed
 from ..rolling.wheelset import Pose, Track, patches
 from .motion import Contacts
-from .settings import KinematicsCase, track_of
-from .wearing import Tread, orders_of, spread
+from .settings import KinematicsCase, track_of, worn_tracks
+from .wearing import (
+    FIRST,
+    SMOOTHING,
+    STRIP,
+    Jump,
+    LeavesTheRail,
+    Tread,
+    columns_of,
+    error_of,
+    filtered,
+    orders_of,
+    spread,
+    worn,
+)
 
 NEEDED = ("time_s", "angle_rad", "speed_m_per_s", "lateral_m", "normal_force_N")
 GIVEN = ("longitudinal_creepage", "lateral_creepage", "spin_1_per_m")
@@ -111,34 +127,154 @@ def _sound(k: Kinematics, path: Path) -> None:
         raise UserError(f"{path}: is of less than a turn of the wheel; give one at the least")
 
 
-def contacts_of(k: Kinematics, track: Track, side: str, places: int) -> list[Contacts]:
-    """`Contacts` at equal angles of each whole turn, arrays (places, 1); where and how large from the profiles.
+class Places:
+    """Equal angles of each whole turn of a file, and the contacts there; arrays (places, turns of the file).
 
-    Raises:
-        UserError: the wheel leaves the profiles.
+    Attributes: k. track. side. load: mean normal force, N. lateral: (POSES,) of the wheelset, m. y: of it, m, at every
+        place. shape: (6, POSES) of new wheels: half axes, m, place on the wheel's profile, m, incline, normal force,
+        approach, m.
     """
-    load = float(np.mean(k.normal_force))
-    lateral = np.linspace(k.lateral.min() - 1e-6, k.lateral.max() + 1e-6, POSES)
-    try:
-        poses = [patches(track, Pose(float(y)), side, load)[0] for y in lateral]
-    except UserError as error:
-        far = int(np.abs(k.lateral).argmax())
-        raise UserError(
-            f"kinematics.file: the {side} wheel does not stay on its rail between {k.lateral.min():.4g} and "
-            f"{k.lateral.max():.4g} m of lateral_m (row {far + 2} is farthest): {error}"
-        ) from error
-    shape = np.array([[p.a, p.b, p.on_wheel, p.angle, p.normal_force] for p in poses]).T
-    turns = []
-    for n in range(k.turns):
-        angle = k.angle[0] + 2 * np.pi * (n + np.arange(places) / places)
-        y, force, speed, xi, eta, phi = (
+
+    def __init__(self, k: Kinematics, track: Track, side: str, places: int) -> None:
+        """Raises:
+        UserError: the wheel leaves the profiles.
+        """
+        self.k, self.track, self.side, self.load = k, track, side, float(np.mean(k.normal_force))
+        self.lateral = np.linspace(k.lateral.min() - 1e-6, k.lateral.max() + 1e-6, POSES)
+        angle = k.angle[0] + 2 * np.pi * (np.arange(k.turns) + np.arange(places)[:, None] / places)
+        self.y, self.force, self.speed, self.xi, self.eta, self.phi = (
             np.interp(angle, k.angle, v) for v in (k.lateral, k.normal_force, k.speed, k.xi, k.eta, k.phi)
         )
-        a, b, on_wheel, incline, static = (np.interp(y, lateral, v) for v in shape)
-        grown = (force / static) ** (1 / 3)
-        columns = (xi, eta, phi, a * grown, b * grown, force, on_wheel, speed, force * np.cos(incline))
-        turns.append(Contacts(*(c[:, None] for c in columns)))
-    return turns
+        try:
+            self.shape = np.array([self._patch(track, y, self.load) for y in self.lateral]).T
+        except UserError as error:
+            far = int(np.abs(k.lateral).argmax())
+            raise UserError(
+                f"kinematics.file: the {side} wheel does not stay on its rail between {k.lateral.min():.4g} and "
+                f"{k.lateral.max():.4g} m of lateral_m (row {far + 2} is farthest): {error}"
+            ) from error
+
+    def _patch(self, track: Track, y: float, vertical: float) -> tuple[float, ...]:
+        p = patches(track, Pose(float(y)), self.side, float(vertical))[0]
+        return p.a, p.b, p.on_wheel, p.angle, p.normal_force, p.approach
+
+    @cached_property
+    def new(self) -> Contacts:
+        """Of new wheels: read straight between lateral places, grown with the force."""
+        a, b, on_wheel, incline, static, _ = (np.interp(self.y, self.lateral, v) for v in self.shape)
+        grown = (self.force / static) ** (1 / 3)
+        return Contacts(self.xi, self.eta, self.phi, a * grown, b * grown, self.force, on_wheel, self.speed,
+                        self.force * np.cos(incline))  # fmt: skip
+
+    def _own(self, tracks: Iterable[Track]) -> Array:
+        """(3, places, turns of the file) half axes and place on the wheel of every single patch, m; tracks: of each
+        place."""
+        found = np.empty((3, *self.y.shape))
+        for n, track in enumerate(tracks):
+            for i, y in enumerate(self.y[n]):
+                a, b, on_wheel, _, static, _ = self._patch(track, y, self.new.vertical[n, i])
+                grown = (self.force[n, i] / static) ** (1 / 3)
+                found[:, n, i] = a * grown, b * grown, on_wheel
+        return found
+
+    @cached_property
+    def _own_new(self) -> Array:
+        return self._own([self.track] * len(self.y))
+
+    @property
+    def deepest(self) -> float:
+        """m, see `wearing.deepest`."""
+        return 0.5 * float(self.shape[-1].min())
+
+    def worn(self, tracks: Callable[[Array], Track], depth: Array) -> Contacts:
+        """On a wheel of which (places, n) m are worn: by how much each patch, under its own force and on the profile
+        across that its place has, differs from that of a new wheel."""
+        found, new, on = self._own(tracks(d) for d in depth), self._own_new, self.new
+        (a, b, _), shift = found / new, found[2] - new[2]
+        return on._replace(a=a * on.a, b=b * on.b, on_wheel=on.on_wheel + shift)
+
+
+@dataclass(frozen=True, eq=False)
+class Passed:
+    """What the turns of a file do at one amount of wear.
+
+    Attributes:
+        turns: so far. depth: (1, places, strips) m worn. taken: m in one turn, in the mean over those of the file.
+            each: (turns of the file, places) m where a new wheel's contact runs, of each of them. friction: (1,) J in
+            one turn, in the mean.
+    """
+
+    turns: float
+    depth: Array
+    taken: Array
+    each: Array
+    friction: Array
+
+    def point(self) -> dict[str, Any]:
+        """Names -> arrays, for a journal."""
+        return vars(self)
+
+    @staticmethod
+    def of(point: Mapping[str, Any]) -> Passed:
+        return Passed(**point)
+
+
+@dataclass(frozen=True, eq=False)
+class Given:
+    """A wheel whose running is given, which its wear changes by the profile alone. Attributes: places. tread. elastic:
+    friction, shear, poisson. tracks: see `settings.worn_tracks`; None: as a new wheel."""
+
+    places: Places
+    tread: Tread
+    elastic: tuple[float, float, float]
+    tracks: Callable[[Array], Track] | None
+
+    def new(self) -> Array:
+        """(1, places, strips) m of a new wheel."""
+        return np.zeros((1, len(self.places.y), len(self.tread.y)))
+
+    def at(self, depth: Array, turns: float, near: Passed | None = None) -> Passed:
+        """All turns of the file on a worn wheel.
+
+        Raises:
+            LeavesTheRail: see `_contacts`.
+        """
+        if near is not None and self.tracks is None:
+            return replace(near, turns=turns, depth=depth)
+        on, taken, each, friction = self._contacts(depth), [], [], []
+        for one, new in zip(_turns(on), _turns(self.places.new), strict=True):  # one after the other: memory
+            taken.append(self.tread.taken(one, *self.elastic)[0])
+            each.append(self.tread.seen(taken[-1][None], new)[:, 0])
+            friction.append(float(self.tread.work(one, *self.elastic)[0]))
+        return Passed(turns, depth, np.mean(taken, axis=0)[None], np.array(each), np.array([np.mean(friction)]))
+
+    def _contacts(self, depth: Array) -> Contacts:
+        """Raises:
+        LeavesTheRail: a groove that is deeper than half of the approach; where the wheel touches is not known.
+        """
+        if self.tracks is None or not depth.any():
+            return self.places.new
+        half, radius = float(np.mean(self.places.new.a)), self.places.track.radius
+        seen = smoothed(filtered(depth[0], half, radius), STRIP, SMOOTHING)
+        if (most := self.places.deepest) < seen.max():
+            raise LeavesTheRail(f"a groove of more than {1e3 * most:.2g} mm splits the contact")
+        try:
+            return self.places.worn(self.tracks, seen)
+        except UserError as error:
+            raise LeavesTheRail(f"where the worn wheel touches is not known any more ({error})") from error
+
+    def seen(self, depth: Array, now: Passed) -> Array:
+        """(places, 1) m where a new wheel's contact runs, in the mean over the turns of the file."""
+        return np.mean([self.tread.seen(depth, new) for new in _turns(self.places.new)], axis=0)
+
+    def work(self, now: Passed) -> Array:
+        """(1,) J of friction in a turn."""
+        return now.friction
+
+
+def _turns(on: Contacts) -> list[Contacts]:
+    """(places, 1) of each turn of a file."""
+    return [Contacts(*(c[:, n : n + 1] for c in on)) for n in range(on.xi.shape[1])]
 
 
 @dataclass(frozen=True)
@@ -146,66 +282,59 @@ class Recorded:
     """Wear of a wheel by given kinematics, which it does not change.
 
     Attributes:
-        case, tread. taken: (turns, places, strips) m that each turn of the file takes off. work: (turns,) J of friction
-            in each. on: `Contacts` of each.
+        case, wheel. history: what was passed and the jump to it, from a new wheel on. ended: why it ends early, or
+            nothing.
     """
 
     case: KinematicsCase
-    tread: Tread
-    taken: Array
-    work: Array
-    on: list[Contacts]
-
-    @property
-    def depth(self) -> Array:
-        """(places, strips) m after all turns that are asked for."""
-        return self.case.kinematics.turns * self.taken.mean(axis=0)
+    wheel: Given
+    history: list[tuple[Passed, Jump]]
+    ended: str
 
     def seen(self) -> tuple[Array, Array]:
         """(places,) m by which the radius is less where the contact runs, after all turns, and its standard error from
         how the turns of the file differ (NaN of a single one)."""
-        each = self.case.kinematics.turns * np.array(
-            [self.tread.seen(t[None], on)[:, 0] for t, on in zip(self.taken, self.on, strict=True)]
-        )
+        rates = [now.each for now, _ in self.history]
+        sizes = [jump.size for _, jump in self.history[1:]]
+        each = sum((s * (0.5 * (a + b)) for s, a, b in zip(sizes, rates, rates[1:], strict=False)), 0 * rates[0])
         error = each.std(axis=0, ddof=1) / len(each) ** 0.5 if len(each) > 1 else np.full(each.shape[1], np.nan)
         return each.mean(axis=0), error
 
     def circumference(self) -> dict[str, Array]:
         """Of the table over the circumference."""
         depth, error = self.seen()
-        mean = {name: np.mean([np.asarray(getattr(on, name))[:, 0] for on in self.on], axis=0)
-                for name in ("normal_force", "xi", "eta")}  # fmt: skip
+        places, deepest = self.wheel.places, self.history[-1][0].depth[0].max(axis=1)
         angle = 360 * np.arange(len(depth)) / len(depth)
-        return {"angle_deg": angle, "depth_m": depth, "standard_error_m": error, "deepest_m": self.depth.max(axis=1),
-                "normal_force_N": mean["normal_force"], "longitudinal_creepage": mean["xi"],
-                "lateral_creepage": mean["eta"]}  # fmt: skip
+        columns = {"angle_deg": angle, "depth_m": depth, "standard_error_m": error, "deepest_m": deepest}
+        mean = (v.mean(axis=1) for v in (places.force, places.xi, places.eta))
+        return columns | dict(zip(("normal_force_N", "longitudinal_creepage", "lateral_creepage"), mean, strict=True))
+
+    def jumped(self) -> dict[str, Array]:
+        """Of the table over the jumps."""
+        tread = self.wheel.tread
+        return columns_of(self.history, tread.way * self.case.kinematics.places, [self.case.kinematics.side])
 
     def sentences(self) -> list[str]:
         """What a reader came for."""
+        (now, _), files = self.history[-1], self.wheel.places.k.turns
         depth, error = self.seen()
-        volume = self.tread.volume(self.depth[None])[0]
+        volume, work = sum(np.array([(j.volume[0], j.work[0]) for _, j in self.history]))
         orders = orders_of(depth[:, None], len(depth) // 8)[:, 0]
         n = int(orders.argmax())
         told = [
-            f"After {self.case.kinematics.turns:.4g} turns, by {len(self.on)} of the file, {1e6 * depth.mean():.4g} um "
+            f"After {now.turns:.4g} turns, by {files} of the file, {1e6 * depth.mean():.4g} um "
             f"are worn where the contact runs, {1e9 * volume:.4g} mm3 in all: the coefficient times the work of "
-            f"friction, {self.work.mean():.4g} J a turn.",
+            f"friction, {work / now.turns if now.turns else now.friction[0]:.4g} J a turn.",
             f"Over the circumference it differs by {1e6 * np.ptp(depth):.4g} um; order {n + 1} is largest, "
             f"{1e6 * orders[n]:.3g} um.",
         ]
-        if len(self.on) == 1:
-            return [
-                *told,
-                "warning: the file holds one whole turn, so that no error can be told of the jump over many.",
-            ]
-        return [
-            *told,
-            f"Turns of the file differ: its standard error is at most {1e6 * error.max():.2g} um.",
-        ]
-
-
-TURNS = "turns"
-"""Series of the journal."""
+        if self.wheel.tracks is not None:
+            told.append(error_of(self.history))
+        if files == 1:
+            told.append("warning: the file holds one whole turn, so that no error can be told of the jump over many.")
+        else:
+            told.append(f"Turns of the file differ: its standard error is at most {1e6 * error.max():.2g} um.")
+        return [*told, f"warning: it ends there: {self.ended}."] if self.ended else told
 
 
 def recorded(
@@ -214,23 +343,22 @@ def recorded(
     """Wear of a case whose files stand in a folder.
 
     Args:
-        journal: where finished turns are kept, and known ones found.
+        journal: where finished jumps are kept, and known ones found.
 
     Raises:
-        UserError: see `read_kinematics` and `contacts_of`.
+        UserError: see `read_kinematics` and `Places`.
     """
     k, track, asked = read_kinematics(folder / case.kinematics.file), track_of(case, folder), case.kinematics
-    on = contacts_of(k, track, asked.side, asked.places)
-    y = spread(np.concatenate([c.on_wheel for c in on]), max(float(c.b.max()) for c in on))
+    places, kept = Places(k, track, asked.side, asked.places), case.wear.profile == "kept"
+    y = spread(places.new.on_wheel, float(places.new.b.max()))
+    if not kept:  # a groove widens the contact
+        more = int(np.ceil(places.new.b.max() / STRIP))
+        y = y[0] + STRIP * np.arange(-more, len(y) + more)
     way = 2 * np.pi * track.radius / asked.places
     t = Tread(y, way, case.wear.coefficient, case.how, (1,) if asked.side == "right" else (-1,))
     elastic = case.friction, track.elastic.shear, track.elastic.poisson
-    known = {} if journal is None else journal.of(TURNS)
-    for n, one in enumerate(on):
-        if n not in known:
-            report(f"turn {n + 1} of {len(on)}")
-            known[n] = {"taken": t.taken(one, *elastic)[0], "work": float(t.work(one, *elastic)[0])}
-            if journal is not None:
-                journal.keep(TURNS, n, known[n])
-    taken, work = (np.array([known[n][name] for n in range(len(on))]) for name in ("taken", "work"))
-    return Recorded(case, t, taken, work, on)
+    wheel = Given(places, t, elastic, None if kept else worn_tracks(track, y))
+    first = asked.turns if kept else min(FIRST, asked.turns)
+    report("wear by jumps over many turns")
+    history, ended = worn(wheel, Passed.of, asked.turns, case.wear.tolerance, first, report, journal)
+    return Recorded(case, wheel, history, ended)

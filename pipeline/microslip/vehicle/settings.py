@@ -76,9 +76,9 @@ class Unround(Model):
     angle: Number = 0.0
 
 
-class WearOfVehicle(WearOfBody):
+class WearOfTurns(WearOfBody):
     """tolerance: of the radius, of each jump over many turns, m. profile: whether wheels touch by the profile that they
-    have worn to, in the mean over both and their circumference, or by that of new ones."""
+    have worn to, or by that of new ones."""
 
     tolerance: Positive = 1e-7
     profile: Literal["renewed", "kept"] = "renewed"
@@ -102,7 +102,7 @@ class KinematicsCase(Model):
     wheel: Wheel
     rail: Rail
     kinematics: KinematicsOfCase
-    wear: WearOfBody
+    wear: WearOfTurns
     model: ModelOfCase = ModelOfCase(exact=0)
 
     @property
@@ -122,7 +122,7 @@ class VehicleCase(Model):
     track: TrackOfCase
     running: RunningOfCase
     unround: Annotated[tuple[Unround, ...], BeforeValidator(_tuple)] = ()
-    wear: WearOfVehicle
+    wear: WearOfTurns
     model: ModelOfCase = ModelOfCase(exact=0)
     table: TableOfCase = TableOfCase(points=(8, 10, 17, 17, 7), elements=(20, 20))
 
@@ -163,15 +163,8 @@ class VehicleCase(Model):
         """Depth (n,) m on strips about y (n,) m of both wheels' profile -> where they touch; see `made`."""
         if self.wear.profile == "kept":
             return None
-        track, each = track_of(self, folder), 0.5 * self.vehicle.load
-        fine = np.arange(track.wheel.y[0], track.wheel.y[-1], y[1] - y[0])
-        new = track.wheel.height(fine)
-
-        def touch(depth: Array) -> Touch:
-            worn = Profile(fine, new - np.interp(fine, y, depth, left=0.0, right=0.0), track.wheel.name)
-            return touching(replace(track, wheel=worn), each, self.running.reach).over
-
-        return touch
+        each, worn = 0.5 * self.vehicle.load, worn_tracks(track_of(self, folder), y)
+        return lambda depth: touching(worn(depth), each, self.running.reach).over
 
     def lumped(self) -> System:
         """Wheelset, suspension and rails, the coordinates those of `motion`."""
@@ -204,6 +197,18 @@ def track_of(case: VehicleCase | KinematicsCase, folder: Path) -> Track:
     elastic = combined(*(Solid(s.young, s.poisson) for s in (case.wheel, case.rail)))
     rail = case.rail.made(folder, 1.0).turned(case.rail.inclination)
     return Track(case.wheel.made(folder, -1.0), rail, case.wheel.radius, case.wheel.at, case.rail.at, elastic)
+
+
+def worn_tracks(track: Track, y: Array) -> Callable[[Array], Track]:
+    """Depth (n,) m on strips about y (n,) m of the wheel -> the track with wheels of such a profile."""
+    fine = np.arange(track.wheel.y[0], track.wheel.y[-1], y[1] - y[0])
+    new = track.wheel.height(fine)
+
+    def worn(depth: Array) -> Track:
+        height = new - np.interp(fine, y, depth, left=0.0, right=0.0)
+        return replace(track, wheel=Profile(fine, height, track.wheel.name))
+
+    return worn
 
 
 def load_kinematics(path: Path, assignments: list[str] | None = None) -> tuple[KinematicsCase, dict[str, Any]]:
