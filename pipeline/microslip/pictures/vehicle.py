@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 SHOWN = 6
-"""Orders that are drawn: those that are largest at the end."""
+"""Orders that are drawn at the most: those that are largest at the end, as far as the axis shows them."""
 
 
 def circumference_picture(found: Studied, path: Path, title: str) -> Path:
@@ -66,9 +66,10 @@ def growth_picture(found: Studied, path: Path, title: str) -> Path:
     amplitudes = 1e6 * found.amplitudes()[:, :, found.wheel]
     km = found.growing()["distance_km"]
     plain_axes(panels[0])
-    for i, n in enumerate(np.sort(np.argsort(-amplitudes[-1])[:SHOWN])):
-        panels[0].plot(km, amplitudes[:, n], color=COLOURS[i % len(COLOURS)], label=f"order {n + 1}")
     low = max(1e-4, 1e-3 * float(amplitudes[-1].max()))
+    largest = np.sort(np.argsort(-amplitudes[-1])[:SHOWN])
+    for i, n in enumerate(largest[amplitudes[:, largest].max(axis=0) > low]):
+        panels[0].plot(km, amplitudes[:, n], color=COLOURS[i % len(COLOURS)], label=f"order {n + 1}")
     panels[0].set(xlabel="distance in km", ylabel="amplitude in µm", yscale="log", ylim=(low, None))
     panels[0].set_title(f"{title}: {WHEELS[found.wheel]} wheel")
     figure.legend(fontsize=9, loc="outside lower center", ncols=SHOWN)
