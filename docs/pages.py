@@ -271,6 +271,12 @@ MEANING: dict[str, tuple[str, str]] = {
     "monitors.point": ("*", "where displacements are read"),
     "monitors.node": ("", "or the number of a node in the mesh file"),
     "monitors.directions": ("", "body directions"),
+    "monitors.points": (
+        "*",
+        "or places that turn: read is the angle, rad, about `axis` of the rigid motion that fits them best; two read "
+        "the difference of their displacements over their distance",
+    ),
+    "monitors.axis": ("", "of that angle, right-handed; neither its length nor its place matters"),
     "gauges.name": ("", ""),
     "gauges.point": ("*", "where the strain is read"),
     "gauges.direction": ("", "of the strain gauge"),
@@ -796,7 +802,8 @@ def _type(schema: dict[str, Any]) -> str:
         count = schema.get("minItems") if schema.get("minItems") == schema.get("maxItems") else None
         item = (schema.get("prefixItems") or [schema.get("items", {})])[0]
         inner = re.sub(r"\b(number|integer)\b", r"\1s", _type(item))
-        return f"{count} x ({inner})" if item.get("type") == "array" else f"{count or 'list of'} {inner}"
+        inner, times = (f"({inner})", f"{count} x") if item.get("type") == "array" else (inner, f"{count}")
+        return f"{times if count else 'list of'} {inner}"
     if kind == "object":
         return "table"
     bounds = [f"{sign} {schema[k]:g}" for k, sign in SIGNS.items() if k in schema]

@@ -20,7 +20,7 @@ from test_harmonic_balance_laws import sled
 
 from microslip.basis import read_basis, write_basis
 from microslip.case import load_case
-from microslip.data import UserError
+from microslip.data import Rows, UserError
 from microslip.results import read_response
 from microslip.stages import response as making
 from microslip.stages import running
@@ -553,27 +553,45 @@ def test_as_many_harmonics_as_the_error_asks_for(folder: Path) -> None:
     assert opened.with_({}).settings.harmonics == H and opened.with_({}).settings.sampled >= 8 * H
 
 
-def test_a_strain_gauge_is_strain_everywhere(folder: Path) -> None:
-    """The strain that its row reads from the coordinates in the response file (2e-3: the bulk beside them); one name
-    and one unit in table, CSV, terminal, page and HDF5, and metres nowhere."""
-    (folder / "case.toml").write_text(CASE.replace('monitor = "probe"', 'monitor = "root"'))
+def turning_sample(folder: Path) -> None:
+    """The sample body with a monitor of an angle: about y, from its probe's u_x over 50 mm."""
+    basis = read_basis(folder / "basis.h5")
+    group = basis.groups[0, 0]
+    angle = Rows(group.monitors["probe"].rows[:1] / 0.05, ("phi",), "rad", np.zeros(3), 0.0, np.zeros(1))
+    with_angle = replace(group, monitors={**group.monitors, "twist": angle})
+    write_basis(folder / "basis.h5", replace(basis, groups={(0, 0): with_angle}))
+
+
+@pytest.mark.parametrize(("name", "kind", "of"), [
+    ("root", "gauges", Quantity("1")), pytest.param("twist", "angles", Quantity("rad"), marks=pytest.mark.slow),
+])  # fmt: skip
+def test_a_strain_gauge_is_strain_everywhere_and_an_angle_is_rad(
+    folder: Path, name: str, kind: str, of: Quantity
+) -> None:
+    """What its row reads from the coordinates in the response file (2e-3: the bulk beside them); one name and one unit
+    in table, CSV, terminal, page, HDF5 and xarray, and metres nowhere."""
+    turning_sample(folder)
+    (folder / "case.toml").write_text(CASE.replace('monitor = "probe"', f'monitor = "{name}"'))
     told, converged = respond(folder)
-    build = folder / "build" / "vane"
-    row = read_basis(folder / "basis.h5").groups[0, 0].gauges["root"].rows[0]
+    build, column = folder / "build" / "vane", of.column("amplitude")
+    group = read_basis(folder / "basis.h5").groups[0, 0]
+    row = {**group.monitors, **group.gauges}[name].rows[0]
     with (build / "response.csv").open(newline="") as file:
         table = list(csv.DictReader(file))
-    strain = {float(r["frequency_Hz"]): float(r["amplitude_strain_FN_50_N"]) for r in table}
+    read = {float(r["frequency_Hz"]): float(r[f"{column}_FN_50_N"]) for r in table}
     assert converged and not any("_m_FN" in name for name in table[0])
     series = read_response(build / "response.h5").series[0]
     pairs = zip(series.frequency, np.abs(series.arrays["bodies/vane-eigenmodes/q"][:, 1] @ row), strict=True)
-    found = [(strain[f], own) for f, own in pairs if f in strain]
+    found = [(read[f], own) for f, own in pairs if f in read]
     assert len(found) == 9 and min(found)[0] > 0
     np.testing.assert_allclose(*zip(*found, strict=True), rtol=2e-3)
     (resonance,) = json.loads((build / "response.json").read_text())["resonances"]
-    assert "amplitude_m" not in resonance and resonance["amplitude_strain"] >= max(strain.values())
-    assert any(t.endswith(" m/m") for t in told) and "amplitude in µm/m" in (build / "response.html").read_text()
+    assert "amplitude_m" not in resonance and resonance[column] >= max(read.values())
+    assert any(t.endswith(f" {of.said}") for t in told)
+    assert f"amplitude in {of.micro}" in (build / "response.html").read_text()
+    assert series.quantity == of and series.to_xarray()[f"{kind}.{name}"].attrs["units"] == of.unit
     with h5py.File(build / "response.h5") as file:
-        assert file["series_0000/gauges/root"].attrs["unit"] == "1"
+        assert file[f"series_0000/{kind}/{name}"].attrs["unit"] == of.unit
 
 
 @pytest.mark.slow

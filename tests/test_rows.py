@@ -16,8 +16,9 @@ from microslip.fem.operators import isotropic
 from microslip.modal.body_rows import body_rows
 from microslip.modal.compute import modal_basis
 from microslip.modal.rigid import rigid_fields
-from microslip.modal.rows import Locator, patch, point_rows, slope_rows
+from microslip.modal.rows import Locator, patch, point_rows, slope_rows, turning_row
 
+SOME = np.array([[0.3, -1.0, 0.5], [2.0, 0.1, 0.4], [-0.6, 0.8, 1.0]])
 E, NU, RHO = STEEL["young"], STEEL["poisson"], STEEL["density"]
 BENT = {t: brick(t, (2, 3, 2), (0.1, 0.08, 0.05), to=shaken(0.004)) for t in CELLS}
 
@@ -520,3 +521,45 @@ def test_extent_and_outline_of_a_patch():
     assert len(p.polygon) == 4
     area = 0.5 * sum(np.cross(a, b) for a, b in zip(p.polygon, np.roll(p.polygon, -1, axis=0), strict=True))
     np.testing.assert_allclose(area, 0.07 * 0.05 * p.rotation[0], atol=1e-12)
+
+
+# ---------------------------------------------------------------- the angle by which points turn
+
+
+def turned(points, w, centre):
+    """Small rotation w (3,) of points about a centre, and a shift, as (3n,)."""
+    return (np.array([0.3, -0.2, 0.1]) + np.cross(w, points - centre)).reshape(-1)
+
+
+def angle_rows(mesh, points, axis):
+    locator = Locator(mesh)
+    return turning_row(mesh.n_points, [locator.find(np.array(at), "at") for at in points], np.array(axis), "twist")
+
+
+@pytest.mark.parametrize("centre", [(0, 0, 0), (0.4, -0.7, 0.2)])
+def test_points_of_a_body_that_turns_rigidly_tell_the_angle_about_any_axis(centre):
+    """a . w for points off a line, wherever the axis stands and however long the vector that names it is (1e-12)."""
+    mesh, w, axis = BENT["tetra10"], np.array([2e-3, -1e-3, 3e-3]), np.array([1.0, 2.0, -0.5])
+    corners = mesh.points[[0, 3, 11, 20, 31]]
+    for scale in (1.0, 40.0):
+        read = angle_rows(mesh, corners, scale * axis) @ turned(mesh.points, w, np.array(centre))
+        assert read == pytest.approx(w @ axis / np.linalg.norm(axis), abs=1e-12)
+
+
+def test_two_points_tell_the_difference_of_their_displacements_over_their_distance():
+    """Two accelerometers 60 mm apart along y, angle about z: (u_x(-y) - u_x(y)) / 60 mm, of any motion (1e-12)."""
+    mesh = brick("tetra10", (2, 2, 2), (0.1, 0.08, 0.05))
+    rows = angle_rows(mesh, [(0.1, 0.01, 0.02), (0.1, 0.07, 0.02)], (0, 0, 1))
+    (low, high), u = [Locator(mesh).find(np.array([0.1, y, 0.02]), "at") for y in (0.01, 0.07)], mesh.points**2 @ SOME
+    reads = [float((point_rows(mesh.n_points, place, np.eye(3)[:1]) @ u.reshape(-1))[0]) for place in (low, high)]
+    assert rows @ u.reshape(-1) == pytest.approx((reads[0] - reads[1]) / 0.06, abs=1e-12)
+    assert rows @ turned(mesh.points, np.array([5e-3, 7e-3, 2e-3]), np.zeros(3)) == pytest.approx(2e-3, abs=1e-12)
+
+
+def test_points_on_a_line_along_the_axis_are_refused():
+    mesh = brick("tetra10", (2, 2, 2), (0.1, 0.08, 0.05))
+    for points in ([(0.02, 0.01, 0.02), (0.08, 0.01, 0.02)], [(0.02, 0.01, 0.02)] * 2):
+        with pytest.raises(UserError, match="monitors.twist.points"):
+            angle_rows(mesh, points, (1, 0, 0))
+    with pytest.raises(ValueError, match="points and axis belong together"):
+        body(monitors=[{"name": "twist", "points": [[0, 0, 0], [1, 0, 0]]}])

@@ -216,8 +216,9 @@ def _outputs(settings: CaseSettings, bodies: Mapping[str, Loaded], path: Path | 
     for m in settings.outputs:
         body, name = settings.address(m.monitor)
         group = body_of(bodies, body, path, "monitor").group
-        if name in group.gauges and name not in group.monitors:
-            found.append(Output(body, name, group.gauges[name].labels[0]))
+        rows = group.monitors.get(name) or group.gauges.get(name)
+        if rows is not None and rows.unit != "m":  # an angle or a strain has one row
+            found.append(Output(body, name, rows.labels[0]))
             continue
         known = group.monitors
         _among(known, name, path, "monitor")

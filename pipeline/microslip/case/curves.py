@@ -21,6 +21,7 @@ from ..harmonic_balance.problem import Problem
 from ..harmonic_balance.readout import measured
 from ..results import Journal
 from ..results.names import exact
+from ..results.series import READ
 from ..units import METRES, Quantity
 from .assemble import Built, build
 from .contacts import swept
@@ -73,7 +74,7 @@ class Followed:
     @cached_property
     def monitor(self) -> Array:
         """(p, H + 1) complex harmonics of the first read-out, m."""
-        name = next((n for n in self.rows[0] if n.startswith(("monitors/", "gauges/"))), "") if self.rows else ""
+        name = next((n for n in self.rows[0] if n.startswith(READ)), "") if self.rows else ""
         return np.array([row[name][0] for row in self.rows], dtype=complex) if name else np.zeros((0, 2), dtype=complex)
 
     @property

@@ -211,7 +211,8 @@ def restored(problem: Problem, row: dict[str, Any]) -> tuple[Point, Operating]:
 def array_of(a: Assembly, w: Output) -> str:
     """Name of the array of a read-out: the component's name stands before the monitor's where there are several."""
     group = next(iter(next(m for m in a.components if m.name == w.component).groups.values()))
-    kind = "monitors" if w.monitor in group.monitors else "gauges"
+    rows = group.monitors.get(w.monitor)
+    kind = "gauges" if rows is None else "angles" if rows.unit == "rad" else "monitors"
     return f"{kind}/" + (f"{w.component}:{w.monitor}" if len(a.components) > 1 else w.monitor)
 
 

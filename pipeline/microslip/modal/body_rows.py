@@ -14,7 +14,7 @@ from ..fem.loads import centrifugal, pressure, traction
 from ..settings.body import BodySettings, Excitation, InterfaceSettings, Monitor
 from .boundary import AXES, require_face
 from .equilibrium import BodyModel, StaticState
-from .rows import Location, Locator, NodeLocator, Patch, at_node, node_patch, patch, point_rows, slope_rows
+from .rows import Location, Locator, NodeLocator, Patch, at_node, node_patch, patch, point_rows, slope_rows, turning_row
 
 INTERFACE_LABELS = INTERFACE_ROWS
 
@@ -76,10 +76,7 @@ def body_rows(mesh: Mesh, settings: BodySettings) -> BodyRows:
     excitations = {e.name: _excitation(mesh, locator, e) for e in settings.excitations if not e.centrifugal}
     monitors, gauges = {}, {}
     for m in settings.monitors:
-        place = _place(mesh, locator, m, f"monitors.{m.name}")
-        directions = np.eye(3)[[AXES[c] for c in m.directions]]
-        labels = tuple(f"u_{c}" for c in m.directions)
-        monitors[m.name] = NamedRows(point_rows(n, place, directions), labels, "m", place.point, place.distance)
+        monitors[m.name] = _monitor(mesh, locator, m)
     for g in settings.gauges:
         place = locator.find(np.array(g.point), f"gauges.{g.name}.point")
         direction = np.array(g.direction) / np.linalg.norm(g.direction)
@@ -126,6 +123,18 @@ def _load_patch(mesh: Mesh, face: str) -> Patch:
     mean = np.sum([b.area.sum(axis=(0, 1)) for b in blocks], axis=0)
     hint = np.eye(3)[int(np.abs(mean).argmin())]
     return patch(mesh, face, hint, face, needs_frame=False)
+
+
+def _monitor(mesh: Mesh, locator: Locator | NodeLocator, m: Monitor) -> NamedRows:
+    n = mesh.n_points
+    if m.points is not None:
+        places = [locator.find(np.array(at), f"monitors.{m.name}.points") for at in m.points]
+        middle, distance = np.mean([p.point for p in places], axis=0), max(p.distance for p in places)
+        return NamedRows(turning_row(n, places, np.array(m.axis), m.name), ("phi",), "rad", middle, distance)
+    place = _place(mesh, locator, m, f"monitors.{m.name}")
+    labels = tuple(f"u_{c}" for c in m.directions)
+    B = point_rows(n, place, np.eye(3)[[AXES[c] for c in m.directions]])
+    return NamedRows(B, labels, "m", place.point, place.distance)
 
 
 def _excitation(mesh: Mesh, locator: Locator | NodeLocator, e: Excitation) -> NamedRows:

@@ -6,6 +6,7 @@ A row set is a sparse matrix B (r, 3n) on u = (u_x1, u_y1, u_z1, u_x2, ...): ``B
 from __future__ import annotations
 
 from bisect import bisect_right
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -357,6 +358,27 @@ def point_rows(n: int, place: Location, directions: Array) -> sp.csr_matrix:
     for i, direction in enumerate(directions):
         rows[i].reshape(n, 3)[place.nodes] = place.N[:, None] * direction
     return sp.csr_matrix(rows)
+
+
+def turning_row(n: int, places: Sequence[Location], axis: Array, name: str) -> sp.csr_matrix:
+    """(1, 3n) small angle, rad, by which places turn about an axis (3,): of the rigid motion that fits them best.
+
+    With r from their middle and J = sum of r^2 1 - r r^T, it is a . J^-1 sum of r x u; where the axis stands does not
+    matter. Of places on a line J is singular: what turns them about the line is not seen and counts as zero.
+
+    Raises:
+        UserError: they lie on a line along the axis.
+    """
+    a, r = axis / np.linalg.norm(axis), np.array([place.point for place in places])
+    r = r - r.mean(axis=0)
+    J = np.einsum("pi,pi->", r, r) * np.eye(3) - r.T @ r
+    inverse = np.linalg.pinv(J, rcond=1e-9, hermitian=True)
+    seen = float(a @ inverse @ J @ a)
+    if seen < 1e-6:
+        raise UserError(f"monitors.{name}.points: they lie on a line along the axis, so they do not show how the body "
+                        "turns about it; give points beside the axis")  # fmt: skip
+    weights = np.cross(inverse @ a / seen, r)
+    return sum(point_rows(n, place, w[None]) for place, w in zip(places, weights, strict=True))
 
 
 def slope_rows(n: int, place: Location, direction: Array) -> sp.csr_matrix:

@@ -121,8 +121,9 @@ def describe(group: ModalGroup, label: str) -> tuple[str, str, str]:
     if kind == "interface":
         turns, kinds = row.startswith("phi"), {"u": "translation", "p": "rotation", "c": "shape"}
         return f"{name} {row}", kinds[row[0]], "rad/(N m)" if turns else "m/N"
-    unit = group.excitations[name].unit if kind == "excitation" else "N"
-    return f"{name} {row}", kind, {"Pa": "m3/Pa", CENTRIFUGAL: "J s4"}.get(unit, "m/N")  # work per square of the load
+    unit = (group.excitations if kind == "excitation" else group.monitors)[name].unit
+    units = {"Pa": "m3/Pa", CENTRIFUGAL: "J s4", "rad": "rad/(N m)"}  # work per square of the load
+    return f"{name} {row}", kind, units.get(unit, "m/N")
 
 
 def ring_pairs(group: ModalGroup) -> list[tuple[str, str]]:

@@ -16,7 +16,7 @@ from ..operating.motion import read_out
 from ..reduced.compliance import has_residual
 from ..units import counted, percent
 from .files import Response
-from .series import CONVERGED, Series
+from .series import CONVERGED, READ, Series
 
 BALANCE = 1e-4
 """Share of the energy that may be missing between what is supplied, damped and taken by the contacts: they follow from
@@ -202,17 +202,18 @@ def _energy(s: Series) -> list[Check]:
 def _read_again(response: Response, s: Series, bases: Mapping[str, ModalBasis]) -> list[Check]:
     """Read-outs from the bodies' coordinates, where all of a read-out stands in these."""
     found = []
-    for name in (n for n in s.arrays if n.startswith(("monitors/", "gauges/"))):
+    for name in (n for n in s.arrays if n.startswith(READ)):
         kind, rows = name.split("/", 1)
         component, monitor = rows.split(":", 1) if ":" in rows else (next(iter(response.bodies), ""), rows)
         basis = bases.get(component)
         if basis is None or has_residual(next(iter(basis.groups.values())), basis.reduction):
             continue
         labels = next(iter(basis.groups.values()))
-        held: Any = (labels.monitors if kind == "monitors" else labels.gauges).get(monitor)
+        of = "gauges" if kind == "gauges" else "monitors"
+        held: Any = getattr(labels, of).get(monitor)
         if held is None:
             continue
-        read = read_out(response.motion(s, basis, component), monitor, kind)[s.converged]
+        read = read_out(response.motion(s, basis, component), monitor, of)[s.converged]
         mine = [list(held.labels).index(label) for label in response.labels.get(name, held.labels)]
         kept = np.moveaxis(s.arrays[name][s.converged], -1, 1)
         off = np.abs(read[:, : kept.shape[1], mine] - kept).max(initial=0.0)
@@ -223,7 +224,7 @@ def _read_again(response: Response, s: Series, bases: Mapping[str, ModalBasis]) 
 
 def _table(response: Response, s: Series) -> list[Check]:
     """Amplitudes in the table of resonances against the points at their frequencies."""
-    first = next((n for n in response.labels if n.startswith(("monitors/", "gauges/"))), None)
+    first = next((n for n in response.labels if n.startswith(READ)), None)
     rows = [r for r in response.resonances if r.get("normal_force_N") == s.parameters.get("normal_force")]
     if first is None or first not in s.arrays or not rows:
         return []

@@ -17,13 +17,14 @@ if TYPE_CHECKING:
 
 CONVERGED = "converged"
 
-READ = ("monitors/", "gauges/")
+READ = ("monitors/", "angles/", "gauges/")
 """How the names of read-outs begin."""
 
 UNITS = {
     "frequency": "Hz", "Omega": "rad/s", "supplied": "J", "damped": "J", "dissipated": "J", "kinetic": "J",
-    "exchanged": "J", "lost": "J", "by_slip": "J", "monitors": "m", "gauges": "1", "bodies": "m kg^1/2",
-    "displacement": "m, rad", "force": "N, N m", "limit": "N", "normal_swing": "N", "normal_mean": "N",
+    "exchanged": "J", "lost": "J", "by_slip": "J", "monitors": "m", "angles": "rad", "gauges": "1",
+    "bodies": "m kg^1/2", "displacement": "m, rad", "force": "N, N m", "limit": "N", "normal_swing": "N",
+    "normal_mean": "N",
 }  # fmt: skip
 """Units by the last part of a name, or by its first one; everything else is a pure number."""
 
@@ -126,7 +127,7 @@ class Series:
         return np.asarray(self.arrays[name][:, row], dtype=complex)
 
     def monitor(self, name: str) -> ComplexArray:
-        """(f, r, H + 1) harmonics of a monitor's rows, m, or of a strain gauge.
+        """(f, r, H + 1) harmonics of a monitor's rows, m or rad, or of a strain gauge.
 
         Raises:
             UserError: none of that name.

@@ -475,16 +475,26 @@ class Excitation(Model):
 
 
 class Monitor(Model):
-    """Displacement read-out along body directions at a point."""
+    """Displacement read-out along body directions at a point, or the angle by which points turn about an axis."""
 
     name: Name
     point: Point | None = None
     node: NodeNumber | None = None
     directions: Directions = "xyz"
+    points: (
+        Annotated[tuple[Point, ...], BeforeValidator(_tuple), Field(min_length=2, max_length=1000), LENGTH] | None
+    ) = None
+    axis: Direction | None = None
 
     @model_validator(mode="after")
     def _one_place(self) -> Monitor:
-        only_one(self, "point", "node")
+        only_one(self, "point", "node", "points")
+        if (self.points is None) != (self.axis is None):
+            raise ValueError(
+                "points and axis belong together: the angle by which these points turn about it; give both"
+            )
+        if self.points is not None and "directions" in self.model_fields_set:
+            raise ValueError("directions belong to a point or node; points turn about their axis, remove directions")
         return self
 
 
@@ -698,7 +708,7 @@ def _is_length(field: Any) -> bool:
 def _scaled(value: Any, scale: float) -> Any:
     if value is None:
         return None
-    return tuple(v * scale for v in value) if isinstance(value, tuple) else value * scale
+    return tuple(_scaled(v, scale) for v in value) if isinstance(value, tuple) else value * scale
 
 
 def implausible(settings: BodySettings, size: float) -> list[str]:

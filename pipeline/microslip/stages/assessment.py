@@ -19,7 +19,7 @@ from ..operating.fatigue import Endurance, MaterialLimits, endurance
 from ..operating.motion import Motion, read_out
 from ..operating.stress import CycleStress, StressPeaks, cycle_stress, stress_peaks
 from ..results import Response, Series
-from ..results.series import unit_of
+from ..results.series import READ, unit_of
 from ..units import METRES, Quantity
 from .stage import Report
 
@@ -146,7 +146,7 @@ def assess(
 def _quantity(response: Response, monitor: str) -> Quantity:
     """What an array of read-outs measures."""
     names = {name for series in response.series for name in series.arrays}
-    return Quantity(unit_of(f"gauges/{monitor}" if f"gauges/{monitor}" in names else f"monitors/{monitor}"))
+    return Quantity(next((unit_of(n) for n in (f"{kind}{monitor}" for kind in READ) if n in names), "m"))
 
 
 def _ranges(stress: Array, chosen: Array, known: Array, at: Indices) -> list[Indices]:
