@@ -17,7 +17,7 @@ SOFT = ["*MATERIAL, NAME=Soft", "*ELASTIC", "70000., 0.33", "*DENSITY", "2.7e-9"
 
 
 def tied(slave, master, shift):
-    """Lines of *EQUATION by which points of z0 lie in the faces of z1, numbered as in a deck whose first is the master."""
+    """Lines of *EQUATION by which points of z0 lie in the faces of z1, the master being the first in its deck."""
     own, lines = master.points, []
     for point in slave.face_points("z0"):
         at = slave.points[point] + np.array(shift) / 1e3
