@@ -23,8 +23,7 @@ from microslip.pictures.plots import closure_plot
 pytest.importorskip("pyvista")
 pytest.importorskip("matplotlib")
 scene.quiet_vtk()
-REASON = pictures.can_draw()
-needs_scenes = pytest.mark.skipif(REASON is not None, reason=str(REASON))
+needs_scenes = pytest.mark.skipif("pictures.can_draw() is not None", reason="PyVista cannot draw here")
 
 
 # --- surface -------------------------------------------------------------------------------------------------------
