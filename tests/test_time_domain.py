@@ -733,6 +733,19 @@ def sizes_of(e: equations.Equations) -> list[int]:
     return [rows.get(name, 1) for name in samples.UNITS]
 
 
+def test_a_motion_has_the_same_bits_however_many_periods_are_done_in_a_call() -> None:
+    """How many are depends on how fast the machine is."""
+    s = Stepper(equations.of(ms.structure(1.0, 1.0, 0.02, force={0: 0.3}, elements=[ms.jenkins(1.0, 0.2)]), 0.8), 0.01)
+    ends = []
+    for calls in ((5,), (1, 4), (1, 1, 3)):
+        now = s.start(np.zeros(1), np.zeros(1))
+        for many in calls:
+            now, *_ = s.run(now, np.where(np.arange(8) < many, 785, 0))
+        ends.append(jax.tree.map(np.asarray, now))
+    for end in ends[1:]:
+        assert jax.tree.all(jax.tree.map(np.array_equal, end, ends[0]))
+
+
 KILLED = """
 import sys
 import numpy as np

@@ -182,15 +182,15 @@ class Stepper:
         spots = np.concatenate([np.zeros((0, 3, len(e.D))), *(G for G, _ in self._spots)])
         return spots @ e.D[self.rows], spots @ e.D_o[self.rows]
 
-    def start(self, q: Array, v: Array, time: float = 0.0, held: Held | None = None) -> Now:
-        """At rest or moving, from modal coordinates (m,) and velocities; contacts come there on a straight way from
-        what they held, from u = 0 if it is not given."""
+    def start(self, q: Array, v: Array, held: Held | None = None) -> Now:
+        """At time 0, at rest or moving, from modal coordinates (m,) and velocities; contacts come there on a straight
+        way from what they held, from u = 0 if it is not given."""
         e = self.equations
         b, p = blocks(e)
         y = np.concatenate([np.reshape(q, (b, p)), np.reshape(v, (b, p))], axis=1)
         none = np.zeros((4, len(e.contacts)))
         now = Now(
-            y, e.oscillators(time), np.array(float(time)), np.zeros((b, p)),
+            y, e.oscillators(0.0), np.zeros(()), np.zeros((b, p)),
             held or untouched(self.groups), np.zeros(6), np.zeros(()), none.astype(bool), none, (),
             np.zeros((), int),
         )  # fmt: skip
@@ -203,7 +203,8 @@ class Stepper:
             Where the motion is; the samples; (e, 3) events: time in s, contact, kind, an index of `KINDS`; how many
             there were, which may be more.
         """
-        reached = float(now.time) + self.tau * np.cumsum(steps)
+        done = np.rint(float(now.time) / self.tau)  # or the last digits would hang on how much is done in a call
+        reached = self.tau * (done + np.cumsum(steps))
         o = self.equations.oscillators(reached)
         listed = Listed(np.zeros((), int), np.zeros((events, 3)))
         counts = 2**self.options.halvings * np.asarray(steps)
