@@ -39,6 +39,9 @@ from .table import ELEMENTS, POINTS
 from .temperature import Conductor
 from .wheelset import Pose, Track
 
+WIDEST = 0.02
+"""m, over which worn profiles are smoothed at most."""
+
 Temperature = Annotated[Number, Field(gt=-273.15)]
 Count = Annotated[int, Field(ge=2, le=400)]
 Fineness = Annotated[int, Field(ge=4, le=100)]
@@ -225,7 +228,7 @@ class WearOfCase(WearOfBody):
 
     updates: Annotated[int, Field(ge=0, le=1000)] = 0
     passages: Positive | None = None
-    smoothing: Annotated[NotNegative, Field(le=0.02)] = 1e-3
+    smoothing: Annotated[NotNegative, Field(le=WIDEST)] = 1e-3
     lateral: Numbers | None = None
 
     @model_validator(mode="after")

@@ -14,7 +14,7 @@ from .ellipse import ellipses
 from .laws import Surface
 from .profiles import Profile
 from .rolled import rolled, sources
-from .settings import RollingCase
+from .settings import WIDEST, RollingCase
 from .wear import deposited, shortest_smoothing, smoothed, strip_depth
 from .wheelset import Patch, Track, patches
 
@@ -97,9 +97,12 @@ class Wearing:
     def warnings(self) -> list[str]:
         told, last = [], self.moments[-1]
         if self.smoothing < self.least:
+            smooth = (
+                f"smooth over {1e3 * self.least:.2g} mm or more (wear.smoothing), or " if self.least <= WIDEST else ""
+            )
             told.append(
-                f"warning: an update takes so much that waves of the worn profile amplify themselves: smooth over "
-                f"{1e3 * self.least:.2g} mm or more (wear.smoothing), or take more updates (wear.updates)."
+                f"warning: an update takes so much that waves of the worn profile amplify themselves: {smooth}"
+                "take more updates (wear.updates)."
             )
         if last.wheel + last.rail > self.approach:
             told.append(
