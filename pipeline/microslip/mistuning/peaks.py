@@ -69,45 +69,9 @@ def highest(
             found with little work from what is known: the sweep goes up as far as that leads, then down from its other
             end, and the rest is looked for in what is between.
     """
-    known: dict[float, Array] = {}
-    failed: list[float] = []
-    tried: set[tuple[float, float, float]] = set()
-
-    def look(f: float) -> None:
-        y = respond(f)
-        if y is None:
-            failed.append(f)
-        else:
-            known[f] = y
-
-    def leads(frequencies: list[float]) -> int:
-        """How many in their order are found at once."""
-        for count, f in enumerate(frequencies):
-            y = None if at_once is None else at_once(f)
-            if y is None:
-                return count
-            known[f] = y
-        return len(frequencies)
-
-    def goes_on(low: float, high: float) -> bool:
-        """Whether the higher of two points leads to more at the other one than is known there."""
-        far, near = sorted((low, high), key=lambda f: known[f].max())
-        told = known[near].max()
-        if follow is None or known[far].max() > STEADY * told or (far, near, told) in tried:
-            return False
-        tried.add((far, near, told))
-        y = follow(far, near)
-        if y is None or y.max() <= known[far].max() * (1 + tolerance):
-            return False
-        known[far] = y
-        return True
-
-    rest = [float(f) for f in frequency]
-    if at_once is not None:
-        rest = rest[leads(rest) :][::-1]
-        rest = rest[leads(rest) :]
-    for f in rest:
-        look(f)
+    search = _Search(respond, follow)
+    known, failed = search.known, search.failed
+    search.sweep([float(f) for f in frequency], at_once)
     before = np.inf  # what was left where a parabola placed the last point
     count, may_fail = 0, len(failed) + FAILING
     while known and count < most and len(failed) < may_fail:
@@ -117,9 +81,9 @@ def highest(
         promised = promised and not _beside(told[1], known, failed)
         if more <= top * (1 + (tolerance if promised else LEFT)):
             break
-        if goes_on(low, high):
+        if search.goes_on(low, high, tolerance):
             continue
-        look(told[1] if promised else _middle(low, high, failed))
+        search.look(told[1] if promised else _middle(low, high, failed))
         count, before = count + 1, more - top if promised else np.inf
     if not known:
         return Highest(-1, np.nan, np.nan, np.nan, np.zeros(0), np.zeros((0, 0)), tuple(failed), False)
@@ -128,6 +92,54 @@ def highest(
     missed = max(may_be(known)[0] / y.max() - 1, 0.0)
     ends = x[i] in (min(frequency), max(frequency))
     return Highest(int(output), float(x[i]), float(y.max()), missed, x, y, tuple(failed), bool(ends))
+
+
+class _Search:
+    """Attributes: known: Hz -> (w,) amplitudes. failed: Hz without a solution. tried: ways back that were gone."""
+
+    def __init__(self, respond: Respond, follow: Follow | None) -> None:
+        self.respond, self.follow = respond, follow
+        self.known: dict[float, Array] = {}
+        self.failed: list[float] = []
+        self.tried: set[tuple[float, float, float]] = set()
+
+    def look(self, f: float) -> None:
+        y = self.respond(f)
+        if y is None:
+            self.failed.append(f)
+        else:
+            self.known[f] = y
+
+    def sweep(self, rest: list[float], at_once: Respond | None) -> None:
+        """Up as far as that leads, down from the other end, then what is between."""
+        if at_once is not None:
+            rest = rest[self._leads(rest, at_once) :][::-1]
+            rest = rest[self._leads(rest, at_once) :]
+        for f in rest:
+            self.look(f)
+
+    def _leads(self, frequencies: list[float], at_once: Respond) -> int:
+        """How many in their order are found at once."""
+        for count, f in enumerate(frequencies):
+            y = at_once(f)
+            if y is None:
+                return count
+            self.known[f] = y
+        return len(frequencies)
+
+    def goes_on(self, low: float, high: float, tolerance: float) -> bool:
+        """Whether the higher of two points leads to more at the other one than is known there."""
+        known = self.known
+        far, near = sorted((low, high), key=lambda f: known[f].max())
+        told = known[near].max()
+        if self.follow is None or known[far].max() > STEADY * told or (far, near, told) in self.tried:
+            return False
+        self.tried.add((far, near, told))
+        y = self.follow(far, near)
+        if y is None or y.max() <= known[far].max() * (1 + tolerance):
+            return False
+        known[far] = y
+        return True
 
 
 def _beside(f: float, known: dict[float, Array], failed: list[float]) -> bool:
