@@ -749,9 +749,9 @@ def test_a_motion_has_the_same_bits_however_many_periods_are_done_in_a_call() ->
 KILLED = """
 import sys
 import numpy as np
-from microslip.time_domain import equations, recorded, samples
+from microslip.time_domain import equations, orbit, recorded, samples
 import microslip as ms
-samples.PAUSE = 0.0
+samples.PAUSE = orbit.PAUSE = 0.0
 slider = ms.structure(1.0, 1.0, 0.02, force={0: 0.3}, elements=[ms.jenkins(1.0, 0.2)])
 asked = recorded.Asked("it", equations.of(slider, 0.8), 5, 1000, 16, 512)
 found = recorded.run(sys.argv[1], [asked], report=lambda text: print(text, flush=True))[0]
@@ -761,17 +761,15 @@ print(found.said)
 
 @pytest.mark.slow
 def test_a_killed_process_leaves_what_the_next_one_goes_on_with(tmp_path: Path) -> None:
-    """SIGKILL at some instants."""
+    """SIGKILL at some instants. Each period is reported, so that how fast the machine is decides nothing."""
     words = [sys.executable, "-c", KILLED, str(tmp_path / "orbit.h5")]
-    reached = []
-    for lines in (3, 9, 17):
+    for period in (100, 300, 500):
         with subprocess.Popen(words, stdout=subprocess.PIPE, text=True) as process:
             assert process.stdout is not None
-            for _ in range(lines):
-                text = process.stdout.readline()
-            reached.append(int(text.split("period ")[1].split()[0]))
+            assert ("goes on from" in next(process.stdout)) == (period > 100)
+            assert any(f"period {period} " in text for text in process.stdout)
             process.kill()
-    assert reached == sorted(set(reached))
+        assert not (tmp_path / "orbit.h5").exists()
     subprocess.run(words, check=True, capture_output=True)
     slider = ms.structure(1.0, 1.0, 0.02, force={0: 0.3}, elements=[ms.jenkins(1.0, 0.2)])
     same(orbit.run(equations.of(slider, 0.8), 5, 1000, 16, 512), ms.load(tmp_path / "orbit.h5"))
