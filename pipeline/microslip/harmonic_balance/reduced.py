@@ -88,6 +88,47 @@ class View:
 
 
 @dataclass(frozen=True, eq=False)
+class Coefficients:
+    """Views of n parts of c coordinates each, as they act on W = 2 H + 1 real coefficients: mean, cos, sin, cos 2, ...
+
+    Attributes:
+        mean: (n, 2, c, c) and waves: (n, 2, H, 2 c, 2 c) the compliance and its derivative with respect to Omega, the
+            cosines of all coordinates before their sines. reference: (n, 2, W, c).
+    """
+
+    mean: Array
+    waves: Array
+    reference: Array
+
+    @classmethod
+    def of(cls, both: ComplexArray) -> Coefficients:
+        """Of (n, 2, H + 1, c, 1 + c) `View.both`."""
+        n, two, count, c, _ = both.shape
+        mean, cos, sin = both.real[:, :, 0], both.real[:, :, 1:], both.imag[:, :, 1:]
+        waves = np.empty((n, two, count - 1, 2, c, 2, c))
+        waves[..., 0, :, 0, :] = waves[..., 1, :, 1, :] = cos[..., 1:]
+        waves[..., 0, :, 1, :] = sin[..., 1:]
+        np.negative(sin[..., 1:], out=waves[..., 1, :, 0, :])
+        given = np.empty((n, two, 2 * count - 1, c))
+        given[:, :, 0], given[:, :, 1::2] = mean[..., 0], cos[..., 0]
+        np.negative(sin[..., 0], out=given[:, :, 2::2])
+        return cls(mean[..., 1:], waves.reshape(n, two, count - 1, 2 * c, 2 * c), given)
+
+    def part(self, i: int) -> Coefficients:
+        """One of the parts by itself."""
+        return Coefficients(self.mean[i : i + 1], self.waves[i : i + 1], self.reference[i : i + 1])
+
+    def applied(self, V: Array, which: slice) -> Array:
+        """(n, 1 or 2, W, c, m) what the compliance, or it and its derivative, make of (n, W, c, m)."""
+        n, W, c, m = V.shape
+        out = np.empty((n, which.stop, W, c, m))
+        np.matmul(self.mean[:, which], V[:, None, 0], out=out[:, :, 0])
+        paired, moved = V[:, 1:].reshape(n, 1, -1, 2 * c, m), out[:, :, 1:].reshape(n, which.stop, -1, 2 * c, m)
+        np.matmul(self.waves[:, which], paired, out=moved)
+        return out
+
+
+@dataclass(frozen=True, eq=False)
 class Poles:
     """The inverse of s^2 M + s C + K + T^H k' T as a sum over its eigenvalues, of some harmonics of one part.
 
@@ -107,19 +148,28 @@ class Poles:
         return MET * np.abs(self.values)
 
     @cached_property
+    def _damped(self) -> bool:
+        """Whether no frequency is an eigenvalue."""
+        return bool((np.abs(self.values.real) > self._near).all())
+
+    @cached_property
     def _turning(self) -> ComplexArray:
         """(g, 1) i h."""
         return 1j * self.harmonics[:, None]
+
+    @cached_property
+    def _falling(self) -> ComplexArray:
+        return -self._turning
 
     def at(self, Omega: float) -> View | None:
         """These harmonics at a frequency (rad/s); None where it or one of its harmonics is, within `MET`, an
         eigenvalue."""
         away = Omega * self._turning - self.values
-        if (np.abs(away) <= self._near).any():
+        if not self._damped and (np.abs(away) <= self._near).any():
             return None
         g = np.empty((2, *away.shape), complex)
         np.divide(1.0, away, out=g[0])
-        np.multiply(g[0] * g[0], -self._turning, out=g[1])  # its derivative
+        np.multiply(g[0] * g[0], self._falling, out=g[1])  # its derivative
         both = (self.left * g[:, :, None]) @ self.right
         both[0] += self.static
         return View(both)
