@@ -96,12 +96,17 @@ class Scaled:
 
     def __call__(self, y: Array) -> tuple[Array, Array]:
         """R (n,) and D = (dR/dx, dR/dlambda) (n, n + 1) with respect to y."""
+        R, B = self.bordered(y)
+        return R, B[:-1]
+
+    def bordered(self, y: Array) -> tuple[Array, Array]:
+        """R (n,) and D above a row (n + 1, n + 1) that is still to be filled."""
         self.count += 1
         R, J, slope = self.problem.evaluate(y[:-1] * self.x_scale, float(y[-1]) * self.lam_scale)
-        D = np.empty((len(y) - 1, len(y)))
-        np.multiply(J, self.x_scale, out=D[:, :-1])
-        np.multiply(slope, self.lam_scale, out=D[:, -1])
-        return np.asarray(R, dtype=float), D
+        B = np.empty((len(y), len(y)), order="F")
+        np.multiply(J, self.x_scale, out=B[:-1, :-1])
+        np.multiply(slope, self.lam_scale, out=B[:-1, -1])
+        return np.asarray(R, dtype=float), B
 
 
 @dataclass(frozen=True)
@@ -146,14 +151,15 @@ class _Place(NamedTuple):
     size: float
 
 
-def _place(y: Array, R: Array, D: Array, weights: Array, border: Array, value: float) -> _Place:
-    residual, B = np.empty(len(y)), np.empty((len(y), len(y)), order="F")
+def _place(y: Array, R: Array, B: Array, weights: Array, border: Array, value: float) -> _Place:
+    """With R and B as `Scaled.bordered` tells them; the row of B is filled, the others weighted."""
+    residual, D = np.empty(len(y)), B[:-1]
     np.multiply(R, weights, out=residual[:-1])
     residual[-1] = border @ y - value
-    np.multiply(D, weights[:, None], out=B[:-1])
+    np.multiply(D, weights[:, None], out=D)
     B[-1] = border
     size = norm(residual)
-    return _Place(y, residual, B, size if math.isfinite(size + float(B.sum())) else math.inf)
+    return _Place(y, residual, B, size if math.isfinite(size + norm(B.ravel(order="K"))) else math.inf)
 
 
 def _factor(B: Array) -> tuple[Array, Array] | None:
@@ -182,9 +188,9 @@ def correct(
     can be one along which the residual rises however short the step, though the full step is right (the other side's
     derivative finishes the work): then the best of the tried steps is taken.
     """
-    R, D = scaled(y)
-    weights = _weights(D)
-    here = _place(y, R, D, weights, border, value)
+    R, B = scaled.bordered(y)
+    weights = _weights(B[:-1])
+    here = _place(y, R, B, weights, border, value)
     sizes: list[float] = []
     forced = 0
     for iteration in range(1, settings.iterations + 1):
@@ -231,7 +237,7 @@ def _damped(
     for k in range(halvings + 1):
         share = 0.5**k
         y = before.y + share * dy
-        here = _place(y, *scaled(y), weights, border, value)
+        here = _place(y, *scaled.bordered(y), weights, border, value)
         if here.size <= (1.0 - 0.1 * share) * before.size:
             return here, True
         if here.size < best.size:
@@ -252,7 +258,7 @@ def _resort(
     weights = _weights(D)
 
     def both(z: Array) -> tuple[Array, Array]:
-        there = _place(z, *scaled(z), weights, border, value)
+        there = _place(z, *scaled.bordered(z), weights, border, value)
         return there.residual, there.B
 
     found = scipy.optimize.root(both, y, jac=True, method="hybr").x

@@ -238,7 +238,7 @@ class _Noted:
 
     def evaluate(self, x: Array, lam: float) -> tuple[Array, Array, Array]:
         R, J, slope = self.family.equations.evaluate(x, lam)
-        if not math.isfinite(float(R.sum() + J.sum())):
+        if not math.isfinite(float(R @ R + np.vdot(J, J))):
             self.place = x.copy(), lam
         return R, J, slope
 
