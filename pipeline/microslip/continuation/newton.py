@@ -22,6 +22,9 @@ CONVERGED = "converged"
 class Equations(Protocol):
     """R(x, lambda) = 0 for n unknowns and one parameter; R continuous, its derivatives may jump.
 
+    Where they do not, an attribute ``smooth`` that is true says so: Newton's method then converges quadratically, and
+    what its next correction would be is known from the last two.
+
     Attributes:
         x_scale: what a large x is, a number or (n,), in the units of x. lam_scale: what a large change of lambda is.
             Length along the curve is measured in these units.
@@ -90,6 +93,7 @@ class Scaled:
         self.problem, self.count = problem, 0
         self.x_scale = np.asarray(problem.x_scale, dtype=float)
         self.lam_scale = float(problem.lam_scale)
+        self.smooth = bool(getattr(problem, "smooth", False))
 
     def pack(self, x: Array, lam: float) -> Array:
         return np.append(np.asarray(x, dtype=float) / self.x_scale, float(lam) / self.lam_scale)
@@ -202,7 +206,7 @@ def correct(
         sizes.append(norm(dy))
         if sizes[-1] > reach:
             return Corrected(here.y, False, "the solution is not near: start nearer", iteration, np.inf)
-        if error := _small_enough(sizes, settings.tolerance * (1.0 + norm(here.y))):
+        if error := _small_enough(sizes, settings.tolerance * (1.0 + norm(here.y)), scaled.smooth):
             return _arrived(here.y + dy, factors, iteration, error, sizes)
         here, falls = _damped(scaled, here, dy, weights, border, value, settings.halvings)
         forced += not falls
@@ -213,14 +217,16 @@ def correct(
     return _resort(scaled, here.y, border, value, settings, settings.iterations, status)
 
 
-def _small_enough(sizes: list[float], tolerance: float) -> float:
+def _small_enough(sizes: list[float], tolerance: float, smooth: bool) -> float:
     """Estimated error after the last correction, 0 while it is not small enough: corrections contract at least as
-    fast as before, so the next one is at most the last times the last contraction."""
+    fast as before, so the next one is at most the last times the last contraction; where all is smooth a correction is
+    a constant times the square of the one before, so the next one is the last times the square of the contraction."""
     last = sizes[-1]
     if last <= tolerance:
         return max(last, 1e-300)
     contraction = last / sizes[-2] if len(sizes) > 1 else 1.0
-    return last * contraction if contraction < 0.1 and last < 1e-3 and last * contraction <= 0.1 * tolerance else 0.0
+    error = last * contraction ** (2 if smooth else 1)
+    return error if contraction < 0.1 and last < 1e-3 and error <= 0.1 * tolerance else 0.0
 
 
 def _arrived(y: Array, factors: tuple[Array, Array], n: int, error: float, sizes: list[float]) -> Corrected:

@@ -165,6 +165,11 @@ class Problem:
         return self.count * self.coefficients
 
     @cached_property
+    def smooth(self) -> bool:
+        """Whether derivatives of the forces change without jumps."""
+        return all(c.patch.law.smooth for c in self.assembly.contacts)
+
+    @cached_property
     def scale(self) -> Array:
         """(c,) of a unit of x: every coordinate moves the points of its patch by as much as the others do."""
         out = np.ones(self.count)
