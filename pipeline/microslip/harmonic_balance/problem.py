@@ -228,11 +228,6 @@ class Problem:
         return out if out.any() else None
 
     @cached_property
-    def loads(self) -> Array:
-        """(W, 1) share of the loads in every coefficient."""
-        return np.array([1.0] + [self.share] * (self.coefficients - 1))[:, None]
-
-    @cached_property
     def units(self) -> Array | None:
         """(c, c) of columns over those of rows in `scale`; None where all are the same."""
         return None if (self.scale == self.scale[:1]).all() else self.scale / self.scale[:, None]
@@ -434,8 +429,9 @@ class AtFrequency:
     @cached_property
     def _alone(self) -> list[Alone] | None:
         p, found = self.problem, list[Alone]()
-        for (parts, at), both in zip(p.alike, self._views, strict=True):
-            one = alone(at, parts, both[:, 0, :, :, 1:], np.array([p.stiffness[i] for i in parts]), p.sides)
+        for parts, at in p.alike:
+            D, k = self._both(parts)[:, 0, :, :, 1:], np.array([p.stiffness[i] for i in parts])
+            one = alone(at, parts, D, k, p.sides)
             if one is None:
                 return None
             found.append(one)
@@ -524,23 +520,22 @@ class AtFrequency:
 
     def _applied(self, force: Array, which: slice, driven: float = 1.0) -> Array:
         """(n, W, c) D, its derivative or both, applied to (W, c), less the reference times a factor."""
-        out, loads = np.empty((which.stop, *force.shape)), self.problem.loads
+        share = driven * self.problem.share
+        if len(self.views) == 1:
+            return self._real[0].beyond(force[None], which, driven, share)[0]
+        out = np.empty((which.stop, *force.shape))
         for (_, at), D in zip(self.problem.alike, self._real, strict=True):
-            moved = D.applied(force[:, at].transpose(1, 0, 2)[..., None], which)[..., 0]
-            moved -= (driven * loads) * D.reference[:, which]
-            out[:, :, at] = moved.transpose(1, 2, 0, 3)
+            out[:, :, at] = D.beyond(force[:, at].transpose(1, 0, 2), which, driven, share).transpose(1, 2, 0, 3)
         return out
 
-    @cached_property
-    def _views(self) -> list[ComplexArray]:
-        """Of each of `Problem.alike` (n, 2, H + 1, c, 1 + c) `View.both`."""
-        each = self.views
-        return [np.array([each[i].both for i in p]) if len(p) > 1 else each[p[0]].both[None] for p, _ in self.problem.alike]
+    def _both(self, parts: Indices) -> ComplexArray:
+        """(n, 2, H + 1, c, 1 + c) `View.both` of parts."""
+        return np.array([self.views[i].both for i in parts]) if len(parts) > 1 else self.views[parts[0]].both[None]
 
     @cached_property
     def _real(self) -> list[Coefficients]:
         """Of each of `Problem.alike`."""
-        return [Coefficients.of(both) for both in self._views]
+        return [Coefficients.of(self._both(parts)) for parts, _ in self.problem.alike]
 
 
 def _places(g: Group, begins: Indices) -> list[tuple[int, tuple[int, int], slice, slice, float]]:

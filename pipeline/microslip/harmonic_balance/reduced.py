@@ -91,40 +91,45 @@ class View:
 class Coefficients:
     """Views of n parts of c coordinates each, as they act on W = 2 H + 1 real coefficients: mean, cos, sin, cos 2, ...
 
+    A complex D takes cos - i sin to D (cos - i sin): its numbers and those of i D, read as pairs of real ones, are the
+    rows that tell the cosines and the sines, from each coordinate's cosine and sine side by side.
+
     Attributes:
-        mean: (n, 2, c, c) and waves: (n, 2, H, 2 c, 2 c) the compliance and its derivative with respect to Omega, the
-            cosines of all coordinates before their sines. reference: (n, 2, W, c).
+        mean: (n, 2, c, 1 + c) and waves: (n, 2, H, 2 c, 2 (1 + c)) value and derivative with respect to Omega, the
+            reference in front; rows of the cosines before those of the sines.
     """
 
     mean: Array
     waves: Array
-    reference: Array
 
     @classmethod
     def of(cls, both: ComplexArray) -> Coefficients:
         """Of (n, 2, H + 1, c, 1 + c) `View.both`."""
         n, two, count, c, _ = both.shape
-        mean, cos, sin = both.real[:, :, 0], both.real[:, :, 1:], both.imag[:, :, 1:]
-        waves = np.empty((n, two, count - 1, 2, c, 2, c))
-        waves[..., 0, :, 0, :] = waves[..., 1, :, 1, :] = cos[..., 1:]
-        waves[..., 0, :, 1, :] = sin[..., 1:]
-        np.negative(sin[..., 1:], out=waves[..., 1, :, 0, :])
-        given = np.empty((n, two, 2 * count - 1, c))
-        given[:, :, 0], given[:, :, 1::2] = mean[..., 0], cos[..., 0]
-        np.negative(sin[..., 0], out=given[:, :, 2::2])
-        return cls(mean[..., 1:], waves.reshape(n, two, count - 1, 2 * c, 2 * c), given)
+        rows = np.empty((n, two, count - 1, 2, c, 1 + c), complex)
+        rows[:, :, :, 0] = both[:, :, 1:]
+        np.multiply(both[:, :, 1:], 1j, out=rows[:, :, :, 1])
+        return cls(both[:, :, 0].real, rows.view(float).reshape(n, two, count - 1, 2 * c, 2 + 2 * c))
 
     def part(self, i: int) -> Coefficients:
         """One of the parts by itself."""
-        return Coefficients(self.mean[i : i + 1], self.waves[i : i + 1], self.reference[i : i + 1])
+        return Coefficients(self.mean[i : i + 1], self.waves[i : i + 1]) if len(self.mean) > 1 else self
 
     def applied(self, V: Array, which: slice) -> Array:
         """(n, 1 or 2, W, c, m) what the compliance, or it and its derivative, make of (n, W, c, m)."""
         n, W, c, m = V.shape
         out = np.empty((n, which.stop, W, c, m))
-        np.matmul(self.mean[:, which], V[:, None, 0], out=out[:, :, 0])
-        paired, moved = V[:, 1:].reshape(n, 1, -1, 2 * c, m), out[:, :, 1:].reshape(n, which.stop, -1, 2 * c, m)
-        np.matmul(self.waves[:, which], paired, out=moved)
+        np.matmul(self.mean[:, which, :, 1:], V[:, None, 0], out=out[:, :, 0])
+        pairs = V[:, 1:].reshape(n, 1, W // 2, 2, c, m).swapaxes(3, 4).reshape(n, 1, W // 2, 2 * c, m)
+        np.matmul(self.waves[:, which, :, :, 2:], pairs, out=out[:, :, 1:].reshape(n, which.stop, W // 2, 2 * c, m))
+        return out
+
+    def beyond(self, force: Array, which: slice, mean: float, share: float) -> Array:
+        """(n, 1 or 2, W, c) the same of (n, W, c), less the mean reference and the others times factors."""
+        out = self.applied(force[..., None], which)[..., 0]
+        out[:, :, 0] -= mean * self.mean[:, which, :, 0]
+        waves = out[:, :, 1:]
+        waves -= share * self.waves[:, which, :, :, 0].reshape(waves.shape)
         return out
 
 
