@@ -118,13 +118,11 @@ class ContactTable(NamedTuple):
         Raises:
             UserError: a pose beyond the table, or a value that none has.
         """
-        speed = np.asarray(speed, float)
-        added = [np.asarray(v, float) for v in (xi, eta, phi)]
-        added = [v if v.ndim > 1 else np.atleast_1d(v)[:, None] for v in added]
-        given = strips.broadcast(lateral, yaw, speed, friction, speed / self.radius if turning is None else turning)
-        n = np.broadcast_shapes(given[0].shape, *((len(v),) for v in added))[0]
-        given = [np.broadcast_to(v, n) for v in given] + [np.broadcast_to(v, (n, 2)) for v in added]
-        loads = np.broadcast_to(np.asarray(self.load if load is None else load, float), (n, 2))
+        turning = np.asarray(speed, float) / self.radius if turning is None else turning
+        given, loads = _together(
+            (lateral, yaw, speed, friction, turning), (xi, eta, phi), self.load if load is None else load
+        )
+        n = len(loads)
         for name, v, reach in zip(("lateral", "yaw"), given, self.reach, strict=False):
             worst = v[np.argmax(np.abs(v))]
             if not abs(worst) <= reach * (1 + 1e-9):
@@ -144,6 +142,24 @@ class ContactTable(NamedTuple):
                 f"mean, 95 % of {self.checked} wheels by less than {100 * creep[1]:.2g} %, the largest by "
                 f"{100 * creep[2]:.2g} %, and places by at most {1e3 * place[2]:.2g} mm; {100 * self.jumping:.2g} % of "
                 "them are near a jump, where the nearest pose is taken.")  # fmt: skip
+
+
+def _together(
+    pose: tuple[ArrayLike, ...], creep: tuple[ArrayLike, ...], load: ArrayLike
+) -> tuple[list[Array], Array]:  # fmt: skip
+    """Arrays (n,) of the poses, then (n, 2) of creepages; loads (n, 2)."""
+    added = [np.asarray(v, float) for v in creep]
+    added = [v if v.ndim > 1 else np.atleast_1d(v)[:, None] for v in added]
+    try:
+        given = strips.broadcast(*pose)
+        n = np.broadcast_shapes(given[0].shape, *((len(v),) for v in added))[0]
+        each = [np.broadcast_to(v, n) for v in given] + [np.broadcast_to(v, (n, 2)) for v in added]
+        return each, np.broadcast_to(np.asarray(load, float), (n, 2))
+    except ValueError as error:
+        raise UserError(
+            f"lateral, yaw, speed, friction, turning, xi, eta, phi, load: shapes do not go together ({error}); give "
+            "(n,) of the poses, and (n, 2) of what differs between the left and the right wheel"
+        ) from error
 
 
 MISSED = ("middle of the contact on the wheel, m", "largest pressure, of its own", "normal force over the load",
