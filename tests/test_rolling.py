@@ -267,7 +267,7 @@ def test_a_table_tells_its_error_and_is_read_with_it(tmp_path: Path) -> None:
     np.testing.assert_allclose(table.forces(*one, G), table.forces(*given, G)[:, 0], rtol=1e-12)
     with pytest.raises(UserError, match="a/b is 6"):
         table.forces(1e-3, 0, 0, 6e-3, 1e-3, 82e3, MU, G)
-    with pytest.raises(UserError, match="no table of creep forces"):
+    with pytest.raises(UserError, match="write a table of creep forces"):
         ms.read_creep_table(CASE)
 
 

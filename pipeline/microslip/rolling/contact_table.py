@@ -10,7 +10,6 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import h5py
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -18,7 +17,9 @@ from numpy.typing import ArrayLike
 
 from ..contact.law import program
 from ..data import UserError
-from ..files import hdf5, store
+from ..files import hdf5
+from ..files.hostile import reading
+from ..files.store import ordinary
 from . import strips
 from .strips import Array
 from .wheelset import Patch, Pose, Track, axle
@@ -375,15 +376,13 @@ FORMAT = "microslip-contact-table-1"
 
 def write_contact_table(path: Path, table: ContactTable) -> Path:
     """As HDF5: a dataset an attribute, those of its patches in a group; complete or not at all."""
-    with store.complete_or_absent(path) as temporary:
-        with hdf5.create(temporary) as file:
-            file.attrs.update(format=FORMAT, meaning=str(ContactTable.__doc__), patches=str(Patches.__doc__),
-                              missed=", ".join(MISSED))  # fmt: skip
-            for group, nouns in ((file, table), (file.create_group("patches"), table.patches)):
-                for name, value in nouns._asdict().items():
-                    if name != "patches":
-                        hdf5.put(group, name, np.asarray(value))
-        hdf5.seal(temporary)
+    with hdf5.sealed(path) as file:
+        file.attrs.update(format=FORMAT, meaning=str(ContactTable.__doc__), patches=str(Patches.__doc__),
+                          missed=", ".join(MISSED))  # fmt: skip
+        for group, nouns in ((file, table), (file.create_group("patches"), table.patches)):
+            for name, value in nouns._asdict().items():
+                if name != "patches":
+                    hdf5.put(group, name, np.asarray(value))
     return path
 
 
@@ -393,10 +392,7 @@ def read_contact_table(path: Path | str) -> ContactTable:
     Raises:
         UserError: another file.
     """
-    try:
-        with h5py.File(store.ordinary(Path(path)), "r") as file:
-            patches = Patches(*(file["patches"][name][()] for name in Patches._fields))
-            rest = {name: file[name][()] for name in ContactTable._fields if name != "patches"}
-            return ContactTable(patches=patches, **rest)
-    except (OSError, KeyError, TypeError) as error:
-        raise UserError(f"{path}: is no table of contacts ({error}); write one with write_contact_table") from error
+    with reading(ordinary(Path(path)), FORMAT, "", "write a table of contacts with [contacts] in a case") as file:
+        patches = Patches(*(file["patches"][name][()] for name in Patches._fields))
+        rest = {name: file[name][()] for name in ContactTable._fields if name != "patches"}
+        return ContactTable(patches=patches, **rest)
