@@ -23,7 +23,6 @@ from microslip.contact.friction import (
     creep,
     lubricated,
     peak,
-    pressure_parameter,
     scattered,
     smoothed,
 )
@@ -86,7 +85,7 @@ def test_heated_friction_and_its_temperature_agree(mu_0, resistance, limit, spee
     assert rise == pytest.approx(resistance * mu * pressed / area * speed, rel=1e-13)
     assert mu == pytest.approx(mu_0 * (1 - rise / limit), rel=1e-9, abs=1e-13)  # difference of nearly equal numbers
     assert 0 <= rise <= limit
-    p_v = pressure_parameter(mu_0, resistance, limit, pressed / area)
+    p_v = resistance * mu_0 * (pressed / area) / limit
     assert mu == pytest.approx(float(Falling(value(mu_0), value(p_v)).coefficient(v, n)[0]), rel=1e-13)
 
 

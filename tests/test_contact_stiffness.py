@@ -17,7 +17,7 @@ from scipy.special import ellipe, ellipk, gamma
 
 from microslip.contact.hertz import Hertz, axis_ratio, ellipse_integrals, half_curvatures
 from microslip.contact.identification import MeasuredResonance, identify, joined, two_beams
-from microslip.contact.layer import BOUNDARIES, Layer, modal_stiffness, modes_needed, quasi_static_error
+from microslip.contact.layer import BOUNDARIES, Layer, modal_stiffness, quasi_static_error
 from microslip.contact.partial_slip import PartialSlip
 from microslip.contact.profiles import Profile, RoundContact
 from microslip.contact.series import BULK, ContactStiffness, for_basis, in_series, of_layer, of_patch, of_point_contact
@@ -97,7 +97,7 @@ def test_largest_shear_stress_against_the_principal_stresses_of_the_tensor(bound
 @pytest.mark.parametrize("boundary", BOUNDARIES)
 def test_a_layer_loaded_to_its_strength_is_at_its_limit(boundary):
     layer, tau_s = Layer(IRON, 0.01, boundary), 2e8
-    p = np.linspace(0, 0.999 * min(float(layer.pressure_limit(tau_s)), 1e9), 12)
+    p = np.linspace(0, 0.999 * min(2 * tau_s / max(abs(1 - layer.lateral_share), 1e-9), 1e9), 12)
     tau = layer.shear_strength(p, tau_s)
     assert layer.shear_stress(p, tau) == pytest.approx(np.full(12, tau_s), rel=1e-12)
     mu = layer.largest_friction(p, tau_s)
@@ -107,9 +107,7 @@ def test_a_layer_loaded_to_its_strength_is_at_its_limit(boundary):
 
 def test_beyond_the_limiting_pressure_no_shear_is_carried():
     layer = Layer(IRON, 0.01)
-    assert layer.pressure_limit(2e8) == 4e8
     assert layer.shear_strength([4e8, 5e8], 2e8) == pytest.approx([0.0, 0.0])
-    assert Layer(IRON, 0.01, "hydrostatic").pressure_limit(2e8) == np.inf
     assert Layer(IRON, 0.01, "hydrostatic").shear_strength(1e12, 2e8) == 2e8
 
 
@@ -163,19 +161,14 @@ def test_modal_stiffness_converges_with_the_first_power():
     error = np.array([modal_stiffness(n) - 1 for n in m])
     assert np.polyfit(np.log(m[2:]), np.log(error[2:]), 1)[0] == pytest.approx(-1, abs=0.01)
     assert error[-1] * 160 == pytest.approx(2 / np.pi**2, rel=2e-3)
-    for tolerance in (0.3, 0.05, 0.01, 1e-3):
-        n = modes_needed(tolerance)
-        assert modal_stiffness(n) - 1 <= tolerance and (n == 1 or modal_stiffness(n - 1) - 1 > tolerance)
 
 
-def test_dynamic_stiffness_is_the_modal_series_with_all_its_modes():
+def test_quasi_static_error_is_the_modal_series_with_all_its_modes():
     """k_0/k = sum of (8/pi^2)/((2j - 1)^2 - r^2); the tail after m terms is (2/pi^2)/m, 1.01e-6 for 2e5."""
-    layer = Layer(IRON, 0.05, density=7850)
-    r = np.array([0.0, 1e-6, 0.1, 0.7, 0.999, 1.5])
+    r = np.array([0.0, 1e-6, 0.1, 0.7, 0.999])
     odd = (2 * np.arange(200_000)[:, None] + 1.0) ** 2
     series = 8 / np.pi**2 * np.sum(1 / (odd - r**2), axis=0) + 2 / np.pi**2 / 200_000
-    found = layer.dynamic_stiffness("normal", r * layer.eigenfrequencies("normal")[0])
-    assert 1 / found == pytest.approx(series, rel=1e-11)
+    assert [1 + quasi_static_error(x) for x in r] == pytest.approx(series, rel=1e-11)
 
 
 def test_quasi_static_error_grows_with_the_square_of_the_frequency():
@@ -209,7 +202,6 @@ def test_the_allowed_frequency_meets_the_tolerance_exactly(tolerance):
         (lambda: Layer(IRON, 0.01, density=1.0).eigenfrequencies("n"), "direction"),
         (lambda: Layer(IRON, 0.01, density=1.0).quasi_static(-1.0), "frequency"),
         (lambda: Layer(IRON, 0.01, density=1.0).quasi_static(1.0, 0.0), "tolerance"),
-        (lambda: modes_needed(0.0), "tolerance"),
         (lambda: Solid(0.0, 0.3), "young"),
         (lambda: Solid(1.0, 0.6), "poisson"),
         (lambda: Solid(1.0, 0.3, 0.0), "shear"),

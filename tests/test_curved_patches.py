@@ -19,7 +19,6 @@ from microslip.contact.hertz import Hertz
 from microslip.contact.normal import Penalty, Preload, Rough
 from microslip.contact.patch import Patch, equilibrium, grid, pressed_by, pressing, pressure
 from microslip.contact.point import PointContact
-from microslip.contact.point_laws import line_point
 from microslip.contact.portion import Portion
 from microslip.contact.sliders import Iwan, rough_strips, uniform
 from microslip.contact.solids import Solid
@@ -104,6 +103,8 @@ def test_approach_of_a_line_against_boundary_elements() -> None:
         assert np.abs(x[p > 0]).max() == pytest.approx(float(PIN.half_width(F)), rel=0.01)  # an element's width
     k = (PIN.approach(101.0, STRIP) - PIN.approach(99.0, STRIP)) / 2
     assert float(PIN.stiffness(100.0, STRIP)) == pytest.approx(1 / float(k), rel=1e-4)
+    with pytest.raises(UserError, match="wider by half"):
+        PIN.curve(3000.0, STRIP)
 
 
 def test_uniform_pressure_on_a_strip_has_the_mean_that_is_taken_off() -> None:
@@ -111,18 +112,6 @@ def test_uniform_pressure_on_a_strip_has_the_mean_that_is_taken_off() -> None:
     x, w = np.polynomial.legendre.leggauss(400)
     mean = w @ (0.5 * ((1 + x) * np.log(1 + x) + (1 - x) * np.log(1 - x)) - 1) / 2
     assert mean == pytest.approx(math.log(2) - 1.5, abs=1e-5)
-
-
-def test_one_point_is_the_line() -> None:
-    """The law of the whole line: approach and force agree within the cubic of its knots, 1e-3; it opens at zero."""
-    law = line_point(PIN, STRIP, 1000.0, COULOMB, "t1")
-    for F in (10.0, 100.0, 900.0):
-        found = float(law.normal.force(jnp.asarray([float(PIN.approach(F, STRIP))]))[0])
-        assert found == pytest.approx(F, rel=1e-3)
-    assert float(law.normal.force(jnp.asarray([-1e-9]))[0]) == 0
-    assert float(law.stiffness_1 / law.stiffness_2) == pytest.approx(1 - STEEL.poisson, rel=1e-12)
-    with pytest.raises(UserError, match="wider by half"):
-        PIN.curve(3000.0, STRIP)
 
 
 def test_point_law_counts_the_face_once() -> None:

@@ -24,7 +24,7 @@ from test_exchange import body
 from test_exchange_peers import ask, needs
 
 from microslip.data import Array, ModalBasis, ModalGroup, UserError
-from microslip.exchange import writer
+from microslip.exchange import formats, writer
 from microslip.exchange.choice import select
 from microslip.reduced.coordinates import in_modes
 
@@ -385,6 +385,18 @@ def test_what_cannot_become_a_unit_is_refused(tmp_path: Path, monkeypatch: pytes
     with pytest.raises(UserError, match="TMPDIR"):
         writer("fmu")(basis, tmp_path / "x.fmu")
     assert not any(tmp_path.iterdir())
+
+
+def test_modes_that_a_simulator_cannot_follow_are_told() -> None:
+    """Outputs a fortieth of the longest period apart: 20 periods of the highest mode are 800 times as fast."""
+    basis = plain()
+    g = basis.groups[0, 0]
+    for ratio, count in ((799, 0), (801, 1)):
+        omega = np.append(g.omega[:-1], ratio * g.omega[0])
+        given = replace(basis, groups={(0, 0): replace(g, omega=omega, K_r=np.diag(omega**2))})
+        told = formats()["fmu"].warnings(given)
+        assert len(told) == count and all(f"{omega[-1] / (2e3 * np.pi):.4g} kHz" in t for t in told)
+    assert not formats()["mat"].warnings(basis)
 
 
 @needs("fmpy")

@@ -273,7 +273,7 @@ def test_damaged_and_foreign_files_get_one_sentence(tmp_path):
         read_response(path)
     with h5py.File(path, "w") as file:
         file.attrs["format"] = "microslip-modal-basis"
-    with pytest.raises(UserError, match="is no response"):
+    with pytest.raises(UserError, match="is 'microslip-modal-basis'"):
         read_response(path)
 
 

@@ -267,7 +267,7 @@ def test_a_table_tells_its_error_and_is_read_with_it(tmp_path: Path) -> None:
     np.testing.assert_allclose(table.forces(*one, G), table.forces(*given, G)[:, 0], rtol=1e-12)
     with pytest.raises(UserError, match="a/b is 6"):
         table.forces(1e-3, 0, 0, 6e-3, 1e-3, 82e3, MU, G)
-    with pytest.raises(UserError, match="no table of creep forces"):
+    with pytest.raises(UserError, match="write a table of creep forces"):
         ms.read_creep_table(CASE)
 
 
@@ -362,7 +362,13 @@ def test_a_table_of_contacts_is_read_for_other_loads_and_creepages(contacts: Con
     flat = [np.full(2, v) for v in (20.0, MU, 20 / 0.46, 0.0, 0.0, 0.0)]
     pure = jax.jit(lambda y: contact_forces(contacts, y, yaw, *flat, np.full((2, 2), 1e5)).felt)
     np.testing.assert_allclose(pure(y), plain.felt, rtol=1e-9, atol=1e-6)
-    for wrong, said in (({"lateral": 5e-3}, "lateral: is 0.005"), ({"speed": 0.0}, "speed"), ({"load": -1.0}, "load")):
+    for wrong, said in (
+        ({"lateral": 5e-3}, "lateral: is 0.005"),
+        ({"speed": 0.0}, "speed"),
+        ({"load": -1.0}, "load"),
+        ({"load": [1e5] * 3}, "load: shapes"),
+        ({"lateral": [0.0] * 3, "xi": [0.0] * 2}, "shapes"),
+    ):
         with pytest.raises(UserError, match=said):
             contacts.forces(**{"lateral": 0.0, "yaw": 0.0, "speed": 20.0, "friction": MU} | wrong)
 
@@ -436,7 +442,9 @@ def test_a_case_makes_its_curve_pictures_and_page(
     folder = tmp_path / "build" / "wheel-rail"
     assert {p.name for p in (folder / "pictures").iterdir()} == {"creep.png", "tractions.png"}
     rows = list(csv.DictReader((folder / "creep.csv").open()))
-    patch = {k: float(v) for k, v in next(csv.DictReader((folder / "patches.csv").open())).items()}
+    patch = next(csv.DictReader((folder / "patches.csv").open()))
+    assert patch.pop("side") == "right"
+    patch = {k: float(v) for k, v in patch.items()}
     row = {k: float(v) for k, v in rows[3].items()}
     solid = Solid(2.1e11, 0.28)
     f = ms.creep_forces(row["longitudinal_creepage"], row["lateral_creepage"], row["spin_1_per_m"], patch["a_m"],

@@ -31,7 +31,7 @@ FEW = ("creep.points=3", "creep.stop=0.02", "model.exact=0")
 
 
 def studied(*changes: str) -> Studied:
-    return study(load_rolling(CASE, [*FEW, "creep.spin=0.0", *changes])[0], CASE.parent)
+    return study(load_rolling(CASE, [*FEW, "creep.spin=0.0", *changes])[0], CASE)
 
 
 def test_friction_that_falls_with_the_speed_of_sliding() -> None:
@@ -121,6 +121,18 @@ def test_tables_and_page_hold_temperature_and_wear(
     assert f"{hot:.4g} degrees C hot" not in capsys.readouterr().out
 
 
+def test_what_is_wrong_with_a_file_beside_the_case_names_the_case_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    case = shutil.copy(CASE, tmp_path / "a.toml")
+    monkeypatch.chdir(tmp_path)
+    for key in ("friction", "roughness"):
+        assert main(["roll", "a.toml", "-q", "--set", f'{key}={{kind="table", file="x.csv"}}']) == 2
+        said = capsys.readouterr().err
+        assert said.startswith(f"error: a.toml: {key}.file: there is no file") and "case.toml" not in said
+    assert case.is_file() and not list((tmp_path / "build").rglob("*.csv"))
+
+
 def test_both_wheels_of_an_axle() -> None:
     """Each carries the vertical force; forces about the axle are those of its wheels, and mirror with the pose."""
     one, other = (
@@ -166,11 +178,11 @@ def test_worn_volume_and_mirror() -> None:
         load_rolling(CASE, [*FEW, wear % (0.002 * s, 0.004 * s), f"pose.yaw={0.001 * s}", f"pose.side='{side}'"])[0]
         for s, side in ((1, "right"), (-1, "left"))
     )
-    one, other = (wearing(c, c.track(CASE.parent), c.characteristic(CASE.parent)) for c in (case, mirror))
+    one, other = (wearing(c, c.track(CASE.parent), c.characteristic(CASE)) for c in (case, mirror))
     assert one.moments[-1].volume == pytest.approx(2 * 2e-13 * one.work, rel=1e-9)
     np.testing.assert_allclose(other.wheel.depth, one.wheel.depth, atol=1e-9 * one.wheel.depth.max())
     few = load_rolling(CASE, [*FEW, "wear={coefficient=2e-13, updates=1, passages=3e5, smoothing=0}"])[0]
-    told = wearing(few, case.track(CASE.parent), case.characteristic(CASE.parent)).warnings()
+    told = wearing(few, case.track(CASE.parent), case.characteristic(CASE)).warnings()
     assert len(told) == 1 and "warning: an update takes so much" in told[0]
     deep = load_rolling(CASE, [*FEW, "wear={coefficient=2e-13, updates=2, passages=2.5e6}"])[0]
     assert any("the grooves" in s for s in wearing(deep, case.track(CASE.parent), Coulomb(value(0.3))).warnings())
@@ -180,8 +192,8 @@ def test_profiles_of_rough_bodies_wear_as_a_rough_passage() -> None:
     """Two ways to a passage in the pose: that of `wear.csv` and that of the first update."""
     given = (*FEW, "roughness=5e-5", "pose.yaw=0.003", "wear={coefficient=1e-13, updates=1, passages=1.0}")
     case = load_rolling(CASE, given)[0]
-    worn = study(case, CASE.parent).worn()
-    found = wearing(case, case.track(CASE.parent), case.characteristic(CASE.parent), case.surface(CASE.parent))
+    worn = study(case, CASE).worn()
+    found = wearing(case, case.track(CASE.parent), case.characteristic(CASE), case.surface(CASE))
     assert found.moments[-1].volume == pytest.approx(2 * worn["depth_m"] @ worn["width_m"], rel=1e-3)
 
 

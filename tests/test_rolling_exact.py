@@ -17,7 +17,7 @@ CASE = ROOT / "pipeline" / "cases" / "wheel-rail.toml"
 
 
 def studied(*changes: str) -> Studied:
-    return study(load_rolling(CASE, ["creep.points=31", *changes])[0], CASE.parent)
+    return study(load_rolling(CASE, ["creep.points=31", *changes])[0], CASE)
 
 
 def test_circles_are_hertz_s_bodies() -> None:

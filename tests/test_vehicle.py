@@ -39,7 +39,7 @@ def vehicle(case: VehicleCase) -> motion.Vehicle:
 
 @pytest.fixture(scope="module")
 def rolling(case: VehicleCase, vehicle: motion.Vehicle) -> wearing.Rolling:
-    t = wearing.tread(vehicle, PLACES, case.wear.coefficient, case.how)
+    t = wearing.tread(vehicle, PLACES, case.wear.coefficient, case.model.model_dump())
     return wearing.Rolling.of(vehicle, linear, t, case.shape())
 
 
@@ -388,6 +388,14 @@ def test_wear_by_a_file_is_that_of_the_vehicle_that_wrote_it(
 def given(folder: Path, columns: dict[str, np.ndarray], *changes: str) -> Given:
     """The wheel of a file, not yet worn."""
     return recorded(load_kinematics(written(folder, columns), ["kinematics.turns=1", *changes])[0], folder).wheel
+
+
+def test_a_case_of_a_vehicle_refuses_what_it_does_not_compare(
+    rolling: wearing.Rolling, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for path in (CASE, written(tmp_path, table(rolling)[0])):
+        assert main(["roll", str(path), "-q", "--set", "model.exact=3"]) == 2
+        assert "model.exact" in capsys.readouterr().err
 
 
 def depth_of(wheel: Any, far: float, count: int = 1) -> tuple[np.ndarray, Any, float]:

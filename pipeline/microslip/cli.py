@@ -773,8 +773,10 @@ def export(
         raise UserError("export --rpm: it chooses the speed already; leave --speed out")
     target = output or file.with_name(file.stem + formats()[to].ending)
     basis = read_basis(file)
-    write(select(basis if rpm is None else _at_speed(basis, rpm), speed, nodal_diameter), target)
+    chosen = select(basis if rpm is None else _at_speed(basis, rpm), speed, nodal_diameter)
+    write(chosen, target)
     print(target)
+    _warn(formats()[to].warnings(chosen))
 
 
 @app.command

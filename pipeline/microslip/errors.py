@@ -14,8 +14,9 @@ class NotConverged(Exception):
 
 @contextmanager
 def told_of(what: object) -> Iterator[None]:
-    """A mistake that is found here is one of a file, or of a key in it: its sentence begins with that."""
+    """A mistake that is found here is one of a file, or of a key in it: its sentence begins with that, once."""
     try:
         yield
     except UserError as error:
-        raise UserError(f"{what}: {error}") from error
+        begun = str(error).startswith(f"{what}: ")
+        raise UserError(str(error) if begun else f"{what}: {error}") from error

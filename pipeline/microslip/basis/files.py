@@ -53,9 +53,9 @@ from ..files.declared import (
     write,
     write_each,
 )
-from ..files.hdf5 import create, put, put_scale, seal
+from ..files.hdf5 import put, put_scale, sealed
 from ..files.hostile import DAMAGE, inspect, refuse_damaged, short
-from ..files.store import complete_or_absent, ordinary
+from ..files.store import ordinary
 from ..topology import CELL_TYPES, FACET_CORNERS
 from .checks import TOLERANCES, Check, check_basis
 
@@ -93,10 +93,8 @@ def write_basis(path: Path | str, basis: ModalBasis) -> None:
     Raises:
         UserError: no permission, no space.
     """
-    with complete_or_absent(path) as temporary:
-        with create(temporary) as file:
-            _write(file, basis)
-        seal(temporary)
+    with sealed(path) as file:
+        _write(file, basis)
 
 
 def _write(file: h5py.File, basis: ModalBasis) -> None:

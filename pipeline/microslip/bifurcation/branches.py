@@ -172,11 +172,9 @@ def get(group: h5py.Group) -> Branch:
 
 def write(path: Path, branch: Branch, inputs: str) -> None:
     """A finished branch, with the hash of what it depends on."""
-    with store.complete_or_absent(path) as temporary:
-        with hdf5.create(temporary) as file:
-            file.attrs["inputs"] = inputs
-            put(file, branch)
-        hdf5.seal(temporary)
+    with hdf5.sealed(path) as file:
+        file.attrs["inputs"] = inputs
+        put(file, branch)
 
 
 def kept(path: Path, inputs: str) -> Branch | None:

@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import h5py
-
 from ..data import Array, UserError
 from ..files import hdf5, store
-from ..files.hostile import DAMAGE, inspect, refuse_damaged, short
+from ..files.hostile import reading, refuse_damaged
 from . import branches
 from .branches import Branch
 from .drawn import draw
@@ -66,15 +63,13 @@ class Branches:
 
 def write_bifurcation(path: Path, diagrams: Sequence[Branches]) -> Path:
     """All diagrams of a case, complete or not at all."""
-    with store.complete_or_absent(path) as temporary:
-        with hdf5.create(temporary) as file:
-            file.attrs["format"], file.attrs["version"] = FORMAT, VERSION
-            for one in diagrams:
-                group = file.create_group(one.name)
-                group.attrs["parameter"], group.attrs["unit"] = one.parameter, one.unit
-                for i, branch in enumerate(one.branches):
-                    branches.put(group.create_group(f"branch_{i}"), branch)
-        hdf5.seal(temporary)
+    with hdf5.sealed(path) as file:
+        file.attrs["format"], file.attrs["version"] = FORMAT, VERSION
+        for one in diagrams:
+            group = file.create_group(one.name)
+            group.attrs["parameter"], group.attrs["unit"] = one.parameter, one.unit
+            for i, branch in enumerate(one.branches):
+                branches.put(group.create_group(f"branch_{i}"), branch)
     return path
 
 
@@ -92,7 +87,7 @@ def read_bifurcation(path: Path | str) -> Mapping[str, Branches]:
 
 
 def _read(path: Path) -> dict[str, Branches]:
-    with _opened(path) as file:
+    with reading(path, FORMAT, VERSION, "run the case again") as file:
         return {
             name: Branches(
                 name, str(group.attrs["parameter"]), str(group.attrs["unit"]),
@@ -100,16 +95,3 @@ def _read(path: Path) -> dict[str, Branches]:
             )
             for name, group in file.items()
         }  # fmt: skip
-
-
-@contextmanager
-def _opened(path: Path) -> Iterator[h5py.File]:
-    try:
-        with h5py.File(path, "r") as file:
-            form, version = file.attrs.get("format"), str(file.attrs.get("version"))
-            if (form, version) != (FORMAT, VERSION):
-                raise UserError(f"{path}: is '{form}' {version} and not '{FORMAT}' {VERSION}; run the case again")
-            inspect(file)
-            yield file
-    except DAMAGE as error:
-        raise UserError(f"{path}: is damaged or incomplete ({short(error)}); run the case again") from error

@@ -394,11 +394,6 @@ def _density(heights: Heights, x: np.ndarray) -> np.ndarray:
     return np.asarray(jax.jvp(heights.area, (at,), (jnp.ones_like(at),))[1])
 
 
-def pressure_parameter(mu_0: float, resistance: float, limit: float, pressure: float) -> float:
-    """p_v in s/m of `Falling` (Sextro Eq. (3.6-16)): k_T (K m2/W), dT_E (K) and the pressure (Pa)."""
-    return resistance * mu_0 * pressure / limit
-
-
 def smoothed(speed: Array, slope: Array | float) -> Array:
     """(2 / pi) arctan(k_S v) (Sextro Eqs. (3.7-43), (4.1-23)): what stands for the sign of a small speed."""
     return 2 / jnp.pi * jnp.arctan(slope * speed)

@@ -107,7 +107,7 @@ class Layer:
     def shear_strength(self, pressure: ArrayLike, yield_shear: ArrayLike) -> Array:
         """tau_max (Pa) that the layer carries beside a pressure before it flows, Sextro Eqs. (3.1-33), (3.1-36).
 
-        sqrt(tau_S^2 - (1 - s_i)^2 p^2 / 4), zero from the limiting pressure on.
+        sqrt(tau_S^2 - (1 - s_i)^2 p^2 / 4), zero from p = 2 tau_S/(1 - s_i) on (3.1-35).
 
         Args:
             pressure: Pa. yield_shear: tau_S at the temperature there, Pa, one value or one a point.
@@ -121,12 +121,6 @@ class Layer:
         p = np.asarray(pressure, dtype=float)
         strength = self.shear_strength(p, yield_shear)
         return np.divide(strength, p, out=np.full(strength.shape, np.inf), where=np.broadcast_to(p > 0, strength.shape))
-
-    def pressure_limit(self, yield_shear: ArrayLike) -> Array:
-        """p_max = 2 tau_S / (1 - s_i) (Pa) without shear, Sextro Eq. (3.1-35); infinite under hydrostatic pressure."""
-        if self.lateral_share == 1:
-            return np.full(np.shape(yield_shear), np.inf)
-        return 2 * _yield_shear(yield_shear) / abs(1 - self.lateral_share)
 
     def check_yield(
         self, pressure: ArrayLike, shear: ArrayLike, yield_shear: ArrayLike, points: ArrayLike | None = None,
@@ -173,16 +167,6 @@ class Layer:
     def reduced_mass(self, area: ArrayLike) -> Array:
         """Delta m_D0 = (4/pi^2) rho_0 A l_0 (kg) of elements of the given areas, Sextro Eqs. (3.2-27), (3.2-28)."""
         return REDUCED_MASS * self._rho() * np.asarray(area, dtype=float) * self.thickness
-
-    def dynamic_stiffness(self, direction: str, omega: ArrayLike) -> Array:
-        """Stiffness at a frequency over the static one: x cot x, x = omega l_0 sqrt(rho_0/E~); exact for a rod.
-
-        1 at rest, 0 at the first eigenfrequency, negative (inertia) above.
-
-        Args:
-            omega: rad/s, any shape.
-        """
-        return _x_cot_x(0.5 * np.pi * np.asarray(omega, dtype=float) / self.eigenfrequencies(direction)[0])
 
     def quasi_static(self, frequency: float, tolerance: float = 0.01) -> FrequencyMargin:
         """Whether the static stiffness may be used up to a frequency, and by what margin, Sextro Eq. (3.2-31).
@@ -322,19 +306,6 @@ def modal_stiffness(modes: int) -> float:
     """
     k = np.arange(modes, 0, -1)  # the small ones first
     return float(np.pi**2 / (8 * np.sum(1.0 / (2 * k - 1.0) ** 2)))
-
-
-def modes_needed(tolerance: float) -> int:
-    """Smallest number of modes whose static stiffness is too large by no more than a share (Fig. 3.2-1).
-
-    Raises:
-        UserError: a tolerance below 1e-6, which would need 200 000 modes.
-    """
-    if not tolerance >= 1e-6:
-        raise UserError(f"tolerance: {tolerance:g} would take over 200 000 modes; add the static compliance instead")
-    k = np.arange(1, int(1 / tolerance) + 2, dtype=float)
-    error = np.pi**2 / (8 * np.cumsum(1 / (2 * k - 1) ** 2)) - 1
-    return int(np.argmax(error <= tolerance)) + 1
 
 
 def quasi_static_error(ratio: float) -> float:

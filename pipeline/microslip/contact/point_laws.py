@@ -9,7 +9,6 @@ import jax.numpy as jnp
 
 from ..data import UserError
 from ..reduced.compliance import BULK_AND_SURFACE, SURFACE
-from .curved import Line
 from .curves import NormalCurve, of_contact
 from .friction import Friction
 from .heights import Heights
@@ -57,21 +56,6 @@ def hertz_point(contact: Hertz, friction: Friction, normal_force: float = 1.0) -
     law = Potential(_value(normal_force), _value(depth), _value(1.5))
     x, y = contact.tangential_stiffness(normal_force)
     return _point(law, friction, (float(x), float(y)), "bulk")
-
-
-def line_point(line: Line, strip: float, largest: float, friction: Friction, along: str = "t1") -> PointContact:
-    """A line of contact, or a piece of one, as one point: what it yields beyond its strip, see `Line.approach`.
-
-    Args:
-        strip: width of the face, m. largest: normal force, N, up to which the law is Hertz'; straight beyond. along:
-            ``t1`` or ``t2``, the direction of the line.
-
-    Raises:
-        UserError: a force under which the line fills its strip.
-    """
-    around, lengthwise = line.tangential_ratio
-    ratio = (lengthwise, around) if along == "t1" else (around, lengthwise)
-    return curve_point(line.curve(largest, strip), ratio, friction)
 
 
 def round_point(contact: RoundContact, friction: Friction, largest: float, count: int = 81) -> PointContact:

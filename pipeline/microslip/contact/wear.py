@@ -279,11 +279,6 @@ def from_archard(K: float, hardness: float, mu: float) -> float:
     return K / (hardness * mu)
 
 
-def to_archard(coefficient: float, hardness: float, mu: float) -> float:
-    """Archard's K, without unit, of I_W (m3/J)."""
-    return coefficient * hardness * mu
-
-
 def from_energy_density(density: float) -> float:
     """I_W in m3/J of Fleischer's apparent frictional energy density in J/m3: the work that wears off a volume."""
     if not density > 0:

@@ -20,13 +20,14 @@ class Format:
 
     Attributes:
         name: as in ``--to``. ending: of the file's name if none is asked for. reader: who takes it. write: a
-            `ModalBasis` and a path; it leaves the file complete or absent.
+            `ModalBasis` and a path; it leaves the file complete or absent. warnings: what its reader may stumble over.
     """
 
     name: str
     ending: str
     reader: str
     write: Callable[[ModalBasis, Path], None]
+    warnings: Callable[[ModalBasis], list[str]] = lambda _: []
 
 
 STATEMENT = (

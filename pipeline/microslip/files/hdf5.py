@@ -18,6 +18,7 @@ import h5py
 import numpy as np
 
 from ..data import UserError
+from .store import complete_or_absent
 
 _SEAL = b"\nmicroslip seal, sha256 of all bytes before this line: "
 IMAGINARY = "_imag"
@@ -76,6 +77,19 @@ def create(path: Path, again: bool = False) -> Iterator[h5py.File]:
         finally:
             if sink.error is not None:
                 raise sink.error
+
+
+@contextlib.contextmanager
+def sealed(path: Path | str) -> Iterator[h5py.File]:
+    """A new file to be written, complete and sealed or absent.
+
+    Raises:
+        UserError: no permission, no space.
+    """
+    with complete_or_absent(path) as temporary:
+        with create(temporary) as file:
+            yield file
+        seal(temporary)
 
 
 def put(

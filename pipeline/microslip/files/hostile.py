@@ -5,7 +5,8 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -67,6 +68,29 @@ def inspect(file: h5py.File) -> None:
     """
     allowed = _EXPANSION * max(Path(file.filename).stat().st_size, 1 << 14)
     _inspect_group(file, "", (), [allowed, _OBJECTS])
+
+
+@contextmanager
+def reading(path: Path, form: str, version: str, again: str) -> Iterator[h5py.File]:
+    """A file of a format and version of our own, looked at before it is read.
+
+    Args:
+        version: of its attribute ``format_version``; "" where the format's name says it. again: what to do about
+            another one.
+
+    Raises:
+        UserError: damaged while it is read, foreign or of another version.
+    """
+    try:
+        with h5py.File(path, "r") as file:
+            found = file.attrs.get("format"), file.attrs.get("format_version", file.attrs.get("version", ""))
+            if found != (form, version):
+                said, wanted = (" ".join(filter(None, map(str, pair))) for pair in (found, (form, version)))
+                raise UserError(f"{path}: is '{said}' and not '{wanted}'; {again}")
+            inspect(file)
+            yield file
+    except DAMAGE as error:
+        raise UserError(f"{path}: is damaged or incomplete ({short(error)}); {again}") from error
 
 
 def _inspect_group(group: h5py.Group, where: str, above: tuple[Any, ...], budget: list[int]) -> None:

@@ -13,9 +13,9 @@ import h5py
 import numpy as np
 
 from ..data import Array, ModalBasis, ModalGroup, UserError
-from ..files.hdf5 import IMAGINARY, create, put, seal
-from ..files.hostile import DAMAGE, inspect, refuse_damaged, short
-from ..files.store import complete_or_absent, ordinary
+from ..files.hdf5 import IMAGINARY, put, sealed
+from ..files.hostile import DAMAGE, reading, refuse_damaged, short
+from ..files.store import ordinary
 from ..operating.motion import Motion, motion_of
 from ..reduced.coordinates import first_modes, in_modes
 from .journal import is_journal, read_journal
@@ -190,10 +190,8 @@ def write_response(path: Path | str, response: Response) -> None:
     Raises:
         UserError: no permission, no space.
     """
-    with complete_or_absent(path) as temporary:
-        with create(temporary) as file:
-            _write(file, response)
-        seal(temporary)
+    with sealed(path) as file:
+        _write(file, response)
 
 
 _TEXTS = ("case", "mode", "inputs", "description")
@@ -256,19 +254,8 @@ def _from_journal(path: Path) -> Response:
 
 
 def _read(path: Path) -> Response:
-    try:
-        with h5py.File(path, "r") as file:
-            form, version = file.attrs.get("format"), str(file.attrs.get("format_version"))
-            if form != FORMAT:
-                raise UserError(f"{path}: is no response (its attribute 'format' is {form!r}, not '{FORMAT}')")
-            if version != FORMAT_VERSION:
-                raise UserError(
-                    f"{path}: has format version {version}, this program reads {FORMAT_VERSION}; run the case again"
-                )
-            inspect(file)
-            return _response(file)
-    except DAMAGE as error:
-        raise UserError(f"{path}: is damaged or incomplete ({short(error)}); run the case again") from error
+    with reading(path, FORMAT, FORMAT_VERSION, "run the case again") as file:
+        return _response(file)
 
 
 def _response(file: h5py.File) -> Response:

@@ -11,9 +11,9 @@ import h5py
 import numpy as np
 
 from ..data import Array, ComplexArray, Indices, UserError
-from ..files.hdf5 import IMAGINARY, create, put, refuse_foreign, seal
-from ..files.hostile import DAMAGE, inspect, refuse_damaged, short
-from ..files.store import complete_or_absent, ordinary
+from ..files.hdf5 import IMAGINARY, put, refuse_foreign, sealed
+from ..files.hostile import DAMAGE, reading, refuse_damaged
+from ..files.store import ordinary
 from ..units import Quantity
 from .series import CONVERGED
 
@@ -159,18 +159,13 @@ class TwoTones:
             UserError: no permission, no space; a file that is none of two tones stands there.
         """
         refuse_foreign(path, FORMAT)
-        with complete_or_absent(Path(path)) as temporary:
-            with create(temporary) as file:
-                file.attrs["format"], file.attrs["format_version"] = FORMAT, FORMAT_VERSION
-                for key in ("readouts", "units", "status", "messages"):
-                    file.attrs[key] = json.dumps(list(getattr(self, key)))
-                put(file, "pairs", self.pairs)
-                for name, unit in UNITS.items():
-                    value = getattr(self, name)
-                    put(file, name, np.real(value), unit)
-                    if np.iscomplexobj(value):
-                        put(file, f"{name}{IMAGINARY}", value.imag, unit)
-            seal(temporary)
+        with sealed(path) as file:
+            file.attrs["format"], file.attrs["format_version"] = FORMAT, FORMAT_VERSION
+            for key in ("readouts", "units", "status", "messages"):
+                file.attrs[key] = json.dumps(list(getattr(self, key)))
+            put(file, "pairs", self.pairs)
+            for name, unit in UNITS.items():
+                put(file, name, getattr(self, name), unit)
         return Path(path)
 
     # pictures --------------------------------------------------------------------------------------------------------
@@ -269,23 +264,14 @@ def read_tones(path: Path | str) -> TwoTones:
 
 
 def _read(path: Path) -> TwoTones:
-    try:
-        with h5py.File(path, "r") as file:
-            form, version = file.attrs.get("format"), str(file.attrs.get("format_version"))
-            if (form, version) != (FORMAT, FORMAT_VERSION):
-                raise UserError(
-                    f"{path}: is '{form}' {version} and not '{FORMAT}' {FORMAT_VERSION}; save the motions again"
-                )
-            inspect(file)
-            told: dict[str, Any] = {
-                key: tuple(json.loads(file.attrs[key])) for key in ("readouts", "units", "status", "messages")
-            }
-            arrays: dict[str, Any] = {name: file[name][()] for name in (*UNITS, "pairs")}
-            arrays["amplitude"] = arrays["amplitude"] + 1j * file[f"amplitude{IMAGINARY}"][()]
-            points = len(told["status"])
-            shape = points, len(told["readouts"]), len(arrays["pairs"])
-            if arrays["amplitude"].shape != shape or any(len(arrays[name]) != points for name in UNITS):
-                raise ValueError("arrays of different lengths")
-            return TwoTones(**arrays, **told)
-    except DAMAGE as error:
-        raise UserError(f"{path}: is damaged or incomplete ({short(error)}); save the motions again") from error
+    with reading(path, FORMAT, FORMAT_VERSION, "save the motions again") as file:
+        told: dict[str, Any] = {
+            key: tuple(json.loads(file.attrs[key])) for key in ("readouts", "units", "status", "messages")
+        }
+        arrays: dict[str, Any] = {name: file[name][()] for name in (*UNITS, "pairs")}
+        arrays["amplitude"] = arrays["amplitude"] + 1j * file[f"amplitude{IMAGINARY}"][()]
+        points = len(told["status"])
+        shape = points, len(told["readouts"]), len(arrays["pairs"])
+        if arrays["amplitude"].shape != shape or any(len(arrays[name]) != points for name in UNITS):
+            raise ValueError("arrays of different lengths")
+        return TwoTones(**arrays, **told)

@@ -10,7 +10,6 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import h5py
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -18,7 +17,9 @@ from numpy.typing import ArrayLike
 
 from ..contact.law import program
 from ..data import UserError
-from ..files import hdf5, store
+from ..files import hdf5
+from ..files.hostile import reading
+from ..files.store import ordinary
 from . import strips
 from .strips import Array
 from .wheelset import Patch, Pose, Track, axle
@@ -118,13 +119,11 @@ class ContactTable(NamedTuple):
         Raises:
             UserError: a pose beyond the table, or a value that none has.
         """
-        speed = np.asarray(speed, float)
-        added = [np.asarray(v, float) for v in (xi, eta, phi)]
-        added = [v if v.ndim > 1 else np.atleast_1d(v)[:, None] for v in added]
-        given = strips.broadcast(lateral, yaw, speed, friction, speed / self.radius if turning is None else turning)
-        n = np.broadcast_shapes(given[0].shape, *((len(v),) for v in added))[0]
-        given = [np.broadcast_to(v, n) for v in given] + [np.broadcast_to(v, (n, 2)) for v in added]
-        loads = np.broadcast_to(np.asarray(self.load if load is None else load, float), (n, 2))
+        turning = np.asarray(speed, float) / self.radius if turning is None else turning
+        given, loads = _together(
+            (lateral, yaw, speed, friction, turning), (xi, eta, phi), self.load if load is None else load
+        )
+        n = len(loads)
         for name, v, reach in zip(("lateral", "yaw"), given, self.reach, strict=False):
             worst = v[np.argmax(np.abs(v))]
             if not abs(worst) <= reach * (1 + 1e-9):
@@ -144,6 +143,24 @@ class ContactTable(NamedTuple):
                 f"mean, 95 % of {self.checked} wheels by less than {100 * creep[1]:.2g} %, the largest by "
                 f"{100 * creep[2]:.2g} %, and places by at most {1e3 * place[2]:.2g} mm; {100 * self.jumping:.2g} % of "
                 "them are near a jump, where the nearest pose is taken.")  # fmt: skip
+
+
+def _together(
+    pose: tuple[ArrayLike, ...], creep: tuple[ArrayLike, ...], load: ArrayLike
+) -> tuple[list[Array], Array]:  # fmt: skip
+    """Arrays (n,) of the poses, then (n, 2) of creepages; loads (n, 2)."""
+    added = [np.asarray(v, float) for v in creep]
+    added = [v if v.ndim > 1 else np.atleast_1d(v)[:, None] for v in added]
+    try:
+        given = strips.broadcast(*pose)
+        n = np.broadcast_shapes(given[0].shape, *((len(v),) for v in added))[0]
+        each = [np.broadcast_to(v, n) for v in given] + [np.broadcast_to(v, (n, 2)) for v in added]
+        return each, np.broadcast_to(np.asarray(load, float), (n, 2))
+    except ValueError as error:
+        raise UserError(
+            f"lateral, yaw, speed, friction, turning, xi, eta, phi, load: shapes do not go together ({error}); give "
+            "(n,) of the poses, and (n, 2) of what differs between the left and the right wheel"
+        ) from error
 
 
 MISSED = ("middle of the contact on the wheel, m", "largest pressure, of its own", "normal force over the load",
@@ -359,15 +376,13 @@ FORMAT = "microslip-contact-table-1"
 
 def write_contact_table(path: Path, table: ContactTable) -> Path:
     """As HDF5: a dataset an attribute, those of its patches in a group; complete or not at all."""
-    with store.complete_or_absent(path) as temporary:
-        with hdf5.create(temporary) as file:
-            file.attrs.update(format=FORMAT, meaning=str(ContactTable.__doc__), patches=str(Patches.__doc__),
-                              missed=", ".join(MISSED))  # fmt: skip
-            for group, nouns in ((file, table), (file.create_group("patches"), table.patches)):
-                for name, value in nouns._asdict().items():
-                    if name != "patches":
-                        hdf5.put(group, name, np.asarray(value))
-        hdf5.seal(temporary)
+    with hdf5.sealed(path) as file:
+        file.attrs.update(format=FORMAT, meaning=str(ContactTable.__doc__), patches=str(Patches.__doc__),
+                          missed=", ".join(MISSED))  # fmt: skip
+        for group, nouns in ((file, table), (file.create_group("patches"), table.patches)):
+            for name, value in nouns._asdict().items():
+                if name != "patches":
+                    hdf5.put(group, name, np.asarray(value))
     return path
 
 
@@ -377,10 +392,7 @@ def read_contact_table(path: Path | str) -> ContactTable:
     Raises:
         UserError: another file.
     """
-    try:
-        with h5py.File(store.ordinary(Path(path)), "r") as file:
-            patches = Patches(*(file["patches"][name][()] for name in Patches._fields))
-            rest = {name: file[name][()] for name in ContactTable._fields if name != "patches"}
-            return ContactTable(patches=patches, **rest)
-    except (OSError, KeyError, TypeError) as error:
-        raise UserError(f"{path}: is no table of contacts ({error}); write one with write_contact_table") from error
+    with reading(ordinary(Path(path)), FORMAT, "", "write a table of contacts with [contacts] in a case") as file:
+        patches = Patches(*(file["patches"][name][()] for name in Patches._fields))
+        rest = {name: file[name][()] for name in ContactTable._fields if name != "patches"}
+        return ContactTable(patches=patches, **rest)

@@ -19,11 +19,9 @@ from ..contact.law import Array
 
 Coefficients = Literal["table", "book"]
 
-POISSON = (0.0, 0.25, 0.5)
-"""Of the columns of `TABLE`, one for each coefficient."""
-
-# C11, C22, C23: Kalker's table E.3, three digits. C33: computed here (tests/closed_forms/no_slip.py: the half-space in
-# rectangles, extrapolated to the element size zero), which gives the other three to 0.7 % as well.
+# A row: each coefficient with nu = 0, 1/4, 1/2. C11, C22, C23: Kalker's table E.3, three digits. C33: computed here
+# (tests/closed_forms/no_slip.py: the half-space in rectangles, extrapolated to the element size zero), which gives the
+# other three to 0.7 % as well.
 _NARROW = """
 2.51 3.31 4.85  2.51 2.52 2.53  0.334 0.473 0.731  6.459 8.339 11.77
 2.59 3.37 4.81  2.59 2.63 2.66  0.483 0.603 0.809  3.472 4.301 5.709

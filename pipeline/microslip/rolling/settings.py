@@ -153,14 +153,18 @@ class Creep(Model):
         return self
 
 
-class ModelOfCase(Model):
-    """elements: along and across rolling. exact: states of the curve that are compared with exact half-spaces between
-    the profiles themselves. The rest as `strips.creep_forces`."""
+class Strips(Model):
+    """elements: along and across rolling. The rest as `strips.creep_forces`."""
 
     elements: Annotated[tuple[Count, Count], BeforeValidator(_tuple)] = (20, 20)
     distribution: Distribution = "constant"
     coefficients: Coefficients = "table"
     spin: Spin = "kalker"
+
+
+class ModelOfCase(Strips):
+    """exact: states of the curve that are compared with exact half-spaces between the profiles themselves."""
+
     exact: Annotated[int, Field(ge=0, le=1000)] = 5
 
 
@@ -309,26 +313,26 @@ class RollingCase(Model):
         """Whether one coefficient of friction holds everywhere."""
         return self.friction.kind == "coulomb" and (self.heat is None or self.heat.limit is None)
 
-    def characteristic(self, folder: Path) -> Friction:
-        """Of files beside the case.
+    def characteristic(self, path: Path) -> Friction:
+        """Of files beside the case's.
 
         Raises:
             UserError: a file that is none, no friction.
         """
-        found = self.friction.friction(folder / "case.toml", None, None)
+        found = self.friction.friction(path, None, None)
         if not np.max(found.highest(jnp.ones(1))) > 0:
             raise UserError("friction: is 0 at all speeds; the creep force is a part of it, so give more than 0")
         return found
 
-    def surface(self, folder: Path) -> Surface | None:
-        """Rough, if it is asked.
+    def surface(self, path: Path) -> Surface | None:
+        """Rough, if it is asked, of files beside the case's.
 
         Raises:
             UserError: a file that is none, heights of another unit.
         """
         if self.roughness is None:
             return None
-        heights, R_Z = self.roughness.heights(folder / "case.toml", 1.0)
+        heights, R_Z = self.roughness.heights(path, 1.0)
         if R_Z > ROUGHEST:
             raise UserError(f"roughness: R_Z = {float(R_Z):g} m is no roughness; give it in m, worn rails have 1e-5")
         return Surface(heights, value(R_Z))

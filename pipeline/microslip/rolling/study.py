@@ -237,18 +237,18 @@ class Studied:
                 'are off by as much, less with model.spin = "book".']  # fmt: skip
 
 
-def study(case: RollingCase, folder: Path) -> Studied:
-    """Patches, curve and tractions of a case whose files stand in a folder.
+def study(case: RollingCase, path: Path) -> Studied:
+    """Patches, curve and tractions of a case; its files stand beside its own.
 
     Raises:
         UserError: profiles that are none, or do not overlap.
     """
-    track = case.track(folder)
+    track = case.track(path.parent)
     found, pose = _touching(case, track)
     creep = _creep(case, found[0] if found else None)
     if not found:
         return Studied(case, track, found, creep, None, None, None, 0, None, None)
-    p, c, friction = found[0], case.creep, case.characteristic(folder)
+    p, c, friction = found[0], case.creep, case.characteristic(path)
     highest = float(np.max(friction.highest(jnp.ones(1))))
     over = creep[list(UNITS).index(c.over)]
     shown = int(np.abs(over - (0.5 * (c.start + c.stop) if c.shown is None else c.shown)).argmin())
@@ -256,7 +256,7 @@ def study(case: RollingCase, folder: Path) -> Studied:
     n = len(over)
     kept = np.array([shown, *range(n, len(speed))])
     heat = case.heat.made() if case.heat else None
-    rough, how = case.surface(folder), case.model.model_dump(exclude={"exact"})
+    rough, how = case.surface(path), case.model.model_dump(exclude={"exact"})
     states = rolled(given, friction, speed, kept, heat, rough, **how)
     forces, of_pose = (Forces(*(v[part] for v in states.forces)) for part in (slice(n), slice(n, None)))
     reference, beside, missed = None, None, ""
@@ -310,9 +310,9 @@ def _creep(case: RollingCase, p: Patch | None) -> Array:
     return np.array(rows)
 
 
-def rows_of_patches(found: list[Patch]) -> tuple[list[str], list[list[float]]]:
+def rows_of_patches(found: list[Patch]) -> tuple[list[str], list[list[float | str]]]:
     """Head and a row for each patch, as in patches.csv."""
     head = ["x_m", "y_m", "z_m", "y_rail_m", "y_wheel_m", "angle_rad", "A_1_per_m", "B_1_per_m", "a_m", "b_m",
             "approach_m", "largest_pressure_Pa", "normal_force_N", "longitudinal_creepage", "lateral_creepage",
-            "spin_1_per_m", "speed_m_per_s", "conformal"]  # fmt: skip
-    return head, [[float(v) for v in (*p[0], *p[1:-1])] for p in found]
+            "spin_1_per_m", "speed_m_per_s", "conformal", "side"]  # fmt: skip
+    return head, [[*(float(v) for v in (*p[0], *p[1:-1])), p.side] for p in found]

@@ -8,17 +8,19 @@ them. With xi the sign of F_x turns, with eta and phi together those of F_y and 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import partial, reduce
+from operator import mul
 from pathlib import Path
 from typing import Any
 
-import h5py
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..contact.law import program
 from ..data import Array, UserError
-from ..files import hdf5, store
+from ..files import hdf5
+from ..files.hostile import reading
+from ..files.store import ordinary
 from .kalker import Coefficients, creep_coefficients
 from .strips import BLOCK, Distribution, Forces, Poses, creep_forces, forces, grid, poses
 
@@ -111,8 +113,8 @@ class CreepTable:
     def _between(self, at: Array) -> Array:
         """(3, n) values at (5, n) coordinates."""
         ridge = int(np.searchsorted(self.size, 0.5))
-        parts = [_weights(self.axes[0], at[0], ridge)]
-        parts += [_weights(axis, v) for axis, v in zip(self.axes[1:], at[1:], strict=True)]
+        parts = [cubic(self.axes[0], at[0], ridge)]
+        parts += [cubic(axis, v) for axis, v in zip(self.axes[1:], at[1:], strict=True)]
         shape = self.values.shape[1:]
         index = np.zeros((at.shape[1], 1), int)
         for (first, weight), many in zip(parts, shape, strict=True):
@@ -124,21 +126,17 @@ class CreepTable:
         return found[..., 0]
 
 
-def _weights(axis: Array, v: Array, ridge: int = 0) -> tuple[Array, Array]:
+def cubic(axis: Any, v: Any, ridge: Any = 0, xp: Any = np) -> tuple[Any, Any]:
     """Index of the first of the points about each place, on one side of a ridge, and what each of them counts (n, 4):
-    Lagrange's polynomials."""
+    Lagrange's polynomials; xp: see `placed`."""
     many = min(4, len(axis))
-    i = np.clip(np.searchsorted(axis, v, side="right") - 1, 0, len(axis) - 2)
-    right = i >= ridge
-    low, high = np.where(right, ridge, 0), np.where(right, len(axis) - 1, ridge)
-    first = np.clip(i - (many - 1) // 2, low, np.maximum(high - many + 1, low))
-    x = axis[first[:, None] + np.arange(many)]
-    weight = np.ones_like(x)
-    for j in range(many):
-        for k in range(many):
-            if j != k:
-                weight[:, j] *= (v - x[:, k]) / (x[:, j] - x[:, k])
-    return first, weight
+    i = xp.clip(xp.searchsorted(axis, v, side="right") - 1, 0, len(axis) - 2)
+    low, high = xp.where(i >= ridge, ridge, 0), xp.where(i >= ridge, len(axis) - 1, ridge)
+    first = xp.clip(i - (many - 1) // 2, low, xp.maximum(high - many + 1, low))
+    x = axis[first[:, None] + xp.arange(many)]
+    ways = v[:, None] - x
+    parts = [[ways[:, k] / (x[:, j] - x[:, k]) for k in range(many) if k != j] for j in range(many)]
+    return first, xp.stack([reduce(mul, part) for part in parts], axis=1)
 
 
 def placed(pull: Any, ratio: Any, xp: Any = np) -> tuple[Any, Any]:
@@ -248,15 +246,13 @@ def write_creep_table(path: Path, table: CreepTable) -> Path:
     """As HDF5: a dataset an axis, ``kalker``, ``values`` in whole steps and ``error``; complete or not at all."""
     step = np.abs(table.values).max() / FINEST
     g = grid(tuple(table.how["elements"]), table.how["distribution"])
-    with store.complete_or_absent(path) as temporary:
-        with hdf5.create(temporary) as file:
-            file.attrs.update(format=FORMAT, poisson=table.poisson, checked=table.checked, values=", ".join(VALUES),
-                              step=step, spin_factor=2 * g.sprung / g.spun, error="mean, 95 % quantile, largest",
-                              meaning=str(CreepTable.__doc__), **table.how)  # fmt: skip
-            for name in (*AXES, "kalker", "error"):
-                hdf5.put(file, name, getattr(table, name))
-            hdf5.put(file, "values", np.rint(table.values / step).astype(np.int16))
-        hdf5.seal(temporary)
+    with hdf5.sealed(path) as file:
+        file.attrs.update(format=FORMAT, poisson=table.poisson, checked=table.checked, values=", ".join(VALUES),
+                          step=step, spin_factor=2 * g.sprung / g.spun, error="mean, 95 % quantile, largest",
+                          meaning=str(CreepTable.__doc__), **table.how)  # fmt: skip
+        for name in (*AXES, "kalker", "error"):
+            hdf5.put(file, name, getattr(table, name))
+        hdf5.put(file, "values", np.rint(table.values / step).astype(np.int16))
     return path
 
 
@@ -266,12 +262,9 @@ def read_creep_table(path: Path | str) -> CreepTable:
     Raises:
         UserError: another file.
     """
-    try:
-        with h5py.File(store.ordinary(Path(path)), "r") as file:
-            parts = {name: file[name][()] for name in (*AXES, "kalker", "error")}
-            nx, ny = map(int, file.attrs["elements"])
-            how = {"elements": (nx, ny)} | {k: str(file.attrs[k]) for k in ("distribution", "coefficients")}
-            return CreepTable(**parts, values=file["values"][()] * float(file.attrs["step"]), how=how,
-                              poisson=float(file.attrs["poisson"]), checked=int(file.attrs["checked"]))  # fmt: skip
-    except (OSError, KeyError) as error:
-        raise UserError(f"{path}: is no table of creep forces ({error}); write one with [table] in a case") from error
+    with reading(ordinary(Path(path)), FORMAT, "", "write a table of creep forces with [table] in a case") as file:
+        parts = {name: file[name][()] for name in (*AXES, "kalker", "error")}
+        nx, ny = map(int, file.attrs["elements"])
+        how = {"elements": (nx, ny)} | {k: str(file.attrs[k]) for k in ("distribution", "coefficients")}
+        return CreepTable(**parts, values=file["values"][()] * float(file.attrs["step"]), how=how,
+                          poisson=float(file.attrs["poisson"]), checked=int(file.attrs["checked"]))  # fmt: skip

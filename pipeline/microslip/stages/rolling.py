@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -67,10 +68,10 @@ def _work(stage: Stage, case: RollingCase, case_path: Path, bodies: list[Path], 
     folder = stage.product.parent
     stage.report("patches and creep curve")
     with told_of(case_path):
-        found = study(case, case_path.parent)
+        found = study(case, case_path)
         elastic = _behind(found, bodies)
         contacts = _contacts(stage, found)
-        worn = _wearing(stage, found, case_path.parent)
+        worn = _wearing(stage, found, case_path)
     stage.begin()
     made = _tables(found, folder)
     beside, more = _beside(stage, found, elastic, contacts)
@@ -122,10 +123,10 @@ def _contacts(stage: Stage, found: Studied) -> ContactTable | None:
     return contact_table(found.track, found.case.vertical_force, **asked.model_dump(), report=stage.report)
 
 
-def _wearing(stage: Stage, found: Studied, folder: Path) -> Wearing | None:
+def _wearing(stage: Stage, found: Studied, path: Path) -> Wearing | None:
     if found.case.wear is None or not found.case.wear.updates:
         return None
-    return wearing(found.case, found.track, found.case.characteristic(folder), found.case.surface(folder), stage.report)
+    return wearing(found.case, found.track, found.case.characteristic(path), found.case.surface(path), stage.report)
 
 
 def _worn_tables(worn: Wearing, folder: Path) -> list[Path]:
@@ -139,18 +140,21 @@ def _worn_tables(worn: Wearing, folder: Path) -> list[Path]:
 
 def _tables(found: Studied, folder: Path) -> list[Path]:
     head, rows = rows_of_patches(found.patches)
-    store.write_text(folder / "patches.csv", rows_csv(head, ([f"{v:.8g}" for v in row] for row in rows)))
+    store.write_text(folder / "patches.csv", rows_csv(head, _cells(rows)))
     if found.forces is None:
         return [folder / "patches.csv"]
     made = {"creep.csv": found.columns(), "exact.csv": found.beside(), "wear.csv": found.worn()}
     for name, columns in made.items():
         if columns:
             store.write_text(folder / name, columns_csv(columns, 8))
-    head, generalised = found.generalised()
-    cells = ([v if isinstance(v, str) else f"{v:.8g}" for v in row] for row in generalised)
-    store.write_text(folder / "forces.csv", rows_csv(head, cells))
+    head, rows = found.generalised()
+    store.write_text(folder / "forces.csv", rows_csv(head, _cells(rows)))
     written = [name for name, columns in made.items() if columns]
     return [folder / name for name in (*written, "patches.csv", "forces.csv")]
+
+
+def _cells(rows: Iterable[Iterable[float | str]]) -> Iterator[list[str]]:
+    return ([v if isinstance(v, str) else f"{v:.8g}" for v in row] for row in rows)
 
 
 def _pictures(found: Studied, worn: Wearing | None, folder: Path, name: str) -> list[Path]:

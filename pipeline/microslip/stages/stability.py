@@ -192,19 +192,17 @@ def write_roots(path: Path, found: Spectrum, over: Diagram | None, values: Mappi
     Raises:
         UserError: no permission, no space.
     """
-    with store.complete_or_absent(path) as temporary:
-        with hdf5.create(temporary) as file:
-            file.attrs["format"], file.attrs["complete"] = "microslip-roots", int(found.complete)
-            file.attrs["values"] = json.dumps(dict(values))
-            where = file.create_group("roots")
-            for name, column in found.columns.items():
-                hdf5.put(where, name, np.array(column), dims=("root",))
-            hdf5.put(where, "s", found.roots.s, "1/s", ("root",))
-            for name, vectors in (("shape", found.roots.x), ("left", found.roots.y)):
-                hdf5.put(where, name, vectors, dims=("coordinate", "root"))
-            for name, column in over.columns.items() if over else ():
-                hdf5.put(file.require_group("over"), name, column, dims=("row",))
-        hdf5.seal(temporary)
+    with hdf5.sealed(path) as file:
+        file.attrs["format"], file.attrs["complete"] = "microslip-roots", int(found.complete)
+        file.attrs["values"] = json.dumps(dict(values))
+        where = file.create_group("roots")
+        for name, column in found.columns.items():
+            hdf5.put(where, name, np.array(column), dims=("root",))
+        hdf5.put(where, "s", found.roots.s, "1/s", ("root",))
+        for name, vectors in (("shape", found.roots.x), ("left", found.roots.y)):
+            hdf5.put(where, name, vectors, dims=("coordinate", "root"))
+        for name, column in over.columns.items() if over else ():
+            hdf5.put(file.require_group("over"), name, column, dims=("row",))
 
 
 def _pictures(found: Spectrum, over: Diagram | None, folder: Path) -> dict[str, Path]:

@@ -16,8 +16,7 @@ import scipy.linalg
 
 from ..contact.set_valued import SetValued
 from ..data import Array, NotConverged, UserError
-from ..files.hdf5 import create, put, refuse_foreign, seal
-from ..files.store import complete_or_absent
+from ..files.hdf5 import put, refuse_foreign, sealed
 from ..settings.mistakes import bounded
 from ..system.assembly import Contact
 from ..units import METRES, counted
@@ -284,18 +283,16 @@ class Orbit:
             UserError: no permission, no space; a file that is none of motions stands there.
         """
         refuse_foreign(path, kept_samples.FORMAT)
-        with complete_or_absent(path) as temporary:
-            with create(temporary) as file:
-                kept_samples.head(file)
-                group = file.create_group("motion_1")
-                kept_samples.describe(
-                    group, f"{self.Omega:.6g} rad/s", self.Omega, self.omega2, self.labels, self.touching, self.samples
-                )
-                for name, unit in UNITS.items():
-                    put(group, name, self.array(name), unit)
-                put(group, "event", self.events)
-                kept_samples.tell(group, self._told)
-            seal(temporary)
+        with sealed(path) as file:
+            kept_samples.head(file)
+            group = file.create_group("motion_1")
+            kept_samples.describe(
+                group, f"{self.Omega:.6g} rad/s", self.Omega, self.omega2, self.labels, self.touching, self.samples
+            )
+            for name, unit in UNITS.items():
+                put(group, name, self.array(name), unit)
+            put(group, "event", self.events)
+            kept_samples.tell(group, self._told)
         return Path(path)
 
     def plot(self, axes: Axes | None = None, read_out: int = 0) -> Axes:

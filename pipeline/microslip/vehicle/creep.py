@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import reduce
-from operator import mul
 from typing import Any
 
 import jax.numpy as jnp
@@ -12,7 +10,7 @@ from jax import lax
 
 from ..rolling import strips
 from ..rolling.kalker import creep_coefficients
-from ..rolling.table import CreepTable, placed
+from ..rolling.table import CreepTable, cubic, placed
 
 Array = Any
 Creep = Callable[..., tuple[Array, Array, Array]]
@@ -54,23 +52,13 @@ def of_table(table: CreepTable) -> Creep:
         pull = jnp.stack([xi, p.eta * p.stiffness_y / p.stiffness_x, c * p.phi_x]) * p.stiffness_x * c**2 / held
         three, signs = placed(pull, ratio, jnp)
         at = [*three, jnp.log(ratio), jnp.log(p.stiffness_y / p.stiffness_x)]
-        weights = [_cubic(axis, v, ridge if k == 0 else 0) for k, (axis, v) in enumerate(zip(axes, at, strict=True))]
+        weights = [
+            cubic(axis, v, ridge if k == 0 else 0, jnp) for k, (axis, v) in enumerate(zip(axes, at, strict=True))
+        ]
         x, y, moment = jnp.stack([_between(values, weights, i) for i in range(len(xi))], axis=1) * signs * held
         return x, y, c * moment
 
     return forces
-
-
-def _cubic(axis: Array, v: Array, ridge: int) -> tuple[Array, Array]:
-    """First of the points about each place, on one side of a ridge, and Lagrange's weights of them, (n,) and (n, 4)."""
-    many = min(4, len(axis))
-    i = jnp.clip(jnp.searchsorted(axis, v, side="right") - 1, 0, len(axis) - 2)
-    low, high = jnp.where(i >= ridge, ridge, 0), jnp.where(i >= ridge, len(axis) - 1, ridge)
-    first = jnp.clip(i - (many - 1) // 2, low, jnp.maximum(high - many + 1, low))
-    x = axis[first[:, None] + jnp.arange(many)]
-    ways = v[:, None] - x
-    parts = [[ways[:, k] / (x[:, j] - x[:, k]) for k in range(many) if k != j] for j in range(many)]
-    return first, jnp.stack([reduce(mul, part) for part in parts], axis=1)
 
 
 def _between(values: Array, weights: list[tuple[Array, Array]], i: int) -> Array:

@@ -355,7 +355,7 @@ def recorded(
         more = int(np.ceil(places.new.b.max() / STRIP))
         y = y[0] + STRIP * np.arange(-more, len(y) + more)
     way = 2 * np.pi * track.radius / asked.places
-    t = Tread(y, way, case.wear.coefficient, case.how, (1,) if asked.side == "right" else (-1,))
+    t = Tread(y, way, case.wear.coefficient, case.model.model_dump(), (1,) if asked.side == "right" else (-1,))
     elastic = case.friction, track.elastic.shear, track.elastic.poisson
     wheel = Given(places, t, elastic, None if kept else worn_tracks(track, y))
     first = asked.turns if kept else min(FIRST, asked.turns)

@@ -15,7 +15,7 @@ from ..contact.solids import Solid
 from ..data import Array
 from ..rolling.ellipse import combined
 from ..rolling.profiles import Profile
-from ..rolling.settings import ModelOfCase, Rail, TableOfCase, WearOfBody, Wheel
+from ..rolling.settings import Rail, Strips, TableOfCase, WearOfBody, Wheel
 from ..rolling.wheelset import Track
 from ..settings.body import Model, Name, NotNegative, Number, Positive, _tuple, load_toml, override
 from ..settings.mistakes import validate
@@ -103,12 +103,7 @@ class KinematicsCase(Model):
     rail: Rail
     kinematics: KinematicsOfCase
     wear: WearOfTurns
-    model: ModelOfCase = ModelOfCase(exact=0)
-
-    @property
-    def how(self) -> dict[str, Any]:
-        """As `strips.creep_forces`."""
-        return self.model.model_dump(exclude={"exact"})
+    model: Strips = Strips()
 
 
 class VehicleCase(Model):
@@ -123,7 +118,7 @@ class VehicleCase(Model):
     running: RunningOfCase
     unround: Annotated[tuple[Unround, ...], BeforeValidator(_tuple)] = ()
     wear: WearOfTurns
-    model: ModelOfCase = ModelOfCase(exact=0)
+    model: Strips = Strips()
     table: TableOfCase = TableOfCase(points=(8, 10, 17, 17, 7), elements=(20, 20))
 
     @model_validator(mode="after")
@@ -137,11 +132,6 @@ class VehicleCase(Model):
                 "give eight times as many at the least"
             )
         return self
-
-    @property
-    def how(self) -> dict[str, Any]:
-        """As `strips.creep_forces`."""
-        return self.model.model_dump(exclude={"exact"})
 
     def made(self, folder: Path) -> Vehicle:
         """Of files beside the case.

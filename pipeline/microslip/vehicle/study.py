@@ -187,7 +187,7 @@ def study(
             f"{critical_speed(v, 1.0, FASTEST) or 0:.4g} m/s; run slower or hold it by a stiffer suspension"
         )
     creep, table = _creep(case, v, report)
-    t = tread(v, case.running.places, case.wear.coefficient, case.how)
+    t = tread(v, case.running.places, case.wear.coefficient, case.model.model_dump())
     r = Rolling.of(v, creep, t, case.shape(), case.profiles(folder, t.y))
     report("wear by jumps over many turns")
     turns = case.running.turns
@@ -207,9 +207,9 @@ def _creep(case: VehicleCase, v: Vehicle, report: Callable[[str], None]) -> tupl
     if case.running.creep == "linear":
         return linear, None
     if case.running.creep == "strips":
-        return of_strips(**case.how), None
+        return of_strips(**case.model.model_dump()), None
     report("table of creep forces")
-    how = {k: v for k, v in case.how.items() if k in ("distribution", "coefficients")}
+    how = case.model.model_dump(include={"distribution", "coefficients"})
     table = creep_table(float(v.poisson), checked=2000, **case.table.model_dump(), **how)
     return of_table(table), table
 

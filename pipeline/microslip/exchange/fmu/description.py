@@ -30,19 +30,24 @@ def description(unit: Unit, name: str, guid: str, said: str) -> bytes:
         "generationTool": f"microslip {__version__}", "variableNamingConvention": "structured",
         "numberOfEventIndicators": "0",
     })  # fmt: skip
-    step = {"canHandleVariableCommunicationStepSize": "true", "canInterpolateInputs": "true"}
-    for kind, more in (("ModelExchange", {}), ("CoSimulation", step)):
+    steps = {"canHandleVariableCommunicationStepSize": "true", "canInterpolateInputs": "true"}
+    for kind, more in (("ModelExchange", {}), ("CoSimulation", steps)):
         part = SubElement(root, kind, {"modelIdentifier": name, **more, **_CAN})
         SubElement(SubElement(part, "SourceFiles"), "File", {"name": "body.c"})
     _units(root, unit)
-    elastic = unit.omega[unit.omega > 0]
-    period = 2 * np.pi / elastic.min() if len(elastic) else 1.0
-    span = {"startTime": "0", "stopTime": f"{20 * period:.6g}", "stepSize": f"{period / 40:.6g}"}
+    step = output_step(unit)
+    span = {"startTime": "0", "stopTime": f"{800 * step:.6g}", "stepSize": f"{step:.6g}"}
     SubElement(root, "DefaultExperiment", span)
     _variables(SubElement(root, "ModelVariables"), unit)
     _structure(SubElement(root, "ModelStructure"), unit)
     ElementTree.indent(root)
     return ElementTree.tostring(root, encoding="utf-8", xml_declaration=True) + b"\n"
+
+
+def output_step(unit: Unit) -> float:
+    """Between the outputs of the default experiment, s: a fortieth of the longest period."""
+    elastic = unit.omega[unit.omega > 0]
+    return 2 * np.pi / elastic.min() / 40 if len(elastic) else 1 / 40
 
 
 def _line(text: str) -> str:
