@@ -505,6 +505,11 @@ def test_envelopes_are_those_of_all_samples() -> None:
     assert told["deviation"] == pytest.approx(every.std(axis=1, ddof=1), rel=1e-9)
     assert told["weibull_exponent"] == pytest.approx(3.0, rel=0.05)
     assert told["quantile_97.5_percent"] == pytest.approx(np.quantile(every, 0.975, axis=1), rel=0.01)
+    e.sums[:], e.bins[:] = Envelope.empty(*e.bins.shape[:1], 1.0).sums, 0
+    e.add(every[:, :1])
+    told = e.columns()
+    for name in ("quantile_2.5_percent", "quantile_97.5_percent"):  # of one blade: itself, not its bin's middle
+        assert told[name] == pytest.approx(told["highest"], rel=1e-12)
 
 
 def test_weibull_is_inverted() -> None:
