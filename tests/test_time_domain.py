@@ -285,6 +285,21 @@ def test_orbit_of_a_case_says_the_same_in_table_page_and_file(hammer: Path, caps
     assert main(["orbit", "case.toml", "-q"]) == 0 and (folder / "orbit.h5").stat().st_mtime_ns == made
 
 
+def test_an_angle_is_told_in_rad(hammer: Path, capsys: pytest.CaptureFixture) -> None:
+    """In sentence, table, page and file, where a monitor reads one."""
+    basis = ms.read_basis(file := hammer / "build" / "hammer" / "basis.h5")
+    for group in basis.groups.values():
+        group.monitors.update({name: replace(rows, unit="rad") for name, rows in group.monitors.items()})
+    ms.write_basis(file, basis)
+    assert main(["orbit", "case.toml", "--no-pictures", "--set", "orbit.settle=2"]) == 0
+    said, folder = capsys.readouterr().out, file.parent
+    assert re.search("swings by [0-9.]+ .?rad on either side", said)
+    assert "largest_rad,largest_velocity_rad_s" in (folder / "orbit.csv").read_text()
+    assert "rad/s" in (folder / "orbit.html").read_text(encoding="utf-8")
+    found = ms.load(folder / "orbit.h5")
+    assert found.units == ("rad",) and found.to_xarray().velocity.attrs["units"] == "rad/s"
+
+
 def test_pictures_are_left_out_when_asked_and_several_motions_stand_together(hammer: Path) -> None:
     folder = hammer / "build" / "hammer"
     assert main(["orbit", "case.toml", "-q", "--no-pictures"]) == 0
