@@ -63,6 +63,8 @@ def of_period(e: Equations, seen: Seen) -> dict[str, Array]:
     """Name -> (rows, s) or (s,) of samples."""
     seen = Seen._make(map(np.asarray, seen))
     rates = seen.q_dot @ e.output.T + e.rates(seen.time) @ e.output_given.T
+    if e.output_residual.any() and len(seen.time) > 1:  # what yields at once has no velocity of its own
+        rates = rates - np.gradient(seen.force @ e.output_residual.T, seen.time, axis=0)
     found = (seen.time, e.frequency(seen.time), read(e, seen), rates.T, seen.q.T, seen.q_dot.T, seen.d.T, seen.force.T)
     return dict(zip(UNITS, (*found, *energies(e, seen).values()), strict=True))
 
