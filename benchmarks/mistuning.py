@@ -250,9 +250,9 @@ def peers(N: int) -> None:
         plain, top = timed(peaked, what, number, what, PlainProblem)
         print(f"  the same with one dense matrix: {plain:.1f} s, {plain / spent:.1f} times; highest "
               f"{top.amplitude / found.top.amplitude - 1:+.1e} off", flush=True)  # fmt: skip
-        book, (solved, highest_) = timed(textbook, what, number)
+        book, (solved, top_) = timed(textbook, what, number)
         print(f"  on the grid alone, from the textbook: {book:.1f} s, {book / spent:.0f} times; {solved} of "
-              f"{len(FREQUENCY)} solved, highest {highest_ / found.top.amplitude - 1:+.1e} off", flush=True)  # fmt: skip
+              f"{len(FREQUENCY)} solved, highest {top_ / found.top.amplitude - 1:+.1e} off", flush=True)  # fmt: skip
     by_hand = replace(what, models=ByHand.of)
     plain, top = timed(peaked, by_hand, number, what, PlainProblem)
     print(f"  sample {number} contact by contact in plain Python, one dense matrix: {plain:.1f} s, {plain / spent:.0f} "
