@@ -582,7 +582,11 @@ MEANING_CASE: dict[str, tuple[str, str]] = {
                                     "`gap` m"),
     "mistuning.scatter.distribution": ("", "the median of a lognormal one is nominal"),
     "mistuning.scatter.values": ("", "or deviations that are known, sector by sector; a shorter pattern is repeated"),
-    "mistuning.scatter.file": ("", "or a table with the column `deviation`, or `frequency_Hz`, whose mean is nominal"),
+    "mistuning.scatter.file": (
+        "",
+        "or a table with the column `deviation`, or `frequency_Hz`, whose mean is nominal; in the order of its rows, "
+        "or of its column `blade` or `sector`",
+    ),
     "mistuning.scatter.others": ("", "or sectors, from 0, that have another modal file, and the file (`{ 3 = "
                                  "\"repaired.h5\" }`), of `modal_file`"),
     "mistuning.scatter.arrangement": ("", "of the known values: as given, in another order in every sample, or each "

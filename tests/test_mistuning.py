@@ -20,7 +20,7 @@ from microslip.mistuning.peaks import Highest, highest
 from microslip.mistuning.ring import Tuned
 from microslip.mistuning.samples import Asked, Sample, Sliding, Sticking, amplitudes, sample
 from microslip.mistuning.scatter import Scatter
-from microslip.mistuning.sensitivity import Linearised, sensitivities, softening
+from microslip.mistuning.sensitivity import Linearised, sensitivities, softening, spread
 from microslip.mistuning.statistics import Envelope, fits, quantile
 from microslip.mistuning.weibull import exponent
 from microslip.system.assembly import Assembly
@@ -505,6 +505,11 @@ def test_envelopes_are_those_of_all_samples() -> None:
     assert told["deviation"] == pytest.approx(every.std(axis=1, ddof=1), rel=1e-9)
     assert told["weibull_exponent"] == pytest.approx(3.0, rel=0.05)
     assert told["quantile_97.5_percent"] == pytest.approx(np.quantile(every, 0.975, axis=1), rel=0.01)
+    e.sums[:], e.bins[:] = Envelope.empty(*e.bins.shape[:1], 1.0).sums, 0
+    e.add(every[:, :1])
+    told = e.columns()
+    for name in ("quantile_2.5_percent", "quantile_97.5_percent"):  # of one blade: itself, not its bin's middle
+        assert told[name] == pytest.approx(told["highest"], rel=1e-12)
 
 
 def test_weibull_is_inverted() -> None:
@@ -527,6 +532,33 @@ def test_correlations_are_as_asked() -> None:
     assert z.std() == pytest.approx(1.0, abs=0.02)
     assert (z[:, :, 0] * z[:, :, 1]).mean() == pytest.approx(0.3, abs=0.02)
     assert (z[:, :, 0] * np.roll(z[:, :, 0], 1, axis=1)).mean() == pytest.approx(0.6, abs=0.02)
+
+
+def test_a_table_tells_its_blades(tmp_path: Path) -> None:
+    """Rows in any order, numbered from 1: the same ring; one blade twice is none."""
+    from microslip.stages.mistuning import _measured
+
+    (file := tmp_path / "blades.csv").write_text("blade,frequency_Hz\n3,101\n1,99\n4,102\n2,98\n")
+    assert _measured(file, "frequency") == pytest.approx([-0.01, -0.02, 0.01, 0.02])
+    file.write_text("blade,deviation\n3,0.1\n1,0.2\n3,0.3\n")
+    with pytest.raises(UserError, match="blade"):
+        _measured(file, "frequency")
+
+
+def test_not_every_blade_of_an_odd_ring_is_against_the_next() -> None:
+    """It would scatter by more than was asked."""
+    with pytest.raises(UserError, match="neighbours"):
+        Scatter("frequency", 0.01, neighbours=-0.9).drawn(5, 1, 0, 1, 0)
+    Scatter("frequency", 0.01, neighbours=-0.9).drawn(6, 1, 0, 1, 0)
+
+
+@pytest.mark.parametrize("together, neighbours", [(1.0, 0.0), (0.3, 0.9), (0.0, -0.5)])
+def test_first_order_spreads_as_samples_do(together: float, neighbours: float) -> None:
+    """What is linear in the deviations, over many samples, whatever correlates: 0.03, of 4000."""
+    s = Scatter("frequency", 0.01, together=together, neighbours=neighbours)
+    S = np.random.default_rng(0).normal(size=(3, 6, 2))
+    y = np.einsum("fjm,njm->nf", S, [s.drawn(6, 2, 0, 1, i) for i in range(4000)])
+    assert spread(S, s) == pytest.approx(y.std(axis=0), rel=0.03)
 
 
 @pytest.mark.parametrize(

@@ -114,6 +114,28 @@ def test_patterns() -> None:
     assert set(every.ravel()) == {0.0, 0.01} and every.mean() == pytest.approx(0.005, abs=0.0005)
 
 
+def test_the_order_of_what_scatters_is_none() -> None:
+    """Blades are made and then carry what sits on them; contacts are pressed and then set apart: to rounding the same
+    ring, whichever scatter is named first, and 1 um of gap is 1 um of gap."""
+    one = sector()
+    ring, rng = Tuned(one, {one.components[0].name: (one.contacts[0].name,)}), np.random.default_rng(0)
+    sizes = {"gap": 1e-6, "added_mass": 1e-3, "frequency": 0.02, "damping": 0.1, "mass": 0.05, "friction": 0.1,
+             "stiffness": 0.1, "normal_force": 0.1}  # fmt: skip
+    asked = [Scatter(of, 0.1, at="probe" if of == "added_mass" else None) for of in sizes]
+    known = [(s, sizes[s.of] * rng.uniform(0, 1, (6, ring.modes(s)))) for s in asked]
+    first, *others = (ring.mistuned(order) for order in (known, known[::-1], [*known[4:], *known[:4]]))
+    for other in others:
+        for a, b in zip(first.components, other.components, strict=True):
+            for name in ("M_r", "K_r", "C_r"):
+                x, y = getattr(a.groups[0], name), getattr(b.groups[0], name)
+                assert np.abs(x - y).max() < 1e-12 * np.abs(x).max()
+        for c, d in zip(first.contacts, other.contacts, strict=True):
+            assert d.offset == pytest.approx(c.offset, rel=1e-12)
+    closed = ring.mistuned(known[1:])
+    apart = [d.offset[0] - c.offset[0] for c, d in zip(first.contacts, closed.contacts, strict=True)]
+    assert apart == pytest.approx(known[0][1][:, 0], rel=1e-9)
+
+
 def test_a_heavier_damper_presses_more() -> None:
     """Mass of a body whose contacts its centrifugal load presses: its density, and the forces of these contacts."""
     one = sector()

@@ -53,6 +53,12 @@ def test_what_is_rounding_is_no_force() -> None:
     assert "feels 0 N forward, 0 N to the right" in found.sentences()[0]
 
 
+def test_a_patch_that_reaches_beyond_a_profile_is_doubted() -> None:
+    """17 mm wide, its middle 10 mm off that of the wheel's profile."""
+    wide, narrow = (" ".join(studied(f"wheel.width={w}").sentences()) for w in (0.04, 0.03))
+    assert "beyond the end of a profile" in narrow and "beyond the end" not in wide
+
+
 def test_temperature_where_all_slides_is_the_integral_of_the_book() -> None:
     """(6.7-11) by quadrature under q = mu p V xi, hottest on the middle strip; unlike bodies, that meet unlike warm."""
     found = studied("heat.conductivity=[50, 20]", "heat.start=[40, 10]")

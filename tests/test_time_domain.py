@@ -37,7 +37,7 @@ from microslip.system import Body, Contact, Force, Monitor, Spring, System
 from microslip.system.assembly import Assembly, ContactFace, Load, Output, Ring, preloaded_contact
 from microslip.system.component import Component
 from microslip.time_domain import classification, equations, loop, orbit, recorded, samples, starts
-from microslip.time_domain.stepper import Stepper
+from microslip.time_domain.stepper import Seen, Stepper
 from microslip.units import METRES
 
 pytestmark = pytest.mark.usefixtures("undrawn")
@@ -283,6 +283,38 @@ def test_orbit_of_a_case_says_the_same_in_table_page_and_file(hammer: Path, caps
     assert text(number(told["lost_in_contacts_J_per_period"])) in page and page.count("<img") == 1
     made = (folder / "orbit.h5").stat().st_mtime_ns
     assert main(["orbit", "case.toml", "-q"]) == 0 and (folder / "orbit.h5").stat().st_mtime_ns == made
+
+
+def test_velocities_of_what_yields_beside_the_modes() -> None:
+    """A read-out that follows a contact's force at once moves as fast as that changes: second order in the samples."""
+    rub = {"interface": "right", "law": "smooth", "normal_force": 20.0, "normal_stiffness": 2e5, "friction": 0.2,
+           "tangential_stiffness": 4e5, "points": [1, 1], "includes": "surface"}  # fmt: skip
+    case = {"body": "vane", "excitation": "magnet", "amplitude": 1.0, "monitor": "probe", "modes": 2}
+    e = equations.of(ms.assemble({**case, "contacts": [rub]}, vane=ms.sample()).assembly, 1.0)
+    off = []
+    for n in (100, 200):
+        t = np.linspace(0.0, 1.0, n)
+        none, force = np.zeros((n, 2)), np.sin(5 * t)[:, None] * np.ones(6)
+        seen = Seen(none, none, np.zeros((n, 6)), force, np.zeros((n, 6)), np.zeros(n), t)
+        still = samples.of_period(e, seen._replace(force=0 * force))["velocity"][0]
+        told = samples.of_period(e, seen)["velocity"][0] - still
+        off.append(np.abs(told + e.output_residual[0].sum() * 5 * np.cos(5 * t))[1:-1].max())
+    assert e.output_residual[0].any() and off[1] < 0.3 * off[0] < 1e-3 * np.abs(e.output_residual).max()
+
+
+def test_an_angle_is_told_in_rad(hammer: Path, capsys: pytest.CaptureFixture) -> None:
+    """In sentence, table, page and file, where a monitor reads one."""
+    basis = ms.read_basis(file := hammer / "build" / "hammer" / "basis.h5")
+    for group in basis.groups.values():
+        group.monitors.update({name: replace(rows, unit="rad") for name, rows in group.monitors.items()})
+    ms.write_basis(file, basis)
+    assert main(["orbit", "case.toml", "--no-pictures", "--set", "orbit.settle=2"]) == 0
+    said, folder = capsys.readouterr().out, file.parent
+    assert re.search("swings by [0-9.]+ .?rad on either side", said)
+    assert "largest_rad,largest_velocity_rad_s" in (folder / "orbit.csv").read_text()
+    assert "rad/s" in (folder / "orbit.html").read_text(encoding="utf-8")
+    found = ms.load(folder / "orbit.h5")
+    assert found.units == ("rad",) and found.to_xarray().velocity.attrs["units"] == "rad/s"
 
 
 def test_pictures_are_left_out_when_asked_and_several_motions_stand_together(hammer: Path) -> None:

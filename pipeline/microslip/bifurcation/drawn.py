@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..units import METRES
+from ..units import Quantity
 from .branches import SPECIAL, Branch
 
 if TYPE_CHECKING:
@@ -23,7 +23,7 @@ def draw(
 ) -> None:  # fmt: skip
     """Branches in the axes: lines where stable, dashes where not, marks where something happens."""
     top = max(float(np.abs(b.swing[:, read_out]).max(initial=0.0)) for b in branches)
-    factor, unit = METRES.scale(top) if unit == "m" else (1.0, unit)
+    factor, unit = Quantity(unit).scale(top) if unit in ("m", "rad", "1") else (1.0, unit)
     for i, branch in enumerate(branches):
         y = factor * branch.swing[:, read_out]
         colour = "#30343c" if branch.still else f"C{(i - 1) % 10}"

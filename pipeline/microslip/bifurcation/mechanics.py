@@ -13,6 +13,7 @@ import scipy.linalg
 
 from .. import sliding
 from ..data import Array, NotConverged, UserError
+from ..harmonic_balance.readout import measured
 from ..system.assembly import Assembly
 from .dynamics import Dynamics
 
@@ -118,9 +119,10 @@ def dynamics(make: Make, low: float, high: float, frequency: float | None = None
         return x[..., :m] @ np.asarray(equations.at(jnp.asarray(p)).output).T
 
     labels = [f"q{i + 1}" for i in range(m)] + [f"v{i + 1}" for i in range(m)] + [f"x{i + 1}" for i in range(n - 2 * m)]
-    names = tuple(f"{w.monitor} {w.label}" for w in make(0.5 * (low + high)).outputs)
+    one = make(0.5 * (low + high))
+    names, unit = tuple(f"{w.monitor} {w.label}" for w in one.outputs), measured(one).unit
     shown = read if names else None
-    return Dynamics(rate, tuple(labels), size(middle), high - low, driven, names, shown, "m", bends(equations))
+    return Dynamics(rate, tuple(labels), size(middle), high - low, driven, names, shown, unit, bends(equations))
 
 
 def bends(equations: Over) -> Array:

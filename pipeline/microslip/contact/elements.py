@@ -76,10 +76,16 @@ class Polynomial(Spring):
 
 
 def _horner(coefficients: list[Any], u: Any) -> Any:
-    total = 0 * u + coefficients[-1]
-    for c in coefficients[-2::-1]:
-        total = total * u + c
-    return total
+    if len(coefficients) == 1:
+        return 0 * u + coefficients[0]
+    total = coefficients[-1] * u
+    for c in coefficients[-2:0:-1]:
+        total = _plus(total, c) * u
+    return _plus(total, coefficients[0])
+
+
+def _plus(total: Any, c: Any) -> Any:
+    return total if isinstance(c, float) and c == 0 else total + c
 
 
 @settings

@@ -249,9 +249,9 @@ def advance(problem: Equations, state: State, settings: Settings) -> State:
     if state.status:
         return state
     scaled = Scaled(problem)
-    length = _within_the_angle(state, min(state.step, settings.step_max), settings)
+    length, guess = _within_the_angle(state, min(state.step, settings.step_max), settings)
     while length >= settings.step_min:
-        trial = _tried(scaled, state, length, settings)
+        trial = _tried(scaled, state, guess, length, settings)
         if trial.flips:
             place = _branch_point(scaled, state, trial, length, settings)
             if place is not None:
@@ -263,6 +263,7 @@ def advance(problem: Equations, state: State, settings: Settings) -> State:
         if trial.good:
             return _taken(scaled, state, trial, length, settings)
         length *= trial.factor
+        guess = predicted(state, length, settings)
     return replace(state, found=(), status="stuck: no step is short enough; start from the other end, or change scales")
 
 
@@ -282,9 +283,8 @@ def _angle(a: Array, b: Array) -> float:
     return 2.0 * math.atan2(norm(a - b), norm(a + b))
 
 
-def _tried(scaled: Scaled, state: State, length: float, settings: Settings) -> _Trial:
-    """Predict, correct, judge."""
-    guess = predicted(state, length, settings)
+def _tried(scaled: Scaled, state: State, guess: Array, length: float, settings: Settings) -> _Trial:
+    """Correct a predicted point, judge."""
     found = correct(scaled, guess, state.tangent, float(state.tangent @ guess), settings.newton, REACH * length)
     if not found.ok:
         return _Trial(False, 0.5)
@@ -300,14 +300,14 @@ def predicted(state: State, length: float, settings: Settings) -> Array:
     return last.guesses(1.0 + length / norm(state.y - state.before))[0]
 
 
-def _within_the_angle(state: State, length: float, settings: Settings) -> float:
-    """A length, shortened until the predicted point is off the tangent by no more than half the angle."""
+def _within_the_angle(state: State, length: float, settings: Settings) -> tuple[float, Array]:
+    """A length, shortened until the predicted point is at most half the angle off the tangent, and the point."""
     for _ in range(10):
-        off = norm(predicted(state, length, settings) - state.y - length * state.tangent)
-        if off <= 0.5 * settings.angle * length:
-            break
+        guess = predicted(state, length, settings)
+        if norm(guess - state.y - length * state.tangent) <= 0.5 * settings.angle * length:
+            return length, guess
         length *= 0.7
-    return length
+    return length, predicted(state, length, settings)
 
 
 def _judged(state: State, found: Corrected, length: float, settings: Settings) -> _Trial:
@@ -368,13 +368,14 @@ def _aimed(scaled: Scaled, state: State, guess: Array, border: Array, length: fl
 # what lies between two points ----------------------------------------------------------------------------------------
 
 
-def _between(scaled: Scaled, segment: Segment, u: float, settings: Settings) -> tuple | None:
-    """Point, tangent, sign and pivots of the determinant at the share u of a segment, or None."""
+def _between(scaled: Scaled, segment: Segment, u: float, settings: Settings, reach: float = 0.0) -> tuple | None:
+    """Point, tangent, sign and pivots of the determinant at the share u of a segment, or None: where a guess is off
+    by more than the length of the segment and a reach."""
     border = segment.border
     value = float((1 - u) * (border @ segment.a) + u * (border @ segment.b))
     for guess in segment.guesses(u):
         found = correct(scaled, guess, border, value, settings.newton)
-        if found.ok and norm(found.y - guess) <= norm(segment.b - segment.a):
+        if found.ok and norm(found.y - guess) <= max(norm(segment.b - segment.a), reach):
             return found.y, _oriented(found, found.sign), found.sign, found.pivots
     return None
 
@@ -456,7 +457,7 @@ def root(
 
     def value(u: float) -> float:
         if u not in kept:
-            here = _between(scaled, segment, u, settings)
+            here = _between(scaled, *_nearest(segment, kept, u), settings, norm(segment.b - segment.a))
             if here is None:
                 raise Lost
             kept[u] = here[:2]
@@ -467,6 +468,13 @@ def root(
     place = float(scipy.optimize.brentq(value, 0.0, 1.0, xtol=share, rtol=1e-12))
     value(place)
     return kept[place]
+
+
+def _nearest(segment: Segment, kept: dict[float, tuple[Array, Array]], u: float) -> tuple[Segment, float]:
+    """The piece of a segment between the known points beside the share u, and the share of that piece."""
+    low, high = max(k for k in kept if k < u), min(k for k in kept if k > u)
+    piece = replace(segment, a=kept[low][0], ta=kept[low][1], b=kept[high][0], tb=kept[high][1])
+    return piece, (u - low) / (high - low)
 
 
 def _fold(scaled: Scaled, segment: Segment, settings: Settings) -> tuple[Array, Array]:

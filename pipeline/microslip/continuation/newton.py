@@ -22,6 +22,9 @@ CONVERGED = "converged"
 class Equations(Protocol):
     """R(x, lambda) = 0 for n unknowns and one parameter; R continuous, its derivatives may jump.
 
+    Where they do not, an attribute ``smooth`` that is true says so: Newton's method then converges quadratically, and
+    what its next correction would be is known from the last two.
+
     Attributes:
         x_scale: what a large x is, a number or (n,), in the units of x. lam_scale: what a large change of lambda is.
             Length along the curve is measured in these units.
@@ -90,18 +93,24 @@ class Scaled:
         self.problem, self.count = problem, 0
         self.x_scale = np.asarray(problem.x_scale, dtype=float)
         self.lam_scale = float(problem.lam_scale)
+        self.smooth = bool(getattr(problem, "smooth", False))
 
     def pack(self, x: Array, lam: float) -> Array:
         return np.append(np.asarray(x, dtype=float) / self.x_scale, float(lam) / self.lam_scale)
 
     def __call__(self, y: Array) -> tuple[Array, Array]:
         """R (n,) and D = (dR/dx, dR/dlambda) (n, n + 1) with respect to y."""
+        R, B = self.bordered(y)
+        return R, B[:-1]
+
+    def bordered(self, y: Array) -> tuple[Array, Array]:
+        """R (n,) and D above a row (n + 1, n + 1) that is still to be filled."""
         self.count += 1
         R, J, slope = self.problem.evaluate(y[:-1] * self.x_scale, float(y[-1]) * self.lam_scale)
-        D = np.empty((len(y) - 1, len(y)))
-        np.multiply(J, self.x_scale, out=D[:, :-1])
-        np.multiply(slope, self.lam_scale, out=D[:, -1])
-        return np.asarray(R, dtype=float), D
+        B = np.empty((len(y), len(y)), order="F")
+        np.multiply(J, self.x_scale, out=B[:-1, :-1])
+        np.multiply(slope, self.lam_scale, out=B[:-1, -1])
+        return np.asarray(R, dtype=float), B
 
 
 @dataclass(frozen=True)
@@ -146,14 +155,15 @@ class _Place(NamedTuple):
     size: float
 
 
-def _place(y: Array, R: Array, D: Array, weights: Array, border: Array, value: float) -> _Place:
-    residual, B = np.empty(len(y)), np.empty((len(y), len(y)), order="F")
+def _place(y: Array, R: Array, B: Array, weights: Array, border: Array, value: float) -> _Place:
+    """With R and B as `Scaled.bordered` tells them; the row of B is filled, the others weighted."""
+    residual, D = np.empty(len(y)), B[:-1]
     np.multiply(R, weights, out=residual[:-1])
     residual[-1] = border @ y - value
-    np.multiply(D, weights[:, None], out=B[:-1])
+    np.multiply(D, weights[:, None], out=D)
     B[-1] = border
     size = norm(residual)
-    return _Place(y, residual, B, size if math.isfinite(size + float(B.sum())) else math.inf)
+    return _Place(y, residual, B, size if math.isfinite(size + norm(B.ravel(order="K"))) else math.inf)
 
 
 def _factor(B: Array) -> tuple[Array, Array] | None:
@@ -182,9 +192,9 @@ def correct(
     can be one along which the residual rises however short the step, though the full step is right (the other side's
     derivative finishes the work): then the best of the tried steps is taken.
     """
-    R, D = scaled(y)
-    weights = _weights(D)
-    here = _place(y, R, D, weights, border, value)
+    R, B = scaled.bordered(y)
+    weights = _weights(B[:-1])
+    here = _place(y, R, B, weights, border, value)
     sizes: list[float] = []
     forced = 0
     for iteration in range(1, settings.iterations + 1):
@@ -196,7 +206,7 @@ def correct(
         sizes.append(norm(dy))
         if sizes[-1] > reach:
             return Corrected(here.y, False, "the solution is not near: start nearer", iteration, np.inf)
-        if error := _small_enough(sizes, settings.tolerance * (1.0 + norm(here.y))):
+        if error := _small_enough(sizes, settings.tolerance * (1.0 + norm(here.y)), scaled.smooth):
             return _arrived(here.y + dy, factors, iteration, error, sizes)
         here, falls = _damped(scaled, here, dy, weights, border, value, settings.halvings)
         forced += not falls
@@ -207,14 +217,16 @@ def correct(
     return _resort(scaled, here.y, border, value, settings, settings.iterations, status)
 
 
-def _small_enough(sizes: list[float], tolerance: float) -> float:
+def _small_enough(sizes: list[float], tolerance: float, smooth: bool) -> float:
     """Estimated error after the last correction, 0 while it is not small enough: corrections contract at least as
-    fast as before, so the next one is at most the last times the last contraction."""
+    fast as before, so the next one is at most the last times the last contraction; where all is smooth a correction is
+    a constant times the square of the one before, so the next one is the last times the square of the contraction."""
     last = sizes[-1]
     if last <= tolerance:
         return max(last, 1e-300)
     contraction = last / sizes[-2] if len(sizes) > 1 else 1.0
-    return last * contraction if contraction < 0.1 and last < 1e-3 and last * contraction <= 0.1 * tolerance else 0.0
+    error = last * contraction ** (2 if smooth else 1)
+    return error if contraction < 0.1 and last < 1e-3 and error <= 0.1 * tolerance else 0.0
 
 
 def _arrived(y: Array, factors: tuple[Array, Array], n: int, error: float, sizes: list[float]) -> Corrected:
@@ -231,7 +243,7 @@ def _damped(
     for k in range(halvings + 1):
         share = 0.5**k
         y = before.y + share * dy
-        here = _place(y, *scaled(y), weights, border, value)
+        here = _place(y, *scaled.bordered(y), weights, border, value)
         if here.size <= (1.0 - 0.1 * share) * before.size:
             return here, True
         if here.size < best.size:
@@ -252,7 +264,7 @@ def _resort(
     weights = _weights(D)
 
     def both(z: Array) -> tuple[Array, Array]:
-        there = _place(z, *scaled(z), weights, border, value)
+        there = _place(z, *scaled.bordered(z), weights, border, value)
         return there.residual, there.B
 
     found = scipy.optimize.root(both, y, jac=True, method="hybr").x

@@ -64,14 +64,25 @@ class ElasticSpring(OneCoordinate):
     """A spring that remembers nothing: `contact.elements.Spring`."""
 
     def force(self, u: Array, period: float) -> Array:
-        path, _, transform = self._sampled(u)
-        return (self._turn * self._spring.force(self._turn * path) @ transform.T)[:, None]
+        values, transform = self._turned(u.shape[2])
+        return self._spring.force(u @ values.T) @ transform.T
 
     def forces(self, u: Array, period: float) -> tuple[Array, Array]:
-        path, values, transform = self._sampled(u)
-        moved, turn = self._turn * path, self._turn
-        slope = (transform * (turn * turn * self._spring.slope(moved))[:, None]) @ values
-        return (turn * self._spring.force(moved) @ transform.T)[:, None], slope[:, None, :, None]
+        values, transform = self._turned(u.shape[2])
+        path = u @ values.T
+        slope = (transform * self._spring.slope(path)) @ values
+        return self._spring.force(path) @ transform.T, slope[:, None, :, None]
+
+    def _turned(self, coefficients: int) -> tuple[Array, Array]:
+        """(s, W) how far the spring is stretched, and (W, s) coefficients of its force along the coordinate."""
+        if coefficients not in self._known:
+            values, transform = self.waves(coefficients)
+            self._known[coefficients] = self._turn * values, self._turn * transform
+        return self._known[coefficients]
+
+    @cached_property
+    def _known(self) -> dict[int, tuple[Array, Array]]:
+        return {}
 
     def traced(self, u: Array, period: float) -> list[Traced]:
         force, zero = self._turn * self._spring.force(self._turn * self._sampled(u)[0]), np.zeros(1)
@@ -84,10 +95,11 @@ class ElasticSpring(OneCoordinate):
         """How far the spring is stretched per unit of the coordinate."""
         return float(self.patch.kinematics[0, 1, 0])
 
-    @property
+    @cached_property
     def _spring(self) -> Spring:
+        """The law with numbers of Python, by which arrays are multiplied faster."""
         assert isinstance(self.patch.law, Spring)
-        return self.patch.law
+        return jax.tree_util.tree_map(lambda number: np.asarray(number).tolist(), self.patch.law)
 
 
 @dataclass(frozen=True, eq=False)

@@ -235,10 +235,11 @@ class _Noted:
     def __init__(self, family: Family) -> None:
         self.family, self.place = family, (np.zeros(0), 0.0)
         self.x_scale, self.lam_scale = family.equations.x_scale, family.equations.lam_scale
+        self.smooth = getattr(family.equations, "smooth", False)
 
     def evaluate(self, x: Array, lam: float) -> tuple[Array, Array, Array]:
         R, J, slope = self.family.equations.evaluate(x, lam)
-        if not math.isfinite(float(R.sum() + J.sum())):
+        if not math.isfinite(float(R @ R + np.vdot(J, J))):
             self.place = x.copy(), lam
         return R, J, slope
 

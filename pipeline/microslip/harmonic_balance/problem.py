@@ -22,9 +22,9 @@ from ..system.assembly import Assembly, Linear
 from . import blocks, by_hand, reduced
 from .blocks import Matrix
 from .forces import Forces
-from .joints import Alone, Joints, Sides, alone, applied
+from .joints import Alone, Joints, Sides, alone
 from .point_cycles import Cycle, Traced
-from .reduced import Eliminated, Seen, View
+from .reduced import Coefficients, Eliminated, Seen, View
 
 SOFTER = 0.7
 """Share of the reference stiffness that serves where the assembly with all of it is at resonance without damping."""
@@ -63,6 +63,10 @@ class Group:
         return bool(self.phase.any())
 
     @cached_property
+    def _shifted(self) -> bool:
+        return bool(self.offset.any())
+
+    @cached_property
     def _known_turns(self) -> dict[int, Array]:
         return {}
 
@@ -70,7 +74,8 @@ class Group:
         """(n, k, W) displacements, preloaded state included, from (W, c) those of the coordinates."""
         d = v[:, self.first] if self.second is None else v[:, self.first] - v[:, self.second]
         out = np.ascontiguousarray(d.transpose(1, 2, 0))
-        out[:, :, 0] += self.offset
+        if self._shifted:
+            out[:, :, 0] += self.offset
         return out
 
     def force(self, u: Array, period: float) -> Array:
@@ -160,6 +165,11 @@ class Problem:
         return self.count * self.coefficients
 
     @cached_property
+    def smooth(self) -> bool:
+        """Whether derivatives of the forces change without jumps."""
+        return all(c.patch.law.smooth for c in self.assembly.contacts)
+
+    @cached_property
     def scale(self) -> Array:
         """(c,) of a unit of x: every coordinate moves the points of its patch by as much as the others do."""
         out = np.ones(self.count)
@@ -191,6 +201,41 @@ class Problem:
     def slices(self) -> list[slice]:
         """Coordinates of each part."""
         return [slice(b, b + p.count) for b, p in zip(self.begins, self.parts[0], strict=True)]
+
+    @cached_property
+    def alike(self) -> list[tuple[Indices, Indices]]:
+        """Of n parts with as many coordinates their numbers, and (n, c) these."""
+        found: dict[int, list[int]] = {}
+        for i, s in enumerate(self.slices):
+            found.setdefault(s.stop - s.start, []).append(i)
+        begins = np.array(self.begins)
+        return [(np.array(parts), begins[parts, None] + np.arange(c)) for c, parts in found.items()]
+
+    @cached_property
+    def kind(self) -> list[tuple[int, int]]:
+        """Of each part its place in `alike`, and its place there."""
+        places = {int(i): (which, n) for which, (parts, _) in enumerate(self.alike) for n, i in enumerate(parts)}
+        return [places[i] for i in range(len(places))]
+
+    @cached_property
+    def pressed(self) -> Array | None:
+        """(c,) preload along the coordinates; None where there is none."""
+        out = np.zeros(self.count)
+        for g in self.groups:
+            out[g.first] += g.preload
+            if g.second is not None:
+                out[g.second] -= g.preload
+        return out if out.any() else None
+
+    @cached_property
+    def units(self) -> Array | None:
+        """(c, c) of columns over those of rows in `scale`; None where all are the same."""
+        return None if (self.scale == self.scale[:1]).all() else self.scale / self.scale[:, None]
+
+    @cached_property
+    def held(self) -> list[tuple[slice, Array]]:
+        """Coordinates of each part that a stiffness is taken into, and that, transposed."""
+        return [(s, k.T) for s, k in zip(self.slices, self.stiffness, strict=True) if k.any()]
 
     @cached_property
     def places(self) -> list[list[tuple[int, tuple[int, int], slice, slice, float]]]:
@@ -384,8 +429,9 @@ class AtFrequency:
     @cached_property
     def _alone(self) -> list[Alone] | None:
         p, found = self.problem, list[Alone]()
-        for parts, at, both in self._views:
-            one = alone(at, parts, both[:, 0, :, :, 1:], np.array([p.stiffness[i] for i in parts]), p.sides)
+        for parts, at in p.alike:
+            D, k = self._both(parts)[:, 0, :, :, 1:], np.array([p.stiffness[i] for i in parts])
+            one = alone(at, parts, D, k, p.sides)
             if one is None:
                 return None
             found.append(one)
@@ -401,13 +447,15 @@ class AtFrequency:
                 if (i, j) not in pieces:
                     size = [p.parts[0][part].count for part in (i, j)]
                     pieces[i, j] = np.zeros((p.coefficients, size[0], p.coefficients, size[1]))
-                pieces[i, j][:, at, :, to] += sign * S[n].transpose(1, 0, 3, 2)
-        where = p.slices
-        D = {}
+                pieces[i, j][:, at, :, to] += (S[n] if sign > 0 else -S[n]).transpose(1, 0, 3, 2)
+        where, moved = p.slices, {}
         for (i, j), P in pieces.items():
-            moved = applied(self.views[i].compliance[0], P.reshape(*P.shape[:2], P.shape[2] * P.shape[3]))
-            D[i, j] = self._scaled(moved.reshape(P.shape), where[i], where[j])
-        return blocks.one_plus(D, [s.stop - s.start for s in where], p.coefficients)
+            (which, n), (W, a, _, b) = p.kind[i], P.shape
+            block = self._real[which].part(n).applied(P.reshape(1, W, a, W * b), slice(1)).reshape(P.shape)
+            if p.units is not None:
+                block *= p.units[where[i], where[j]][:, None]
+            moved[i, j] = block.reshape(W * a, W * b)
+        return blocks.one_plus(moved, [s.stop - s.start for s in where], p.coefficients)
 
     def rate(self, x: Array, force: Array) -> Array:
         """(size,) dR/dOmega."""
@@ -436,8 +484,8 @@ class AtFrequency:
     def _excess(self, v: Array, force: Array) -> Array:
         """(W, c) p: forces less the preload, less what the reference stiffness makes of the displacement."""
         out = force.copy()
-        for s, k in zip(self.problem.slices, self.problem.stiffness, strict=True):
-            out[:, s] -= v[:, s] @ k.T
+        for s, k in self.problem.held:
+            out[:, s] -= v[:, s] @ k
         return out
 
     def residual_of(self, x: Array, force: Array) -> Array:
@@ -463,41 +511,31 @@ class AtFrequency:
         p = self.problem
         out = np.zeros((p.coefficients, p.count))
         for g, F in zip(p.groups, forces, strict=True):
-            F = F.transpose(2, 0, 1).copy()
-            if preload:
-                F[0] -= g.preload
-            out[:, g.first] += F
+            out[:, g.first] = F.transpose(2, 0, 1)
             if g.second is not None:
-                out[:, g.second] -= F
+                out[:, g.second] = -F.transpose(2, 0, 1)
+        if preload and p.pressed is not None:
+            out[0] -= p.pressed
         return out
 
     def _applied(self, force: Array, which: slice, driven: float = 1.0) -> Array:
         """(n, W, c) D, its derivative or both, applied to (W, c), less the reference times a factor."""
+        share = driven * self.problem.share
+        if len(self.views) == 1:
+            return self._real[0].beyond(force[None], which, driven, share)[0]
         out = np.empty((which.stop, *force.shape))
-        for _, at, both in self._views:
-            V = np.zeros((len(at), 1, len(force), 1 + at.shape[1], 1))
-            V[:, 0, 0, 0], V[:, 0, 1::2, 0] = -driven, -driven * self.problem.share
-            V[:, 0, :, 1:, 0] = force[:, at].transpose(1, 0, 2)
-            out[:, :, at] = applied(both[:, which], V)[..., 0].transpose(1, 2, 0, 3)
+        for (_, at), D in zip(self.problem.alike, self._real, strict=True):
+            out[:, :, at] = D.beyond(force[:, at].transpose(1, 0, 2), which, driven, share).transpose(1, 2, 0, 3)
         return out
 
-    @cached_property
-    def _views(self) -> list[tuple[Indices, Indices, ComplexArray]]:
-        """Of n parts with as many coordinates their numbers, (n, c) these, and (n, 2, H + 1, c, 1 + c) `View.both`."""
-        found: dict[int, list[int]] = {}
-        for i, s in enumerate(self.problem.slices):
-            found.setdefault(s.stop - s.start, []).append(i)
-        begins, each = np.array(self.problem.begins), [(np.array(parts), c) for c, parts in found.items()]
-        return [
-            (parts, begins[parts, None] + np.arange(c), np.array([self.views[i].both for i in parts]))
-            for parts, c in each
-        ]
+    def _both(self, parts: Indices) -> ComplexArray:
+        """(n, 2, H + 1, c, 1 + c) `View.both` of parts."""
+        return np.array([self.views[i].both for i in parts]) if len(parts) > 1 else self.views[parts[0]].both[None]
 
-    def _scaled(self, block: Array, rows: slice, columns: slice) -> Array:
-        """A block (W, a, W, b) as a matrix, in units of x."""
-        unit, W = self.problem.scale, len(block)
-        block = block * unit[columns] / unit[rows][:, None, None]
-        return block.reshape(W * block.shape[1], W * block.shape[3])
+    @cached_property
+    def _real(self) -> list[Coefficients]:
+        """Of each of `Problem.alike`."""
+        return [Coefficients.of(self._both(parts)) for parts, _ in self.problem.alike]
 
 
 def _places(g: Group, begins: Indices) -> list[tuple[int, tuple[int, int], slice, slice, float]]:

@@ -88,6 +88,52 @@ class View:
 
 
 @dataclass(frozen=True, eq=False)
+class Coefficients:
+    """Views of n parts of c coordinates each, as they act on W = 2 H + 1 real coefficients: mean, cos, sin, cos 2, ...
+
+    A complex D takes cos - i sin to D (cos - i sin): its numbers and those of i D, read as pairs of real ones, are the
+    rows that tell the cosines and the sines, from each coordinate's cosine and sine side by side.
+
+    Attributes:
+        mean: (n, 2, c, 1 + c) and waves: (n, 2, H, 2 c, 2 (1 + c)) value and derivative with respect to Omega, the
+            reference in front; rows of the cosines before those of the sines.
+    """
+
+    mean: Array
+    waves: Array
+
+    @classmethod
+    def of(cls, both: ComplexArray) -> Coefficients:
+        """Of (n, 2, H + 1, c, 1 + c) `View.both`."""
+        n, two, count, c, _ = both.shape
+        rows = np.empty((n, two, count - 1, 2, c, 1 + c), complex)
+        rows[:, :, :, 0] = both[:, :, 1:]
+        np.multiply(both[:, :, 1:], 1j, out=rows[:, :, :, 1])
+        return cls(both[:, :, 0].real, rows.view(float).reshape(n, two, count - 1, 2 * c, 2 + 2 * c))
+
+    def part(self, i: int) -> Coefficients:
+        """One of the parts by itself."""
+        return Coefficients(self.mean[i : i + 1], self.waves[i : i + 1]) if len(self.mean) > 1 else self
+
+    def applied(self, V: Array, which: slice) -> Array:
+        """(n, 1 or 2, W, c, m) what the compliance, or it and its derivative, make of (n, W, c, m)."""
+        n, W, c, m = V.shape
+        out = np.empty((n, which.stop, W, c, m))
+        np.matmul(self.mean[:, which, :, 1:], V[:, None, 0], out=out[:, :, 0])
+        pairs = V[:, 1:].reshape(n, 1, W // 2, 2, c, m).swapaxes(3, 4).reshape(n, 1, W // 2, 2 * c, m)
+        np.matmul(self.waves[:, which, :, :, 2:], pairs, out=out[:, :, 1:].reshape(n, which.stop, W // 2, 2 * c, m))
+        return out
+
+    def beyond(self, force: Array, which: slice, mean: float, share: float) -> Array:
+        """(n, 1 or 2, W, c) the same of (n, W, c), less the mean reference and the others times factors."""
+        out = self.applied(force[..., None], which)[..., 0]
+        out[:, :, 0] -= mean * self.mean[:, which, :, 0]
+        waves = out[:, :, 1:]
+        waves -= share * self.waves[:, which, :, :, 0].reshape(waves.shape)
+        return out
+
+
+@dataclass(frozen=True, eq=False)
 class Poles:
     """The inverse of s^2 M + s C + K + T^H k' T as a sum over its eigenvalues, of some harmonics of one part.
 
@@ -107,19 +153,28 @@ class Poles:
         return MET * np.abs(self.values)
 
     @cached_property
+    def _damped(self) -> bool:
+        """Whether no frequency is an eigenvalue."""
+        return bool((np.abs(self.values.real) > self._near).all())
+
+    @cached_property
     def _turning(self) -> ComplexArray:
         """(g, 1) i h."""
         return 1j * self.harmonics[:, None]
+
+    @cached_property
+    def _falling(self) -> ComplexArray:
+        return -self._turning
 
     def at(self, Omega: float) -> View | None:
         """These harmonics at a frequency (rad/s); None where it or one of its harmonics is, within `MET`, an
         eigenvalue."""
         away = Omega * self._turning - self.values
-        if (np.abs(away) <= self._near).any():
+        if not self._damped and (np.abs(away) <= self._near).any():
             return None
         g = np.empty((2, *away.shape), complex)
         np.divide(1.0, away, out=g[0])
-        np.multiply(g[0] * g[0], -self._turning, out=g[1])  # its derivative
+        np.multiply(g[0] * g[0], self._falling, out=g[1])  # its derivative
         both = (self.left * g[:, :, None]) @ self.right
         both[0] += self.static
         return View(both)

@@ -24,6 +24,11 @@ ELSEWHERE = 0.1
 Deviations = Sequence[tuple[Scatter, Array]]
 """What differs, and its (sectors, modes) deviations."""
 
+MADE = ("modal_file", "mass", "frequency", "damping", "added_mass",
+        "friction", "stiffness", "normal_force", "gap")  # fmt: skip
+"""In this order, whatever that of the scatters is: blades as they are made, then what sits on them; contacts pressed,
+then set apart."""
+
 OF_LAWS = {
     "friction": ("mu", "static", "sliding", "held"),
     "stiffness": ("stiffness_0", "stiffness_1", "stiffness_2", "normal", "along", "across"),
@@ -81,7 +86,7 @@ class Tuned:
         components = {m.name: m for m in self.whole.components}
         contacts = {c.name: c for c in self.whole.contacts}
         discs, heavier = dict[str, Array](), list[tuple[str, Scatter, Array]]()
-        for s, values in sorted(deviations, key=lambda one: one[0].of != "modal_file"):  # then what differs in them
+        for s, values in sorted(deviations, key=lambda one: MADE.index(one[0].of)):
             positive(s, values)
             name = self.body(s).name if s.of in OF_BLADES else self._contact(s).name
             if name in components:  # a disc in one piece

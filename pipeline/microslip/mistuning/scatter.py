@@ -134,9 +134,21 @@ class Scatter:
         z = np.sqrt(self.together) * common + np.sqrt(1 - self.together) * alone
         if not self.neighbours:
             return z
+        return np.fft.ifft(np.sqrt(self.power(sectors))[:, None] * np.fft.fft(z, axis=0), axis=0).real
+
+    def power(self, sectors: int) -> Array:
+        """(sectors,) eigenvalues of the circulant correlation round the ring.
+
+        Raises:
+            UserError: numbers cannot correlate so, as those round an odd ring that are each against the next.
+        """
         apart = np.minimum(np.arange(sectors), sectors - np.arange(sectors))
-        power = np.fft.fft(self.neighbours**apart).real  # the eigenvalues of a circulant covariance
-        return np.fft.ifft(np.sqrt(np.maximum(power, 0.0))[:, None] * np.fft.fft(z, axis=0), axis=0).real
+        found = np.fft.fft(self.neighbours**apart).real
+        if found.min() < -1e-9 * sectors:
+            raise UserError(
+                f"neighbours: {self.neighbours:g} cannot hold all round a ring of {sectors} sectors; take one nearer 0"
+            )
+        return np.maximum(found, 0.0)
 
     def _of(self, z: Array) -> Array:
         if self.distribution == "uniform":

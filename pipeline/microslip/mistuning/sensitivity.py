@@ -57,9 +57,16 @@ def approximation(asked: Asked, scatter: Scatter) -> Approximation:
     points = asked.tuned_points
     found = [sensitivities(asked, scatter, point) for point in points]
     mean, S = np.array([m for m, _ in found]), np.array([s for _, s in found])
-    alone, common = (S**2).sum(axis=(1, 2)), (S.sum(axis=2) ** 2).sum(axis=1)
-    spread = scatter.deviation * np.sqrt(scatter.together * common + (1 - scatter.together) * alone)
-    return Approximation(np.array([p.Omega for p in points]) / (2 * np.pi), mean, S, spread)
+    return Approximation(np.array([p.Omega for p in points]) / (2 * np.pi), mean, S, spread(S, scatter))
+
+
+def spread(S: Array, scatter: Scatter) -> Array:
+    """(f,) standard deviation of what is linear in the deviations: its (f, sectors, modes) sensitivities S in waves
+    round the ring, of which each has its own share of correlated deviations."""
+    power = scatter.power(S.shape[1])
+    alone = (np.abs(np.fft.fft(S, axis=1, norm="ortho")) ** 2).sum(axis=2) @ power
+    common = np.abs(np.fft.fft(S.sum(axis=2), axis=1, norm="ortho")) ** 2 @ power
+    return np.asarray(scatter.deviation * np.sqrt(scatter.together * common + (1 - scatter.together) * alone))
 
 
 def sensitivities(asked: Asked, scatter: Scatter, point: Point) -> tuple[float, Array]:

@@ -103,10 +103,11 @@ class Envelope:
         return self.unit * np.sqrt(np.maximum(square, 0.0))
 
     def quantile(self, share: float) -> Array:
-        """(f,) within a bin."""
+        """(f,) within a bin, and within all that was taken in."""
         counts = np.cumsum(self.bins, axis=1)
         at = np.array([np.searchsorted(c, share * c[-1]) if c[-1] else 0 for c in counts])
-        return np.where(counts[:, -1] > 0, self.unit * np.exp(LOW + (at + 0.5) * WIDTH), np.nan)
+        middle = np.clip(np.exp(LOW + (at + 0.5) * WIDTH), self.sums[3], self.sums[4])
+        return np.where(counts[:, -1] > 0, self.unit * middle, np.nan)
 
     def columns(self) -> dict[str, Array]:
         """Column -> (f,); amplitudes in their unit, k of Sextro Eq. (5.6-17)."""

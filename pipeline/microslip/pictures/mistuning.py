@@ -84,6 +84,10 @@ def sensitivity_picture(near: Approximation, path: Path, title: str) -> Path:
     return save_figure(figure, path)
 
 
+SHOWN = {"added_mass": (1e3, "g"), "gap": (1e6, "um"), "modal_file": (1.0, "number")}
+"""What is no share of something nominal, in which unit it is drawn."""
+
+
 def worst_picture(found: Ensemble, path: Path, title: str) -> Path:
     """The sample with the highest blade: amplitudes round the ring at its peak, and what differs."""
     at = int(np.nanargmax(found.amplification))
@@ -105,11 +109,13 @@ def worst_picture(found: Ensemble, path: Path, title: str) -> Path:
     plain_axes(axes)
     drawn: list[tuple[str, Array]] = []
     for s, v in found.asked.deviations(at):
-        drawn.append((s.of.replace("_", " ") + (", first mode" if np.ptp(v, axis=1).any() else ""), v[:, 0]))
+        by, unit = SHOWN.get(s.of, (100.0, "%"))
+        name = s.of.replace("_", " ") + (", first mode" if np.ptp(v, axis=1).any() else "")
+        drawn.append((f"{name}, {unit}", by * v[:, 0]))
     for i, (name, v) in enumerate(drawn):
         width = 0.8 / len(drawn)
-        axes.bar(np.arange(N) + (i - 0.5 * (len(drawn) - 1)) * width, 100 * v, width, color=COLOURS[i % 10], label=name)
-    axes.set(xlabel="blade", ylabel="deviation in %")
+        axes.bar(np.arange(N) + (i - 0.5 * (len(drawn) - 1)) * width, v, width, color=COLOURS[i % 10], label=name)
+    axes.set(xlabel="blade", ylabel="deviation")
     axes.legend(fontsize=9)
     figure.suptitle(f"{title}: sample {at}, blade {one.top.output}")
     return save_figure(figure, path)

@@ -11,8 +11,8 @@ import numpy as np
 
 from ..data import Array
 from ..time_domain.classification import Chatter, chatter, coordinates, loops, rubs
-from ..units import METRES
-from .plots import COLOURS, empty_figure, length_scale, length_unit, plain_axes, plain_numbers, save_figure
+from ..units import METRES, Quantity
+from .plots import COLOURS, empty_figure, plain_axes, plain_numbers, save_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -85,7 +85,7 @@ def portraits(orbits: Sequence[tuple[str, Orbit]], path: Path, title: str) -> Pa
 def _section(orbit: Orbit, axes: Axes, read_out: int) -> None:
     """Velocity over displacement after every period: the Poincare section."""
     last = slice(orbit.samples - 1, None, orbit.samples)
-    (y, unit), (v, per_second) = (_sized(x[read_out]) for x in (orbit.y, orbit.v))
+    (y, unit), (v, per_second) = (_sized(x[read_out], orbit.of(read_out)) for x in (orbit.y, orbit.v))
     axes.plot(y[last], v[last], ".", color=COLOURS[1], markersize=5)
     axes.set(xlabel=f"{orbit.labels[read_out]} in {unit}", ylabel=f"velocity in {per_second}/s")
     axes.set_title(f"Poincaré section, {len(y[last])} periods", fontsize=9)
@@ -93,7 +93,7 @@ def _section(orbit: Orbit, axes: Axes, read_out: int) -> None:
 
 def _over_frequency(orbit: Orbit, axes: Axes, read_out: int) -> None:
     """Displacement over the frequency of the excitation, and its largest size in every period of that."""
-    f, (y, unit) = orbit.frequency, _sized(orbit.y[read_out])
+    f, (y, unit) = orbit.frequency, _sized(orbit.y[read_out], orbit.of(read_out))
     moves = np.flatnonzero(f != f[-1])
     period = np.floor(np.cumsum(f[moves]) * (orbit.time[1] - orbit.time[0])).astype(int)
     begins = np.searchsorted(period, np.unique(period))
@@ -129,7 +129,7 @@ def _order(orbit: Orbit, harmonic: int) -> str:
 
 def _history(orbit: Orbit, axes: Axes, read_out: int) -> None:
     shown = slice(-SHOWN * orbit.samples, None)
-    y, unit = _sized(orbit.y[read_out][shown])
+    y, unit = _sized(orbit.y[read_out][shown], orbit.of(read_out))
     time = orbit.time[shown]
     axes.plot((time - time[0]) / orbit.period, y, color=COLOURS[0], linewidth=1.0)
     for kind, mark, size, words in EVENT_MARKS:
@@ -143,9 +143,9 @@ def _history(orbit: Orbit, axes: Axes, read_out: int) -> None:
     axes.set(xlabel="time in periods of the excitation", ylabel=f"{orbit.labels[read_out]} in {unit}")
 
 
-def _sized(values: Array) -> tuple[Array, str]:
+def _sized(values: Array, of: Quantity = METRES) -> tuple[Array, str]:
     """In the unit that the phase portrait takes."""
-    factor, unit = METRES.scale(np.abs(values).max(initial=0.0))
+    factor, unit = of.scale(np.abs(values).max(initial=0.0))
     return factor * values, unit
 
 
@@ -163,8 +163,8 @@ def _spectrum(orbit: Orbit, axes: Axes, read_out: int) -> None:
     amplitude: Array = np.abs(np.fft.rfft(window * (y - np.average(y, weights=window)))) * 2 / window.sum()
     multiples = np.arange(len(amplitude)) * orbit.samples / len(y)
     seen = multiples <= min(HIGHEST, orbit.samples / 2)
-    _, unit = length_unit(1e-2 * amplitude)
-    scaled, top = length_scale(unit) * amplitude, length_scale(unit) * amplitude.max(initial=1e-300)
+    by, unit = orbit.of(read_out).scale(0.1 * amplitude.max(initial=0.0))
+    scaled, top = by * amplitude, by * amplitude.max(initial=1e-300)
     axes.semilogy(multiples[seen], np.maximum(scaled, 1e-300)[seen], color=COLOURS[2], lw=0.9)
     axes.set(xlabel="multiples of the excitation frequency", ylabel=f"amplitude in {unit}")
     axes.set_ylim(SPECTRUM * top, 2 * top)
@@ -236,7 +236,7 @@ def chatter_picture(orbit: Orbit, contact: int, path: Path, title: str, read_out
         (panels[1], orbit.v[read_out], "velocity", "/s"),
     ):
         plain_axes(axes)
-        scaled, unit = _sized(values[seen])
+        scaled, unit = _sized(values[seen], orbit.of(read_out))
         axes.plot(orbit.time[seen] - begin, scaled, color=COLOURS[0], linewidth=0.9)
         shown = impacts[impacts >= begin]
         axes.plot(shown - begin, np.interp(shown, orbit.time[seen], scaled), "|", color=COLOURS[1], label="meets")

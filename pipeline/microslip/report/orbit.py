@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from ..units import METRES, percent
+from ..units import percent
 from .page import Album, Piece, fold, number, page, say, table
 
 Row = Mapping[str, Any]
@@ -19,8 +19,8 @@ def orbit_html(
     """The page.
 
     Args:
-        rows: of orbit.csv, with ``name`` and ``kind`` of each motion. notes: sentences. messages: what a reader must
-            know.
+        rows: of orbit.csv, with ``name`` and ``kind`` of each motion, and ``of``, what is read. notes: sentences.
+        messages: what a reader must know.
     """
     album = Album({p.name: p for p in pictures})
     pieces = [
@@ -29,7 +29,7 @@ def orbit_html(
         Piece("box", [say(*messages)], tone="warn") if messages else say(""),
         *album.begun(""),
     ]
-    keys = [key for key in rows[0] if key not in ("name", "kind")]
+    keys = [key for key in rows[0] if key not in ("name", "kind", "of")]
     numbers = table(
         [key.replace("_", " ") for key in keys], [[number(float(row[key]), 6) for key in keys] for row in rows]
     )
@@ -44,8 +44,8 @@ def _answer(rows: Sequence[Row]) -> Piece:
         "period": [_count(row["repeats_after_periods"]) for row in rows],
         "impacts": [_rate(row["impacts_per_period"]) for row in rows],
         "slips": [_rate(row["slips_per_period"]) for row in rows],
-        "moves": [METRES.sized(_largest(row)) for row in rows],
-        "speed": [f"{METRES.sized(row['largest_velocity_m_s'])}/s" for row in rows],
+        "moves": [row["of"].sized(_largest(row)) for row in rows],
+        "speed": [f"{row['of'].sized(row[row['of'].column('largest_velocity') + '_s'])}/s" for row in rows],
         "force": [_with(row["largest_contact_force_N"], "N") for row in rows],
         "lost": [_with(row["lost_in_contacts_J_per_period"], "J") for row in rows],
         "Lyapunov": [_exponent(row) for row in rows],
@@ -62,7 +62,7 @@ READ_AS = (
 
 
 def _largest(row: Row) -> float:
-    return max(abs(row["smallest_m"]), abs(row["largest_m"]))
+    return max(abs(row[row["of"].column(name)]) for name in ("smallest", "largest"))
 
 
 def _count(periods: float) -> str:

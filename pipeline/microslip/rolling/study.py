@@ -213,6 +213,12 @@ class Studied:
                     f"warning: patch {k + 1}: wheel and rail conform: it is {2e3 * p.b:.3g} mm wide, too wide for its "
                     "radii of curvature, so that neither body is a half-space and the numbers are a guess."
                 )
+            ends = ((p.on_wheel, self.track.wheel.y), (p.on_rail, self.track.rail.y))
+            if any(not y[0] <= middle - p.b <= middle + p.b <= y[-1] for middle, y in ends):
+                told.append(
+                    f"warning: patch {k + 1}, {2e3 * p.b:.3g} mm wide, reaches beyond the end of a profile, where its "
+                    "shape is not known and the patch taken for an ellipse; give a wider profile (width)."
+                )
         return told
 
     def _slow(self) -> list[str]:

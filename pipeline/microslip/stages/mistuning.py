@@ -17,7 +17,7 @@ from ..case.assemble import Built, build
 from ..case.contacts import swept
 from ..case.problem import book_models
 from ..case.questions import MistuningOfCase, ScatterOfCase
-from ..data import Array, UserError
+from ..data import Array, Indices, UserError
 from ..errors import told_of
 from ..files import store
 from ..files.tables import columns_csv, rows_csv
@@ -154,7 +154,8 @@ def _scatter(s: ScatterOfCase, number: int, built: Built, path: Path, others: Ma
 
 
 def _measured(file: Path, of: str) -> tuple[float, ...]:
-    """Deviations in a table: its column ``deviation``, or ``frequency_Hz`` over its mean, less 1."""
+    """Deviations in a table: its column ``deviation``, or ``frequency_Hz`` over its mean, less 1; in the order of its
+    rows, or of its column ``blade`` or ``sector``."""
     try:
         with store.ordinary(file).open(newline="", encoding="utf-8-sig") as text:
             rows = list(csv.DictReader(line for line in text if not line.startswith("#")))
@@ -164,14 +165,30 @@ def _measured(file: Path, of: str) -> tuple[float, ...]:
         raise UserError(f"file: {file}: cannot be read as comma-separated values ({error})") from error
     for name in ("deviation", "frequency_Hz"):
         if rows and name in rows[0]:
-            try:
-                found = np.array([float(row[name]) for row in rows])
-            except (TypeError, ValueError) as error:
-                raise UserError(f"file: {file}: column {name}: {error}; every row needs a number") from error
-            if not np.isfinite(found).all():
-                raise UserError(f"file: {file}: column {name}: holds what is not a finite number; correct it")
+            found = _column(file, rows, name)[_places(file, rows)]
             return tuple(found if name == "deviation" else found / found.mean() - 1)
     raise UserError(f"file: {file}: has no row, or neither a column deviation nor frequency_Hz; add one for {of}")
+
+
+def _column(file: Path, rows: list[dict[str, str]], name: str) -> Array:
+    try:
+        found = np.array([float(row[name]) for row in rows])
+    except (TypeError, ValueError) as error:
+        raise UserError(f"file: {file}: column {name}: {error}; every row needs a number") from error
+    if not np.isfinite(found).all():
+        raise UserError(f"file: {file}: column {name}: holds what is not a finite number; correct it")
+    return found
+
+
+def _places(file: Path, rows: list[dict[str, str]]) -> Indices:
+    """Rows in the order in which blades stand round the ring, where the table numbers them."""
+    for name in ("blade", "sector"):
+        if name in rows[0]:
+            numbers = _column(file, rows, name)
+            if (np.sort(numbers) - numbers.min() != np.arange(len(numbers))).any():
+                raise UserError(f"file: {file}: column {name}: must number all blades round the ring, each once")
+            return np.argsort(numbers)
+    return np.arange(len(rows))
 
 
 def said(found: Ensemble) -> list[str]:

@@ -22,7 +22,7 @@ from ..time_domain import classification, equations, orbit, recorded, starts
 from ..time_domain.classification import Exponent
 from ..time_domain.orbit import Orbit
 from ..time_domain.ramp import Ramp
-from ..units import METRES, counted, percent
+from ..units import counted, percent
 from .answer import Answer, CaseJob
 from .moving import moving_bodies
 from .stage import Stage
@@ -50,7 +50,8 @@ def _work(stage: Stage, case: CaseJob) -> Answer:
     drawn = _pictures(found, folder / "pictures", name) if case.pictures else []
     moving = moving_bodies(found, built, folder) if case.pictures else []
     drawn += [path for path in moving if path.suffix == ".gif"]
-    rows = [{"name": m, "kind": KIND.get(kind := classification.kind(one), kind), **_row(one)} for m, one in found]
+    rows = [{"name": m, "kind": KIND.get(kind := classification.kind(one), kind), "of": one.of(), **_row(one)}
+            for m, one in found]  # fmt: skip
     page = orbit_html(f"{name}: motion in time", rows, notes, messages, drawn)
     store.write_text(folder / "orbit.html", page)
     made = [*(folder / f"orbit.{end}" for end in ("html", "csv", "h5")), *dict.fromkeys(drawn + moving)]
@@ -107,7 +108,7 @@ def _messages(found: Sequence[tuple[str, Orbit]], built: Built) -> list[str]:
 def _sentence(name: str, one: Orbit) -> str:
     if not len(one.time):
         return f"{name}: {one.said}."
-    size = METRES.sized(0.5 * float(np.ptp(one.y[0])), 5)
+    size = one.of().sized(0.5 * float(np.ptp(one.y[0])), 5)
     error = f", its last period uncertain by {percent(one.error)}" if np.isfinite(one.error) else ""
     return f"{name}: {one.said}; {one.labels[0]} swings by {size} on either side{error}."
 
@@ -154,16 +155,16 @@ def _table(found: Sequence[tuple[str, Orbit]]) -> dict[str, Any]:
 
 
 def _row(one: Orbit) -> dict[str, float]:
-    grows = one.exponent or Exponent(np.nan, np.nan, 0)
+    grows, of = one.exponent or Exponent(np.nan, np.nan, 0), one.of()
     return {
         "frequency_Hz": one.Omega / (2 * np.pi),
         "angular_frequency_rad_s": one.Omega,
         "repeats_after_periods": one.repeats,
         "impacts_per_period": one.impacts,
         "slips_per_period": one.slips,
-        "smallest_m": one.y[0].min(initial=np.inf),
-        "largest_m": one.y[0].max(initial=-np.inf),
-        "largest_velocity_m_s": np.abs(one.v[0]).max(initial=0.0),
+        of.column("smallest"): one.y[0].min(initial=np.inf),
+        of.column("largest"): one.y[0].max(initial=-np.inf),
+        f"{of.column('largest_velocity')}_s": np.abs(one.v[0]).max(initial=0.0),
         "largest_contact_force_N": classification.largest_force(one),
         "lost_in_contacts_J_per_period": classification.lost(one),
         "lyapunov_exponent_1_s": grows.value,

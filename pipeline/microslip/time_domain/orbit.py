@@ -19,13 +19,13 @@ from ..data import Array, NotConverged, UserError
 from ..files.hdf5 import put, refuse_foreign, sealed
 from ..settings.mistakes import bounded
 from ..system.assembly import Contact
-from ..units import METRES, counted
+from ..units import METRES, Quantity, counted
 from . import classification
 from . import samples as kept_samples
 from .classification import Exponent
 from .equations import Equations
 from .ground import steps_of_waves
-from .samples import ROWS, UNITS, InMemory, Kept
+from .samples import ROWS, InMemory, Kept
 from .starts import Periodic
 from .starts import begun as on_its_way
 from .stepper import KINDS, Now, Seen, Stepper, static_force
@@ -73,8 +73,8 @@ class Orbit:
 
     Attributes:
         equations. labels: of the read-outs, ``monitor direction``. samples: of a period. steps: of a period.
-        time: (s,) s. y, v: (w, s) read-outs in m and their velocities in m/s. q, q_dot: (m, s) modal coordinates of
-            `Equations.shapes`. d, force: (c, s) of the contact coordinates, m and N.
+        time: (s,) s. y, v: (w, s) read-outs in the units of `of`, and their velocities. q, q_dot: (m, s) modal
+            coordinates of `Equations.shapes`. d, force: (c, s) of the contact coordinates, m and N.
         energy: name -> (s,) J: ``mechanical`` of the bodies; since the start ``given`` by loads and preloads,
             ``damped``, and ``contacts``, done on them; of that, and of what moving
             ``ground`` gave them, ``stored`` and ``lost``, nan where a law does not tell.
@@ -124,6 +124,15 @@ class Orbit:
     def touching(self) -> tuple[kept_samples.Touch, ...]:
         """Contacts, in the order in which events count them."""
         return kept_samples.touches(self.equations)
+
+    @property
+    def units(self) -> tuple[str, ...]:
+        """Of the read-outs."""
+        return kept_samples.units_of(self.equations)
+
+    def of(self, read_out: int = 0) -> Quantity:
+        """What a read-out measures: a displacement, an angle, a strain."""
+        return Quantity(self.units[read_out]) if read_out < len(self.units) else METRES
 
     @property
     def contacts(self) -> tuple[str, ...]:
@@ -246,7 +255,7 @@ class Orbit:
         y, v = self.y, self.v
         columns = {"time_s": self.time}
         for i, label in enumerate(self.labels):
-            columns |= {f"{label}_m": y[i], f"{label}_m_per_s": v[i]}
+            columns |= {self.of(i).column(label): y[i], f"{self.of(i).column(label)}_per_s": v[i]}
         return pandas.DataFrame({**columns, **{f"{name}_J": values for name, values in self.energy.items()}})
 
     def to_xarray(self) -> Any:
@@ -256,7 +265,7 @@ class Orbit:
 
         variables = {
             name: ((ROWS[name], "time") if name in ROWS else ("time",), self.array(name), {"units": unit})
-            for name, unit in UNITS.items()
+            for name, unit in kept_samples.units_with(self.units).items()
             if name != "time"
         }
         when, where, kind = self.events.T
@@ -287,9 +296,10 @@ class Orbit:
             kept_samples.head(file)
             group = file.create_group("motion_1")
             kept_samples.describe(
-                group, f"{self.Omega:.6g} rad/s", self.Omega, self.omega2, self.labels, self.touching, self.samples
-            )
-            for name, unit in UNITS.items():
+                group, f"{self.Omega:.6g} rad/s", self.Omega, self.omega2, self.labels, self.units, self.touching,
+                self.samples,
+            )  # fmt: skip
+            for name, unit in kept_samples.units_with(self.units).items():
                 put(group, name, self.array(name), unit)
             put(group, "event", self.events)
             kept_samples.tell(group, self._told)
@@ -307,7 +317,7 @@ class Orbit:
 
             axes = plt.subplots(layout="constrained")[1]
         y, v, last = self.y[read_out], self.v[read_out], slice(self.samples - 1, None, self.samples)
-        (by, unit), (rate, per_second) = (METRES.scale(np.abs(x).max(initial=0.0)) for x in (y, v))
+        (by, unit), (rate, per_second) = (self.of(read_out).scale(np.abs(x).max(initial=0.0)) for x in (y, v))
         axes.plot(by * y, rate * v, color="#0b4f9c", linewidth=0.7)
         axes.plot(by * y[last], rate * v[last], "o", color="#c8382c", markersize=4, label="after every period")
         axes.set(xlabel=f"{self.labels[read_out]} in {unit}", ylabel=f"velocity in {per_second}/s")

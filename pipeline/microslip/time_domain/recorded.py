@@ -40,6 +40,7 @@ class Recorded(Orbit):
         told = dict(group.attrs)
         own: dict[str, Any] = {
             "path": path, "number": number, "name": str(told["name"]), "labels": tuple(json.loads(told["read_outs"])),
+            "_units": tuple(json.loads(told.get("read_out_units", "[]"))),
             "samples": int(told["samples_per_period"]), "steps": int(told["steps_per_period"]),
             "missed": int(told["missed_events"]), "error": float(told["error"]), "diverged": float(told["diverged"]),
             "messages": tuple(json.loads(told["messages"])), "exponent": orbit.exponent_of(told),
@@ -51,6 +52,10 @@ class Recorded(Orbit):
     def array(self, name: str, part: slice = slice(None)) -> Array:
         with h5py.File(self.path, "r") as file:
             return np.asarray(file[f"motion_{self.number}"][name][..., part])
+
+    @property
+    def units(self) -> tuple[str, ...]:
+        return tuple(self.__dict__["_units"])
 
     @property
     def Omega(self) -> float:

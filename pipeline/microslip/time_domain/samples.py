@@ -24,6 +24,7 @@ from ..data import Array, UserError
 from ..files.hdf5 import create, put, seal, seal_state
 from ..files.hostile import DAMAGE, inspect, refuse_damaged, short
 from ..files.store import complete_or_absent, ordinary, put_in_place, refused
+from ..harmonic_balance.readout import measured
 from .equations import Equations
 from .stepper import KINDS, Now, Seen
 
@@ -37,7 +38,7 @@ UNITS = {
     "modal_velocity": "m kg^1/2 / s", "contact_displacement": "m, rad", "contact_force": "N, N m",
     **{f"energy_{name}": "J" for name in ENERGIES},
 }  # fmt: skip
-"""Of every array of samples, in the order in which a file has them; the last axis is time."""
+"""Of every array of samples, in the order in which a file has them; the last axis is time. See `units_with`."""
 
 ROWS = {
     "displacement": "read_out", "velocity": "read_out", "modal_displacement": "mode", "modal_velocity": "mode",
@@ -62,12 +63,14 @@ def of_period(e: Equations, seen: Seen) -> dict[str, Array]:
     """Name -> (rows, s) or (s,) of samples."""
     seen = Seen._make(map(np.asarray, seen))
     rates = seen.q_dot @ e.output.T + e.rates(seen.time) @ e.output_given.T
+    if e.output_residual.any() and len(seen.time) > 1:  # what yields at once has no velocity of its own
+        rates = rates - np.gradient(seen.force @ e.output_residual.T, seen.time, axis=0)
     found = (seen.time, e.frequency(seen.time), read(e, seen), rates.T, seen.q.T, seen.q_dot.T, seen.d.T, seen.force.T)
     return dict(zip(UNITS, (*found, *energies(e, seen).values()), strict=True))
 
 
 def read(e: Equations, seen: Seen) -> Array:
-    """(w, s) read-outs, m."""
+    """(w, s) read-outs."""
     q, force, o = np.asarray(seen.q), np.asarray(seen.force), e.oscillators(np.asarray(seen.time))
     return (q @ e.output.T - (force - e.F_0) @ e.output_residual.T + o @ e.output_given.T).T
 
@@ -338,9 +341,9 @@ def _reserve(file: h5py.File, plan: Sequence[Planned]) -> None:
     for i, one in enumerate(plan, 1):
         group, s = file.create_group(f"motion_{i}"), one.samples * one.keep
         e = one.equations
-        describe(group, one.name, e.Omega, e.omega2, labels_of(e), touches(e), one.samples)
+        describe(group, one.name, e.Omega, e.omega2, labels_of(e), units_of(e), touches(e), one.samples)
         rows = sizes(one.equations)
-        for name, unit in UNITS.items():
+        for name, unit in units_with(units_of(e)).items():
             _room(group, name, (rows[name], s) if name in rows else (s,), unit)
         most = one.keep * (one.samples + EVENTS_OF_CONTACT * len(one.equations.contacts))
         _room(group, "event", (most, 3), "", along=0)
@@ -396,11 +399,12 @@ def head(file: h5py.File) -> None:
 
 
 def describe(
-    group: h5py.Group, name: str, Omega: float, omega2: Array, labels: Sequence[str], contacts: Sequence[Touch],
-    samples: int,
+    group: h5py.Group, name: str, Omega: float, omega2: Array, labels: Sequence[str], units: Sequence[str],
+    contacts: Sequence[Touch], samples: int,
 ) -> None:  # fmt: skip
     """What is known of a motion before it is."""
     group.attrs["name"], group.attrs["Omega"], group.attrs["samples_per_period"] = name, Omega, samples
+    group.attrs["read_out_units"] = json.dumps(list(units))
     group.attrs["read_outs"], group.attrs["contacts"] = json.dumps(list(labels)), json.dumps(list(contacts))
     group.attrs["events"] = "rows of time in s, number of the contact, kind: " + ", ".join(
         f"{k} {kind}" for k, kind in enumerate(KINDS)
@@ -417,6 +421,17 @@ def tell(group: h5py.Group, told: Mapping[str, Any]) -> None:
 def labels_of(e: Equations) -> tuple[str, ...]:
     """Read-outs, ``monitor direction``."""
     return tuple(f"{w.monitor} {w.label}" for w in e.assembly.outputs)
+
+
+def units_of(e: Equations) -> tuple[str, ...]:
+    """Of the read-outs, as `units.Quantity` has them."""
+    return tuple(measured(e.assembly, i).unit for i in range(len(e.assembly.outputs)))
+
+
+def units_with(read_outs: Sequence[str]) -> dict[str, str]:
+    """`UNITS` with those of the read-outs, each once."""
+    own = dict.fromkeys(read_outs or ("m",))
+    return {**UNITS, "displacement": ", ".join(own), "velocity": ", ".join(f"{unit}/s" for unit in own)}
 
 
 def is_of_motions(path: Path | str) -> bool:
