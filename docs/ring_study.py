@@ -101,12 +101,6 @@ def over_forces(r: Ring, forces: Sequence[float], frequency: Array, **asked: Any
     return [highest(r.problem(float(n), **asked), r.basis, frequency) for n in forces]
 
 
-def error_of_modes(r: Ring, few: int, frequency: Array, normal: float = 780.0) -> tuple[Array, Array]:
-    """|FRF| with fewer modes and with all, m (f,) each."""
-    one, other = (frf(r.problem(normal, modes=m), frequency) for m in (few, None))
-    return np.abs(one.monitor), np.abs(other.monitor)
-
-
 def inclined(r: Ring, degrees: float, normal: float, order: int) -> Problem:
     """The ring with its contact faces turned about the radial axis: a shroud angle beta on the same blade."""
     from microslip.harmonic_balance import problem as balance

@@ -42,14 +42,14 @@ def part_lines(name: str, mesh: Mesh, sets: tuple[str, ...], body: str = "Steel"
 
 def surfaces(mesh: Mesh, sets: tuple[str, ...], prefix: str = "S-", first: int = 0) -> list[str]:
     """A *SURFACE, TYPE=ELEMENT of every face, cell by cell."""
-    from microslip.mesh.inp import _sides
+    from microslip.mesh.deck_surfaces import sides_of
 
     lines, number = [], first
     sides = {}
     for kind, cells in mesh.cells.items():
         for cell in cells:
             number += 1
-            for i, corners in enumerate(_sides(kind), 1):
+            for i, corners in enumerate(sides_of(kind), 1):
                 sides[frozenset(int(cell[c]) for c in corners)] = (number, i)
     for name in sets:
         lines.append(f"*Surface, type=ELEMENT, name={prefix}{name}")

@@ -111,6 +111,16 @@ def test_python_blocks_are_python() -> None:
 # architecture ------------------------------------------------------------------------------------------------------
 
 
+def test_ways_into_the_package_lead_somewhere() -> None:
+    """Files that "Where to begin" names are there, and what it names of them stands in them."""
+    text = (DOCS / "architecture.md").read_text(encoding="utf-8").split("## Where to begin", 1)[1].split("\n## ", 1)[0]
+    named = re.findall(r"`([\w/]+\.py)`(?: \(`(\w+))?", text)
+    assert len(named) > 15
+    for file, name in named:
+        code = (PACKAGE / file).read_text(encoding="utf-8")
+        assert not name or re.search(rf"^(def|class) {name}\b", code, re.M), file
+
+
 def room_order() -> list[str]:
     """Rooms of docs/architecture.md, first to last."""
     text = (DOCS / "architecture.md").read_text(encoding="utf-8")

@@ -53,7 +53,7 @@ def over_time(a: np.ndarray, samples: int = 20000) -> np.ndarray:
 
 
 @pytest.mark.parametrize("order", [1, 2, 3, 7])
-def testwave_top_value_of_a_wave(order):
+def test_top_value_of_a_wave(order):
     """Against 20000 samples, which miss the top by at most sum |a_n| n^2 (pi/20000)^2/2."""
     a = wave(500, order + 1)
     found, sampled = wave_top(a, 16), over_time(a.T).max(axis=0)

@@ -756,7 +756,6 @@ def export(
     """
     from .basis import read_basis
     from .exchange import formats, writer
-    from .exchange.choice import select
 
     file = _modal_file(file)
     write = writer(to)
@@ -772,8 +771,7 @@ def export(
     if rpm is not None and speed is not None:
         raise UserError("export --rpm: it chooses the speed already; leave --speed out")
     target = output or file.with_name(file.stem + formats()[to].ending)
-    basis = read_basis(file)
-    chosen = select(basis if rpm is None else _at_speed(basis, rpm), speed, nodal_diameter)
+    chosen = _chosen(file, rpm, speed, nodal_diameter)
     write(chosen, target)
     print(target)
     _warn(formats()[to].warnings(chosen))
@@ -870,13 +868,9 @@ def info(
         raise UserError(f"--unit {unit}: unknown unit of length; choose one of {', '.join(UNITS)}")
     suffix = file.suffix.lower()
     if suffix in (".h5", ".hdf5"):
-        from .basis import read_basis
-        from .exchange.choice import select
         from .stages.summary import basis_summary
 
-        basis = read_basis(file)
-        basis = select(basis if rpm is None else _at_speed(basis, rpm), speed, nodal_diameter)
-        print("\n".join(basis_summary(basis)))
+        print("\n".join(basis_summary(_chosen(file, rpm, speed, nodal_diameter))))
     elif suffix in CAD:
         text, reason = cad_table(file, unit, output)
         print(text)
@@ -895,20 +889,25 @@ def info(
 
         print(f"{file}: matrices {_words(matrix_names(file))}")
     else:
-        from .mesh import mesh_problems, read_mesh
-        from .stages.meshing import linked_mesh
+        _tell_mesh(file, unit)
 
-        grid = linked_mesh(file, read_mesh(file, unit))
-        size = (grid.points.max(axis=0) - grid.points.min(axis=0)).tolist()
-        kinds = ", ".join(f"{len(c)} {t}" for t, c in grid.cells.items())
-        print(f"{file}: {grid.n_points} points, {kinds}, {size[0]:.4g} x {size[1]:.4g} x {size[2]:.4g} m")
-        print(f"faces: {_words(grid.faces)}\npoint sets: {_words(grid.point_sets)}")
-        if grid.supports:
-            print(f"supports: {_words(f'{name} in {directions}' for name, directions in grid.supports.items())}")
-        errors, warnings = mesh_problems(grid)
-        _warn(warnings)
-        if errors:
-            raise UserError("\n".join(f"{file}: {e}" for e in errors))
+
+def _tell_mesh(file: Path, unit: str) -> None:
+    """What a mesh holds, and what is wrong with it."""
+    from .mesh import mesh_problems, read_mesh
+    from .stages.meshing import linked_mesh
+
+    grid = linked_mesh(file, read_mesh(file, unit))
+    size = (grid.points.max(axis=0) - grid.points.min(axis=0)).tolist()
+    kinds = ", ".join(f"{len(c)} {t}" for t, c in grid.cells.items())
+    print(f"{file}: {grid.n_points} points, {kinds}, {size[0]:.4g} x {size[1]:.4g} x {size[2]:.4g} m")
+    print(f"faces: {_words(grid.faces)}\npoint sets: {_words(grid.point_sets)}")
+    if grid.supports:
+        print(f"supports: {_words(f'{name} in {directions}' for name, directions in grid.supports.items())}")
+    errors, warnings = mesh_problems(grid)
+    _warn(warnings)
+    if errors:
+        raise UserError("\n".join(f"{file}: {e}" for e in errors))
 
 
 def _modal_file(path: Path) -> Path:
@@ -944,10 +943,17 @@ def _not_foreign(path: Path) -> Path:
     raise UserError(f"{path}: is {what} and no modal file; type: microslip {way} {shlex.quote(str(path))}")
 
 
-def _at_speed(basis: ModalBasis, rpm: float) -> ModalBasis:
-    from .modal.speed_range import basis_at
+def _chosen(file: Path, rpm: float | None, speed: int | None, nodal_diameter: int | None) -> ModalBasis:
+    """A modal file's groups of one speed and nodal diameter, as far as they are given."""
+    from .basis import read_basis
+    from .exchange.choice import select
 
-    return basis_at(basis, rpm)
+    basis = read_basis(file)
+    if rpm is not None:
+        from .modal.speed_range import basis_at
+
+        basis = basis_at(basis, rpm)
+    return select(basis, speed, nodal_diameter)
 
 
 def _say(text: object, quiet: bool) -> None:

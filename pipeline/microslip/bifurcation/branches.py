@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -18,6 +18,7 @@ from .shooting import Orbit
 
 if TYPE_CHECKING:
     import pandas
+    import xarray
 
 EQUILIBRIA = "equilibria"
 
@@ -119,17 +120,29 @@ def joined(back: Branch, forth: Branch) -> Branch:
     return replace(forth, ended=ended, **both)
 
 
-def values_at(found: Sequence[Branch], kind: str) -> dict[str, Array]:
-    """Branch -> values of the parameter at its points of a kind, see `SPECIAL`."""
-    values = {b.name: b.parameter[b.of_kind(kind)] for b in found}
-    return {name: at for name, at in values.items() if len(at)}
+class Collected:
+    """Branches over one parameter, found or read."""
 
+    branches: tuple[Branch, ...]
 
-def table(found: Sequence[Branch]) -> pandas.DataFrame:
-    """A row a point, branch by branch."""
-    import pandas
+    def __getitem__(self, name: str) -> Branch:
+        return next(b for b in self.branches if b.name == name)
 
-    return pandas.concat([b.to_dataframe() for b in found], ignore_index=True)
+    def at(self, kind: str) -> dict[str, Array]:
+        """Branch -> values of the parameter at its points of a kind: ``Hopf``, ``fold``, ``period doubling``,
+        ``torus``, ``branch point``."""
+        values = {b.name: b.parameter[b.of_kind(kind)] for b in self.branches}
+        return {name: at for name, at in values.items() if len(at)}
+
+    def to_dataframe(self) -> pandas.DataFrame:
+        """A row a point, branch by branch."""
+        import pandas
+
+        return pandas.concat([b.to_dataframe() for b in self.branches], ignore_index=True)
+
+    def to_xarray(self) -> xarray.Dataset:
+        """The same by points."""
+        return self.to_dataframe().rename_axis("point").to_xarray()
 
 
 def columns(branch: Branch) -> dict[str, Any]:

@@ -14,15 +14,13 @@ from ..continuation.curve import State
 from ..data import Array, UserError
 from . import deflation, equilibria, floquet, flow, orbits, switching
 from .basin import Attractor, attractors
-from .branches import EQUILIBRIA, Branch, joined, of_orbits, table, values_at
+from .branches import EQUILIBRIA, Branch, Collected, joined, of_orbits
 from .drawn import draw
 from .dynamics import Dynamics
 from .equilibria import Hopf
 from .shooting import Orbit, Shooting
 
 if TYPE_CHECKING:
-    import pandas
-    import xarray
     from matplotlib.axes import Axes
 
 Report = Callable[[str], None]
@@ -57,7 +55,7 @@ class Asked:
 
 
 @dataclass(frozen=True, eq=False)
-class Diagram:
+class Diagram(Collected):
     """Branches over a parameter.
 
     Attributes:
@@ -72,25 +70,10 @@ class Diagram:
     deflated: tuple[orbits.Found, ...] = ()
     messages: tuple[str, ...] = ()
 
-    def __getitem__(self, name: str) -> Branch:
-        return next(b for b in self.branches if b.name == name)
-
-    def at(self, kind: str) -> dict[str, Array]:
-        """Branch -> values of the parameter at its points of a kind, see `branches.SPECIAL`."""
-        return values_at(self.branches, kind)
-
     def plot(self, axes: Axes, label: str = "parameter", read_out: int = 0) -> None:
         """Half of the way from the smallest to the largest value of a read-out, in matplotlib's axes."""
         dots = [(a.orbit.p, float(a.swing[read_out])) for a in self.attractors]
         draw(self.branches, dots, axes, label, self.system.named[read_out], self.system.unit, read_out)
-
-    def to_dataframe(self) -> pandas.DataFrame:
-        """A row a point, branch by branch."""
-        return table(self.branches)
-
-    def to_xarray(self) -> xarray.Dataset:
-        """The same by points."""
-        return self.to_dataframe().rename_axis("point").to_xarray()
 
 
 @dataclass(eq=False)

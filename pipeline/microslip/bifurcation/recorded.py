@@ -7,16 +7,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..data import Array, UserError
+from ..data import UserError
 from ..files import hdf5, store
 from ..files.hostile import reading, refuse_damaged
 from . import branches
-from .branches import Branch
+from .branches import Branch, Collected
 from .drawn import draw
 
 if TYPE_CHECKING:
-    import pandas
-    import xarray
     from matplotlib.axes import Axes
 
 FORMAT, VERSION = "microslip-bifurcation", "0.1"
@@ -25,7 +23,7 @@ _TRIAL = "from microslip.bifurcation.recorded import _read; _read(path)"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Branches:
+class Branches(Collected):
     """A diagram as its file has it. Attributes: name. parameter, unit: of its axis. branches."""
 
     name: str
@@ -33,29 +31,13 @@ class Branches:
     unit: str
     branches: tuple[Branch, ...]
 
-    def __getitem__(self, name: str) -> Branch:
-        return next(b for b in self.branches if b.name == name)
-
     def __len__(self) -> int:
         return len(self.branches)
-
-    def at(self, kind: str) -> dict[str, Array]:
-        """Branch -> values of the parameter at its points of a kind: ``Hopf``, ``fold``, ``period doubling``,
-        ``torus``, ``branch point``."""
-        return branches.values_at(self.branches, kind)
 
     def plot(self, axes: Axes, read_out: int = 0, unit: str = "m") -> None:
         """Half of the way from the smallest to the largest value of a read-out, in matplotlib's axes."""
         axis = f"{self.parameter} in {self.unit}".removesuffix(" in ")
         draw(self.branches, [], axes, axis, self.branches[0].outputs[read_out], unit, read_out)
-
-    def to_dataframe(self) -> pandas.DataFrame:
-        """A row a point, branch by branch."""
-        return branches.table(self.branches)
-
-    def to_xarray(self) -> xarray.Dataset:
-        """The same by points."""
-        return self.to_dataframe().rename_axis("point").to_xarray()
 
     def __repr__(self) -> str:
         return f"<Branches: {self.name}, over {self.parameter}: {', '.join(b.name for b in self.branches)}>"

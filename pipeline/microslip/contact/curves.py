@@ -24,6 +24,7 @@ from ..reduced.compliance import BULK_AND_SURFACE
 from .hertz import Hertz
 from .profiles import RoundContact
 from .series import BULK, INCLUDES
+from .solids import pressing
 
 LENGTHS = {"m": 1.0, "mm": 1e-3, "um": 1e-6, "nm": 1e-9}
 FORCES = {"N": 1.0, "kN": 1e3, "mN": 1e-3}
@@ -85,9 +86,7 @@ class NormalCurve:
         Raises:
             UserError: a negative force.
         """
-        F = np.asarray(force, dtype=float)
-        if not (F >= 0).all():
-            raise UserError(f"force: {F.min():g} N; a contact is pressed, so the force must not be negative")
+        F = pressing(force)
         return np.array([self._inverse(v) for v in F.ravel()]).reshape(F.shape)
 
     @cached_property

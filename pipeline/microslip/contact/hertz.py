@@ -16,7 +16,7 @@ from scipy.interpolate import CubicSpline
 from scipy.special import elliprd, elliprf
 
 from ..data import Array, UserError
-from .solids import Solid, normal_modulus
+from .solids import Solid, normal_modulus, pressing
 
 SLENDEREST = 1e-6
 """Smallest ratio of half curvatures: such an ellipse is 20 000 times longer than wide, no longer a point contact."""
@@ -145,7 +145,7 @@ class Hertz:
 
     def approach(self, force: ArrayLike) -> Array:
         """Approach (m) under a normal force (N, not negative)."""
-        return (_pressing(force) / self._coefficient) ** (2 / 3)
+        return (pressing(force) / self._coefficient) ** (2 / 3)
 
     def semi_axes(self, force: ArrayLike) -> tuple[Array, Array]:
         """(a_x, a_y): half axes along x and y, m, Sextro Eq. (6.4-17)."""
@@ -160,7 +160,7 @@ class Hertz:
 
     def largest_pressure(self, force: ArrayLike) -> Array:
         """3 F/(2 pi a b), Pa, in the middle; zero without force."""
-        area, F = self.area(force), _pressing(force)
+        area, F = self.area(force), pressing(force)
         return np.divide(1.5 * F, area, out=np.zeros_like(area), where=area > 0)
 
     def pressure(self, force: float, x: ArrayLike, y: ArrayLike) -> Array:
@@ -202,10 +202,3 @@ class Hertz:
         normal = self.normal_stiffness(force)
         x, y = self.tangential_ratio
         return x * normal, y * normal
-
-
-def _pressing(force: ArrayLike) -> Array:
-    F = np.asarray(force, dtype=float)
-    if not (F >= 0).all():
-        raise UserError(f"force: {F.min():g} N; a contact is pressed, so the force must not be negative")
-    return F

@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike
 from scipy.integrate import quad
 
 from ..data import Array, UserError
+from .solids import refuse_not_positive
 
 
 class NormalContact(Protocol):
@@ -51,8 +52,7 @@ class PartialSlip:
     def __post_init__(self) -> None:
         if not 0 < self.normal_force < np.inf:
             raise UserError(f"normal_force: {self.normal_force:g} N; partial slip needs a pressed contact")
-        if not 0 < self.friction < np.inf:
-            raise UserError(f"friction: {self.friction:g}; it must be greater than 0")
+        refuse_not_positive(friction=self.friction)
         if self.axis not in (0, 1):
             raise UserError(f"axis: {self.axis} is none; 0 is along x, 1 along y")
 

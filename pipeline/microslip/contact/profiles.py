@@ -22,7 +22,7 @@ from scipy.optimize import brentq
 from scipy.special import ellipk, ellipkinc
 
 from ..data import Array, Indices, UserError
-from .solids import Solid, normal_modulus, tangential_modulus
+from .solids import Solid, normal_modulus, pressing, tangential_modulus
 
 _RULES = {n: np.polynomial.legendre.leggauss(n) for n in (4, 16)}
 _DEGREE = 14
@@ -247,10 +247,8 @@ class RoundContact:
         Raises:
             UserError: a negative force, or one that needs a wider profile.
         """
-        F = np.asarray(force, dtype=float)
-        if not (F >= 0).all():
-            raise UserError(f"force: {F.min():g} N; a contact is pressed, so the force must not be negative")
-        return np.array([self._approach(v) for v in np.atleast_1d(F).ravel()]).reshape(F.shape)
+        F = pressing(force)
+        return np.array([self._approach(v) for v in F.ravel()]).reshape(F.shape)
 
     def _approach(self, force: float) -> float:
         a, g = self._table

@@ -26,6 +26,7 @@ from .normal import Normal, Preload
 from .partial_slip import NormalContact
 from .point import PointContact, Stretch, dragged, let_go, met, slide, touching, weight
 from .series import BULK
+from .solids import refuse_not_positive
 from .stiffness import OfHertz
 
 if TYPE_CHECKING:
@@ -367,7 +368,7 @@ def rough_strips(
         UserError: a setting that is not positive, heights that lie above x* = 0.
     """
     _counted(count)
-    _positive(stiffness_0=stiffness_0, roughness=roughness, stiffness_t=stiffness_t, friction=mu)
+    refuse_not_positive(stiffness_0=stiffness_0, roughness=roughness, stiffness_t=stiffness_t, friction=mu)
     table = as_table(heights)
     if table.x.ndim != 1:
         raise UserError("height distribution: one table per point; make the strips of each point apart")
@@ -399,7 +400,7 @@ def mindlin(contact: NormalContact, mu: float, deepest: float, count: int, axis:
         UserError: a setting that is not positive, a force that is not convex.
     """
     _counted(count)
-    _positive(deepest=deepest, friction=mu)
+    refuse_not_positive(deepest=deepest, friction=mu)
     at = (np.arange(count + 1) / count) ** 2
     slopes = np.diff(np.asarray(contact.force(at * deepest))) / np.diff(at * deepest)
     rises = np.diff(slopes, prepend=0.0)
@@ -424,12 +425,6 @@ def _edges(x: np.ndarray, area: np.ndarray, count: int) -> np.ndarray:
     passed = np.concatenate([[0.0], np.cumsum(np.sqrt(np.diff(area) * np.diff(x)))])
     rises = np.concatenate([[True], np.diff(passed) > 0])
     return np.interp(np.linspace(0, passed[-1], count + 1), passed[rises], x[rises])
-
-
-def _positive(**settings: float) -> None:
-    for name, given in settings.items():
-        if not 0 < given < np.inf:
-            raise UserError(f"{name}: {given:g}; it must be greater than 0")
 
 
 # the laws of a contact file ------------------------------------------------------------------------------------------

@@ -5,8 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from ..data import UserError
+from ..data import Array, UserError
 
 
 @dataclass(frozen=True)
@@ -37,6 +38,25 @@ class Solid:
     def shear(self) -> float:
         """G, Pa."""
         return self.young / (2 * (1 + self.poisson)) if self.given_shear is None else self.given_shear
+
+
+def pressing(force: ArrayLike) -> Array:
+    """Normal forces, N, any shape.
+
+    Raises:
+        UserError: a negative one.
+    """
+    F = np.asarray(force, dtype=float)
+    if not (F >= 0).all():
+        raise UserError(f"force: {F.min():g} N; a contact is pressed, so the force must not be negative")
+    return F
+
+
+def refuse_not_positive(**given: float) -> None:
+    """Raises `UserError` of a number that is 0, negative, infinite or none."""
+    for name, value in given.items():
+        if not 0 < value < np.inf:
+            raise UserError(f"{name}: {value:g}; it must be greater than 0")
 
 
 def normal_modulus(first: Solid, second: Solid) -> float:

@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-
-from ..data import Array
-
-
-def rows_csv(head: Iterable[str], rows: Iterable[Iterable[str]]) -> str:
-    """Of cells that are written already."""
-    return "\n".join(",".join(row) for row in (head, *rows)) + "\n"
+from typing import Any
 
 
-def columns_csv(columns: Mapping[str, Array], digits: int) -> str:
-    """Of name -> numbers, columns of equal length, so many significant digits of each."""
-    rows = zip(*columns.values(), strict=True)
-    return rows_csv(columns, ((f"{v:.{digits}g}" for v in row) for row in rows))
+def rows_csv(head: Iterable[str], rows: Iterable[Iterable[str | float]], digits: int = 8) -> str:
+    """Texts stand as they are, numbers with so many significant digits."""
+    cells = ((v if isinstance(v, str) else f"{v:.{digits}g}" for v in row) for row in rows)
+    return "\n".join(",".join(row) for row in (head, *cells)) + "\n"
+
+
+def columns_csv(columns: Mapping[str, Iterable[Any]], digits: int) -> str:
+    """Of name -> numbers or texts, columns of equal length."""
+    return rows_csv(columns, zip(*columns.values(), strict=True), digits)

@@ -33,13 +33,11 @@ class Count:
 
     Attributes:
         missed: roots inside the window that are not among the known ones (pairs counted once; negative: known ones
-            that are none). turns: the same, not rounded. factorisations: of Q along the border. largest_turn: rad.
+            that are none). turns: the same, not rounded.
     """
 
     missed: int
     turns: float
-    factorisations: int
-    largest_turn: float
 
 
 def missed(Q: Quadratic, window: Window, known: ComplexArray) -> Count:
@@ -72,7 +70,7 @@ def missed(Q: Quadratic, window: Window, known: ComplexArray) -> Count:
     mirrored = window.omega[0] == 0
     turns = total / (np.pi if mirrored else 2 * np.pi)
     count = round(turns)
-    return Count(-(-count // 2) if mirrored else count, turns / (2 if mirrored else 1), len(smooth.at), smooth.largest)
+    return Count(-(-count // 2) if mirrored else count, turns / (2 if mirrored else 1))
 
 
 def _border(window: Window) -> ComplexArray:
@@ -90,7 +88,6 @@ class _Smooth:
         pairs = known[known.imag > 0]
         self._known = np.concatenate([pairs, pairs.conj(), known[known.imag == 0]])
         self.at: dict[complex, complex] = {}
-        self.largest = 0.0
         self._steady = (0.0, 0.0)
 
     def calm(self, window: Window) -> None:
@@ -125,7 +122,6 @@ def _turn(f: Callable[[complex], complex], a: complex, b: complex, least: float)
     bend = abs(first - second) / 2
     turned = max(abs(first.imag), abs(second.imag))
     if (turned <= SAFE and bend <= BEND) or abs(b - a) <= least:
-        f.largest = max(f.largest, turned)  # type: ignore[attr-defined]
         return first.imag + second.imag
     return _turn(f, a, middle, least) + _turn(f, middle, b, least)
 

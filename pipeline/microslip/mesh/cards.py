@@ -7,6 +7,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
+import numpy as np
+
+from ..data import Indices
 from ..files.store import ordinary
 from .raw import Damaged
 
@@ -121,3 +124,24 @@ def parameters(line: str) -> dict[str, str]:
 def fields(line: str) -> list[str]:
     """The words of a data line."""
     return [word.strip() for word in line.split(",") if word.strip()]
+
+
+def whole_numbers(text: str, what: str) -> Indices:
+    """Of a text, each above 0."""
+    words = [word for word in text.replace(",", " ").split() if word]
+    try:
+        values = np.array(words, dtype=np.int64) if words else np.zeros(0, dtype=np.int64)
+    except (ValueError, OverflowError):
+        raise Damaged(f"{what} holds something that is no whole number") from None
+    if len(values) and values.min() < 1:
+        raise Damaged(f"{what} holds a number below 1")
+    return values
+
+
+def numbers(lines: list[str], what: str) -> list[list[float]]:
+    """Numbers of the data lines; an empty place counts as 0."""
+    try:
+        rows = [line.rstrip().rstrip(",").split(",") for line in lines]
+        return [[float(w.replace("D", "e").replace("d", "e")) if w.strip() else 0.0 for w in row] for row in rows]
+    except ValueError as error:
+        raise Damaged(f"{what} holds something that is no number ({str(error)[-60:]})") from None

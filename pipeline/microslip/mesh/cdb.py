@@ -17,7 +17,7 @@ import numpy as np
 from ..data import Array, Equation, Link, RigidLink
 from ..elasticity import turned_strain
 from .materials import isotropic_rows, orthotropic_row
-from .raw import Damaged, DeckMaterial, Numbering, RawMesh, is_number, lost
+from .raw import Damaged, DeckMaterial, Numbering, RawMesh, is_number, lost, real
 from .supports import Constraints, add_supports
 
 _SOLIDS = {185: 8, 45: 8, 186: 20, 95: 20, 187: 10, 92: 10, 285: 4}
@@ -126,28 +126,21 @@ def _whole(text: str, what: str) -> int:
     return value
 
 
-def _number(text: str, what: str) -> float:
-    try:
-        return float(text.replace("D", "E").replace("d", "e"))
-    except ValueError:
-        raise Damaged(f"{what} holds '{text.strip()[:30]}' where a number belongs") from None
-
-
 def _read_nodes(archive: _Archive, words: list[str], lines: list[str], at: int) -> int:
     fields = _widths(lines, at, "NBLOCK")
     whole = [f for f in fields if f[2] == "i"]
-    real = [f for f in fields if f[2] == "e"]
-    real, angles = real[:3], real[3:]
-    if not whole or len(real) < 3:
+    coordinates = [f for f in fields if f[2] == "e"]
+    coordinates, angles = coordinates[:3], coordinates[3:]
+    if not whole or len(coordinates) < 3:
         raise Damaged("NBLOCK has a format without a number and three coordinates")
     for number, line in enumerate(lines[at + 1 :], at + 1):
         if line.strip().upper().startswith("N,") or line.strip() == "-1":
             return number + 1
         archive.node_id.append(_whole(line[: whole[0][1]], "NBLOCK"))
-        if any(_number(t, "NBLOCK") for a, b, _ in angles if (t := line[a:b].strip())):
+        if any(real(t, "NBLOCK") for a, b, _ in angles if (t := line[a:b].strip())):
             archive.held.turned.add(archive.node_id[-1])
-        given = [line[a:b] for a, b, _ in real]
-        archive.points.append([_number(t, "NBLOCK") if t.strip() else 0.0 for t in given])
+        given = [line[a:b] for a, b, _ in coordinates]
+        archive.points.append([real(t, "NBLOCK") if t.strip() else 0.0 for t in given])
     raise Damaged("NBLOCK has no end, the file is truncated")
 
 
@@ -243,7 +236,7 @@ def _read_temperatures(archive: _Archive, words: list[str]) -> None:
         return
     start = _whole(rest[0], "MPTEMP")
     for i, text in enumerate(t for t in rest[1:] if t):
-        archive.temperatures[start + i] = _number(text, "MPTEMP")
+        archive.temperatures[start + i] = real(text, "MPTEMP")
 
 
 def _read_data(archive: _Archive, words: list[str]) -> None:
@@ -256,34 +249,34 @@ def _read_data(archive: _Archive, words: list[str]) -> None:
     values = archive.constants.setdefault(material, {}).setdefault(label, {})
     table = archive.tables.setdefault(material, {}).setdefault(label, {})
     for place, text in enumerate((t for t in rest[3:] if t), start):
-        values[place], table[place] = _number(text, "MPDATA"), archive.temperatures.get(place, 0.0)
+        values[place], table[place] = real(text, "MPDATA"), archive.temperatures.get(place, 0.0)
 
 
 def _read_constant(archive: _Archive, words: list[str]) -> None:
     """MP, label, material, value[, slopes over temperature]."""
     if len(words) > 3 and words[3]:
-        if any(_number(w, "MP") for w in words[4:] if w):
+        if any(real(w, "MP") for w in words[4:] if w):
             raise Damaged(f"MP,{words[1]},{words[2]} is a polynomial of temperature; write a table (MPTEMP, MPDATA)")
         material = _whole(words[2] or "1", "MP")
-        archive.constants.setdefault(material, {})[words[1].upper()] = {1: _number(words[3], "MP")}
+        archive.constants.setdefault(material, {})[words[1].upper()] = {1: real(words[3], "MP")}
         archive.tables.setdefault(material, {})[words[1].upper()] = {1: 0.0}
 
 
 def _read_reference(archive: _Archive, words: list[str]) -> None:
     if len(words) > 1 and words[1]:
-        archive.reference = _number(words[1], "TREF")
+        archive.reference = real(words[1], "TREF")
 
 
 def _read_uniform(archive: _Archive, words: list[str]) -> None:
     if words[0].upper() == "TUNIF" and len(words) > 1 and words[1]:
-        archive.uniform = _number(words[1], "TUNIF")
+        archive.uniform = real(words[1], "TUNIF")
     elif len(words) > 2 and words[1].upper() == "TEMP" and words[2] not in ("", "_TINY"):  # how Ansys says none
-        archive.uniform = _number(words[2], "BFUNIF")
+        archive.uniform = real(words[2], "BFUNIF")
 
 
 def _read_body_force(archive: _Archive, words: list[str]) -> None:
     if len(words) > 3 and words[2].upper() == "TEMP" and words[1].lstrip("-").isdecimal():
-        archive.nodal[_whole(words[1], "BF")] = _number(words[3], "BF")
+        archive.nodal[_whole(words[1], "BF")] = real(words[3], "BF")
 
 
 def _refuse_temperatures(archive: _Archive, words: list[str]) -> None:
@@ -297,7 +290,7 @@ def _read_displacement(archive: _Archive, words: list[str]) -> None:
     directions = "".join("xyzabc" if w.upper() == "ALL" else _LABELS.get(w.upper(), "") for w in (label, *more))
     if not directions:
         return
-    if value and _number(value, "D") != 0:
+    if value and real(value, "D") != 0:
         archive.held.left_out.append(f"D,{where},{label} prescribes a displacement")
     elif is_number(where):
         first, end = int(where), _whole(last, "D") if last else int(where)
@@ -321,7 +314,7 @@ def _read_equation(archive: _Archive, words: list[str]) -> None:
             number, constant, terms = archive.open, "", words[3:]
     else:
         number, constant, terms = (words[1:2] or [""])[0], (words[2:3] or [""])[0], words[3:]
-    if constant and _number(constant, "CE") != 0:
+    if constant and real(constant, "CE") != 0:
         raise Damaged(f"the constraint equation CE {number} has the constant {constant}; only 0 is read")
     archive.places.setdefault(f"CE {number}", f"{archive.where}: CE {number}")
     found = archive.equations.setdefault(f"CE {number}", [])
@@ -330,7 +323,7 @@ def _read_equation(archive: _Archive, words: list[str]) -> None:
         if node:
             if label.upper() not in _LABELS:
                 raise Damaged(f"the constraint equation CE {number} takes in {label or 'nothing'} of node {node}")
-            found.append((_whole(node, "CE"), _LABELS[label.upper()], _number(factor, "CE")))
+            found.append((_whole(node, "CE"), _LABELS[label.upper()], real(factor, "CE")))
 
 
 def _read_coupled(archive: _Archive, words: list[str]) -> None:

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from ..data import Joint
-from .cards import Card, fields
+from .cards import fields
 from .deck import Deck
-from .raw import Damaged
+from .raw import Damaged, real
 
 KEYWORDS = ("CONTACT PAIR", "SURFACE INTERACTION", "FRICTION", "SURFACE BEHAVIOR", "PRE-TENSION SECTION", "CLOAD")
 
@@ -21,7 +21,7 @@ def joints_of(deck: Deck) -> list[Joint]:
         if card.keyword == "SURFACE INTERACTION":
             current = card.parameters.get("NAME", "").upper()
         elif card.keyword == "FRICTION" and card.lines:
-            friction[current] = _number(card, card.lines[0])
+            friction[current] = real(card.lines[0].split(",")[0], f"{card.where}: *{card.keyword}")
     known = {name.upper(): name for name, *_ in deck.surfaces}
     laws = {card.parameters.get("NAME", "").upper() for card, _ in deck.links if card.keyword == "SURFACE INTERACTION"}
     found = []
@@ -84,12 +84,6 @@ def _loads(deck: Deck) -> list[tuple[int, float]]:
             words = [word.strip() for word in line.split(",")]
             nodes = deck.nodes(words[0], space)
             if nodes is not None and len(words) > 2:
-                found += [(int(node), _number(card, words[2]) if words[1] == "1" else 0.0) for node in nodes]
+                along = real(words[2], f"{card.where}: *{card.keyword}") if words[1] == "1" else 0.0
+                found += [(int(node), along) for node in nodes]
     return found
-
-
-def _number(card: Card, line: str) -> float:
-    try:
-        return float(line.split(",")[0].replace("D", "e").replace("d", "e"))
-    except ValueError:
-        raise Damaged(f"{card.where}: *{card.keyword} holds '{line[:40]}', no number") from None

@@ -10,7 +10,7 @@ import numpy as np
 from ..data import Array, AverageLink, Equation, FaceTie, Indices, Link, RigidLink
 from .cards import Card, fields
 from .deck import Deck
-from .raw import Damaged, Numbering, is_number, lost
+from .raw import Damaged, Numbering, is_number, lost, real
 
 KEYWORDS = (
     "TIE", "EQUATION", "MPC", "KINEMATIC COUPLING", "DISTRIBUTING COUPLING", "COUPLING", "KINEMATIC", "DISTRIBUTING",
@@ -92,20 +92,13 @@ def _tie(reading: _Reading, card: Card, space: str, following: Card | None) -> I
         reading.left_out.append(lost(card.where, "*TIE of CYCLIC SYMMETRY (write [cyclic] in body.toml)"))
         return
     text = card.parameters.get("POSITION TOLERANCE", "")
-    tolerance = _number(text, "POSITION TOLERANCE") if text else None
+    tolerance = real(text, "POSITION TOLERANCE") if text else None
     for line in card.lines:
         words = [word.strip() for word in line.split(",")]
         if len(words) < 2 or not words[1]:
             raise Damaged(f"*TIE needs the slave and the master surface in a line, not '{line[:60]}'")
         slave, master = (reading.surface(word, card, space) for word in words[:2])
         yield FaceTie(_where(card), slave, master, tolerance)
-
-
-def _number(word: str, what: str) -> float:
-    try:
-        return float(word.replace("D", "e").replace("d", "e"))
-    except ValueError:
-        raise Damaged(f"{what} is '{word[:40]}', no number") from None
 
 
 def _equations(reading: _Reading, card: Card, space: str, following: Card | None) -> Iterator[Link]:
@@ -120,7 +113,7 @@ def _equations(reading: _Reading, card: Card, space: str, following: Card | None
         if len(terms) < 3 * count:
             raise Damaged(f"*EQUATION announces {count} terms of three words and has {len(terms)} words")
         ways = [_direction(word) for word in terms[1::3]]
-        factors = np.array([_number(word, "a factor of *EQUATION") for word in terms[2::3]])
+        factors = np.array([real(word, "a factor of *EQUATION") for word in terms[2::3]])
         members = [reading.nodes(word, card, space) for word in terms[::3]]
         length = max(map(len, members))
         if any(len(m) not in (1, length) for m in members):
@@ -223,7 +216,7 @@ def _weighed(reading: _Reading, card: Card, surface: str) -> tuple[Indices | str
         return surface, None
     weights: dict[int, float] = {}
     for name, weight in ([*row, ""][:2] for row in rows):
-        number = _number(weight, f"a weight of the surface '{surface}'") if weight else 1.0
+        number = real(weight, f"a weight of the surface '{surface}'") if weight else 1.0
         weights.update(dict.fromkeys(reading.nodes(name, card, space).tolist(), number))
     return np.array(list(weights), dtype=np.int64), np.array(list(weights.values()))
 

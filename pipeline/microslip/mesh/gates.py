@@ -30,31 +30,13 @@ def mesh_problems(mesh: Mesh) -> tuple[list[str], list[str]]:
     read, first-order cells, sets of facets that cannot serve as faces, parts that share no points
     (`modes.unconstrained` refuses those that nothing holds).
     """
-    errors, warnings = [], []
-    for cell_type, cells in mesh.cells.items():
-        first = partial(_first, mesh, cell_type)
-        repeated = (np.diff(np.sort(cells, axis=1), axis=1) == 0).any(axis=1)
-        if repeated.any():
-            errors.append(
-                f"{repeated.sum()} {cell_type} cells name a point twice (first: {first(repeated)}); they are "
-                "degenerate, remesh"
-            )
-            continue
-        with np.errstate(all="ignore"):  # cells of vanishing size
-            volume = corner_volumes(mesh, cell_type)
-        scale = np.abs(volume).mean()
-        if (flat := ~(np.abs(volume) > 1e-9 * scale)).any():
-            errors.append(f"{flat.sum()} {cell_type} cells have no volume (first: {first(flat)}); remesh")
-        elif (inverted := volume < 0).any():
-            errors.append(
-                f"{inverted.sum()} of {len(cells)} {cell_type} cells are inside out (first: {first(inverted)}); "
-                "the node order is not the one of the format, or the mesh is damaged"
-            )
-        if cell_type in _FIRST_ORDER:
-            warnings.append(
-                f"first-order cells ({cell_type}) are too stiff in bending (frequencies can be tens of per cents "
-                "high); use second-order ones"
-            )
+    errors = [said for cell_type in mesh.cells if (said := _cell_problem(mesh, cell_type))]
+    warnings = [
+        f"first-order cells ({cell_type}) are too stiff in bending (frequencies can be tens of per cents high); use "
+        "second-order ones"
+        for cell_type in mesh.cells
+        if cell_type in _FIRST_ORDER
+    ]
     if mesh.unended:
         warnings.append(f"the file has {mesh.unended}, so it may be cut; write it again, or add that if it is whole")
     warnings += mesh.lost
@@ -82,6 +64,28 @@ def mesh_problems(mesh: Mesh) -> tuple[list[str], list[str]]:
             "support each, press it by a closure, or join them"
         )
     return errors, warnings
+
+
+def _cell_problem(mesh: Mesh, cell_type: str) -> str:
+    """What is wrong with the cells of a type, or nothing."""
+    cells, first = mesh.cells[cell_type], partial(_first, mesh, cell_type)
+    repeated = (np.diff(np.sort(cells, axis=1), axis=1) == 0).any(axis=1)
+    if repeated.any():
+        return (
+            f"{repeated.sum()} {cell_type} cells name a point twice (first: {first(repeated)}); they are "
+            "degenerate, remesh"
+        )
+    with np.errstate(all="ignore"):  # cells of vanishing size
+        volume = corner_volumes(mesh, cell_type)
+    scale = np.abs(volume).mean()
+    if (flat := ~(np.abs(volume) > 1e-9 * scale)).any():
+        return f"{flat.sum()} {cell_type} cells have no volume (first: {first(flat)}); remesh"
+    if (inverted := volume < 0).any():
+        return (
+            f"{inverted.sum()} of {len(cells)} {cell_type} cells are inside out (first: {first(inverted)}); "
+            "the node order is not the one of the format, or the mesh is damaged"
+        )
+    return ""
 
 
 def _overlapping(mesh: Mesh) -> int:

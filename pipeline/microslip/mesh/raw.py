@@ -105,7 +105,7 @@ class RawMesh:
             self.blocks.append((kind, numbering.positions(nodes, what)))
             self.cell_id.append(ids)
             self.regions.append(regions)
-        refuse_twice(self.cell_id, "element")
+        refuse_twice(self.cell_id)
 
 
 def in_file(path: Path, text: str) -> str:
@@ -123,16 +123,24 @@ def joined(parts: Iterable[Indices]) -> Indices:
     return np.concatenate([np.zeros(0, dtype=np.int64), *parts])
 
 
-def refuse_twice(numbers: Iterable[Indices], what: str) -> None:
-    """Raises `Damaged` if a number stands there twice."""
+def refuse_twice(numbers: Iterable[Indices]) -> None:
+    """Raises `Damaged` if a number of elements stands there twice."""
     ids, count = np.unique(joined(numbers), return_counts=True)
     if (count > 1).any():
-        raise Damaged(f"{what} {ids[count > 1][0]} is defined twice")
+        raise Damaged(f"element {ids[count > 1][0]} is defined twice")
 
 
 def is_number(word: str) -> bool:
     """Whether a word is a node's or a cell's number, which fits into 64 bits."""
     return word.isdecimal() and len(word) < 18
+
+
+def real(text: str, what: str) -> float:
+    """A number of a deck, with Fortran's exponent D as well."""
+    try:
+        return float(text.replace("D", "e").replace("d", "e"))
+    except ValueError:
+        raise Damaged(f"{what} holds '{text.strip()[:40]}' where a number belongs") from None
 
 
 class Numbering:

@@ -26,7 +26,7 @@ def on_common_points(first: ModalBasis, second: ModalBasis) -> tuple[ModalBasis,
         UserError: one body is more than 2 % larger than the other or elsewhere; a node lies outside the other body by
             more than 2 % of its size.
     """
-    if not _solid(first) or not _solid(second):
+    if not is_solid(first) or not is_solid(second):
         return _at_points_of_the_other(first, second)
     if _same(first.mesh, second.mesh):
         return first, second
@@ -40,7 +40,7 @@ def on_common_points(first: ModalBasis, second: ModalBasis) -> tuple[ModalBasis,
 
 def _at_points_of_the_other(first: ModalBasis, second: ModalBasis) -> tuple[ModalBasis, ModalBasis]:
     for solid, points, order in ((first, second, 1), (second, first, -1)):
-        if _solid(solid) and not _solid(points) and points.mesh.n_points <= MOST_POINTS:
+        if is_solid(solid) and not is_solid(points) and points.mesh.n_points <= MOST_POINTS:
             with suppress(UserError):
                 return (at_points(solid, points.mesh.points), points)[::order]  # type: ignore[return-value]
     return first, second
@@ -80,7 +80,8 @@ def _reshaped(basis: ModalBasis, mesh: Mesh, cut: Callable[[Array], Array]) -> M
     return replace(basis, mesh=mesh, groups=groups)
 
 
-def _solid(basis: ModalBasis) -> bool:
+def is_solid(basis: ModalBasis) -> bool:
+    """Whether it has cells, and not points alone, as measured modes have."""
     return any(kind in CELL_TYPES for kind in basis.mesh.cells)
 
 

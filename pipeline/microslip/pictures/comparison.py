@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..data import Array, ModalBasis, ModalGroup
+from ..modal.sampling import is_solid
 from ..reduced.coordinates import in_modes
 from ..reduced.correlation import Comparison, Pair, measured_directions, nearest_points
-from ..topology import CELL_TYPES
 from . import plots
 from .lettering import INK, captioned, scaled, sheet, side_by_side
 from .scene import OUTLINE, Camera, Stage, fit, surface, view_axes
@@ -73,7 +73,7 @@ def pair_sheet(bodies: Both, seen: Both, found: Comparison, key: tuple[int, int]
     if not found.pairs:
         return None
     first, second = bodies
-    sides = [ContactFace(b, in_modes(b.groups[key]), _solid(b)) for b in bodies]
+    sides = [ContactFace(b, in_modes(b.groups[key]), is_solid(b)) for b in bodies]
     signs = _factors([in_modes(b.groups[key]) for b in seen], seen, found)
     stage = Stage()
     try:
@@ -84,10 +84,6 @@ def pair_sheet(bodies: Both, seen: Both, found: Comparison, key: tuple[int, int]
     left = f" {len(found.pairs) - MOST_PAIRS} pairs more are not drawn." if len(found.pairs) > MOST_PAIRS else ""
     note = f"Left {first.name}, right {second.name}, amplified; grey: at rest.{left}"
     return sheet(tiles, f"{first.name} and {second.name}: {len(found.pairs)} pairs of modes", note)
-
-
-def _solid(basis: ModalBasis) -> bool:
-    return any(kind in CELL_TYPES for kind in basis.mesh.cells)
 
 
 def _factors(groups: Sequence[ModalGroup], seen: Both, found: Comparison) -> list[tuple[Any, Any]]:

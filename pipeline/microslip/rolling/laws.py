@@ -3,6 +3,7 @@ sliding (Sextro, 6.5 with 3.6 and 3.7). A hundred times the work of constant fri
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -18,7 +19,7 @@ from ..contact.law import program, settings
 from ..contact.normal import Normal, Preload, Rough
 from ..contact.point import PointContact
 from .kalker import Coefficients
-from .strips import Array, Distribution, Forces, Poses, Spin, Tractions, broadcast, grid, over_elements, posed
+from .strips import Array, Distribution, Forces, Grid, Poses, Spin, Tractions, broadcast, grid, over_elements, posed
 
 
 @settings
@@ -74,6 +75,33 @@ NEWTON = 40
 """Steps; a quarter of them is enough where peaks are finite."""
 
 
+class Elements(NamedTuple):
+    """Of the strips of n states, arrays (ny n,); nx elements each.
+
+    Attributes:
+        reach, across: half the chord, and y, m. along: creepage of the strip. length: of an element, m. area: m^2.
+        pressed: N that an element carries over its share. springs: N/m, likewise, along and across rolling.
+    """
+
+    reach: Array
+    across: Array
+    along: Array
+    length: Array
+    area: Array
+    pressed: Array
+    springs: tuple[Array, Array]
+
+
+def _elements(pose: Poses, g: Grid, flat: Callable[[Array], Array]) -> Elements:
+    chord, width = g.chord[:, None], g.width[:, None]
+    reach, across = flat(pose.a * chord), flat(pose.b * g.y[:, None])
+    length, area = 2 * reach / len(g.x), flat(2 * pose.a * chord / len(g.x) * pose.b * width)
+    pressed = flat(pose.normal_force / (pose.a * pose.b * g.pressed) * chord ** g.powers[0]) * area
+    by = chord ** g.powers[1] / (pose.a * g.sprung)
+    springs = flat(pose.stiffness_x * by) * area, flat(pose.stiffness_y * by) * area
+    return Elements(reach, across, flat(pose.xi) - flat(pose.phi_x) * across, length, area, pressed, springs)
+
+
 @partial(program, static_argnames=("elements", "distribution"))
 def _marched(
     pose: Poses, friction: Friction, speed: Array, left: Array, surface: Surface | None, depth: Array,
@@ -84,17 +112,11 @@ def _marched(
     g = grid(elements, distribution)
     ny, n = len(g.y), len(pose.a)
     flat = lambda v: jnp.broadcast_to(v, (ny, n)).ravel()  # noqa: E731
-    chord, width = g.chord[:, None], g.width[:, None]
-    reach, across = flat(pose.a * chord), flat(pose.b * g.y[:, None])
-    length, area = 2 * reach / len(g.x), flat(2 * pose.a * chord / len(g.x) * pose.b * width)
-    pressed = flat(pose.normal_force / (pose.a * pose.b * g.pressed) * chord ** g.powers[0]) * area
-    by = chord ** g.powers[1] / (pose.a * g.sprung)
-    springs = [flat(c * by) * area for c in (pose.stiffness_x, pose.stiffness_y)]
-    along = flat(pose.xi) - flat(pose.phi_x) * across
-    smooth = jnp.asarray(g.pressure)[:, None] * pressed
+    e = _elements(pose, g, flat)
+    smooth = jnp.asarray(g.pressure)[:, None] * e.pressed
     springs_n, sinks = jnp.zeros_like(smooth), jnp.zeros_like(smooth)
     if surface is not None:
-        parabola = depth * chord**2 * (1 - jnp.asarray(g.x)[:, None, None] ** 2)
+        parabola = depth * g.chord[:, None] ** 2 * (1 - jnp.asarray(g.x)[:, None, None] ** 2)
         found = sunk(surface, smooth.reshape(-1, ny, n), parabola)
         springs_n, sinks = (v.reshape(smooth.shape) for v in found)
 
@@ -104,33 +126,33 @@ def _marched(
     def step(carry: Any, element: Any) -> tuple[Any, tuple[Array, ...]]:
         state, before, sum_ = carry
         x, way, p, share, changed, warm, spring, sink = element
-        x, h = reach * x, length * way
-        law = PointContact(normal(p, spring), Warmed(friction, warm), springs[0] * share, springs[1] * share)
+        x, h = e.reach * x, e.length * way
+        law = PointContact(normal(p, spring), Warmed(friction, warm), e.springs[0] * share, e.springs[1] * share)
         state = state._replace(elastic=state.elastic * changed)
-        moved = h * jnp.stack([along, flat(pose.eta) + flat(pose.phi_y) * (x + 0.5 * h)])
+        moved = h * jnp.stack([e.along, flat(pose.eta) + flat(pose.phi_y) * (x + 0.5 * h)])
         u = jnp.concatenate([sink[None], state.tangential + moved]).T
         found, after = law.step(u, u / h[:, None], h / flat(speed), state)
         t, slid = -found.T[1:], after.slipped - state.slipped
-        work = -0.5 * jnp.sum((before + t) * slid, axis=0) / length
+        work = -0.5 * jnp.sum((before + t) * slid, axis=0) / e.length
         slides = jnp.sum(slid**2, axis=0) > 1e-18 * jnp.sum(moved**2, axis=0)
-        added = t[0], t[1], x * t[1] - across * t[0], work, jnp.where(slides, area, 0.0)
-        shown = x, found.T[0] / area, *t / area, *(after.slipped - after.tangential)
+        added = t[0], t[1], x * t[1] - e.across * t[0], work, jnp.where(slides, e.area, 0.0)
+        shown = x, found.T[0] / e.area, *t / e.area, *(after.slipped - after.tangential)
         return (after, t, Forces(*(s + a for s, a in zip(sum_, added, strict=True)))), shown
 
-    one = PointContact(normal(pressed, pressed), friction, springs[0], springs[1]).init(ny * n)
+    one = PointContact(normal(e.pressed, e.pressed), friction, *e.springs).init(ny * n)
     none = jnp.zeros(ny * n)
     changed = np.concatenate([[1.0], g.stiffness[1:] / g.stiffness[:-1]])
     per_element = tuple(map(jnp.asarray, (g.x, g.way, smooth, g.stiffness, changed, left, springs_n, sinks)))
     start = one, jnp.stack([none, none]), Forces(*[none] * 5)
     (last, t, sum_), found = jax.lax.scan(step, start, per_element)
-    h = 0.5 * length  # to the trailing edge, as in `strips.forces`
-    rigid = along, flat(pose.eta) - flat(pose.phi_y) * (reach - 0.5 * h)
+    h = 0.5 * e.length  # to the trailing edge, as in `strips.forces`
+    rigid = e.along, flat(pose.eta) - flat(pose.phi_y) * (e.reach - 0.5 * h)
     work = sum(f * (u - h * s) for f, u, s in zip(t, last.slipped - last.tangential, rigid, strict=True))
-    sum_ = sum_._replace(power=sum_.power + 0.5 * work / length)
+    sum_ = sum_._replace(power=sum_.power + 0.5 * work / e.length)
     x, y, moment, power, slides = (v.reshape(ny, n).sum(axis=0) for v in sum_)
     fields = (jnp.moveaxis(v.reshape(-1, ny, n), 1, 0) for v in found)
     slides = slides / (2 * pose.a * pose.b * float(g.chord @ g.width))
-    return Forces(x, y, moment, power, slides), (*fields, length.reshape(ny, n))
+    return Forces(x, y, moment, power, slides), (*fields, e.length.reshape(ny, n))
 
 
 def rolled_by_characteristic(

@@ -18,6 +18,7 @@ from scipy.optimize import minimize_scalar
 
 from ..data import Array, UserError
 from ..files import store
+from ..settings.mistakes import is_number
 
 WIDTH = 0.07
 """m, of profiles that are given by a formula."""
@@ -125,7 +126,7 @@ def read_profile(
         unit, sign, shift = _header(lines[:begin], path)
         lines = lines[begin + 1 : end]
     rows = [line.replace(",", " ").replace(";", " ").split() for line in lines if line]
-    if rows and not _is_number(rows[0][0]):
+    if rows and not is_number(rows[0][0]):
         rows = rows[1:]
     try:
         points = np.array([[float(v) for v in row[:2]] for row in rows])
@@ -151,7 +152,7 @@ def _header(lines: list[str], path: Path) -> tuple[float, Array, Array]:
     told = dict.fromkeys(("shift.y", "shift.z", "mirror.y", "mirror.z", "rotate"), 0.0) | {"units.len.f": 1e3}
     for line in lines:
         key, equals, value = (part.strip() for part in line.partition("="))
-        if equals and key in told and _is_number(value):
+        if equals and key in told and is_number(value):
             told[key] = float(value)
     if told["rotate"]:
         raise UserError(f"{path}: rotate is not read; turn the points, or set inclination in the case")
@@ -166,22 +167,14 @@ def _miniprof(lines: list[str], path: Path) -> list[str]:
     lines = [line for line in lines if not line.startswith('"')]
     told = dict(line.split("=", 1) for line in lines if "=" in line)
     for key in ("XOffset", "YOffset", "Tilt"):
-        if _is_number(told.get(key, "")) and float(told[key]):
+        if is_number(told.get(key, "")) and float(told[key]):
             raise UserError(f"{path}: {key} is not read; save the profile with {key} applied to its points")
     names = [name.strip() for name in told.get("ColumnDef", "X,Y").split(",")]
     if not {"X", "Y"} <= set(names):
         raise UserError(f"{path}: ColumnDef names no X and Y; save the profile with both")
     rows = [line.split() for line in lines]
-    rows = [row for row in rows if len(row) >= len(names) and all(map(_is_number, row))]
+    rows = [row for row in rows if len(row) >= len(names) and all(map(is_number, row))]
     return [f"{row[names.index('X')]} {row[names.index('Y')]}" for row in rows]
-
-
-def _is_number(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True
 
 
 WIDEST = 0.5

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import erfc
 
+from ..contact.solids import refuse_not_positive
 from ..data import Array, UserError
 
 ITERATIONS = 200
@@ -35,9 +36,7 @@ class Conductor:
     heat_capacity: float
 
     def __post_init__(self) -> None:
-        for key, value in vars(self).items():
-            if not 0 < value < np.inf:
-                raise UserError(f"{key}: {value:g}; it must be greater than 0")
+        refuse_not_positive(**vars(self))
 
     @property
     def diffusivity(self) -> float:

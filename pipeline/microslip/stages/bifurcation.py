@@ -105,8 +105,7 @@ def _table(folder: Path, asked: BifurcationOfCase, found: Diagram) -> Path:
     keys = list(dict.fromkeys(key for part in parts for key in part))
     empty = np.full(max(len(b) for b in found.branches), np.nan)
     rows = [row for part in parts for row in zip(*(part.get(k, empty[: len(part["kind"])]) for k in keys), strict=True)]
-    cells = ([v if isinstance(v, str) else f"{v:.10g}" for v in row] for row in rows)
-    store.write_text(folder / f"bifurcation_{asked.name}.csv", rows_csv(keys, cells))
+    store.write_text(folder / f"bifurcation_{asked.name}.csv", rows_csv(keys, rows, 10))
     return folder / f"bifurcation_{asked.name}.csv"
 
 

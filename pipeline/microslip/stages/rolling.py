@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -91,9 +90,8 @@ def _beside(
     """Files of what is asked beside the curve, and what is said of them."""
     folder, case, made, more = stage.product.parent, found.case, [], []
     if elastic is not None:
-        rows = zip(ROWS, *(map("{:.8g}".format, v) for v in elastic.columns().values()), strict=True)
         made.append(folder / "stiffness.csv")
-        store.write_text(made[-1], rows_csv(["direction", *elastic.columns()], rows))
+        store.write_text(made[-1], columns_csv({"direction": ROWS, **elastic.columns()}, 8))
         more.append(elastic.sentence())
     if case.table is not None:
         stage.report("table of creep forces")
@@ -140,7 +138,7 @@ def _worn_tables(worn: Wearing, folder: Path) -> list[Path]:
 
 def _tables(found: Studied, folder: Path) -> list[Path]:
     head, rows = rows_of_patches(found.patches)
-    store.write_text(folder / "patches.csv", rows_csv(head, _cells(rows)))
+    store.write_text(folder / "patches.csv", rows_csv(head, rows))
     if found.forces is None:
         return [folder / "patches.csv"]
     made = {"creep.csv": found.columns(), "exact.csv": found.beside(), "wear.csv": found.worn()}
@@ -148,13 +146,9 @@ def _tables(found: Studied, folder: Path) -> list[Path]:
         if columns:
             store.write_text(folder / name, columns_csv(columns, 8))
     head, rows = found.generalised()
-    store.write_text(folder / "forces.csv", rows_csv(head, _cells(rows)))
+    store.write_text(folder / "forces.csv", rows_csv(head, rows))
     written = [name for name, columns in made.items() if columns]
     return [folder / name for name in (*written, "patches.csv", "forces.csv")]
-
-
-def _cells(rows: Iterable[Iterable[float | str]]) -> Iterator[list[str]]:
-    return ([v if isinstance(v, str) else f"{v:.8g}" for v in row] for row in rows)
 
 
 def _pictures(found: Studied, worn: Wearing | None, folder: Path, name: str) -> list[Path]:

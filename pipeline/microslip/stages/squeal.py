@@ -34,7 +34,7 @@ from .job import open_job
 from .meshing import load_mesh, mesh_stage
 from .moving import moving_shape
 from .places import find_body, lumped
-from .stability import table_csv, table_lines, window_of, write_roots
+from .stability import table_lines, window_of, write_roots
 from .stage import Report, Stage
 from .varied import Varied
 
@@ -268,7 +268,7 @@ def _written(
     drawn |= {path.stem: path for path in moves if path.suffix == ".gif"}
     texts = {
         "stability.html": squeal_html(f"{name}: stability of sliding", said, found, over, full, drawn),
-        "stability.csv": table_csv(found),
+        "stability.csv": columns_csv(found.columns, 16),
     }
     if over is not None:
         texts["stability_map.csv"] = columns_csv(over.columns, 12)

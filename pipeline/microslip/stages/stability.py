@@ -16,7 +16,7 @@ from ..data import UserError
 from ..errors import told_of
 from ..exchange.choice import select
 from ..files import hdf5, store
-from ..files.tables import columns_csv, rows_csv
+from ..files.tables import columns_csv
 from ..linalg.parametric import Family, family_of, family_of_group
 from ..linalg.quadratic import Window
 from ..modal.foreign import values_of
@@ -176,7 +176,7 @@ def _written(q: Question, found: Spectrum, over: Diagram | None, pictures: bool)
     drawn = _pictures(found, over, folder / "pictures") if pictures else {}
     texts = {
         "stability.html": roots_html(f"{q.name}: stability", q.state, found, over, drawn),
-        "stability.csv": table_csv(found),
+        "stability.csv": columns_csv(found.columns, 16),
     }
     if over is not None:
         texts["stability_over.csv"] = columns_csv(over.columns, 12)
@@ -212,12 +212,6 @@ def _pictures(found: Spectrum, over: Diagram | None, folder: Path) -> dict[str, 
     if over is not None:
         drawn["over"] = over_picture(over, folder / "roots_over.png")
     return drawn
-
-
-def table_csv(found: Spectrum) -> str:
-    """One row a root, sixteen digits."""
-    rows = zip(*found.columns.values(), strict=True)
-    return rows_csv(found.columns, ((v if isinstance(v, str) else f"{v:.16g}" for v in row) for row in rows))
 
 
 def table_lines(found: Spectrum) -> list[str]:

@@ -10,7 +10,7 @@ import numpy as np
 from ..analyses import two_tones
 from ..data import UserError
 from ..files import store
-from ..files.tables import rows_csv
+from ..files.tables import columns_csv
 from ..harmonic_balance.tones import Kept
 from ..report.tones import tones_html
 from ..results import open_journal
@@ -55,8 +55,7 @@ def _work(stage: Stage, case: CaseJob) -> Answer:
     left_out = found.error_estimate(best) if found.converged[best] else np.inf
     messages = [*_sentences(found, best, left_out), *found.messages, *built.messages]
     columns = found.columns()
-    cells = ([v if isinstance(v, str) else f"{v:.10g}" for v in row] for row in zip(*columns.values(), strict=True))
-    store.write_text(folder / "two_tones.csv", rows_csv(list(columns), cells))
+    store.write_text(folder / "two_tones.csv", columns_csv(columns, 10))
     found.save(folder / "two_tones.h5")
     drawn = _pictures(found, best, folder / "pictures", name) if case.pictures else []
     store.write_text(folder / "two_tones.html", tones_html(f"{name}: two tones", found, best, messages, drawn))

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
@@ -67,50 +68,52 @@ def read_matrices(
     Raises:
         UserError: with the file at fault.
     """
-    found = {}
-    for role in USUAL:
-        if (reference := getattr(given, role)) is not None:
-            found[role] = _read(folder, reference, role)
+    references = {role: reference for role in USUAL if (reference := getattr(given, role)) is not None}
+    found = {role: _read(folder, reference, role) for role, reference in references.items()}
     mesh = _nodes(folder, given, length_unit)
     dofs, where = _dofs(folder, given, found, mesh)
     rows, loose = found["stiffness"].matrix.shape[0], given.superelement or given.nodes is None
     node, component = _meaning(dofs, mesh, rows, loose, where)
-    made: dict[str, sp.csr_matrix] = {}
-    messages, scaling = list[str](), list[MatrixTerm]()
+    asked = [(role, references[role], item) for role, item in found.items()]
+    asked += [(term.role, term.matrix, _read(folder, term.matrix, term.role)) for term in terms]
+    checked = [_checked(item, role, reference, folder, rows, dofs) for role, reference, item in asked]
+    _check_mass(checked[list(found).index("mass")][0], folder / split(given.mass)[0], dofs)
+    system = _system(given, length_unit)
+    in_si = [_in_si(matrix, role, system, component) for (role, *_), (matrix, _) in zip(asked, checked, strict=True)]
+    own = dict(zip(found, in_si, strict=False))
+    scaling = [
+        MatrixTerm(term.role, matrix, term.name, term.power, term.factor, term.reference)
+        for term, matrix in zip(terms, in_si[len(found) :], strict=True)
+    ]
+    return Matrices(
+        own["stiffness"], own["mass"], own.get("damping"), own.get("gyroscopic"), mesh, node, component,
+        given.grounded or given.nodes is None, tuple(message for _, message in checked if message),
+        own.get("circulatory"), tuple(scaling),
+    )  # fmt: skip
 
-    def checked(item: Found, role: str, reference: str) -> sp.csr_matrix:
-        path = folder / split(reference)[0]
-        matrix = _in_order(item, dofs, path) if item.dofs is not None else item.matrix
-        if matrix.shape[0] != rows:
-            raise UserError(
-                f"{path}: the {role} matrix {split(reference)[1]} has {matrix.shape[0]} rows and the stiffness {rows}; "
-                "give matrices of the same coordinates"
-            )
-        if role == "circulatory":
-            return matrix
-        matrix, message = _symmetric(matrix, role, path)
-        messages.extend([message] if message else [])
-        return matrix
 
-    for role, item in found.items():
-        made[role] = checked(item, role, getattr(given, role))
-    for term in terms:
-        how = (term.name, term.power, term.factor, term.reference)
-        matrix = checked(_read(folder, term.matrix, term.role), term.role, term.matrix)
-        scaling.append(MatrixTerm(term.role, matrix, *how))
-    _check_mass(made["mass"], folder / split(given.mass)[0], dofs)
+def _checked(
+    item: Found, role: str, reference: str, folder: Path, rows: int, dofs: Indices
+) -> tuple[sp.csr_matrix, str]:  # fmt: skip
+    """The matrix on the rows of all, as symmetric as its role says, and what is told of that."""
+    path = folder / split(reference)[0]
+    matrix = _in_order(item, dofs, path) if item.dofs is not None else item.matrix
+    if matrix.shape[0] != rows:
+        raise UserError(
+            f"{path}: the {role} matrix {split(reference)[1]} has {matrix.shape[0]} rows and the stiffness {rows}; "
+            "give matrices of the same coordinates"
+        )
+    return (matrix, "") if role == "circulatory" else _symmetric(matrix, role, path)
+
+
+def _system(given: MatrixFiles, length_unit: str) -> str:
     system = given.units or usual_system(length_unit)
     if system is None:
         raise UserError(
             f'geometry.matrices.units: with length_unit = "{length_unit}" it must be said; choose one of '
             + ", ".join(SYSTEMS)
         )
-    scaled = {role: _in_si(matrix, role, system, component) for role, matrix in made.items()}
-    scaling = [replace(term, matrix=_in_si(term.matrix, term.role, system, component)) for term in scaling]
-    return Matrices(
-        scaled["stiffness"], scaled["mass"], scaled.get("damping"), scaled.get("gyroscopic"), mesh, node, component,
-        given.grounded or given.nodes is None, tuple(messages), scaled.get("circulatory"), tuple(scaling),
-    )  # fmt: skip
+    return system
 
 
 def matrix_names(path: Path) -> list[str]:
@@ -120,10 +123,8 @@ def matrix_names(path: Path) -> list[str]:
         UserError: unreadable.
     """
     reader = _reader(path)
-    try:
+    with _readable(path):
         return reader.names(path)
-    except (Unreadable, OSError) as error:
-        raise UserError(f"{path}: {_told(error)}; write it again") from error
 
 
 def own_nodes(path: Path) -> tuple[bool, bool]:
@@ -148,33 +149,39 @@ def _reader(path: Path) -> ModuleType:
     return READERS[path.suffix.lower()]
 
 
-def _told(error: Exception) -> str:
-    return str(error) if isinstance(error, Unreadable) else f"cannot be read ({getattr(error, 'strerror', error)})"
+@contextmanager
+def _readable(path: Path, what: str = "") -> Iterator[None]:
+    """What cannot be read here is told with its file."""
+    try:
+        yield
+    except (Unreadable, OSError) as error:
+        told = error if isinstance(error, Unreadable) else f"cannot be read ({getattr(error, 'strerror', error)})"
+        raise UserError(f"{path}: {what}{told}; write it again") from error
+    except MemoryError as error:
+        raise UserError(f"{path}: {what or 'it '}needs more memory than there is; store it sparse") from error
+
+
+def _there(path: Path, key: str) -> Path:
+    if not ordinary(path).is_file():
+        raise UserError(f"{path}: there is no such file; correct geometry.matrices.{key}")
+    return path
 
 
 def _read(folder: Path, reference: str, role: str) -> Found:
     file, name = split(reference)
     path = folder / file
     reader = _reader(path)
-    try:
+    with _readable(path, f"the {role} matrix: "):
         return reader.read(path, pick(reader.names(path), name, USUAL[role], path))
-    except (Unreadable, OSError) as error:
-        raise UserError(f"{path}: the {role} matrix: {_told(error)}; write it again") from error
-    except MemoryError as error:
-        raise UserError(f"{path}: the {role} matrix needs more memory than there is; store it sparse") from error
 
 
 def _nodes(folder: Path, given: MatrixFiles, unit: str) -> Mesh:
     if given.nodes is None:
         return Mesh(np.zeros((0, 3)), {}, {}, {}, np.zeros(0, dtype=np.int64))
     file, name = split(given.nodes)
-    path = folder / file
-    if not ordinary(path).is_file():
-        raise UserError(f"{path}: there is no such file; correct geometry.matrices.nodes")
-    try:
+    path = _there(folder / file, "nodes")
+    with _readable(path):
         mesh = read_nodes(path, name, unit)
-    except (Unreadable, OSError) as error:
-        raise UserError(f"{path}: {_told(error)}; write it again") from error
     sets = dict(mesh.point_sets)
     position = {int(number): i for i, number in enumerate(mesh.node_id)}
     for key, numbers in given.sets.items():
@@ -191,13 +198,9 @@ def _dofs(folder: Path, given: MatrixFiles, found: dict[str, Found], mesh: Mesh)
     if given.nodes is None:
         return np.zeros((0, 2), dtype=np.int64), "nothing"
     if given.dofs is not None:
-        path = folder / given.dofs
-        if not ordinary(path).is_file():
-            raise UserError(f"{path}: there is no such file; correct geometry.matrices.dofs")
-        try:
+        path = _there(folder / given.dofs, "dofs")
+        with _readable(path):
             return read_dofs(path), path.name
-        except (Unreadable, OSError) as error:
-            raise UserError(f"{path}: {_told(error)}; write it again") from error
     if own := [f.dofs for f in found.values() if f.dofs is not None]:
         alike = all(np.array_equal(a, own[0]) for a in own)
         return own[0] if alike else np.unique(np.vstack(own), axis=0), "the matrices' file"

@@ -1,0 +1,178 @@
+"""Of an Abaqus or CalculiX input file: materials, orientations, and the cells that sections give them to."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from ..data import Array
+from ..elasticity import turned, turned_strain
+from ..frames import rotation
+from .cards import numbers
+from .deck import Deck, DeckConstants
+from .materials import isotropic_rows, orthotropic_row
+from .raw import Damaged, DeckMaterial, RawMesh
+
+
+def _read_material(deck: Deck, parameters: dict[str, str], lines: list[str]) -> None:
+    name = parameters.get("NAME", "")
+    if not name:
+        raise Damaged("a *MATERIAL has no name")
+    deck.current = name.upper()
+    deck.materials[deck.current] = DeckConstants(name, deck.where)
+
+
+def _of(deck: Deck, keyword: str) -> DeckConstants:
+    if not deck.current:
+        raise Damaged(f"*{keyword} stands before any *MATERIAL")
+    return deck.materials[deck.current]
+
+
+def _read_elastic(deck: Deck, parameters: dict[str, str], lines: list[str]) -> None:
+    material, kind = _of(deck, "ELASTIC"), " ".join(parameters.get("TYPE", "ISO").upper().split())
+    rows, what = (
+        numbers(lines, f"*ELASTIC of {material.name}"),
+        f"*ELASTIC, TYPE={kind} of the material {material.name}",
+    )
+    if kind.startswith("ISO"):
+        if any(len(row) not in (2, 3) for row in rows) or not rows:
+            raise Damaged(f"{what} needs E, nu and perhaps a temperature a line")
+        material.isotropic = np.array([[*row, 0.0][:3] for row in rows])
+        return
+    values = np.array([v for row in rows for v in row])
+    if kind not in ("ENGINEERING CONSTANTS", "ORTHO", "ORTHOTROPIC"):
+        material.refused = f"*ELASTIC, TYPE={kind}"
+    elif len(values) not in (9, 10):
+        material.refused = f"{what} with {len(values)} numbers (nine, at one temperature, are read)"
+    elif kind == "ENGINEERING CONSTANTS":
+        material.orthotropic = values[:9]
+    else:
+        material.stiffness = values[:9]
+
+
+def _read_density(deck: Deck, parameters: dict[str, str], lines: list[str]) -> None:
+    material = _of(deck, "DENSITY")
+    rows = numbers(lines, f"*DENSITY of {material.name}")
+    if not rows or not rows[0]:
+        raise Damaged(f"*DENSITY of the material {material.name} holds no number")
+    if len({row[0] for row in rows}) > 1:
+        material.refused = "a density that depends on temperature"
+    material.density = rows[0][0]
+
+
+def _read_expansion(deck: Deck, parameters: dict[str, str], lines: list[str]) -> None:
+    material, kind = _of(deck, "EXPANSION"), parameters.get("TYPE", "ISO").upper()
+    rows = numbers(lines, f"*EXPANSION of {material.name}")
+    count = 3 if kind.startswith("ORTHO") else 1
+    if not rows or any(len(row) not in (count, count + 1) for row in rows) or kind.startswith("ANISO"):
+        raise Damaged(f"*EXPANSION, TYPE={kind} of the material {material.name} is not read; use ISO or ORTHO")
+    values = np.array([row[:count] for row in rows])
+    if np.ptp(values, axis=0).any():
+        material.refused = "an expansion that depends on temperature"
+    material.expansion = np.broadcast_to(values[0], 3).copy()
+
+
+def _read_section(deck: Deck, parameters: dict[str, str], lines: list[str]) -> None:
+    keys = ("ELSET", "MATERIAL", "ORIENTATION")
+    words = [parameters.get(key, "") for key in keys]
+    deck.sections.append((words[0], words[1], words[2], "", deck.where))
+
+
+def _read_orientation(deck: Deck, parameters: dict[str, str], lines: list[str]) -> None:
+    name, system = parameters.get("NAME", ""), parameters.get("SYSTEM", "RECTANGULAR").upper()
+    key = name.upper()
+    if not system.startswith("R") or parameters.get("DEFINITION", "COORDINATES").upper() != "COORDINATES":
+        deck.orientations[key] = f"*ORIENTATION, NAME={name} of the system {system}"
+        return
+    rows = numbers(lines, f"*ORIENTATION, NAME={name}")
+    if not rows or len(rows[0]) not in (6, 9):
+        raise Damaged(f"*ORIENTATION, NAME={name} needs the six coordinates of two points")
+    origin = np.array(rows[0][6:9]) if len(rows[0]) == 9 else np.zeros(3)
+    a, b = np.array(rows[0][:3]) - origin, np.array(rows[0][3:6]) - origin
+    normal = np.cross(a, b)
+    if not np.linalg.norm(normal) > 1e-9 * np.linalg.norm(a) * np.linalg.norm(b):
+        raise Damaged(f"the points of *ORIENTATION, NAME={name} lie on a line")
+    x, z = a / np.linalg.norm(a), normal / np.linalg.norm(normal)
+    axes = np.array([x, np.cross(z, x), z])
+    if len(rows) > 1 and len(rows[1]) > 1 and rows[1][1]:
+        if rows[1][0] not in (1, 2, 3):
+            raise Damaged(f"*ORIENTATION, NAME={name} turns about the axis {rows[1][0]:g}, which is none of 1, 2, 3")
+        axes = axes @ rotation(axes[int(rows[1][0]) - 1], np.radians(rows[1][1])).T
+    deck.orientations[key] = axes
+
+
+def assign_materials(deck: Deck, raw: RawMesh) -> None:
+    """A region for every pair of material and orientation that sections give to cells."""
+    if not deck.materials:
+        return
+    raw.regions = [np.full(len(cells.ids), -1) for cells in deck.solids]
+    known: dict[tuple[str, str], int] = {}
+    for name_of_set, material, orientation, space, where in deck.sections:
+        if material.upper() not in deck.materials:
+            raise Damaged(
+                f"{where}: *SOLID SECTION, ELSET={name_of_set} names the material '{material}', which is not defined"
+            )
+        axes = deck.key(deck.orientations, orientation, space) if orientation else ""
+        if axes is None:
+            raise Damaged(
+                f"{where}: *SOLID SECTION, ELSET={name_of_set} names the orientation '{orientation}', which is not "
+                "defined"
+            )
+        key = (material.upper(), axes)
+        if key not in known:
+            known[key] = len(raw.materials)
+            raw.materials.append(_deck_material(deck, key, name_of_set))
+        chosen = deck.cells(name_of_set, space)
+        if chosen is None:
+            raise Damaged(f"{where}: *SOLID SECTION names the element set '{name_of_set}', which is not defined")
+        for cells, region in zip(deck.solids, raw.regions, strict=True):
+            region[np.isin(cells.ids, chosen)] = known[key]
+    bare = [cells.ids[region < 0] for cells, region in zip(deck.solids, raw.regions, strict=True)]
+    if count := sum(map(len, bare)):
+        first = next(int(ids[0]) for ids in bare if len(ids))
+        raw.materials.append(DeckMaterial("", None, None, np.zeros(6), where=f"{count} cells from number {first} on"))
+        for region in raw.regions:
+            region[region < 0] = len(raw.materials) - 1
+
+
+def _deck_material(deck: Deck, key: tuple[str, str], where: str) -> DeckMaterial:
+    found = deck.materials[key[0]]
+    turn = deck.orientations[key[1]] if key[1] else None
+    axes = None if isinstance(turn, str) else turn
+    if refused := found.refused or (turn if isinstance(turn, str) else ""):
+        text = f"{refused}, which is not read; write another form, or give density and stiffness in a body.toml"
+        return DeckMaterial(found.name, None, found.density, np.zeros(6), None, where, text)
+    C, table = None, None
+    if found.isotropic is not None:
+        C, table = isotropic_rows(found.name, found.isotropic)
+    elif found.orthotropic is not None:
+        C = orthotropic_row(found.name, found.orthotropic)
+    elif found.stiffness is not None:
+        C = _orthotropic_stiffness(found.name, found.stiffness)
+    if C is not None and axes is not None:
+        C = turned(C, axes)
+    return DeckMaterial(
+        found.name, C, found.density, turned_strain(found.expansion, axes), table, where, line=found.where
+    )
+
+
+def _orthotropic_stiffness(name: str, d: Array) -> Array:
+    """Hooke matrix from D1111, D1122, D2222, D1133, D2233, D3333, D1212, D1313, D2323."""
+    C = np.diag([d[0], d[2], d[5], d[6], d[8], d[7]])
+    C[0, 1] = C[1, 0] = d[1]
+    C[0, 2] = C[2, 0] = d[3]
+    C[1, 2] = C[2, 1] = d[4]
+    if not np.isfinite(C).all() or np.linalg.eigvalsh(C).min() <= 0:
+        raise Damaged(f"the stiffness of the material '{name}' is not positive definite")
+    return C
+
+
+READERS: dict[str, Callable[[Deck, dict[str, str], list[str]], None]] = {
+    "MATERIAL": _read_material,
+    "ELASTIC": _read_elastic,
+    "DENSITY": _read_density,
+    "EXPANSION": _read_expansion,
+    "SOLID SECTION": _read_section,
+    "ORIENTATION": _read_orientation,
+}
