@@ -96,7 +96,7 @@ class AFT:
     @cached_property
     def kinematics(self) -> Any:
         """(n, 3, k) jax array."""
-        return jnp.asarray(self.patch.kinematics)
+        return jax.device_put(self.patch.kinematics)
 
     def _given(self, u: Array, period: float) -> tuple[Any, ...]:
         """Arguments of the programs; a NumPy number as the period would compile them again."""
