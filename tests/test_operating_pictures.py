@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -63,6 +64,24 @@ def test_the_body_is_drawn_where_it_is_farthest_out(harmonics):
     turn = np.exp(1j * np.multiply.outer(t, np.arange(1, harmonics + 1)))
     far = np.linalg.norm(np.tensordot(turn, a[1:], axes=1).real, axis=2).max()
     assert np.linalg.norm(shape, axis=1).max() == size == pytest.approx(far, rel=1e-2)
+
+
+@pytest.mark.parametrize(
+    "joules, words", [(-2.45e-5, "-24.5 µJ"), (2.45e-5, "24.5 µJ"), (-3e-9, "-3 nJ"), (0.0, "0 J")]
+)
+def test_energy_given_by_a_contact_is_told_in_the_unit_of_energy_lost(joules, words):
+    assert operating._energy(joules) == words
+
+
+def test_a_map_reaches_down_to_what_is_negative():
+    """A contact that counts less work than it gives: its map has colours for all of it."""
+    from matplotlib.figure import Figure
+
+    for values, limits in (([-2.0, -1.0], (-2.0, 0.0)), ([1.0, 2.0], (0.0, 2.0)), ([-1.0, 3.0], (-1.0, 3.0))):
+        patch = SimpleNamespace(places=np.array([[0.0, 0.0], [1e-3, 0.0]]), dissipated=np.array(values))
+        axes = Figure().subplots()
+        operating._map_panel(axes, patch, "dissipated", "energy", 1.0, "J/m²", "BuPu", True, " ")
+        assert axes.collections[0].get_clim() == limits
 
 
 @pytest.mark.slow

@@ -298,6 +298,8 @@ def test_the_answer_is_a_resonance_that_is_valid() -> None:
     assert "highest resonance found is 80.65 µm at 171.1 Hz" in words and "lowest with 12.74 µm" in words
     assert "Under FN = 20 N contacts would lift off" in words
     assert "largest stress amplitude is 41.5 MPa" in words
+    of_one = response_html({"resonances": rows, "stressed_body": "lower"}, {})
+    assert "largest stress amplitude of lower is 41.5 MPa" in said(of_one)
     assert "uncertain by less than 0.01" in words and "32000" in words and "10000" in words and "·10" not in words
 
 

@@ -231,7 +231,8 @@ def contact_map_plot(maps: Sequence[ContactMap], title: str, path: Path) -> Path
 def _energy(joules: float) -> str:
     if abs(joules) < 1e-15:  # rounding of forces that give back what they took
         return "0 J"
-    scale, unit = next(((s, u) for s, u in ((1.0, "J"), (1e3, "mJ"), (1e6, "µJ")) if joules * s >= 0.5), (1e9, "nJ"))
+    units = ((1.0, "J"), (1e3, "mJ"), (1e6, "µJ"))
+    scale, unit = next(((s, u) for s, u in units if abs(joules) * s >= 0.5), (1e9, "nJ"))
     return f"{joules * scale:.3g} {unit}"
 
 
@@ -243,8 +244,8 @@ def _map_panel(
     from ..operating.contact_maps import grid_of, on_grid
 
     values, places = scale * getattr(m, name), m.places if lies else m.places[:, ::-1]
-    how: dict[str, Any] = {"vmin": 0.0, "vmax": 100.0 if unit.startswith("%") else max(float(values.max()), 1e-12)}
-    how["cmap"] = colours
+    low, high = min(float(values.min()), 0.0), 100.0 if unit.startswith("%") else max(float(values.max()), 0.0)
+    how: dict[str, Any] = {"vmin": low, "vmax": high if high > low else 1e-12, "cmap": colours}
     edges = grid_of(places)
     if edges is not None:
         shown: Any = axes.pcolormesh(1e3 * edges[0], 1e3 * edges[1], on_grid(places, values), **how)

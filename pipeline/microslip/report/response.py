@@ -73,12 +73,13 @@ def _sentences(response: Mapping[str, Any]) -> list[str]:
     if lifted:
         named = " and ".join(filter(None, [", ".join(map(number, sorted(lifted)[:-1])), number(max(lifted))]))
         said.append(f"Under F_N = {named} N contacts would lift off: what was found there is not valid.")
+    of_body = f" of {response['stressed_body']}" if "stressed_body" in response else ""
     if stressed := [row for row in valid if "stress_amplitude_Pa" in row]:
         worst = max(stressed, key=lambda row: row["stress_amplitude_Pa"])
         margin = f", reserve factor {number(worst['reserve_factor'], 3)}" if "reserve_factor" in worst else ""
         force = number(worst["normal_force_N"])
         said.append(
-            f"The largest stress amplitude is {number(1e-6 * worst['stress_amplitude_Pa'])} MPa at "
+            f"The largest stress amplitude{of_body} is {number(1e-6 * worst['stress_amplitude_Pa'])} MPa at "
             f"{number(worst['frequency_of_stress_Hz'], 5)} Hz under F_N = {force} N{margin}."
         )
     uncertain = response.get("estimated_error_of_harmonics")
@@ -188,7 +189,7 @@ def response_pieces(response: Mapping[str, Any], album: Album) -> list[Piece]:
     told = {k: v for k, v in told.items() if not response.get(_TOLD.get(k, ""))}
     words = told.pop("description", "")
     tables = {k: v for k, v in told.items() if isinstance(v, list) and v and isinstance(v[0], Mapping)}
-    facts = [(_label(k), _cell(v)) for k, v in told.items() if k not in tables]
+    facts = [(_label(k), _cell(v).removeprefix(f"{k}: ")) for k, v in told.items() if k not in tables]
     rest = [n for n in album.left if n not in SHOWN and not n.startswith(("mode_", "modes_", "animation_"))]
     return [
         say(f"{words}." if words else ""),

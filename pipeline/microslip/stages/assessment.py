@@ -64,6 +64,7 @@ class Assessment:
             None. quantity: what the read-out measures. everywhere: whether
             the points are enough for a curve over the frequency. lifted: normal force (N) -> which of the points to
             draw are not valid, because contacts would lift off; not_valid: those under which a resonance is not.
+            several: whether the response has other bodies too.
     """
 
     component: str
@@ -74,6 +75,12 @@ class Assessment:
     everywhere: bool = True
     lifted: Mapping[float, Array] = field(default_factory=dict)
     not_valid: frozenset[float] = frozenset()
+    several: bool = False
+
+    @property
+    def whose(self) -> str:
+        """Whose stresses, for titles."""
+        return self.component if self.several else "the body"
 
     @property
     def highest(self) -> StressedResonance | None:
@@ -140,7 +147,8 @@ def assess(
             worst = endurance(cycle_stress(motion, j), limits or ENDLESS)
             f, low, high, there = (float(series.frequency[k]) for k in (i, r[0], r[-1], j))
             found.append(StressedResonance(normal, f, float(size[i]), (low, high), j, there, worst))
-    return Assessment(name, sweeps, tuple(found), limits, _quantity(response, monitor), everywhere)
+    several = len(response.bodies) > 1
+    return Assessment(name, sweeps, tuple(found), limits, _quantity(response, monitor), everywhere, several=several)
 
 
 def _quantity(response: Response, monitor: str) -> Quantity:
@@ -263,14 +271,14 @@ def draw(
     drawn: dict[str, Path] = {}
     curves = {n: operating.stress_curve(s.frequency[i], p, s.converged[i]) for n, (s, _, i, p) in found.sweeps.items()}
     if curves and found.everywhere:
-        label, title = "largest stress amplitude of the body in MPa", f"{case}: largest stress of the body"
+        label, title = f"largest stress amplitude of {found.whose} in MPa", f"{case}: largest stress of {found.whose}"
         drawn["stress over frequency"] = operating.over_frequency_plot(
             curves, label, title, folder / "stress_over_frequency.png", found.lifted
         )
     if lines := over_force(found):
         drawn["stress over normal force"] = operating.over_normal_force_plot(
             lines,
-            "largest stress amplitude of the body in MPa",
+            f"largest stress amplitude of {found.whose} in MPa",
             f"{case}: resonances over the normal force",
             folder / "stress_over_normal_force.png",
             found.not_valid,

@@ -160,6 +160,7 @@ def _finished(points: Checkpoint, result: CaseResult, wanted: Wanted, report: Re
         summary["resonances"] = [_ordered(row) for row in rows] or summary["resonances"]
         drawn, files = drawn | more.drawn, files + more.files
         summary["messages"] += more.messages
+        summary |= {"stressed_body": more.body} if len(response.bodies) > 1 else {}
     summary["checked"] = sentence(response, response.estimated)
     if result.rising:
         summary["checked"] += f"; still rising at {counted(len(result.rising), 'end')} of the band"
@@ -264,6 +265,7 @@ def _response(points: Checkpoint, result: CaseResult, summary: Mapping[str, Any]
 
 @dataclass(frozen=True)
 class _Assessed:
+    body: str
     rows: list[dict[str, Any]]
     drawn: dict[str, Path]
     files: list[Path]
@@ -291,7 +293,7 @@ def _assessed(
         name, arrays = result.settings.name, response.series[0].arrays
         contacts = sum(n.startswith("contacts/") and n.endswith("/dissipated") for n in arrays)
         drawn = assessment.draw(found, basis, name, folder / "pictures", scenes, maps, contacts)
-    return _Assessed(found.table(), drawn, _for_paraview(found, basis, maps, folder), messages)
+    return _Assessed(component, found.table(), drawn, _for_paraview(found, basis, maps, folder), messages)
 
 
 def _lifted_off(result: CaseResult, found: assessment.Assessment) -> dict[float, Array]:

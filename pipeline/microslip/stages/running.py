@@ -65,6 +65,7 @@ def _answered(
     response, converged = None, True
     if not case.is_only_in_time and not case.is_only_followed and not case.mistuning:
         response, converged = response_stage(path, files, folder, assignments, force, report, wanted=wanted)
+        _tell(response, report)
     job = CaseJob(path, files, folder, assignments or (), force, report, wanted.pictures)
     answers = (
         (case.orbit, orbit_stage), (case.stability, squeal_stage), (case.bifurcation, bifurcation_stage),
@@ -145,11 +146,16 @@ def respond(
             )
     folder = root / "build" / case.name
     summary, converged = response_stage(case_path, files, folder, assignments, force, report, log, wanted)
+    _tell(summary, report)
+    return folder / "response.csv", converged
+
+
+def _tell(summary: Mapping[str, Any], report: Report) -> None:
+    """The resonances of a response, and where it still rises."""
     rows = [*summary["resonances"], *summary["rising_at_the_edge"]]
     for row, normal in zip(rows, apart([row["normal_force_N"] for row in rows]), strict=True):
         note = f" ({row['doubt']})" if row.get("doubt") else f"; add {row['add']}" if "add" in row else ""
         report(f"F_N = {normal} N: {'still rising at ' if 'add' in row else ''}{_at(row)}{note}")
-    return folder / "response.csv", converged
 
 
 def _at(row: Mapping[str, Any]) -> str:
