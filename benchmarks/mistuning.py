@@ -24,6 +24,8 @@ import shutil
 import subprocess
 import tempfile
 import time
+from dataclasses import dataclass, fields, replace
+from functools import lru_cache
 from pathlib import Path
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")
@@ -31,9 +33,12 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 import numpy as np
 
 import microslip as ms
+from microslip.harmonic_balance.blocks import Dense
+from microslip.harmonic_balance.problem import AtFrequency, Problem
 from microslip.harmonic_balance.solver import CONVERGED, Point
+from microslip.mistuning.peaks import Highest, highest
 from microslip.mistuning.ring import Tuned
-from microslip.mistuning.samples import Asked, amplitudes, sample
+from microslip.mistuning.samples import Asked, Sliding, amplitudes, sample
 from microslip.mistuning.scatter import Scatter
 
 RUB = {"interface": "right", "against": "left", "against_sector": 1, "law": "smooth", "normal_force": 20.0,
@@ -49,51 +54,24 @@ def asked(blades: int, stuck: bool = False) -> Asked:
     return Asked(tuned, (Scatter("frequency", 0.01),), FREQUENCY, 1, {"harmonics": 3, "samples": 64}, stuck)
 
 
-def compiled(at, x):
-    """(W, c) forces and their derivatives, as Newton's method of the program asks for them."""
-    return at.forces(x)
-
-
-def by_hand(at, x):
-    """The same: a linear spring that opens, Coulomb friction by a return map, contact after contact."""
-    p, forces, slopes = at.problem, [], []
-    W, T = p.coefficients, waves(p.coefficients, 64)
-    for g in p.groups:
-        U, F, S = g.relative(p.displacement(x)), [], []
-        for i, u in zip(g.contacts, U, strict=True):
-            contact = p.assembly.contacts[i]
-            G, k = contact.patch.kinematics[0], np.diag(contact.stiffness)[:3].tolist()
-            place = G @ u
-            f = marched(place, k, RUB["friction"], T)
-            slope = np.zeros((3, W, 3, W))
-            for d in range(3):
-                for w in range(W):
-                    moved = place.copy()
-                    moved[d, w] += 1e-10
-                    slope[:, :, d, w] = (marched(moved, k, RUB["friction"], T) - f) / 1e-10
-            F.append(G.T @ f)
-            S.append(np.einsum("ak,awbz,bl->kwlz", G, slope, G))
-        forces.append(np.array(F))
-        slopes.append(np.array(S))
-    return at.along(forces), slopes
-
-
+@lru_cache
 def waves(W: int, samples: int) -> np.ndarray:
     """(W, samples) 1, cos, sin, cos 2, ... over a cycle."""
     t, h = 2 * np.pi * np.arange(samples) / samples, np.arange(1, W // 2 + 1)[:, None]
     return np.vstack([np.ones((1, samples)), np.stack([np.cos(h * t), np.sin(h * t)], axis=1).reshape(W - 1, samples)])
 
 
-def marched(place: np.ndarray, k: list[float], mu: float, T: np.ndarray) -> np.ndarray:
+def marched(place: np.ndarray, k: tuple[float, ...], mu: float = RUB["friction"]) -> np.ndarray:
     """(3, W) harmonics of the force of a point, two cycles."""
+    T = waves(place.shape[1], 64)
     normal, first, second = (place @ T).tolist()
     out = np.zeros((3, T.shape[1]))
     a = b = 0.0
     for cycle in range(2):
         for i, un in enumerate(normal):
             N = max(k[0] * un, 0.0)
-            a += k[1] * (first[i] - first[i - 1]) if cycle or i else 0.0
-            b += k[2] * (second[i] - second[i - 1]) if cycle or i else 0.0
+            a += k[1] * (first[i] - (first[i - 1] if cycle or i else 0.0))
+            b += k[2] * (second[i] - (second[i - 1] if cycle or i else 0.0))
             size = (a * a + b * b) ** 0.5
             if size > mu * N:
                 a, b = a * mu * N / size, b * mu * N / size
@@ -104,57 +82,124 @@ def marched(place: np.ndarray, k: list[float], mu: float, T: np.ndarray) -> np.n
     return out @ (T.T * weights) / T.shape[1]
 
 
-def dense(what: Asked, number: int, forces=compiled, frequency=FREQUENCY) -> tuple[int, float]:
-    """Points with a solution, and the highest amplitude on the grid, by dense Newton steps with halving."""
-    problem = what.problem(what.tuned.mistuned(what.deviations(number)))
+class Plain(AtFrequency):
+    """The balance with one dense matrix in every step."""
+
+    def jacobian(self, slopes):
+        return Dense(self._of_sides(slopes).dense())
+
+
+class PlainProblem(Problem):
+    """Of which every frequency is a `Plain` one."""
+
+    def at(self, Omega):
+        return Plain(**own(super().at(Omega)))
+
+
+def own(what) -> dict:
+    """The fields of a frozen object as they are."""
+    return {f.name: getattr(what, f.name) for f in fields(what)}
+
+
+@dataclass(frozen=True)
+class ByHand:
+    """The forces of one contact in plain Python, for `Asked.models`: a linear spring that opens, Coulomb friction by a
+    return map, two cycles, derivatives by differences."""
+
+    G: np.ndarray
+    k: tuple[float, ...]
+
+    def force(self, u, period):
+        return np.array([self.G.T @ marched(self.G @ one, self.k) for one in u])
+
+    def forces(self, u, period):
+        slopes = []
+        for one in u:
+            place = self.G @ one
+            f, slope = marched(place, self.k), np.zeros((*place.shape, *place.shape))
+            for at in np.ndindex(*place.shape):
+                moved = place.copy()
+                moved[at] += 1e-10
+                slope[(..., *at)] = (marched(moved, self.k) - f) / 1e-10
+            slopes.append(np.einsum("ak,awbz,bl->kwlz", self.G, slope, self.G))
+        return self.force(u, period), np.array(slopes)
+
+    def rate(self, u, period):
+        return None
+
+    @staticmethod
+    def of(ring) -> dict[int, ByHand]:
+        """Contact -> its forces."""
+        k = (np.diag(c.stiffness)[:3].tolist() for c in ring.contacts)
+        return {i: ByHand(c.patch.kinematics[0], own) for i, (c, own) in enumerate(zip(ring.contacts, k, strict=True))}
+
+
+def peaked(what: Asked, number: int, of: Asked, kind=Problem) -> Highest:
+    """A sample with its peak, as `mistuning.samples` searches for it, by any kind of balance, from the tuned ring's
+    solutions that another one has found."""
+    problem = kind(**own(what.problem(what.tuned.mistuned(what.deviations(number)))))
+    ring = Sliding(problem, of.tuned_points)
+    return highest(ring, FREQUENCY, follow=ring.follow, at_once=ring.at_once)
+
+
+def textbook(what: Asked, number: int) -> tuple[int, float]:
+    """Points with a solution, and the highest amplitude on the grid, by dense Newton steps with halving, each point
+    from its neighbour, every derivative new."""
+    problem = PlainProblem(**own(what.problem(what.tuned.mistuned(what.deviations(number)))))
     x, solved, top = None, 0, 0.0
-
-    def left(at, x):
-        return at.residual(x) if forces is compiled else at.residual_of(x, forces(at, x)[0])
-
-    for f in frequency:
+    for f in FREQUENCY:
         at = problem.at(2 * np.pi * f)
         x = at.reference if x is None else x
         for _ in range(60):
-            force, slopes = forces(at, x)
+            force, slopes = at.forces(x)
             R = at.residual_of(x, force)
             if np.abs(R).max() <= 1e-8 * np.abs(x).max():
                 solved += 1
                 top = max(top, float(np.abs(amplitudes(problem, Point(at.Omega, x, CONVERGED, 0.0, 0))).max()))
                 break
-            step, share = np.linalg.solve(at.jacobian(slopes).dense(), -R), 1.0
-            while share > 0.02 and not np.linalg.norm(left(at, x + share * step)) < np.linalg.norm(R):
+            step, share = at.jacobian(slopes).solve(-R), 1.0
+            while share > 0.02 and not np.linalg.norm(at.residual(x + share * step)) < np.linalg.norm(R):
                 share *= 0.5
             x = x + share * step
     return solved, top
 
 
 def annulus(blades: int, n: tuple[int, int, int], modes: int) -> list[str]:
-    """A CalculiX deck of bricks the size of the vane, clamped at one end, six modes each, driven at their tips."""
+    """A CalculiX deck of bricks the size of the vane, clamped at one end, each of its own modulus, a spring from tip to
+    tip: all modes, then the steady state at 24 frequencies below the first of them. In a band that holds modes CalculiX
+    adds as many points between any two."""
     places = np.stack(np.meshgrid(*(np.arange(m + 1) for m in n), indexing="ij"), axis=-1).reshape(-1, 3)
     number = np.arange(len(places)).reshape([m + 1 for m in n])
     corners = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1)]
     cells = np.stack(
         [number[i : i + n[0] or None, j : j + n[1] or None, k : k + n[2] or None][: n[0], : n[1], : n[2]].ravel()
          for i, j, k in corners], axis=1)  # fmt: skip
-    nodes, elements, held, tips = ["*NODE, NSET=NALL"], ["*ELEMENT, TYPE=C3D8I, ELSET=EALL"], ["*BOUNDARY"], ["*CLOAD"]
-    for b in range(blades):
-        first = 1 + b * len(places)
+    nodes, elements, held, tips, springs = ["*NODE, NSET=NALL"], [], ["*BOUNDARY"], ["*CLOAD"], []
+    for b, modulus in enumerate(np.random.default_rng(0).normal(1.0, 0.02, blades)):
+        first, after = 1 + b * len(places), 1 + (b + 1) % blades * len(places)
         nodes += [f"{first + i}, {x}, {y}, {z}" for i, (x, y, z) in enumerate(places * SIZE / n + [0.1 * b, 0, 0])]
+        elements.append(f"*ELEMENT, TYPE=C3D8I, ELSET=E{b}")
         elements += [f"{1 + b * len(cells) + i}, " + ", ".join(str(first + c) for c in one)
                      for i, one in enumerate(cells)]  # fmt: skip
+        elements += [f"*MATERIAL, NAME=M{b}", "*ELASTIC", f"{2.1e11 * modulus}, 0.3", "*DENSITY", "7850.",
+                     f"*SOLID SECTION, ELSET=E{b}, MATERIAL=M{b}"]  # fmt: skip
         held += [f"{first + i}, 1, 3" for i in number[:, :, 0].ravel()]
         tips.append(f"{first + number[0, 0, -1]}, 1, 2.0")
+        tip = number[0, 0, -1]
+        springs.append(f"{blades * len(cells) + 1 + b}, {first + tip}, {after + tip}")
     return [
-        *nodes, *elements, "*MATERIAL, NAME=M", "*ELASTIC", "2.1e11, 0.3", "*DENSITY", "7850.",
-        "*SOLID SECTION, ELSET=EALL, MATERIAL=M", *held, "*STEP", "*FREQUENCY, STORAGE=YES", f"{modes}", "*END STEP",
-        "*STEP", "*STEADY STATE DYNAMICS", f"{FREQUENCY[0]}, {FREQUENCY[-1]}, {len(FREQUENCY)}, 1.",
-        "*MODAL DAMPING", f"1, {modes}, 0.001", *tips, "*NODE PRINT, NSET=NALL, FREQUENCY=100", "U", "*END STEP",
+        *nodes, *elements, "*ELEMENT, TYPE=SPRINGA, ELSET=S", *springs, "*SPRING, ELSET=S", "", "4.e5", *held, "*STEP",
+        "*FREQUENCY, STORAGE=YES", f"{modes}", "*END STEP", "*STEP", "*STEADY STATE DYNAMICS",
+        f"100., 112., {len(FREQUENCY)}, 1.", "*MODAL DAMPING", f"1, {modes}, 0.001", *tips,
+        "*NODE PRINT, NSET=NALL, FREQUENCY=100", "U", "*END STEP",
     ]  # fmt: skip
 
 
 SIZE = np.array([0.005, 0.02, 0.12])
 """m, of the bricks of CalculiX."""
+
+MESHES = (1, 2, 12), (2, 4, 24), (3, 6, 30), (4, 8, 40)
+"""Elements of a brick along its edges."""
 
 
 def calculix(blades: int, n: tuple[int, int, int]) -> float | None:
@@ -194,24 +239,36 @@ def main() -> None:
 
 
 def peers(N: int) -> None:
-    """One sample by the program, and by its peers."""
-    what = asked(N)
+    """Samples by the program, and by its peers."""
+    what, linear = asked(N), asked(N, stuck=True)
     sample(what, 0)
-    own, found = timed(sample, what, 1)
-    print(f"{N} blades, sample 1: {own:.2f} s with its peak, {len(found.top.frequencies)} points", flush=True)
-    on_grid = float(np.nanmax(found.grid))
-    for name, forces, frequency in (("dense", compiled, FREQUENCY), ("by hand", by_hand, FREQUENCY[9:12])):
-        spent, (solved, top) = timed(dense, what, 1, forces, frequency)
-        whole = spent * len(FREQUENCY) / len(frequency)
-        same = float(np.nanmax(found.grid[np.isin(FREQUENCY, frequency)]))
-        print(f"{name}: {spent:.1f} s at {len(frequency)} frequencies, {solved} solved, {whole / own:.0f} times as "
-              f"long for all; highest {top / same - 1:+.1e} off", flush=True)  # fmt: skip
-    print(f"highest on the grid {on_grid:.6g} m, at the peak {found.top.amplitude:.6g} m")
-    for n in ((1, 2, 12), (4, 8, 40)):
+    alike = 0.0
+    for number in SAMPLES:
+        spent, found = timed(sample, what, number)
+        alike += spent
+        print(f"{N} blades, sample {number}: {spent:.2f} s, {len(found.top.frequencies)} points", flush=True)
+        plain, top = timed(peaked, what, number, what, PlainProblem)
+        print(f"  the same with one dense matrix: {plain:.1f} s, {plain / spent:.1f} times; highest "
+              f"{top.amplitude / found.top.amplitude - 1:+.1e} off", flush=True)  # fmt: skip
+        book, (solved, top_) = timed(textbook, what, number)
+        print(f"  on the grid alone, from the textbook: {book:.1f} s, {book / spent:.0f} times; {solved} of "
+              f"{len(FREQUENCY)} solved, highest {top_ / found.top.amplitude - 1:+.1e} off", flush=True)  # fmt: skip
+    by_hand = replace(what, models=ByHand.of)
+    plain, top = timed(peaked, by_hand, number, what, PlainProblem)
+    print(f"  sample {number} contact by contact in plain Python, one dense matrix: {plain:.1f} s, {plain / spent:.0f} "
+          f"times; highest {top.amplitude / found.top.amplitude - 1:+.1e} off", flush=True)  # fmt: skip
+    alike /= len(SAMPLES)
+    stuck = np.mean([timed(sample, linear, n)[0] for n in range(4)])
+    print(f"with sticking contacts: {stuck:.3f} s a sample", flush=True)
+    for n in MESHES[: 1 if N < 24 else None]:
         if (spent := calculix(N, n)) is not None:
             size = 3 * N * (n[0] + 1) * (n[1] + 1) * n[2]
-            print(f"ccx, {size} degrees of freedom: {spent:.1f} s, {spent / own:.1f} times as long", flush=True)
+            print(f"ccx, {size} degrees of freedom: {spent:.1f} s, {spent / alike:.0f} times as long as with friction, "
+                  f"{spent / stuck:.0f} as sticking", flush=True)  # fmt: skip
 
+
+SAMPLES = 1, 2, 3
+"""That peers solve too."""
 
 if __name__ == "__main__":
     main()

@@ -66,7 +66,10 @@ def one_point(folder: Path, monkeypatch: pytest.MonkeyPatch, points: int) -> Non
 def test_backbone_of_one_point(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The frequency falls where it slides."""
     one_point(tmp_path, monkeypatch, points=3)
+    text = Path("case.toml").read_text().replace("normal_forces = [40.0]\n", "")
+    Path("case.toml").write_text(text.replace("[[contacts]]", "[[contacts]]\nnormal_force = 40.0"))
     assert main(["backbone", "case.toml", "-q"]) == 0
+    assert {r["normal_force_N"] for r in table("backbone.csv")} == {"40"}  # also where it is the contact's own
     f = [float(r["frequency_Hz"]) for r in table("backbone.csv")]
     assert len(f) > 5 and f[-1] < 0.9 * f[0]
 

@@ -114,7 +114,7 @@ def _points(contacts: Sequence[Contact], D: Array) -> tuple[Points, ...]:
         law = jax.tree_util.tree_map(lambda x, n=n: np.broadcast_to(x, n), law) if scalar else law
         found.setdefault(tree if scalar else c.name, []).append(Points(law, own, G @ c.offset, _ground(c)))
         begin += c.patch.count
-    return tuple(jax.tree_util.tree_map(lambda *x: jnp.asarray(np.concatenate(x)), *same) if len(same) > 1
+    return tuple(jax.tree_util.tree_map(lambda *x: jax.device_put(np.concatenate(x)), *same) if len(same) > 1
                  else jax.tree_util.tree_map(jnp.asarray, same[0]) for same in found.values())  # fmt: skip
 
 
@@ -259,7 +259,7 @@ def tangents(assembly: Assembly, s: Sliding, z: Array) -> list[Tangent]:
         def force(u: Any, v: Any, law: Any = c.patch.law, n: int = n) -> Any:
             return law.rates(u, v, jnp.zeros((0, n)), 0.0, 0.0)[0]
 
-        at = jnp.asarray(u), jnp.asarray(-ground)
+        at = jax.device_put(u), jax.device_put(-ground)
         still = jnp.zeros_like(at[0])
         ways = [still.at[:, j].set(1.0) for j in range(3)]
         stiff = np.stack([np.asarray(jax.jvp(force, at, (way, still))[1]) for way in ways], axis=2)

@@ -25,7 +25,7 @@ from ..results.series import READ
 from ..units import METRES, Quantity
 from .assemble import Built, build
 from .contacts import swept
-from .problem import normal_forces, problem_of
+from .problem import normal_forces, pressed_by, problem_of
 from .questions import CurveOfCase
 from .settings import CaseSettings
 from .surveys import Bases, Report
@@ -199,22 +199,21 @@ def curves(
                 if over != "frequency":
                     at = asked.frequency or _resonance(built, problem, normal, journal, path, report)
                     one = replace(one, frequency=at)
-                one = one.named
-                found.append(_followed(_family(built, problem, one), problem, one, normal, journal, report, how))
+                one, pressed = one.named, pressed_by(built, problem) if normal is None else normal
+                found.append(_followed(_family(built, problem, one), problem, one, pressed, journal, report, how))
                 if found[-1].leaves_out:
                     one = found[-1].turned
-                    found.append(_followed(_family(built, problem, one), problem, one, normal, journal, report, how))
+                    found.append(_followed(_family(built, problem, one), problem, one, pressed, journal, report, how))
             except KeyboardInterrupt:
                 return [*found, replace(one, rows=points_of_curve(journal, one.name))], False
     return found, True
 
 
 def _followed(
-    family: Family, problem: Problem, one: Followed, normal: float | None, journal: Journal, report: Report,
-    how: Settings,
+    family: Family, problem: Problem, one: Followed, normal: float, journal: Journal, report: Report, how: Settings,
 ) -> Followed:  # fmt: skip
     """A curve with its points, kept in a series of the journal."""
-    told = {**journal.head.get("parameters", {}), one.name: {"normal_force": normal or 0.0}}
+    told = {**journal.head.get("parameters", {}), one.name: {"normal_force": normal}}
     journal.say({**journal.head, "parameters": told, "labels": labels(problem), "over": one.over})
     report(f"curve over the {one.over.replace('_', ' ')}, {one.label}")
     branch, rows = resumed_curve(family, journal, one.name, report, how)

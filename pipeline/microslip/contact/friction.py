@@ -66,7 +66,7 @@ class Friction:
 
     def columns(self, speeds: np.ndarray, pressed: float) -> dict[str, np.ndarray]:
         """Name -> values at speeds (m/s) under a normal force (N), for a table."""
-        return {"coefficient": np.array(self.coefficient(jnp.asarray(speeds), jnp.full(len(speeds), pressed)))}
+        return {"coefficient": np.array(self.coefficient(jax.device_put(speeds), jnp.full(len(speeds), pressed)))}
 
 
 FASTEST = 50.0
@@ -164,7 +164,7 @@ class Heated(Friction):
         return float(self._p_v(jnp.asarray(pressed)))
 
     def columns(self, speeds: np.ndarray, pressed: float) -> dict[str, np.ndarray]:
-        warm = np.array(self.temperature(jnp.asarray(speeds), jnp.full(len(speeds), pressed)))
+        warm = np.array(self.temperature(jax.device_put(speeds), jnp.full(len(speeds), pressed)))
         return super().columns(speeds, pressed) | {"temperature_rise_K": warm}
 
     def temperature(self, speed: Array, pressed: Array) -> Array:
@@ -245,7 +245,7 @@ def characteristic(speeds: ArrayLike, values: ArrayLike, where: str = "the table
     x = np.log(v)
     slopes = PchipInterpolator(x, mu)(x, 1)
     slopes[[0, -1]] = 0.0  # constant outside
-    speed, value, slope = (jnp.asarray(column)[:, None] for column in (v, mu, slopes))
+    speed, value, slope = (jax.device_put(column)[:, None] for column in (v, mu, slopes))
     for name, given in shift.items():
         bounded(f"{where}: {name}", given)
     made = Measured(speed, value, slope, **shift)
@@ -327,7 +327,7 @@ def scattered(
     phases = random.uniform(0, 2 * np.pi, (cosines, points))
     quantiles = (np.arange(cosines)[:, None] + random.uniform(0, 1, (cosines, points))) / cosines
     share = deviation if isinstance(deviation, Friction) else jnp.asarray(float(deviation))
-    return Scattered(mean, share, jnp.asarray(float(memory)), jnp.asarray(phases), jnp.asarray(quantiles))
+    return Scattered(mean, share, jnp.asarray(float(memory)), jax.device_put(phases), jax.device_put(quantiles))
 
 
 # --- dry and fluid parts of a lubricated rough surface -------------------------------------------------------------

@@ -102,7 +102,7 @@ def values(made: Any, what: str, x: ArrayLike) -> np.ndarray:
     shape.
     """
     x = np.asarray(x, dtype=float)
-    padded = np.zeros(1 << max(x.size - 1, 63).bit_length())
+    padded = np.zeros(1 << max(x.size - 1, 1023).bit_length())
     padded[: x.size] = x.ravel()
     return np.array(_values(made, what, padded))[: x.size].reshape(x.shape)
 
@@ -389,7 +389,6 @@ def history(law: Law, u: Array, dt: float | Array, state: State | None = None) -
     """
     state = law.init(u.shape[1]) if state is None else state
     v = velocities(u, dt, 2 * u[0] - u[1] if len(u) > 1 else u[0])
-    force_0, state = law.step(u[0], v[0], dt, state)
 
     def one(carried: tuple[State, Array, Array, Array], sample: tuple[Array, Array]) -> tuple[Any, tuple[Array, ...]]:
         state, before, force_before, work = carried
@@ -397,11 +396,9 @@ def history(law: Law, u: Array, dt: float | Array, state: State | None = None) -
         work = work + 0.5 * jnp.sum((force + force_before) * (sample[0] - before), axis=-1)
         return (state, sample[0], force, work), (force, law.slip(state), work - law.stored(sample[0], state))
 
-    start = (state, u[0], force_0, law.stored(u[0], state))
-    (after, *_), (force, slip, dissipated) = jax.lax.scan(one, start, (u[1:], v[1:]))
-    first = (force_0, law.slip(state), jnp.zeros(u.shape[1]))
-    whole = [jnp.concatenate([f[None], r]) for f, r in zip(first, (force, slip, dissipated), strict=True)]
-    return History(whole[0], whole[1], whole[2], after)
+    start = (state, u[0], jnp.zeros_like(u[0]), jnp.zeros(u.shape[1]))  # no way to the first, and no work
+    (after, *_), (force, slip, lost) = jax.lax.scan(one, start, (u, v))
+    return History(force, slip, lost - lost[0], after)
 
 
 def root(value: Array) -> Array:

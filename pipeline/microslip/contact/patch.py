@@ -137,7 +137,7 @@ def pressed_by(patch: Patch, interference: float, compliance: Array | None = Non
 
 def pressure(patch: Patch, u: Array) -> Array:
     """(n,) contact pressure of the points (Pa) at coordinates (k,), friction left out."""
-    return np.asarray(_normal(patch.law, jnp.asarray(patch.kinematics[:, 0] @ u))[0]) / patch.areas
+    return np.asarray(_normal(patch.law, patch.kinematics[:, 0] @ u)[0]) / patch.areas
 
 
 def pressing(patch: Patch, u: Array) -> Array:
@@ -201,7 +201,7 @@ def _deep_enough(patch: Patch, normal: float) -> float:
 def _pressed(patch: Patch, u: Array) -> tuple[Array, Array]:
     """(k,) forces of the normal pressure at (k,) coordinates, and (k, k) their derivative."""
     G = patch.kinematics[:, 0]
-    force, slope = (_known(patch, part) for part in _normal(patch.law, jnp.asarray(G @ u)))
+    force, slope = (_known(patch, part) for part in _normal(patch.law, G @ u))
     return G.T @ force, G.T @ (slope[:, None] * G)
 
 
@@ -233,7 +233,7 @@ def stuck_stiffness(patch: Patch, u: Array) -> Array:
         UserError: a law without one.
     """
     G = patch.kinematics
-    return np.einsum("nia,nij,njb->ab", G, _known(patch, _tangent(patch.law, jnp.asarray(G @ u))), G)
+    return np.einsum("nia,nij,njb->ab", G, _known(patch, _tangent(patch.law, G @ u)), G)
 
 
 @program

@@ -10,6 +10,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, NamedTuple
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 from numpy.typing import ArrayLike
@@ -222,7 +223,7 @@ class Strips(Sliders):
 
     def under(self, force: ArrayLike) -> Strips:
         """The same contact under a constant normal force (N, one or one per point), whatever the normal motion."""
-        return replace(self, held=jnp.asarray(self.approach(force)))
+        return replace(self, held=jax.device_put(self.approach(force)))
 
     def _overlap(self, approach: Array) -> Array:
         """(m, n) how far each strip is pressed, m."""
@@ -339,7 +340,7 @@ def segalman(count: int, exponent: float, ratio_last: float, smallest: float = 1
 def _columns(shares: np.ndarray, displacements: np.ndarray) -> tuple[Array, Array]:
     """Shares of the stiffness and of the strength from stiffnesses and the displacements at which sliders let go."""
     strengths = shares * displacements
-    return tuple(jnp.asarray((part / part.sum())[:, None]) for part in (shares, strengths))  # type: ignore[return-value]
+    return tuple(jax.device_put((part / part.sum())[:, None]) for part in (shares, strengths))  # type: ignore[return-value]
 
 
 def _counted(count: int) -> None:
@@ -417,7 +418,7 @@ def _strips(
     at: np.ndarray, shares: np.ndarray, depth: float, stiffness_0: float, stiffness_t: float, mu: float
 ) -> Strips:
     depth_, c_N0, c_R0, friction = (jnp.asarray(x, dtype=float) for x in (depth, stiffness_0, stiffness_t, mu))
-    return Strips(jnp.asarray(at[:, None]), jnp.asarray(shares[:, None]), depth_, c_N0, c_R0, friction)
+    return Strips(jax.device_put(at[:, None]), jax.device_put(shares[:, None]), depth_, c_N0, c_R0, friction)
 
 
 def _edges(x: np.ndarray, area: np.ndarray, count: int) -> np.ndarray:

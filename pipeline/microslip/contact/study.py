@@ -183,7 +183,7 @@ def _characteristic(c: ContactModel, working: tuple[float, float] | None, found:
     speeds = c.friction.speeds_shown(pressed)
     table = {"speed_m/s": speeds, **c.friction.columns(speeds, pressed)}
     if isinstance(c.law, MassContact):
-        table["smoothed"] = table["coefficient"] * np.array(smoothed(jnp.asarray(speeds), c.law.slope))
+        table["smoothed"] = table["coefficient"] * np.array(smoothed(jax.device_put(speeds), c.law.slope))
     found.tables["friction"] = table
 
 
@@ -211,15 +211,15 @@ def _motion(c: ContactModel, working: tuple[float, float] | None, found: _Findin
     time = np.arange(motion.cycles * motion.samples + 1) / (motion.samples * motion.frequency)
     path = _path(motion, working[0])
     amplitudes = _amplitudes(c, working)
-    u = np.asarray(jax.vmap(path)(jnp.asarray(time)))
+    u = np.asarray(jax.vmap(path)(jax.device_put(time)))
     loops = _loop_paths(amplitudes, working[0], motion, time)
     if isinstance(c.law, MassContact):
         told = integrate(c.law, path, time)
         force, slip, speed = told.force, told.point, told.velocity
         slips = np.linalg.norm(speed, axis=1) * float(c.law.slope) > CREEP
-        loop_force = np.asarray(history(c.law, jnp.asarray(loops), time[1]).force) if len(amplitudes) else loops
+        loop_force = np.asarray(history(c.law, loops, time[1]).force) if len(amplitudes) else loops
     else:
-        done = history(c.law, jnp.asarray(np.concatenate([u[:, None], loops], axis=1)), time[1])
+        done = history(c.law, np.concatenate([u[:, None], loops], axis=1), time[1])
         force, slip, loop_force = np.asarray(done.force[:, 0]), np.array(done.slip[:, 0]), np.asarray(done.force[:, 1:])
         slips, speed = _slips(c, force, slip, time), np.gradient(slip, time, axis=0)
     apart = (force[:, 0] <= 0) & c.settings.what.opens
@@ -321,7 +321,7 @@ def _slips(c: ContactModel, force: np.ndarray, slip: np.ndarray, time: np.ndarra
     if isinstance(c.law, PointContact | Jenkins):
         moved = np.linalg.norm(np.diff(slip, axis=0, prepend=slip[:1]), axis=1)
         return moved > 1e-9 * max(float(np.ptp(slip, axis=0).max()), 1e-300)
-    held = np.asarray(c.friction.coefficient(jnp.zeros(len(force)), jnp.asarray(force[:, 0]))) * force[:, 0]
+    held = np.asarray(c.friction.coefficient(jnp.zeros(len(force)), jax.device_put(force[:, 0]))) * force[:, 0]
     return np.hypot(force[:, 1], force[:, 2]) > (1 - 1e-6) * held
 
 

@@ -301,7 +301,7 @@ def predicted(state: State, length: float, settings: Settings) -> Array:
 
 
 def _within_the_angle(state: State, length: float, settings: Settings) -> tuple[float, Array]:
-    """A length, shortened until the predicted point is at most half the angle off the tangent, and the point."""
+    """A length, shortened until the predicted point is off the tangent by half the angle at most, and that point."""
     for _ in range(10):
         guess = predicted(state, length, settings)
         if norm(guess - state.y - length * state.tangent) <= 0.5 * settings.angle * length:

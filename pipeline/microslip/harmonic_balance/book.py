@@ -258,7 +258,7 @@ def swings(
     unit, scale, stiffness, (middle, half) = _scaled(law)
     table = normal_table(unit, middle, half, tolerance, where)
     placed = (jnp.asarray(x, dtype=float) for x in (middle, half, scale, stiffness))
-    return Swings(unit, jnp.asarray(table.arrays["coefficients"]), *placed), table
+    return Swings(unit, jax.device_put(table.arrays["coefficients"]), *placed), table
 
 
 # The contact plane -------------------------------------------------------------------------------------------------
@@ -482,7 +482,7 @@ class BookPatch:
     @cached_property
     def kinematics(self) -> Any:
         """(n, 3, k) jax array."""
-        return jnp.asarray(self.patch.kinematics)
+        return jax.device_put(self.patch.kinematics)
 
     def force(self, u: Array, period: float = 1.0) -> Array:
         """(c, k, 3) mean, cos and sin of the resultants, N and N m, of coordinates u (c, k, 3), m and rad.

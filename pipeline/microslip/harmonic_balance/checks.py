@@ -48,23 +48,21 @@ def _apart(problem: Problem, found: Operating) -> float:
 
 def _moving(problem: Problem, component: Component, found: Operating) -> dict[tuple[int, int], ComplexArray]:
     """(contact, side) of a component -> (k, H + 1) its motion there, from its coordinates and the forces on it."""
-    a, moved = problem.assembly, []
-    sides = a.sides(component.name)
-    for h in range(problem.harmonics + 1):
-        index, q = a.index(h), found.q[component.name][h]
+    a, sides = problem.assembly, problem.assembly.sides(component.name)
+    moved = {(i, j): np.empty((a.contacts[i].patch.count, problem.harmonics + 1), complex) for i, j, _ in sides}
+    for hs in problem.waves:
+        index, q = a.index(hs[0]), np.array([found.q[component.name][h] for h in hs])
         at = component.at(index)
         labels = at.group.compliance.labels
-        touched, loaded = forces_on(problem, component, h, found, labels)
-        if h and at.loss is not None:
-            touched = (1 - 1j * component.residual_loss) * touched
-        row = []
-        for _, _, s in sides:
-            own = s.motion(at, index, a.blades) @ q
-            if s.rows is None:
-                own = own + s.frame @ at.residual(s.labels, labels) @ (touched + loaded) * s.phase(index, a.blades)
-            row.append(own)
-        moved.append(row)
-    return {(i, j): np.column_stack([row[n] for row in moved]) for n, (i, j, _) in enumerate(sides)}
+        both = [forces_on(problem, component, h, found, labels) for h in hs] if labels else []
+        lossy = 1 - 1j * component.residual_loss if hs[0] and at.loss is not None else 1.0
+        forces = np.array([lossy * touched + loaded for touched, loaded in both])
+        for i, j, s in sides:
+            own = s.motion(at, index, a.blades) @ q.T
+            if s.rows is None and labels:
+                own = own + s.frame @ at.residual(s.labels, labels) @ forces.T * s.phase(index, a.blades)
+            moved[i, j][:, hs] = own
+    return moved
 
 
 def forces_on(

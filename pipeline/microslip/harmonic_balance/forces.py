@@ -78,7 +78,7 @@ class AFT:
         """(s, W) derivative of the series over the time in cycles, at the samples."""
         if self.torus is not None:
             return self.torus.ahead
-        return 2 * np.pi * self.waves(coefficients)[0] @ derivative(coefficients)
+        return _ahead(coefficients // 2, self.samples)
 
     @cached_property
     def law(self) -> Law:
@@ -96,7 +96,7 @@ class AFT:
     @cached_property
     def kinematics(self) -> Any:
         """(n, 3, k) jax array."""
-        return jnp.asarray(self.patch.kinematics)
+        return jax.device_put(self.patch.kinematics)
 
     def _given(self, u: Array, period: float) -> tuple[Any, ...]:
         """Arguments of the programs; a NumPy number as the period would compile them again."""
@@ -139,6 +139,11 @@ class AFT:
 def _waves(harmonics: int, samples: int) -> tuple[Array, Array]:
     values, transform = fourier(harmonics, samples)
     return np.asarray(values), np.asarray(transform)
+
+
+@lru_cache(maxsize=8)
+def _ahead(harmonics: int, samples: int) -> Array:
+    return 2 * np.pi * _waves(harmonics, samples)[0] @ derivative(2 * harmonics + 1)
 
 
 def repeated(law: Law, n: int, times: int) -> Law:

@@ -268,8 +268,8 @@ def _edge(nodes: int = 129) -> Array:
 def _longest_sticking(e: Array) -> Array:
     """A_c of shares e: the half-axis beyond which the slider never sticks."""
     e = np.clip(e, THINNEST, 1.0)
-    table = Orbits(jnp.zeros((2, 4, 6, 6)), jnp.asarray(_edge_spline(_edge())))
-    return 1 / np.sin(0.5 * np.asarray(table.last(jnp.asarray(e), jnp.asarray(1 - e)))) ** 2
+    table = Orbits(jnp.zeros((2, 4, 6, 6)), jax.device_put(_edge_spline(_edge())))
+    return 1 / np.sin(0.5 * np.asarray(table.last(jax.device_put(e), jax.device_put(1 - e)))) ** 2
 
 
 def _edge_spline(rho: Array) -> Array:
@@ -373,4 +373,4 @@ def orbits(tolerance: float = TOLERANCE, where: Path | None = None) -> tuple[Orb
         table = read(SHIPPED, KIND, LAW)
     else:
         table = kept(KIND, LAW, tolerance, lambda: make(tolerance), where)
-    return Orbits(*(jnp.asarray(table.arrays[name]) for name in ("coefficients", "edge"))), table
+    return Orbits(*(jax.device_put(table.arrays[name]) for name in ("coefficients", "edge"))), table

@@ -61,7 +61,7 @@ def traced(
     if waves is None:
         values = np.asarray(fourier(u.shape[1] // 2, samples)[0])
         waves = values, 2 * np.pi * values @ derivative(u.shape[1])
-    parts = _point_cycles(law, jnp.asarray(G), jnp.asarray(u), float(period), *waves, count, periodicity)
+    parts = _point_cycles(law, G, u, float(period), *waves, count, periodicity)
     dissipated, by_slip, lost, slipping, open_ = (np.asarray(p) for p in parts[:5])
     return Traced(parts[6], Cycle(dissipated, by_slip, lost, slipping, open_, float(parts[5])))
 

@@ -203,6 +203,14 @@ class Problem:
         return [slice(b, b + p.count) for b, p in zip(self.begins, self.parts[0], strict=True)]
 
     @cached_property
+    def waves(self) -> list[list[int]]:
+        """The mean, and the harmonics by the wave of the ring that the components move in."""
+        found: dict[int, list[int]] = {}
+        for h in range(1, self.harmonics + 1):
+            found.setdefault(self.assembly.index(h), []).append(h)
+        return [[0], *found.values()]
+
+    @cached_property
     def alike(self) -> list[tuple[Indices, Indices]]:
         """Of n parts with as many coordinates their numbers, and (n, c) these."""
         found: dict[int, list[int]] = {}
@@ -472,14 +480,15 @@ class AtFrequency:
     def modal(self, x: Array, force: Array) -> list[list[ComplexArray]]:
         """Harmonic -> part -> (m,) amplitudes of the bodies' coordinates."""
         p = self.problem
-        g = np.array(self.amplitudes(self._excess(p.displacement(x), force)))
+        g = self.amplitudes(self._excess(p.displacement(x), force))
         each = [one.coordinates(self.Omega, p.share, g[:, at]) for one, at in zip(p.eliminated, p.slices, strict=True)]
         return [list(parts) for parts in zip(*each, strict=True)]
 
-    def amplitudes(self, v: Array) -> list[ComplexArray]:
-        """(c,) complex amplitudes of the harmonics 0 to H of (W, c) real ones."""
-        pairs = zip(v[1::2], v[2::2], strict=True)
-        return [v[0].astype(complex), *(cos - 1j * sin for cos, sin in pairs)]
+    def amplitudes(self, v: Array) -> ComplexArray:
+        """(H + 1, c) complex amplitudes of (W, c) real ones."""
+        out = np.empty((len(v) // 2 + 1, v.shape[1]), complex)
+        out[0], out[1:] = v[0], v[1::2] - 1j * v[2::2]
+        return out
 
     def _excess(self, v: Array, force: Array) -> Array:
         """(W, c) p: forces less the preload, less what the reference stiffness makes of the displacement."""

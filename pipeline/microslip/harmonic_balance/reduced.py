@@ -329,21 +329,43 @@ def _alike(a: Linear, b: Linear) -> bool:
 
 def monitored(part: Linear, q: ComplexArray, force: ComplexArray, share: float = 1.0) -> ComplexArray:
     """(w,) read-outs under (c,) contact forces less the preload and a share of the loads, of one harmonic."""
-    return part.output @ q + share * part.output_given - part.output_residual @ force
+    return moved(part, q, force) + share * part.output_given
+
+
+def moved(part: Linear, q: ComplexArray, force: ComplexArray) -> ComplexArray:
+    """(w, ...) read-outs by (m, ...) coordinates and (c, ...) contact forces less the preload alone."""
+    return part.output @ q - part.output_residual @ force
 
 
 def work(
-    part: Linear, Omega: float, harmonic: int, q: ComplexArray, force: ComplexArray, share: float = 1.0
-) -> tuple[float, float, float, float]:
+    parts: Sequence[Linear], Omega: float, harmonics: Sequence[int], q: ComplexArray, force: ComplexArray,
+    share: float = 1.0,
+) -> Array:  # fmt: skip
     """Work of a share of the loads, loss in the bodies' own damping and to circulatory forces, and what the loads would
-    do in phase with the speed, J per cycle, and the largest kinetic energy, J, in one harmonic that is not 0."""
-    moved = share * (part.load.conj() @ q - part.given.conj() @ force)
-    lost = (q.conj() @ (Omega * harmonic * part.viscous(Omega * harmonic)) @ q).real
-    lost += 0.5 * (q.conj() @ (part.K - part.K.conj().T) @ q).imag
+    do in phase with the speed, J per cycle, and the largest kinetic energy, J, added up over g harmonics of one wave.
+
+    Args:
+        parts: (g,), equal but for the loads. harmonics: (g,), not 0. q: (g, m). force: (g, c).
+    """
+    part, h = parts[0], np.array(harmonics)
+    w, moved = Omega * h, np.zeros(len(h), complex)
+    for i, one in enumerate(parts):
+        if one.load.any() or one.given.any():
+            moved[i] = share * (one.load.conj() @ q[i] - one.given.conj() @ force[i])
+    lost = w * _squared(part.C, q).real
+    if part.loss is not None:
+        lost += _squared(part.loss, q).real
+    if (turning := part.K - part.K.conj().T).any():
+        lost += 0.5 * _squared(turning, q).imag
     if part.residual_loss is not None:
-        lost += (force.conj() @ part.residual_loss @ force).real
-    cycle, kinetic = np.pi * harmonic, 0.5 * (Omega * harmonic) ** 2 * float((q.conj() @ part.M @ q).real)
-    return -cycle * float(moved.imag), cycle * float(lost), cycle * float(abs(moved)), kinetic
+        lost += _squared(part.residual_loss, force).real
+    each = -h * moved.imag, h * lost, h * np.abs(moved)
+    return np.array([*(np.pi * one.sum() for one in each), 0.5 * (w**2 * _squared(part.M, q).real).sum()])
+
+
+def _squared(A: Array, q: ComplexArray) -> ComplexArray:
+    """(g,) q^H A q of every row of (g, m)."""
+    return (q.conj() * (q @ A.T)).sum(axis=1)
 
 
 def untouched(part: Linear) -> Linear:

@@ -64,17 +64,19 @@ def operating(problem: Problem, point: Point) -> Operating:
     cycles = [g.point_cycles(u, at.period) for g, u in zip(p.groups, relative, strict=True)]
     beyond = at.along(forces)
     q, f = at.modal(point.x, beyond), at.amplitudes(beyond)
-    outputs, work = [], np.zeros(4)
-    for h, parts in enumerate(p.parts):
-        each = list(zip(parts, q[h], [f[h][s] for s in p.slices], strict=True))
-        share = p.share if h else 1.0
-        outputs.append(np.sum([reduced.monitored(part, own, F, share) for part, own, F in each], axis=0))
-        if h:
-            work += np.sum([reduced.work(part, at.Omega, h, own, F, share) for part, own, F in each], axis=0)
+    outputs, work = np.zeros((len(p.assembly.outputs), p.harmonics + 1), complex), np.zeros(4)
+    for hs in p.waves:
+        for i, s in enumerate(p.slices):
+            parts, own, F = [p.parts[h][i] for h in hs], np.array([q[h][i] for h in hs]), f[hs, s]
+            share = p.share if hs[0] else 1.0
+            outputs[:, hs] += reduced.moved(parts[0], own.T, F.T)
+            outputs[:, hs] += share * np.array([part.output_given for part in parts]).T
+            if hs[0]:
+                work += reduced.work(parts, at.Omega, hs, own, F, share)
     found = Operating(
         at.Omega,
         {m.name: [_own(p, i, h, q[h]) for h in range(p.harmonics + 1)] for i, m in enumerate(p.assembly.components)},
-        np.array(outputs).T,
+        outputs,
         _by_contact(p, relative),
         _by_contact(p, forces),
         float(work[0]),

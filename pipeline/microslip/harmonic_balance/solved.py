@@ -78,11 +78,8 @@ class Motions(Series):
 
     @cached_property
     def _rows(self) -> list[dict[str, Any]]:
-        return [record(self.problem(float(v)), p, self.motion(i)) for i, (v, p) in enumerate(self._pairs)]
-
-    @property
-    def _pairs(self) -> list[tuple[float, Point]]:
-        return list(zip(self.parameter.tolist(), self.points, strict=True))
+        problems = [self.problem(v) for v in self.parameter.tolist()]
+        return [record(one, p, operating(one, p)) for one, p in zip(problems, self.points, strict=True)]
 
     @cached_property
     def status(self) -> tuple[str, ...]:
@@ -101,14 +98,13 @@ class Motions(Series):
 
     def motion(self, i: int) -> Operating:
         """All that belongs to point number i: coordinates of the bodies, forces and cycles of the contacts."""
-        value, point = self._pairs[i]
-        return operating(self.problem(value), point)
+        return operating(self.problem(float(self.parameter[i])), self.points[i])
 
     def error_estimate(self, i: int | None = None) -> accuracy.Error:
         """What more harmonics and samples would change of a point, the largest one if none is named: ``readout`` is the
         share of its amplitude."""
         i = int(np.argmax(np.where(self.converged, self.amplitude, 0.0))) if i is None else i
-        value, point = self._pairs[i]
+        value, point = float(self.parameter[i]), self.points[i]
         return accuracy.error(self.problem(value), point.x, point.Omega)
 
     def save(self, path: Path | str) -> Path:

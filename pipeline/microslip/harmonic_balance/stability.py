@@ -257,8 +257,8 @@ class _Memory:
 def _carrier(orbit: Orbit, steps: int) -> tuple[Callable[[Array], Array], Array]:
     """The map (N, k) -> (N, k) of one period, and the (N,) units of its coordinates: q, q', states that matter."""
     dt = orbit.period / steps
-    G = tuple(jnp.asarray(g) for g in orbit.kinematics)
-    parts = tuple(jnp.asarray(orbit.displacement[rows]) for rows in orbit.blocks)
+    G = tuple(jax.device_put(g) for g in orbit.kinematics)
+    parts = tuple(jax.device_put(orbit.displacement[rows]) for rows in orbit.blocks)
     body = _middle(orbit, dt)
     path = _followed(orbit.laws, G, parts, orbit.period, steps, orbit.cycles, body)
     along = zip(orbit.laws, path.u, path.v, path.states, strict=True)
@@ -268,7 +268,7 @@ def _carrier(orbit: Orbit, steps: int) -> tuple[Callable[[Array], Array], Array]
     memory = _Memory(told, tuple(tuple(leaf.shape[1:]) for leaf, t in pairs if t))
 
     def carry(start: Array) -> Array:
-        return np.asarray(_carried(orbit.laws, G, path, body, jnp.asarray(start.T), dt, memory)).T
+        return np.asarray(_carried(orbit.laws, G, path, body, jax.device_put(start.T), dt, memory)).T
 
     return carry, _units(orbit, memory.kept(path.states))
 
@@ -290,7 +290,7 @@ def _middle(orbit: Orbit, h: float) -> _Body:
     speed, by_force = solved[:, : 2 * m], solved[:, 2 * m :]
     place = np.eye(m, 2 * m) + 0.5 * h * speed
     arrays = (place, speed, 0.5 * h * by_force, by_force, orbit.rows, orbit.compliance)
-    return _Body(*(jnp.asarray(a) for a in arrays))
+    return _Body(*(jax.device_put(a) for a in arrays))
 
 
 # the contacts along the orbit ---------------------------------------------------------------------------------------
@@ -366,7 +366,7 @@ def _effects(law: Law, u: jax.Array, v: jax.Array, states: State, dt: float) -> 
     """(leaves, 1 + leaves) largest change along the orbit of the force, and of every leaf, when a leaf is moved."""
     leaves, tree = jax.tree_util.tree_flatten(states)
     rng = np.random.default_rng(0)
-    moved = [jnp.asarray(rng.normal(size=leaf.shape[1:])) for leaf in leaves]
+    moved = [jax.device_put(rng.normal(size=leaf.shape[1:])) for leaf in leaves]
 
     def one(largest: jax.Array, sample: tuple[Any, ...]) -> tuple[jax.Array, None]:
         at, rate, state = sample

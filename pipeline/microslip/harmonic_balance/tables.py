@@ -155,7 +155,7 @@ def _at(spline: Spline, s: jax.Array, t: jax.Array) -> jax.Array:
 def _on_grid(coefficients: Array, s: Array) -> Array:
     """(m, p, p) spline values on the grid of s along both axes."""
     S, T = (x.ravel() for x in np.meshgrid(s, s, indexing="ij"))
-    return np.asarray(_at(Spline(jnp.asarray(coefficients[None])), S, T)).reshape(-1, len(s), len(s))
+    return np.asarray(_at(Spline(jax.device_put(coefficients[None])), S, T)).reshape(-1, len(s), len(s))
 
 
 def in_chunks(function: Callable[..., Sequence[Any]], *of: Array, size: int = 512) -> tuple[Array, ...]:
@@ -166,7 +166,7 @@ def in_chunks(function: Callable[..., Sequence[Any]], *of: Array, size: int = 51
     n, parts = of[0].shape[-1], []
     for start in range(0, n, size):
         at = np.minimum(np.arange(start, start + size), n - 1)
-        parts.append(function(*(jnp.asarray(x[..., at]) for x in of)))
+        parts.append(function(*(jax.device_put(x[..., at]) for x in of)))
     return tuple(np.concatenate([np.asarray(p) for p in part], axis=-1)[..., :n] for part in zip(*parts, strict=True))
 
 

@@ -242,7 +242,7 @@ def _powers(b: TwoTone, p: Point) -> list[float]:
     s, supplied, damped = _shown(b, p), [0.0, 0.0], 0.0
     for k, part, w, q, F in zip(b.torus.pairs, s.parts[1:], s.w[1:], s.q[1:], s.F[1:], strict=True):
         if w:
-            done, lost, *_ = reduced.work(part, float(w), 1, q, F)
+            done, lost, *_ = reduced.work([part], float(w), [1], q[None], F[None])
             supplied[int(k[0] == 0)] += done * w / (2 * np.pi)
             damped += lost * w / (2 * np.pi)
     v = b.displacement(p.x)

@@ -17,7 +17,7 @@ import numpy as np
 from ..basis import read_basis
 from ..case import CaseSettings, checkpoint, load_case
 from ..case.assemble import Built, build
-from ..case.problem import problem_of
+from ..case.problem import pressed_by, problem_of
 from ..continuation import NO_OPTIMUM
 from ..data import ModalBasis, UserError
 from ..files import store
@@ -124,14 +124,15 @@ def backbones(
     forces = [n for n in normal_forces(built) if n != 0] or normal_forces(built)
     if 0.0 in normal_forces(built):
         report("left out: a normal force of 0 N, under which nothing sticks")
-    for i, normal in enumerate(forces):
-        report(f"backbone at F_N = {normal or 0:g} N, {i + 1} of {len(forces)}")
-        problem = problem_of(built, normal, form="relative")
+    for count, asked in enumerate(forces, 1):
+        problem = problem_of(built, asked, form="relative")
+        normal = pressed_by(built, problem) if asked is None else asked
+        report(f"backbone at F_N = {normal:g} N, {count} of {len(forces)}")
         number = mode - 1 if mode is not None else strongest(problem, band[0], band[1])
         begins = sliding_amplitude(problem, number)
-        found[normal or 0.0] = backbone(problem, low or begins / 30, high or begins * 30, number, report=report)
+        found[normal] = backbone(problem, low or begins / 30, high or begins * 30, number, report=report)
         _backbone_table(found, case)
-        one = found[normal or 0.0]
+        one = found[normal]
         said = f"mode {number + 1}, {one.stuck / 2 / np.pi:.6g} Hz stuck"
         if len(one.amplitude):
             i = int(np.argmax(one.damping))
@@ -140,7 +141,7 @@ def backbones(
                 f"{100 * one.damping[i]:.3g} % at {of.sized(one.amplitude[i], 3)}"
             )
             said += f"; {checked(largest(one.checks))}"
-        report(f"F_N = {normal or 0:g} N: {said}" + ("" if one.complete else f" ({one.status})"))
+        report(f"F_N = {normal:g} N: {said}" + ("" if one.complete else f" ({one.status})"))
     return found
 
 

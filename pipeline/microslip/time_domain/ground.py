@@ -15,6 +15,7 @@ import math
 from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 
@@ -138,12 +139,12 @@ def moving(law: Law, ground: Ground, points: np.ndarray) -> Moving:
     """A law of points (n, 2), m along t1 and t2, on a ground."""
     e = np.array([np.cos(ground.angle), np.sin(ground.angle)])
     amplitude, length, phase = np.array(ground.waves or [(0.0, 1.0, 0.0)]).T[:, :, None]
-    waves = jnp.asarray(amplitude), jnp.asarray(2 * np.pi / length), jnp.asarray(phase)
-    along, place, speed = jnp.asarray(e[:, None]), jnp.asarray(points @ e), value(ground.velocity)
+    waves = jax.device_put(amplitude), jax.device_put(2 * np.pi / length), jax.device_put(phase)
+    along, place, speed = jax.device_put(e[:, None]), jax.device_put(points @ e), value(ground.velocity)
     if ground.spin:
         V = ground.velocities(points).T
         fastest = np.linalg.norm(V, axis=0)
-        along, speed = jnp.asarray(V / np.where(fastest > 0, fastest, 1.0)), jnp.asarray(fastest)
+        along, speed = jax.device_put(V / np.where(fastest > 0, fastest, 1.0)), jax.device_put(fastest)
     return Moving(law, speed, along, place, *waves, ground.pushes, bool(ground.waves))
 
 

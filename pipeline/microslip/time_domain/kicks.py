@@ -7,26 +7,25 @@ from __future__ import annotations
 
 from typing import Any
 
+import jax
 import jax.numpy as jnp
 
-from .bodies import Bodies, Now, Options, by_force
+from .bodies import Bodies, Now, Options, by_force, exponent
 from .braking import slowed
 from .contacts import Group, Held, answer, force_at, rigid_answer, times
 
 
-def step(options: Options, groups: tuple[Group, ...], B: Bodies, k: Any, now: Now) -> Now:
-    """2^k steps, of which more than one only where no contact is met in them."""
+def step(options: Options, groups: tuple[Group, ...], B: Bodies, n: Any, now: Now) -> Now:
+    """n steps, of which more than one only where no contact is met in them."""
     p = B.omega2.shape[1]
-    dt = B.flow.length[k]
+    dt = B.flow.length[0] * n
     touched, pushed = 0.5 * dt * now.push, 0.5 * dt * times(B.loads, now.o)
     v = now.y[:, p:] + touched + pushed
-    z = jnp.concatenate([now.y[:, :p], v, jnp.broadcast_to(now.o, (len(v), len(now.o)))], axis=1)
-    flown = times(B.flow.stack[k], z)
-    q, v_free = flown[:, :p], flown[:, p : 2 * p]
-    given, taken = jnp.sum(z * flown[:, 2 * p :].reshape(len(z), 2, -1).transpose(1, 0, 2), axis=(1, 2))
-    o, moves = _driven(options, B, now, k, dt)
+    y, o, (given, taken) = _flown(options, B, n, now.y.at[:, p:].set(v), now.o)
+    q, v_free = y[:, :p], y[:, p:]
+    o, moves = _driven(options, B, now, o, dt)
     held, push = answered(options, groups, B, q, v_free, touched + pushed, o, moves, dt, now.held)
-    y, work = jnp.concatenate([q, v_free], axis=1), jnp.zeros(())
+    work = jnp.zeros(())
     after = 0.5 * dt * push, 0.5 * dt * times(B.loads, o)
     for contacts, loads, mean in ((touched, pushed, 0.5 * (now.y[:, p:] + v)), (*after, v_free + 0.5 * sum(after))):
         work -= jnp.sum(contacts * mean)
@@ -39,10 +38,29 @@ def step(options: Options, groups: tuple[Group, ...], B: Bodies, k: Any, now: No
     )
 
 
-def _driven(options: Options, B: Bodies, now: Now, k: Any, dt: Any) -> tuple[Any, Any]:
-    """(n,) o after a step, and o' there."""
+def flown(stack: Any, y: Any, o: Any) -> tuple[Any, Any]:
+    """(b, 2 p) after a flow of `Flow.stack`, and (2,) J given by loads and taken by dampers in it."""
+    z, p = jnp.concatenate([y, jnp.broadcast_to(o, (len(y), len(o)))], axis=1), y.shape[1]
+    after = times(stack, z)
+    return after[:, :p], jnp.sum(z * after[:, p:].reshape(len(z), 2, -1).transpose(1, 0, 2), axis=(1, 2))
+
+
+def _flown(options: Options, B: Bodies, n: Any, y: Any, o: Any) -> tuple[Any, Any, Any]:
+    """The same and o after n steps, done by powers of two."""
+
+    def on(carried: tuple) -> tuple:
+        n, y, o, works = carried
+        k = exponent(n)
+        y, more = flown(B.flow.stack[k], y, o)
+        return n - (1 << k), y, times(B.flow.turn[k], o), works + more
+
+    first = n, y, o, jnp.zeros(2)
+    return (jax.lax.while_loop(lambda c: c[0] > 0, on, first) if options.leaps else on(first))[1:]
+
+
+def _driven(options: Options, B: Bodies, now: Now, o: Any, dt: Any) -> tuple[Any, Any]:
+    """(n,) o after a step, and o' there, where o turns or, in a run-up, is driven."""
     if options.ramp is None:
-        o = times(B.flow.turn[k], now.o)
         return o, times(B.rate, o)
     ramp, harmonics = options.ramp
     o = ramp.driving(now.time + dt, harmonics, jnp)

@@ -100,7 +100,7 @@ class Rates:
 
     def at(self, times: Array, z: Array) -> tuple[Array, Array]:
         """(c, s) d and force of the contacts' coordinates at times (s,) and states (s, z)."""
-        _, d, force, _ = jax.vmap(self.told)(jnp.asarray(times), jnp.asarray(z))
+        _, d, force, _ = jax.vmap(self.told)(jax.device_put(times), jax.device_put(z))
         back = np.argsort(self.stepper.rows)
         return np.asarray(d).T[back], np.asarray(force).T[back]
 

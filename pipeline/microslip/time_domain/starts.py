@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 
 from ..data import Array, NotConverged
@@ -73,7 +72,7 @@ def begun(stepper: Stepper, start: Periodic) -> Now:
     d, v = d[:, stepper.rows], v[:, stepper.rows]
     held, before = untouched(stepper.groups), np.full(1, np.inf)
     for _ in range(CYCLES):
-        held = _led(stepper.groups, held, jnp.asarray(d), jnp.asarray(v), 2 * np.pi / e.Omega / SAMPLES)
+        held = _led(stepper.groups, held, jax.device_put(d), jax.device_put(v), 2 * np.pi / e.Omega / SAMPLES)
         points = np.concatenate([np.zeros((1, 3)), *(np.asarray(p) for p in held.forces)])
         if np.abs(points - before).max(initial=0.0) <= PERIODIC * np.abs(points).max(initial=0.0):
             break

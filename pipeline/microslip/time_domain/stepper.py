@@ -142,7 +142,7 @@ class Stepper:
             p = blocks(e)[1]
             speeds = scipy.linalg.block_diag(*np.asarray(flows.stack[0][:, :p, p : 2 * p]))
             D = self._points[0][rigid].reshape(-1, len(e.omega2))
-            return meets(jnp.asarray(D @ speeds @ D.T * self.tau))
+            return meets(jax.device_put(D @ speeds @ D.T * self.tau))
         names = ", ".join(c.name for c in e.contacts)
         if not rigid.all() or any(g.law.normal is not None for g in self.groups):
             raise UserError(
@@ -161,7 +161,7 @@ class Stepper:
                 f"contacts {names}: some of these bodies yield beside their modes and some do not; keep the residual "
                 "compliance of all contacts, or of none"
             )
-        return meets(jnp.asarray(yields))
+        return meets(jax.device_put(yields))
 
     @cached_property
     def _spots(self) -> list[tuple[Array, bool]]:
@@ -192,7 +192,7 @@ class Stepper:
         now = Now(
             y, e.oscillators(0.0), np.zeros(()), np.zeros((b, p)),
             held or untouched(self.groups), np.zeros(6), np.zeros(()), none.astype(bool), none, (),
-            np.zeros((), int),
+            np.zeros(2, int),
         )  # fmt: skip
         return loop.begun(self.options, self.groups, self.bodies, now)
 
@@ -225,7 +225,7 @@ def static_force(stepper: Stepper) -> Callable[[Array], tuple[Array, Array]]:
     """Function of modal displacements (m,): modal forces (m,) of contacts that came there on a straight way, and (m, m)
     their slope."""
     groups, bodies = stepper.groups, stepper.bodies
-    states, D = untouched(groups).states, jnp.asarray(stepper.equations.D[stepper.rows])
+    states, D = untouched(groups).states, jax.device_put(stepper.equations.D[stepper.rows])
     if bodies.meets is not None:
         raise UserError('start: set-valued contacts have no stiffness to find a rest by; begin from "rest"')
     if bodies.yielding is not None:
