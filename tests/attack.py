@@ -32,9 +32,10 @@ from microslip.basis import read_basis, write_basis
 from microslip.case import CaseSettings, load_case
 from microslip.case.assemble import Built, build
 from microslip.case.checkpoint import files_of
-from microslip.contact.settings import _to_metres, load_contact
+from microslip.contact.settings import load_contact
 from microslip.data import Array, UserError
 from microslip.results import read_journal
+from microslip.settings.body import to_metres
 from microslip.stages import places, running
 
 SAME = 1e-6
@@ -191,7 +192,7 @@ def in_millimetres(folder: Path) -> bool:
         found = load_contact(folder / name)
         if getattr(found.roughness, "kind", "") == "table":
             return False  # lengths stand in a further file
-        told = _to_metres(found, 1e3).model_dump(exclude_unset=True, exclude_none=True)
+        told = to_metres(found, 1e3).model_dump(exclude_unset=True, exclude_none=True)
         (folder / name).write_text(toml(told | {"length_unit": "mm"}))
     for x in raw.get("excitations", []):
         if x.get("length_unit") == "m" and x["field"].endswith(".csv") and x["field"] not in files:

@@ -8,8 +8,9 @@ import numpy as np
 import scipy.linalg
 
 from microslip.data import Array, Compliance, Interface, Mesh, ModalGroup, Rows
+from microslip.elasticity import isotropic
 from microslip.fem.discretise import discretise
-from microslip.fem.operators import isotropic, mass, stiffness
+from microslip.fem.operators import mass, stiffness
 from microslip.modal.rows import patch
 
 YOUNG, POISSON, DENSITY = 2.1e11, 0.3, 7850.0

@@ -13,8 +13,9 @@ import scipy.linalg
 from meshes import brick
 
 from microslip.data import Array, Compliance, Mesh, ModalBasis, ModalGroup
+from microslip.elasticity import isotropic
 from microslip.fem.discretise import discretise
-from microslip.fem.operators import isotropic, mass, stiffness
+from microslip.fem.operators import mass, stiffness
 from microslip.frames import skew
 from microslip.linalg.canonical import by_place, signs
 from microslip.modal.body_rows import BodyRows, body_rows, reduced_interfaces, reduced_rows

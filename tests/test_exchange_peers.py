@@ -22,9 +22,10 @@ from scipy.io import loadmat
 from test_exchange import blocks
 
 from microslip.data import Array, ModalBasis
+from microslip.elasticity import isotropic
 from microslip.exchange import formats, writer
 from microslip.fem.discretise import discretise
-from microslip.fem.operators import isotropic, mass, stiffness
+from microslip.fem.operators import mass, stiffness
 from microslip.modal.compute import modal_basis
 from microslip.reference.one_harmonic import jenkins_harmonic
 from microslip.settings.body import BodySettings

@@ -16,8 +16,9 @@ import touching
 
 from microslip.basis import read_basis
 from microslip.cli import main
+from microslip.elasticity import isotropic
 from microslip.fem.discretise import discretise
-from microslip.fem.operators import isotropic, mass, stiffness
+from microslip.fem.operators import mass, stiffness
 
 
 def beam():

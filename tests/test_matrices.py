@@ -21,9 +21,10 @@ from hypothesis import strategies as st
 from microslip.basis import check_basis, read_basis
 from microslip.cli import main
 from microslip.data import UserError
+from microslip.elasticity import isotropic
 from microslip.exchange.matrices import matrix_names, read_matrices
 from microslip.fem.discretise import discretise
-from microslip.fem.operators import isotropic, mass, stiffness
+from microslip.fem.operators import mass, stiffness
 from microslip.modal.compute import modal_basis
 from microslip.stages.job import open_job
 from microslip.stages.modal import modes_stage

@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 from meshes import CELLS, QUADRATIC, STEEL, body, brick, nearest, pipe, rotation_matrix, shaken, with_sets
 
 from microslip.data import Mesh, UserError
+from microslip.elasticity import isotropic
 from microslip.fem import discretise, displacement_gradient, mass, stiffness
 from microslip.fem.discretise import face_blocks, shape_functions
-from microslip.fem.operators import isotropic
 from microslip.modal.body_rows import body_rows
 from microslip.modal.compute import modal_basis
 from microslip.modal.rigid import rigid_fields

@@ -20,9 +20,10 @@ from instanced import Placed
 from microslip.basis import read_basis
 from microslip.cli import main
 from microslip.data import AverageLink, Equation, FaceTie, Links, Mesh, RigidLink, UserError
+from microslip.elasticity import isotropic
 from microslip.fem.discretise import discretise
 from microslip.fem.links import linked
-from microslip.fem.operators import isotropic, mass, stiffness
+from microslip.fem.operators import mass, stiffness
 from microslip.fem.tied import tied_upper
 from microslip.mesh import boundary_facets, part_numbers, read_mesh
 from microslip.modal.compute import modal_basis

@@ -12,8 +12,9 @@ import pytest
 from microslip import elements
 from microslip.basis import check_basis
 from microslip.data import Mesh
+from microslip.elasticity import isotropic
 from microslip.fem.discretise import discretise, face_blocks, shape_functions
-from microslip.fem.operators import isotropic, mass, stiffness
+from microslip.fem.operators import mass, stiffness
 from microslip.mesh import boundary_facets, mesh_problems, read_mesh
 from microslip.modal.compute import modal_basis
 from microslip.modal.rows import Locator

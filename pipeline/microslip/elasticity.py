@@ -58,7 +58,7 @@ def pushed(C: Array, F: Array) -> Array:
     Args:
         F: (..., 3, 3) deformation gradient.
     """
-    i, j = np.array([0, 1, 2, 0, 1, 0]), np.array([0, 1, 2, 1, 2, 2])
+    i, j = VOIGT_AXES
     # sigma = L S in Voigt components; L^T takes engineering strain back
     L = F[..., i[:, None], i[None]] * F[..., j[:, None], j[None]]
     L[..., 3:] += F[..., i[:, None], j[None, 3:]] * F[..., j[:, None], i[None, 3:]]
@@ -79,6 +79,5 @@ def to_tensor(C: Array) -> Array:
 
 def from_tensor(C: Array) -> Array:
     """(3, 3, 3, 3) elasticity tensor -> (6, 6) Hooke matrix."""
-    i = np.array([0, 1, 2, 0, 1, 0])
-    j = np.array([0, 1, 2, 1, 2, 2])
+    i, j = VOIGT_AXES
     return C[i[:, None], j[:, None], i[None], j[None]]

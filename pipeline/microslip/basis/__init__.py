@@ -1,16 +1,10 @@
 """The modal file: write, read, check. The layout is documented in ``docs/modal_file.md``."""
 
-from .checks import TOLERANCES, Check, check_basis
-from .files import CONVENTIONS, FORMAT, FORMAT_VERSION, open_file, read_basis, write_basis
-
-__all__ = [
-    "CONVENTIONS",
-    "FORMAT",
-    "FORMAT_VERSION",
-    "TOLERANCES",
-    "Check",
-    "check_basis",
-    "open_file",
-    "read_basis",
-    "write_basis",
-]
+from .checks import Check as Check
+from .checks import check_basis as check_basis
+from .files import CONVENTIONS as CONVENTIONS
+from .files import FORMAT as FORMAT
+from .files import FORMAT_VERSION as FORMAT_VERSION
+from .files import open_file as open_file
+from .files import read_basis as read_basis
+from .files import write_basis as write_basis

@@ -3,5 +3,4 @@
 from .run import CaseResult as CaseResult
 from .run import run_case as run_case
 from .settings import CaseSettings as CaseSettings
-from .settings import ContactSettings as ContactSettings
 from .settings import load_case as load_case

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -14,7 +14,6 @@ from ..contact.point import OfPoint
 from ..contact.settings import ContactLaw
 from ..operating.fatigue import MaterialLimits
 from ..reduced.compliance import BULK_AND_SURFACE
-from ..settings.body import validate
 from ..settings.numbers import (
     Model,
     Name,
@@ -29,7 +28,7 @@ from ..settings.numbers import (
     _float,
     _tuple,
 )
-from ..settings.toml import load_toml, override
+from ..settings.toml import read_settings
 from ..system.excitation import Turning
 from .driving import ROTATION, ExcitationOfCase, GroundOfCase, SpringOfCase, base_of
 from .keys import GROUND as GROUND
@@ -564,12 +563,6 @@ def band_of(orbit: Mapping[str, Any]) -> dict[str, float]:
     return {}
 
 
-def load_case(path: Path | str, assignments: list[str] | None = None) -> tuple[CaseSettings, dict[str, Any]]:
-    """Read and check a case file (SI units).
-
-    Raises:
-        UserError: with every mistake named by file and key.
-    """
-    path = Path(path)
-    raw = override(load_toml(path), assignments or [], path)
-    return validate(CaseSettings, raw, path), raw
+def load_case(path: Path | str, assignments: Sequence[str] | None = None) -> tuple[CaseSettings, dict[str, Any]]:
+    """A case file (SI units); see `read_settings`."""
+    return read_settings(CaseSettings, path, assignments)

@@ -6,6 +6,7 @@ jump (stick-slip in one step); the return map then takes one of the roots, the r
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
@@ -404,6 +405,21 @@ def creep(speed: Array, slope: Array | float) -> Array:
     moves = speed > 0
     some = jnp.where(moves, speed, 1.0)
     return jnp.where(moves, smoothed(some, slope) / some, 2 / jnp.pi * slope)
+
+
+def halved(excess: Callable[[Array], Array], fastest: Array, powers: float, halvings: int) -> Array:
+    """(n,) speed where a function is zero that is negative at rest and not negative at ``fastest``: its logarithm is
+    halved so often, over so many powers of e."""
+    safe = jnp.where(fastest > 0, fastest, 1.0)
+
+    def halve(_: int, ends: tuple[Array, Array]) -> tuple[Array, Array]:
+        low, high = ends
+        middle = 0.5 * (low + high)
+        above = excess(safe * jnp.exp(middle)) > 0
+        return jnp.where(above, low, middle), jnp.where(above, middle, high)
+
+    low, high = jax.lax.fori_loop(0, halvings, halve, (jnp.full_like(safe, -powers), jnp.zeros_like(safe)))
+    return jnp.where(fastest > 0, safe * jnp.exp(0.5 * (low + high)), 0.0)
 
 
 def peak(friction: Friction, slope: float, fastest: float = 10.0) -> tuple[float, float]:

@@ -6,15 +6,13 @@ body. Where a sticking contact would stand still it creeps, the slower the large
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import TYPE_CHECKING, ClassVar, Literal, NamedTuple
 
-import jax
 import jax.numpy as jnp
 
 from ..reduced.compliance import BULK_AND_SURFACE
 from ..settings.numbers import NotNegative, Positive
-from .friction import Friction, Scattered, creep
+from .friction import Friction, Scattered, creep, halved
 from .law import Array, Law, Step, norm, number, settings, static, value
 from .normal import Normal
 from .point import OwnNormal
@@ -81,7 +79,7 @@ class RateContact(Law):
         def excess(speed: Array) -> Array:
             return speed * (1 + yielding * self._drag(speed, pressed, time)) - fastest
 
-        speed = _root(excess, fastest)
+        speed = halved(excess, fastest, 40.0, 50)  # to 1e-13 of it
         share = 1 / (1 + yielding * self._drag(speed, pressed, time))
         return jnp.concatenate([v.T[:1], share * trial]).T
 
@@ -107,24 +105,6 @@ class RateContact(Law):
     def _drag(self, speed: Array, pressed: Array, time: Array) -> Array:
         """(n,) friction over the speed, N s/m."""
         return pressed * self.friction.coefficient(speed, pressed, time) * creep(speed, self.slope)
-
-
-_HALVINGS = 50  # of a logarithm over forty powers of e, to 1e-13 of the speed
-
-
-def _root(excess: Callable[[Array], Array], fastest: Array) -> Array:
-    """(n,) speed where a function is zero that is negative at rest and not negative at ``fastest``."""
-    safe = jnp.where(fastest > 0, fastest, 1.0)
-
-    def halve(_: int, ends: tuple[Array, Array]) -> tuple[Array, Array]:
-        low, high = ends
-        middle = 0.5 * (low + high)
-        above = excess(safe * jnp.exp(middle)) > 0
-        return jnp.where(above, low, middle), jnp.where(above, middle, high)
-
-    ends = jnp.full_like(safe, -40.0), jnp.zeros_like(safe)
-    low, high = jax.lax.fori_loop(0, _HALVINGS, halve, ends)
-    return jnp.where(fastest > 0, safe * jnp.exp(0.5 * (low + high)), 0.0)
 
 
 class OfRate(OwnNormal):

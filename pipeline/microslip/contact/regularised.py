@@ -20,7 +20,7 @@ from scipy.integrate import solve_ivp
 from ..errors import NotConverged
 from ..reduced.compliance import BULK_AND_SURFACE
 from ..settings.numbers import NotNegative, Positive
-from .friction import Friction, creep
+from .friction import Friction, creep, halved
 from .law import Array, Law, Step, norm, number, ratio, settings, static, value
 from .normal import Normal
 from .point import OwnNormal, met, touching
@@ -180,30 +180,13 @@ class MassContact(Law):
             return trial / (resistance + self._drag(speed, pressed, share, time))
 
         def excess(speed: Array) -> Array:
-            return norm(at(speed)) - speed
+            return speed - norm(at(speed))
 
-        speed = jax.lax.stop_gradient(_speed(excess, norm(trial) / jnp.min(resistance, axis=0)))
+        fastest = jax.lax.stop_gradient(norm(trial) / jnp.min(resistance, axis=0))
+        speed = jax.lax.stop_gradient(halved(excess, fastest, 60.0, 70))  # creep is ten powers of ten below sliding
         value, slope = jax.jvp(excess, (speed,), (jnp.ones_like(speed),))
-        speed = speed - value / jnp.where(slope < -1e-3, jax.lax.stop_gradient(slope), -1.0)
+        speed = speed - value / jnp.where(slope > 1e-3, jax.lax.stop_gradient(slope), 1.0)
         return at(jnp.maximum(speed, 0.0))
-
-
-_HALVINGS = 70  # of a logarithm: creep is ten powers of ten slower than sliding
-
-
-def _speed(excess: Callable[[Array], Array], fastest: Array) -> Array:
-    """(n,) root of a decreasing function between 0 and ``fastest``: halving of the exponent, then of the value."""
-    fastest = jax.lax.stop_gradient(fastest)
-    safe = jnp.where(fastest > 0, fastest, 1.0)
-
-    def halve(_: int, ends: tuple[Array, Array]) -> tuple[Array, Array]:
-        low, high = ends
-        middle = 0.5 * (low + high)
-        above = excess(safe * jnp.exp(middle)) > 0
-        return jnp.where(above, middle, low), jnp.where(above, high, middle)
-
-    low, high = jax.lax.fori_loop(0, _HALVINGS, halve, (jnp.full_like(safe, -60.0), jnp.zeros_like(safe)))
-    return jnp.where(fastest > 0, safe * jnp.exp(0.5 * (low + high)), 0.0)
 
 
 @dataclass(frozen=True)

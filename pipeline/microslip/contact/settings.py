@@ -9,10 +9,10 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from pydantic import BaseModel, BeforeValidator, Field, model_validator
+from pydantic import BeforeValidator, Field, model_validator
 
 from ..mesh import UNITS
-from ..settings.body import _is_length, _scaled, validate
+from ..settings.body import to_metres
 from ..settings.numbers import (
     Coefficient,
     Model,
@@ -24,7 +24,7 @@ from ..settings.numbers import (
     Positives,
     only_one,
 )
-from ..settings.toml import load_toml, override
+from ..settings.toml import read_settings
 from .friction import (
     FrictionKind,
     OfCoulomb,
@@ -302,21 +302,5 @@ def load_contact(path: Path | str, assignments: list[str] | None = None) -> Cont
     Raises:
         UserError: with every mistake named by file and key.
     """
-    path = Path(path)
-    raw = override(load_toml(path), assignments or [], path)
-    settings = validate(ContactFile, raw, path)
-    return _to_metres(settings, settings.unit)
-
-
-def _to_metres(model: Any, scale: float) -> Any:
-    """Multiply every number marked as a length, and every area by the square, at any depth."""
-    if not isinstance(model, BaseModel):
-        return model
-    update = {}
-    for name, field in type(model).model_fields.items():
-        value = getattr(model, name)
-        if name == "area":
-            update[name] = _scaled(value, scale**2)
-        else:
-            update[name] = _scaled(value, scale) if _is_length(field) else _to_metres(value, scale)
-    return model.model_copy(update=update)
+    settings, _ = read_settings(ContactFile, path, assignments)
+    return to_metres(settings, settings.unit)

@@ -5,7 +5,6 @@ Knows no mechanics: lambda may be a frequency, a normal force, a level of excita
 """
 
 from .curve import Branch as Branch
-from .curve import Kind as Kind
 from .curve import Lost as Lost
 from .curve import Point as Point
 from .curve import Segment as Segment

@@ -4,39 +4,16 @@ scikit-fem supplies the shape functions and the quadrature; the contraction over
 product per batch. The plain scikit-fem forms are the oracle in the tests.
 """
 
-from .discretise import Block, Discretisation, FacetBlock, discretise, facet_block
-from .loads import body_force, centrifugal, pressure, thermal
-from .operators import (
-    displacement_gradient,
-    green_strain,
-    internal_force,
-    isotropic,
-    mass,
-    orthotropic,
-    spin_projector,
-    stiffness,
-    stress_stiffness,
-    tangent,
-)
-
-__all__ = [
-    "Block",
-    "Discretisation",
-    "FacetBlock",
-    "body_force",
-    "centrifugal",
-    "discretise",
-    "displacement_gradient",
-    "facet_block",
-    "green_strain",
-    "internal_force",
-    "isotropic",
-    "mass",
-    "orthotropic",
-    "pressure",
-    "spin_projector",
-    "stiffness",
-    "stress_stiffness",
-    "tangent",
-    "thermal",
-]
+from ..elasticity import isotropic as isotropic
+from ..elasticity import orthotropic as orthotropic
+from .discretise import discretise as discretise
+from .loads import centrifugal as centrifugal
+from .loads import pressure as pressure
+from .operators import displacement_gradient as displacement_gradient
+from .operators import green_strain as green_strain
+from .operators import internal_force as internal_force
+from .operators import mass as mass
+from .operators import spin_projector as spin_projector
+from .operators import stiffness as stiffness
+from .operators import stress_stiffness as stress_stiffness
+from .operators import tangent as tangent

@@ -15,8 +15,6 @@ import scipy.sparse as sp
 from ..data import Array, Indices
 from ..elasticity import PAIR, to_tensor
 from ..elasticity import from_tensor as from_tensor
-from ..elasticity import isotropic as isotropic
-from ..elasticity import orthotropic as orthotropic
 from .discretise import Block, Discretisation
 
 _BATCH = 300_000  # node pairs assembled at a time: temporaries stay below the 32 MB that malloc hands back at once

@@ -228,9 +228,14 @@ def _leave_out(archive: _Archive, words: list[str]) -> None:
     archive.outside[archive.kind] = where, count + 1
 
 
+def _behind_release(words: list[str]) -> list[str]:
+    """What stands behind the command and "R5.0, count"."""
+    return words[3:] if len(words) > 1 and words[1].upper().startswith("R") else words[1:]
+
+
 def _read_temperatures(archive: _Archive, words: list[str]) -> None:
     """MPTEMP[, R5.0, count], first place, values; alone it clears the table."""
-    rest = words[3:] if len(words) > 1 and words[1].upper().startswith("R") else words[1:]
+    rest = _behind_release(words)
     if not any(rest):
         archive.temperatures = {}
         return
@@ -241,7 +246,7 @@ def _read_temperatures(archive: _Archive, words: list[str]) -> None:
 
 def _read_data(archive: _Archive, words: list[str]) -> None:
     """MPDATA[, R5.0, count], label, material, first place, values."""
-    rest = words[3:] if len(words) > 1 and words[1].upper().startswith("R") else words[1:]
+    rest = _behind_release(words)
     if not any(rest[3:]):
         return
     material, label = _whole(rest[1], "MPDATA"), rest[0].upper()

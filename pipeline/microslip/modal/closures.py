@@ -61,11 +61,16 @@ def _refuse_absurd(mesh: Mesh, c: Closure) -> None:
         )
 
 
-def _ground(mesh: Mesh, c: Closure) -> Plane:
-    blocks = face_blocks(mesh, c.face)
+def _facets(mesh: Mesh, face: str) -> tuple[Array, Array, Array]:
+    """Points (n, 3) of a face, m, their areas (n,), m2, and the sum (3,) of these along the outward normals."""
+    blocks = face_blocks(mesh, face)
     vectors = np.concatenate([b.area.reshape(-1, 3) for b in blocks])
     points = np.concatenate([b.points.reshape(-1, 3) for b in blocks])
-    mean, areas = vectors.sum(axis=0), np.linalg.norm(vectors, axis=1)
+    return points, np.linalg.norm(vectors, axis=1), vectors.sum(axis=0)
+
+
+def _ground(mesh: Mesh, c: Closure) -> Plane:
+    points, areas, mean = _facets(mesh, c.face)
     if c.normal is None and np.linalg.norm(mean) < 1e-6 * areas.sum():
         raise UserError(f"closures.{c.name}: face '{c.face}' closes on itself; give the ground's normal and point")
     normal = np.array(c.normal) if c.normal is not None else -mean
@@ -122,10 +127,7 @@ def bolt_forces(mesh: Mesh, settings: BodySettings) -> Array:
 
 def _seat(mesh: Mesh, face: str, key: str) -> tuple[Array, Array, float]:
     """Area centre (3,), mean outward normal (3,), area of a face."""
-    blocks = face_blocks(mesh, face)
-    vectors = np.concatenate([b.area.reshape(-1, 3) for b in blocks])
-    points = np.concatenate([b.points.reshape(-1, 3) for b in blocks])
-    areas, mean = np.linalg.norm(vectors, axis=1), vectors.sum(axis=0)
+    points, areas, mean = _facets(mesh, face)
     if np.linalg.norm(mean) < 0.9 * areas.sum():
         raise UserError(f"{key}: face '{face}' is not flat enough to seat a bolt; name the ring under the head")
     return areas @ points / areas.sum(), mean / np.linalg.norm(mean), float(areas.sum())
@@ -139,9 +141,7 @@ def contact_states(mesh: Mesh, settings: BodySettings, grips: tuple[Grip, ...]) 
 
 
 def _state(mesh: Mesh, c: Closure, of_face: dict[str, str], g: Grip) -> ContactState:
-    blocks = face_blocks(mesh, c.face)
-    points = np.concatenate([b.points.reshape(-1, 3) for b in blocks])
-    areas = np.concatenate([np.linalg.norm(b.area, axis=2).ravel() for b in blocks])
+    points, areas, _ = _facets(mesh, c.face)
     places: list[tuple[str, Indices, Array]] = [(t, f, quadrature(t)[0]) for t, f in mesh.faces[c.face].items()]
     force = g.slave_force.sum(axis=0)
     weight = g.point_weight * g.point_pressure

@@ -14,7 +14,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from ..data import Array, Indices, Material, NotConverged, UserError
-from ..elasticity import pushed, strain_tensor
+from ..elasticity import VOIGT_AXES, pushed, strain_tensor
 from ..fem.contact import ContactPair, Grip
 from ..fem.cyclic import CyclicUpper
 from ..fem.discretise import Discretisation, FreeUpper, whole
@@ -392,5 +392,4 @@ def cauchy(state: StaticState, block: int) -> Array:
     F = np.eye(3) + state.H[block]
     S = to_symmetric(state.stress[block])
     sigma = np.matmul(np.matmul(F, S), np.swapaxes(F, -1, -2)) / np.linalg.det(F)[..., None, None]
-    i, j = np.array([0, 1, 2, 0, 1, 0]), np.array([0, 1, 2, 1, 2, 2])
-    return sigma[..., i, j]
+    return sigma[..., *VOIGT_AXES]

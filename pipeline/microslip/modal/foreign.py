@@ -14,7 +14,7 @@ from ..data import Array, Compliance, Indices, Matrices, Mesh, ModalBasis, Modal
 from ..frames import skew
 from ..linalg import canonical, eigen
 from ..linalg.parametric import state
-from ..reduction import Reduced, stuck
+from ..reduction import Reduced
 from ..settings.body import BodySettings
 from ..units import from_rpm
 from . import rigid
@@ -22,8 +22,7 @@ from .body_rows import BodyRows, body_rows, reduced_interfaces, reduced_rows
 from .boundary import AXES, check_held, require_face
 from .group import modal_damping
 from .rows import Patch
-from .solution import Searched, Solution, certified, held_compliance, reduced_on
-from .spectrum import static_answers
+from .solution import Searched, Solution, answered, certified, held_compliance, reduced_on
 
 Report = Callable[[str], None]
 
@@ -387,12 +386,7 @@ def _search(
         raise UserError(
             f"geometry.matrices: the stiffness has {error.count} negative directions; is it K, of a stable state?"
         ) from error
-    B, labels = rows.stacked(settings)
-    B = unknowns.rows(B) if B.shape[0] else sp.csr_matrix((0, pencil.n))
-    answers = static_answers(pencil, found, B, R, shift)
-    at = [i for i, label in enumerate(labels) if label.startswith("interface:")]
-    held = stuck.reference(pencil, found.values, found.vectors, B[at], answers[:, at], bool(R.shape[1]))
-    s = Searched(pencil, unknowns, R, shift, found, B, labels, answers, held)
+    s = answered(settings, pencil, unknowns, R, shift, found, rows, bool(R.shape[1]))
     if not settings.modes.certify:
         return s
     report("certifying the spectrum by the inertia count")

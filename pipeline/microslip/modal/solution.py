@@ -109,11 +109,23 @@ def search(
     except eigen.Unstable as error:
         raise UserError(_divergence(settings, speed, error.count, model, where)) from error
     refuse_unresolved(pencil, found, R.shape[1])
+    return answered(settings, pencil, unknowns, R, shift, found, rows, bool(shift), floating)
+
+
+def answered(
+    settings: BodySettings, pencil: eigen.Pencil, unknowns: Unknowns, R: Array, shift: float, found: eigen.Spectrum,
+    rows: BodyRows, floats: bool, floating: Floating | None = None,
+) -> Searched:  # fmt: skip
+    """Modes found, with the static answers of all rows and what sticking interfaces are judged by.
+
+    Args:
+        floats: whether the body has rigid motions that nothing holds.
+    """
     B, labels = rows.stacked(settings)
     B = unknowns.rows(B) if B.shape[0] else sp.csr_matrix((0, pencil.n))
     answers = static_answers(pencil, found, B, R, shift)
     at = [i for i, label in enumerate(labels) if label.startswith("interface:")]
-    held = stuck.reference(pencil, found.values, found.vectors, B[at], answers[:, at], bool(shift))
+    held = stuck.reference(pencil, found.values, found.vectors, B[at], answers[:, at], floats)
     return Searched(pencil, unknowns, R, shift, found, B, labels, answers, held, floating)
 
 

@@ -5,5 +5,4 @@ point, monitors, gauges. `stress`: stresses over the cycle. `fatigue`: margins f
 """
 
 from .fatigue import MaterialLimits as MaterialLimits
-from .motion import Motion as Motion
 from .motion import motion_of as motion_of

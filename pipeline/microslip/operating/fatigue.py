@@ -8,7 +8,7 @@ import numpy as np
 from pydantic import model_validator
 
 from ..data import Array
-from ..settings.body import Model, Name, Positive
+from ..settings.numbers import Model, Name, Positive
 from .motion import Motion
 from .stress import CycleStress, StressPeaks, cycle_stress, places, stress_peaks
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..mistuning.ensemble import Ensemble
 from ..mistuning.statistics import SHARES, fits
-from .page import Album, Piece, fold, number, page, say, table
+from .page import Piece, answer_page, fold, number, say, table
 
 READ_AS = (
     "Amplification: the highest amplitude of any blade over the frequency, over that of the ring of equal sectors. "
@@ -22,10 +22,8 @@ WORST = 12
 
 def mistuning_html(title: str, found: Ensemble, messages: Sequence[str], pictures: Sequence[Path]) -> str:
     """The page. messages: sentences."""
-    album = Album({p.name: p for p in pictures})
-    pieces: list[Piece] = [say(*messages, tone="lead"), *album.begun(""), _quantiles(found), _fits(found)]
-    pieces += [fold("The highest samples, all in samples.csv", _highest(found)), say(READ_AS, tone="note")]
-    return page(title, [piece for piece in pieces if piece])
+    highest = fold("The highest samples, all in samples.csv", _highest(found))
+    return answer_page(title, messages, pictures, _quantiles(found), _fits(found), highest, say(READ_AS, tone="note"))
 
 
 def _quantiles(found: Ensemble) -> Piece:

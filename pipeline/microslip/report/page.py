@@ -52,6 +52,14 @@ def number(value: float, digits: int = 4) -> str:
     return f"{value:.0f}" if 10**digits <= abs(value) < 1e6 else f"{value:.{digits}g}"
 
 
+def answer_page(title: str, told: Sequence[str], pictures: Sequence[Path], *rest: Piece) -> str:
+    """A page of sentences, those that warn apart, pictures, and what follows."""
+    lead, warnings = ([s for s in told if s.startswith("warning") is w] for w in (False, True))
+    shown = Album({p.name: p for p in pictures}).begun("")
+    pieces = [say(*lead, tone="lead"), say(*warnings, tone="warn"), *shown, *rest]
+    return page(title, [piece for piece in pieces if piece])
+
+
 class Album:
     """Pictures by name; each is shown once, what is left at the end was not asked for."""
 

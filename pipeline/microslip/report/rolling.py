@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from ..rolling.study import Studied
-from .page import Album, Piece, number, page, say, table
+from .page import Piece, answer_page, number, say, table
 
 READ_AS = (
     "Forces act on the wheel, at the middle of the patch: x forward, y to the left, z up. A positive creepage means "
@@ -17,10 +17,8 @@ READ_AS = (
 
 def rolling_html(title: str, found: Studied, pictures: Sequence[Path], more: Sequence[str] = ()) -> str:
     """The page; `more` sentences are of what was made beside."""
-    warnings = found.warnings()
-    lead = [*(s for s in found.sentences() if s not in warnings), *more]
-    pieces = [say(*lead, tone="lead"), say(*warnings, tone="warn"), *Album({p.name: p for p in pictures}).begun("")]
-    return page(title, [piece for piece in [*pieces, _patches(found), say(READ_AS, tone="note")] if piece])
+    told = [*found.sentences(), *more]
+    return answer_page(title, told, pictures, _patches(found), say(READ_AS, tone="note"))
 
 
 def _patches(found: Studied) -> Piece:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from ..rolling.slip import Studied
-from .page import Album, Piece, number, page, say, table
+from .page import Piece, answer_page, number, say, table
 
 READ_AS = (
     "A row of point contacts along the middle of the patch, each with its share of the static pressure, is passed by "
@@ -17,8 +17,7 @@ READ_AS = (
 
 def tyre_html(title: str, found: Studied, pictures: Sequence[Path]) -> str:
     """The page."""
-    pieces = [say(*found.sentences(), tone="lead"), *Album({p.name: p for p in pictures}).begun("")]
-    return page(title, [piece for piece in [*pieces, _loads(found), say(READ_AS, tone="note")] if piece])
+    return answer_page(title, found.sentences(), pictures, _loads(found), say(READ_AS, tone="note"))
 
 
 def _loads(found: Studied) -> Piece:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -15,19 +16,8 @@ from ..contact.law import value
 from ..contact.settings import AnyFriction, AnyRoughness, _short
 from ..contact.solids import Solid
 from ..data import UserError
-from ..settings.body import (
-    Model,
-    Name,
-    NotNegative,
-    Number,
-    Numbers,
-    Positive,
-    _finite_vector,
-    _tuple,
-    load_toml,
-    override,
-)
-from ..settings.mistakes import validate
+from ..settings.numbers import Model, Name, NotNegative, Number, Numbers, Positive, _finite_vector, _tuple
+from ..settings.toml import read_settings
 from .contact_table import POINTS as SHIFTS
 from .ellipse import combined
 from .kalker import Coefficients
@@ -357,11 +347,6 @@ class RollingCase(Model):
         return Pose(p.lateral, p.yaw, p.roll, p.speed, p.turning)
 
 
-def load_rolling(path: Path, assignments: list[str] | None = None) -> tuple[RollingCase, dict[str, Any]]:
-    """Read and check a rolling case (SI units).
-
-    Raises:
-        UserError: with every mistake named by file and key.
-    """
-    raw = override(load_toml(path), assignments or [], path)
-    return validate(RollingCase, raw, path), raw
+def load_rolling(path: Path | str, assignments: Sequence[str] | None = None) -> tuple[RollingCase, dict[str, Any]]:
+    """A rolling case (SI units); see `read_settings`."""
+    return read_settings(RollingCase, path, assignments)

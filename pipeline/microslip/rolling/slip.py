@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -11,8 +12,8 @@ import numpy as np
 from pydantic import BeforeValidator, Field, model_validator
 
 from ..data import Array, ContactState, ModalGroup, UserError
-from ..settings.body import Model, Name, NotNegative, Positive, _tuple, load_toml, override
-from ..settings.mistakes import validate
+from ..settings.numbers import Model, Name, NotNegative, Positive, _tuple
+from ..settings.toml import read_settings
 from .brush import Brush, fitted, jump, reached
 
 Slip = Annotated[float, Field(gt=0, le=1)]
@@ -62,14 +63,9 @@ class TyreCase(Model):
         return self
 
 
-def load_tyre(path: Path, assignments: list[str] | None = None) -> tuple[TyreCase, dict[str, Any]]:
-    """Read and check a case of a tyre (SI units).
-
-    Raises:
-        UserError: with every mistake named by file and key.
-    """
-    raw = override(load_toml(path), assignments or [], path)
-    return validate(TyreCase, raw, path), raw
+def load_tyre(path: Path | str, assignments: Sequence[str] | None = None) -> tuple[TyreCase, dict[str, Any]]:
+    """A case of a tyre (SI units); see `read_settings`."""
+    return read_settings(TyreCase, path, assignments)
 
 
 @dataclass(frozen=True)

@@ -680,24 +680,26 @@ def body_settings(raw: dict[str, Any], path: Path) -> BodySettings:
         UserError: with every mistake named by file and key.
     """
     settings = validate(BodySettings, raw, path)
-    return _to_metres(settings, UNITS[settings.length_unit])
+    return to_metres(settings, UNITS[settings.length_unit])
 
 
-def _to_metres(model: Any, scale: float) -> Any:
-    """Multiply every number marked as a length, at any depth."""
+def to_metres(model: Any, scale: float) -> Any:
+    """Multiply every number marked as a length, and every area by the square, at any depth."""
     if isinstance(model, tuple):
-        return tuple(_to_metres(m, scale) for m in model)
+        return tuple(to_metres(m, scale) for m in model)
     if not isinstance(model, BaseModel):
         return model
     update = {}
     for name, field in type(model).model_fields.items():
         value = getattr(model, name)
-        if _is_length(field):
+        if name == "area":
+            update[name] = _scaled(value, scale**2)
+        elif _is_length(field):
             update[name] = _scaled(value, scale)
         elif name == "local":
             update[name] = {k: v * scale for k, v in value.items()}
         else:
-            update[name] = _to_metres(value, scale)
+            update[name] = to_metres(value, scale)
     return model.model_copy(update=update)
 
 

@@ -3,11 +3,32 @@
 from __future__ import annotations
 
 import tomllib
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from ..data import UserError
 from ..files.store import ordinary
+from .mistakes import validate
+
+
+def read_settings(
+    model: type[Any], path: Path | str, assignments: Sequence[str] | None = None
+) -> tuple[Any, dict[str, Any]]:
+    """Read and check a settings file.
+
+    Args:
+        model: what it holds. assignments: ``--set`` texts.
+
+    Returns:
+        The settings, and the file's own table.
+
+    Raises:
+        UserError: with every mistake named by file and key.
+    """
+    path = Path(path)
+    raw = override(load_toml(path), list(assignments or []), path)
+    return validate(model, raw, path), raw
 
 
 def load_toml(path: Path | str) -> dict[str, Any]:

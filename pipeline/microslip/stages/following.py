@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..basis import read_basis
-from ..case import CaseSettings, checkpoint
+from ..case import CaseSettings, checkpoint, load_case
 from ..case.assemble import Built, build
 from ..case.problem import pressed_by, problem_of
 from ..continuation import NO_OPTIMUM
@@ -26,7 +26,7 @@ from ..harmonic_balance.readout import measured
 from ..results import read_response
 from ..results.checks import checked, largest
 from ..settings.mistakes import validate
-from ..settings.toml import load_toml, override
+from ..settings.toml import override
 from ..units import METRES, Quantity
 from .stage import Report
 
@@ -83,8 +83,7 @@ class Case:
 
 def open_case(path: Path, files: Mapping[str, Path], folder: Path, assignments: Sequence[str] = ()) -> Case:
     """A case and its modal files."""
-    raw = override(load_toml(path), list(assignments), path)
-    asked = validate(CaseSettings, raw, path)
+    asked, raw = load_case(path, assignments)
     settings = checkpoint.as_found(asked, folder, path)
     if asked.looks_for_harmonics:
         raw = {k: v for k, v in raw.items() if k != "harmonics_error"}

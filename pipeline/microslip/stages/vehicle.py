@@ -11,7 +11,8 @@ from ..data import UserError
 from ..errors import told_of
 from ..files import store
 from ..files.tables import columns_csv
-from ..report.vehicle import recorded_html, vehicle_html
+from ..report.page import answer_page
+from ..report.vehicle import vehicle_html
 from ..results import Journal, open_journal
 from ..vehicle.kinematics import recorded
 from ..vehicle.settings import VehicleCase, load_kinematics, load_vehicle
@@ -64,7 +65,7 @@ def kinematics_stage(
 
             drawn = [recorded_picture(found, folder / "pictures" / "circumference.png", case.name)]
         page = folder / "unround.html"
-        store.write_text(page, recorded_html(f"{case.name}: wear of a wheel", found.sentences(), drawn))
+        store.write_text(page, answer_page(f"{case.name}: wear of a wheel", found.sentences(), drawn))
         return Answer([page, *made, *drawn], found.sentences(), not found.ended)
 
     return _answered(stage, inputs, work)

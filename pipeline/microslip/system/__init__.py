@@ -1,6 +1,5 @@
 """Systems of bodies: small ones by hand (`lumped`), and bodies that touch (`assembly`, which needs jax)."""
 
-from .lumped import GROUND as GROUND
 from .lumped import Body as Body
 from .lumped import Contact as Contact
 from .lumped import Damper as Damper

@@ -10,7 +10,6 @@ from pydantic import BeforeValidator, Field, model_validator
 
 from ..data import ModalBasis, UserError
 from ..errors import told_of
-from ..settings.mistakes import validate
 from ..settings.numbers import (
     Direction,
     Model,
@@ -25,7 +24,7 @@ from ..settings.numbers import (
     _tuple,
     named_once,
 )
-from ..settings.toml import load_toml, override
+from ..settings.toml import read_settings
 from .lumped import Body, Contact, Damper, Force, Monitor, Spring, System
 
 Six = Annotated[Numbers | Number, Field(union_mode="left_to_right")]
@@ -140,8 +139,7 @@ def load_system(path: Path | str, assignments: list[str] | None = None) -> Syste
         UserError: with every mistake named by file and key.
     """
     path = Path(path)
-    raw = override(load_toml(path), assignments or [], path)
-    s = validate(SystemSettings, raw, path)
+    s, raw = read_settings(SystemSettings, path, assignments)
     components = [Body(m.name, m.mass, m.at, None, m.free) for m in s.masses]
     components += [Body(b.name, b.mass, b.at, b.inertia, b.free) for b in s.bodies]
     links = [Spring(i.between[0], i.between[1], i.stiffness, i.axis, i.at) for i in s.springs]

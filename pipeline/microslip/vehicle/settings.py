@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -17,8 +17,8 @@ from ..rolling.ellipse import combined
 from ..rolling.profiles import Profile
 from ..rolling.settings import Rail, Strips, TableOfCase, WearOfBody, Wheel
 from ..rolling.wheelset import Track
-from ..settings.body import Model, Name, NotNegative, Number, Positive, _tuple, load_toml, override
-from ..settings.mistakes import validate
+from ..settings.numbers import Model, Name, NotNegative, Number, Positive, _tuple
+from ..settings.toml import read_settings
 from ..system.lumped import Body, Link, System
 from .motion import Vehicle, sunk
 from .touch import Touch, at, touching
@@ -201,21 +201,13 @@ def worn_tracks(track: Track, y: Array) -> Callable[[Array], Track]:
     return worn
 
 
-def load_kinematics(path: Path, assignments: list[str] | None = None) -> tuple[KinematicsCase, dict[str, Any]]:
-    """Read and check a case of given kinematics (SI units).
-
-    Raises:
-        UserError: with every mistake named by file and key.
-    """
-    raw = override(load_toml(path), assignments or [], path)
-    return validate(KinematicsCase, raw, path), raw
+def load_kinematics(
+    path: Path | str, assignments: Sequence[str] | None = None
+) -> tuple[KinematicsCase, dict[str, Any]]:
+    """A case of given kinematics (SI units); see `read_settings`."""
+    return read_settings(KinematicsCase, path, assignments)
 
 
-def load_vehicle(path: Path, assignments: list[str] | None = None) -> tuple[VehicleCase, dict[str, Any]]:
-    """Read and check a case of a vehicle (SI units).
-
-    Raises:
-        UserError: with every mistake named by file and key.
-    """
-    raw = override(load_toml(path), assignments or [], path)
-    return validate(VehicleCase, raw, path), raw
+def load_vehicle(path: Path | str, assignments: Sequence[str] | None = None) -> tuple[VehicleCase, dict[str, Any]]:
+    """A case of a vehicle (SI units); see `read_settings`."""
+    return read_settings(VehicleCase, path, assignments)
