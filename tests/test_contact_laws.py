@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from microslip.contact import EXAMPLES
 from microslip.contact.friction import Coulomb, Scattered
 from microslip.contact.harmonics import force_harmonics
-from microslip.contact.law import Step, history, march
+from microslip.contact.law import Law, Step, history, march
 from microslip.contact.periodic import periodic
 from microslip.contact.portion import portion
 from microslip.errors import UserError
@@ -163,6 +163,13 @@ def test_turning_the_tangents_turns_the_force(example, seed, angle) -> None:
         assert np.quantile(wrong, 0.9) <= 1e-7 * scale(force)
     else:
         assert wrong.max() <= 1e-9 * scale(force)
+
+
+@pytest.mark.parametrize("name", ["rough point, damped", "portion of a rough contact", "smooth point"])
+def test_an_approach_presses_as_a_step_from_nothing_does(name) -> None:
+    """Also of laws that say it without one."""
+    law, u = EXAMPLES[name].law, np.linspace(-1, 1.5, 3) * EXAMPLES[name].normal
+    np.testing.assert_allclose(law.pressed(u), Law.pressed(law, u), rtol=1e-14)
 
 
 @LAWS

@@ -324,6 +324,11 @@ class Law:
         """(n,) energy in J that an unloading can give back at most."""
         raise NotImplementedError
 
+    def pressed(self, approach: Array) -> Array:
+        """(n,) N by which an approach (n,) m presses, come to straight from u = 0 and at rest."""
+        path = jnp.stack([approach, jnp.zeros_like(approach), jnp.zeros_like(approach)], axis=1)
+        return self.step(path, jnp.zeros_like(path), 1.0, self.init(len(approach)))[0][:, 0]
+
     def overlap(self, u: Array) -> Array:
         """(n,) m by which points at ``u`` (n, 3) are past their first touch. Below zero they hold no force and remember
         nothing, and no way of that length closes them. NaN, the default: they never open, or it is not known."""

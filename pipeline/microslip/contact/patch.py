@@ -15,7 +15,8 @@ import jax.numpy as jnp
 import numpy as np
 
 from ..data import Array, Indices, NotConverged, UserError
-from .law import Law, program
+from .cycle import stepped
+from .law import Law, seldom
 
 
 @dataclass(frozen=True)
@@ -217,13 +218,9 @@ def _known(patch: Patch, values: jax.Array) -> Array:
     return found
 
 
-@program
+@seldom
 def _normal(law: Law, approach: jax.Array) -> tuple[jax.Array, jax.Array]:
-    def force(u: jax.Array) -> jax.Array:
-        path = jnp.stack([u, jnp.zeros_like(u), jnp.zeros_like(u)], axis=1)
-        return law.step(path, jnp.zeros_like(path), 1.0, law.init(len(u)))[0][:, 0]
-
-    return jax.jvp(force, (approach,), (jnp.ones_like(approach),))
+    return jax.jvp(law.pressed, (approach,), (jnp.ones_like(approach),))
 
 
 def stuck_stiffness(patch: Patch, u: Array) -> Array:
@@ -236,14 +233,14 @@ def stuck_stiffness(patch: Patch, u: Array) -> Array:
     return np.einsum("nia,nij,njb->ab", G, _known(patch, _tangent(patch.law, G @ u)), G)
 
 
-@program
+@seldom
 def _tangent(law: Law, u: jax.Array) -> jax.Array:
     """(n, 3, 3) derivative of the force for a small motion from a loaded state without tangential force."""
     at_rest = u.at[:, 1:].set(0.0)
-    state = law.step(at_rest, jnp.zeros_like(u), 1.0, law.init(len(u)))[1]
+    state = stepped(law, at_rest, jnp.zeros_like(u), 1.0, law.init(len(u)))[1]
 
     def moved(direction: jax.Array) -> jax.Array:
         whole = jnp.broadcast_to(direction, u.shape)
-        return jax.jvp(lambda x: law.step(x, jnp.zeros_like(x), 1.0, state)[0], (at_rest,), (whole,))[1]
+        return jax.jvp(lambda x: stepped(law, x, jnp.zeros_like(x), 1.0, state)[0], (at_rest,), (whole,))[1]
 
     return jnp.moveaxis(jax.vmap(moved)(jnp.eye(3)), 0, 2)

@@ -202,6 +202,9 @@ class PointContact(Law):
         across = jnp.sum((step.force.T[1:] - step.after.elastic) * stretched, axis=0)
         return (step.force[:, 0] - spring) * step.moved[:, 0] + across
 
+    def pressed(self, approach: Array) -> Array:
+        return self._pressed(approach, jnp.zeros_like(approach))
+
     def _pressed(self, u: Array, v: Array) -> Array:
         force = self.normal.force(u)
         if self.damping is not None:

@@ -79,6 +79,9 @@ class Portion(Law):
     def stored(self, u: Array, state: State) -> Array:
         return self.share * self.whole.stored(u, state)
 
+    def pressed(self, approach: Array) -> Array:
+        return self.share * self.whole.pressed(approach)
+
     def overlap(self, u: Array) -> Array:
         return self.whole.overlap(u)
 
