@@ -11,12 +11,14 @@ import pytest
 import scipy.stats
 from test_mistuning import FINE, SLIPS, sector
 
+from microslip.data import UserError
 from microslip.mistuning import ensemble
 from microslip.mistuning.peaks import Highest
 from microslip.mistuning.ring import Tuned
 from microslip.mistuning.samples import Asked, Sample, Sticking, amplitudes
 from microslip.mistuning.scatter import Scatter
 from microslip.mistuning.statistics import fits
+from microslip.system.assembly import Assembly
 
 
 @pytest.fixture(scope="module")
@@ -134,6 +136,27 @@ def test_the_order_of_what_scatters_is_none() -> None:
     closed = ring.mistuned(known[1:])
     apart = [d.offset[0] - c.offset[0] for c, d in zip(first.contacts, closed.contacts, strict=True)]
     assert apart == pytest.approx(known[0][1][:, 0], rel=1e-9)
+
+
+def test_a_ring_damped_by_its_stuck_modes() -> None:
+    """Ratios a mode of the sector are those of N modes of the ring; stiffer blades damp no more by C of their own,
+    which is none; ratios of bodies do not scatter, as there are none; modes that are mixed are refused."""
+    for given in ((0.005,), (0.005, 0.05)):
+        one = _damped(sector(), given)
+        assert Sticking(one.unrolled())(337.2) == pytest.approx(np.full(6, Sticking(one)(337.2)[0]), rel=1e-9)
+    ring = Tuned(one, {})
+    faster = ring.mistuned([(Scatter("frequency", 0.1), np.full((6, 2), 0.1))])
+    assert all(not m.groups[0].C_r.any() for m in faster.components)
+    with pytest.raises(UserError, match="stuck"):
+        ring.check([Scatter("damping", 0.1)])
+    with pytest.raises(UserError, match="one after the other"):
+        _damped(sector(modes=3, tangential_stiffness=2e7, normal_stiffness=2e7), (0.005, 0.05)).unrolled()
+
+
+def _damped(one: Assembly, ratios: tuple[float, ...]) -> Assembly:
+    """By its stuck modes alone."""
+    groups = {0: replace(one.components[0].groups[0], C_r=0 * one.components[0].groups[0].C_r)}
+    return replace(one, components=(replace(one.components[0], groups=groups),), stuck_damping=ratios)
 
 
 def test_a_heavier_damper_presses_more() -> None:

@@ -642,6 +642,10 @@ def test_a_case_runs_up_into_its_stop(hammer: Path, capsys: pytest.CaptureFixtur
     assert found.frequency[0] == pytest.approx(3.0, abs=0.01) and found.frequency[-1] == pytest.approx(8.0, abs=1e-9)
     assert found.said in (hammer / "build" / "hammer" / "orbit.html").read_text(encoding="utf-8")
     assert found.count("closes") > 5 and found.balance < 1e-8 and found.drift < 1e-2
+    assert found.cycles == pytest.approx(16.5, rel=2e-3)  # by its phase, where the highest frequency has 24 periods
+    assert found.impacts == found.count("closes") / found.cycles
+    lost = found.energy["lost"]
+    assert classification.lost(found) == pytest.approx(float(lost[-1] - lost[0]) / found.cycles)
     for change in ("orbit.keep=3", "orbit.frequency=3.0", 'orbit.start="balance"', "orbit.run_up.stop=3.0"):
         assert main(["orbit", "case.toml", "-q", "--set", change]) == 2
         assert "orbit" in capsys.readouterr().err

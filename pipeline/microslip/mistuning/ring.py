@@ -121,6 +121,10 @@ class Tuned:
             raise UserError(f"{s.of}: of which body? give one of {', '.join(names)}")
         if s.component is not None and s.component not in names:
             raise UserError(f"{s.of}: there is no body '{s.component}', but {', '.join(names)}")
+        if s.of == "damping" and self.sector.stuck_damping is not None:
+            raise UserError(
+                'damping: with damping = "stuck" no body has ratios of its own; write "modal" or leave it out'
+            )
         body = names[s.component or next(iter(names))]
         if body.sectors > 1 and s.of not in ("frequency", "added_mass"):
             raise UserError(
@@ -207,7 +211,8 @@ def deviated(component: Component, s: Scatter, own: Array) -> Component:
     if s.of == "added_mass":
         return replace(component, groups={0: _heavier(group, s, float(own[0]))})
     V = np.eye(len(group.M_r)) if group.to_diagonal is None else group.to_diagonal
-    P, omega, D = group.M_r @ V, group.omega, group.damping_ratio
+    damped = bool(component.loss) or bool(group.C_r.any())  # else it is the modes of stuck contacts that are
+    P, omega, D = group.M_r @ V, group.omega, damped * group.damping_ratio
     if s.of == "damping":
         C = (P * (2 * D * omega * own)) @ P.conj().T
         loss = {0: component.loss[0] + (P * (2 * D * omega**2 * own)) @ P.conj().T} if component.loss else {}

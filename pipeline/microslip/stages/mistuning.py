@@ -71,12 +71,16 @@ def _work(stage: Stage, case: CaseJob, workers: int | None) -> Answer:
     first = next((s for s in what.scatter if s.of == "frequency" and s.deviation), None)
     lone = first is not None and what.tuned.body(first).sectors == 1 and settings.stuck_ratios is None
     near = approximation(what, first) if first and lone and not what.stuck else None
-    sentences = [*said(found), *built.messages]
+    alone = near is not None and len(what.scatter) > 1
+    sentences = [*said(found), *([FIRST_ALONE] if alone else []), *built.messages]
     made = _written(found, near, folder)
     drawn = _pictures(found, near, folder / "pictures", settings.name) if case.pictures else []
     page = folder / "mistuning.html"
     store.write_text(page, mistuning_html(f"{settings.name}: mistuned", found, sentences, drawn))
     return Answer([page, *made, *drawn], sentences, bool(found.solved.all()))
+
+
+FIRST_ALONE = "First order is of the first scatter of frequencies alone; the samples have all that scatters."
 
 
 def _of_samples(inputs: Mapping[str, Any]) -> str:

@@ -16,6 +16,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -377,9 +378,31 @@ class Assembly:
             tuple(load(x, j) for j in range(N) for x in self.loads),
             tuple(output(w, j) for j in range(N) for w in self.outputs),
             None,
-            self.stuck_damping,
+            self._stuck_damping_all_round(),
             _flows(self.components, N),
         )
+
+    def _stuck_damping_all_round(self) -> tuple[float, ...] | None:
+        """Of the whole ring, in which every mode of the sector is as many as there are sectors.
+
+        Raises:
+            UserError: modes of different ratios that are not one after the other, whatever the nodal diameter.
+        """
+        given = self.stuck_damping
+        if given is None or len(set(given)) == 1:
+            return given
+        assert self.ring is not None
+        N, bare = self.ring.blades, replace(self, stuck_damping=None)
+        waves = (replace(bare, ring=replace(self.ring, order=n)) for n in range(N // 2 + 1))
+        square = np.array([stuck_modes(w.joined(1), w.stiffness)[0] for w in waves])
+        for j, (own, following) in enumerate(pairwise(given[: square.shape[1]])):
+            if own != following and square[:, j].max() >= square[:, j + 1].min():
+                raise UserError(
+                    f"damping_ratio: modes {j + 1} and {j + 2} of a sector have ratios of their own, and in the whole "
+                    "ring they are not one after the other over the nodal diameters; give both the same, or keep the "
+                    "sector"
+                )
+        return tuple(np.repeat(given, N).tolist())
 
     def joined(self, harmonic: int) -> Linear:
         """All components in one harmonic; the contact coordinates are the relative motions, contact by contact."""

@@ -258,6 +258,8 @@ def lost(orbit: Orbit) -> float:
     not tell."""
     periods = len(orbit.time) // orbit.samples - 1
     taken = orbit.energy["lost"]
+    if periods > 0 and orbit.run_up:
+        return float(taken[-1] - taken[0]) / orbit.cycles
     return float(taken[-1] - taken[-1 - periods * orbit.samples]) / periods if periods > 0 else math.nan
 
 

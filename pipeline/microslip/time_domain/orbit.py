@@ -183,16 +183,24 @@ class Orbit:
         """Number of those events."""
         return len(self.times(kind, contact))
 
+    @cached_property
+    def cycles(self) -> float:
+        """Periods of the excitation that are kept, one at least; of a run-up by its phase."""
+        if not self.run_up:
+            return max(len(self.time) // self.samples, 1)
+        turned = sum(float(w.sum()) for (w,) in self.strips("angular_frequency")) * self.period / self.samples
+        return max(turned / (2 * np.pi), 1.0)
+
     @property
     def impacts(self) -> float:
         """Impacts of all contacts per period of the excitation."""
-        return self.count("closes") / max(len(self.time) // self.samples, 1)
+        return self.count("closes") / self.cycles
 
     @property
     def slips(self) -> float:
         """Times that a contact with friction begins to slide, per period of the excitation."""
         rubbing = [i for i in range(len(self.touching)) if classification.rubs(self, i)]
-        return sum(self.count("slips", i) for i in rubbing) / max(len(self.time) // self.samples, 1)
+        return sum(self.count("slips", i) for i in rubbing) / self.cycles
 
     @cached_property
     def said(self) -> str:
