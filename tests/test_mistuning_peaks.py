@@ -9,6 +9,8 @@ import pytest
 import scipy.optimize
 from test_mistuning import FINE, sector
 
+from microslip.harmonic_balance.solver import CONVERGED, Point
+from microslip.mistuning.branch import Branch
 from microslip.mistuning.peaks import highest
 from microslip.mistuning.ring import Tuned
 from microslip.mistuning.samples import Asked, Sliding
@@ -132,3 +134,44 @@ def test_a_sweep_goes_from_both_ends_to_where_nothing_leads_further() -> None:
     found = highest(respond, grid, at_once=lambda f: None if 100.5 < f < 103.5 else curve(f))
     assert looked[:3] == [103.0, 102.0, 101.0] and not set(looked[3:]) & set(grid)
     assert found.amplitude == highest(curve, grid).amplitude == pytest.approx(truth, rel=1e-4)
+
+
+class Bent:
+    """R = Omega - g(x) of one unknown, g by straight lines between corners: its own problem, balance and matrix."""
+
+    def __init__(self, x: list[float], Omega: list[float]) -> None:
+        self.corners, self.slopes, self.Omega = (x, Omega), np.diff(Omega) / np.diff(x), 0.0
+
+    def at(self, Omega: float) -> Bent:
+        self.Omega = Omega
+        return self
+
+    def forces(self, x: np.ndarray) -> tuple[float, float]:
+        piece = np.clip(np.searchsorted(self.corners[0], x[0]) - 1, 0, len(self.slopes) - 1)
+        return float(np.interp(x[0], *self.corners)), float(self.slopes[piece])
+
+    def residual_of(self, x: np.ndarray, force: float) -> np.ndarray:
+        return np.array([self.Omega - force])
+
+    def jacobian(self, slope: float) -> Bent:
+        self.slope = slope
+        return self
+
+    def solve(self, right: np.ndarray) -> np.ndarray:
+        return -right / self.slope
+
+    def rate(self, x: np.ndarray, force: float) -> np.ndarray:
+        return np.ones(1)
+
+
+def test_a_solution_is_followed_round_sharp_corners() -> None:
+    """One that turns back at 12 and goes on at 11.7 rad/s, and ends at 13: that is found within a step, and not taken
+    for the end of one that has to go to 12.8 only."""
+    bent = Bent([1.0, 2.0, 2.1, 3.0, 3.5], [10.0, 12.0, 11.7, 13.0, 10.0])
+    begin = Point(10.2, np.array([1.1]), CONVERGED, 0.0, 0)
+    points, ends = Branch(bent, begin, 14.0, 2.0).onward()
+    assert ends and 13.0 - 0.01 < points[-1].Omega <= 13.0
+    assert all(a.Omega < b.Omega for a, b in zip(points, points[1:], strict=False))
+    points, ends = Branch(bent, begin, 12.8, 2.0).onward()
+    assert not ends and points[-1].Omega >= 12.8
+    assert points[-1].x == pytest.approx(2.1 + (points[-1].Omega - 11.7) / 1.3 * 0.9)

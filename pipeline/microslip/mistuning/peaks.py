@@ -20,8 +20,9 @@ from ..data import Array
 Respond = Callable[[float], Array | None]
 """(w,) amplitudes of the read-outs at a frequency (Hz); None where there is no solution."""
 
-Follow = Callable[[float, float], Array | None]
-"""The same, of the solution that goes on from the one at another frequency (Hz), the second; None where none does."""
+Follow = Callable[[float, float, float], tuple[list[tuple[float, Array]], bool]]
+"""Frequencies and amplitudes of the solution that goes on towards a frequency (Hz) from the one at another, the second,
+and whether it ends on the way; the third is the width (Hz) of what is between two points of the sweep."""
 
 TOLERANCE = 1e-4
 """Share of the highest amplitude by which it may be missed."""
@@ -69,7 +70,7 @@ def highest(
             found with little work from what is known: the sweep goes up as far as that leads, then down from its other
             end, and the rest is looked for in what is between.
     """
-    search = _Search(respond, follow)
+    search = _Search(respond, follow, frequency)
     known, failed = search.known, search.failed
     search.sweep([float(f) for f in frequency], at_once)
     before = np.inf  # what was left where a parabola placed the last point
@@ -97,8 +98,9 @@ def highest(
 class _Search:
     """Attributes: known: Hz -> (w,) amplitudes. failed: Hz without a solution. tried: ways back that were gone."""
 
-    def __init__(self, respond: Respond, follow: Follow | None) -> None:
+    def __init__(self, respond: Respond, follow: Follow | None, frequency: Array) -> None:
         self.respond, self.follow = respond, follow
+        self.low, self.high, self.width = float(min(frequency)), float(max(frequency)), float(np.diff(frequency).max())
         self.known: dict[float, Array] = {}
         self.failed: list[float] = []
         self.tried: set[tuple[float, float, float]] = set()
@@ -128,18 +130,30 @@ class _Search:
         return len(frequencies)
 
     def goes_on(self, low: float, high: float, tolerance: float) -> bool:
-        """Whether the higher of two points leads to more at the other one than is known there."""
+        """Whether the higher of two points leads to more at the other one, or on the way there, than is known. Where it
+        ends, a point is looked for beside that."""
         known = self.known
         far, near = sorted((low, high), key=lambda f: known[f].max())
         told = known[near].max()
         if self.follow is None or known[far].max() > STEADY * told or (far, near, told) in self.tried:
             return False
         self.tried.add((far, near, told))
-        y = self.follow(far, near)
-        if y is None or y.max() <= known[far].max() * (1 + tolerance):
-            return False
-        known[far] = y
-        return True
+        points, ends = self.follow(far, near, self.width)
+        higher = {
+            f: y for f, y in points if y.max() > (1 + tolerance) * known[far].max() and self.low <= f <= self.high
+        }
+        known |= higher
+        if ends:
+            end = max([near, *higher], key=lambda f: abs(f - near))
+            beside = end + BESIDE * (far - end)
+            self.look(beside)
+            if beside in known:
+                self.tried.add((beside, end, known[end].max()))
+        return bool(higher) or ends
+
+
+BESIDE = 1e-3
+"""Share of the way from where a solution ends to a point without it, at which that is looked for."""
 
 
 def _beside(f: float, known: dict[float, Array], failed: list[float]) -> bool:

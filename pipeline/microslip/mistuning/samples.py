@@ -17,6 +17,7 @@ from ..harmonic_balance.problem import AtFrequency, Problem
 from ..harmonic_balance.reduced import Seen
 from ..harmonic_balance.solver import Point, among, carried, solve, sweep
 from ..system.assembly import Assembly
+from .branch import Branch
 from .peaks import Highest, highest
 from .ring import Deviations, Tuned
 from .scatter import Scatter
@@ -122,9 +123,10 @@ class Sliding:
                 return self._kept(frequency, point)
         return None
 
-    def follow(self, frequency: float, behind: float) -> Array | None:
-        """(w,) m of the solution that Newton's method finds from the one at another frequency; the known one stays
-        where that is higher."""
+    def follow(self, frequency: float, behind: float, width: float) -> tuple[list[tuple[float, Array]], bool]:
+        """Hz and (w,) m of the solution that goes on from the one at another frequency: at this one by Newton's method,
+        or on the way there along its arc, and whether it ends; what is known here stays where that is higher. width:
+        Hz, of what is between two points of a sweep."""
         Omega, before = 2 * np.pi * frequency, self.known.get(frequency)
         beyond = [self.known[f] for f in self.known if (f - behind) * (frequency - behind) <= 0]
         side = sorted(beyond, key=lambda p: abs(p.Omega - Omega))
@@ -132,10 +134,15 @@ class Sliding:
             point = among(self._at(Omega), carried(side[:count], Omega))
             y = self._kept(frequency, point)
             if y is not None and (before is None or y.max() > np.abs(amplitudes(self.problem, before)).max()):
-                return y
+                return [(frequency, y)], False
         if before is not None:
             self.known[frequency] = before
-        return None
+        points, ends = Branch(self.problem, self.known[behind], Omega, 2 * np.pi * width).onward()
+        return [(f, self._read(f, p)) for p in points if (f := p.Omega / (2 * np.pi)) != frequency], ends
+
+    def _read(self, frequency: float, point: Point) -> Array:
+        self.known[frequency] = point
+        return np.abs(amplitudes(self.problem, point))
 
     def _kept(self, frequency: float, point: Point) -> Array | None:
         self.slope = point.slope
