@@ -224,23 +224,30 @@ def _normal(law: Law, approach: jax.Array) -> tuple[jax.Array, jax.Array]:
 
 
 def stuck_stiffness(patch: Patch, u: Array) -> Array:
-    """(k, k) tangent of the patch about (k,) coordinates, every point sticking (Sextro Eq. (5.2-32), linear).
+    """(k, k) tangent of the patch about (k,) coordinates, every point sticking (Sextro Eq. (5.2-32), linear); about
+    (d, k) several of them.
 
     Raises:
         UserError: a law without one.
     """
     G = patch.kinematics
-    return np.einsum("nia,nij,njb->ab", G, _known(patch, _tangent(patch.law, G @ u)), G)
+    at = np.einsum("nia,da->dni", G, np.atleast_2d(u))
+    slopes = np.einsum("nia,dnij,njb->dab", G, _known(patch, _tangents(patch.law, jnp.asarray(at))), G)
+    return slopes.reshape(*u.shape, -1)
 
 
 @seldom
-def _tangent(law: Law, u: jax.Array) -> jax.Array:
-    """(n, 3, 3) derivative of the force for a small motion from a loaded state without tangential force."""
-    at_rest = u.at[:, 1:].set(0.0)
-    state = stepped(law, at_rest, jnp.zeros_like(u), 1.0, law.init(len(u)))[1]
+def _tangents(law: Law, places: jax.Array) -> jax.Array:
+    """(d, n, 3, 3) derivatives of the force for small motions from loaded states (d, n, 3) without tangential force."""
 
-    def moved(direction: jax.Array) -> jax.Array:
-        whole = jnp.broadcast_to(direction, u.shape)
-        return jax.jvp(lambda x: stepped(law, x, jnp.zeros_like(x), 1.0, state)[0], (at_rest,), (whole,))[1]
+    def tangent(u: jax.Array) -> jax.Array:
+        at_rest = u.at[:, 1:].set(0.0)
+        state = stepped(law, at_rest, jnp.zeros_like(u), 1.0, law.init(len(u)))[1]
 
-    return jnp.moveaxis(jax.vmap(moved)(jnp.eye(3)), 0, 2)
+        def moved(direction: jax.Array) -> jax.Array:
+            whole = jnp.broadcast_to(direction, u.shape)
+            return jax.jvp(lambda x: stepped(law, x, jnp.zeros_like(x), 1.0, state)[0], (at_rest,), (whole,))[1]
+
+        return jnp.moveaxis(jax.vmap(moved)(jnp.eye(3)), 0, 2)
+
+    return jax.vmap(tangent)(places)

@@ -25,7 +25,7 @@ class Bodies(NamedTuple):
         omega2: (b, p). steady: (b, 2 p, n) of the periodic motion without contacts. reach: (points,) norm of their
             motion by modes, and m/s of the steady motion at most; bends: the same of how their velocities change,
             1/s and m/s2: see `loop`. loads: (b, p, n) modal
-            forces of o that kick, of a run-up. enough: see `fourth`.
+            forces of o that kick, of a run-up. enough: see `fourth`. harmonics: (H,) rad/s of the loads.
     """
 
     flow: Flow
@@ -43,6 +43,7 @@ class Bodies(NamedTuple):
     loads: Any
     kick: Any
     enough: Any
+    harmonics: Any
 
 
 class Now(NamedTuple):

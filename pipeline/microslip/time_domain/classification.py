@@ -93,7 +93,7 @@ def exponent(stepper: Stepper, now: Now, samples: int, each: int, periods: int, 
     if told := whole(now.held.states):
         return Exponent(math.nan, math.nan, 0, told)
     e = stepper.equations
-    rows = np.where(np.arange(samples) < 1, each * samples, 0)
+    rows = np.full(samples, each * samples)
     weights = np.where(np.abs(e.omega2) > FREE * e.Omega**2, np.abs(e.omega2), e.Omega**2)
     weights = np.sqrt(weights).reshape(len(now.y), -1)
     scale = np.concatenate([weights, np.ones_like(weights)], axis=1)
@@ -104,7 +104,7 @@ def exponent(stepper: Stepper, now: Now, samples: int, each: int, periods: int, 
     other = now._replace(y=now.y + apart / np.linalg.norm(scale * way) * way)
     growth = np.zeros(ALIGNED + periods)
     for i in range(len(growth)):
-        now, other = stepper.run(now, rows)[0], stepper.run(other, rows)[0]
+        now, other = stepper.run(now, rows, 1)[0], stepper.run(other, rows, 1)[0]
         size = float(np.linalg.norm(scale * (other.y - now.y)))
         if not 0 < size < math.inf:
             return Exponent(math.nan, math.nan, i, "No Lyapunov exponent: the separation of two motions was lost.")

@@ -73,6 +73,15 @@ class Equations:
         turns = [np.array([[0.0, -1.0], [1.0, 0.0]]) * h * self.Omega for h in self.harmonics]
         return scipy.linalg.block_diag(np.zeros((1, 1)), *turns)
 
+    def turned(self, lengths: Array) -> Array:
+        """(k, n, n) by which o turns in so many s: the exponentials of `turning`."""
+        found = np.tile(np.eye(len(self.turning)), (len(lengths), 1, 1))
+        if self.ramp is None:
+            for i, h in enumerate(self.harmonics):
+                c, s = np.cos(h * self.Omega * lengths), np.sin(h * self.Omega * lengths)
+                found[:, 2 * i + 1 : 2 * i + 3, 2 * i + 1 : 2 * i + 3] = np.stack([[c, -s], [s, c]]).transpose(2, 0, 1)
+        return found
+
     def oscillators(self, time: Array | float) -> Array:
         """(..., n) o at times (s), n = 1 + 2 H."""
         if self.ramp:
@@ -163,11 +172,10 @@ def _stiffest(contact: Contact) -> Array:
     """(k, k) N/m."""
     if isinstance(contact.patch.law, SetValued):
         return np.zeros(2 * contact.offset.shape)
-    found, at = contact.stiffness, np.zeros_like(contact.offset)
-    for at[0] in DEEPEST / 4.0 ** np.arange(9):
-        k = stuck_stiffness(contact.patch, at)
-        found = k if np.trace(k) > np.trace(found) else found
-    return found
+    deep = np.zeros((9, len(contact.offset)))
+    deep[:, 0] = DEEPEST / 4.0 ** np.arange(9)
+    found = [contact.stiffness, *stuck_stiffness(contact.patch, deep)]
+    return found[int(np.argmax([np.trace(k) for k in found]))]
 
 
 def of(assembly: Assembly, Omega: float, second: float | None = None) -> Equations:

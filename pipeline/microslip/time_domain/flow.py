@@ -20,9 +20,6 @@ import scipy.linalg
 from ..data import Array
 from .equations import Equations
 
-DOUBLINGS = 24
-"""Flights are exact leaps of at most 2^24 steps."""
-
 
 class Flow(NamedTuple):
     """Flows over tau 2^k, k = 0, 1, ..., of b blocks of p modes each, s = 2 p + n. All are jax arrays.
@@ -44,24 +41,24 @@ def blocks(equations: Equations) -> tuple[int, int]:
     return (1, m) if coupled else (m, 1)
 
 
-def flow(equations: Equations, tau: float, doublings: int = DOUBLINGS) -> Flow:
+def flow(equations: Equations, tau: float, doublings: int) -> Flow:
     """Flows over tau (s) and its doublings."""
     e = equations
     b, p = blocks(e)
     n = e.turning.shape[0]
     one = _one_step(e, tau, b, p)
-    moves, turns, S, L = ([x] for x in one)
-    for _ in range(doublings):
-        full = _whole(moves[-1], turns[-1])
+    length = tau * 2.0 ** np.arange(doublings + 1)
+    turns, (moves, S, L) = e.turned(length), ([x] for x in one)
+    for turn in turns[:-1]:
+        full = _whole(moves[-1], turn)
         with np.errstate(over="ignore", invalid="ignore"):  # of a motion that grows, which takes no leaps
             twice = full @ full
             for kept in (S, L):
                 kept.append(kept[-1] + full.transpose(0, 2, 1) @ kept[-1] @ full)
         moves.append(twice[:, : 2 * p])
-        turns.append(scipy.linalg.expm(e.turning * tau * 2.0 ** len(turns)))
     assert moves[0].shape == (b, 2 * p, 2 * p + n)
     stack = np.concatenate([np.array(x) for x in (moves, S, L)], axis=2)
-    return Flow(*jax.device_put((stack, np.array(turns), tau * 2.0 ** np.arange(len(turns)))))
+    return Flow(*jax.device_put((stack, turns, length)))
 
 
 def _whole(move: Array, turn: Array) -> Array:
@@ -73,7 +70,7 @@ def _whole(move: Array, turn: Array) -> Array:
 
 
 def _one_step(e: Equations, tau: float, b: int, p: int) -> tuple[Array, ...]:
-    """move (b, 2 p, 2 p + n), turn, and both quadratic forms of one step, of all blocks together."""
+    """move (b, 2 p, 2 p + n) and both quadratic forms of one step, of all blocks together."""
     s, q, v, o = 2 * p + e.turning.shape[0], slice(p), slice(p, 2 * p), slice(2 * p, None)
     at = np.arange(b * p).reshape(b, p)
     C, A = e.C[at[:, :, None], at[:, None, :]], np.zeros((b, s, s))
@@ -83,7 +80,7 @@ def _one_step(e: Equations, tau: float, b: int, p: int) -> tuple[Array, ...]:
     lost[:, v, v], given[:, v, o] = C, e.B[at]
     full = scipy.linalg.expm(A * tau)
     S, L = (_integral(A, 0.5 * (Q + Q.transpose(0, 2, 1)), tau) for Q in (given, lost))
-    return full[:, : 2 * p], scipy.linalg.expm(e.turning * tau), S, L
+    return full[:, : 2 * p], S, L
 
 
 def _integral(A: Array, Q: Array, tau: float) -> Array:

@@ -34,8 +34,8 @@ GROWS = 40.0
 """How many times smaller than it may be the estimate of a step is after which the next one is twice as long."""
 
 SMOOTH = 8.0
-"""How many times less a step misses where accelerations bend as oddly as in the step before: Simpson's weights miss of
-a kink up to a quarter of what they miss of a jump, and of what is smooth a thousandth."""
+"""How many times less a step misses where accelerations bend as oddly as in the step before: of a kink Simpson's
+weights miss up to a quarter of what they miss of a jump, of what is smooth a thousandth."""
 
 SLOW = 0.03
 """Over the fastest frequency, s: laws that follow the motion more quickly would make steps too short."""

@@ -13,9 +13,10 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 
+from ..contact.law import program
 from . import fourth, kicks
 from .bodies import Bodies, Listed, Now, Options, Seen, exponent
-from .contacts import Group, Held, moved, parts, times
+from .contacts import Group, Held, moved, parts, times, untouched
 
 LEAST = 4
 """Shortest steps that are leapt over at once; nearer to a contact they are gone one by one."""
@@ -28,21 +29,32 @@ ROUNDING = 1e-6
 
 
 @partial(jax.jit, static_argnums=0)
-def begun(options: Options, groups: tuple[Group, ...], B: Bodies, now: Now) -> Now:
-    """The contacts where the bodies are."""
-    q, v = jnp.split(now.y, 2, axis=1)
-    dt, moves = B.flow.length[0], times(B.rate, now.o)
-    held, push = kicks.answered(options, groups, B, q, v, 0 * v, now.o, moves, dt, now.held, 0.5)
-    now = now._replace(push=push, held=held, energy=now.energy.at[4].set(held.stored), worst=held.missed)
+def begun(options: Options, groups: tuple[Group, ...], B: Bodies, y: Any, o: Any, held: Held | None) -> Now:
+    """At time 0, bodies at y (b, 2 p), the contacts there from what they held, or never touched before."""
+    q, v = jnp.split(y, 2, axis=1)
+    dt, moves = B.flow.length[0], times(B.rate, o)
+    before = held or untouched(groups)
+    held, push = kicks.answered(options, groups, B, q, v, 0 * v, o, moves, dt, before, 0.5)
+    zero, none = jnp.zeros(()), jnp.zeros((4, sum(len(g.G) for g in groups)))
+    energy = jnp.zeros(6).at[4].set(held.stored)
+    now = Now(y, o, zero, push, held, energy, held.missed, none.astype(bool), none, (), jnp.zeros(2, int))
     return fourth.begun(groups, B, now) if options.halvings else now
 
 
-@partial(jax.jit, static_argnums=0)
+@partial(program, static_argnums=(0, 1))
 def run(
-    options: Options, groups: tuple[Group, ...], B: Bodies, now: Now, listed: Listed, oscillators: Any, steps: Any
-) -> tuple[Now, Listed, Seen]:
-    """Samples after (s,) steps each; oscillators: (s, n) o there, so that rounding does not add up."""
-    p = B.omega2.shape[1]
+    options: Options, events: int, groups: tuple[Group, ...], B: Bodies, now: Now, each: Any, rows: Any, steps: Any
+) -> tuple[Now, Listed, Seen, Any]:
+    """Rows of so many steps each, of which each (s,) is a sample, the first again after the last; as many as are
+    asked for, or until numbers are infinite.
+
+    Args:
+        steps: done so far, all told. events: that are listed.
+
+    Returns:
+        Where the motion is; the events; the last s samples, row i at i modulo s; how many rows there were.
+    """
+    p, s = B.omega2.shape[1], len(each)
     step = partial(one_step, options, groups, B)
 
     def on(carried: tuple) -> tuple:
@@ -50,17 +62,34 @@ def run(
         left, now = jax.lax.while_loop(lambda c: (c[0] > 0) & ~c[1].met.any(), lambda c: step(*c), (left, now))
         return left, now._replace(met=jnp.zeros_like(now.met)), _noted(now, listed)
 
-    def sample(carried: tuple, one: tuple) -> tuple[tuple, Seen]:
-        o, count = one
-        _, now, listed = jax.lax.while_loop(lambda c: c[0] > 0, on, (count, *carried))
-        now = now._replace(o=o)
+    def look(now: Now) -> Seen:
         q, v = now.y[:, :p], now.y[:, p:]
         bodies = 0.5 * jnp.sum(v**2 + B.omega2 * q**2)
-        seen = Seen(q.reshape(-1), v.reshape(-1), now.held.d, now.held.force, now.energy, bodies, now.time)
-        return (now, listed), seen
+        return Seen(q.reshape(-1), v.reshape(-1), now.held.d, now.held.force, now.energy, bodies, now.time)
 
-    (now, listed), seen = jax.lax.scan(sample, (now, listed), (oscillators, steps))
-    return now, listed, seen
+    def row(carried: tuple) -> tuple:
+        i, steps, _, now, listed, seen = carried
+        count = each[i % s]
+        _, now, listed = jax.lax.while_loop(lambda c: c[0] > 0, on, (count, now, listed))
+        steps = steps + count
+        now = now._replace(o=oscillators(options, B, steps * B.flow.length[0]))
+        found = look(now)
+        kept = jax.tree_util.tree_map(lambda all_of, one: all_of.at[i % s].set(one), seen, found)
+        return i + 1, steps, jnp.isfinite(found.mechanical), now, listed, kept
+
+    listed = Listed(jnp.zeros((), int), jnp.zeros((events, 3)))
+    seen = jax.tree_util.tree_map(lambda one: jnp.zeros((s, *one.shape)), look(now))
+    first = jnp.zeros((), int), steps, jnp.ones((), bool), now, listed, seen
+    i, _, _, now, listed, seen = jax.lax.while_loop(lambda c: (c[0] < rows) & c[2], row, first)
+    return now, listed, seen, i
+
+
+def oscillators(options: Options, B: Bodies, time: Any) -> Any:
+    """(n,) o at a time, so that the rounding of many turns does not add up."""
+    if options.ramp is not None:
+        return options.ramp[0].driving(time, options.ramp[1], jnp)
+    angle = time * B.harmonics
+    return jnp.concatenate([jnp.ones(1), jnp.stack([jnp.cos(angle), jnp.sin(angle)], axis=1).reshape(-1)])
 
 
 def one_step(options: Options, groups: tuple[Group, ...], B: Bodies, left: Any, now: Now) -> tuple[Any, Now]:

@@ -14,6 +14,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from ..contact.law import program
 from ..data import Array, UserError
 from . import loop
 from .bodies import Bodies, Now, Options
@@ -108,18 +109,17 @@ def run(e: Equations, x: Array, x_dot: Array, settle: int, keep: int, steps: int
     each = steps_of_a_sample(e, 1, steps)
     stepper = Stepper(e, 2 * np.pi / e.Omega / each, accounts=False)
     to_modes = e.shapes.T @ e.assembly.joined(1).M.real
-    first = stepper.start(np.zeros(len(e.omega2)), np.zeros(len(e.omega2)))
-    shape = (len(x), *first.y.shape[:1], -1)
+    shape = (len(x), stepper.bodies.omega2.shape[0], -1)
     y = np.concatenate([(x @ to_modes.T).reshape(shape), (x_dot @ to_modes.T).reshape(shape)], axis=2)
     counts = np.array([settle * each, each]) * 2**stepper.options.halvings
-    ends, closes = _all(stepper.options, keep, stepper.groups, stepper.bodies, first, y, counts)
+    ends, closes = _all(stepper.options, keep, stepper.groups, stepper.bodies, y, e.oscillators(0.0), counts)
     q, v = (np.asarray(part).reshape(len(x), keep, -1) for part in np.split(np.asarray(ends), 2, axis=3))
     return Reached(e, each, q, v, np.asarray(closes))
 
 
-@partial(jax.jit, static_argnums=(0, 1))
+@partial(program, static_argnums=(0, 1))
 def _all(
-    options: Options, keep: int, groups: tuple[Group, ...], B: Bodies, first: Now, y: Any, counts: Any
+    options: Options, keep: int, groups: tuple[Group, ...], B: Bodies, y: Any, o: Any, counts: Any
 ) -> tuple[Any, Any]:
     """(n, keep, b, 2 p) after every period that is kept, and (n,) impacts in them."""
 
@@ -134,7 +134,7 @@ def _all(
         return after._replace(o=now.o), (after.y, closes)
 
     def one(start: Any) -> tuple[Any, Any]:
-        now, _ = on(loop.begun(options, groups, B, first._replace(y=start)), counts[0])
+        now, _ = on(loop.begun(options, groups, B, start, o, None), counts[0])
         _, (ends, closes) = jax.lax.scan(lambda n, _: on(n, counts[1]), now, length=keep)
         return ends, jnp.sum(closes)
 

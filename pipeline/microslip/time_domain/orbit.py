@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -47,6 +47,9 @@ STABLE = 1.8
 
 PAUSE = 0.5
 """s between two reports, about: as long as periods that are left to themselves are done in one call."""
+
+FURTHER = 64
+"""Times as many periods as before that are done in a call at most, so that what the first one took is no chance."""
 
 PENETRATES = 1e-6
 """Share of an interference by which a contact may be pressed deeper than it is under the steady loads."""
@@ -438,9 +441,9 @@ def march(
     many, happened, reported = 1, 0, time.monotonic()
     while done < settle + keep:
         before, dense = now, done >= settle
-        ahead = 1 if dense else min(many, settle - done)
-        rows = np.full(samples, each) if dense else np.where(np.arange(samples) < ahead, each * samples, 0)
-        now, seen, listed, count = stepper.run(now, rows)
+        ahead, began = 1 if dense else min(many, settle - done), time.monotonic()
+        rows = np.full(samples, each if dense else each * samples)
+        now, seen, listed, count = stepper.run(now, rows, samples if dense else ahead)
         done, happened = done + ahead, happened + count
         if not np.isfinite(seen.mechanical[-1]):
             when, why = _divergence(stepper, before, seen, kept if dense else None)
@@ -448,11 +451,12 @@ def march(
         if dense:
             kept.keep(kept_samples.of_period(equations, seen), listed, count - len(listed))
         kept.mark(now, done)
-        if (late := time.monotonic() - reported >= PAUSE) or done in (settle, settle + keep):
+        if time.monotonic() - reported >= PAUSE or done in (settle, settle + keep):
             met = counted(happened, "event")
             report(f"period {done} of {settle + keep}, {float(now.time):.6g} s, {met}")
             reported = time.monotonic()
-        many = max(1, many // 2) if late else min(4 * many, samples)
+        took = max(time.monotonic() - began, 1e-6)
+        many = int(np.clip(0.5 * PAUSE / took * ahead, 1, FURTHER * ahead))
     error, told = _error(stepper, now, samples, each, settle + keep)
     exponent = _exponent(stepper, now, kept, samples, each, settle + keep)
     more = tuple(text for text in (told, exponent.message if exponent else "") if text)
@@ -503,9 +507,11 @@ def _error(stepper: Stepper, now: Now, samples: int, each: int, done: int) -> tu
     One more period done with half the step tells what one leaves; how two motions that far apart, but for a factor,
     come nearer or part in `AFTER` periods, or in an eighth of those that were done, tells what all of them leave.
     """
-    fine, e = replace(stepper, tau=stepper.tau / 2), stepper.equations
+    fine, e = stepper.halved(), stepper.equations
     found = [s.run(now, np.full(samples, k))[:2] for s, k in ((stepper, each), (fine, 2 * each))]
     y = [kept_samples.read(e, seen) for _, seen in found]
+    if not all(np.isfinite(seen.mechanical[-1]) for _, seen in found):
+        return 1.0, ""
     size, order = np.abs(y[1]).max(initial=0.0), 4 if stepper.options.halvings else 2
     share = float(np.abs(y[0] - y[1]).max(initial=0.0) / (size or 1.0)) * 2**order / (2**order - 1)
     parts = _separations(stepper, found[0][0], found[1][0], samples, each, min(AFTER, done // 8, samples))
@@ -536,8 +542,10 @@ def _separations(stepper: Stepper, a: Now, b: Now, samples: int, each: int, peri
     if not far(a.y - b.y) > 0 or classification.whole(a.held.states):
         return np.zeros(0)
     b = classification.between(a, b, APART * far(a.y) / far(a.y - b.y))
-    begin, rows = far(a.y - b.y), np.where(np.arange(samples) < periods, samples * each, 0)
-    one, other = (_phases(stepper, stepper.run(now, rows)[1])[:periods] for now in (a, b))
+    begin, rows = far(a.y - b.y), np.full(samples, samples * each)
+    one, other = (_phases(stepper, stepper.run(now, rows, periods)[1]) for now in (a, b))
+    if len(one) != len(other):  # one of them became infinite
+        return np.zeros(0)
     return np.linalg.norm(one - other, axis=1) / begin
 
 

@@ -9,7 +9,7 @@ gave, less what dampers and kicks took, to rounding.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -22,11 +22,11 @@ from ..contact.set_valued import SetValued
 from ..data import Array, UserError
 from ..harmonic_balance.forces import repeated
 from . import fourth, loop
-from .bodies import Bodies, Listed, Now, Options, Seen
+from .bodies import Bodies, Now, Options, Seen
 from .braking import Braking
 from .contacts import Group, Held, Yielding, force_at, slope_at, untouched
 from .equations import Equations
-from .flow import DOUBLINGS, Flow, blocks, flow
+from .flow import Flow, blocks, flow
 from .ground import moving
 from .inclusion import Meets, meets
 
@@ -98,8 +98,24 @@ class Stepper:
         halvings = fourth.HALVINGS if flows else 0
         return Options(leaps, self.accounts, (e.ramp, e.harmonics) if e.ramp else None, halvings)
 
+    def halved(self) -> Stepper:
+        """With half the step; what hangs on that alone is made anew."""
+        fine = replace(self, tau=self.tau / 2)
+        for name in ("groups", "same", "rows", "numbers", "options", "_fixed"):
+            fine.__dict__[name] = getattr(self, name)
+        return fine
+
     @cached_property
     def bodies(self) -> Bodies:
+        e, halvings = self.equations, self.options.halvings
+        period = int(np.ceil(np.log2(2 * np.pi / e.Omega / self.tau))) if self.options.leaps else 0
+        flows = flow(e, self.tau / 2**halvings, halvings + max(period, 0))
+        enough = jnp.asarray(fourth.MISSED * (self.tau * e.fastest) ** 4)
+        return self._fixed._replace(flow=flows, meets=self._meets(flows), braking=self._braking, enough=enough)
+
+    @cached_property
+    def _fixed(self) -> Bodies:
+        """What does not hang on the step."""
         e, rows = self.equations, self.rows
         b, p = blocks(e)
         n = e.turning.shape[0]
@@ -114,11 +130,9 @@ class Stepper:
         R, share = (jax.device_put(x[np.ix_(rows, rows)]) for x in (e.R, e.yields))
         loads = (np.zeros((b * p, n)) if e.push is None else e.push).reshape(b, p, n)
         arrays = (D, D_o, e.turning, e.omega2.reshape(b, p), steady, reach, bends, loads, -D.T)
-        halvings = self.options.halvings
-        flows = flow(e, self.tau / 2**halvings, halvings + (DOUBLINGS if self.options.leaps else 0))
         yielding = Yielding(R, share, F_0) if e.R.any() else None
-        more = jax.device_put((*arrays, np.array(fourth.MISSED * (self.tau * e.fastest) ** 4)))
-        return Bodies._make((flows, yielding, self._meets(flows), self._braking, F_0, *more))
+        more = jax.device_put((*arrays, np.zeros(()), e.Omega * np.array(e.harmonics, dtype=float)))
+        return Bodies._make((None, yielding, None, None, F_0, *more))
 
     @property
     def _braking(self) -> Braking | None:
@@ -188,32 +202,31 @@ class Stepper:
         e = self.equations
         b, p = blocks(e)
         y = np.concatenate([np.reshape(q, (b, p)), np.reshape(v, (b, p))], axis=1)
-        none = np.zeros((4, len(e.contacts)))
-        now = Now(
-            y, e.oscillators(0.0), np.zeros(()), np.zeros((b, p)),
-            held or untouched(self.groups), np.zeros(6), np.zeros(()), none.astype(bool), none, (),
-            np.zeros(2, int),
-        )  # fmt: skip
-        return loop.begun(self.options, self.groups, self.bodies, now)
+        return loop.begun(self.options, self.groups, self.bodies, y, e.oscillators(0.0), held)
 
-    def run(self, now: Now, steps: Array, events: int = EVENTS) -> tuple[Now, Seen, Array, int]:
-        """Samples (s,) further, each after so many steps of tau; compiled anew for another s alone.
+    def run(
+        self, now: Now, steps: Array, rows: int | None = None, events: int = EVENTS
+    ) -> tuple[Now, Seen, Array, int]:
+        """So many rows further, all samples if it is not said, the i-th after steps[i modulo s] of tau, (s,); compiled
+        anew for another s alone. It ends early where numbers become infinite, in the last sample then.
 
         Returns:
-            Where the motion is; the samples; (e, 3) events: time in s, contact, kind, an index of `KINDS`; how many
-            there were, which may be more.
+            Where the motion is; the samples, the last s of more; (e, 3) events: time in s, contact, kind, an index of
+            `KINDS`; how many there were, which may be more.
         """
-        done = np.rint(float(now.time) / self.tau)  # or the last digits would hang on how much is done in a call
-        reached = self.tau * (done + np.cumsum(steps))
-        o = self.equations.oscillators(reached)
-        listed = Listed(np.zeros((), int), np.zeros((events, 3)))
-        counts = 2**self.options.halvings * np.asarray(steps)
-        now, listed, seen = loop.run(self.options, self.groups, self.bodies, now, listed, o, counts)
+        s = len(steps)
+        done = int(np.rint(float(now.time) / self.tau))  # or the last digits would hang on how much is done in a call
+        fine = 2**self.options.halvings
+        now, listed, seen, i = loop.run(
+            self.options, events, self.groups, self.bodies, now, fine * np.asarray(steps), s if rows is None else rows,
+            fine * done,
+        )  # fmt: skip
         count, back = int(listed.count), np.argsort(self.rows)
-        rows = np.array(np.asarray(listed.rows)[: min(count, events)])
-        rows[:, 1] = self.numbers[rows[:, 1].astype(int)] if len(rows) else 0
-        seen = Seen._make(map(np.asarray, seen))
-        return now, seen._replace(d=seen.d[:, back], force=seen.force[:, back]), rows, count
+        told = np.array(np.asarray(listed.rows)[: min(count, events)])
+        told[:, 1] = self.numbers[told[:, 1].astype(int)] if len(told) else 0
+        last = np.arange(max(int(i) - s, 0), int(i)) % s
+        seen = Seen._make(np.asarray(x)[last] for x in seen)
+        return now, seen._replace(d=seen.d[:, back], force=seen.force[:, back]), told, count
 
 
 def _most(rates: Array) -> Array:
