@@ -17,7 +17,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from ..contact.harmonics import CHUNK, CHUNK_ALONE, force_alone, force_harmonics, fourier
-from ..contact.law import Law, point_axes, program, seldom
+from ..contact.law import Law, often, point_axes, program, seldom
 from ..contact.patch import Patch
 from ..contact.periodic import periodic, with_slopes
 from ..data import Array
@@ -197,8 +197,7 @@ def _compiled(how: Any) -> tuple[Any, Any]:
     return how(_force, static_argnames=("samples", "count")), how(_with_slopes, static_argnames=("samples", "count"))
 
 
-_few, _seldom, _many = map(_compiled, (program, seldom, jax.jit))
-"""The last is a fifth to a third faster and compiled half a second longer, which pays for hundreds of points."""
+_few, _seldom, _many = map(_compiled, (program, seldom, often))
 
 
 @partial(program, static_argnames=("samples", "count"))
