@@ -90,8 +90,12 @@ class AFT:
     @property
     def _programs(self) -> tuple[Any, Any]:
         """What finds the force, and the force with its derivative."""
-        few = self.contacts * len(self.patch.points) <= CHUNK
-        return (_seldom if self.seldom else _few) if few else _many
+        return _many if self.many else _seldom if self.seldom else _few
+
+    @property
+    def many(self) -> bool:
+        """Whether there are more points than are differentiated at a time."""
+        return self.contacts * len(self.patch.points) > CHUNK
 
     @cached_property
     def kinematics(self) -> Any:
