@@ -111,11 +111,12 @@ def first_harmonics(law, motion, samples):
 
 
 def test_derivatives_of_a_straight_way_are_those_of_differences() -> None:
-    """From rest inside the circle and from the circle itself, with a limit that grows or falls: 1e-7 of what it is,
-    but for one in a thousand, next to where it begins to slide."""
+    """From rest inside the circle and from the circle itself, with a limit that grows or falls, a tenth without a way:
+    1e-7 of what it is, but for one in a thousand, next to where it begins to slide."""
     rng, n, h = np.random.default_rng(0), 4000, 1e-6
     before = rng.uniform(0.5, 1.5, n)
     force, way = rng.normal(size=(2, n)), rng.normal(size=(2, n)) * 10 ** rng.uniform(-2, 0.7, n)
+    way[:, ::10] = 0
     on_circle = rng.random(n) < 0.5
     force *= before / np.hypot(*force) * np.where(on_circle, 1.0, rng.random(n))
     given = [force, way, before, before * rng.uniform(0.5, 1.5, n)]
@@ -127,6 +128,12 @@ def test_derivatives_of_a_straight_way_are_those_of_differences() -> None:
     differences = (ends[0] - ends[1]) / (2 * h)
     wrong = np.abs(told - differences).max(axis=0) / (1 + np.abs(differences).max(axis=0))
     assert np.isfinite(told).all() and np.quantile(wrong, 0.999) < 1e-7
+
+
+def test_a_force_keeps_its_direction_where_the_limit_falls_below_it_without_a_way() -> None:
+    force = jnp.array([[3.0, 0.0], [4.0, 2.0]])
+    kept = dragged(force, jnp.zeros((2, 2)), jnp.array([5.0, 3.0]), jnp.array([2.5, 1.0]))
+    np.testing.assert_allclose(kept, [[1.5, 0.0], [2.0, 1.0]], rtol=1e-15)
 
 
 @pytest.mark.slow

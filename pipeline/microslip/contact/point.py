@@ -275,47 +275,48 @@ def _slides(trial: Array, held: Array) -> Array:
 
 
 class _Way(NamedTuple):
-    """Of a slider's way: whether it slides; the share of it before it does, and d share over -(P . dP - R dR) there;
-    P and R then; length, direction; mean of 1 / R from there on and its derivatives with respect to R at both ends;
-    sine of the last angle, and d of the last over d of the first one."""
+    """Of a slider's way: whether it slides; the share of it before it does; P and R then, and the root that tells it;
+    length; mean of 1 / R from there on; sine of the last angle, and d of the last over d of the first one."""
 
     slides: Array
     share: Array
-    by_excess: Array
     on_cone: Array
     reached: Array
+    found: Array
     length: Array
-    e: Array
-    softness: tuple[Array, Array, Array]
+    softness: Array
     sine: Array
     angles: Array
 
 
 def _dragged(force: Array, way: Array, before: Array, held: Array) -> tuple[Array, _Way]:
     trial, grows = force + way, held - before
-    tried, longer = _square(trial), _square(way)
+    slides, longer = _slides(trial, held), _square(way)
     room = jnp.maximum(before**2 - _square(force), 0.0)
     a, b = longer - grows**2, _inner(force, way) - before * grows
-    found, length = root(b**2 + a * room), root(longer)  # where a s^2 + 2 b s = room the force reaches R
+    found = root(b**2 + a * room)  # where a s^2 + 2 b s = room the force reaches R
     ahead = b > 0
     share = jnp.clip(ratio(jnp.where(ahead, room, found - b), jnp.where(ahead, b + found, a)), 0.0, 1.0)
     reached, on_cone = before + share * grows, force + share * way
-    e = ratio(way, length)
-    along, across = _inner(e, on_cone), e[0] * on_cone[1] - e[1] * on_cone[0]
+    # without a way the force keeps its direction; cosines and sines are times the length of what they are about
+    moved = longer > 0
+    about, size = jnp.where(moved, way, trial), root(jnp.where(moved, longer, _square(trial)))
+    length, both = jnp.where(moved, size, 0.0), size * reached
+    along, across = _inner(about, on_cone), about[0] * on_cone[1] - about[1] * on_cone[0]
     softness = mean_inverse(reached, held)
-    left, ahead = jnp.exp(-(1 - share) * length * softness[0]), along >= 0
+    left, ahead = jnp.exp(-(1 - share) * length * softness), along >= 0
     # cosine and sine of beta / 2 but for their size, without a difference of equal numbers
-    cosine, first = jnp.where(ahead, reached + along, across), jnp.where(ahead, across, reached - along)
+    cosine, first = jnp.where(ahead, both + along + _SOME, across), jnp.where(ahead, across, both - along)
     sine = first * left
-    size = cosine**2 + sine**2
-    over = ratio(jnp.ones_like(size), size)
-    x, y = (cosine**2 - sine**2) * over, 2 * cosine * sine * over
-    straight = ratio(trial, root(tried))
-    turned = jnp.where(size > 0, jnp.stack([e[0] * x - e[1] * y, e[1] * x + e[0] * y]), straight)
-    slides = _slides(trial, held)
-    angles = left * (cosine**2 + first**2) * over
-    told = _Way(slides, share, ratio(jnp.ones_like(found), found), on_cone, reached, length, e, softness, y, angles)
-    return jnp.where(slides, held * turned, trial), told
+    square = cosine**2 + sine**2
+    over = ratio(held, square * size)
+    turned = (cosine**2 - sine**2) * over * about + 2 * cosine * sine * over * _across(about)
+    angles = left * ratio(cosine**2 + first**2, square)
+    told = _Way(slides, share, on_cone, reached, found, length, softness, 2 * ratio(cosine * sine, square), angles)
+    return jnp.where(slides, turned, trial), told
+
+
+_SOME = 1e-100  # of a force that grows from nothing, which has the direction of the way
 
 
 def _inner(a: Array, b: Array) -> Array:
@@ -323,25 +324,55 @@ def _inner(a: Array, b: Array) -> Array:
     return a[0] * b[0] + a[1] * b[1]
 
 
+def _across(a: Array) -> Array:
+    """A vector turned by a right angle."""
+    return jnp.stack([-a[1], a[0]])
+
+
 def _square(a: Array) -> Array:
     return _inner(a, a)
 
 
-def mean_inverse(first: Array, last: Array) -> tuple[Array, Array, Array]:
-    """Mean of 1 / R over a straight way from R = first to last, (ln last - ln first) / (last - first), and its
-    derivatives with respect to both; without a difference of equal numbers where they are alike."""
-    both = first + last
-    r = jnp.clip(ratio(last - first, both), -_ALIKE, _ALIKE)
-    near, z = jnp.abs(r) < 0.03, r**2
-    at = jnp.where(near, 0.5, r)
-    over = jnp.log((1 + at) / (1 - at)) / (2 * at)  # arctanh(r) / r
-    G = jnp.where(near, 1 + z * (1 / 3 + z * (1 / 5 + z * (1 / 7 + z * (1 / 9 + z / 11)))), over)
-    bend = r * (2 / 3 + z * (4 / 5 + z * (6 / 7 + z * (8 / 9 + z * 10 / 11))))
-    slope = jnp.where(near, bend, (1 / (1 - at**2) - over) / at)
-    mean, bend = ratio(2 * G, both), ratio(4 * slope, both**3)
-    return mean, -ratio(mean, both) - bend * last, -ratio(mean, both) + bend * first
+def mean_inverse(first: Array, last: Array) -> Array:
+    """Mean of 1 / R over a straight way from R = first to last, (ln last - ln first) / (last - first), without a
+    difference of equal numbers where they are alike."""
+    over, r = _unlike(first, last)
+
+    def series() -> Array:
+        return _power_series([1 / (2 * k + 1) for k in range(_TERMS)], r**2)
+
+    def closed() -> Array:
+        at = jnp.where(jnp.abs(r) < _NEAR, 0.5, r)
+        return jnp.where(jnp.abs(r) < _NEAR, series(), jnp.log((1 + at) / (1 - at)) / (2 * at))
+
+    return 2 * over * jax.lax.cond((jnp.abs(r) < _NEAR).all(), series, closed)  # arctanh(r) / r
 
 
+def _mean_slopes(first: Array, last: Array, mean: Array) -> tuple[Array, Array]:
+    """Derivatives of `mean_inverse` with respect to both."""
+    over, r = _unlike(first, last)
+    at = jnp.where(jnp.abs(r) < _NEAR, 0.5, r)
+    near = r * _power_series([2 * k / (2 * k + 1) for k in range(1, _TERMS)], r**2)
+    bend = jnp.where(jnp.abs(r) < _NEAR, near, (1 / (1 - at**2) - 0.5 * mean * (first + last)) / at)
+    both = 4 * bend * over**3
+    return -mean * over - both * last, -mean * over + both * first
+
+
+def _unlike(first: Array, last: Array) -> tuple[Array, Array]:
+    """1 / (last + first), and (last - first) over it."""
+    over = ratio(jnp.ones_like(first), first + last)
+    return over, jnp.clip((last - first) * over, -_ALIKE, _ALIKE)
+
+
+def _power_series(factors: list[float], z: Array) -> Array:
+    """Of z^0, z^1, ..., by Horner's rule."""
+    out = jnp.full_like(z, factors[-1])
+    for factor in factors[-2::-1]:
+        out = out * z + factor
+    return out
+
+
+_NEAR, _TERMS = 0.1, 9  # r up to which a series serves, the next term of which is rounding
 _ALIKE = 1 - 1e-12  # of (last - first) / (last + first): from nothing, the angle falls to e^-28 and not to zero
 
 
@@ -359,14 +390,16 @@ def _slid(given: tuple[Array, ...], moved: list[Array | None], straight: Array) 
     where nothing but the force before changes."""
     _, way, before, held = given
     out, w = _dragged(*given)
-    s, share_of, (inverse, by_first, by_last) = w.share, 1 - w.share, w.softness
-    turn = ratio(jnp.stack([-w.on_cone[1], w.on_cone[0]]), w.reached**2)  # d angle of P over dP
-    at_first, at_last = (-w.sine * share_of * w.length * by for by in (by_first, by_last))  # d angle over dR
-    by_share = w.angles * _inner(turn, way) + w.sine * ratio(w.length, w.reached)
-    by_excess = by_share * w.by_excess
+    s, share_of, inverse = w.share, 1 - w.share, w.softness
+    shorter, over_length = ratio(jnp.ones_like(held), w.reached), ratio(jnp.ones_like(held), w.length)
+    turn = _across(w.on_cone) * shorter**2  # d angle of P over dP
+    by_ends = _mean_slopes(w.reached, held, inverse)
+    at_first, at_last = (-w.sine * share_of * w.length * by for by in by_ends)  # d angle over dR
+    by_share = w.angles * _inner(turn, way) + w.sine * w.length * shorter
+    by_excess = ratio(by_share, w.found)  # d angle over -(P . dP - R dR) where it reaches R
     by_force = w.angles * turn - by_excess * w.on_cone
-    across = ratio(jnp.stack([-w.e[1], w.e[0]]), w.length)
-    by_way = (1 - w.angles) * across + s * by_force - w.sine * share_of * inverse * w.e
+    bend = (1 - w.angles) * _across(way) * over_length**2 - w.sine * share_of * inverse * way * over_length
+    by_way = s * by_force + jnp.where(w.length > 0, bend, share_of * inverse * w.reached * turn)
     by_before = share_of * (at_first + by_excess * w.reached)
     by_held = at_first * s + at_last + by_excess * w.reached * s
     of_force, of_way, of_before, of_held = moved
@@ -377,8 +410,7 @@ def _slid(given: tuple[Array, ...], moved: list[Array | None], straight: Array) 
         angle = angle if change is None else angle + by * change
     if of_held is not None:
         size = ratio(of_held, held)
-    turned = jnp.stack([size * out[0] - angle * out[1], size * out[1] + angle * out[0]])
-    return out, jnp.where(w.slides, turned, straight)
+    return out, jnp.where(w.slides, size * out + angle * _across(out), straight)
 
 
 def weight(theta: Array, relative: Array | None) -> Array:

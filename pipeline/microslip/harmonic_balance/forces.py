@@ -17,7 +17,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from ..contact.harmonics import CHUNK, CHUNK_ALONE, force_alone, force_harmonics, fourier
-from ..contact.law import Law, point_axes, program, seldom
+from ..contact.law import Law, often, point_axes, program, seldom
 from ..contact.patch import Patch
 from ..contact.periodic import periodic, with_slopes
 from ..data import Array
@@ -90,8 +90,12 @@ class AFT:
     @property
     def _programs(self) -> tuple[Any, Any]:
         """What finds the force, and the force with its derivative."""
-        few = self.contacts * len(self.patch.points) <= CHUNK
-        return (_seldom if self.seldom else _few) if few else _many
+        return _many if self.many else _seldom if self.seldom else _few
+
+    @property
+    def many(self) -> bool:
+        """Whether there are more points than are differentiated at a time."""
+        return self.contacts * len(self.patch.points) > CHUNK
 
     @cached_property
     def kinematics(self) -> Any:
@@ -202,8 +206,7 @@ def _compiled(how: Any) -> tuple[Any, Any]:
     return how(_force, static_argnames=("samples", "count")), how(_with_slopes, static_argnames=("samples", "count"))
 
 
-_few, _seldom, _many = map(_compiled, (program, seldom, jax.jit))
-"""The last is a fifth to a third faster and compiled half a second longer, which pays for hundreds of points."""
+_few, _seldom, _many = map(_compiled, (program, seldom, often))
 
 
 @partial(program, static_argnames=("samples", "count"))

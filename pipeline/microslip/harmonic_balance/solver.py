@@ -14,6 +14,7 @@ from .. import continuation
 from ..data import Array, UserError
 from ..settings.mistakes import bounded
 from . import pseudo_transient
+from .forces import AFT
 from .problem import NO_NUMBER, AtFrequency, Problem, Tried
 
 Report = Callable[[str], None]
@@ -63,8 +64,9 @@ press a contact a million times more than anything moves it leave no more of R t
 AT_MOST = 1e-5
 """Share of x that rounding may be."""
 
-CONTRACTION = 0.1
-"""Share of |R| that a step may leave for the derivative to be used again: a new one costs three or four residuals."""
+CONTRACTION, OF_MANY = 0.1, 0.5
+"""Share of |R| that a step may leave for the derivative to be used again: a new one costs three or four residuals. Of
+bodies eliminated together, with many points that are marched, it costs six and a step costs next to nothing."""
 
 RISES = 5
 """How often a step is taken whole although |R| rises: the derivatives of the pieces that it leads to find the solution
@@ -94,6 +96,7 @@ def newton(
     start, fresh, history, left_over = x, False, list[float](), rises
     halved, last = np.inf, 0
     R, seen = at.tried(x)
+    contraction = _contraction(at.problem)
     reference, error = float(np.abs(at.reference).max(initial=0.0)) or 1.0, np.inf  # where nothing drives, the length
     for count in range(most):
         size = np.clip(np.abs(x).max(initial=0.0), 1e-3 * reference, 1e3 * reference)
@@ -115,7 +118,7 @@ def newton(
         step = at.jacobian(slope).solve(-R)
         left, shown = at.tried(x + step)
         before, after = np.linalg.norm(R), np.linalg.norm(left)
-        if after <= CONTRACTION * before:
+        if after <= contraction * before:
             slope, fresh = at.secant(slope, seen, shown), False
             x, R, seen = x + step, left, shown
             continue
@@ -135,6 +138,12 @@ def newton(
         return replace(again, iterations=len(history) + again.iterations, history=told)
     words = f"no convergence in {most} steps, |R|/|x| = {error:.1e}"
     return Point(at.Omega, x, words, error, most, history=tuple(history))
+
+
+def _contraction(problem: Problem) -> float:
+    """`CONTRACTION` or `OF_MANY`."""
+    many = any(isinstance(g.model, AFT) and g.model.many for g in problem.groups)
+    return OF_MANY if many and len(problem.slices) == 1 else CONTRACTION
 
 
 def _shortened(
