@@ -4,7 +4,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from test_contact_laws import COUNTED, FORCES, TANGENT, path, work
+from test_contact_laws import FORCES, TANGENT, counted, path, work
 
 from microslip.contact.jenkins import Jenkins, four_places
 from microslip.contact.law import Example, march, value
@@ -68,7 +68,7 @@ def test_one_harmonic_is_the_closed_form(slider: int) -> None:
 
 def test_a_cycle_takes_what_the_law_counts_and_gives_nothing_back() -> None:
     u = path(3, LAW, samples=1024)
-    force, lost = COUNTED(LAW.law, u, LAW.period / 1024)
+    force, lost = counted(LAW.law, u, LAW.period / 1024)
     taken, size = work(np.asarray(force), np.asarray(u))
     assert (np.asarray(lost) > 0.01 * size).all()
     np.testing.assert_allclose(taken, lost, rtol=0, atol=1e-4 * size.max())
