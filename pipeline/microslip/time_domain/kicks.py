@@ -12,6 +12,7 @@ import jax.numpy as jnp
 from .bodies import Bodies, Now, Options, by_force
 from .braking import slowed
 from .contacts import Group, Held, answer, force_at, rigid_answer, times
+from .flow import flown, worked
 
 
 def step(options: Options, groups: tuple[Group, ...], B: Bodies, k: Any, now: Now) -> Now:
@@ -20,13 +21,12 @@ def step(options: Options, groups: tuple[Group, ...], B: Bodies, k: Any, now: No
     dt = B.flow.length[k]
     touched, pushed = 0.5 * dt * now.push, 0.5 * dt * times(B.loads, now.o)
     v = now.y[:, p:] + touched + pushed
-    z = jnp.concatenate([now.y[:, :p], v, jnp.broadcast_to(now.o, (len(v), len(now.o)))], axis=1)
-    flown = times(B.flow.stack[k], z)
-    q, v_free = flown[:, :p], flown[:, p : 2 * p]
-    given, taken = jnp.sum(z * flown[:, 2 * p :].reshape(len(z), 2, -1).transpose(1, 0, 2), axis=(1, 2))
+    y, works = worked(B.flow.stack[k], jnp.concatenate([now.y[:, :p], v], axis=1), now.o)
+    q, v_free = y[:, :p], y[:, p:]
+    given, taken = works.sum(axis=1)
     o, moves = _driven(options, B, now, k, dt)
     held, push = answered(options, groups, B, q, v_free, touched + pushed, o, moves, dt, now.held)
-    y, work = jnp.concatenate([q, v_free], axis=1), jnp.zeros(())
+    work = jnp.zeros(())
     after = 0.5 * dt * push, 0.5 * dt * times(B.loads, o)
     for contacts, loads, mean in ((touched, pushed, 0.5 * (now.y[:, p:] + v)), (*after, v_free + 0.5 * sum(after))):
         work -= jnp.sum(contacts * mean)
@@ -88,6 +88,5 @@ def answered(
 
 def _ahead(B: Bodies, q: Any, v: Any, o: Any) -> Any:
     """(c,) of the contact coordinates after another step."""
-    z = jnp.concatenate([q, v, jnp.broadcast_to(o, (len(q), len(o)))], axis=1)
-    then = times(B.flow.stack[0][:, : q.shape[1]], z)
-    return times(B.D, then.reshape(-1)) + times(B.D_o, times(B.flow.turn[0], o))
+    then = flown(B.flow.stack[0][: q.shape[1]], jnp.concatenate([q, v], axis=1), o)
+    return times(B.D, then.T.reshape(-1)) + times(B.D_o, times(B.flow.turn[0], o))

@@ -51,6 +51,8 @@ def run(
         o, count = one
         _, now, listed = jax.lax.while_loop(lambda c: c[0] > 0, on, (count, *carried))
         now = now._replace(o=o)
+        if options.halvings:
+            now = now._replace(held=fourth.at_sample(groups, B, now))
         q, v = now.y[:, :p], now.y[:, p:]
         bodies = 0.5 * jnp.sum(v**2 + B.omega2 * q**2)
         seen = Seen(q.reshape(-1), v.reshape(-1), now.held.d, now.held.force, now.energy, bodies, now.time)
