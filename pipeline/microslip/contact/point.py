@@ -392,8 +392,14 @@ def slide(
     trial: Array, stiffness: Array, relative: Array | None, friction: Friction, pressed: Array, dt: Array | float,
     time: Array,
 ) -> Array:  # fmt: skip
-    """theta where friction holds what is left: found without derivatives, which the implicit function theorem adds."""
+    """theta where friction holds what is left. With one coefficient and one stiffness that is the share which is held;
+    else it is found without derivatives, which the implicit function theorem adds."""
     largest = jnp.max(stiffness, axis=0)
+    if friction.constant:
+        held = friction.coefficient(largest, pressed, time) * pressed
+        if relative is None:
+            size = norm(trial)
+            return jnp.where(size <= held, 1.0, ratio(held, size, 1.0))
 
     def excess(theta: Array) -> Array:
         force = norm(trial * weight(theta, relative))
@@ -402,7 +408,7 @@ def slide(
 
     sticks = excess(jnp.ones(trial.shape[1])) <= 0
     if friction.constant:
-        theta = _secular(trial, relative, friction.coefficient(largest, pressed, time) * pressed)
+        theta = _secular(trial, relative, held)
     else:
         theta = _halved(excess, trial.shape[1])
     theta = jax.lax.stop_gradient(theta)
@@ -416,14 +422,13 @@ _STEPS = 50  # halvings of the interval of theta
 _NEWTON = 8  # steps of an iteration that is exact for equal stiffness; enough for stiffnesses of a ratio of 1e-4
 
 
-def _secular(trial: Array, relative: Array | None, held: Array) -> Array:
+def _secular(trial: Array, relative: Array, held: Array) -> Array:
     """theta where the force is ``held`` (n,): Newton's method on 1/|force| over lambda, as for trust regions.
 
     1/|force(lambda)| is concave and nearly straight (More & Sorensen, SIAM J. Sci. Stat. Comput. 4, 1983), so the
     iteration rises monotonically from lambda = 0.
     """
-    trial, held = jax.lax.stop_gradient(trial), jax.lax.stop_gradient(held)
-    relative = jnp.ones_like(trial) if relative is None else jax.lax.stop_gradient(relative)
+    trial, relative, held = (jax.lax.stop_gradient(x) for x in (trial, relative, held))
     multiplier = jnp.zeros(trial.shape[1])
     for _ in range(_NEWTON):
         left = trial / (1 + multiplier * relative)

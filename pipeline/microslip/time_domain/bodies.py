@@ -5,6 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
+import jax
+import jax.numpy as jnp
+
 from .braking import Braking
 from .contacts import Held, Yielding, times
 from .flow import Flow
@@ -56,7 +59,7 @@ class Now(NamedTuple):
             contacts store now, and what moving ground gave them. worst: m, the largest residual of an implicit contact.
         met: (4, contacts) the events of the last step, at: when, s. memory: of `fourth`, what the laws' differential
             equations remember (k, n) and its rate, group by group, and how the accelerations were bent.
-            level: of `fourth`, k of the next step's 2^k.
+            level: (2,) of `fourth`, k of the next step's 2^k, and of the first one's after a leap.
     """
 
     y: Any
@@ -106,3 +109,9 @@ class Options:
 def by_force(B: Bodies, force: Any) -> Any:
     """(b, p) m/s2 of the modes by forces (c,) of the contact coordinates."""
     return times(B.kick, force - B.F_0).reshape(B.omega2.shape)
+
+
+def exponent(x: Any) -> Any:
+    """Largest k with 2^k <= x, x > 0: the binary exponent of a float64, which costs less than its logarithm."""
+    bits = jax.lax.bitcast_convert_type(jnp.asarray(x, float), jnp.int64)
+    return (bits >> 52) - 1023

@@ -20,7 +20,7 @@ from typing import Any, NamedTuple
 import jax
 import jax.numpy as jnp
 
-from .bodies import Bodies, Now, Options
+from .bodies import Bodies, Now, Options, exponent
 from .contacts import Group, Held, joined, times, told
 from .flow import flown, worked
 from .spots import by_modes, to_modes
@@ -33,6 +33,10 @@ MISSED = 1e-3
 
 GROWS = 40.0
 """How many times smaller than it may be the estimate of a step is after which the next one is twice as long."""
+
+SMOOTH = 8.0
+"""How many times less a step misses where accelerations bend as oddly as in the step before: Simpson's weights miss of
+a kink up to a quarter of what they miss of a jump, and of what is smooth a thousandth."""
 
 SLOW = 0.03
 """Over the fastest frequency, s: laws that follow the motion more quickly would make steps too short."""
@@ -51,11 +55,12 @@ class Answer(NamedTuple):
 
 class Bent(NamedTuple):
     """bent: (b, p) second differences of the accelerations in the last step, m/s4, slope: how they change, m/s5; h: s,
-    that step."""
+    that step. curl: how they change otherwise, m/s6."""
 
     bent: Any
     slope: Any
     h: Any
+    curl: Any
 
 
 def begun(groups: tuple[Group, ...], B: Bodies, now: Now) -> Now:
@@ -66,13 +71,14 @@ def begun(groups: tuple[Group, ...], B: Bodies, now: Now) -> Now:
     )
     first = _answer(groups, B, now.y, now.o, x, now.time)
     held = now.held._replace(forces=first.forces)
-    straight = Bent(0 * first.push, 0 * first.push, jnp.zeros(()))
-    return now._replace(push=first.push, held=held, memory=(x, first.rates, straight), level=jnp.full((), 1, int))
+    straight = Bent(0 * first.push, 0 * first.push, jnp.zeros(()), jnp.zeros(()))
+    return now._replace(push=first.push, held=held, memory=(x, first.rates, straight), level=jnp.full(2, 1, int))
 
 
-def forgotten(memory: tuple) -> tuple:
-    """Of contacts that were open all along."""
-    return jax.tree_util.tree_map(jnp.zeros_like, memory)
+def leapt(now: Now) -> Now:
+    """After a leap: contacts that were open all along remember nothing, and what comes is met as it was last time."""
+    nothing = jax.tree_util.tree_map(jnp.zeros_like, now.memory)
+    return now._replace(memory=nothing, level=jnp.broadcast_to(now.level[1], 2))
 
 
 def _answer(groups: tuple[Group, ...], B: Bodies, y: Any, o: Any, x: tuple[Any, ...], time: Any) -> Answer:
@@ -121,19 +127,14 @@ def step(options: Options, groups: tuple[Group, ...], B: Bodies, k: Any, now: No
     size = _norm(jnp.concatenate([y[:, p:], jnp.sqrt(jnp.abs(B.omega2)) * y[:, :p]])) + 1e-300
     bent, third, kink = _missed(h, now, two.push + three.push, four.push, last.push)
     third = third / size
-    done, level = _judged(options, k, now.level, 2 * third * jnp.sqrt(jnp.sqrt(third)) + kink / size, B.enough)
+    done, level = _judged(options, k, now.level[0], 2 * third * jnp.sqrt(jnp.sqrt(third)) + kink / size, B.enough)
+    first = done & (now.memory[2].h == 0)
     energy = now.energy.at[:3].add(energy).at[3].add(held.lost).at[4].set(held.stored).at[5].add(held.given)
     after = now._replace(
         y=y, o=o[1], time=now.time + h, push=last.push, held=held, energy=energy, memory=(x, last.rates, bent)
     )
     after = jax.tree_util.tree_map(lambda a, b: jnp.where(done, a, b), after, now)
-    return done, after._replace(level=level)
-
-
-def exponent(x: Any) -> Any:
-    """Largest k with 2^k <= x, x > 0: the binary exponent of a float64, which costs less than its logarithm."""
-    bits = jax.lax.bitcast_convert_type(jnp.asarray(x, float), jnp.int64)
-    return (bits >> 52) - 1023
+    return done, after._replace(level=jnp.stack([level, jnp.where(first, level, now.level[1])]))
 
 
 def _norm(x: Any) -> Any:
@@ -145,8 +146,9 @@ def _missed(h: Any, now: Now, middle: Any, four: Any, five: Any) -> tuple[Bent, 
     before, between = now.memory[2], 0.5 * (h + now.memory[2].h)
     bent = (now.push - middle + five) / h**2
     as_before = [0.0, before.bent, before.bent + between * before.slope]
-    kink = h**3 / 3 * jnp.min(jnp.stack([_norm(bent - expected) for expected in as_before]))
-    return Bent(bent, (bent - before.bent) / between, h), h / 6 * _norm(four - five), kink
+    odd = jnp.min(jnp.stack([_norm(bent - expected) for expected in as_before]))
+    kink = h**3 / 3 * jnp.maximum(odd - 2 * before.curl * between**2, odd / SMOOTH)
+    return Bent(bent, (bent - before.bent) / between, h, odd / between**2), h / 6 * _norm(four - five), kink
 
 
 def _judged(options: Options, k: Any, level: Any, missed: Any, enough: Any) -> tuple[Any, Any]:

@@ -7,24 +7,24 @@ from __future__ import annotations
 
 from typing import Any
 
+import jax
 import jax.numpy as jnp
 
-from .bodies import Bodies, Now, Options, by_force
+from .bodies import Bodies, Now, Options, by_force, exponent
 from .braking import slowed
 from .contacts import Group, Held, answer, force_at, rigid_answer, times
 from .flow import flown, worked
 
 
-def step(options: Options, groups: tuple[Group, ...], B: Bodies, k: Any, now: Now) -> Now:
-    """2^k steps, of which more than one only where no contact is met in them."""
+def step(options: Options, groups: tuple[Group, ...], B: Bodies, n: Any, now: Now) -> Now:
+    """n steps, of which more than one only where no contact is met in them."""
     p = B.omega2.shape[1]
-    dt = B.flow.length[k]
+    dt = B.flow.length[0] * n
     touched, pushed = 0.5 * dt * now.push, 0.5 * dt * times(B.loads, now.o)
     v = now.y[:, p:] + touched + pushed
-    y, works = worked(B.flow.stack[k], jnp.concatenate([now.y[:, :p], v], axis=1), now.o)
+    y, o, (given, taken) = _flown(options, B, n, now.y.at[:, p:].set(v), now.o)
     q, v_free = y[:, :p], y[:, p:]
-    given, taken = works.sum(axis=1)
-    o, moves = _driven(options, B, now, k, dt)
+    o, moves = _driven(options, B, now, o, dt)
     held, push = answered(options, groups, B, q, v_free, touched + pushed, o, moves, dt, now.held)
     work = jnp.zeros(())
     after = 0.5 * dt * push, 0.5 * dt * times(B.loads, o)
@@ -39,10 +39,22 @@ def step(options: Options, groups: tuple[Group, ...], B: Bodies, k: Any, now: No
     )
 
 
-def _driven(options: Options, B: Bodies, now: Now, k: Any, dt: Any) -> tuple[Any, Any]:
-    """(n,) o after a step, and o' there."""
+def _flown(options: Options, B: Bodies, n: Any, y: Any, o: Any) -> tuple[Any, Any, Any]:
+    """(b, 2 p) and o after n steps, done by powers of two, and (2,) J given by loads and taken by dampers in them."""
+
+    def on(carried: tuple) -> tuple:
+        n, y, o, works = carried
+        k = exponent(n)
+        y, more = worked(B.flow.stack[k], y, o)
+        return n - (1 << k), y, times(B.flow.turn[k], o), works + more.sum(axis=1)
+
+    first = n, y, o, jnp.zeros(2)
+    return (jax.lax.while_loop(lambda c: c[0] > 0, on, first) if options.leaps else on(first))[1:]
+
+
+def _driven(options: Options, B: Bodies, now: Now, o: Any, dt: Any) -> tuple[Any, Any]:
+    """(n,) o after a step, and o' there, where o turns or, in a run-up, is driven."""
     if options.ramp is None:
-        o = times(B.flow.turn[k], now.o)
         return o, times(B.rate, o)
     ramp, harmonics = options.ramp
     o = ramp.driving(now.time + dt, harmonics, jnp)

@@ -14,11 +14,14 @@ import jax
 import jax.numpy as jnp
 
 from . import fourth, kicks
-from .bodies import Bodies, Listed, Now, Options, Seen
+from .bodies import Bodies, Listed, Now, Options, Seen, exponent
 from .contacts import Group, Held, moved, parts, times
 
-LEAST = 4.0
+LEAST = 4
 """Shortest steps that are leapt over at once; nearer to a contact they are gone one by one."""
+
+DIGITS = 5
+"""Of a leap, which is flown by powers of two: a few more bring it no nearer, as what it is reckoned by is a bound."""
 
 ROUNDING = 1e-6
 """Share of a leap that is left out, so that rounding does not bring it into contact."""
@@ -64,31 +67,25 @@ def run(
 
 def one_step(options: Options, groups: tuple[Group, ...], B: Bodies, left: Any, now: Now) -> tuple[Any, Now]:
     """A step, or a leap over as many as no contact is met in, of those that are left; and what is left then."""
-    steps = _free(groups, B, now) if options.leaps else jnp.zeros(())
-    far = _floor(steps, left)
+    free = _free(groups, B, now) if options.leaps else jnp.zeros((), int)
+    far = jnp.clip(free, 1, left)
     if not options.halvings:
-        return left - 2**far, _told(B, far, now, kicks.step(options, groups, B, far, now))
-    near = jnp.minimum(now.level, fourth.exponent(left))
+        return left - far, _told(B, far, now, kicks.step(options, groups, B, far, now))
+    near = jnp.minimum(now.level[0], exponent(left))
 
     def leap(now: Now) -> tuple[Any, Now]:
-        after = kicks.step(options, groups, B, far, now)
-        return 2**far, _told(B, far, now, after._replace(memory=fourth.forgotten(now.memory)))
+        return far, _told(B, far, now, fourth.leapt(kicks.step(options, groups, B, far, now)))
 
     def step(now: Now) -> tuple[Any, Now]:
         done, after = fourth.step(options, groups, B, near, now)
-        return jnp.where(done, 2**near, 0), _told(B, near, now, after, done)
+        return jnp.where(done, 1 << near, 0), _told(B, 1 << near, now, after, done)
 
-    done, after = jax.lax.cond(steps >= LEAST, leap, step, now) if options.leaps else step(now)
+    done, after = jax.lax.cond(free >= LEAST, leap, step, now) if options.leaps else step(now)
     return left - done, after
 
 
-def _floor(steps: Any, left: Any) -> Any:
-    """k of the longest 2^k steps, one at least, that are no more than these and those that are left."""
-    return fourth.exponent(jnp.minimum(jnp.maximum(steps, 1.0), left))
-
-
 def _free(groups: tuple[Group, ...], B: Bodies, now: Now) -> Any:
-    """Steps in which no point of contact can close its gap."""
+    """Steps in which no point of contact can close its gap: an even number, of `DIGITS` binary digits."""
     p = B.omega2.shape[1]
     z = now.y - times(B.steady, now.o)
     swings = jnp.sqrt(jnp.sum(z[:, p:] ** 2 + B.omega2 * z[:, :p] ** 2))
@@ -99,7 +96,9 @@ def _free(groups: tuple[Group, ...], B: Bodies, now: Now) -> Any:
         own = slice(begin, begin + len(u))
         free.append(_unmet(g.law.overlap, u, moved(g, rate), fastest[own], bent[own]))
         begin += len(u)
-    return jnp.minimum(jnp.min(jnp.concatenate(free)) / B.flow.length[0], 2.0 ** (len(B.flow.length) - 1))
+    most = jnp.minimum(jnp.min(jnp.concatenate(free)) / B.flow.length[0], 2.0 ** (len(B.flow.length) - 1))
+    last = jnp.maximum(exponent(jnp.maximum(most, 1.0)) - (DIGITS - 1), 1)
+    return (most.astype(int) >> last) << last
 
 
 def _unmet(overlap: Any, u: Any, w: Any, fastest: Any, bent: Any) -> Any:
@@ -114,9 +113,9 @@ def _unmet(overlap: Any, u: Any, w: Any, fastest: Any, bent: Any) -> Any:
     return jnp.where((past <= 0) & (deep <= 0), jnp.maximum(ahead, sure), sure)
 
 
-def _told(B: Bodies, k: Any, now: Now, after: Now, done: Any = True) -> Now:
-    """With the events of a step that was done."""
-    met, at = _met(now, after.held, B.flow.length[k])
+def _told(B: Bodies, n: Any, now: Now, after: Now, done: Any = True) -> Now:
+    """With the events of n short steps, if they were done."""
+    met, at = _met(now, after.held, B.flow.length[0] * n)
     return after._replace(met=met & done, at=at)
 
 

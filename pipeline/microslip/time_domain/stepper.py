@@ -203,7 +203,7 @@ class Stepper:
         now = Now(
             y, e.oscillators(0.0), np.zeros(()), np.zeros((b, p)),
             held or untouched(self.groups), np.zeros(6), np.zeros(()), none.astype(bool), none, (),
-            np.zeros((), int),
+            np.zeros(2, int),
         )  # fmt: skip
         return loop.begun(self.options, self.groups, self.bodies, now)
 
