@@ -21,7 +21,7 @@ from ..settings.mistakes import bounded
 
 os.environ.setdefault("NPROC", "1")  # threads of jax: the steps of contact laws are too short to be shared
 if "xla_backend_extra_options" not in os.environ.get("XLA_FLAGS", ""):  # loops as one program, no step by step calls
-    small = "--xla_backend_extra_options=xla_cpu_small_while_loop_byte_threshold=1000000"
+    small = "--xla_backend_extra_options=xla_cpu_small_while_loop_byte_threshold=4000000"
     os.environ["XLA_FLAGS"] = f"{os.environ.get('XLA_FLAGS', '')} {small}".strip()
 jax.config.update("jax_enable_x64", True)  # contact forces are differences of large numbers
 

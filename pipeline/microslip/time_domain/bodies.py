@@ -13,6 +13,7 @@ from .contacts import Held, Yielding, times
 from .flow import Flow
 from .inclusion import Meets
 from .ramp import Ramp
+from .spots import Spots
 
 
 class Bodies(NamedTuple):
@@ -25,7 +26,8 @@ class Bodies(NamedTuple):
         omega2: (b, p). steady: (b, 2 p, n) of the periodic motion without contacts. reach: (points,) norm of their
             motion by modes, and m/s of the steady motion at most; bends: the same of how their velocities change,
             1/s and m/s2: see `loop`. loads: (b, p, n) modal
-            forces of o that kick, of a run-up. enough: see `fourth`. harmonics: (H,) rad/s of the loads.
+            forces of o that kick, of a run-up. enough: see `fourth`. harmonics: (H,) rad/s of the loads. spots: of
+            `fourth`, group by group, see there; preload: (m,) accelerations by F_0.
     """
 
     flow: Flow
@@ -44,6 +46,8 @@ class Bodies(NamedTuple):
     kick: Any
     enough: Any
     harmonics: Any
+    spots: tuple[Spots, ...]
+    preload: Any
 
 
 class Now(NamedTuple):

@@ -59,8 +59,8 @@ class Held(NamedTuple):
     """What contacts hold.
 
     Attributes:
-        d, force: (c,) of the coordinates. states: of the laws, group by group; forces, places: (c n, 3) N and m of
-            their points.
+        d, force: (c,) of the coordinates; of steps of fourth order, at samples alone. states: of the laws, group by
+            group; forces, places: (c n, 3) N and m of their points.
         approach: (contacts,) m of each contact's deepest point; where a law does not know it, whether it is pressed
             (1 or 0). slips: (contacts,) bool.
         lost, given, stored: J, lost in the last step, given by moving ground in it, and stored after it. missed: m, the
@@ -190,15 +190,21 @@ def answer(
         d, missed, (force, states, points) = free, jnp.zeros(()), force_at(groups, free, v, dt, held.states)
     else:
         d, missed, (force, states, points) = _placed(groups, bodies, free, v, dt, held)
-    return told(groups, d, dt, held, accounts, force, states, points, missed)
+    after = told(groups, placed(groups, d), dt, held, accounts, states, points)
+    return after._replace(d=d, force=force, missed=missed)
+
+
+def placed(groups: tuple[Group, ...], d: Any) -> tuple[Any, ...]:
+    """(c n, 3) of the points of each group."""
+    return tuple(moved(g, at + g.offset) for g, at in zip(groups, parts(groups, d), strict=True))
 
 
 def told(
-    groups: tuple[Group, ...], d: Any, dt: Any, held: Held, accounts: bool, force: Any, states: Any, points: Any,
-    missed: Any, by_law: bool = True,
+    groups: tuple[Group, ...], places: tuple[Any, ...], dt: Any, held: Held, accounts: bool, states: tuple[Any, ...],
+    points: tuple[Any, ...], by_law: bool = True,
 ) -> Held:  # fmt: skip
-    """What contacts hold, with events and energies; by_law: whether set-valued laws say what they lose."""
-    places = tuple(moved(g, at + g.offset) for g, at in zip(groups, parts(groups, d), strict=True))
+    """What contacts hold, with events and energies, d and force as before; by_law: whether set-valued laws say what
+    they lose."""
     approach, slips, lost, stored = [jnp.zeros(0)], [jnp.zeros(0, bool)], jnp.zeros(()), jnp.zeros(())
     given = jnp.zeros(())
     for i, (g, u) in enumerate(zip(groups, places, strict=True)):
@@ -215,20 +221,8 @@ def told(
             lost += jnp.sum(g.law.lost(step)) if by_law or not g.rigid else 0.0
             given += jnp.sum(g.law.given(step))
             stored += jnp.sum(g.law.stored(u, states[i]))
-    return Held(
-        d,
-        force,
-        states,
-        points,
-        places,
-        jnp.concatenate(approach),
-        jnp.concatenate(slips),
-        lost,
-        given,
-        stored,
-        missed,
-        jnp.zeros(()),
-    )
+    zero, events = jnp.zeros(()), (jnp.concatenate(approach), jnp.concatenate(slips))
+    return Held(held.d, held.force, states, points, places, *events, lost, given, stored, zero, zero)
 
 
 def rigid_answer(
@@ -263,11 +257,10 @@ def rigid_answer(
     for i, force, way in zip(spots, jnp.split(f, ends), jnp.split(slipped, ends), strict=True):
         points[i], states[i] = force, held.states[i] + way.T
     force = joined(groups, points)
-    if bodies is not None:
-        return told(
-            groups, free - times(bodies.R, force), dt, held, accounts, force, tuple(states), tuple(points), missed
-        )
-    return told(groups, free, dt, held, accounts, force, tuple(states), tuple(points), missed, by_law=False)
+    d = free if bodies is None else free - times(bodies.R, force)
+    by_law = bodies is not None
+    after = told(groups, placed(groups, d), dt, held, accounts, tuple(states), tuple(points), by_law)
+    return after._replace(d=d, force=force, missed=missed)
 
 
 def slid(w: Any, free: Any) -> Any:

@@ -14,10 +14,12 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import jax
+import jax.numpy as jnp
 import numpy as np
 import scipy.linalg
 
 from ..data import Array
+from .contacts import times
 from .equations import Equations
 
 
@@ -25,8 +27,9 @@ class Flow(NamedTuple):
     """Flows over tau 2^k, k = 0, 1, ..., of b blocks of p modes each, s = 2 p + n. All are jax arrays.
 
     Attributes:
-        stack: (K, b, 2 p + 2 s, s), one above the other: how (q_b, v_b, o) moves, and the symmetric matrices, J, of the
-            works of loads and of dampers as quadratic forms of it. turn: (K, n, n) of the oscillators. length: (K,) s.
+        stack: (K, 2 p + 2 s, s, b), one above the other: how (q_b, v_b, o) moves, and the symmetric matrices, J, of the
+            works of loads and of dampers as quadratic forms of it; blocks stand last, and are done side by side.
+            turn: (K, n, n) of the oscillators. length: (K,) s.
     """
 
     stack: Any
@@ -57,8 +60,22 @@ def flow(equations: Equations, tau: float, doublings: int) -> Flow:
                 kept.append(kept[-1] + full.transpose(0, 2, 1) @ kept[-1] @ full)
         moves.append(twice[:, : 2 * p])
     assert moves[0].shape == (b, 2 * p, 2 * p + n)
-    stack = np.concatenate([np.array(x) for x in (moves, S, L)], axis=2)
+    stack = np.ascontiguousarray(np.concatenate([np.array(x) for x in (moves, S, L)], axis=2).transpose(0, 2, 3, 1))
     return Flow(*jax.device_put((stack, turns, length)))
+
+
+def flown(A: Any, y: Any, o: Any) -> Any:
+    """(r, b) rows A (r, s, b) of a flow times (q_b, v_b, o), of bodies at y (b, 2 p)."""
+    if A.shape[2] == 1:
+        return times(A[:, :, 0], jnp.concatenate([y[0], o]))[:, None]
+    return sum(A[:, i] * one for i, one in enumerate((*y.T, *o)))
+
+
+def worked(A: Any, y: Any, o: Any) -> tuple[Any, Any]:
+    """(b, 2 p) after a flow A (2 p + 2 s, s, b), and (2, b) J given by loads and taken by dampers in it."""
+    after, n = flown(A, y, o), y.shape[1]
+    z = jnp.concatenate([y.T, jnp.broadcast_to(o[:, None], (len(o), len(y)))])
+    return after[:n].T, (z * after[n:].reshape(2, *z.shape)).sum(axis=1)
 
 
 def _whole(move: Array, turn: Array) -> Array:

@@ -20,9 +20,10 @@ from typing import Any, NamedTuple
 import jax
 import jax.numpy as jnp
 
-from .bodies import Bodies, Now, Options, by_force, exponent
-from .contacts import Group, force_at, joined, moved, parts, times, told
-from .kicks import flown
+from .bodies import Bodies, Now, Options, exponent
+from .contacts import Group, Held, joined, times, told
+from .flow import flown, worked
+from .spots import by_modes, to_modes
 
 HALVINGS = 10
 """Of a step, of which the shortest flow is half a step: where contacts change it is a 512th at least."""
@@ -42,14 +43,14 @@ SLOW = 0.03
 
 
 class Answer(NamedTuple):
-    """push: (b, p) accelerations. points: (c n, 3) N and rates: (k, n) of what is remembered, group by group. d, v:
-    (c,) of the contact coordinates, m and m/s."""
+    """push: (b, p) accelerations. Group by group forces: (c n, 3) N, rates: (k, n) of what is remembered, places and
+    speeds: (c n, 3) m and m/s of the points."""
 
     push: Any
-    points: tuple[Any, ...]
+    forces: tuple[Any, ...]
     rates: tuple[Any, ...]
-    d: Any
-    v: Any
+    places: tuple[Any, ...]
+    speeds: tuple[Any, ...]
 
 
 class Bent(NamedTuple):
@@ -69,7 +70,7 @@ def begun(groups: tuple[Group, ...], B: Bodies, now: Now) -> Now:
         for g, f, s in zip(groups, now.held.forces, now.held.states, strict=True)
     )
     first = _answer(groups, B, now.y, now.o, x, now.time)
-    held = now.held._replace(force=joined(groups, first.points), forces=first.points)
+    held = now.held._replace(forces=first.forces)
     straight = Bent(0 * first.push, 0 * first.push, jnp.zeros(()), jnp.zeros(()))
     return now._replace(push=first.push, held=held, memory=(x, first.rates, straight), level=jnp.full(2, 1, int))
 
@@ -82,15 +83,14 @@ def leapt(now: Now) -> Now:
 
 def _answer(groups: tuple[Group, ...], B: Bodies, y: Any, o: Any, x: tuple[Any, ...], time: Any) -> Answer:
     """What contacts say where the bodies are, (b, 2 p)."""
-    q, v = jnp.split(y, 2, axis=1)
-    d = times(B.D, q.reshape(-1)) + times(B.D_o, o)
-    w = times(B.D, v.reshape(-1)) + times(B.D_o, times(B.rate, o))
-    found = [
-        g.law.rates(moved(g, at + g.offset), moved(g, rate), own, time, B.flow.length[0])
-        for g, at, rate, own in zip(groups, parts(groups, d), parts(groups, w), x, strict=True)
-    ]
-    points, rates = tuple(f for f, _ in found), tuple(r for _, r in found)
-    return Answer(by_force(B, joined(groups, points)), points, rates, d, w)
+    q, v = (part.reshape(-1) for part in jnp.split(y, 2, axis=1))
+    moves, push, found = times(B.rate, o), B.preload, []
+    for g, spots, own in zip(groups, B.spots, x, strict=True):
+        u, w = by_modes(spots, q, o) + spots.rest, by_modes(spots, v, moves)
+        force, rate = g.law.rates(u.T, w.T, own, time, B.flow.length[0])
+        push -= to_modes(spots, force)
+        found.append((force, rate, u.T, w.T))
+    return Answer(push.reshape(B.omega2.shape), *zip(*found, strict=True))
 
 
 def step(options: Options, groups: tuple[Group, ...], B: Bodies, k: Any, now: Now) -> tuple[Any, Now]:
@@ -99,25 +99,25 @@ def step(options: Options, groups: tuple[Group, ...], B: Bodies, k: Any, now: No
     x, rates, _ = now.memory
     o = times(B.flow.turn[k - 1], now.o), times(B.flow.turn[k], now.o)
     stack = B.flow.stack[k - 1]
-    moves = stack[:, : 2 * p]
+    moves = stack[: 2 * p]
 
-    def moved_on(y: Any, o: Any) -> Any:
-        return times(moves, jnp.concatenate([y, jnp.broadcast_to(o, (len(y), len(o)))], axis=1))
+    def on(y: Any, o: Any) -> Any:
+        return flown(moves, y, o).T
 
     def kick(y: Any, push: Any) -> Any:
         return y.at[:, p:].add(push)
 
     def pushed(push: Any) -> Any:
         """(b, 2 p) what half a step makes of an acceleration."""
-        return times(moves[:, :, p : 2 * p], push)
+        return flown(moves[:, p : 2 * p], push, now.o[:0]).T
 
     def grown(share: Any, *by: tuple[Any, ...]) -> tuple[Any, ...]:
         return tuple(a + share * sum(r) for a, *r in zip(x, *by, strict=True))
 
-    free, first = moved_on(now.y, now.o), pushed(now.push)
+    free, first = on(now.y, now.o), pushed(now.push)
     two = _answer(groups, B, free + half * first, o[0], grown(half, rates), now.time + half)
     three = _answer(groups, B, kick(free, half * two.push), o[0], grown(half, two.rates), now.time + half)
-    end = moved_on(free, o[0]) + h * pushed(three.push)
+    end = on(free, o[0]) + h * pushed(three.push)
     four = _answer(groups, B, end, o[1], grown(h, three.rates), now.time + h)
     kicks = (h / 6 * now.push, h / 3 * (two.push + three.push), h / 6 * four.push)
     y, energy = _gone(stack, now.y, (now.o, o[0]), kicks)
@@ -162,21 +162,28 @@ def _judged(options: Options, k: Any, level: Any, missed: Any, enough: Any) -> t
 def _gone(stack: Any, y: Any, oscillators: tuple[Any, Any], kicks: tuple[Any, Any, Any]) -> tuple[Any, Any]:
     """(b, 2 p) after kicks with flows between them, and (3,) J given by loads, taken by dampers, done on contacts."""
     p = y.shape[1] // 2
-    given, taken, work = (jnp.zeros(()) for _ in range(3))
+    works, work = jnp.zeros((2, len(y))), jnp.zeros(len(y))
     for i, push in enumerate(kicks):
-        work -= jnp.sum(push * (y[:, p:] + 0.5 * push))
+        work -= jnp.sum(push * (y[:, p:] + 0.5 * push), axis=1)
         y = y.at[:, p:].add(push)
         if i < 2:
-            y, works = flown(stack, y, oscillators[i])
-            given, taken = given + works[0], taken + works[1]
-    return y, jnp.stack([given, taken, work])
+            y, more = worked(stack, y, oscillators[i])
+            works += more
+    return y, jnp.concatenate([works, work[None]]).sum(axis=1)
 
 
-def _held(options: Options, groups: tuple[Group, ...], h: Any, now: Now, last: Answer, x: tuple[Any, ...]) -> Any:
-    """What contacts hold: their state as their law's own step tells it, with the memory that was integrated."""
-    _, states, _ = force_at(groups, last.d, last.v, h, now.held.states)
-    recalled = tuple(
-        (g.law.recalled(s, own) if g.law.remembers else None) or s for g, s, own in zip(groups, states, x, strict=True)
-    )
-    force = joined(groups, last.points)
-    return told(groups, last.d, h, now.held, options.accounts, force, recalled, last.points, jnp.zeros(()))
+def _held(options: Options, groups: tuple[Group, ...], h: Any, now: Now, last: Answer, x: tuple[Any, ...]) -> Held:
+    """What contacts hold: their state as their law's own step tells it, with the memory that was integrated; of their
+    coordinates see `at_sample`."""
+    states = list[Any]()
+    for g, u, w, state, own in zip(groups, last.places, last.speeds, now.held.states, x, strict=True):
+        _, after = g.law.step(u, w, h, state)
+        states.append((g.law.recalled(after, own) if g.law.remembers else None) or after)
+    return told(groups, last.places, h, now.held, options.accounts, tuple(states), last.forces)
+
+
+def at_sample(groups: tuple[Group, ...], B: Bodies, now: Now) -> Held:
+    """With what contacts hold in their coordinates, which no step asks for."""
+    q, _ = jnp.split(now.y, 2, axis=1)
+    d = times(B.D, q.reshape(-1)) + times(B.D_o, now.o)
+    return now.held._replace(d=d, force=joined(groups, now.held.forces))

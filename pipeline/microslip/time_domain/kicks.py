@@ -13,6 +13,7 @@ import jax.numpy as jnp
 from .bodies import Bodies, Now, Options, by_force, exponent
 from .braking import slowed
 from .contacts import Group, Held, answer, force_at, rigid_answer, times
+from .flow import flown, worked
 
 
 def step(options: Options, groups: tuple[Group, ...], B: Bodies, n: Any, now: Now) -> Now:
@@ -38,21 +39,14 @@ def step(options: Options, groups: tuple[Group, ...], B: Bodies, n: Any, now: No
     )
 
 
-def flown(stack: Any, y: Any, o: Any) -> tuple[Any, Any]:
-    """(b, 2 p) after a flow of `Flow.stack`, and (2,) J given by loads and taken by dampers in it."""
-    z, p = jnp.concatenate([y, jnp.broadcast_to(o, (len(y), len(o)))], axis=1), y.shape[1]
-    after = times(stack, z)
-    return after[:, :p], jnp.sum(z * after[:, p:].reshape(len(z), 2, -1).transpose(1, 0, 2), axis=(1, 2))
-
-
 def _flown(options: Options, B: Bodies, n: Any, y: Any, o: Any) -> tuple[Any, Any, Any]:
-    """The same and o after n steps, done by powers of two."""
+    """(b, 2 p) and o after n steps, done by powers of two, and (2,) J given by loads and taken by dampers in them."""
 
     def on(carried: tuple) -> tuple:
         n, y, o, works = carried
         k = exponent(n)
-        y, more = flown(B.flow.stack[k], y, o)
-        return n - (1 << k), y, times(B.flow.turn[k], o), works + more
+        y, more = worked(B.flow.stack[k], y, o)
+        return n - (1 << k), y, times(B.flow.turn[k], o), works + more.sum(axis=1)
 
     first = n, y, o, jnp.zeros(2)
     return (jax.lax.while_loop(lambda c: c[0] > 0, on, first) if options.leaps else on(first))[1:]
@@ -106,6 +100,5 @@ def answered(
 
 def _ahead(B: Bodies, q: Any, v: Any, o: Any) -> Any:
     """(c,) of the contact coordinates after another step."""
-    z = jnp.concatenate([q, v, jnp.broadcast_to(o, (len(q), len(o)))], axis=1)
-    then = times(B.flow.stack[0][:, : q.shape[1]], z)
-    return times(B.D, then.reshape(-1)) + times(B.D_o, times(B.flow.turn[0], o))
+    then = flown(B.flow.stack[0][: q.shape[1]], jnp.concatenate([q, v], axis=1), o)
+    return times(B.D, then.T.reshape(-1)) + times(B.D_o, times(B.flow.turn[0], o))

@@ -73,6 +73,8 @@ def run(
         _, now, listed = jax.lax.while_loop(lambda c: c[0] > 0, on, (count, now, listed))
         steps = steps + count
         now = now._replace(o=oscillators(options, B, steps * B.flow.length[0]))
+        if options.halvings:
+            now = now._replace(held=fourth.at_sample(groups, B, now))
         found = look(now)
         kept = jax.tree_util.tree_map(lambda all_of, one: all_of.at[i % s].set(one), seen, found)
         return i + 1, steps, jnp.isfinite(found.mechanical), now, listed, kept

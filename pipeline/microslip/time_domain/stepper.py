@@ -29,6 +29,7 @@ from .equations import Equations
 from .flow import Flow, blocks, flow
 from .ground import moving
 from .inclusion import Meets, meets
+from .spots import Spots, spots
 
 EVENTS = 8192
 """Events that one call of the loop keeps; of more, only their number is known."""
@@ -132,7 +133,17 @@ class Stepper:
         arrays = (D, D_o, e.turning, e.omega2.reshape(b, p), steady, reach, bends, loads, -D.T)
         yielding = Yielding(R, share, F_0) if e.R.any() else None
         more = jax.device_put((*arrays, np.zeros(()), e.Omega * np.array(e.harmonics, dtype=float)))
-        return Bodies._make((None, yielding, None, None, F_0, *more))
+        preload = jax.device_put(D.T @ e.F_0[rows])
+        return Bodies._make((None, yielding, None, None, F_0, *more, self._moved, preload))
+
+    @property
+    def _moved(self) -> tuple[Spots, ...]:
+        """Of steps of fourth order, group by group."""
+        if not self.options.halvings:
+            return ()
+        ends = np.cumsum([g.G.shape[0] * g.G.shape[1] for g in self.groups])[:-1]
+        rest = np.concatenate([np.einsum("cnik,ck->cni", g.G, g.offset).reshape(-1, 3) for g in self.groups])
+        return tuple(spots(*parts) for parts in zip(*(np.split(x, ends) for x in (*self._points, rest)), strict=True))
 
     @property
     def _braking(self) -> Braking | None:
@@ -154,7 +165,7 @@ class Stepper:
             return None
         if not e.R.any():
             p = blocks(e)[1]
-            speeds = scipy.linalg.block_diag(*np.asarray(flows.stack[0][:, :p, p : 2 * p]))
+            speeds = scipy.linalg.block_diag(*np.asarray(flows.stack[0][:p, p : 2 * p]).transpose(2, 0, 1))
             D = self._points[0][rigid].reshape(-1, len(e.omega2))
             return meets(jax.device_put(D @ speeds @ D.T * self.tau))
         names = ", ".join(c.name for c in e.contacts)
