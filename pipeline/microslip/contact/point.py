@@ -407,7 +407,7 @@ def slide(
         return force - friction.coefficient(slip / dt, pressed, time) * pressed
 
     sticks = excess(jnp.ones(trial.shape[1])) <= 0
-    if friction.constant:
+    if friction.constant and relative is not None:
         theta = _secular(trial, relative, held)
     else:
         theta = _halved(excess, trial.shape[1])
