@@ -177,6 +177,16 @@ def test_init_copies_a_runnable_body_and_overwrites_nothing(folder: Path, capsys
     assert "is there already" in said(capsys)[1] and (folder / "blade" / "body.toml").read_bytes() == before
 
 
+def test_every_question_takes_the_modal_file_beside_a_case(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Also those that make modal files where a body.toml is: the case alone is wrong then, no body is looked for."""
+    assert main(["init", "sample", "vane"]) == 0
+    said(capsys)
+    for verb in ("mistune", "bifurcate", "orbit"):
+        assert main([verb, "vane"]) == 2
+        assert "nor in" not in said(capsys)[1], verb
+    assert main(["mistune", "vane"]) == 2 and "mistuning: is missing" in said(capsys)[1]
+
+
 def test_run_prints_the_first_frequencies(
     folder: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

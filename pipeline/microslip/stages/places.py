@@ -95,12 +95,13 @@ def is_case(path: Path) -> bool:
 def modal_files(
     case: CaseSettings, path: Path, root: Path, report: Report, known: Mapping[str, Path] | None = None
 ) -> dict[str, Path]:
-    """Body of a case -> its modal file, computed where that is not up to date.
+    """Body of a case -> its modal file, computed where that is not up to date; basis.h5 beside a case of one body
+    without a body.toml there.
 
     Raises:
         UserError: a body that is nowhere.
     """
-    found = dict(known or {})
+    found = ({} if path.with_name("body.toml").is_file() else _beside(case, path)) | dict(known or {})
     for b in case.components:
         if b.name in found:
             continue
@@ -128,8 +129,10 @@ def lumped(case_path: Path, name: str) -> Path | None:
 def existing_files(case: CaseSettings, path: Path, basis_file: Path | None, root: Path) -> dict[str, Path]:
     """Body of a case -> a modal file that exists."""
     beside = path.with_name("basis.h5")
-    if len(case.components) == 1 and case.components[0].file is None and (basis_file is not None or beside.is_file()):
-        return {case.components[0].name: basis_file or beside}
+    if len(case.components) == 1 and case.components[0].file is None and basis_file is not None:
+        return {case.components[0].name: basis_file}
+    if there := _beside(case, path):
+        return there
     if basis_file is not None:
         raise UserError(f"{path}: has {len(case.components)} bodies; name their modal files in it (bodies.<name>.file)")
     found = {}
@@ -139,6 +142,13 @@ def existing_files(case: CaseSettings, path: Path, basis_file: Path | None, root
             own = [beside] if len(case.components) == 1 else []
             raise UserError(_nowhere(case, path, b, [*own, found[b.name]], root))
     return found
+
+
+def _beside(case: CaseSettings, path: Path) -> dict[str, Path]:
+    """The modal file basis.h5 beside a case of one body that names no other."""
+    file = path.with_name("basis.h5")
+    one = case.components[0] if len(case.components) == 1 else None
+    return {one.name: file} if one is not None and one.file is None and file.is_file() else {}
 
 
 def _named(path: Path, b: BodyOfCase) -> Path:
