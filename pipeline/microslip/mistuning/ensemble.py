@@ -131,11 +131,8 @@ def run(
     found = Ensemble(
         asked, tuned, np.zeros((0, len(COLUMNS))), Envelope.empty(len(asked.frequency), tuned.top.amplitude)
     )
-    known = _kept(file, inputs, found) if file is not None else found
-    if len(known) > samples:  # its envelope is that of all of them: it stays for who asks for as many
-        file = None
-    else:
-        found = known
+    found = _kept(file, inputs, found) if file is not None else found
+    found.rows = found.rows[:samples]
     workers = workers or min(_cores(), -(-samples // EACH))
     with _computed(asked, workers, executor) as of:
         while len(found) < samples and not _narrow(found, until):
