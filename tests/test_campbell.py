@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,7 +14,7 @@ from hypothesis import strategies as st
 
 from microslip.data import Array, ModalGroup
 from microslip.modal.campbell import LINK, Tracks, crossings, mac, track, track_basis
-from microslip.pictures.plots import _ceiling
+from microslip.pictures.plots import _ceiling, campbell_plot
 
 
 def shapes(n: int, m: int, seed: int = 0) -> Array:
@@ -144,3 +145,11 @@ def test_the_lowest_mode_is_seen_above_all_engine_orders(lowest: float) -> None:
     omega = 2 * np.pi * np.array([[lowest, 1.1 * lowest], [9e3, 9e3]])
     tracks = Tracks(np.array([0.0, 200 * np.pi]), np.array([[0, 0], [1, 1]]), omega, np.ones((2, 1)))
     assert _ceiling(tracks, [1]) == pytest.approx(max(120.0, 1.1 * 1.1 * lowest))
+
+
+def test_a_mode_of_one_speed_alone_is_drawn(tmp_path: Path) -> None:
+    """Among the highest ones kept a mode may be there at a single speed, between those of the diagram's grid."""
+    omega = np.array([[1000.0, 1010.0, 1020.0, 1040.0], [np.nan, np.nan, 3050.0, np.nan]])
+    modes = np.where(np.isnan(omega), -1, np.arange(2)[:, None])
+    tracks = Tracks(np.array([0.0, 100.0, 217.0, 300.0]), modes, omega, np.full((2, 3), 0.9))
+    assert campbell_plot(small.basis(), tracks, [], tmp_path / "c.png").is_file()

@@ -52,6 +52,16 @@ def test_a_run_ends_when_its_interval_is_narrow(tuned: Tuned) -> None:
     assert any(str(before.quantile(0.95)) in line for line in told)
 
 
+def test_a_run_ends_at_the_same_sample_whoever_solves_them(tuned: Tuned) -> None:
+    """Many at a time or one: what is solved beyond it counts nowhere."""
+    asked = Asked(tuned, (Scatter("frequency", 0.002),), np.array([286.0, 287.0, 288.0]), stuck=True)
+    one = ensemble.run(asked, 200, until=0.02, workers=1)
+    with ThreadPoolExecutor(2) as pool:
+        many = ensemble.run(asked, 200, until=0.02, workers=7, executor=pool)
+    assert len(one) % 28 and len(one) < 200
+    assert many.rows.tobytes() == one.rows.tobytes() and many.envelope.sums.tobytes() == one.envelope.sums.tobytes()
+
+
 def test_other_peoples_processes(tuned: Tuned) -> None:
     """Anything with a map of concurrent.futures, in the place of own processes: the same bits."""
     asked = Asked(tuned, (Scatter("frequency", 0.01),), np.array([286.0, 287.0, 288.0]), stuck=True)

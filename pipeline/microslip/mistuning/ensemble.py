@@ -136,16 +136,35 @@ def run(
     workers = workers or min(_cores(), -(-samples // EACH))
     with _computed(asked, workers, executor) as of:
         while len(found) < samples and not _narrow(found, until):
-            more = max(EACH * workers, int(SHARE * len(found)))
-            made, told = list[list[float]](), _told(found)
-            for one in of(range(len(found), min(samples, len(found) + more))):
-                found.envelope.add(one.grid)
-                made.append(_row(one))
-                report(f"{len(found) + len(made)} of {samples} samples{told}")
-            found.rows = np.vstack([found.rows, made])
+            _more(found, of, min(samples, _next(len(found), EACH * workers)), until, samples, report)
             if file is not None:
                 _keep(file, inputs, found)
     return found
+
+
+def _more(
+    found: Ensemble, of: Callable[[Sequence[int]], Iterator[Sample]], end: int, until: float | None, samples: int,
+    report: Report,
+) -> None:  # fmt: skip
+    """Samples up to a number, or as many as are enough, which does not depend on how many are solved side by side."""
+    made, told, judged = list[list[float]](), _told(found), _next(len(found))
+    for number, one in zip(range(len(found) + 1, end + 1), of(range(len(found), end)), strict=True):
+        found.envelope.add(one.grid)
+        made.append(_row(one))
+        report(f"{number} of {samples} samples{told}")
+        if number in (judged, end):
+            found.rows, made, judged = np.vstack([found.rows, made]), [], _next(number)
+            if number == end or _narrow(found, until):
+                return
+            told = _told(found)
+
+
+def _next(known: int, more: int = 1) -> int:
+    """Number of samples, so many more at least, at which it is judged whether they are enough."""
+    judged = 0
+    while judged < known + more:
+        judged += max(EACH, int(SHARE * judged))
+    return judged
 
 
 DRAWN = 100_000

@@ -250,8 +250,8 @@ def _ceiling(tracks: Tracks, orders: Sequence[int]) -> float:
 
 
 def _curves(axes: Axes, tracks: Tracks, rpm: Array, top: float) -> None:
-    speeds = from_rpm(rpm)
-    labels = []
+    speeds = np.union1d(from_rpm(rpm), tracks.speeds)  # a curve may be of one station
+    labels, rpm = [], to_rpm(speeds)
     for c in range(len(tracks.modes)):
         f = tracks.frequency(c, speeds)
         if np.nanmin(f) > top:

@@ -218,15 +218,16 @@ class Orbit:
     @property
     def run_up(self) -> str:
         """What a run-up met, in words; empty if it is none."""
-        ends = [self.array("angular_frequency", part) for part in (slice(1), slice(-1, None))]
-        if not len(self.time) or np.ptp(ends) == 0:
+        begun, (last,) = (self.array("angular_frequency", part) for part in (slice(2), slice(-1, None)))
+        if len(begun) < 2 or begun[0] == last:
             return ""
+        first = begun[0] - (begun[1] - begun[0]) / (self.time[1] / self.time[0] - 1)  # at time 0, before any sample
         top, at = -1.0, 0.0
         for y, w in self.strips("displacement", "angular_frequency"):
             if len(y) and (high := float(np.abs(y[0]).max())) > top:
                 top, at = high, float(w[np.abs(y[0]).argmax()]) / (2 * np.pi)
-        way = "up" if ends[1] > ends[0] else "down"
-        said = f"run-{way} from {ends[0][0] / 2 / np.pi:.6g} to {ends[1][0] / 2 / np.pi:.6g} Hz"
+        way = "up" if last > first else "down"
+        said = f"run-{way} from {first / 2 / np.pi:.6g} to {last / 2 / np.pi:.6g} Hz"
         return f"{said}, largest at {at:.6g} Hz" if self.labels else said
 
     @property
