@@ -130,6 +130,21 @@ def test_derivatives_of_a_straight_way_are_those_of_differences() -> None:
     assert np.isfinite(told).all() and np.quantile(wrong, 0.999) < 1e-7
 
 
+@pytest.mark.parametrize("angle", [0.3, 2.0, -2.9])
+def test_the_derivative_by_a_way_of_rounding_is_that_by_a_short_one(angle: float) -> None:
+    """On the cone only what is across the force turns it, whatever the size and direction of a short way."""
+    force, held = jnp.array([1.2, -0.5]), jnp.array(1.3)
+    way = jnp.array([jnp.cos(angle), jnp.sin(angle)]) / 1.3
+    for size in (0.0, 1e-170, 1e-40, 1e-20, 1e-17, 1e-15, 1e-12):
+        held_after = held * (1 - 1e-3)  # so that it slides whatever the way is
+        at = (force, size * way, held, held_after)
+        told = jax.jvp(lambda x, at=at: dragged(at[0], x, at[2], at[3]), (at[1],), (jnp.array([1.0, 2.0]),))[1]
+        across = jnp.array([0.5, 1.2]) / 1.3
+        mean = jnp.log(held / held_after) / (held - held_after)  # of 1 / R
+        right = held_after * mean * (across @ jnp.array([1.0, 2.0])) * across
+        np.testing.assert_allclose(told, right, rtol=0, atol=1e-9, err_msg=str(size))
+
+
 def test_a_force_keeps_its_direction_where_the_limit_falls_below_it_without_a_way() -> None:
     force = jnp.array([[3.0, 0.0], [4.0, 2.0]])
     kept = dragged(force, jnp.zeros((2, 2)), jnp.array([5.0, 3.0]), jnp.array([2.5, 1.0]))

@@ -276,7 +276,7 @@ def _slides(trial: Array, held: Array) -> Array:
 
 class _Way(NamedTuple):
     """Of a slider's way: whether it slides; the share of it before it does; P and R then, and the root that tells it;
-    length; mean of 1 / R from there on; sine of the last angle, and d of the last over d of the first one."""
+    length; mean of 1 / R from there on; sine of the last angle, and the share of d of the first one that is lost."""
 
     slides: Array
     share: Array
@@ -286,7 +286,7 @@ class _Way(NamedTuple):
     length: Array
     softness: Array
     sine: Array
-    angles: Array
+    lost: Array
 
 
 def _dragged(force: Array, way: Array, before: Array, held: Array) -> tuple[Array, _Way]:
@@ -299,20 +299,21 @@ def _dragged(force: Array, way: Array, before: Array, held: Array) -> tuple[Arra
     share = jnp.clip(ratio(jnp.where(ahead, room, found - b), jnp.where(ahead, b + found, a)), 0.0, 1.0)
     reached, on_cone = before + share * grows, force + share * way
     # without a way the force keeps its direction; cosines and sines are times the length of what they are about
-    moved = longer > 0
+    moved = longer > 1e-300
     about, size = jnp.where(moved, way, trial), root(jnp.where(moved, longer, _square(trial)))
     length, both = jnp.where(moved, size, 0.0), size * reached
     along, across = _inner(about, on_cone), about[0] * on_cone[1] - about[1] * on_cone[0]
     softness = mean_inverse(reached, held)
-    left, ahead = jnp.exp(-(1 - share) * length * softness), along >= 0
+    falls = -(1 - share) * length * softness
+    left, ahead = jnp.exp(falls), along >= 0
     # cosine and sine of beta / 2 but for their size, without a difference of equal numbers
     cosine, first = jnp.where(ahead, both + along + _SOME, across), jnp.where(ahead, across, both - along)
     sine = first * left
     square = cosine**2 + sine**2
     over = ratio(held, square * size)
     turned = (cosine**2 - sine**2) * over * about + 2 * cosine * sine * over * _across(about)
-    angles = left * ratio(cosine**2 + first**2, square)
-    told = _Way(slides, share, on_cone, reached, found, length, softness, 2 * ratio(cosine * sine, square), angles)
+    lost = -jnp.expm1(falls) * ratio(cosine**2 - first * sine, square)  # divided by the way, which may be rounding
+    told = _Way(slides, share, on_cone, reached, found, length, softness, 2 * ratio(cosine * sine, square), lost)
     return jnp.where(slides, turned, trial), told
 
 
@@ -395,10 +396,11 @@ def _slid(given: tuple[Array, ...], moved: list[Array | None], straight: Array) 
     turn = _across(w.on_cone) * shorter**2  # d angle of P over dP
     by_ends = _mean_slopes(w.reached, held, inverse)
     at_first, at_last = (-w.sine * share_of * w.length * by for by in by_ends)  # d angle over dR
-    by_share = w.angles * _inner(turn, way) + w.sine * w.length * shorter
+    angles = 1 - w.lost
+    by_share = angles * _inner(turn, way) + w.sine * w.length * shorter
     by_excess = ratio(by_share, w.found)  # d angle over -(P . dP - R dR) where it reaches R
-    by_force = w.angles * turn - by_excess * w.on_cone
-    bend = (1 - w.angles) * _across(way) * over_length**2 - w.sine * share_of * inverse * way * over_length
+    by_force = angles * turn - by_excess * w.on_cone
+    bend = w.lost * _across(way) * over_length**2 - w.sine * share_of * inverse * way * over_length
     by_way = s * by_force + jnp.where(w.length > 0, bend, share_of * inverse * w.reached * turn)
     by_before = share_of * (at_first + by_excess * w.reached)
     by_held = at_first * s + at_last + by_excess * w.reached * s
