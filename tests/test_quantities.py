@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from small import basis as small_basis
 
+import microslip as ms
 from microslip.case.curves import Followed
 from microslip.harmonic_balance.envelope import Envelope, OverOrders
 from microslip.harmonic_balance.readout import measured
@@ -53,3 +54,13 @@ def test_tables_of_surveys_and_curves() -> None:
     ]
     for columns in tables:
         assert any(name.endswith("_strain") for name in columns) and not any(name.endswith("_m") for name in columns)
+
+
+def test_each_read_out_of_two_tones_has_its_own_unit() -> None:
+    """A displacement beside a strain is none."""
+    case = {
+        "body": "vane", "modes": 2, "contacts": [], "monitors": [{"monitor": "root"}, {"monitor": "probe"}],
+        "excitations": [{"row": "magnet"}, {"row": "magnet", "tone": 2}],
+    }  # fmt: skip
+    found = ms.two_tones(ms.assemble(case, vane=ms.sample()), [500.0], second=707.3, harmonics=1)
+    assert found.units == ("1", "m") and "amplitude_m" in found.columns(1)

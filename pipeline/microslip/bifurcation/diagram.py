@@ -73,7 +73,7 @@ class Diagram(Collected):
     def plot(self, axes: Axes, label: str = "parameter", read_out: int = 0) -> None:
         """Half of the way from the smallest to the largest value of a read-out, in matplotlib's axes."""
         dots = [(a.orbit.p, float(a.swing[read_out])) for a in self.attractors]
-        draw(self.branches, dots, axes, label, self.system.named[read_out], self.system.unit, read_out)
+        draw(self.branches, dots, axes, label, self.system.named[read_out], self.system.unit(read_out), read_out)
 
 
 @dataclass(eq=False)

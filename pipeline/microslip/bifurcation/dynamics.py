@@ -27,7 +27,7 @@ class Dynamics:
         rate: f. labels: of the n coordinates. scale: (n,) what a large change of each is. parameter_scale: what a large
             change of p is. frequency: rad/s of what drives it, a function of p in jax; None: nothing does, and f does
             not depend on the angle.
-        outputs: names of what is read, and unit. read: of x (..., n) and p: (..., w); None: the coordinates.
+        outputs: names of what is read, units of each. read: of x (..., n) and p: (..., w); None: the coordinates.
         bends: (n, r) orthonormal, of the coordinates that f is not linear in: its derivative over all orthogonal to
             them depends on p alone; None: not known.
     """
@@ -39,7 +39,7 @@ class Dynamics:
     frequency: Callable[[Any], Any] | None = None
     outputs: tuple[str, ...] = ()
     read: Callable[[Array, float], Array] | None = None
-    unit: str = ""
+    units: tuple[str, ...] = ()
     bends: Array | None = None
 
     @property
@@ -54,6 +54,10 @@ class Dynamics:
     def named(self) -> tuple[str, ...]:
         """(w,) of the read-outs."""
         return self.outputs or self.labels
+
+    def unit(self, output: int = 0) -> str:
+        """Of a read-out; empty if it is not known."""
+        return self.units[output] if self.units else ""
 
     @cached_property
     def still(self) -> Callable[[Any, Any], tuple[Any, Any, Any]]:

@@ -120,9 +120,10 @@ def dynamics(make: Make, low: float, high: float, frequency: float | None = None
 
     labels = [f"q{i + 1}" for i in range(m)] + [f"v{i + 1}" for i in range(m)] + [f"x{i + 1}" for i in range(n - 2 * m)]
     one = make(0.5 * (low + high))
-    names, unit = tuple(f"{w.monitor} {w.label}" for w in one.outputs), measured(one).unit
+    names = tuple(f"{w.monitor} {w.label}" for w in one.outputs)
+    units = tuple(measured(one, i).unit for i in range(len(names)))
     shown = read if names else None
-    return Dynamics(rate, tuple(labels), size(middle), high - low, driven, names, shown, unit, bends(equations))
+    return Dynamics(rate, tuple(labels), size(middle), high - low, driven, names, shown, units, bends(equations))
 
 
 def bends(equations: Over) -> Array:

@@ -186,11 +186,12 @@ def of_points(points: Sequence[Point], balances: Sequence[TwoTone]) -> Solved:
     b, turn = balances[0], 2 * np.pi
     works = np.array([_powers(*one) for one in zip(balances, points, strict=True)])
     pairs = np.vstack([[0, 0], b.torus.pairs])
-    outputs = b.problem.assembly.outputs
+    assembly = b.problem.assembly
+    units = tuple(measured(assembly, i).unit for i in range(len(assembly.outputs)))
     return Solved(
         np.array([p.first for p in points]) / turn, np.array([p.second for p in points]) / turn, pairs,
         np.array([_amplitudes(*one) for one in zip(balances, points, strict=True)]),
-        tuple(f"{w.monitor} {w.label}" for w in outputs), (measured(b.problem.assembly).unit,) * len(outputs),
+        tuple(f"{w.monitor} {w.label}" for w in assembly.outputs), units,
         works[:, :2], works[:, 2], works[:, 3], works[:, 4], tuple(p.status for p in points),
         np.array([p.error for p in points]), _said(points, b), points=tuple(points), balances=tuple(balances),
     )  # fmt: skip

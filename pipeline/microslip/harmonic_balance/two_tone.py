@@ -168,7 +168,7 @@ class TwoTone:
         R = x[:n] + (views.applied(excess) / p.scale).ravel()
         for i in range(p.count):
             slope[:, :, :, i] -= np.einsum("wx,j->wjx", np.eye(len(v)), p.stiffness[0][:, i])
-        A = views.compliant(slope.reshape(len(v), p.count, -1)).reshape(len(v), p.count, len(v), p.count)
+        A = views.compliant(slope.reshape(len(v), p.count, n)).reshape(len(v), p.count, len(v), p.count)
         A = np.eye(n) + (A * p.scale / p.scale[:, None, None]).reshape(n, n)
         tones = [
             ((views.rate(excess, self.torus.pairs[:, i]) + views.compliant(by_tone[i][..., None])[..., 0]) / p.scale)
