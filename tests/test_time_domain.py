@@ -832,3 +832,14 @@ def test_a_case_that_diverges_ends_with_exit_code_1(hammer: Path, capsys: pytest
     page = (hammer / "build" / "hammer" / "orbit.html").read_text(encoding="utf-8")
     assert "its energy was" in page
     assert len(ms.load(hammer / "build" / "hammer" / "orbit.h5").time) > 200
+
+
+@pytest.mark.parametrize("damping", ["modal", "structural"])
+def test_loss_factors_in_time_are_told(damping: str) -> None:
+    """They are dampers there, that take as much at the first harmonic alone."""
+    rub = {"interface": "right", "law": "smooth", "normal_force": 20.0, "normal_stiffness": 2e5, "friction": 0.2,
+           "tangential_stiffness": 4e5, "points": [1, 1]}  # fmt: skip
+    case = {"body": "vane", "excitation": "magnet", "amplitude": 1.0, "monitor": "probe", "modes": 2, "contacts": [rub]}
+    built = ms.assemble({**case, "damping": damping}, vane=ms.sample())
+    found = ms.integrate(built, 300.0, settle=0, keep=1)
+    assert any("at 300 Hz" in text for text in found.messages) == (damping == "structural")

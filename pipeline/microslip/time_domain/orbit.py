@@ -461,7 +461,9 @@ def march(
     error, told = _error(stepper, now, samples, each, settle + keep)
     exponent = _exponent(stepper, now, kept, samples, each, settle + keep)
     more = tuple(text for text in (told, exponent.message if exponent else "") if text)
-    return Ended(each * samples, error, messages=(*_warnings(kept, float(now.worst)), *more), exponent=exponent)
+    return Ended(
+        each * samples, error, messages=(*_warnings(equations, kept, float(now.worst)), *more), exponent=exponent
+    )
 
 
 def _exponent(stepper: Stepper, now: Now, kept: Kept, samples: int, each: int, done: int) -> Exponent | None:
@@ -492,9 +494,15 @@ def _divergence(stepper: Stepper, before: Now, seen: Seen, kept: Kept | None) ->
     return when, f"From {when:.6g} s on it is no number: {reached}; take more steps, or look for what drives it."
 
 
-def _warnings(kept: Kept, worst: float) -> tuple[str, ...]:
+def _warnings(equations: Equations, kept: Kept, worst: float) -> tuple[str, ...]:
     """What a reader must know. worst: m, of the contacts that yield at once."""
     said = []
+    if any(H.any() for c in equations.assembly.components for H in c.loss.values()):
+        said.append(
+            f"Loss factors (structural damping) have no form in time: dampers that take as much at "
+            f"{equations.Omega / (2 * np.pi):.6g} Hz stand for them, and take h times as much in the h-th harmonic, "
+            "where a harmonic balance does not; with modal damping both mean the same."
+        )
     if worst > UNSOLVED * kept.widest:
         said.append(f"Contacts were not solved for in every step, to {worst:.2g} m at worst; take more steps.")
     if kept.missed:
