@@ -183,7 +183,7 @@ def ring(blades: int, periods: int, rounds: int) -> None:
     tolerances, steps = 10.0 ** -np.arange(3, 9, 0.5), SAMPLES * np.array([0.5, 0.75, 1.0, 1.5, 2, 2.5, 3, 4, 6, 8])
     peers: list[Method] = [("LSODA, solve_ivp", tolerances, scipy("LSODA")), ("LSODA, odeint", tolerances, compiled)]
     if periods <= 10:
-        peers = [("Radau", tolerances[:6], scipy("Radau"))]
+        peers.append(("Radau", tolerances[:6], scipy("Radau")))
     compared(exact, [("microslip", steps, own), *peers], rounds)
 
 
