@@ -34,7 +34,7 @@ from microslip.contact.friction import Coulomb
 from microslip.contact.harmonics import force_harmonics, fourier
 from microslip.contact.law import Law
 from microslip.contact.normal import Penalty
-from microslip.contact.point import PointContact, mean_inverse
+from microslip.contact.point import PointContact, mean_inverse, mean_slopes
 
 ROOT = Path(__file__).resolve().parents[1]
 PYHARM = ROOT / "build" / "peers" / "pyharm" / "bin" / "python"
@@ -119,7 +119,8 @@ def straight(F: np.ndarray, d: np.ndarray, R0: np.ndarray, R: np.ndarray) -> tup
     s = np.clip(np.where(b > 0, _over(room, b + root), _over(root - b, a)), 0.0, 1.0)
     r, P, e = R0 + s * grows, F + s * d, _over(d, way)
     x, y = (e * P).sum(axis=0), e[0] * P[1] - e[1] * P[0]
-    inverse, by_first, by_last = (np.asarray(x) for x in mean_inverse(r, R))
+    inverse = np.asarray(mean_inverse(r, R))
+    by_first, by_last = (np.asarray(x) for x in mean_slopes(r, R, inverse))
     lag = (1 - s) * way * inverse
     c, first = np.where(x >= 0, r + x, y), np.where(x >= 0, y, r - x)
     last = first * np.exp(-lag)

@@ -287,7 +287,7 @@ def test_incomplete_and_newer_files_get_one_sentence(tmp_path):
     write_response(path, response(1.0))
     with h5py.File(path, "r+") as file:
         file.attrs["format_version"] = "7.0"
-    with pytest.raises(UserError, match="version 7.0"):
+    with pytest.raises(UserError, match="7.0"):
         read_response(path)
     write_response(path, response(1.0))
     with h5py.File(path, "r+") as file:

@@ -349,7 +349,7 @@ def mean_inverse(first: Array, last: Array) -> Array:
     return 2 * over * jax.lax.cond((jnp.abs(r) < _NEAR).all(), series, closed)  # arctanh(r) / r
 
 
-def _mean_slopes(first: Array, last: Array, mean: Array) -> tuple[Array, Array]:
+def mean_slopes(first: Array, last: Array, mean: Array) -> tuple[Array, Array]:
     """Derivatives of `mean_inverse` with respect to both."""
     over, r = _unlike(first, last)
     at = jnp.where(jnp.abs(r) < _NEAR, 0.5, r)
@@ -394,7 +394,7 @@ def _slid(given: tuple[Array, ...], moved: list[Array | None], straight: Array) 
     s, share_of, inverse = w.share, 1 - w.share, w.softness
     shorter, over_length = ratio(jnp.ones_like(held), w.reached), ratio(jnp.ones_like(held), w.length)
     turn = _across(w.on_cone) * shorter**2  # d angle of P over dP
-    by_ends = _mean_slopes(w.reached, held, inverse)
+    by_ends = mean_slopes(w.reached, held, inverse)
     at_first, at_last = (-w.sine * share_of * w.length * by for by in by_ends)  # d angle over dR
     angles = 1 - w.lost
     by_share = angles * _inner(turn, way) + w.sine * w.length * shorter
