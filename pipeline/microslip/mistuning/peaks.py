@@ -100,7 +100,8 @@ class _Search:
 
     def __init__(self, respond: Respond, follow: Follow | None, frequency: Array) -> None:
         self.respond, self.follow = respond, follow
-        self.low, self.high, self.width = float(min(frequency)), float(max(frequency)), float(np.diff(frequency).max(initial=0.0))
+        self.low, self.high = float(min(frequency)), float(max(frequency))
+        self.width = float(np.diff(frequency).max(initial=0.0))
         self.known: dict[float, Array] = {}
         self.failed: list[float] = []
         self.tried: set[tuple[float, float, float]] = set()
