@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -122,3 +123,7 @@ class Deck:
         """The parts of a set, to add to."""
         self.written.setdefault(name.upper(), name)
         return sets.setdefault(name.upper(), [])
+
+
+Readers = dict[str, Callable[[Deck, dict[str, str], list[str]], None]]
+"""Keyword -> what reads such a card, by its parameters and data lines, into the deck."""

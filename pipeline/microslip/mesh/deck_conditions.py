@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 
 from .cards import fields
-from .deck import Deck
+from .deck import Deck, Readers
 from .raw import Damaged, Numbering, RawMesh, joined, lost
 from .supports import Constraints
 
@@ -102,7 +100,7 @@ def constraints(deck: Deck) -> Constraints:
     return held
 
 
-READERS: dict[str, Callable[[Deck, dict[str, str], list[str]], None]] = {
+READERS: Readers = {
     "BOUNDARY": _read_boundary,
     "STEP": _read_step,
     "TRANSFORM": _read_transform,

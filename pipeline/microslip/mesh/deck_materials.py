@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 
 from ..data import Array
 from ..elasticity import turned, turned_strain
 from ..frames import rotation
 from .cards import numbers
-from .deck import Deck, DeckConstants
+from .deck import Deck, DeckConstants, Readers
 from .materials import isotropic_rows, orthotropic_row
 from .raw import Damaged, DeckMaterial, RawMesh
 
@@ -168,7 +166,7 @@ def _orthotropic_stiffness(name: str, d: Array) -> Array:
     return C
 
 
-READERS: dict[str, Callable[[Deck, dict[str, str], list[str]], None]] = {
+READERS: Readers = {
     "MATERIAL": _read_material,
     "ELASTIC": _read_elastic,
     "DENSITY": _read_density,

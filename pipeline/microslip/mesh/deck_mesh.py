@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
 from contextlib import suppress
 
 import numpy as np
 
 from ..data import Array, Indices
 from .cards import fields, numbers, whole_numbers
-from .deck import Cells, Deck
+from .deck import Cells, Deck, Readers
 from .instances import local_system
 from .raw import Damaged, joined
 
@@ -148,7 +147,7 @@ def _read_surface(deck: Deck, parameters: dict[str, str], lines: list[str]) -> N
         deck.written.setdefault(name.upper(), name)
 
 
-READERS: dict[str, Callable[[Deck, dict[str, str], list[str]], None]] = {
+READERS: Readers = {
     "SYSTEM": _read_system,
     "NODE": _read_nodes,
     "ELEMENT": _read_elements,
