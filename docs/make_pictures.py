@@ -18,6 +18,7 @@ from typing import Any
 
 import damper_study
 import numpy as np
+import scipy.linalg
 from pages import (
     HERE,
     body_reference,
@@ -46,7 +47,6 @@ from microslip.pictures.scene import quiet_vtk
 from microslip.reduced import truncation
 from microslip.reduced.compliance import contact_share, without_bulk
 from microslip.reduction import METHODS
-from microslip.reference.one_harmonic import JenkinsContact, stuck_frequencies
 from microslip.stages.closure import closure_stage
 from microslip.stages.job import open_job
 from microslip.stages.meshing import load_mesh, mesh_stage
@@ -561,8 +561,11 @@ def blade_case(basis: ModalBasis, **changes: Any) -> CaseSettings:
 
 
 def stuck(group: ModalGroup, settings: CaseSettings) -> np.ndarray:
-    contacts = [JenkinsContact(c.interface, six := springs_of(c), 1, six[1], np.inf) for c in settings.contacts]
-    return stuck_frequencies(group, contacts)[:4]
+    K = group.K_r.copy()
+    for c in settings.contacts:
+        rows = group.interfaces[c.interface].rows
+        K += rows.T @ (springs_of(c)[:, None] * rows)
+    return np.sqrt(scipy.linalg.eigvalsh(K, group.M_r)[:4]) / (2 * np.pi)
 
 
 def springs_of(c: ContactSettings) -> np.ndarray:
