@@ -1160,12 +1160,13 @@ def identification() -> None:
 
 def rolling() -> None:
     """A wheel on a rail: creep curve and tractions; profiles that wear."""
+    from microslip.stages.answer import RollJob
     from microslip.stages.rolling import rolling_stage
 
     wear = ["name=wheel-rail-worn", "wear={coefficient=2e-13, updates=20, passages=1e6}", "model.exact=0"]
     case = ROOT / "pipeline" / "cases" / "wheel-rail.toml"
-    worn = [file for file in rolling_stage(case, BUILD, wear)[0] if file.stem == "wearing"]
-    for file in [*rolling_stage(case, BUILD)[0], *worn]:
+    worn = [file for file in rolling_stage(RollJob(case, BUILD, wear)).files if file.stem == "wearing"]
+    for file in [*rolling_stage(RollJob(case, BUILD)).files, *worn]:
         if file.suffix == ".png":
             save(from_file(file), f"rolling_{file.stem}", colours=LINES)
 
@@ -1174,9 +1175,10 @@ def unround_wheels() -> None:
     """A wheel with three lobes: wear over its circumference, and growth by order over distance and speed."""
     from PIL import Image
 
+    from microslip.stages.answer import RollJob
     from microslip.stages.vehicle import vehicle_stage
 
-    made, _, _ = vehicle_stage(ROOT / "pipeline" / "cases" / "unround-wheel.toml", BUILD)
+    made = vehicle_stage(RollJob(ROOT / "pipeline" / "cases" / "unround-wheel.toml", BUILD)).files
     parts = [from_file(file) for file in made if file.suffix == ".png"]
     whole = Image.new("RGB", (max(p.width for p in parts), sum(p.height for p in parts)), "white")
     for k, part in enumerate(parts):
@@ -1186,9 +1188,10 @@ def unround_wheels() -> None:
 
 def tyre() -> None:
     """A rubber wheel whose slip jumps."""
+    from microslip.stages.answer import RollJob
     from microslip.stages.tyre import tyre_stage
 
-    for file in tyre_stage(ROOT / "pipeline" / "cases" / "slip-jump.toml", BUILD)[0]:
+    for file in tyre_stage(RollJob(ROOT / "pipeline" / "cases" / "slip-jump.toml", BUILD)).files:
         if file.suffix == ".png":
             save(from_file(file), "tyre", colours=LINES)
 
