@@ -18,7 +18,7 @@ from microslip.bifurcation import balance, branches, deflation, equilibria, floq
 from microslip.bifurcation.diagram import Asked, Diagram, diagram
 from microslip.bifurcation.dynamics import Dynamics
 from microslip.bifurcation.shooting import Orbit, Shooting
-from microslip.data import UserError
+from microslip.errors import UserError
 
 
 def circling(z: Any, p: Any) -> Any:

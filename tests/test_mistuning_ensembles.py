@@ -11,7 +11,7 @@ import pytest
 import scipy.stats
 from test_mistuning import FINE, SLIPS, sector
 
-from microslip.data import UserError
+from microslip.errors import UserError
 from microslip.mistuning import ensemble
 from microslip.mistuning.peaks import Highest
 from microslip.mistuning.ring import Tuned

@@ -12,7 +12,7 @@ import scipy.sparse as sp
 from meshes import body
 from scipy.sparse.linalg import eigsh
 
-from microslip.data import UserError
+from microslip.errors import UserError
 from microslip.mistuning.ring import Tuned
 from microslip.mistuning.scatter import Scatter
 from microslip.mistuning.subset import mistuned

@@ -15,7 +15,7 @@ from meshes import body, brick
 from pydantic import ValidationError
 from small import basis as small_basis
 
-from microslip.data import UserError
+from microslip.errors import UserError
 from microslip.fem import discretise, displacement_gradient, green_strain, isotropic
 from microslip.modal.compute import modal_basis
 from microslip.modal.stress import von_mises

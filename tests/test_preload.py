@@ -13,7 +13,8 @@ from drawn import made
 from meshes import body, brick
 
 from microslip.basis import check_basis, read_basis, write_basis
-from microslip.data import Mesh, ModalGroup, UserError
+from microslip.data import Mesh, ModalGroup
+from microslip.errors import UserError
 from microslip.fem.discretise import discretise, free_upper
 from microslip.linalg import eigen
 from microslip.modal import rigid

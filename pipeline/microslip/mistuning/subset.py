@@ -16,7 +16,8 @@ from dataclasses import replace
 import numpy as np
 import scipy.linalg
 
-from ..data import Array, StressSet, UserError
+from ..data import Array, StressSet
+from ..errors import UserError
 from ..system.component import Component
 from ..system.disc import spread, whole
 

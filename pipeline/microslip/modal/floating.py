@@ -24,7 +24,8 @@ import numpy as np
 import scipy.linalg
 import scipy.sparse as sp
 
-from ..data import Array, UserError
+from ..data import Array
+from ..errors import UserError
 from ..fem.operators import internal_force, spin_projector
 from ..linalg import eigen
 from ..reduction import Reduced

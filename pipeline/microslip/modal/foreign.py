@@ -10,7 +10,8 @@ import scipy.linalg
 import scipy.sparse as sp
 from scipy.spatial import ConvexHull, QhullError
 
-from ..data import Array, Compliance, Indices, Matrices, Mesh, ModalBasis, ModalGroup, Residual, UserError
+from ..data import Array, Compliance, Indices, Matrices, Mesh, ModalBasis, ModalGroup, Residual
+from ..errors import UserError
 from ..frames import skew
 from ..linalg import canonical, eigen
 from ..linalg.parametric import state

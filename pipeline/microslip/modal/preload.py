@@ -17,7 +17,8 @@ import numpy as np
 import scipy.linalg
 import scipy.sparse as sp
 
-from ..data import Array, Indices, UserError
+from ..data import Array, Indices
+from ..errors import UserError
 from ..fem.contact import Grip, cut_pair, grip
 from ..fem.cyclic import CyclicUpper
 from ..fem.tied import Tied, tied_upper

@@ -8,7 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ..data import Array, Joint, Mesh, UserError
+from ..data import Array, Joint, Mesh
+from ..errors import UserError
 from ..files.store import write_text
 from ..mesh import UNITS, boundary_facets, read_mesh
 from ..mesh.cards import files_of

@@ -15,7 +15,8 @@ from pathlib import Path
 import numpy as np
 
 from ..basis import write_basis
-from ..data import Mesh, UserError
+from ..data import Mesh
+from ..errors import UserError
 from ..files.store import ordinary, write_text
 from ..mesh import UNITS, mesh_problems, read_mesh
 from ..mesh.chosen import of_instances

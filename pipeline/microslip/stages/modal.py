@@ -12,8 +12,8 @@ import numpy as np
 
 from .. import __version__
 from ..basis import write_basis
-from ..data import Array, Mesh, ModalBasis, UserError
-from ..errors import told_of
+from ..data import Array, Mesh, ModalBasis
+from ..errors import UserError, told_of
 from ..files import store
 from ..mesh import UNITS
 from ..mesh.cards import files_of

@@ -15,7 +15,8 @@ from typing import Any
 
 import numpy as np
 
-from ..data import Array, UserError
+from ..data import Array
+from ..errors import UserError
 from ..files.store import ordinary, write_text
 from ..mesh import UNITS, boundary_facets, read_mesh
 from ..mesh.touching import touches

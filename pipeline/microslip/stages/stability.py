@@ -12,8 +12,7 @@ import numpy as np
 
 from ..basis import read_basis
 from ..case.questions import StabilityOfCase
-from ..data import UserError
-from ..errors import told_of
+from ..errors import UserError, told_of
 from ..exchange.choice import select
 from ..files import hdf5, store
 from ..files.tables import columns_csv

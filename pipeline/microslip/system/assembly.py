@@ -22,7 +22,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 import scipy.linalg
 
-from ..data import INTERFACE_ROWS, Array, ComplexArray, Indices, UserError
+from ..data import INTERFACE_ROWS, Array, ComplexArray, Indices
+from ..errors import UserError
 from ..settings.mistakes import bounded
 from .component import Component, InWave, Ring
 from .disc import directed, spread, whole

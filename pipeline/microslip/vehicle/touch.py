@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import jax.numpy as jnp
 import numpy as np
 
-from ..data import UserError
+from ..errors import UserError
 from ..rolling.wheelset import Patch, Pose, Track, patches
 
 Array = Any
