@@ -13,8 +13,6 @@ from ..rolling.wheelset import Patch, Pose, Track, patches
 
 Array = Any
 """Of numpy; of jax in what is traced."""
-SIDES = (1.0, -1.0)
-"""Of the right and the left wheel: the sign of y."""
 
 
 class Touch(NamedTuple):
