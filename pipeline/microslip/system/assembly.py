@@ -432,8 +432,8 @@ class _Sectors:
         at, rows = j + s.shift, s.rows
         if rows is not None and s.component in self.cyclic:
             rows = _rows_all_round(s, at, self.ring.blades)
-        where = {"component": self.body(s.component, at), "interface": self.row(s.component, s.interface, at)}
-        return replace(s, **where, shift=0, rows=rows)
+        body, row = self.body(s.component, at), self.row(s.component, s.interface, at)
+        return replace(s, component=body, interface=row, shift=0, rows=rows)
 
     def contact(self, c: Contact, j: int) -> Contact:
         second, N = self.side(c.second, j) if c.second else None, self.ring.blades
