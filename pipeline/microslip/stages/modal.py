@@ -74,12 +74,9 @@ def _from_matrices(job: Job, given: MatrixFiles, report: Report) -> tuple[ModalB
     from ..exchange.matrices import read_matrices
     from ..modal.foreign import foreign_basis
 
-    try:
+    with told_of(job.path, job.folder):
         body = read_matrices(given, job.folder, job.settings.length_unit, job.settings.parameters)
         basis, messages = foreign_basis(body, job.settings, report, provenance(job, job.path))
-    except UserError as error:
-        text = str(error)
-        raise UserError(text if text.startswith(str(job.folder)) else f"{job.path}: {text}") from error
     warnings = [f"{job.path}: {message}" for message in messages]
     for warning in warnings:
         report(f"warning: {warning}")
