@@ -18,6 +18,7 @@ from typing import Any
 
 import damper_study
 import numpy as np
+import scipy.linalg
 from pages import (
     HERE,
     body_reference,
@@ -46,7 +47,6 @@ from microslip.pictures.scene import quiet_vtk
 from microslip.reduced import truncation
 from microslip.reduced.compliance import contact_share, without_bulk
 from microslip.reduction import METHODS
-from microslip.reference.one_harmonic import JenkinsContact, stuck_frequencies
 from microslip.stages.closure import closure_stage
 from microslip.stages.job import open_job
 from microslip.stages.meshing import load_mesh, mesh_stage
@@ -561,8 +561,11 @@ def blade_case(basis: ModalBasis, **changes: Any) -> CaseSettings:
 
 
 def stuck(group: ModalGroup, settings: CaseSettings) -> np.ndarray:
-    contacts = [JenkinsContact(c.interface, six := springs_of(c), 1, six[1], np.inf) for c in settings.contacts]
-    return stuck_frequencies(group, contacts)[:4]
+    K = group.K_r.copy()
+    for c in settings.contacts:
+        rows = group.interfaces[c.interface].rows
+        K += rows.T @ (springs_of(c)[:, None] * rows)
+    return np.sqrt(scipy.linalg.eigvalsh(K, group.M_r)[:4]) / (2 * np.pi)
 
 
 def springs_of(c: ContactSettings) -> np.ndarray:
@@ -1157,12 +1160,13 @@ def identification() -> None:
 
 def rolling() -> None:
     """A wheel on a rail: creep curve and tractions; profiles that wear."""
+    from microslip.stages.answer import RollJob
     from microslip.stages.rolling import rolling_stage
 
     wear = ["name=wheel-rail-worn", "wear={coefficient=2e-13, updates=20, passages=1e6}", "model.exact=0"]
     case = ROOT / "pipeline" / "cases" / "wheel-rail.toml"
-    worn = [file for file in rolling_stage(case, BUILD, wear)[0] if file.stem == "wearing"]
-    for file in [*rolling_stage(case, BUILD)[0], *worn]:
+    worn = [file for file in rolling_stage(RollJob(case, BUILD, wear)).files if file.stem == "wearing"]
+    for file in [*rolling_stage(RollJob(case, BUILD)).files, *worn]:
         if file.suffix == ".png":
             save(from_file(file), f"rolling_{file.stem}", colours=LINES)
 
@@ -1171,9 +1175,10 @@ def unround_wheels() -> None:
     """A wheel with three lobes: wear over its circumference, and growth by order over distance and speed."""
     from PIL import Image
 
+    from microslip.stages.answer import RollJob
     from microslip.stages.vehicle import vehicle_stage
 
-    made, _, _ = vehicle_stage(ROOT / "pipeline" / "cases" / "unround-wheel.toml", BUILD)
+    made = vehicle_stage(RollJob(ROOT / "pipeline" / "cases" / "unround-wheel.toml", BUILD)).files
     parts = [from_file(file) for file in made if file.suffix == ".png"]
     whole = Image.new("RGB", (max(p.width for p in parts), sum(p.height for p in parts)), "white")
     for k, part in enumerate(parts):
@@ -1183,9 +1188,10 @@ def unround_wheels() -> None:
 
 def tyre() -> None:
     """A rubber wheel whose slip jumps."""
+    from microslip.stages.answer import RollJob
     from microslip.stages.tyre import tyre_stage
 
-    for file in tyre_stage(ROOT / "pipeline" / "cases" / "slip-jump.toml", BUILD)[0]:
+    for file in tyre_stage(RollJob(ROOT / "pipeline" / "cases" / "slip-jump.toml", BUILD)).files:
         if file.suffix == ".png":
             save(from_file(file), "tyre", colours=LINES)
 

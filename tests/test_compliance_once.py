@@ -19,13 +19,13 @@ from test_truncation import chain
 from microslip.basis import read_basis
 from microslip.case import CaseSettings
 from microslip.case.assemble import build
+from microslip.contact.solids import mean_inverse_distance
 from microslip.data import Array, Compliance, ModalBasis, ModalGroup, UserError
 from microslip.harmonic_balance import reduced
 from microslip.modal.compute import modal_basis
 from microslip.reduced.compliance import contact_share, facing, law_stiffness, sentence, shares, without_bulk
 from microslip.reduced.truncation import closing, verdict
 from microslip.reduction import METHODS
-from microslip.reference.half_space import mean_inverse_distance
 from microslip.report.body import report_html
 from microslip.stages.job import open_job
 from microslip.stages.meshing import load_mesh, mesh_stage

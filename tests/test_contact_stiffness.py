@@ -15,8 +15,10 @@ from closed_forms.joined_beams import hinge_spring, shear_spring
 from meshes import STEEL, body, brick
 from scipy.special import ellipe, ellipk, gamma
 
+from microslip.contact import joined_beams
 from microslip.contact.hertz import Hertz, axis_ratio, ellipse_integrals, half_curvatures
 from microslip.contact.identification import MeasuredResonance, identify, joined, two_beams
+from microslip.contact.joined_beams import rectangle
 from microslip.contact.layer import BOUNDARIES, Layer, modal_stiffness, quasi_static_error
 from microslip.contact.partial_slip import PartialSlip
 from microslip.contact.profiles import Profile, RoundContact
@@ -25,8 +27,6 @@ from microslip.contact.solids import Solid, mismatch, normal_modulus, tangential
 from microslip.data import UserError
 from microslip.modal.compute import modal_basis
 from microslip.reduced.compliance import BULK_AND_SURFACE, SURFACE, contact_share
-from microslip.reference import joined_beams
-from microslip.reference.beams import rectangle
 from microslip.system import Body, Contact, Link, Spring, System
 
 IRON, BRASS = Solid(2.1e11, 0.3), Solid(1.0e11, 0.35)

@@ -21,9 +21,8 @@ from microslip.contact.patch import Patch, equilibrium, grid, pressed_by, pressi
 from microslip.contact.point import PointContact
 from microslip.contact.portion import Portion
 from microslip.contact.sliders import Iwan, rough_strips, uniform
-from microslip.contact.solids import Solid
+from microslip.contact.solids import Solid, mean_inverse_distance
 from microslip.data import Array, UserError
-from microslip.reference.half_space import mean_inverse_distance
 from microslip.system.assembly import ContactFace
 from microslip.system.component import Component
 from microslip.system.nodal import nodal, static_compliance

@@ -205,7 +205,7 @@ def test_gyroscopic_matrix_has_the_sign_of_the_page() -> None:
 
 def test_loss_of_the_jenkins_element_in_the_errata() -> None:
     """The closed form quoted there against the integral of force over displacement."""
-    from microslip.reference.one_harmonic import jenkins_harmonic
+    from closed_forms.one_harmonic import jenkins_harmonic
 
     c, limit, amplitude = 3.0, 2.0, 1.9
     x = c * amplitude / limit

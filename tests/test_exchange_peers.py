@@ -18,6 +18,7 @@ import numpy as np
 import pytest
 import sector
 import small
+from closed_forms.one_harmonic import jenkins_harmonic
 from scipy.io import loadmat
 from test_exchange import blocks
 
@@ -27,7 +28,6 @@ from microslip.exchange import formats, writer
 from microslip.fem.discretise import discretise
 from microslip.fem.operators import mass, stiffness
 from microslip.modal.compute import modal_basis
-from microslip.reference.one_harmonic import jenkins_harmonic
 from microslip.settings.body import BodySettings
 
 PEERS = Path(__file__).parent / "peers"

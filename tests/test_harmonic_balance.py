@@ -6,11 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from closed_forms.one_harmonic import JenkinsContact, frequency_response, jenkins_harmonic, stuck_frequencies
 
 from microslip.data import Compliance, Interface, ModalGroup
 from microslip.harmonic_balance import FrequencyResponse, peaks
 from microslip.harmonic_balance.sweeps import resonances
-from microslip.reference.one_harmonic import JenkinsContact, frequency_response, jenkins_harmonic, stuck_frequencies
 
 
 def oscillator(mass: float = 1.0, stiffness: float = 1e4, ratio: float = 0.0) -> ModalGroup:

@@ -11,6 +11,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from closed_forms.one_harmonic import JenkinsContact, frequency_response
 from test_harmonic_balance_time import slider
 
 from microslip import continuation
@@ -29,7 +30,6 @@ from microslip.harmonic_balance import response_table, solver
 from microslip.harmonic_balance.problem import Problem
 from microslip.harmonic_balance.reduced import stuck
 from microslip.harmonic_balance.response import HarmonicResponse, harmonic_response, newton, of_body
-from microslip.reference.one_harmonic import JenkinsContact, frequency_response
 from microslip.system import Body, Contact, Force, Monitor, Spring, System
 
 

@@ -4,6 +4,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from closed_forms.one_harmonic import JenkinsContact, frequency_response
 from test_contact_laws import FORCES, TANGENT, counted, path, work
 
 from microslip.contact.jenkins import Jenkins, four_places
@@ -12,7 +13,6 @@ from microslip.contact.patch import Patch, stuck_stiffness
 from microslip.errors import UserError
 from microslip.harmonic_balance import problem as balance
 from microslip.harmonic_balance.response import harmonic_response
-from microslip.reference.one_harmonic import JenkinsContact, frequency_response
 from microslip.system import Body, Contact, Force, Monitor, Spring, System
 from microslip.system.assembly import Assembly, ContactFace, Load, Output, preloaded_contact
 from microslip.system.component import Component

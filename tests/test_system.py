@@ -13,11 +13,11 @@ import numpy as np
 import pytest
 import scipy.linalg
 from box import edit
+from closed_forms.one_harmonic import JenkinsContact, frequency_response, stuck_frequencies
 
 from microslip.basis import check_basis, read_basis, write_basis
 from microslip.cli import main
 from microslip.data import UserError
-from microslip.reference.one_harmonic import JenkinsContact, frequency_response, stuck_frequencies
 from microslip.system import Body, Contact, Damper, Force, Monitor, Spring, System, load_system, system_basis
 
 pytestmark = pytest.mark.usefixtures("undrawn", "unjudged")

@@ -501,6 +501,7 @@ def roll(
     Args:
         case: a case.toml with [wheel] and [rail], or with [tyre], the folder that holds it, its name, or its products.
     """
+    from .stages.answer import RollJob
     from .stages.places import is_kinematics, is_tyre, is_vehicle
     from .stages.rolling import rolling_stage
     from .stages.tyre import tyre_stage
@@ -510,7 +511,7 @@ def roll(
     kinds = ((is_vehicle, vehicle_stage), (is_kinematics, kinematics_stage), (is_tyre, tyre_stage))
     stage = next((stage for is_kind, stage in kinds if is_kind(case)), rolling_stage)
     with progress(f"roll {case}", quiet) as report:
-        found = stage(case, Path("build"), list(set_), force, report, not no_pictures)
+        found = stage(RollJob(case, Path("build"), set_, force, report, not no_pictures))
     _tell(found, quiet, "the run ended early; {page} says why, and holds what was found")
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from microslip.reference.half_space import mean_inverse_distance
+from microslip.contact.solids import mean_inverse_distance
 
 
 def sphere_force(modulus: float, radius: float, approach: float) -> float:

@@ -1,11 +1,10 @@
-"""Springs between two cantilevers in line from one measured frequency: `microslip.reference.joined_beams` inverted."""
+"""Springs between two cantilevers in line from one measured frequency: `microslip.contact.joined_beams` inverted."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from microslip.reference.beams import Section
-from microslip.reference.joined_beams import FREE, HINGE_LOCKED, SHEAR_LOCKED, hinge_number, shear_number
+from microslip.contact.joined_beams import FREE, HINGE_LOCKED, SHEAR_LOCKED, Section, hinge_number, shear_number
 
 
 def hinge_spring(section: Section, omega: float) -> float:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from microslip.contact.joined_beams import Section
 from microslip.data import Array
-from microslip.reference.beams import Section
 
 
 def spinning_mass(first: float, second: float, speed: float) -> Array:

@@ -11,9 +11,9 @@ import pytest
 from closed_forms import bars, beams, shafts
 from meshes import STEEL, body, brick, nearest, with_sets
 
+from microslip.contact.joined_beams import rectangle
 from microslip.data import UserError
 from microslip.modal.compute import modal_basis
-from microslip.reference.beams import rectangle
 
 E, NU, RHO = STEEL["young"], STEEL["poisson"], STEEL["density"]
 LAME, SHEAR = E * NU / ((1 + NU) * (1 - 2 * NU)), E / (2 * (1 + NU))

@@ -12,9 +12,9 @@ from scipy.integrate import quad
 
 from microslip.contact.curves import curve
 from microslip.contact.identification import MeasuredResonance, identify, two_beams
+from microslip.contact.joined_beams import rectangle
 from microslip.contact.layer import Layer, modal_stiffness
 from microslip.contact.solids import Solid
-from microslip.reference.beams import rectangle
 
 STEEL = Solid(2.1e11, 0.3)
 SHROUD = 0.072 * 0.005  # m2, contact of the test blade

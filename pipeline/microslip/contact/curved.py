@@ -16,14 +16,13 @@ from numpy.typing import ArrayLike
 
 from ..data import Array, UserError
 from ..reduced.compliance import SURFACE
-from ..reference.half_space import mean_inverse_distance
 from .curves import NormalCurve
 from .hertz import Hertz
 from .law import Law
 from .normal import Gapped, Normal, Preload
 from .portion import Portion
 from .sliders import Strips
-from .solids import Solid, normal_modulus
+from .solids import Solid, mean_inverse_distance, normal_modulus
 
 Match = Literal["approach", "width"]
 

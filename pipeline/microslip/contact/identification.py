@@ -19,8 +19,8 @@ import scipy.optimize
 from ..data import INTERFACE_ROWS, Array, ModalGroup, UserError
 from ..reduced.compliance import BULK_AND_SURFACE, SURFACE
 from ..reduced.coordinates import in_modes
-from ..reference import joined_beams
-from ..reference.beams import Section
+from . import joined_beams
+from .joined_beams import Section
 
 Model = Callable[[Array], Array]
 """Stiffnesses (k,), N/m, to eigenfrequencies (m,), Hz, each of which rises with every stiffness or stays."""
@@ -209,7 +209,7 @@ def _not_told(names: tuple[str, ...], resonances: Sequence[MeasuredResonance], s
 
 
 def two_beams(section: Section, height: float) -> Model:
-    """The rig of Sextro 3.5 (`reference.joined_beams`): (k_n, k_t) to the first two frequencies in Hz.
+    """The rig of Sextro 3.5 (`joined_beams`): (k_n, k_t) to the first two frequencies in Hz.
 
     The normal stiffness works as a hinge with c_phi = c_N h^2/12; the tangential one as c_T.
 

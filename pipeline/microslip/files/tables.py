@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from pathlib import Path
 from typing import Any
+
+from .store import write_text
 
 
 def rows_csv(head: Iterable[str], rows: Iterable[Iterable[str | float]], digits: int = 8) -> str:
@@ -15,3 +18,11 @@ def rows_csv(head: Iterable[str], rows: Iterable[Iterable[str | float]], digits:
 def columns_csv(columns: Mapping[str, Iterable[Any]], digits: int) -> str:
     """Of name -> numbers or texts, columns of equal length."""
     return rows_csv(columns, zip(*columns.values(), strict=True), digits)
+
+
+def write_tables(folder: Path, tables: Mapping[str, Mapping[str, Iterable[Any]]], digits: int) -> list[Path]:
+    """Write file name -> columns; those without columns are left out."""
+    made = [folder / name for name, columns in tables.items() if columns]
+    for path in made:
+        write_text(path, columns_csv(tables[path.name], digits))
+    return made

@@ -14,13 +14,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..data import ModalBasis, ModalGroup
-from ..files.store import complete_or_absent
 from ..modal.campbell import track_basis
 from ..reduced.coordinates import basis_in_modes
 from ..ring.expansion import multiplicity
 from ..ring.resonances import eigenmodes
 from ..units import to_rpm
 from . import plots
+from .lettering import save_gif, save_png
 from .scene import quiet_vtk
 
 if TYPE_CHECKING:
@@ -142,6 +142,8 @@ def _diagrams(basis: ModalBasis, folder: Path, engine_orders: Sequence[int]) -> 
 
 
 def _scenes(basis: ModalBasis, folder: Path, report: Report) -> dict[str, Path]:
+    from PIL import Image
+
     quiet_vtk()
     from . import views
 
@@ -149,8 +151,7 @@ def _scenes(basis: ModalBasis, folder: Path, report: Report) -> dict[str, Path]:
 
     def keep(name: str, image: Picture | None) -> None:
         if image is not None:
-            drawn[name] = folder / f"{name}.png"
-            _save(image, drawn[name])
+            drawn[name] = save_png(image, folder / f"{name}.png")
 
     studio = views.open_studio(basis)
     try:
@@ -172,7 +173,8 @@ def _scenes(basis: ModalBasis, folder: Path, report: Report) -> dict[str, Path]:
                 images = list(views.mode_pictures(studio, group, MOST_MODES, camera))
                 keep(f"modes_{_rpm(group)}", views.contact_sheet(studio, group, images))
                 for j, image in enumerate(images):
-                    keep(f"mode_{j + 1:02d}_{_rpm(group)}", views.mode_caption(studio, image, group, j))
+                    mode = views.mode_caption(studio, image, group, j)  # 256 colours: a third of the size
+                keep(f"mode_{j + 1:02d}_{_rpm(group)}", mode.quantize(256, dither=Image.Dither.NONE))
             report("animations")
             drawn |= _animations(studio, shown[0], folder)
             report("pictures of stresses")
@@ -214,7 +216,7 @@ def _sector(basis: ModalBasis, k: int) -> ModalBasis:
 
 def _ring(basis: ModalBasis, studio: Studio, folder: Path, report: Report) -> dict[str, Path]:
     """Standing shapes of the first nodal diameters and two waves, at the lowest speed."""
-    from . import lettering, ring_views
+    from . import ring_views
 
     groups = {k: g for (s, k), g in sorted(basis.groups.items()) if s == min(basis.groups)[0] and len(g.phi)}
     if not groups:
@@ -223,14 +225,12 @@ def _ring(basis: ModalBasis, studio: Studio, folder: Path, report: Report) -> di
     chosen = list(groups.values())[:RING_ROWS]
     report("pictures of the ring")
     camera = ring_views.ring_camera(ring, 0.3 * ring_views.AREA)
-    sheet = folder / f"ring_modes_{_rpm(chosen[0])}.png"
-    _save(ring_views.ring_sheet(ring, chosen, RING_COLUMNS, camera), sheet)
+    image = ring_views.ring_sheet(ring, chosen, RING_COLUMNS, camera)
+    sheet = save_png(image, folder / f"ring_modes_{_rpm(chosen[0])}.png")
     drawn, camera = {sheet.stem: sheet}, ring_views.ring_camera(ring)
     for g in [g for g in chosen if multiplicity(g.harmonic, basis.sectors) == 2][:WAVES]:
         report(f"animation of nodal diameter {g.harmonic}")
-        path = folder / f"ring_wave_nd{g.harmonic:02d}.gif"
-        with complete_or_absent(path) as temporary:
-            lettering.save_gif(str(temporary), ring_views.ring_wave(ring, g, 0, camera), 60)
+        path = save_gif(ring_views.ring_wave(ring, g, 0, camera), folder / f"ring_wave_nd{g.harmonic:02d}.gif")
         drawn[path.stem] = path
     return drawn
 
@@ -240,23 +240,11 @@ def _rpm(group: ModalGroup) -> str:
 
 
 def _animations(studio: Studio, group: ModalGroup, folder: Path) -> dict[str, Path]:
-    from . import lettering, views
+    from . import views
 
     drawn = {}
     camera = views.mode_camera(studio, [group], ANIMATED + group.kind.count("rigid"), 0.45 * views.AREA)
     for j in [j for j in range(group.n_modes) if group.kind[j] != "rigid"][:ANIMATED]:
-        path = folder / f"animation_{j + 1:02d}.gif"
-        with complete_or_absent(path) as temporary:
-            lettering.save_gif(str(temporary), views.animation(studio, group, j, camera), 60)
+        path = save_gif(views.animation(studio, group, j, camera), folder / f"animation_{j + 1:02d}.gif")
         drawn[path.stem] = path
     return drawn
-
-
-def _save(image: Picture, path: Path) -> None:
-    """As PNG; those of single modes, which are many and need no exact colours, in 256 colours: a third of the size."""
-    from PIL import Image
-
-    with complete_or_absent(path) as temporary:
-        if path.stem.startswith("mode_"):
-            image = image.quantize(256, dither=Image.Dither.NONE)
-        image.save(temporary, format="PNG", compress_level=6)

@@ -17,7 +17,7 @@ from ..modal.sampling import is_solid
 from ..reduced.coordinates import in_modes
 from ..reduced.correlation import Comparison, Pair, measured_directions, nearest_points
 from . import plots
-from .lettering import INK, captioned, scaled, sheet, side_by_side
+from .lettering import INK, captioned, save_png, scaled, sheet, side_by_side
 from .scene import OUTLINE, Camera, Stage, fit, surface, view_axes
 from .views import AMPLITUDE, Studio, hertz, mode_pictures
 
@@ -156,7 +156,7 @@ def draw_comparison(
     bodies: Both, seen: Both, found: Comparison, key: tuple[int, int], folder: Path, scenes: bool = True
 ) -> dict[str, Path]:
     """Write ``mac.png`` and, where PyVista can draw, ``pairs.png``. Name -> file. Arguments: see `pair_sheet`."""
-    from . import _save, quiet_vtk
+    from . import quiet_vtk
 
     folder.mkdir(parents=True, exist_ok=True)
     drawn: dict[str, Any] = {"mac": mac_plot(found, (bodies[0].name, bodies[1].name), folder / "mac.png")}
@@ -164,6 +164,5 @@ def draw_comparison(
         quiet_vtk()
         image = pair_sheet(bodies, seen, found, key)
         if image is not None:
-            drawn["pairs"] = folder / "pairs.png"
-            _save(image, drawn["pairs"])
+            drawn["pairs"] = save_png(image, folder / "pairs.png")
     return drawn

@@ -9,11 +9,13 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..data import Array
+from ..files.store import complete_or_absent
 
 if TYPE_CHECKING:
     from PIL import Image, ImageDraw, ImageFont
@@ -178,17 +180,30 @@ def scaled(image: Picture, factor: float) -> Picture:
     return image.resize(size, Image.Resampling.LANCZOS)
 
 
-def save_gif(path: str, frames: Sequence[Picture], milliseconds: int, colours: int = 160) -> None:
-    """An endless animation; all frames share one palette, with pure white in it, so that nothing flickers."""
+def save_png(image: Picture, path: Path) -> Path:
+    """Complete or absent."""
+    with complete_or_absent(path) as temporary:
+        image.save(temporary, format="PNG", compress_level=6)
+    return path
+
+
+MILLISECONDS = 60
+"""Of a frame."""
+
+
+def save_gif(frames: Sequence[Picture], path: Path, colours: int = 160) -> Path:
+    """An endless animation, complete or absent; all frames share one palette, with pure white in it, so that nothing
+    flickers."""
     from PIL import Image
 
     strip = stacked([scaled(f, 0.5) for f in (frames[0], frames[len(frames) // 4], frames[len(frames) // 2])])
     palette = strip.quantize(colours, Image.Quantize.MEDIANCUT)
     entries = [*(palette.getpalette() or [])[: 3 * colours], 255, 255, 255]
     flat = [_white_stays(f, f.quantize(palette=palette, dither=Image.Dither.NONE), entries) for f in frames]
-    flat[0].save(
-        path, format="GIF", save_all=True, append_images=flat[1:], duration=milliseconds, loop=0, optimize=False
-    )
+    how = {"append_images": flat[1:], "duration": MILLISECONDS, "loop": 0, "optimize": False}
+    with complete_or_absent(path) as temporary:
+        flat[0].save(temporary, format="GIF", save_all=True, **how)
+    return path
 
 
 def _white_stays(frame: Picture, reduced: Picture, entries: list[int]) -> Picture:

@@ -7,13 +7,9 @@ from pathlib import Path
 import numpy as np
 
 from ..data import Array, ModalBasis
-from ..files.store import complete_or_absent
 from ..units import METRES
 from . import lettering, ring_views, views
 from .scene import Stage, fit, quiet_vtk
-
-MILLISECONDS = 60
-"""Of a frame."""
 
 
 def moving_gif(basis: ModalBasis, moved: Array, path: Path, title: str) -> Path:
@@ -27,9 +23,7 @@ def moving_gif(basis: ModalBasis, moved: Array, path: Path, title: str) -> Path:
         frames = _frames(studio, moved, title)
     finally:
         studio.stage.close()
-    with complete_or_absent(path) as temporary:
-        lettering.save_gif(str(temporary), frames, MILLISECONDS)
-    return path
+    return lettering.save_gif(frames, path)
 
 
 def _frames(studio: views.Studio | ring_views.RingStudio, moved: Array, title: str) -> list[lettering.Picture]:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..data import Array, Indices
-from .lettering import INK, captioned, font, pen, side_by_side
+from .lettering import INK, captioned, font, pen, save_png, side_by_side
 from .scene import Camera, Stage, axes_towards, fit, quiet_vtk, view_axes
 from .views import _measured
 
@@ -29,8 +29,6 @@ def surfaces_picture(points: Array, triangles: Indices, surface: Indices, title:
     Args:
         points: (n, 3) m. triangles: (t, 3). surface: (t,) number of the CAD surface of each triangle.
     """
-    from . import _save
-
     quiet_vtk()
     stage = Stage()
     spread = np.cov((points - points.mean(axis=0)).T) + 1e-30 * np.eye(3)
@@ -47,8 +45,7 @@ def surfaces_picture(points: Array, triangles: Indices, surface: Indices, title:
     hidden = [str(v) for v in np.setdiff1d(names, used)]
     more = f" Hidden here, or too small for a number: {', '.join(hidden)}." if hidden else ""
     note = f"The numbers are those of the table and of geometry.faces.surfaces. Seen from two opposite sides.{more}"
-    _save(captioned(side_by_side(views), title, note, 22), path)
-    return path
+    return save_png(captioned(side_by_side(views), title, note, 22), path)
 
 
 def _view(

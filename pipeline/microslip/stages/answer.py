@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -118,3 +118,29 @@ class CaseJob:
         found = answered(stage, {**self.inputs, "pictures": self.pictures}, lambda: work(stage, self))
         stage.product.with_suffix(".points").unlink(missing_ok=True)
         return found
+
+
+@dataclass(frozen=True)
+class RollJob:
+    """One case of rolling contact on its way to an answer.
+
+    Attributes:
+        path: the case file. root: where the folder of its name is made. Others: see `CaseJob`.
+    """
+
+    path: Path
+    root: Path = Path("build")
+    assignments: Sequence[str] = ()
+    force: bool = False
+    report: Report = lambda _: None
+    pictures: bool = True
+
+    def stage(self, case: str, name: str, module: str) -> Stage:
+        """The stage whose product is ``name.json``, made by a module."""
+        return Stage(self.root / case / f"{name}.json", (module,), self.force, self.report)
+
+    def inputs(self, raw: Mapping[str, Any], files: Iterable[Path | str]) -> dict[str, Any]:
+        """What the answer depends on: the case as a table, files that it names (what is missing is told where it is
+        read), and whether pictures are wanted."""
+        there = [file for name in files if (file := self.path.parent / name).is_file()]
+        return {"case": raw, "files": [store.hash_file(file) for file in there], "pictures": self.pictures}

@@ -334,7 +334,6 @@ def over_force(found: Assessment) -> dict[str, list[tuple[float, float]]]:
 def _at_worst(
     found: Assessment, top: StressedResonance, basis: ModalBasis, case: str, folder: Path, scenes: bool
 ) -> dict[str, Path]:
-    from ..files.store import complete_or_absent
     from ..pictures import operating
 
     drawn: dict[str, Path] = {}
@@ -345,6 +344,7 @@ def _at_worst(
             cycle, found.limits, top.worst, f"{case}: {where}", folder / "haigh.png"
         )
     if scenes and basis.mesh.n_cells:
+        from ..pictures.lettering import save_png
         from ..pictures.scene import quiet_vtk
         from ..pictures.views import open_studio
 
@@ -356,9 +356,7 @@ def _at_worst(
         finally:
             studio.stage.close()
         if image is not None:
-            drawn["stress at resonance"] = folder / "stress_at_resonance.png"
-            with complete_or_absent(drawn["stress at resonance"]) as temporary:
-                image.save(temporary, format="PNG", compress_level=6)
+            drawn["stress at resonance"] = save_png(image, folder / "stress_at_resonance.png")
     return drawn
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from ..files import store
-from ..files.tables import columns_csv, rows_csv
+from ..files.tables import rows_csv, write_tables
 from .stage import Report
 
 
@@ -31,9 +31,8 @@ def contact_stage(
     rows = [*found.told, *(("judgement", s) for s in found.sentences)]
     report("pictures and tables")
     with store.making(summary, report):
-        files = [*draw(found, folder), *(folder / f"{name}.csv" for name in found.tables), summary]
-        for name, columns in found.tables.items():
-            store.write_text(folder / f"{name}.csv", columns_csv(columns, 10))
+        tables = write_tables(folder, {f"{name}.csv": columns for name, columns in found.tables.items()}, 10)
+        files = [*draw(found, folder), *tables, summary]
         store.write_text(summary, rows_csv(("what", "value"), ((f'"{a}"', f'"{b}"') for a, b in rows)))
     width = max(len(what) for what, _ in found.told)
     lines = [f"{what:{width}}  {value}" for what, value in found.told]

@@ -77,7 +77,7 @@ def draw_ring(built: Built, series: Series, row: Mapping[str, Any], path: Path) 
     Returns:
         The picture; None where no body has elements and shapes.
     """
-    from ..files.store import complete_or_absent
+    from ..pictures.lettering import save_png
     from ..pictures.ring_views import Round, operating_ring
     from ..pictures.scene import quiet_vtk
 
@@ -99,9 +99,7 @@ def draw_ring(built: Built, series: Series, row: Mapping[str, Any], path: Path) 
     quiet_vtk()
     title = f"{built.settings.name}: the ring at {row['frequency_Hz']:.5g} Hz under {row['normal_force_N']:.6g} N"
     image = operating_ring(bodies, first.rotation_axis, first.rotation_point, title, _said(built, angle))
-    with complete_or_absent(path) as temporary:
-        image.save(temporary, format="PNG", compress_level=6)
-    return path
+    return save_png(image, path)
 
 
 def _swinging(harmonics: Array) -> Array:

@@ -8,7 +8,7 @@ from pathlib import Path
 from ..basis import read_basis
 from ..errors import UserError, told_of
 from ..files import store
-from ..files.tables import columns_csv, rows_csv
+from ..files.tables import rows_csv, write_tables
 from ..report.rolling import rolling_html
 from ..rolling.behind import ROWS, Behind, behind
 from ..rolling.contact_table import ContactTable, contact_table, write_contact_table
@@ -16,29 +16,24 @@ from ..rolling.settings import RollingCase, Section, load_rolling
 from ..rolling.study import Studied, rows_of_patches, study
 from ..rolling.table import creep_table, write_creep_table
 from ..rolling.wearing import Wearing, wearing
-from .answer import Answer, answered
+from .answer import Answer, RollJob, answered
 from .job import Job, open_job
 from .modal import modes_stage
 from .places import find_body
 from .stage import Report, Stage
 
 
-def rolling_stage(
-    case_path: Path, root: Path = Path("build"), assignments: list[str] | None = None, force: bool = False,
-    report: Report = lambda _: None, pictures: bool = True,
-) -> Answer:  # fmt: skip
-    """What a rolling case asks for, in ``root/NAME``.
+def rolling_stage(job: RollJob) -> Answer:
+    """What a rolling case asks for.
 
     Raises:
         UserError: mistakes of the case or its profiles.
     """
-    case, raw = load_rolling(case_path, assignments)
-    stage = Stage(root / case.name / "rolling.json", ("stages.rolling",), force, report)
-    files = [case_path.parent / name for name in case.files]
-    profiles = [store.hash_file(file) for file in files if file.is_file()]
-    bodies = _bodies(case, case_path, report)
-    inputs = {"case": raw, "profiles": profiles, "pictures": pictures, "bodies": [store.hash_file(b) for b in bodies]}
-    return answered(stage, inputs, lambda: _work(stage, case, case_path, bodies, pictures))
+    case, raw = load_rolling(job.path, list(job.assignments))
+    stage = job.stage(case.name, "rolling", "stages.rolling")
+    bodies = _bodies(case, job.path, job.report)
+    inputs = job.inputs(raw, [*case.files, *(body.resolve() for body in bodies)])
+    return answered(stage, inputs, lambda: _work(stage, case, job, bodies))
 
 
 def _bodies(case: RollingCase, case_path: Path, report: Report) -> list[Path]:
@@ -63,21 +58,23 @@ def _of_one_material(case_path: Path, key: str, job: Job, section: Section) -> N
         )
 
 
-def _work(stage: Stage, case: RollingCase, case_path: Path, bodies: list[Path], pictures: bool) -> Answer:
+def _work(stage: Stage, case: RollingCase, job: RollJob, bodies: list[Path]) -> Answer:
     folder = stage.product.parent
     stage.report("patches and creep curve")
-    with told_of(case_path):
-        found = study(case, case_path)
+    with told_of(job.path):
+        found = study(case, job.path)
         elastic = _behind(found, bodies)
         contacts = _contacts(stage, found)
-        worn = _wearing(stage, found, case_path)
+        worn = _wearing(stage, found, job.path)
     stage.begin()
     made = _tables(found, folder)
     beside, more = _beside(stage, found, elastic, contacts)
     if worn is not None:
         beside += _worn_tables(worn, folder)
         more += [worn.sentence(), *worn.warnings()]
-    drawn = _pictures(found, worn, folder / "pictures", case.name) if pictures and found.forces is not None else []
+    drawn = []
+    if job.pictures and found.forces is not None:
+        drawn = _pictures(found, worn, folder / "pictures", case.name)
     page = folder / "rolling.html"
     shown = [p for p in drawn if p.suffix == ".png"]
     store.write_text(page, rolling_html(f"{case.name}: rolling contact", found, shown, more))
@@ -90,8 +87,7 @@ def _beside(
     """Files of what is asked beside the curve, and what is said of them."""
     folder, case, made, more = stage.product.parent, found.case, [], []
     if elastic is not None:
-        made.append(folder / "stiffness.csv")
-        store.write_text(made[-1], columns_csv({"direction": ROWS, **elastic.columns()}, 8))
+        made += write_tables(folder, {"stiffness.csv": {"direction": ROWS, **elastic.columns()}}, 8)
         more.append(elastic.sentence())
     if case.table is not None:
         stage.report("table of creep forces")
@@ -131,9 +127,7 @@ def _worn_tables(worn: Wearing, folder: Path) -> list[Path]:
     """Over the passages, and both profiles as tables in mm that a case takes."""
     tables = {"wearing.csv": worn.columns()}
     tables |= {f"{name}_worn.csv": getattr(worn, name).columns(worn.smoothing) for name in ("wheel", "rail")}
-    for name, columns in tables.items():
-        store.write_text(folder / name, columns_csv(columns, 10))
-    return [folder / name for name in tables]
+    return write_tables(folder, tables, 10)
 
 
 def _tables(found: Studied, folder: Path) -> list[Path]:
@@ -142,13 +136,10 @@ def _tables(found: Studied, folder: Path) -> list[Path]:
     if found.forces is None:
         return [folder / "patches.csv"]
     made = {"creep.csv": found.columns(), "exact.csv": found.beside(), "wear.csv": found.worn()}
-    for name, columns in made.items():
-        if columns:
-            store.write_text(folder / name, columns_csv(columns, 8))
+    written = write_tables(folder, made, 8)
     head, rows = found.generalised()
     store.write_text(folder / "forces.csv", rows_csv(head, rows))
-    written = [name for name, columns in made.items() if columns]
-    return [folder / name for name in (*written, "patches.csv", "forces.csv")]
+    return [*written, folder / "patches.csv", folder / "forces.csv"]
 
 
 def _pictures(found: Studied, worn: Wearing | None, folder: Path, name: str) -> list[Path]:

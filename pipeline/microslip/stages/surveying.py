@@ -16,7 +16,7 @@ from ..case import CaseSettings, checkpoint, load_case, surveys
 from ..case.curves import Followed, curves
 from ..data import Array, ModalBasis
 from ..files import store
-from ..files.tables import columns_csv
+from ..files.tables import write_tables
 from ..harmonic_balance.envelope import Worst, lowest, worst
 from ..report.response import survey_html
 from ..report.words import number_list
@@ -99,8 +99,7 @@ def _work(
 
     def write(tables: Tables) -> None:
         begin()
-        for name, columns in tables.items():
-            store.write_text(folder / name, columns_csv(columns, 12))
+        write_tables(folder, tables, 12)
 
     survey = partial(KINDS[kind], write) if kind in KINDS else partial(_curve, kind, points)
     found = survey(settings, {name: read_basis(file) for name, file in files.items()}, case_path, stage.report)

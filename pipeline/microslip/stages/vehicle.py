@@ -10,65 +10,60 @@ from typing import Any
 from ..data import UserError
 from ..errors import told_of
 from ..files import store
-from ..files.tables import columns_csv
+from ..files.tables import write_tables
 from ..report.page import answer_page
 from ..report.vehicle import vehicle_html
 from ..results import Journal, open_journal
+from ..rolling.settings import Section
 from ..vehicle.kinematics import recorded
-from ..vehicle.settings import VehicleCase, load_kinematics, load_vehicle
+from ..vehicle.settings import KinematicsCase, VehicleCase, load_kinematics, load_vehicle
 from ..vehicle.study import Studied, study
-from .answer import Answer, answered
-from .stage import Report, Stage, hash_of_code
+from .answer import Answer, RollJob, answered
+from .stage import Stage, hash_of_code
 
 
-def vehicle_stage(
-    case_path: Path, root: Path = Path("build"), assignments: list[str] | None = None, force: bool = False,
-    report: Report = lambda _: None, pictures: bool = True,
-) -> Answer:  # fmt: skip
-    """What a case of a vehicle asks for, in ``root/NAME``; whole if it did not end early.
+def vehicle_stage(job: RollJob) -> Answer:
+    """What a case of a vehicle asks for; whole if it did not end early.
 
     Raises:
         UserError: mistakes of the case or its profiles.
     """
-    case, raw = load_vehicle(case_path, assignments)
-    stage = Stage(root / case.name / "unround.json", ("stages.vehicle",), force, report)
-    files = [case_path.parent / s.profile for s in (case.wheel, case.rail) if isinstance(s.profile, str)]
-    inputs = {"case": raw, "profiles": [store.hash_file(f) for f in files if f.is_file()], "pictures": pictures}
-    return _answered(stage, inputs, lambda: _work(stage, case, case_path, pictures, inputs))
+    case, raw = load_vehicle(job.path, list(job.assignments))
+    stage = job.stage(case.name, "unround", "stages.vehicle")
+    inputs = job.inputs(raw, _profiles(case.wheel, case.rail))
+    return _answered(stage, inputs, lambda: _work(stage, case, job, inputs))
 
 
-def kinematics_stage(
-    case_path: Path, root: Path = Path("build"), assignments: list[str] | None = None, force: bool = False,
-    report: Report = lambda _: None, pictures: bool = True,
-) -> Answer:  # fmt: skip
-    """Wear of a wheel by the kinematics of a file, in ``root/NAME``.
+def kinematics_stage(job: RollJob) -> Answer:
+    """Wear of a wheel by the kinematics of a file.
 
     Raises:
         UserError: mistakes of the case or its files.
     """
-    case, raw = load_kinematics(case_path, assignments)
-    stage = Stage(root / case.name / "unround.json", ("stages.vehicle",), force, report)
-    names = [s.profile for s in (case.wheel, case.rail) if isinstance(s.profile, str)] + [case.kinematics.file]
-    files = [case_path.parent / name for name in names]
-    inputs = {"case": raw, "files": [store.hash_file(f) for f in files if f.is_file()], "pictures": pictures}
+    case, raw = load_kinematics(job.path, list(job.assignments))
+    stage = job.stage(case.name, "unround", "stages.vehicle")
+    inputs = job.inputs(raw, [*_profiles(case.wheel, case.rail), case.kinematics.file])
+    return _answered(stage, inputs, lambda: _recorded(stage, case, job, inputs))
 
-    def work() -> Answer:
-        with _kept(stage, case_path, inputs) as journal:
-            found = recorded(case, case_path.parent, report, journal)
-        stage.begin()
-        folder, drawn = stage.product.parent, []
-        made = [folder / "circumference.csv", folder / "wear.csv"]
-        for path, columns in zip(made, (found.circumference(), found.jumped()), strict=True):
-            store.write_text(path, columns_csv(columns, 10))
-        if pictures:
-            from ..pictures.vehicle import recorded_picture
 
-            drawn = [recorded_picture(found, folder / "pictures" / "circumference.png", case.name)]
-        page = folder / "unround.html"
-        store.write_text(page, answer_page(f"{case.name}: wear of a wheel", found.sentences(), drawn))
-        return Answer([page, *made, *drawn], found.sentences(), not found.ended)
+def _profiles(*sections: Section) -> list[str]:
+    """Files of the profiles."""
+    return [s.profile for s in sections if isinstance(s.profile, str)]
 
-    return _answered(stage, inputs, work)
+
+def _recorded(stage: Stage, case: KinematicsCase, job: RollJob, inputs: Mapping[str, Any]) -> Answer:
+    with _kept(stage, job.path, inputs) as journal:
+        found = recorded(case, job.path.parent, stage.report, journal)
+    stage.begin()
+    folder, drawn = stage.product.parent, []
+    made = write_tables(folder, {"circumference.csv": found.circumference(), "wear.csv": found.jumped()}, 10)
+    if job.pictures:
+        from ..pictures.vehicle import recorded_picture
+
+        drawn = [recorded_picture(found, folder / "pictures" / "circumference.png", case.name)]
+    page = folder / "unround.html"
+    store.write_text(page, answer_page(f"{case.name}: wear of a wheel", found.sentences(), drawn))
+    return Answer([page, *made, *drawn], found.sentences(), not found.ended)
 
 
 def _points(stage: Stage) -> Path:
@@ -94,13 +89,13 @@ def _kept(stage: Stage, case_path: Path, inputs: Mapping[str, Any]) -> Iterator[
             raise
 
 
-def _work(stage: Stage, case: VehicleCase, case_path: Path, pictures: bool, inputs: Mapping[str, Any]) -> Answer:
+def _work(stage: Stage, case: VehicleCase, job: RollJob, inputs: Mapping[str, Any]) -> Answer:
     folder = stage.product.parent
-    with _kept(stage, case_path, inputs) as journal:
-        found = study(case, case_path.parent, stage.report, journal)
+    with _kept(stage, job.path, inputs) as journal:
+        found = study(case, job.path.parent, stage.report, journal)
     stage.begin()
     made = _tables(found, folder)
-    drawn = _pictures(found, folder / "pictures", case.name) if pictures else []
+    drawn = _pictures(found, folder / "pictures", case.name) if job.pictures else []
     page = folder / "unround.html"
     store.write_text(page, vehicle_html(f"{case.name}: unround wheels", found, drawn))
     return Answer([page, *made, *drawn], found.sentences(), not found.ended)
@@ -112,10 +107,7 @@ def _tables(found: Studied, folder: Path) -> list[Path]:
         "growth.csv": found.growing(),
         "speeds.csv": found.over_speed(),
     }
-    for name, columns in tables.items():
-        if columns:
-            store.write_text(folder / name, columns_csv(columns, 10))
-    return [folder / name for name, columns in tables.items() if columns]
+    return write_tables(folder, tables, 10)
 
 
 def _pictures(found: Studied, folder: Path, name: str) -> list[Path]:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.linalg
 
-from ..data import Array, ComplexArray, ModalGroup
+from microslip.data import Array, ComplexArray, ModalGroup
 
 
 @dataclass(frozen=True)
