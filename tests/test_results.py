@@ -225,6 +225,22 @@ def test_response_round_trip(tmp_path):
         assert file["series_0000/frequency"].attrs["unit"] == "Hz"
 
 
+def test_readouts_of_a_file_are_those_that_were_asked_for_in_their_order_and_units(tmp_path):
+    """A monitor may be called like a quantity, and the first one need not be the first in the alphabet."""
+    rows = {"monitors/zeta": ["u_z", "u_x"], "gauges/limit": ["strain"], "monitors/force": ["u_x"]}
+    sizes = {name: (1 + i) * np.ones((len(of), 2)) for i, (name, of) in enumerate(rows.items())}
+    written = response_of({**HEAD, "labels": rows}, {"one": {f: point(f) | sizes for f in (1.0, 2.0)}})
+    write_response(tmp_path / "response.h5", written)
+    (one,) = read_response(tmp_path / "response.h5").series
+    assert one.readouts[:4] == written.series[0].readouts[3:] == ("zeta u_z", "zeta u_x", "limit", "force")
+    assert [one.harmonics(n)[0, 1].real for n in one.readouts[:4]] == [1, 1, 2, 3]
+    seen = one.to_xarray()
+    assert [seen[n].units for n in ("monitors.zeta", "gauges.limit", "monitors.force")] == ["m", "1", "m"]
+    with h5py.File(tmp_path / "response.h5") as file:
+        assert file["series_0000/monitors/force"].attrs["unit"] == "m"
+    assert [one.plot(readout=i).get_ylabel() for i in (1, 2)] == ["amplitude in m", "amplitude in m/m"]
+
+
 def test_same_response_same_bytes(tmp_path):
     for name in ("a.h5", "b.h5"):
         write_response(tmp_path / name, response(1.0, 2.0))
