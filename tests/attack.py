@@ -33,7 +33,8 @@ from microslip.case import CaseSettings, load_case
 from microslip.case.assemble import Built, build
 from microslip.case.checkpoint import files_of
 from microslip.contact.settings import load_contact
-from microslip.data import Array, UserError
+from microslip.data import Array
+from microslip.errors import UserError
 from microslip.results import read_journal
 from microslip.settings.body import to_metres
 from microslip.stages import places, running

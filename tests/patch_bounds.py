@@ -14,7 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
-from microslip.data import Array, Indices, Mesh, UserError
+from microslip.data import Array, Indices, Mesh
+from microslip.errors import UserError
 from microslip.fem.discretise import Discretisation, discretise, free_upper
 from microslip.linalg import eigen
 from microslip.modal.body_rows import INTERFACE_LABELS, BodyRows, body_rows

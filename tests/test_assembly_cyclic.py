@@ -14,7 +14,8 @@ from microslip.contact.friction import Coulomb
 from microslip.contact.normal import Penalty
 from microslip.contact.patch import Patch, grid
 from microslip.contact.point import PointContact
-from microslip.data import ModalBasis, UserError
+from microslip.data import ModalBasis
+from microslip.errors import UserError
 from microslip.harmonic_balance import problem as balance
 from microslip.harmonic_balance import response
 from microslip.harmonic_balance.reduced import stuck

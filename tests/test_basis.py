@@ -22,7 +22,8 @@ import small
 
 from microslip.basis import check_basis, open_file, read_basis, write_basis
 from microslip.basis.integrals import modal_mass
-from microslip.data import Mesh, ModalBasis, UserError
+from microslip.data import Mesh, ModalBasis
+from microslip.errors import UserError
 from microslip.files.hdf5 import seal, seal_state
 from microslip.files.hostile import HostileFile, inspect, trial
 from microslip.modal.compute import modal_basis

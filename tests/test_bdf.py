@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from microslip.cli import main
-from microslip.data import Mesh, UserError
+from microslip.data import Mesh
+from microslip.errors import UserError
 from microslip.fem.discretise import discretise
 from microslip.mesh import mesh_problems, read_mesh
 

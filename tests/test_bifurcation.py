@@ -21,7 +21,7 @@ from microslip.bifurcation.diagram import Asked, Diagram, diagram
 from microslip.bifurcation.dynamics import Dynamics
 from microslip.bifurcation.recorded import Branches
 from microslip.bifurcation.shooting import Orbit, Shooting
-from microslip.data import UserError
+from microslip.errors import UserError
 
 
 def circling(z: Any, p: Any) -> Any:

@@ -11,7 +11,7 @@ import pytest
 
 import microslip as ms
 from microslip.cli import main
-from microslip.data import UserError
+from microslip.errors import UserError
 
 CASES = Path(__file__).parents[1] / "pipeline" / "cases"
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 import small
 
-from microslip.data import UserError
+from microslip.errors import UserError
 from microslip.settings.body import BodySettings, implausible, load_body, validate
 from microslip.settings.toml import load_toml, override
 

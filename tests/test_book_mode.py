@@ -20,7 +20,7 @@ from microslip.contact.patch import Patch, equilibrium, grid
 from microslip.contact.point import PointContact
 from microslip.contact.sliders import Iwan, mindlin, rough_strips, uniform
 from microslip.contact.solids import Solid
-from microslip.data import UserError
+from microslip.errors import UserError
 from microslip.harmonic_balance import book, orbits, response, tables
 from microslip.harmonic_balance import problem as balance
 from microslip.harmonic_balance.forces import Forces

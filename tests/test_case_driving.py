@@ -13,7 +13,7 @@ from microslip.basis import write_basis
 from microslip.case import load_case
 from microslip.case.assemble import Built, build
 from microslip.cli import main
-from microslip.data import UserError
+from microslip.errors import UserError
 from microslip.modal.compute import modal_basis
 from microslip.system.component import Ring
 

@@ -12,8 +12,9 @@ from hypothesis import strategies as st
 
 from microslip.basis import check_basis, read_basis
 from microslip.cli import main
-from microslip.data import Mesh, UserError
+from microslip.data import Mesh
 from microslip.elasticity import isotropic, orthotropic
+from microslip.errors import UserError
 from microslip.fem.discretise import discretise
 from microslip.mesh import mesh_problems, read_mesh
 from microslip.modal.compute import modal_basis

@@ -14,7 +14,8 @@ import small
 
 from microslip.basis import read_basis, write_basis
 from microslip.cli import main
-from microslip.data import ModalBasis, Rows, UserError
+from microslip.data import ModalBasis, Rows
+from microslip.errors import UserError
 from microslip.modal.compute import modal_basis
 from microslip.modal.sampling import at_points, on_common_points
 from microslip.pictures import can_draw

@@ -17,7 +17,7 @@ from microslip.case.checkpoint import series_name
 from microslip.case.comparison import Pair, comparison_table, paired, sentence
 from microslip.case.run import _lifting
 from microslip.cli import main
-from microslip.data import UserError
+from microslip.errors import UserError
 from microslip.harmonic_balance import FrequencyResponse, response_table
 from microslip.harmonic_balance.orbits import orbits
 from microslip.results import read_response, response_of, write_response

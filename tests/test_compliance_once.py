@@ -20,7 +20,8 @@ from microslip.basis import read_basis
 from microslip.case import CaseSettings
 from microslip.case.assemble import build
 from microslip.contact.solids import mean_inverse_distance
-from microslip.data import Array, Compliance, ModalBasis, ModalGroup, UserError
+from microslip.data import Array, Compliance, ModalBasis, ModalGroup
+from microslip.errors import UserError
 from microslip.harmonic_balance import reduced
 from microslip.modal.compute import modal_basis
 from microslip.reduced.compliance import contact_share, facing, law_stiffness, sentence, shares, without_bulk

@@ -16,7 +16,8 @@ from microslip.basis import check_basis, read_basis, write_basis
 from microslip.case import CaseSettings
 from microslip.case.assemble import build
 from microslip.case.problem import normal_forces
-from microslip.data import Mesh, NotConverged, UserError
+from microslip.data import Mesh
+from microslip.errors import NotConverged, UserError
 from microslip.fem.contact import (
     ContactPair,
     Plane,

@@ -12,7 +12,7 @@ from microslip.contact.curves import NormalCurve, curve, read_columns, read_curv
 from microslip.contact.hertz import Hertz
 from microslip.contact.series import BULK
 from microslip.contact.solids import Solid
-from microslip.data import UserError
+from microslip.errors import UserError
 from microslip.modal.closures import ContactCurve
 
 ROUGH, C_N0 = 12e-6, 240e6

@@ -17,7 +17,7 @@ from microslip.contact.point_laws import curve_point, hertz_point, rough_point, 
 from microslip.contact.profiles import Profile, RoundContact
 from microslip.contact.series import BULK, ContactStiffness, in_series, of_layer
 from microslip.contact.solids import Solid
-from microslip.data import UserError
+from microslip.errors import UserError
 
 STEEL, MU = Solid(2.1e11, 0.3), Coulomb(jnp.asarray(0.3))
 

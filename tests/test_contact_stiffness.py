@@ -24,7 +24,7 @@ from microslip.contact.partial_slip import PartialSlip
 from microslip.contact.profiles import Profile, RoundContact
 from microslip.contact.series import BULK, ContactStiffness, for_basis, in_series, of_layer, of_patch, of_point_contact
 from microslip.contact.solids import Solid, mismatch, normal_modulus, tangential_modulus
-from microslip.data import UserError
+from microslip.errors import UserError
 from microslip.modal.compute import modal_basis
 from microslip.reduced.compliance import BULK_AND_SURFACE, SURFACE, contact_share
 from microslip.system import Body, Contact, Link, Spring, System

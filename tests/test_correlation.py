@@ -10,7 +10,8 @@ import small
 from hypothesis import given
 from hypothesis import strategies as st
 
-from microslip.data import ModalBasis, UserError
+from microslip.data import ModalBasis
+from microslip.errors import UserError
 from microslip.reduced.correlation import compare_groups, mac, nearest_points, pair_table, pairs
 
 

@@ -22,7 +22,8 @@ from microslip.contact.point import PointContact
 from microslip.contact.portion import Portion
 from microslip.contact.sliders import Iwan, rough_strips, uniform
 from microslip.contact.solids import Solid, mean_inverse_distance
-from microslip.data import Array, UserError
+from microslip.data import Array
+from microslip.errors import UserError
 from microslip.system.assembly import ContactFace
 from microslip.system.component import Component
 from microslip.system.nodal import nodal, static_compliance

@@ -16,7 +16,8 @@ import scipy.linalg
 import scipy.sparse as sp
 from meshes import body, moved, nearest, rotation_matrix, with_sets
 
-from microslip.data import Mesh, UserError
+from microslip.data import Mesh
+from microslip.errors import UserError
 from microslip.fem.cyclic import pair_cut_faces
 from microslip.mesh import boundary_facets
 from microslip.modal.compute import modal_basis

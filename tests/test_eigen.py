@@ -13,7 +13,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from meshes import STEEL, body, brick, moved, renumbered, roller_box, rotation_matrix, shaken
 
-from microslip.data import NotConverged, UserError
+from microslip.errors import NotConverged, UserError
 from microslip.fem import discretise
 from microslip.fem.discretise import free_upper
 from microslip.linalg import eigen

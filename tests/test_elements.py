@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from meshes import CELLS, QUADRATIC, brick, pipe, shaken
 
-from microslip.data import UserError
+from microslip.errors import UserError
 from microslip.fem import discretise
 from microslip.fem.discretise import face_blocks, quadrature, reference_nodes, shape_functions
 from microslip.mesh import boundary_facets, corner_volumes, mesh_problems, read_mesh

@@ -20,7 +20,8 @@ from scipy.io import loadmat, mmread
 
 from microslip.basis import read_basis, write_basis
 from microslip.cli import main
-from microslip.data import INTERFACE_ROWS, ModalBasis, UserError
+from microslip.data import INTERFACE_ROWS, ModalBasis
+from microslip.errors import UserError
 from microslip.exchange import formats, to_xarray, writer
 from microslip.exchange.choice import elastic, select
 from microslip.frames import skew

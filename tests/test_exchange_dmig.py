@@ -19,7 +19,8 @@ from test_exchange import body
 from test_exchange_peers import ask, needs
 
 from microslip.cli import main
-from microslip.data import INTERFACE_ROWS, Array, ModalBasis, UserError
+from microslip.data import INTERFACE_ROWS, Array, ModalBasis
+from microslip.errors import UserError
 from microslip.exchange import writer
 from microslip.exchange.choice import select
 from microslip.exchange.dmig import number

@@ -23,7 +23,8 @@ import small
 from test_exchange import body
 from test_exchange_peers import ask, needs
 
-from microslip.data import Array, ModalBasis, ModalGroup, UserError
+from microslip.data import Array, ModalBasis, ModalGroup
+from microslip.errors import UserError
 from microslip.exchange import formats, writer
 from microslip.exchange.choice import select
 from microslip.reduced.coordinates import in_modes

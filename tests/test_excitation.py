@@ -14,7 +14,8 @@ import small
 from meshes import body
 from test_assembly import FINE, blade, sector
 
-from microslip.data import ModalBasis, UserError
+from microslip.data import ModalBasis
+from microslip.errors import UserError
 from microslip.harmonic_balance import problem as balance
 from microslip.harmonic_balance import response
 from microslip.harmonic_balance.solver import solve

@@ -31,7 +31,7 @@ from microslip.fem import (
     tangent,
 )
 from microslip.fem.discretise import face_blocks, free_upper, reference_nodes
-from microslip.fem.loads import body_force, thermal, traction
+from microslip.fem.loads import body_force, traction
 from microslip.fem.operators import engineering, from_tensor, tangent_tensor, to_symmetric, to_tensor
 from microslip.modal.group import inertia_of
 from microslip.modal.rigid import rigid_fields
@@ -450,7 +450,7 @@ def test_thermal_forces_hold_a_heated_box():
     d = discretise(mesh)
     bulk, alpha = E / (3 * (1 - 2 * NU)), 1.2e-5
     strain = np.array([1, 1, 1, 0, 0, 0]) * alpha * 50
-    f = thermal(d, [np.broadcast_to(strain @ STEEL_C, (*d.blocks[0].dx.shape, 6))])
+    f = internal_force(d, [np.broadcast_to(strain @ STEEL_C, (*d.blocks[0].dx.shape, 6))], None)
     wall = f[mesh.face_points("x1")].sum(axis=0)
     np.testing.assert_allclose(wall, [3 * bulk * alpha * 50 * 0.15, 0, 0], atol=1e-5)
 

@@ -11,7 +11,8 @@ from microslip.basis import read_basis
 from microslip.case import load_case, run_case
 from microslip.case.assemble import build
 from microslip.case.run import free_response
-from microslip.data import ModalBasis, UserError
+from microslip.data import ModalBasis
+from microslip.errors import UserError
 from microslip.operating.motion import motion_of
 from microslip.reduced.coordinates import first_modes
 from microslip.stages.running import respond

@@ -10,7 +10,8 @@ import pytest
 from meshes import STEEL, body, brick, shaken, twisted_blade
 
 from microslip.basis import check_basis, read_basis, write_basis
-from microslip.data import MOTIONS, UserError
+from microslip.data import MOTIONS
+from microslip.errors import UserError
 from microslip.fem import discretise, stress_stiffness
 from microslip.fem.discretise import free_upper
 from microslip.linalg import eigen

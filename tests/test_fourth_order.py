@@ -7,7 +7,7 @@ import pytest
 from test_time_domain import BOOK, hitting
 
 import microslip as ms
-from microslip.data import UserError
+from microslip.errors import UserError
 from microslip.time_domain import equations, orbit
 from microslip.time_domain.stepper import Stepper
 

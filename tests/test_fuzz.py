@@ -28,7 +28,7 @@ from test_mesh import INP, TET
 from microslip.basis import read_basis, write_basis
 from microslip.case import load_case
 from microslip.cli import main
-from microslip.data import UserError
+from microslip.errors import UserError
 from microslip.mesh import mesh_problems, read_mesh
 from microslip.modal.compute import modal_basis
 from microslip.settings.body import BodySettings, load_body, validate
@@ -324,7 +324,7 @@ from pathlib import Path
 from microslip.basis import check_basis, files
 from microslip.case import load_case
 from microslip.cli import main
-from microslip.data import UserError
+from microslip.errors import UserError
 from test_fuzz import flipped
 data, out = Path(sys.argv[1]).read_bytes()[:-120], Path(sys.argv[2])  # without its seal
 try:

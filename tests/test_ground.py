@@ -19,7 +19,7 @@ from microslip.contact.normal import Penalty
 from microslip.contact.patch import Patch
 from microslip.contact.point import PointContact
 from microslip.contact.rate import RateContact
-from microslip.data import UserError
+from microslip.errors import UserError
 from microslip.system import Body, Contact, Force, Monitor, System
 from microslip.system.assembly import Assembly, ContactFace, Load, Output, preloaded_contact
 from microslip.system.component import Component

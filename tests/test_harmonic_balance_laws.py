@@ -25,7 +25,8 @@ from microslip.contact.law import Law
 from microslip.contact.normal import Normal, Penalty, Preload, Rough
 from microslip.contact.patch import Patch, equilibrium, grid, stuck_stiffness
 from microslip.contact.point import PointContact
-from microslip.data import Compliance, Interface, ModalBasis, ModalGroup, NotConverged, UserError
+from microslip.data import Compliance, Interface, ModalBasis, ModalGroup
+from microslip.errors import NotConverged, UserError
 from microslip.harmonic_balance import response_table, solver
 from microslip.harmonic_balance.problem import Problem
 from microslip.harmonic_balance.reduced import stuck

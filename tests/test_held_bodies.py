@@ -7,7 +7,7 @@ import pytest
 import scipy.linalg
 
 from microslip.case.loaded import on_weak_springs
-from microslip.data import UserError
+from microslip.errors import UserError
 from microslip.system import Body, Contact, Force, Monitor, Spring, System
 
 

@@ -13,7 +13,8 @@ from test_assembly import FINE, sector
 from test_neighbours import N, mesh, settings, whole  # noqa: F401 (fixtures)
 
 from microslip.contact.patch import Patch, grid
-from microslip.data import ModalBasis, UserError
+from microslip.data import ModalBasis
+from microslip.errors import UserError
 from microslip.harmonic_balance import envelope, identification, response
 from microslip.harmonic_balance import problem as balance
 from microslip.harmonic_balance.envelope import _snake

@@ -13,7 +13,7 @@ from rings import bladed_sector
 
 from microslip.basis import check_basis, read_basis, write_basis
 from microslip.case import CaseSettings, run_case
-from microslip.data import UserError
+from microslip.errors import UserError
 from microslip.fem.discretise import discretise, free_upper
 from microslip.linalg import eigen
 from microslip.modal.boundary import fixed_dofs

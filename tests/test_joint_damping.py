@@ -14,7 +14,8 @@ from microslip.case import load_case
 from microslip.case.assemble import Built, build
 from microslip.case.problem import problem_of
 from microslip.cli import main
-from microslip.data import Array, UserError
+from microslip.data import Array
+from microslip.errors import UserError
 from microslip.harmonic_balance import response
 from microslip.harmonic_balance.reduced import stuck, stuck_damping
 from microslip.harmonic_balance.solver import solve

@@ -17,7 +17,8 @@ from microslip.case.loaded import load_bodies
 from microslip.case.settings import BodyOfCase
 from microslip.case.thrown import normal_forces
 from microslip.cli import main
-from microslip.data import CENTRIFUGAL, Array, ModalBasis, UserError
+from microslip.data import CENTRIFUGAL, Array, ModalBasis
+from microslip.errors import UserError
 from microslip.modal.compute import modal_basis
 from microslip.operating.motion import read_out
 from microslip.reduced.coordinates import of_density

@@ -13,7 +13,7 @@ import pytest
 import small
 from scipy.io import loadmat
 
-from microslip.data import UserError
+from microslip.errors import UserError
 from microslip.exchange import formats, writer
 from microslip.exchange.mat import field_names, write_mat
 

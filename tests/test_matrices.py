@@ -20,8 +20,8 @@ from hypothesis import strategies as st
 
 from microslip.basis import check_basis, read_basis
 from microslip.cli import main
-from microslip.data import UserError
 from microslip.elasticity import isotropic
+from microslip.errors import UserError
 from microslip.exchange.matrices import matrix_names, read_matrices
 from microslip.fem.discretise import discretise
 from microslip.fem.operators import mass, stiffness

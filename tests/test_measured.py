@@ -15,7 +15,8 @@ from test_fuzz import user_errors_only
 
 from microslip.basis import check_basis, read_basis, write_basis
 from microslip.cli import main
-from microslip.data import ModalBasis, UserError
+from microslip.data import ModalBasis
+from microslip.errors import UserError
 from microslip.exchange.measured import holds_modes, read_measured
 from microslip.exchange.uff import write_uff
 from microslip.reduced.correlation import compare_groups, measured_directions

@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 import small
 
-from microslip.data import Mesh, UserError
+from microslip.data import Mesh
+from microslip.errors import UserError
 from microslip.mesh import boundary_facets, mesh_problems, read_mesh
 from microslip.mesh.msh import to_vtk
 from microslip.modal.boundary import require_face

@@ -12,7 +12,8 @@ from scipy.optimize import brentq
 
 import microslip as ms
 from microslip.basis import read_basis, write_basis
-from microslip.data import ModalBasis, UserError
+from microslip.data import ModalBasis
+from microslip.errors import UserError
 from microslip.harmonic_balance import problem as balance
 from microslip.harmonic_balance.solver import newton, solve
 from microslip.mistuning import ensemble, rare

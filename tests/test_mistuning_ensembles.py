@@ -14,7 +14,7 @@ import pytest
 import scipy.stats
 from test_mistuning import FINE, SLIPS, sector
 
-from microslip.data import UserError
+from microslip.errors import UserError
 from microslip.harmonic_balance.forces import _with_slopes, beside
 from microslip.mistuning import ensemble
 from microslip.mistuning.peaks import Highest

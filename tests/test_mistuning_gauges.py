@@ -12,7 +12,7 @@ from microslip.contact.friction import Coulomb
 from microslip.contact.normal import Penalty
 from microslip.contact.patch import Patch
 from microslip.contact.point import PointContact
-from microslip.data import UserError
+from microslip.errors import UserError
 from microslip.mistuning.gauges import Stuck, blades_from_gauges
 from microslip.mistuning.ring import Tuned
 from microslip.mistuning.samples import Sticking

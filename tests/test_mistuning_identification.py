@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import scipy.linalg
 
-from microslip.data import UserError
+from microslip.errors import UserError
 from microslip.mistuning import identification
 from microslip.mistuning.identification import blades_from_modes
 

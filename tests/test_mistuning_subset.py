@@ -13,7 +13,8 @@ import scipy.sparse as sp
 from meshes import body
 from scipy.sparse.linalg import eigsh
 
-from microslip.data import Mesh, UserError
+from microslip.data import Mesh
+from microslip.errors import UserError
 from microslip.mesh import boundary_facets
 from microslip.mistuning.ring import Tuned
 from microslip.mistuning.scatter import Scatter

@@ -11,7 +11,7 @@ import scipy.linalg
 import scipy.sparse as sp
 from meshes import body
 
-from microslip.data import UserError
+from microslip.errors import UserError
 from microslip.fem.cyclic import pair_cut_faces, sector_unknowns
 from microslip.fem.discretise import discretise
 from microslip.fem.operators import mass, stiffness

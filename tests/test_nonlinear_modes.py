@@ -16,7 +16,7 @@ from microslip.contact.friction import Coulomb
 from microslip.contact.normal import Penalty
 from microslip.contact.patch import Patch, grid
 from microslip.contact.point import PointContact
-from microslip.data import UserError
+from microslip.errors import UserError
 from microslip.harmonic_balance import problem as balance
 from microslip.harmonic_balance.nonlinear_modes import _Curve, backbone, strongest, stuck_modes
 from microslip.harmonic_balance.peak import highest, resonance

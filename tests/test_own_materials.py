@@ -11,8 +11,9 @@ from hypothesis import strategies as st
 
 from microslip.basis import check_basis, read_basis
 from microslip.cli import main
-from microslip.data import Mesh, UserError
+from microslip.data import Mesh
 from microslip.elasticity import isotropic, orthotropic
+from microslip.errors import UserError
 from microslip.mesh import read_mesh
 from microslip.stages.job import open_job
 from microslip.stages.modal import modes_stage

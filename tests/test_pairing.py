@@ -10,7 +10,8 @@ import pytest
 from small import basis
 
 from microslip.contact.patch import grid
-from microslip.data import Array, Interface, UserError
+from microslip.data import Array, Interface
+from microslip.errors import UserError
 from microslip.frames import rotation
 from microslip.system.pairing import Place, facing, in_ring, rigid_points
 

@@ -17,7 +17,8 @@ from microslip.contact.friction import Coulomb
 from microslip.contact.normal import Penalty
 from microslip.contact.patch import Patch, equilibrium, pressed_by, pressure
 from microslip.contact.point import PointContact
-from microslip.data import Array, ModalGroup, UserError
+from microslip.data import Array, ModalGroup
+from microslip.errors import UserError
 from microslip.harmonic_balance import problem as balance
 from microslip.harmonic_balance import response
 from microslip.harmonic_balance.solver import solve

@@ -13,15 +13,17 @@ from drawn import made
 from meshes import body, brick
 
 from microslip.basis import check_basis, read_basis, write_basis
-from microslip.data import Mesh, ModalGroup, UserError
+from microslip.data import Mesh, ModalGroup
+from microslip.errors import UserError
 from microslip.fem.discretise import discretise, free_upper
 from microslip.linalg import eigen
+from microslip.linalg.bordered import Bordered
 from microslip.modal import rigid
 from microslip.modal.boundary import known_materials
 from microslip.modal.closures import bolt_forces
 from microslip.modal.compute import modal_basis
 from microslip.modal.equilibrium import make_model
-from microslip.modal.preload import Corrected, determinate, pressed_modes, pressed_state, without_rigid
+from microslip.modal.preload import determinate, pressed_modes, pressed_state, without_rigid
 from microslip.modal.spectrum import make_pencil
 from microslip.settings.body import load_body
 
@@ -177,7 +179,7 @@ def test_solver_with_the_rigid_part_taken_out():
         eigen.new_solver("superlu"),
     )  # fmt: skip
     relieved = without_rigid(pencil, R)
-    assert isinstance(relieved.solver, Corrected)
+    assert isinstance(relieved.solver, Bordered)
     np.testing.assert_allclose(relieved.K(np.eye(n)), P.T @ A @ P, atol=1e-12 * np.abs(A).max())
     for s in (-3.0, 0.7, 5.0):
         dense = P.T @ A @ P - s * M

@@ -19,7 +19,7 @@ from microslip.case import load_case, run_case
 from microslip.contact.elements import Polynomial, Stop
 from microslip.contact.patch import Patch
 from microslip.continuation import Settings
-from microslip.data import UserError
+from microslip.errors import UserError
 from microslip.harmonic_balance.by_hand import ElasticSpring, model
 from microslip.harmonic_balance.forces import AFT
 

@@ -21,8 +21,9 @@ from test_fuzz import flipped, user_errors_only
 from test_mesh import TET
 
 from microslip.cli import main
-from microslip.data import Mesh, UserError
+from microslip.data import Mesh
 from microslip.elasticity import isotropic
+from microslip.errors import UserError
 from microslip.mesh import mesh_problems, read_mesh
 from microslip.mesh.med import vtk_places
 

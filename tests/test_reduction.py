@@ -10,7 +10,7 @@ from meshes import STEEL, body, brick
 
 from microslip.basis import check_basis, read_basis, write_basis
 from microslip.case import CaseSettings, run_case
-from microslip.data import UserError
+from microslip.errors import UserError
 from microslip.fem.discretise import discretise, free_upper
 from microslip.linalg import eigen
 from microslip.modal.body_rows import body_rows

@@ -19,7 +19,7 @@ from microslip.contact.normal import Penalty, Rough
 from microslip.contact.patch import Patch
 from microslip.contact.portion import portion
 from microslip.contact.regularised import MassContact
-from microslip.data import UserError
+from microslip.errors import UserError
 from microslip.system.assembly import Assembly
 from microslip.time_domain import equations, orbit, reference
 from microslip.time_domain.equations import Equations

@@ -10,7 +10,8 @@ from scipy.optimize import brentq
 from test_harmonic_balance_time import Cubic, group, held
 
 from microslip.contact.law import settings
-from microslip.data import Array, UserError
+from microslip.data import Array
+from microslip.errors import UserError
 from microslip.harmonic_balance import problem as balance
 from microslip.harmonic_balance.checkpoint import labels, resumed_response
 from microslip.harmonic_balance.refinement import HALVINGS, filled_response

@@ -20,7 +20,8 @@ from test_harmonic_balance_laws import sled
 
 from microslip.basis import read_basis, write_basis
 from microslip.case import load_case
-from microslip.data import Rows, UserError
+from microslip.data import Rows
+from microslip.errors import UserError
 from microslip.results import read_response
 from microslip.stages import response as making
 from microslip.stages import running

@@ -13,7 +13,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from microslip.basis import check_basis, read_basis, write_basis
-from microslip.data import Array, ModalBasis, UserError
+from microslip.data import Array, ModalBasis
+from microslip.errors import UserError
 from microslip.ring.expansion import (
     aliased,
     certify_ring,

@@ -20,7 +20,7 @@ from microslip.contact.hertz import Hertz
 from microslip.contact.law import value
 from microslip.contact.point import opposed, slide, weight
 from microslip.contact.solids import Solid
-from microslip.data import UserError
+from microslip.errors import UserError
 from microslip.rolling.contact_table import ContactTable
 from microslip.rolling.contact_table import forces as contact_forces
 from microslip.rolling.ellipse import combined, ellipses

@@ -9,7 +9,8 @@ import pytest
 
 from microslip.contact.hertz import Hertz
 from microslip.contact.solids import Solid
-from microslip.data import Array, UserError
+from microslip.data import Array
+from microslip.errors import UserError
 from microslip.rolling.half_space import Contact, linear_coefficients, pressed, rolled, shifted, steady_rolling
 from microslip.rolling.half_space_influence import ALL, Grid, Pair, influence, influence_ahead, rectangle
 

@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import quad
 from scipy.special import erfcx
 
-from microslip.data import UserError
+from microslip.errors import UserError
 from microslip.rolling.temperature import (
     Conductor,
     conducted,

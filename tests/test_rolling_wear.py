@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from microslip.data import UserError
+from microslip.errors import UserError
 from microslip.rolling.half_space import pressed, steady_rolling
 from microslip.rolling.half_space_influence import Grid, Pair
 from microslip.rolling.temperature import heat_source

@@ -10,7 +10,8 @@ import scipy.sparse as sp
 import microslip as ms
 from microslip.basis import check_basis, read_basis, write_basis
 from microslip.cli import main
-from microslip.data import MatrixTerm, UserError
+from microslip.data import MatrixTerm
+from microslip.errors import UserError
 from microslip.linalg.parametric import Family
 from microslip.linalg.quadratic import Factors, Quadratic, Window, every_root, every_value, refined, search
 from microslip.linalg.sampled import sampled

@@ -10,7 +10,7 @@ from closed_forms.bars import box_frequencies
 from meshes import STEEL, body, brick, nearest, roller_box, shaken, twisted_blade, with_sets
 from scipy.special import ellipe, ellipeinc, ellipk, ellipkinc
 
-from microslip.data import UserError
+from microslip.errors import UserError
 from microslip.fem import discretise, displacement_gradient, green_strain, internal_force, stress_stiffness
 from microslip.fem.discretise import free_upper
 from microslip.linalg import eigen

@@ -9,8 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from meshes import CELLS, QUADRATIC, STEEL, body, brick, nearest, pipe, rotation_matrix, shaken, with_sets
 
-from microslip.data import Mesh, UserError
+from microslip.data import Mesh
 from microslip.elasticity import isotropic
+from microslip.errors import UserError
 from microslip.fem import discretise, displacement_gradient, mass, stiffness
 from microslip.fem.discretise import face_blocks, shape_functions
 from microslip.modal.body_rows import body_rows

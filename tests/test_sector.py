@@ -14,7 +14,8 @@ from hypothesis import strategies as st
 from meshes import body
 
 from microslip.basis import check_basis, read_basis, write_basis
-from microslip.data import Mesh, UserError
+from microslip.data import Mesh
+from microslip.errors import UserError
 from microslip.fem.cyclic import cyclic_upper, pair_cut_faces, sector_unknowns
 from microslip.fem.discretise import discretise
 from microslip.frames import rotation

@@ -13,7 +13,7 @@ from microslip.contact.friction import StaticSliding
 from microslip.contact.law import value
 from microslip.contact.normal import Preload
 from microslip.contact.set_valued import SetValued
-from microslip.data import UserError
+from microslip.errors import UserError
 from microslip.time_domain import equations
 from microslip.time_domain.inclusion import meets, solve
 from microslip.time_domain.stepper import Stepper

@@ -14,7 +14,7 @@ from microslip import sliding
 from microslip.bifurcation import mechanics
 from microslip.case import load_case
 from microslip.case.assemble import build
-from microslip.data import UserError
+from microslip.errors import UserError
 from microslip.system.assembly import Assembly
 from microslip.system.settings import load_system
 

@@ -10,7 +10,8 @@ import rings
 from meshes import STEEL, body, brick, nearest, twisted_blade
 
 from microslip.basis import check_basis, read_basis, write_basis
-from microslip.data import ModalBasis, UserError
+from microslip.data import ModalBasis
+from microslip.errors import UserError
 from microslip.linalg import eigen
 from microslip.modal.campbell import track_basis
 from microslip.modal.compute import modal_basis

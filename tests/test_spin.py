@@ -15,7 +15,8 @@ from rings import AXIS, disc_sector, full_ring
 from microslip.basis.integrals import convected
 from microslip.case.assemble import build
 from microslip.case.settings import CaseSettings
-from microslip.data import Array, ModalBasis, ModalGroup, UserError
+from microslip.data import Array, ModalBasis, ModalGroup
+from microslip.errors import UserError
 from microslip.modal.compute import modal_basis
 from microslip.modal.unreduced import unreduced
 from microslip.roots.full import full_matrices

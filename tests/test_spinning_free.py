@@ -18,7 +18,8 @@ import microslip as ms
 from microslip.basis import write_basis
 from microslip.basis.checks import check_basis
 from microslip.cli import main
-from microslip.data import Mesh, ModalBasis, ModalGroup, UserError
+from microslip.data import Mesh, ModalBasis, ModalGroup
+from microslip.errors import UserError
 from microslip.harmonic_balance import problem as balance
 from microslip.harmonic_balance import pseudo_transient
 from microslip.linalg import eigen

@@ -18,7 +18,7 @@ from microslip.contact.law import Law, settings
 from microslip.contact.normal import Penalty, Preload
 from microslip.contact.patch import Patch
 from microslip.contact.point import PointContact
-from microslip.data import UserError
+from microslip.errors import UserError
 from microslip.harmonic_balance import problem as balance
 from microslip.harmonic_balance.forces import AFT
 from microslip.harmonic_balance.problem import Group, Problem

@@ -20,7 +20,7 @@ import small
 
 from microslip.basis import check_basis, read_basis, write_basis
 from microslip.contact.examples import EXAMPLES
-from microslip.data import UserError
+from microslip.errors import UserError
 from microslip.exchange.mat import write_mat
 from microslip.files import store
 
@@ -121,7 +121,7 @@ import resource, sys
 import small
 from microslip.basis import read_basis, write_basis
 from microslip.contact.examples import EXAMPLES
-from microslip.data import UserError
+from microslip.errors import UserError
 from microslip.exchange.mat import write_mat
 from microslip.files.store import write_text
 basis = read_basis(sys.argv[1])

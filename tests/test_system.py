@@ -17,7 +17,7 @@ from closed_forms.one_harmonic import JenkinsContact, frequency_response, stuck_
 
 from microslip.basis import check_basis, read_basis, write_basis
 from microslip.cli import main
-from microslip.data import UserError
+from microslip.errors import UserError
 from microslip.system import Body, Contact, Damper, Force, Monitor, Spring, System, load_system, system_basis
 
 pytestmark = pytest.mark.usefixtures("undrawn", "unjudged")

@@ -19,8 +19,9 @@ from instanced import Placed
 
 from microslip.basis import read_basis
 from microslip.cli import main
-from microslip.data import AverageLink, Equation, FaceTie, Links, Mesh, RigidLink, UserError
+from microslip.data import AverageLink, Equation, FaceTie, Links, Mesh, RigidLink
 from microslip.elasticity import isotropic
+from microslip.errors import UserError
 from microslip.fem.discretise import discretise
 from microslip.fem.links import linked
 from microslip.fem.operators import mass, stiffness

@@ -29,7 +29,8 @@ from microslip.contact.law import Law, settings, value
 from microslip.contact.normal import Normal, Penalty, Rough
 from microslip.contact.patch import Patch
 from microslip.contact.point import PointContact
-from microslip.data import CENTRIFUGAL, Rows, RunUp, UserError
+from microslip.data import CENTRIFUGAL, Rows, RunUp
+from microslip.errors import UserError
 from microslip.exchange.vtu import write_motion
 from microslip.report.page import number, text
 from microslip.stages.moving import whole_ring

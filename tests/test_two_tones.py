@@ -17,7 +17,7 @@ import pytest
 import microslip as ms
 from microslip.case import load_case
 from microslip.contact.law import Law, number, settings
-from microslip.data import UserError
+from microslip.errors import UserError
 from microslip.harmonic_balance import tones, two_tone
 from microslip.harmonic_balance.torus import closed, commensurate, pairs_of, with_mean
 

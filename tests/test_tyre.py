@@ -14,8 +14,9 @@ from scipy.sparse.linalg import spsolve
 
 from microslip.basis import read_basis
 from microslip.cli import main
-from microslip.data import ContactState, Mesh, UserError
+from microslip.data import ContactState, Mesh
 from microslip.elasticity import isotropic
+from microslip.errors import UserError
 from microslip.fem.contact import Grip, Plane, coupled_points, make_pair
 from microslip.fem.discretise import REDUCED, discretise, face_blocks, free_upper
 from microslip.fem.loads import pressure

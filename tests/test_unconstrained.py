@@ -7,7 +7,8 @@ import pytest
 from meshes import body, brick
 from touching import together
 
-from microslip.data import Mesh, UserError
+from microslip.data import Mesh
+from microslip.errors import UserError
 from microslip.modal.compute import modal_basis
 
 JOINT = {"name": "joint", "face": "b_z0", "against": "a_z1"}

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import small
 
-from microslip.data import UserError
+from microslip.errors import UserError
 from microslip.exchange.vtu import write_vtu
 
 meshio = pytest.importorskip("meshio")

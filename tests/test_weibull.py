@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from microslip.data import UserError
+from microslip.errors import UserError
 from microslip.mistuning import weibull
 
 

@@ -12,7 +12,7 @@ import pytest
 from box import edit, write_box
 
 from microslip.basis import read_basis
-from microslip.data import UserError
+from microslip.errors import UserError
 from microslip.files import store
 from microslip.settings.toml import load_toml
 from microslip.stages import meshing, modal, places, response, running

@@ -14,7 +14,7 @@ from .case.assemble import Built
 from .case.contacts import swept
 from .case.problem import problem_of
 from .continuation import Settings
-from .data import UserError
+from .errors import UserError
 from .harmonic_balance import families, nonlinear_modes
 from .harmonic_balance import problem as balance
 from .harmonic_balance.nonlinear_modes import Backbone

@@ -11,7 +11,8 @@ from .basis import read_basis
 from .case.assemble import Built, build
 from .case.contacts import swept
 from .case.settings import CaseSettings
-from .data import ModalBasis, UserError
+from .data import ModalBasis
+from .errors import UserError
 from .settings.mistakes import bounded, validate
 from .settings.toml import load_toml
 from .stages.job import job_of, open_job

@@ -13,10 +13,11 @@ class NotConverged(Exception):
 
 
 @contextmanager
-def told_of(what: object) -> Iterator[None]:
-    """A mistake that is found here is one of a file, or of a key in it: its sentence begins with that, once."""
+def told_of(what: object, folder: object = None) -> Iterator[None]:
+    """A mistake that is found here is one of a file, or of a key in it: its sentence begins with that, once, or with
+    another file of a folder."""
     try:
         yield
     except UserError as error:
-        begun = str(error).startswith(f"{what}: ")
+        begun = str(error).startswith(f"{what}: ") or folder is not None and str(error).startswith(str(folder))
         raise UserError(str(error) if begun else f"{what}: {error}") from error

@@ -20,7 +20,8 @@ import jax.numpy as jnp
 import numpy as np
 import scipy.linalg
 
-from .data import Array, NotConverged, UserError
+from .data import Array
+from .errors import NotConverged, UserError
 from .system.assembly import Assembly, Contact
 
 

@@ -12,7 +12,7 @@ from closed_forms import bars, beams, shafts
 from meshes import STEEL, body, brick, nearest, with_sets
 
 from microslip.contact.joined_beams import rectangle
-from microslip.data import UserError
+from microslip.errors import UserError
 from microslip.modal.compute import modal_basis
 
 E, NU, RHO = STEEL["young"], STEEL["poisson"], STEEL["density"]

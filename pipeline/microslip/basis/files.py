@@ -36,8 +36,8 @@ from ..data import (
     RunUp,
     SpeedRange,
     StressSet,
-    UserError,
 )
+from ..errors import UserError
 from ..files.declared import (
     Noun,
     Scales,

@@ -11,7 +11,8 @@ import numpy as np
 
 from ..continuation import Lost, Scaled, Settings, newton, start
 from ..continuation.curve import State
-from ..data import Array, UserError
+from ..data import Array
+from ..errors import UserError
 from . import deflation, equilibria, floquet, flow, orbits, switching
 from .basin import Attractor, attractors
 from .branches import EQUILIBRIA, Branch, Collected, joined, of_orbits

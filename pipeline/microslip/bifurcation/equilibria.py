@@ -9,7 +9,8 @@ import numpy as np
 
 from ..continuation import Lost, Scaled, Segment, Settings, advance, root, start
 from ..continuation.curve import State
-from ..data import Array, ComplexArray, UserError
+from ..data import Array, ComplexArray
+from ..errors import UserError
 from .dynamics import Dynamics
 
 

@@ -12,7 +12,8 @@ import numpy as np
 import scipy.linalg
 
 from .. import sliding
-from ..data import Array, NotConverged, UserError
+from ..data import Array
+from ..errors import NotConverged, UserError
 from ..harmonic_balance.readout import measured
 from ..system.assembly import Assembly
 from .dynamics import Dynamics

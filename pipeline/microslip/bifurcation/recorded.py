@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..data import UserError
+from ..errors import UserError
 from ..files import hdf5, store
 from ..files.hostile import reading, refuse_damaged
 from . import branches

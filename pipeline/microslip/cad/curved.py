@@ -5,7 +5,7 @@ from __future__ import annotations
 import gmsh
 import numpy as np
 
-from microslip.data import UserError
+from microslip.errors import UserError
 
 TETRA10 = 11  # gmsh's number of the element type
 # corners of the edges on which gmsh's mid-side nodes 4..9 lie (the last two swapped against VTK)

@@ -16,7 +16,7 @@ import gmsh
 import numpy as np
 
 from microslip.cad.curved import refuse_inverted, straighten
-from microslip.data import UserError
+from microslip.errors import UserError
 from microslip.files.store import complete_or_absent, ordinary
 
 warnings: list[str] = []

@@ -13,7 +13,7 @@ from microslip.cad.drawing import boundary_surfaces, name_face, surfaces_where, 
 from microslip.cad.imprint import lies_in
 from microslip.cad.marks import Marks, short_name
 from microslip.cad.solids import load
-from microslip.data import UserError
+from microslip.errors import UserError
 from microslip.mesh import UNITS
 
 

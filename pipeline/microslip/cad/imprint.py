@@ -12,7 +12,7 @@ import numpy as np
 from microslip.cad.drawing import boundary_surfaces
 from microslip.cad.marks import Marks
 from microslip.cad.solids import import_shapes, lies_on, point_on
-from microslip.data import UserError
+from microslip.errors import UserError
 from microslip.files.store import ordinary
 
 Pieces = list[tuple[int, int]]

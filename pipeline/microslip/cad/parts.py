@@ -16,7 +16,7 @@ from microslip.cad.drawing import boundary_surfaces
 from microslip.cad.imprint import box_of, common_surfaces, meet
 from microslip.cad.marks import short_name
 from microslip.cad.solids import import_shapes, silent
-from microslip.data import UserError
+from microslip.errors import UserError
 
 
 def set_apart(file: str, folder: str) -> None:

@@ -18,7 +18,7 @@ import numpy as np
 
 from microslip.cad.drawing import boundary_surfaces, warn
 from microslip.cad.marks import Marks, marks_of
-from microslip.data import UserError
+from microslip.errors import UserError
 from microslip.files.store import ordinary
 from microslip.mesh import UNITS
 

@@ -8,7 +8,8 @@ from collections.abc import Sequence
 import gmsh
 import numpy as np
 
-from microslip.data import Array, UserError
+from microslip.data import Array
+from microslip.errors import UserError
 
 
 def round_section(centre: Array, axes: Array, radius: float, strips: Sequence[tuple[float, float]]) -> int:

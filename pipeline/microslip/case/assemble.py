@@ -10,8 +10,8 @@ from typing import Any, Literal
 
 import numpy as np
 
-from ..data import CENTRIFUGAL, Array, ModalBasis, ModalGroup, UserError
-from ..errors import told_of
+from ..data import CENTRIFUGAL, Array, ModalBasis, ModalGroup
+from ..errors import UserError, told_of
 from ..reduced.compliance import SURFACE
 from ..system.assembly import Assembly, Contact, Load, Output
 from ..system.component import Component, Ring

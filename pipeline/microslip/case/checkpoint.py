@@ -14,7 +14,7 @@ import numpy as np
 from ..contact.kinds import files_of as of_contact
 from ..contact.kinds import sources_of_others
 from ..contact.settings import ContactLaw, load_contact
-from ..data import UserError
+from ..errors import UserError
 from ..files.store import fingerprint
 from ..harmonic_balance.checkpoint import restored
 from ..harmonic_balance.response import traced

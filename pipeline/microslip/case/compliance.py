@@ -8,7 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ..data import INTERFACE_ROWS, Array, ModalGroup, UserError
+from ..data import INTERFACE_ROWS, Array, ModalGroup
+from ..errors import UserError
 from ..reduced.compliance import BULK_AND_SURFACE, SURFACE, Share, contact_share, facing, without_bulk
 from .settings import ContactSettings
 

@@ -15,8 +15,8 @@ from ..contact.composed import ContactModel, compose
 from ..contact.law import Law
 from ..contact.settings import ContactLaw, load_contact
 from ..contact.stiffness import Given
-from ..data import Array, Interface, UserError
-from ..errors import told_of
+from ..data import Array, Interface
+from ..errors import UserError, told_of
 from ..files.store import ordinary
 from ..harmonic_balance.accuracy import more
 from ..harmonic_balance.cost import GIB, aft_bytes, of_this_machine

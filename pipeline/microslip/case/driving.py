@@ -10,8 +10,8 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import BeforeValidator, Field, model_validator
 
-from ..data import Array, Interface, ModalGroup, UserError
-from ..errors import told_of
+from ..data import Array, Interface, ModalGroup
+from ..errors import UserError, told_of
 from ..settings.numbers import Direction, Model, NotNegative, Number, Numbers, Positive, Vector, _finite_vector, _tuple
 from ..system.assembly import Load
 from ..system.component import Component, Ring

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ..data import Interface, ModalBasis, ModalGroup, UserError
-from ..errors import told_of
+from ..data import Interface, ModalBasis, ModalGroup
+from ..errors import UserError, told_of
 from ..frames import rotation
 from ..modal.speed_range import basis_at
 from ..reduced.compliance import has_residual

@@ -15,7 +15,8 @@ from ..contact.patch import Patch, equilibrium, grid, pressure
 from ..contact.point_laws import curve_point
 from ..contact.portion import portion
 from ..contact.solids import Solid
-from ..data import Array, Interface, UserError
+from ..data import Array, Interface
+from ..errors import UserError
 from ..system.nodal import Nodal
 from ..system.pairing import rigid_points
 from .compliance import Springs

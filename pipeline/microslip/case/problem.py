@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from ..data import ModalGroup, UserError
+from ..data import ModalGroup
+from ..errors import UserError
 from ..harmonic_balance import problem as balance
 from ..harmonic_balance.book import BookPatch, book_patch
 from ..harmonic_balance.problem import Forces, Problem

@@ -10,7 +10,8 @@ from pathlib import Path
 import numpy as np
 import scipy.linalg
 
-from ..data import Array, ComplexArray, ModalBasis, UserError
+from ..data import Array, ComplexArray, ModalBasis
+from ..errors import UserError
 from ..harmonic_balance import FrequencyResponse
 from ..harmonic_balance.accuracy import FLOOR, Error, enough, judged
 from ..harmonic_balance.book import normal_law

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from ..contact.friction import OfCoulomb
-from ..data import Array, ModalBasis, UserError
-from ..errors import told_of
+from ..data import Array, ModalBasis
+from ..errors import UserError, told_of
 from ..harmonic_balance import envelope, speed_line
 from ..harmonic_balance.envelope import Envelope, OverOrders
 from ..harmonic_balance.identification import Identified, Measured, NodalDiagram, identify, nodal_diagram

@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 import scipy.optimize
 
-from ..data import Array, ModalBasis, UserError
+from ..data import Array, ModalBasis
+from ..errors import UserError
 from .settings import BodyOfCase, CaseSettings
 
 UNHELD = 0.05

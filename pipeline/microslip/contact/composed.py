@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 
-from ..data import UserError
+from ..errors import UserError
 from .friction import Friction, OfCoulomb
 from .heights import Heights
 from .hertz import Hertz

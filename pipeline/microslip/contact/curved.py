@@ -14,7 +14,8 @@ import jax.numpy as jnp
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..data import Array, UserError
+from ..data import Array
+from ..errors import UserError
 from ..reduced.compliance import SURFACE
 from .curves import NormalCurve
 from .hertz import Hertz

@@ -18,7 +18,8 @@ from numpy.typing import ArrayLike
 from scipy.interpolate import CubicHermiteSpline, PchipInterpolator
 from scipy.optimize import isotonic_regression
 
-from ..data import Array, Indices, UserError
+from ..data import Array, Indices
+from ..errors import UserError
 from ..files.store import ordinary
 from ..reduced.compliance import BULK_AND_SURFACE
 from .hertz import Hertz

@@ -15,7 +15,8 @@ from numpy.typing import ArrayLike
 from scipy.interpolate import CubicSpline
 from scipy.special import elliprd, elliprf
 
-from ..data import Array, UserError
+from ..data import Array
+from ..errors import UserError
 from .solids import Solid, normal_modulus, pressing
 
 SLENDEREST = 1e-6

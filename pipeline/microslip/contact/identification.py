@@ -16,7 +16,8 @@ import scipy.linalg
 import scipy.ndimage
 import scipy.optimize
 
-from ..data import INTERFACE_ROWS, Array, ModalGroup, UserError
+from ..data import INTERFACE_ROWS, Array, ModalGroup
+from ..errors import UserError
 from ..reduced.compliance import BULK_AND_SURFACE, SURFACE
 from ..reduced.coordinates import in_modes
 from . import joined_beams

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Union
 import numpy as np
 from pydantic import Field
 
-from ..data import UserError
+from ..errors import UserError
 from ..files.store import ordinary
 from ..settings.numbers import Model
 from ..settings.toml import load_toml

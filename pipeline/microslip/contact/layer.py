@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.optimize import brentq
 
-from ..data import Array, Indices, UserError
+from ..data import Array, Indices
+from ..errors import UserError
 from .solids import Solid
 
 STRESS_FREE, HYDROSTATIC, NO_LATERAL_STRAIN = BOUNDARIES = ("stress-free", "hydrostatic", "no-lateral-strain")

@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.integrate import quad
 
-from ..data import Array, UserError
+from ..data import Array
+from ..errors import UserError
 from .solids import refuse_not_positive
 
 

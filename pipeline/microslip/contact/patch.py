@@ -14,7 +14,8 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from ..data import Array, Indices, NotConverged, UserError
+from ..data import Array, Indices
+from ..errors import NotConverged, UserError
 from .cycle import stepped
 from .law import Law, seldom
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import jax.numpy as jnp
 
-from ..data import UserError
+from ..errors import UserError
 from ..reduced.compliance import BULK_AND_SURFACE, SURFACE
 from .curves import NormalCurve, of_contact
 from .friction import Friction

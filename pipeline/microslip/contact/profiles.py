@@ -21,7 +21,8 @@ from scipy.interpolate import PchipInterpolator
 from scipy.optimize import brentq
 from scipy.special import ellipk, ellipkinc
 
-from ..data import Array, Indices, UserError
+from ..data import Array, Indices
+from ..errors import UserError
 from .solids import Solid, normal_modulus, pressing, tangential_modulus
 
 _RULES = {n: np.polynomial.legendre.leggauss(n) for n in (4, 16)}

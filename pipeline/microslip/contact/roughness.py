@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field, model_validator
 
-from ..data import UserError
+from ..errors import UserError
 from ..settings.numbers import Numbers, Positive, PositiveLength
 from . import topography
 from .curves import read_table

@@ -10,7 +10,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..data import ModalGroup, UserError
+from ..data import ModalGroup
+from ..errors import UserError
 from ..reduced.compliance import BULK_AND_SURFACE, SURFACE, Share, contact_share, without_bulk
 from .hertz import Hertz
 from .layer import Layer

@@ -10,7 +10,7 @@ from typing import ClassVar, Literal
 import numpy as np
 
 from ..basis import read_basis
-from ..data import UserError
+from ..errors import UserError
 from ..settings.numbers import Name, NotNegative, Number, Positive, PositiveLength
 from .curves import FORCES, LENGTHS, read_curve
 from .hertz import Hertz, half_curvatures

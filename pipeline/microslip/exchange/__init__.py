@@ -10,7 +10,8 @@ from importlib.metadata import entry_points
 from pathlib import Path
 from typing import Any
 
-from ..data import ModalBasis, UserError
+from ..data import ModalBasis
+from ..errors import UserError
 from .choice import Format
 
 GROUP = "microslip.exporter"

@@ -8,7 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ..data import Indices, ModalBasis, ModalGroup, UserError
+from ..data import Indices, ModalBasis, ModalGroup
+from ..errors import UserError
 from ..reduced.coordinates import in_modes
 from ..ring.resonances import speeds_of
 from ..units import rpm_text

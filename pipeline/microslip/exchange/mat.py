@@ -17,7 +17,8 @@ from typing import Any
 import numpy as np
 
 from ..basis import CONVENTIONS, FORMAT, FORMAT_VERSION
-from ..data import INTERFACE_ROWS, Array, Interface, ModalBasis, ModalGroup, Rows, UserError
+from ..data import INTERFACE_ROWS, Array, Interface, ModalBasis, ModalGroup, Rows
+from ..errors import UserError
 from ..files.store import complete_or_absent
 from .choice import STATEMENT, Format
 

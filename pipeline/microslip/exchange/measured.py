@@ -16,7 +16,8 @@ from typing import Any
 
 import numpy as np
 
-from ..data import Array, Compliance, Indices, Mesh, ModalBasis, ModalGroup, Rows, UserError
+from ..data import Array, Compliance, Indices, Mesh, ModalBasis, ModalGroup, Rows
+from ..errors import UserError
 from ..files.store import ordinary
 from ..linalg.canonical import signs
 from ..mesh import UNITS

@@ -18,7 +18,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ..data import Array, ModalBasis, ModalGroup, UserError
+from ..data import Array, ModalBasis, ModalGroup
+from ..errors import UserError
 from ..files.store import refused
 from ..reduced.coordinates import compliance_row
 from ..units import rpm_text

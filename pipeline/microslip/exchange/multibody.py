@@ -13,7 +13,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ..data import Array, Invariants, ModalBasis, ModalGroup, UserError
+from ..data import Array, Invariants, ModalBasis, ModalGroup
+from ..errors import UserError
 from ..files.store import write_text
 from ..reduced.floating_frame import rotation_shape
 from .choice import body_in_motion

@@ -17,7 +17,8 @@ from typing import Any
 
 import numpy as np
 
-from ..data import INTERFACE_ROWS, Array, Indices, ModalBasis, ModalGroup, UserError
+from ..data import INTERFACE_ROWS, Array, Indices, ModalBasis, ModalGroup
+from ..errors import UserError
 from ..files.store import complete_or_absent
 from .choice import STATEMENT, Format, only_group, real
 from .mat import clean_header

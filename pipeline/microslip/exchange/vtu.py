@@ -14,7 +14,8 @@ from xml.sax.saxutils import escape
 
 import numpy as np
 
-from ..data import Array, Indices, Mesh, ModalBasis, ModalGroup, UserError
+from ..data import Array, Indices, Mesh, ModalBasis, ModalGroup
+from ..errors import UserError
 from ..files.store import complete_or_absent, write_text
 from ..mesh import boundary_facets
 from ..reduced.coordinates import basis_in_modes, in_modes

@@ -23,7 +23,8 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.spatial import cKDTree
 
-from ..data import Array, Indices, Mesh, NotConverged, UserError
+from ..data import Array, Indices, Mesh
+from ..errors import NotConverged, UserError
 from ..topology import FACET_CORNERS
 from .discretise import Pattern, face_blocks
 from .segments import Facets, Points, cut, facet_functions, flat, near_pairs, node_hats, whole

@@ -17,7 +17,8 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.spatial import cKDTree
 
-from ..data import Array, Indices, Mesh, Ties, UserError
+from ..data import Array, Indices, Mesh, Ties
+from ..errors import UserError
 from ..frames import rotation
 from ..mesh import part_numbers
 from .discretise import FreeUpper, Pattern

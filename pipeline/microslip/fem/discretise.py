@@ -11,7 +11,8 @@ import numpy as np
 import scipy.sparse as sp
 
 from .. import elements
-from ..data import Array, Indices, Mesh, UserError
+from ..data import Array, Indices, Mesh
+from ..errors import UserError
 from ..topology import CELL_TYPES
 
 _ELEMENTS = {

@@ -16,7 +16,8 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.spatial import cKDTree
 
-from ..data import Array, AverageLink, Equation, FaceTie, Indices, Links, Mesh, RigidLink, Ties, UserError
+from ..data import Array, AverageLink, Equation, FaceTie, Indices, Links, Mesh, RigidLink, Ties
+from ..errors import UserError
 from ..frames import rigid_fields
 from ..topology import FACET_CORNERS
 from .discretise import face_blocks, shape_functions

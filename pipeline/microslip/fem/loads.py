@@ -6,8 +6,8 @@ import numpy as np
 import scipy.sparse as sp
 
 from ..data import Array
-from .discretise import Discretisation, FacetBlock
-from .operators import internal_force, spin_projector
+from .discretise import FacetBlock
+from .operators import spin_projector
 
 
 def body_force(mass_full: sp.csr_matrix, acceleration: Array) -> Array:
@@ -41,8 +41,3 @@ def traction(blocks: list[FacetBlock], n_points: int, direction: Array) -> Array
         nodal = np.einsum("qk,fq->fk", b.N, np.linalg.norm(b.area, axis=2))[..., None] * direction
         np.add.at(f, b.facets.reshape(-1), nodal.reshape(-1, 3))
     return f
-
-
-def thermal(d: Discretisation, thermal_stress: list[Array]) -> Array:
-    """Forces of a thermal stress C : (alpha dT) (per block (e, q, 6), Pa) on the undeformed body."""
-    return internal_force(d, thermal_stress, None)

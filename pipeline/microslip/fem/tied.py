@@ -17,7 +17,8 @@ import scipy.sparse as sp
 import scipy.sparse.csgraph
 import scipy.sparse.linalg as spla
 
-from ..data import Array, Flags, Indices, Ties, UserError
+from ..data import Array, Flags, Indices, Ties
+from ..errors import UserError
 from .discretise import FreeUpper, Pattern, free_upper
 
 _NOTHING = 1e-10

@@ -17,7 +17,7 @@ from typing import Any, BinaryIO, Literal
 import h5py
 import numpy as np
 
-from ..data import UserError
+from ..errors import UserError
 from .store import complete_or_absent
 
 _SEAL = b"\nmicroslip seal, sha256 of all bytes before this line: "

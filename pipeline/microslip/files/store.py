@@ -26,7 +26,7 @@ from typing import Any
 
 import numpy as np
 
-from ..data import UserError
+from ..errors import UserError
 
 _ODD = {
     stat.S_IFDIR: "a folder",

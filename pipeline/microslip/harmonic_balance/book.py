@@ -29,7 +29,8 @@ from ..contact.patch import Patch
 from ..contact.point import PointContact
 from ..contact.portion import Portion
 from ..contact.sliders import Iwan, Strips
-from ..data import Array, ComplexArray, UserError
+from ..data import Array, ComplexArray
+from ..errors import UserError
 from .orbits import TOLERANCE, Orbits, orbits
 from .point_cycles import Cycle, Traced
 from .tables import Spline, Table, in_chunks, kept, law_hash, refined

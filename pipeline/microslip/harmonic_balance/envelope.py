@@ -11,7 +11,8 @@ from typing import Any, Literal
 
 import numpy as np
 
-from ..data import Array, ComplexArray, Indices, UserError
+from ..data import Array, ComplexArray, Indices
+from ..errors import UserError
 from ..operating.motion import Motion, motion_of
 from ..operating.stress import stress_peaks
 from ..units import METRES, Quantity

@@ -15,7 +15,8 @@ import scipy.linalg
 import scipy.optimize
 
 from ..contact.patch import Patch
-from ..data import Array, Indices, UserError
+from ..data import Array, Indices
+from ..errors import UserError
 from ..system.assembly import Assembly
 from ..system.component import Ring
 

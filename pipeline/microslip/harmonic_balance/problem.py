@@ -16,7 +16,8 @@ from typing import Any
 import numpy as np
 import scipy.linalg
 
-from ..data import Array, ComplexArray, Indices, UserError
+from ..data import Array, ComplexArray, Indices
+from ..errors import UserError
 from ..settings.mistakes import bounded
 from ..system.assembly import Assembly, Linear
 from . import blocks, by_hand, reduced

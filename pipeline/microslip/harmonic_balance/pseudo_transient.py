@@ -19,7 +19,8 @@ from dataclasses import replace
 import numpy as np
 import scipy.linalg
 
-from ..data import Array, ComplexArray, UserError
+from ..data import Array, ComplexArray
+from ..errors import UserError
 from ..system.assembly import Linear
 from .forces import AFT
 from .problem import AtFrequency, Problem

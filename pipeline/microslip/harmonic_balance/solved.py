@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from ..data import Array, UserError
+from ..data import Array
+from ..errors import UserError
 from ..files.hdf5 import refuse_foreign
 from ..results.files import FORMAT, Response, read_response, stacked, write_response
 from ..results.series import Series

@@ -12,7 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from ..data import Array, UserError
+from ..data import Array
+from ..errors import UserError
 from ..system.assembly import Assembly
 from . import problem as balance
 from . import response

@@ -28,7 +28,8 @@ import numpy as np
 
 from ..contact.law import Law, State
 from ..contact.periodic import periodic
-from ..data import Array, ComplexArray, UserError
+from ..data import Array, ComplexArray
+from ..errors import UserError
 from .problem import Problem
 
 Loss = Literal["", "fold", "flip", "Neimark-Sacker"]

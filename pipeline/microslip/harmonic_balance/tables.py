@@ -21,7 +21,8 @@ import numpy as np
 
 from .. import __version__
 from ..contact.law import program, settings
-from ..data import Array, UserError
+from ..data import Array
+from ..errors import UserError
 from ..files.store import complete_or_absent
 
 FORMAT, VERSION = "microslip table", 1

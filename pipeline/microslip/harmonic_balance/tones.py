@@ -10,7 +10,8 @@ import numpy as np
 import scipy.optimize
 
 from ..continuation import CONVERGED, newton
-from ..data import Array, UserError
+from ..data import Array
+from ..errors import UserError
 from ..results.journal import Journal
 from ..results.tones import TwoTones
 from . import reduced

@@ -23,7 +23,8 @@ import jax.numpy as jnp
 import numpy as np
 
 from ..contact.law import Law, program
-from ..data import Array, ComplexArray, UserError
+from ..data import Array, ComplexArray
+from ..errors import UserError
 from ..system.assembly import Assembly, Linear
 from . import problem as balance
 from . import reduced

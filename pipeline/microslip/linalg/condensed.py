@@ -13,7 +13,8 @@ import numpy as np
 import scipy.linalg
 import scipy.sparse as sp
 
-from ..data import Array, Indices, NotConverged
+from ..data import Array, Indices
+from ..errors import NotConverged
 from .eigen import DirectSolver, Pardiso, available_backends, new_solver
 
 

@@ -20,7 +20,8 @@ import scipy.linalg
 import scipy.sparse as sp
 import scipy.sparse.linalg as spla
 
-from ..data import Array, Indices, NotConverged
+from ..data import Array, Indices
+from ..errors import NotConverged
 
 TOLERANCE = 1e-9
 MatVec = Callable[[Array], Array]

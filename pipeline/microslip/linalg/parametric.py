@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from ..data import Array, Matrices, MatrixTerm, ModalGroup, UserError
+from ..data import Array, Matrices, MatrixTerm, ModalGroup
+from ..errors import UserError
 from .quadratic import Quadratic
 
 ORDERS = {"mass": 2, "damping": 1, "gyroscopic": 1, "stiffness": 0, "circulatory": 0}

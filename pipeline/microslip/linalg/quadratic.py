@@ -16,7 +16,8 @@ import scipy.sparse as sp
 import scipy.sparse.linalg as spla
 from scipy.linalg import lapack
 
-from ..data import Array, ComplexArray, Flags, NotConverged
+from ..data import Array, ComplexArray, Flags
+from ..errors import NotConverged
 
 DENSE = 300
 """Rows up to which all roots are computed at once."""

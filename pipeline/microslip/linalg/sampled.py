@@ -10,7 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..data import Array, ComplexArray, NotConverged
+from ..data import Array, ComplexArray
+from ..errors import NotConverged
 from .parametric import Family
 from .quadratic import Factors, Quadratic, Window, every_value, search
 

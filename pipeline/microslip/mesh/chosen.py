@@ -9,7 +9,8 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 
-from ..data import Equation, FaceTie, Indices, Link, Mesh, UserError
+from ..data import Equation, FaceTie, Indices, Link, Mesh
+from ..errors import UserError
 
 
 def of_instances(mesh: Mesh, names: Sequence[str]) -> Mesh:

@@ -17,7 +17,8 @@ from typing import Any
 
 import numpy as np
 
-from ..data import Array, Indices, Mesh, UserError
+from ..data import Array, Indices, Mesh
+from ..errors import UserError
 from ..files.hostile import tried
 from ..files.store import ordinary
 from ..topology import CELL_TYPES, FACET_CORNERS

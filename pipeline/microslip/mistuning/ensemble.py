@@ -13,7 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from ..data import Array, UserError
+from ..data import Array
+from ..errors import UserError
 from ..files import store
 from ..settings.mistakes import whole
 from ..units import counted, percent

@@ -18,7 +18,8 @@ import scipy.linalg
 import scipy.optimize
 from numpy.typing import ArrayLike
 
-from ..data import Array, UserError
+from ..data import Array
+from ..errors import UserError
 from ..system.assembly import Assembly, Linear
 from .estimate import Estimate, accepted, covariance, misfit
 from .linear import held

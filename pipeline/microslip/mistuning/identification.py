@@ -25,7 +25,8 @@ import numpy as np
 import scipy.optimize
 from numpy.typing import ArrayLike
 
-from ..data import Array, UserError
+from ..data import Array
+from ..errors import UserError
 from .estimate import Estimate, covariance, misfit
 
 _ROUNDING = 1e-9

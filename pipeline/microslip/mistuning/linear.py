@@ -17,7 +17,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.linalg
 
-from ..data import Array, ComplexArray, UserError
+from ..data import Array, ComplexArray
+from ..errors import UserError
 from ..harmonic_balance.problem import AtFrequency
 from ..system.assembly import Linear
 from .peaks import told_by

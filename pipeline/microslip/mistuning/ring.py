@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from ..data import Array, ModalGroup, UserError
+from ..data import Array, ModalGroup
+from ..errors import UserError
 from ..reduced.coordinates import of_density
 from ..system.assembly import Assembly, Contact, ContactFace, preloaded_contact
 from ..system.component import Component

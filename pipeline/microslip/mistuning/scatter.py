@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.special import ndtr
 
-from ..data import Array, UserError
+from ..data import Array
+from ..errors import UserError
 
 if TYPE_CHECKING:
     from ..system.assembly import Assembly

@@ -26,7 +26,8 @@ import numpy as np
 import scipy.linalg
 from scipy.spatial import cKDTree
 
-from ..data import Array, ModalGroup, StressSet, UserError
+from ..data import Array, ModalGroup, StressSet
+from ..errors import UserError
 from ..system.component import Component
 from ..system.disc import spread, whole
 

@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import gammaln, psi, zeta
 
-from ..data import Array, UserError
+from ..data import Array
+from ..errors import UserError
 
 DRAWS = 20000
 """Samples drawn for an interval of k: its ends then lie within 0.3 % of the probabilities asked for."""

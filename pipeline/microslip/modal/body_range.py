@@ -7,7 +7,8 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ..data import Array, ModalGroup, SpeedRange, UserError
+from ..data import Array, ModalGroup, SpeedRange
+from ..errors import UserError
 from ..linalg import canonical, eigen
 from ..reduction import Reduced
 from ..settings.body import BodySettings

@@ -8,7 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.sparse as sp
 
-from ..data import CENTRIFUGAL, INTERFACE_ROWS, Array, Interface, Mesh, Rows, UserError
+from ..data import CENTRIFUGAL, INTERFACE_ROWS, Array, Interface, Mesh, Rows
+from ..errors import UserError
 from ..fem.discretise import face_blocks
 from ..fem.loads import centrifugal, pressure, traction
 from ..settings.body import BodySettings, Excitation, InterfaceSettings, Monitor

@@ -6,7 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..data import Array, Indices, Material, Mesh, UserError
+from ..data import Array, Indices, Material, Mesh
+from ..errors import UserError
 from ..fem.discretise import Discretisation, face_blocks
 from ..fem.loads import body_force, pressure, traction
 from ..settings.body import BodySettings, MaterialSettings

@@ -14,7 +14,8 @@ import numpy as np
 import scipy.linalg
 import scipy.sparse as sp
 
-from ..data import Array, Indices, Mesh, UserError
+from ..data import Array, Indices, Mesh
+from ..errors import UserError
 from ..fem.cyclic import CyclicUpper
 from ..fem.discretise import FreeUpper
 from ..fem.tied import Tied

@@ -6,7 +6,8 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from ..data import Array, NotConverged
+from ..data import Array
+from ..errors import NotConverged
 from ..fem.contact import ContactPair, Cut, Grip, contact_stiffness, cut_pair, grip, has_slid
 from ..fem.discretise import Pattern
 

@@ -7,7 +7,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..data import Array, ContactState, Indices, Material, Mesh, UserError
+from ..data import Array, ContactState, Indices, Material, Mesh
+from ..errors import UserError
 from ..fem.contact import ContactPair, Grip, Plane, gap_at, make_pair, node_values
 from ..fem.discretise import face_blocks, quadrature
 from ..fem.loads import traction

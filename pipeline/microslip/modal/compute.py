@@ -7,14 +7,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..data import (
-    Array,
-    Mesh,
-    ModalBasis,
-    ModalGroup,
-    SpeedRange,
-    UserError,
-)
+from ..data import Array, Mesh, ModalBasis, ModalGroup, SpeedRange
+from ..errors import UserError
 from ..fem.contact import coupled_points
 from ..fem.cyclic import CyclicUpper
 from ..fem.discretise import REDUCED, discretise, whole

@@ -13,8 +13,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.sparse as sp
 
-from ..data import Array, Indices, Material, NotConverged, UserError
+from ..data import Array, Indices, Material
 from ..elasticity import VOIGT_AXES, pushed, strain_tensor
+from ..errors import NotConverged, UserError
 from ..fem.contact import ContactPair, Grip
 from ..fem.cyclic import CyclicUpper
 from ..fem.discretise import Discretisation, FreeUpper, whole

@@ -24,9 +24,11 @@ import numpy as np
 import scipy.linalg
 import scipy.sparse as sp
 
-from ..data import Array, UserError
+from ..data import Array
+from ..errors import UserError
 from ..fem.operators import internal_force, spin_projector
 from ..linalg import eigen
+from ..linalg.bordered import Bordered
 from ..reduction import Reduced
 from ..settings.body import BodySettings
 from . import rigid
@@ -108,38 +110,25 @@ def refuse_unbalanced(model: BodyModel, R: Array, centre: Array, inertia: Array)
     )
 
 
-class Balanced(eigen.DirectSolver):
+class Balanced(Bordered):
     """Solutions of K x + M R f = b with R^T M x = 0: what is out of balance is taken up by f.
 
     With r degrees of freedom E on springs S the matrix K + E S E^T can be factorised; they are taken out again beside
-    the constraint, which is a dense problem of 2 r unknowns. Negative eigenvalues are counted where R^T M x = 0
-    (Haynsworth's inertia additivity).
+    the constraint, which is a dense problem of 2 r unknowns. Negative eigenvalues are counted where R^T M x = 0.
     """
 
     def __init__(self, inner: eigen.DirectSolver, R: Array, MR: Array) -> None:
-        self.inner, self.name = inner, inner.name
-        self._at, self._MR = determinate(R), MR / np.linalg.norm(MR, axis=0)
-        self._U = self._answers = self._middle = np.zeros((0, 0))
+        m, r = MR.shape
+        self._at, U = determinate(R), np.hstack([np.zeros((m, r)), MR / np.linalg.norm(MR, axis=0)])
+        super().__init__(inner, U, np.diag(np.repeat([1.0, 0.0], r)), r)
 
     def factorise(self, upper: sp.csr_matrix) -> None:
-        m, r = self._MR.shape
         held, first = upper.copy(), upper.indptr[self._at]  # where the diagonal of an upper triangle stands
         spring = np.abs(held.data[first])
         held.data[first] += spring
-        self.inner.factorise(held)
-        E = np.zeros((m, r))
-        E[self._at, np.arange(r)] = -np.sqrt(spring)
-        self._U = np.hstack([E, self._MR])
-        self._answers = self.inner.solve(self._U)
-        middle = np.diag(np.repeat([1.0, 0.0], r)) - self._U.T @ self._answers
-        self._middle = 0.5 * (middle + middle.T)
-
-    def solve(self, b: Array) -> Array:
-        x = self.inner.solve(b)
-        return x + self._answers @ np.linalg.solve(self._middle, self._U.T @ x)
-
-    def negative(self) -> int:
-        return self.inner.negative() + int((np.linalg.eigvalsh(self._middle) < 0).sum()) - self._MR.shape[1]
+        r = len(self._at)
+        self._U[self._at, np.arange(r)] = -np.sqrt(spring)
+        super().factorise(held)
 
 
 def balanced(model: BodyModel, coefficients: Array, solver: eigen.DirectSolver) -> eigen.DirectSolver:

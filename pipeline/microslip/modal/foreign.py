@@ -10,7 +10,8 @@ import scipy.linalg
 import scipy.sparse as sp
 from scipy.spatial import ConvexHull, QhullError
 
-from ..data import Array, Compliance, Indices, Matrices, Mesh, ModalBasis, ModalGroup, Residual, UserError
+from ..data import Array, Indices, Matrices, Mesh, ModalBasis, ModalGroup, Residual
+from ..errors import UserError
 from ..frames import skew
 from ..linalg import canonical, eigen
 from ..linalg.parametric import state
@@ -18,11 +19,11 @@ from ..reduction import Reduced
 from ..settings.body import BodySettings
 from ..units import from_rpm
 from . import rigid
-from .body_rows import BodyRows, body_rows, reduced_interfaces, reduced_rows
+from .body_rows import BodyRows, body_rows
 from .boundary import AXES, check_held, require_face
-from .group import modal_damping
+from .group import checks_of, modal_damping, of_solution
 from .rows import Patch
-from .solution import Searched, Solution, answered, certified, held_compliance, reduced_on
+from .solution import Searched, Solution, answered, certified, reduced_on
 
 Report = Callable[[str], None]
 
@@ -55,16 +56,7 @@ def foreign_basis(
     try:
         pencil = _pencil(body.stiffness[free][:, free], body.mass[free][:, free], solver)
         R = _free_motions(body, motions, free)
-        spread = np.zeros((3 * body.mesh.n_points, R.shape[1]))
-        at = free[(body.component[free] >= 0) & (body.component[free] < 3)]
-        spread[layout.column[at]] = R[np.isin(free, at)]
-        if (body.component >= 3).any():
-            middle, known = body.mesh.points.mean(axis=0), np.linalg.lstsq(motions[free], R, rcond=None)[0]
-            check_held(body.mesh, settings, middle, spread, known)
-        else:
-            check_held(body.mesh, settings, centre, spread)
-        if settings.free and any(settings.rotation.speeds_rpm):
-            raise UserError("rotation.speeds_rpm: matrices tell no balance of a free body at speed; use speed 0")
+        _refuse_unheld(body, settings, layout, motions, centre, free, R)
         shift = _shift(body, R, free, pencil) if R.shape[1] else 0.0
         s = _search(settings, pencil, unknowns, R, shift, rows, report)
         place = np.concatenate([canonical.by_place(body.mesh.points), np.arange(3 * body.mesh.n_points, layout.width)])
@@ -80,6 +72,22 @@ def foreign_basis(
         source="matrices",
     )  # fmt: skip
     return basis, messages
+
+
+def _refuse_unheld(
+    body: Matrices, settings: BodySettings, layout: Layout, motions: Array, centre: Array, free: Indices, R: Array
+) -> None:
+    """Raise `UserError` of rigid motions R (f, r) over the free rows that the settings do not ask for."""
+    spread = np.zeros((3 * body.mesh.n_points, R.shape[1]))
+    at = free[(body.component[free] >= 0) & (body.component[free] < 3)]
+    spread[layout.column[at]] = R[np.isin(free, at)]
+    if (body.component >= 3).any():
+        middle, known = body.mesh.points.mean(axis=0), np.linalg.lstsq(motions[free], R, rcond=None)[0]
+        check_held(body.mesh, settings, middle, spread, known)
+    else:
+        check_held(body.mesh, settings, centre, spread)
+    if settings.free and any(settings.rotation.speeds_rpm):
+        raise UserError("rotation.speeds_rpm: matrices tell no balance of a free body at speed; use speed 0")
 
 
 def values_of(settings: BodySettings) -> dict[str, float]:
@@ -397,43 +405,18 @@ def _group(
     body: Matrices, settings: BodySettings, s: Solution, rows: BodyRows, layout: Layout, free: Indices
 ) -> ModalGroup:
     reduced, n = s.reduced, body.mesh.n_points
-    whole = s.unknowns.expand(reduced.vectors, n)
-    shapes = whole.reshape(layout.width // 3, 3, -1)
-    m, speed = whole.shape[1], from_rpm(settings.rotation.speeds_rpm[0])
-    B, labels = rows.stacked(settings)
-    T = np.asarray(B @ whole) if B.shape[0] else np.zeros((0, m))
+    whole, speed = s.unknowns.expand(reduced.vectors, n), from_rpm(settings.rotation.speeds_rpm[0])
     C, ratios = _damping(body, settings, reduced, free)
-    G = np.zeros((m, m))
+    G, N = np.zeros_like(C), None
     if body.gyroscopic is not None:
         G = reduced.vectors.T @ (body.gyroscopic[free][:, free] @ reduced.vectors)
         G = 0.5 * (G - G.T)
-    N = None
     if body.circulatory is not None:
         N = reduced.vectors.T @ (body.circulatory[free][:, free] @ reduced.vectors)
-    interfaces = reduced_interfaces(rows, settings, whole, shapes)
     return ModalGroup(
-        speed=speed, omega=reduced.omega, kind=reduced.kind, damping_ratio=ratios, M_r=reduced.M_r, K_r=reduced.K_r,
-        C_r=C, G_r=G, to_diagonal=reduced.to_diagonal,
-        phi=shapes[:n] if settings.output.shapes else np.zeros((0, 3, m)),
-        interfaces=interfaces,
-        excitations={k: reduced_rows(v, whole, None) for k, v in rows.excitations.items()},
-        monitors={k: reduced_rows(v, whole, None) for k, v in rows.monitors.items()},
-        gauges={},
-        compliance=Compliance(
-            labels, s.static, held_compliance(T, reduced, labels), bool((reduced.omega == 0).any()), s.eigenmodes
-        ),
-        stresses={}, u_static=np.zeros((n, 3)),
-        checks={
-            "certified": float(s.found.certified),
-            "count_below_upper_shift": float(len(s.found.values)),
-            "upper_shift_hz": float(np.sqrt(max(s.found.upper_shift, 0.0)) / 2 / np.pi),
-            "refound": float(s.found.refound),
-            "orthogonality": s.found.orthogonality,
-            "backward_error": float(s.found.backward_error[: s.kept].max()),
-            **s.indicators,
-        },
-        prestress="none" if not speed else "foreign",
-        residual=_residual(settings, s, layout.width // 3, n), N_r=N,
+        **of_solution(settings, rows, s, whole, n), speed=speed, damping_ratio=ratios, C_r=C, G_r=G, N_r=N, gauges={},
+        stresses={}, u_static=np.zeros((n, 3)), checks={**checks_of(s), **s.indicators},
+        prestress="none" if not speed else "foreign", residual=_residual(settings, s, layout.width // 3, n),
     )  # fmt: skip
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -80,49 +81,56 @@ def assemble_group(
     harmonic: int, report: Report,
 ) -> ModalGroup:  # fmt: skip
     """Everything the modal file holds of one state and nodal diameter."""
-    reduced = s.reduced
-    phi = s.unknowns.expand(reduced.vectors, model.d.mesh.n_points)
-    n, m, omega = model.d.mesh.n_points, phi.shape[1], reduced.omega
-    shapes = phi.reshape(n, 3, m)
-    ratios = settings.damping.ratios(omega)
-    B, labels = rows.stacked(settings)
-    T = np.asarray(B @ phi) if B.shape[0] else np.zeros((0, m))
-    modal = held_compliance(T, reduced, labels)
-    Mphi = (model.M_full @ phi.reshape(n, 3 * m)).reshape(n, 3, m)
-    run_up = run_up_terms(model, state, shapes, Mphi, harmonic)
-    run_up = without_massless(run_up, reduced)
-    G = 2 * speed * run_up.N
+    reduced, n = s.reduced, model.d.mesh.n_points
+    phi = s.unknowns.expand(reduced.vectors, n)
+    shapes = phi.reshape(n, 3, -1)
+    ratios = settings.damping.ratios(reduced.omega)
+    Mphi = (model.M_full @ phi.reshape(n, -1)).reshape(shapes.shape)
+    run_up = without_massless(run_up_terms(model, state, shapes, Mphi, harmonic), reduced)
     if (settings.output.gauss or settings.output.nodal_stress) and settings.output.stress_at(harmonic):
         report("strain and stress modes")
-    u = state.u.reshape(-1)
     return ModalGroup(
+        **of_solution(settings, rows, s, phi, n, state.u.reshape(-1)),
         speed=speed,
-        omega=omega,
-        kind=reduced.kind,
         damping_ratio=ratios,
-        M_r=reduced.M_r,
-        K_r=reduced.K_r,
-        C_r=modal_damping(reduced, 2 * ratios * omega),
-        to_diagonal=reduced.to_diagonal,
-        G_r=G,
+        C_r=modal_damping(reduced, 2 * ratios * reduced.omega),
+        G_r=2 * speed * run_up.N,
         run_up=run_up,
         gyroscopic=_gyroscopic(settings, speed, reduced, run_up, s.found, s.kept),
         invariants=None if settings.cyclic else inertia_invariants(model, state, shapes, Mphi),
-        phi=shapes if settings.output.shapes else np.zeros((0, 3, m)),
-        interfaces=reduced_interfaces(rows, settings, phi, shapes),
-        excitations={k: reduced_rows(v, phi, None) for k, v in rows.excitations.items()},
-        monitors={k: reduced_rows(v, phi, u) for k, v in rows.monitors.items()},
         gauges={k: reduced_gauge(v, phi, state) for k, v in rows.gauges.items()},
-        compliance=Compliance(labels, s.static, modal, bool((omega == 0).any()), s.eigenmodes),
         stresses=_stress_sets(model, settings, state, shapes, harmonic),
         u_static=state.u,
-        checks={**_checks(s.found, model, state, s.kept), **s.indicators},
+        checks={**checks_of(s), **_checks(model, state), **s.indicators},
         prestress=state.prestress if (speed or model.loaded) else "none",
         harmonic=harmonic,
         spin_softening=model.spin_softening,
         contacts=contact_states(model.d.mesh, settings, state.contacts),
         residual=_residual(model, settings, state, rows, s, harmonic),
     )
+
+
+def of_solution(
+    settings: BodySettings, rows: BodyRows, s: Solution, whole: Array, n: int, u: Array | None = None
+) -> dict[str, Any]:
+    """Fields of a group that its solution and the rows tell.
+
+    Args:
+        whole: (3 r, c) shapes of all triples of rows, those of the n points first. u: (3 n,) static displacements, m.
+    """
+    reduced = s.reduced
+    shapes = whole.reshape(len(whole) // 3, 3, -1)
+    B, labels = rows.stacked(settings)
+    T = np.asarray(B @ whole) if B.shape[0] else np.zeros((0, whole.shape[1]))
+    modal = held_compliance(T, reduced, labels)
+    return {
+        "omega": reduced.omega, "kind": reduced.kind, "M_r": reduced.M_r, "K_r": reduced.K_r,
+        "to_diagonal": reduced.to_diagonal, "phi": shapes[: n if settings.output.shapes else 0],
+        "interfaces": reduced_interfaces(rows, settings, whole, shapes),
+        "excitations": {k: reduced_rows(v, whole, None) for k, v in rows.excitations.items()},
+        "monitors": {k: reduced_rows(v, whole, u) for k, v in rows.monitors.items()},
+        "compliance": Compliance(labels, s.static, modal, bool((reduced.omega == 0).any()), s.eigenmodes),
+    }  # fmt: skip
 
 
 def _stress_sets(
@@ -190,16 +198,20 @@ def modal_damping(reduced: Reduced, diagonal: Array) -> Array:
     return (back * diagonal) @ back.conj().T
 
 
-def _checks(found: eigen.Spectrum, model: BodyModel, state: StaticState, kept: int) -> dict[str, float]:
-    total = float(model.M_full.sum())
-    volume = float(sum(m.density * b.dx.sum() for m, b in zip(model.materials, model.d.blocks, strict=True)))
+def checks_of(s: Solution) -> dict[str, float]:
+    """What the search says of itself."""
+    found = s.found
     return {
         "certified": float(found.certified),
         "count_below_upper_shift": float(len(found.values)),
         "upper_shift_hz": float(np.sqrt(max(found.upper_shift, 0.0)) / 2 / np.pi),
         "refound": float(found.refound),
         "orthogonality": found.orthogonality,
-        "backward_error": float(found.backward_error[:kept].max()),
-        "mass_error": abs(total - volume) / volume,
-        "newton_steps": float(state.iterations),
+        "backward_error": float(found.backward_error[: s.kept].max()),
     }
+
+
+def _checks(model: BodyModel, state: StaticState) -> dict[str, float]:
+    total = float(model.M_full.sum())
+    volume = float(sum(m.density * b.dx.sum() for m, b in zip(model.materials, model.d.blocks, strict=True)))
+    return {"mass_error": abs(total - volume) / volume, "newton_steps": float(state.iterations)}

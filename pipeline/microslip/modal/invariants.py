@@ -11,7 +11,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..data import Array, Invariants, ModalGroup, NotConverged
+from ..data import Array, Invariants, ModalGroup
+from ..errors import NotConverged
 from ..fem.operators import displacement_gradient, green_strain, stress_stiffness
 from ..linalg.eigen import DirectSolver
 from . import rigid

@@ -15,13 +15,14 @@ from dataclasses import replace
 
 import numpy as np
 import scipy.linalg
-import scipy.sparse as sp
 
-from ..data import Array, Indices, UserError
+from ..data import Array, Indices
+from ..errors import UserError
 from ..fem.contact import Grip, cut_pair, grip
 from ..fem.cyclic import CyclicUpper
 from ..fem.tied import Tied, tied_upper
 from ..linalg import eigen
+from ..linalg.bordered import Bordered
 from . import rigid
 from .equilibrium import BodyModel, StaticState, equilibrium
 
@@ -124,38 +125,14 @@ def without_rigid(pencil: eigen.Pencil, R: Array) -> eigen.Pencil:
     def stiffness(x: Array) -> Array:
         return pencil.K(x) - Y @ (Z.conj().T @ x) - Z @ (Y.conj().T @ x)
 
-    return replace(pencil, K=stiffness, solver=Corrected(pencil.solver, Y, Z))
+    return replace(pencil, K=stiffness, solver=corrected(pencil.solver, Y, Z))
 
 
-class Corrected(eigen.DirectSolver):
-    """Solutions with A - Y Z^T - Z Y^T from a direct solver of A (Woodbury's identity).
-
-    With U = (Y, Z), C = -(0 1; 1 0) = C^-1 the matrix is A + U C U^T; by Haynsworth's inertia additivity it has
-    n(A) + n(-C - U^T A^-1 U) - r negative eigenvalues, r the columns of Y (-C has as many).
-    """
-
-    def __init__(self, inner: eigen.DirectSolver, Y: Array, Z: Array) -> None:
-        self.inner, self.name, self.rank = inner, inner.name, Y.shape[1]
-        size = np.linalg.norm(Y, axis=0), np.linalg.norm(Z, axis=0)  # Y s, Z / s: the same product, of one size
-        scale = np.sqrt(np.maximum(size[1], 1e-12 * size[1].max(initial=0.0)) / size[0])
-        scale = np.where(scale > 0, scale, 1.0)
-        self._U = np.hstack([Y * scale, Z / scale])
-        one = np.eye(self.rank)
-        self._C = -np.block([[0 * one, one], [one, 0 * one]])
-        self._answers, self._middle = self._U, self._C
-
-    def factorise(self, upper: sp.csr_matrix) -> None:
-        self.inner.factorise(upper)
-        self._answers = self.inner.solve(self._U)
-        middle = self._C + self._U.conj().T @ self._answers
-        self._middle = 0.5 * (middle + middle.conj().T)
-
-    def solve(self, b: Array) -> Array:
-        x = self.inner.solve(b)
-        return x - self._answers @ np.linalg.solve(self._middle, self._U.conj().T @ x)
-
-    def negative(self) -> int:
-        return self.inner.negative() + int((np.linalg.eigvalsh(-self._middle) < 0).sum()) - self.rank
-
-    def close(self) -> None:
-        self.inner.close()
+def corrected(inner: eigen.DirectSolver, Y: Array, Z: Array) -> Bordered:
+    """Solutions with A - Y Z^H - Z Y^H from a direct solver of A: with U = (Y, Z) and D = (0 1; 1 0) = D^-1 that is
+    A - U D^-1 U^H, and D has as many negative eigenvalues as Y has columns."""
+    size = np.linalg.norm(Y, axis=0), np.linalg.norm(Z, axis=0)  # Y s, Z / s: the same product, of one size
+    scale = np.sqrt(np.maximum(size[1], 1e-12 * size[1].max(initial=0.0)) / size[0])
+    scale = np.where(scale > 0, scale, 1.0)
+    one = np.eye(Y.shape[1])
+    return Bordered(inner, np.hstack([Y * scale, Z / scale]), np.block([[0 * one, one], [one, 0 * one]]), len(one))

@@ -31,7 +31,8 @@ from typing import Any
 
 import numpy as np
 
-from ..data import Array, NotConverged
+from ..data import Array
+from ..errors import NotConverged
 from ..linalg import eigen
 from ..units import rpm_text
 

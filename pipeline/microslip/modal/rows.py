@@ -14,7 +14,8 @@ import scipy.sparse as sp
 from scipy.optimize import lsq_linear, nnls
 from scipy.spatial import ConvexHull, QhullError
 
-from ..data import Array, Indices, Mesh, UserError
+from ..data import Array, Indices, Mesh
+from ..errors import UserError
 from ..fem.discretise import face_blocks, shape_functions
 from ..frames import skew
 from ..topology import CELL_TYPES, CellType

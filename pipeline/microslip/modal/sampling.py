@@ -8,7 +8,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..data import Array, Indices, Mesh, ModalBasis, UserError
+from ..data import Array, Indices, Mesh, ModalBasis
+from ..errors import UserError
 from ..topology import CELL_TYPES
 from .rows import Locator
 

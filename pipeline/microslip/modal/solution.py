@@ -9,7 +9,8 @@ from typing import Protocol
 import numpy as np
 import scipy.sparse as sp
 
-from ..data import Array, Indices, UserError
+from ..data import Array, Indices
+from ..errors import UserError
 from ..fem.discretise import FreeUpper
 from ..fem.tied import Tied
 from ..linalg import canonical, eigen

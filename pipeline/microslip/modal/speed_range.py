@@ -24,8 +24,8 @@ from ..data import (
     RunUp,
     SpeedRange,
     StressSet,
-    UserError,
 )
+from ..errors import UserError
 from ..linalg import canonical, eigen
 from ..linalg.gyroscopic import gyroscopic_modes, hermitian_modes
 from ..reduced.coordinates import compliance_rows, in_coordinates

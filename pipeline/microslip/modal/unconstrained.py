@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..data import Array, Indices, Mesh, UserError
+from ..data import Array, Indices, Mesh
+from ..errors import UserError
 from ..fem.tied import Tied
 from ..linalg import eigen
 from ..mesh import part_numbers

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 import scipy.sparse as sp
 
-from ..data import Mesh, UserError
+from ..data import Mesh
+from ..errors import UserError
 from ..fem.cyclic import CyclicUpper
 from ..settings.body import BodySettings
 from .compute import prepared

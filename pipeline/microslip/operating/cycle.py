@@ -35,11 +35,6 @@ def farthest_at(harmonics: ComplexArray) -> float:
     return float(angles[np.linalg.norm(at_time(a[:, node], angles, axis=0), axis=1).argmax()])
 
 
-def phase(harmonics: ComplexArray, harmonic: int = 1, axis: int = 1) -> Array:
-    """Phase of one harmonic against cos(h Omega t), rad between -pi and pi; a quantity that lags has a negative one."""
-    return np.angle(np.take(harmonics, harmonic, axis=axis))
-
-
 def amplitude(harmonics: ComplexArray, axis: int = 1, samples: int | None = None) -> Array:
     """Largest |x(t) - mean| over the cycle of signals whose harmonics stand along an axis.
 

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..data import Array, ComplexArray, ModalBasis, ModalGroup, Residual, Rows, UserError
+from ..data import Array, ComplexArray, ModalBasis, ModalGroup, Residual, Rows
+from ..errors import UserError
 
 
 @dataclass(frozen=True)

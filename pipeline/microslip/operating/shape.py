@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from ..data import Array, ModalBasis, UserError
+from ..data import Array, ModalBasis
+from ..errors import UserError
 from ..exchange import vtu
 from ..files.store import write_text
 from ..frames import rotation

@@ -12,7 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..data import Array, ComplexArray, ModalGroup, StressSet, UserError
+from ..data import Array, ComplexArray, ModalGroup, StressSet
+from ..errors import UserError
 from .cycle import SAMPLES, longest, wave_top
 from .motion import Motion, Part
 

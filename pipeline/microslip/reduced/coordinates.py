@@ -7,18 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..data import (
-    CENTRIFUGAL,
-    Array,
-    GyroscopicModes,
-    Interface,
-    Invariants,
-    ModalBasis,
-    ModalGroup,
-    Rows,
-    RunUp,
-    UserError,
-)
+from ..data import CENTRIFUGAL, Array, GyroscopicModes, Interface, Invariants, ModalBasis, ModalGroup, Rows, RunUp
+from ..errors import UserError
 
 
 def in_modes(g: ModalGroup) -> ModalGroup:

@@ -12,7 +12,8 @@ import numpy as np
 import scipy.optimize
 import scipy.spatial
 
-from ..data import Array, Indices, ModalBasis, ModalGroup, UserError
+from ..data import Array, Indices, ModalBasis, ModalGroup
+from ..errors import UserError
 from .coordinates import in_modes
 
 DIRECTIONS = ("u_x", "u_y", "u_z")

@@ -19,7 +19,8 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.integrate
 
-from ..data import Array, Invariants, ModalBasis, NotConverged, UserError
+from ..data import Array, Invariants, ModalBasis
+from ..errors import NotConverged, UserError
 from ..frames import skew
 from .coordinates import in_modes
 

@@ -14,7 +14,8 @@ import numpy as np
 import scipy.linalg
 import scipy.sparse as sp
 
-from ..data import Array, UserError
+from ..data import Array
+from ..errors import UserError
 from ..linalg import eigen
 from ..linalg.canonical import signs
 from .problem import Reduced, Substructure, diagonalised, hermitian, own_modes, without_modes

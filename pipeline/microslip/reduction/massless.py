@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..data import UserError
+from ..errors import UserError
 from .problem import Reduced, Substructure, frequencies, hermitian, refuse_dependent
 
 

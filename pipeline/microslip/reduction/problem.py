@@ -8,7 +8,8 @@ import numpy as np
 import scipy.linalg
 import scipy.sparse as sp
 
-from ..data import Array, Indices, UserError
+from ..data import Array, Indices
+from ..errors import UserError
 from ..linalg.canonical import signs
 from ..linalg.eigen import Pencil
 

@@ -19,7 +19,8 @@ from typing import Any
 
 import numpy as np
 
-from ..data import Array, UserError
+from ..data import Array
+from ..errors import UserError
 from ..files.store import open_to_append, ordinary, refused
 
 FORMAT = "microslip-points"

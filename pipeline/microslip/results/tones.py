@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any
 import h5py
 import numpy as np
 
-from ..data import Array, ComplexArray, Indices, UserError
+from ..data import Array, ComplexArray, Indices
+from ..errors import UserError
 from ..files.hdf5 import IMAGINARY, put, refuse_foreign, sealed
 from ..files.hostile import DAMAGE, reading, refuse_damaged
 from ..files.store import ordinary

@@ -15,7 +15,8 @@ import numpy as np
 
 from ..basis import Check
 from ..basis.integrals import modal_mass
-from ..data import Array, Indices, Mesh, ModalBasis, ModalGroup, UserError
+from ..data import Array, Indices, Mesh, ModalBasis, ModalGroup
+from ..errors import UserError
 from ..frames import rotation
 from ..reduced.coordinates import in_modes
 

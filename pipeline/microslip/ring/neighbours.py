@@ -9,7 +9,8 @@ from __future__ import annotations
 import numpy as np
 import scipy.linalg
 
-from ..data import Array, Interface, ModalBasis, ModalGroup, UserError
+from ..data import Array, Interface, ModalBasis, ModalGroup
+from ..errors import UserError
 from .expansion import phase, sector_rotation
 
 

@@ -14,7 +14,8 @@ import numpy as np
 
 from ..contact.hertz import Hertz
 from ..contact.solids import Solid
-from ..data import Array, ModalGroup, UserError
+from ..data import Array, ModalGroup
+from ..errors import UserError
 from ..reduced.compliance import contact_share
 from .half_space_influence import ALL, Grid, Pair, influence
 from .wheelset import Patch

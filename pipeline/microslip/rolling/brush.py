@@ -12,7 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..data import Array, UserError
+from ..data import Array
+from ..errors import UserError
 
 
 @dataclass(frozen=True)

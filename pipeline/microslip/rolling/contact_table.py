@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..contact.law import program
-from ..data import UserError
+from ..errors import UserError
 from ..files import hdf5
 from ..files.hostile import reading
 from ..files.store import ordinary

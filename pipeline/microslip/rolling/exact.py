@@ -7,7 +7,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ..contact.solids import Solid
-from ..data import Array, UserError
+from ..data import Array
+from ..errors import UserError
 from .half_space import Contact, steady_rolling
 from .half_space_influence import Grid, Pair
 from .wheelset import Patch

@@ -14,7 +14,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..data import Array, Flags, UserError
+from ..data import Array, Flags
+from ..errors import UserError
 from .half_space_influence import (
     ALL,
     NORMAL,

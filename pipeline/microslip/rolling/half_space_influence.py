@@ -17,7 +17,8 @@ from numpy.typing import ArrayLike
 from scipy import fft
 
 from ..contact.solids import Solid
-from ..data import Array, UserError
+from ..data import Array
+from ..errors import UserError
 
 
 @dataclass(frozen=True)

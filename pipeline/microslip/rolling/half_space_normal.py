@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..data import Array, UserError
+from ..data import Array
+from ..errors import UserError
 from .half_space_influence import NORMAL, Influence
 
 TOLERANCE = 1e-10

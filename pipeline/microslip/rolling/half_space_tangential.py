@@ -20,7 +20,8 @@ import numpy as np
 from scipy.linalg import lapack
 from scipy.sparse.linalg import LinearOperator, gmres
 
-from ..data import Array, Flags, UserError
+from ..data import Array, Flags
+from ..errors import UserError
 from .half_space_influence import TANGENTIAL, Grid, Influence
 
 TOLERANCE = 1e-7

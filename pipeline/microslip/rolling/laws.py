@@ -114,11 +114,7 @@ def _marched(
     flat = lambda v: jnp.broadcast_to(v, (ny, n)).ravel()  # noqa: E731
     e = _elements(pose, g, flat)
     smooth = jnp.asarray(g.pressure)[:, None] * e.pressed
-    springs_n, sinks = jnp.zeros_like(smooth), jnp.zeros_like(smooth)
-    if surface is not None:
-        parabola = depth * g.chord[:, None] ** 2 * (1 - jnp.asarray(g.x)[:, None, None] ** 2)
-        found = sunk(surface, smooth.reshape(-1, ny, n), parabola)
-        springs_n, sinks = (v.reshape(smooth.shape) for v in found)
+    rough = _roughened(surface, depth, g, smooth.reshape(-1, ny, n))
 
     def normal(p: Array, spring: Array) -> Normal:
         return Preload(p) if surface is None else Rough(spring, surface.roughness, surface.heights)
@@ -142,17 +138,25 @@ def _marched(
     one = PointContact(normal(e.pressed, e.pressed), friction, *e.springs).init(ny * n)
     none = jnp.zeros(ny * n)
     changed = np.concatenate([[1.0], g.stiffness[1:] / g.stiffness[:-1]])
-    per_element = tuple(map(jnp.asarray, (g.x, g.way, smooth, g.stiffness, changed, left, springs_n, sinks)))
+    pressed = (smooth, g.stiffness, changed, left, *(v.reshape(smooth.shape) for v in rough))
+    per_element = tuple(map(jnp.asarray, (g.x, g.way, *pressed)))
     start = one, jnp.stack([none, none]), Forces(*[none] * 5)
     (last, t, sum_), found = jax.lax.scan(step, start, per_element)
     h = 0.5 * e.length  # to the trailing edge, as in `strips.forces`
     rigid = e.along, flat(pose.eta) - flat(pose.phi_y) * (e.reach - 0.5 * h)
     work = sum(f * (u - h * s) for f, u, s in zip(t, last.slipped - last.tangential, rigid, strict=True))
     sum_ = sum_._replace(power=sum_.power + 0.5 * work / e.length)
-    x, y, moment, power, slides = (v.reshape(ny, n).sum(axis=0) for v in sum_)
+    forces = Forces(*(v.reshape(ny, n).sum(axis=0) for v in sum_))
     fields = (jnp.moveaxis(v.reshape(-1, ny, n), 1, 0) for v in found)
-    slides = slides / (2 * pose.a * pose.b * float(g.chord @ g.width))
-    return Forces(x, y, moment, power, slides), (*fields, e.length.reshape(ny, n))
+    share = forces.sliding / (2 * pose.a * pose.b * float(g.chord @ g.width))
+    return forces._replace(sliding=share), (*fields, e.length.reshape(ny, n))
+
+
+def _roughened(surface: Surface | None, depth: Array, g: Grid, smooth: Array) -> tuple[Array, Array]:
+    """(nx, ny, n) normal springs of rough elements, N/m, and how deep they sink, m, under the forces of smooth ones."""
+    if surface is None:
+        return jnp.zeros_like(smooth), jnp.zeros_like(smooth)
+    return sunk(surface, smooth, depth * g.chord[:, None] ** 2 * (1 - jnp.asarray(g.x)[:, None, None] ** 2))
 
 
 def rolled_by_characteristic(

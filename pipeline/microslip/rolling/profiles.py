@@ -16,7 +16,8 @@ from numpy.typing import ArrayLike
 from scipy.interpolate import CubicSpline, UnivariateSpline
 from scipy.optimize import minimize_scalar
 
-from ..data import Array, UserError
+from ..data import Array
+from ..errors import UserError
 from ..files import store
 from ..settings.mistakes import is_number
 

@@ -15,7 +15,7 @@ from ..contact.keys import FileName, OneOrTwo, Poisson
 from ..contact.law import value
 from ..contact.settings import AnyFriction, AnyRoughness, _short
 from ..contact.solids import Solid
-from ..data import UserError
+from ..errors import UserError
 from ..settings.numbers import Model, Name, NotNegative, Number, Numbers, Positive, _finite_vector, _tuple
 from ..settings.toml import read_settings
 from .contact_table import POINTS as SHIFTS

@@ -11,7 +11,8 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import BeforeValidator, Field, model_validator
 
-from ..data import Array, ContactState, ModalGroup, UserError
+from ..data import Array, ContactState, ModalGroup
+from ..errors import UserError
 from ..settings.numbers import Model, Name, NotNegative, Positive, _tuple
 from ..settings.toml import read_settings
 from .brush import Brush, fitted, jump, reached

@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike
 
 from ..contact.law import program
 from ..contact.point import opposed
-from ..data import UserError
+from ..errors import UserError
 from .kalker import Coefficients, creep_coefficients
 
 Array = Any

@@ -9,7 +9,8 @@ import jax.numpy as jnp
 import numpy as np
 
 from ..contact.solids import mismatch
-from ..data import Array, UserError
+from ..data import Array
+from ..errors import UserError
 from .exact import Exact, exact
 from .fastsim import fastsim
 from .rolled import rolled, sources

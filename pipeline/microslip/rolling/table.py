@@ -17,7 +17,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..contact.law import program
-from ..data import Array, UserError
+from ..data import Array
+from ..errors import UserError
 from ..files import hdf5
 from ..files.hostile import reading
 from ..files.store import ordinary

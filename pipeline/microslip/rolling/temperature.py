@@ -14,7 +14,8 @@ import numpy as np
 from scipy.special import erfc
 
 from ..contact.solids import refuse_not_positive
-from ..data import Array, UserError
+from ..data import Array
+from ..errors import UserError
 
 ITERATIONS = 200
 HISTORY = 6

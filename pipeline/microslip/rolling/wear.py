@@ -11,7 +11,8 @@ from collections.abc import Callable
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
-from ..data import Array, UserError
+from ..data import Array
+from ..errors import UserError
 
 
 def depth_along(source: Array, dx: float, coefficient: float, speed: float) -> Array:

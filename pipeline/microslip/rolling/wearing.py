@@ -9,7 +9,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ..contact.friction import Friction
-from ..data import Array, UserError
+from ..data import Array
+from ..errors import UserError
 from .ellipse import ellipses
 from .laws import Surface
 from .profiles import Profile

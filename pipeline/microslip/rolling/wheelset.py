@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.optimize import brentq
 
-from ..data import Array, UserError
+from ..data import Array
+from ..errors import UserError
 from .ellipse import Elastic, ellipses, half_width
 from .profiles import Profile
 

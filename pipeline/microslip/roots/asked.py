@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from ..data import MatrixTerm, ModalBasis, UserError
+from ..data import MatrixTerm, ModalBasis
+from ..errors import UserError
 from ..exchange.choice import select
 from ..linalg import quadratic
 from ..linalg.parametric import Family, family_of_group

@@ -8,7 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.sparse as sp
 
-from ..data import ComplexArray, UserError
+from ..data import ComplexArray
+from ..errors import UserError
 from ..linalg import quadratic, winding
 from ..linalg.quadratic import Quadratic, Window
 from ..modal.unreduced import Unreduced

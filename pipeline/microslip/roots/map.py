@@ -10,7 +10,8 @@ import numpy as np
 
 from .. import sliding
 from ..bifurcation import mechanics
-from ..data import Array, NotConverged, UserError
+from ..data import Array
+from ..errors import NotConverged, UserError
 from ..linalg import quadratic
 from ..linalg.quadratic import Quadratic, Window
 from ..results.journal import Journal

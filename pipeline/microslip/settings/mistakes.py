@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from pydantic import BaseModel, ValidationError
 
-from ..data import UserError
+from ..errors import UserError
 
 _WORDS = {
     "float_type": "must be a number",

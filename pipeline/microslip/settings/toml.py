@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from ..data import UserError
+from ..errors import UserError
 from ..files.store import ordinary
 from .mistakes import validate
 

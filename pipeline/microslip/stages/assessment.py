@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..data import Array, Indices, ModalBasis, UserError
+from ..data import Array, Indices, ModalBasis
+from ..errors import UserError
 from ..harmonic_balance.sweeps import prominent
 from ..operating.cycle import amplitude
 from ..operating.fatigue import Endurance, MaterialLimits, endurance

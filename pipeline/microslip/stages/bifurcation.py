@@ -15,7 +15,7 @@ from ..bifurcation.diagram import Asked, Diagram, diagram
 from ..bifurcation.recorded import Branches, write_bifurcation
 from ..case import CaseSettings, checkpoint
 from ..case.questions import BifurcationOfCase
-from ..data import NotConverged, UserError
+from ..errors import NotConverged, UserError
 from ..files import store
 from ..files.tables import rows_csv
 from ..report.bifurcation import bifurcation_html

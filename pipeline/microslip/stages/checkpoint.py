@@ -11,7 +11,7 @@ from typing import Any
 from ..case import CaseSettings, checkpoint
 from ..case.assemble import Built
 from ..contact.kinds import sources_of_others
-from ..data import UserError
+from ..errors import UserError
 from ..files import store
 from ..results import Journal, open_journal, read_journal
 from ..units import counted

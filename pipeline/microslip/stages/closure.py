@@ -6,8 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..data import UserError
-from ..errors import told_of
+from ..errors import UserError, told_of
 from ..files import store
 from ..mesh import UNITS
 from ..units import from_rpm

@@ -8,12 +8,12 @@ from pathlib import Path
 
 import numpy as np
 
-from ..data import Array, Joint, Mesh, UserError
+from ..data import Array, Joint, Mesh
 from ..files.store import write_text
 from ..mesh import UNITS, boundary_facets, read_mesh
 from ..mesh.cards import files_of
 from ..mesh.chosen import bodies, of_instances
-from .importing import Imported, body_name, import_file
+from .importing import Imported, body_name, import_file, refuse_taken
 from .parts import Part, Patch, Shape, add_lines, case_lines, drive
 
 
@@ -33,9 +33,7 @@ def import_deck(file: Path, folder: Path | None, unit: str) -> Imported:
     home = folder or Path(body_name(file.stem))
     names = [body_name("-".join(group)) for group in groups]
     parts = [Part(file, name, home / name / "body.toml") for name in names]
-    for new in (home / "case.toml", *(part.body for part in parts)):
-        if new.exists():
-            raise UserError(f"{new}: is there already; give another folder as last argument (nothing was changed)")
+    refuse_taken(home / "case.toml", *(part.body for part in parts))
     shapes = [_shape(of_instances(mesh, group), UNITS[unit]) for group in groups]
     patches = [_patch(mesh, joint, ends, UNITS[unit]) for joint, ends in joints]
     flat = [patch for patch in patches if patch.normal is not None]
@@ -87,7 +85,7 @@ def _patch(mesh: Mesh, joint: Joint, ends: tuple[int, int], metres: float) -> Pa
     for face in (joint.slave, joint.master):
         points = mesh.points[mesh.face_points(face)] / metres
         boxes.append([*points.min(axis=0), *points.max(axis=0)])
-    faces = (interface_name(joint.slave), interface_name(joint.master))
+    faces = (body_name(joint.slave, "contact"), body_name(joint.master, "contact"))
     friction = 0.2 if joint.friction is None else joint.friction
     return Patch(ends, area / metres**2, normal, np.array(boxes), faces, True, friction)
 
@@ -99,11 +97,6 @@ def _area(mesh: Mesh, face: str) -> tuple[float, Array | None]:
     vectors = np.concatenate([b.area.reshape(-1, 3) for b in face_blocks(mesh, face)])
     area, mean = float(np.linalg.norm(vectors, axis=1).sum()), vectors.sum(axis=0)
     return area, mean / np.linalg.norm(mean) if np.linalg.norm(mean) > 0.999 * area else None
-
-
-def interface_name(face: str) -> str:
-    """The name that an interface has by its face."""
-    return re.sub(r"[^A-Za-z0-9_.-]", "-", face).lstrip("-._")[:64] or "contact"
 
 
 def _interfaces(number: int, patches: list[Patch], joints: list[tuple[Joint, tuple[int, int]]]) -> list[str]:

@@ -19,7 +19,8 @@ from ..case import CaseSettings, checkpoint, load_case
 from ..case.assemble import Built, build
 from ..case.problem import pressed_by, problem_of
 from ..continuation import NO_OPTIMUM
-from ..data import ModalBasis, UserError
+from ..data import ModalBasis
+from ..errors import UserError
 from ..files import store
 from ..files.tables import rows_csv
 from ..harmonic_balance.readout import measured

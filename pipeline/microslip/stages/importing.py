@@ -15,7 +15,8 @@ from pathlib import Path
 import numpy as np
 
 from ..basis import write_basis
-from ..data import Mesh, UserError
+from ..data import Mesh
+from ..errors import UserError
 from ..files.store import ordinary, write_text
 from ..mesh import UNITS, mesh_problems, read_mesh
 from ..mesh.chosen import of_instances
@@ -62,8 +63,7 @@ def import_file(file: Path, folder: Path | None, unit: str, instances: Sequence[
     if file.suffix.lower() in _UNIVERSAL and _holds_modes(file):
         return _measured(file, (folder or Path(name)) / "basis.h5", unit, name)
     target = (folder or Path(name)) / "body.toml"
-    if target.exists():
-        raise UserError(f"{target}: is there already; give another folder as second argument (nothing was changed)")
+    refuse_taken(target)
     kind = file.suffix.lower()
     made = _matrices if kind in MATRICES else _cad if kind in CAD else partial(_mesh, instances=instances)
     if made is _matrices and _in_metres(file):
@@ -76,9 +76,16 @@ def import_file(file: Path, folder: Path | None, unit: str, instances: Sequence[
     return Imported(target, (*told, last))
 
 
-def body_name(stem: str) -> str:
-    """The name that a body has by that of its folder or file."""
-    return re.sub(r"[^A-Za-z0-9_.-]", "-", stem).lstrip("-._")[:64] or "part"
+def refuse_taken(*new: Path) -> None:
+    """Raise `UserError` of the first of new files that is there already."""
+    for path in new:
+        if path.exists():
+            raise UserError(f"{path}: is there already; give another folder as last argument (nothing was changed)")
+
+
+def body_name(stem: str, none: str = "part") -> str:
+    """The name that a body, or an interface, has by that of its folder, file or face."""
+    return re.sub(r"[^A-Za-z0-9_.-]", "-", stem).lstrip("-._")[:64] or none
 
 
 _UNIVERSAL = (".uff", ".uf", ".unv", ".u")
@@ -94,8 +101,7 @@ def _measured(file: Path, target: Path, unit: str, name: str) -> Imported:
     """Modes of a test become a modal file at once: nothing is left to solve."""
     from ..exchange.measured import read_measured
 
-    if target.exists():
-        raise UserError(f"{target}: is there already; give another folder as second argument (nothing was changed)")
+    refuse_taken(target)
     basis, told = read_measured(file, unit, name)
     write_basis(target, basis)
     group = basis.groups[0, 0]

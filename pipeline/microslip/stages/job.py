@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ..data import UserError
+from ..errors import UserError
 from ..settings.body import BodySettings, body_settings, load_body
 from ..settings.toml import load_toml
 

@@ -12,7 +12,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ..data import Indices, Material, Mesh, UserError
+from ..data import Indices, Material, Mesh
+from ..errors import UserError
 from ..files import store
 from ..mesh import mesh_problems, part_numbers, read_mesh
 from ..mesh.chosen import of_instances

@@ -17,8 +17,8 @@ from ..case.assemble import Built, build
 from ..case.contacts import swept
 from ..case.problem import book_models
 from ..case.questions import MistuningOfCase, ScatterOfCase
-from ..data import Array, Indices, UserError
-from ..errors import told_of
+from ..data import Array, Indices
+from ..errors import UserError, told_of
 from ..files import store
 from ..files.tables import columns_csv, rows_csv
 from ..harmonic_balance.readout import measured

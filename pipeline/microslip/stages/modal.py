@@ -12,8 +12,8 @@ import numpy as np
 
 from .. import __version__
 from ..basis import write_basis
-from ..data import Array, Mesh, ModalBasis, UserError
-from ..errors import told_of
+from ..data import Array, Mesh, ModalBasis
+from ..errors import UserError, told_of
 from ..files import store
 from ..mesh import UNITS
 from ..mesh.cards import files_of
@@ -74,12 +74,9 @@ def _from_matrices(job: Job, given: MatrixFiles, report: Report) -> tuple[ModalB
     from ..exchange.matrices import read_matrices
     from ..modal.foreign import foreign_basis
 
-    try:
+    with told_of(job.path, job.folder):
         body = read_matrices(given, job.folder, job.settings.length_unit, job.settings.parameters)
         basis, messages = foreign_basis(body, job.settings, report, provenance(job, job.path))
-    except UserError as error:
-        text = str(error)
-        raise UserError(text if text.startswith(str(job.folder)) else f"{job.path}: {text}") from error
     warnings = [f"{job.path}: {message}" for message in messages]
     for warning in warnings:
         report(f"warning: {warning}")

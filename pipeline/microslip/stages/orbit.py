@@ -13,7 +13,7 @@ from ..case.assemble import Built
 from ..case.contacts import swept
 from ..case.problem import problem_of
 from ..case.questions import OrbitOfCase, RunUpOfCase
-from ..data import UserError
+from ..errors import UserError
 from ..files import store
 from ..files.tables import columns_csv
 from ..report.orbit import orbit_html

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from ..basis import read_basis
+from ..data import ModalBasis
 from ..files import store
 from ..ring.resonances import resonance_csv, resonances, speeds_of
 from .job import Job
@@ -17,7 +19,6 @@ def report_stage(
     job: Job, response: dict[str, Any] | None, force: bool, report: Report, draw: bool = True
 ) -> Path:  # fmt: skip
     """Pictures, if they are wanted, and the self-contained page of a body."""
-    from .. import pictures
     from ..report.body import report_html
 
     stage = Stage(job.build_folder / "report.html", ("stages.page",), force, report)
@@ -31,14 +32,8 @@ def report_stage(
     def work() -> Made:
         basis = read_basis(job.basis_file)
         stage.begin()
-        reason = None
-        if draw:
-            report("starting PyVista")
-            reason = pictures.can_draw()
-        if reason is not None:
-            report(f"warning: no pictures of the body: {reason}")
-            messages.append(f"The pictures of the body are missing: {reason}")
-        drawn = pictures.draw_all(basis, folder, report, engine_orders, scenes=reason is None) if draw else {}
+        drawn, reason = _drawn(basis, folder, engine_orders, report) if draw else ({}, None)
+        messages.extend([f"The pictures of the body are missing: {reason}"] if reason else [])
         tables: list[Path] = []
         if basis.sectors > 1 and (basis.ranges or len(speeds_of(basis)) > 1):
             tables = [job.build_folder / "resonances.csv"]
@@ -57,6 +52,19 @@ def report_stage(
     }
     stage.make(inputs, work)
     return stage.product
+
+
+def _drawn(
+    basis: ModalBasis, folder: Path, engine_orders: Sequence[int], report: Report
+) -> tuple[dict[str, Path], str | None]:
+    """The pictures of a body, and why those by PyVista are not there."""
+    from .. import pictures
+
+    report("starting PyVista")
+    reason = pictures.can_draw()
+    if reason is not None:
+        report(f"warning: no pictures of the body: {reason}")
+    return pictures.draw_all(basis, folder, report, engine_orders, scenes=reason is None), reason
 
 
 def _messages(job: Job) -> list[str]:

@@ -15,12 +15,13 @@ from typing import Any
 
 import numpy as np
 
-from ..data import Array, UserError
+from ..data import Array
+from ..errors import UserError
 from ..files.store import ordinary, write_text
 from ..mesh import UNITS, boundary_facets, read_mesh
 from ..mesh.touching import touches
 from ..settings.toml import load_toml
-from .importing import CAD, MATRICES, Imported, body_name, cad_result, import_file
+from .importing import CAD, MATRICES, Imported, body_name, cad_result, import_file, refuse_taken
 
 NORMAL_STIFFNESS, TANGENTIAL_STIFFNESS = 4e11, 2e11
 """N/m3, per area of a joint of machined steel: where an own case begins, not a property of it."""
@@ -124,9 +125,7 @@ def _parts(files: Sequence[Path], folder: Path | None) -> tuple[Path, list[Part]
     names = [part.name for part in parts]
     if twice := sorted({n for n in names if names.count(n) > 1}):
         raise UserError(f"{twice[0]}: is the name of two of these parts; give the files names of their own")
-    for new in (home / "case.toml", *(part.body for part in parts if not part.there)):
-        if new.exists():
-            raise UserError(f"{new}: is there already; give another folder as last argument (nothing was changed)")
+    refuse_taken(home / "case.toml", *(part.body for part in parts if not part.there))
     return home, parts
 
 
@@ -164,8 +163,7 @@ def import_apart(file: Path, folder: Path | None) -> Imported:
     home = folder or Path(body_name(file.stem))
     if not ordinary(file).is_file():
         raise UserError(f"{file}: there is no such file; correct the path")
-    if home.exists():
-        raise UserError(f"{home}: is there already; give another folder as last argument (nothing was changed)")
+    refuse_taken(home)
     with tempfile.TemporaryDirectory() as scratch:
         names = json.loads(cad_result(["--apart", str(file.resolve()), scratch]))
         made = [home / name / f"{name}.step" for name in names]

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from ..case import CaseSettings
 from ..case.settings import BodyOfCase
-from ..data import UserError
+from ..errors import UserError
 from ..files import store
 from ..settings.toml import load_toml
 from .job import ASKED, open_job, system_file

@@ -18,7 +18,8 @@ from ..case import CaseResult, CaseSettings, checkpoint, load_case, run_case
 from ..case.assemble import build
 from ..case.run import lifted
 from ..case.settings import FIRST_HARMONICS
-from ..data import Array, ModalBasis, UserError
+from ..data import Array, ModalBasis
+from ..errors import UserError
 from ..files import store
 from ..harmonic_balance.response import HarmonicResponse
 from ..harmonic_balance.sweeps import overhanging

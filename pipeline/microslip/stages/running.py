@@ -11,7 +11,8 @@ import numpy as np
 from ..basis import read_basis
 from ..case import CaseSettings, checkpoint, load_case
 from ..case.comparison import Pair, comparison_table, paired
-from ..data import Array, UserError
+from ..data import Array
+from ..errors import UserError
 from ..files import store
 from ..results import read_response
 from ..results.names import apart

@@ -14,7 +14,8 @@ from .. import sliding
 from ..case import CaseSettings
 from ..case.questions import Cycle, Over, StabilityOfCase
 from ..case.settings import GROUND
-from ..data import Array, ComplexArray, ModalBasis, NotConverged, UserError
+from ..data import Array, ComplexArray, ModalBasis
+from ..errors import NotConverged, UserError
 from ..files import store
 from ..files.tables import columns_csv
 from ..linalg import quadratic

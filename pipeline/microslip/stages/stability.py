@@ -12,8 +12,7 @@ import numpy as np
 
 from ..basis import read_basis
 from ..case.questions import StabilityOfCase
-from ..data import UserError
-from ..errors import told_of
+from ..errors import UserError, told_of
 from ..exchange.choice import select
 from ..files import hdf5, store
 from ..files.tables import columns_csv
@@ -135,11 +134,8 @@ def family(job: Job) -> Family:
 
     given = job.settings.geometry.matrices
     assert given is not None
-    try:
+    with told_of(job.path, job.folder):
         return family_of(read_matrices(given, job.folder, job.settings.length_unit, job.settings.parameters))
-    except UserError as error:
-        text = str(error)
-        raise UserError(text if text.startswith(str(job.folder)) else f"{job.path}: {text}") from error
 
 
 def _work(stage: Stage, q: Question, pictures: bool) -> Answer:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..analyses import two_tones
-from ..data import UserError
+from ..errors import UserError
 from ..files import store
 from ..files.tables import columns_csv
 from ..harmonic_balance.tones import Kept

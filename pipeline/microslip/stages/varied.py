@@ -10,7 +10,8 @@ from typing import Any
 
 from ..case import CaseSettings
 from ..case.assemble import build
-from ..data import ModalBasis, UserError
+from ..data import ModalBasis
+from ..errors import UserError
 from ..settings.mistakes import validate
 from ..settings.toml import override
 from ..system.assembly import Assembly

@@ -7,8 +7,7 @@ from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from ..data import UserError
-from ..errors import told_of
+from ..errors import UserError, told_of
 from ..files import store
 from ..files.tables import write_tables
 from ..report.page import answer_page

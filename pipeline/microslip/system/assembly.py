@@ -22,7 +22,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 import scipy.linalg
 
-from ..data import INTERFACE_ROWS, Array, ComplexArray, Indices, UserError
+from ..data import INTERFACE_ROWS, Array, ComplexArray, Indices
+from ..errors import UserError
 from ..settings.mistakes import bounded
 from .component import Component, InWave, Ring
 from .disc import directed, spread, whole
@@ -343,40 +344,13 @@ class Assembly:
         """
         if self.ring is None:
             return self
-        N, ring = self.ring.blades, self.ring
-        cyclic = {m.name for m in self.components if m.sectors > 1}
-
-        def body(name: str, j: int) -> str:
-            return name if name in cyclic else f"{name}_{j % N}"
-
-        def row(component: str, name: str, j: int) -> str:
-            return f"{name}@{j % N}" if component in cyclic else name
-
-        def side(s: ContactFace, j: int) -> ContactFace:
-            at, rows = j + s.shift, s.rows
-            if rows is not None and s.component in cyclic:
-                rows = _rows_all_round(s, at, N)
-            return replace(
-                s, component=body(s.component, at), interface=row(s.component, s.interface, at), shift=0, rows=rows
-            )
-
-        def met(c: Contact, j: int) -> Contact:
-            second = side(c.second, j) if c.second else None
-            phase = c.phase + 2 * np.pi * (j * ring.index(1) % N) / N
-            return replace(c, name=f"{c.name}_{j}", first=side(c.first, j), second=second, phase=phase)
-
-        def load(x: Load, j: int) -> Load:
-            turn = complex(np.exp(2j * np.pi * (j * ring.index(x.harmonic) % N) / N))
-            return Load(body(x.component, j), row(x.component, x.row, j), x.amplitude * turn, x.harmonic, x.tone)
-
-        def output(w: Output, j: int) -> Output:
-            return Output(body(w.component, j), row(w.component, w.monitor, j), w.label)
-
+        N = self.ring.blades
+        names = _Sectors(self.ring, frozenset(m.name for m in self.components if m.sectors > 1))
         return Assembly(
             _all_round(self.components, N),
-            tuple(met(c, j) for j in range(N) for c in self.contacts),
-            tuple(load(x, j) for j in range(N) for x in self.loads),
-            tuple(output(w, j) for j in range(N) for w in self.outputs),
+            tuple(names.contact(c, j) for j in range(N) for c in self.contacts),
+            tuple(names.load(x, j) for j in range(N) for x in self.loads),
+            tuple(names.output(w, j) for j in range(N) for w in self.outputs),
             None,
             self._stuck_damping_all_round(),
             _flows(self.components, N),
@@ -439,6 +413,41 @@ class Assembly:
         for i, j, start, k in self.coordinates:
             out[begins[i] : begins[i] + k, start : start + k] = np.eye(k) * (-1.0 if j else 1.0)
         return out
+
+
+@dataclass(frozen=True)
+class _Sectors:
+    """What one sector holds, in sector j of its ring. cyclic: names of bodies that are a ring in one piece."""
+
+    ring: Ring
+    cyclic: frozenset[str]
+
+    def body(self, name: str, j: int) -> str:
+        return name if name in self.cyclic else f"{name}_{j % self.ring.blades}"
+
+    def row(self, component: str, name: str, j: int) -> str:
+        return f"{name}@{j % self.ring.blades}" if component in self.cyclic else name
+
+    def side(self, s: ContactFace, j: int) -> ContactFace:
+        at, rows = j + s.shift, s.rows
+        if rows is not None and s.component in self.cyclic:
+            rows = _rows_all_round(s, at, self.ring.blades)
+        body, row = self.body(s.component, at), self.row(s.component, s.interface, at)
+        return replace(s, component=body, interface=row, shift=0, rows=rows)
+
+    def contact(self, c: Contact, j: int) -> Contact:
+        second, N = self.side(c.second, j) if c.second else None, self.ring.blades
+        phase = c.phase + 2 * np.pi * (j * self.ring.index(1) % N) / N
+        return replace(c, name=f"{c.name}_{j}", first=self.side(c.first, j), second=second, phase=phase)
+
+    def load(self, x: Load, j: int) -> Load:
+        N = self.ring.blades
+        turn = complex(np.exp(2j * np.pi * (j * self.ring.index(x.harmonic) % N) / N))
+        row = self.row(x.component, x.row, j)
+        return Load(self.body(x.component, j), row, x.amplitude * turn, x.harmonic, x.tone)
+
+    def output(self, w: Output, j: int) -> Output:
+        return Output(self.body(w.component, j), self.row(w.component, w.monitor, j), w.label)
 
 
 def _all_round(components: Sequence[Component], blades: int) -> tuple[Component, ...]:

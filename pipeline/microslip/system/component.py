@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..data import Array, ModalGroup, UserError
+from ..data import Array, ModalGroup
+from ..errors import UserError
 
 if TYPE_CHECKING:
     from .spin import Spin

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ..data import Array, ModalGroup, UserError
-from ..errors import told_of
+from ..data import Array, ModalGroup
+from ..errors import UserError, told_of
 from ..files.store import ordinary
 from ..reduced.coordinates import own_stiffness
 from ..ring.expansion import BACKWARD, FORWARD

@@ -15,7 +15,8 @@ from typing import Any
 import numpy as np
 import scipy.linalg
 
-from ..data import Array, Compliance, Interface, ModalGroup, Rows, UserError
+from ..data import Array, Compliance, Interface, ModalGroup, Rows
+from ..errors import UserError
 from .component import Component, InWave
 from .flow import Flow
 

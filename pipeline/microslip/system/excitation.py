@@ -18,7 +18,8 @@ from typing import Literal
 
 import numpy as np
 
-from ..data import Array, ComplexArray, UserError
+from ..data import Array, ComplexArray
+from ..errors import UserError
 from ..ring.expansion import BACKWARD, FORWARD, STANDING
 from .assembly import Load
 from .component import Ring

@@ -18,7 +18,8 @@ from typing import Any
 import numpy as np
 import scipy.linalg
 
-from ..data import INTERFACE_ROWS, Array, Compliance, Interface, Mesh, ModalBasis, ModalGroup, Rows, UserError
+from ..data import INTERFACE_ROWS, Array, Compliance, Interface, Mesh, ModalBasis, ModalGroup, Rows
+from ..errors import UserError
 from ..frames import skew
 from ..linalg.canonical import signs, turn_clusters
 from ..settings.mistakes import bounded

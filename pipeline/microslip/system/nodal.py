@@ -14,7 +14,8 @@ import numpy as np
 import scipy.linalg
 from scipy.spatial import ConvexHull, Delaunay, cKDTree
 
-from ..data import Array, Interface, UserError
+from ..data import Array, Interface
+from ..errors import UserError
 from .assembly import ContactFace
 from .component import Component, InWave
 from .pairing import Pairing

@@ -10,7 +10,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..data import Array, Interface, UserError
+from ..data import Array, Interface
+from ..errors import UserError
 from ..frames import rotation
 from .assembly import across
 

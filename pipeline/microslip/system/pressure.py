@@ -15,7 +15,8 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial import KDTree
 
-from ..data import Array, ComplexArray, Interface, ModalGroup, Rows, UserError
+from ..data import Array, ComplexArray, Interface, ModalGroup, Rows
+from ..errors import UserError
 from ..files.store import ordinary
 from ..mesh import UNITS, point_data
 from .assembly import Load

@@ -8,8 +8,8 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, model_validator
 
-from ..data import ModalBasis, UserError
-from ..errors import told_of
+from ..data import ModalBasis
+from ..errors import UserError, told_of
 from ..settings.numbers import (
     Direction,
     Model,

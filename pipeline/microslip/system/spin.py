@@ -17,7 +17,8 @@ import numpy as np
 import scipy.sparse as sp
 
 from ..basis.integrals import convected
-from ..data import Array, Mesh, ModalGroup, UserError
+from ..data import Array, Mesh, ModalGroup
+from ..errors import UserError
 from .component import Component
 
 MASSLESS = ("massless-interface", "interface-force")

@@ -22,7 +22,8 @@ from ..contact.law import Law
 from ..contact.normal import Preload
 from ..contact.patch import Patch
 from ..contact.set_valued import SetValued
-from ..data import Array, Compliance, ModalGroup, Rows, UserError
+from ..data import Array, Compliance, ModalGroup, Rows
+from ..errors import UserError
 from ..settings.mistakes import bounded
 from .assembly import Assembly, Contact, ContactFace, Load, Output
 from .component import Component

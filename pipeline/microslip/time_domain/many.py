@@ -15,7 +15,8 @@ import jax.numpy as jnp
 import numpy as np
 
 from ..contact.law import program
-from ..data import Array, UserError
+from ..data import Array
+from ..errors import UserError
 from . import loop
 from .bodies import Bodies, Now, Options
 from .contacts import Group

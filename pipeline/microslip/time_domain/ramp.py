@@ -12,7 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from ..data import CENTRIFUGAL, Array, UserError
+from ..data import CENTRIFUGAL, Array
+from ..errors import UserError
 from ..settings.mistakes import bounded
 from ..system.assembly import Assembly
 

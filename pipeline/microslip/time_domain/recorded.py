@@ -11,7 +11,8 @@ from typing import Any
 import h5py
 import numpy as np
 
-from ..data import Array, UserError
+from ..data import Array
+from ..errors import UserError
 from ..files.store import fingerprint
 from ..harmonic_balance import solved
 from ..harmonic_balance.nonlinear_modes import Backbone

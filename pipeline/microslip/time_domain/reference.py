@@ -20,7 +20,8 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from ..data import Array, NotConverged, UserError
+from ..data import Array
+from ..errors import NotConverged, UserError
 from ..settings.mistakes import bounded
 from .contacts import Group, joined, moved, parts
 from .equations import Equations

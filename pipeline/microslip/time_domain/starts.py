@@ -8,7 +8,8 @@ from typing import Any
 import jax
 import numpy as np
 
-from ..data import Array, NotConverged
+from ..data import Array
+from ..errors import NotConverged
 from ..harmonic_balance.problem import Problem
 from ..harmonic_balance.response import operating
 from ..harmonic_balance.solver import sweep

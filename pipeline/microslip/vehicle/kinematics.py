@@ -11,7 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from ..data import Array, UserError
+from ..data import Array
+from ..errors import UserError
 from ..files import store
 from ..results import Journal
 from ..rolling.wear import smoothed

@@ -8,7 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ..data import Array, UserError
+from ..data import Array
+from ..errors import UserError
 from ..results import Journal
 from ..rolling.table import CreepTable, creep_table
 from .creep import Creep, linear, of_strips, of_table

@@ -8,13 +8,11 @@ from typing import Any, NamedTuple
 import jax.numpy as jnp
 import numpy as np
 
-from ..data import UserError
+from ..errors import UserError
 from ..rolling.wheelset import Patch, Pose, Track, patches
 
 Array = Any
 """Of numpy; of jax in what is traced."""
-SIDES = (1.0, -1.0)
-"""Of the right and the left wheel: the sign of y."""
 
 
 class Touch(NamedTuple):

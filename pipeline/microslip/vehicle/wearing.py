@@ -11,7 +11,8 @@ from typing import Any, Protocol, TypeVar
 
 import numpy as np
 
-from ..data import Array, UserError
+from ..data import Array
+from ..errors import UserError
 from ..results import Journal
 from ..rolling.strips import creep_forces, tractions
 from ..rolling.wear import deposited, smoothed

@@ -19,7 +19,8 @@ from collections.abc import Mapping
 from math import pi
 from pathlib import Path
 
-from ...data import ModalBasis, ModalGroup, UserError
+from ...data import ModalBasis, ModalGroup
+from ...errors import UserError
 from ...files.store import complete_or_absent
 from ...reduced.coordinates import in_modes
 from ...units import rpm_text

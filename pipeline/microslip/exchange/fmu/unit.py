@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...data import INTERFACE_ROWS, Array, ModalBasis, ModalGroup, Rows, UserError
+from ...data import INTERFACE_ROWS, Array, ModalBasis, ModalGroup, Rows
+from ...errors import UserError
 from ..mat import field_names
 
 

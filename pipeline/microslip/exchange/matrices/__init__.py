@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 import scipy.sparse as sp
 
-from ...data import Array, Indices, Matrices, MatrixTerm, Mesh, UserError
+from ...data import Array, Indices, Matrices, MatrixTerm, Mesh
+from ...errors import UserError
 from ...files.store import ordinary
 from ...units import SYSTEMS, usual_system
 from . import calculix, hdf5, market, matlab, nastran, numpy_archive

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from ...data import Array, Indices, UserError
+from ...data import Array, Indices
+from ...errors import UserError
 from ...settings.mistakes import is_number
 
 LARGEST = 50_000_000

@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from ...data import Array, Indices, Mesh, UserError
+from ...data import Array, Indices, Mesh
+from ...errors import UserError
 from ...mesh import UNITS, read_mesh
 from . import hdf5, matlab, nastran
 from .found import Unreadable, pick, table
