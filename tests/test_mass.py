@@ -6,6 +6,7 @@ import csv
 import shutil
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -148,7 +149,7 @@ def test_coordinates_of_a_heavier_body_are_those_of_its_file(folder: Path) -> No
     np.testing.assert_allclose(read, told, rtol=3e-3)
 
 
-def damper(pressed: float, mass: float, centre: Array) -> list[float]:
+def damper(pressed: float, mass: float, centre: Array, shift: Array | None = None) -> list[float]:
     """Normal forces of two flanks under a roof of 90 degrees, which a modal file of a beam stands for."""
     body = basis()
     flanks = {"left": [-1.0, 0.0, 1.0], "right": [1.0, 0.0, 1.0]}
@@ -161,20 +162,26 @@ def damper(pressed: float, mass: float, centre: Array) -> list[float]:
         body, groups={(0, 0): replace(group, interfaces=faces)}, centre=centre, rotation_point=np.zeros(3),
         rotation_axis=Y,
     )  # fmt: skip
-    settings = BodyOfCase(name="damper", pressed_at_rpm=pressed, mass=mass)
-    return normal_forces(settings, body, ["left", "right"], "case.toml: bodies.damper.pressed_at_rpm")
+    where, place = "case.toml: bodies.damper.pressed_at_rpm", dict[str, Any]()
+    if shift is not None:
+        place = {"shift": tuple(shift), "turn": 20.0}
+    settings = BodyOfCase(name="damper", pressed_at_rpm=pressed, mass=mass, **place)
+    about = None if shift is None else (Y, np.zeros(3))  # of the body above
+    return normal_forces(settings, body, ["left", "right"], where, about)
 
 
 Y = np.array([0.0, 1.0, 0.0])
 
 
 def test_a_damper_under_a_roof_presses_both_flanks() -> None:
-    """m r Omega^2 / (2 sin 45 degrees) each, whatever the place along the axis; leaning by 10 degrees one takes more:
-    F sin(45 +- 10 degrees) by the parallelogram of forces."""
+    """m r Omega^2 / (2 sin 45 degrees) each, whatever the place along the axis, whoever puts it there; leaning by
+    10 degrees one takes more: F sin(45 +- 10 degrees) by the parallelogram of forces."""
     load = 0.04 * 0.25 * (2700 * np.pi / 30) ** 2
     for along in (0.0, 0.03):
         found = damper(2700.0, 0.04, np.array([0.0, along, 0.25]))
         np.testing.assert_allclose(found, load / (2 * np.sin(np.pi / 4)), rtol=1e-12)
+    shift = 0.25 * np.array([np.sin(np.radians(20.0)), 0.0, np.cos(np.radians(20.0))])
+    np.testing.assert_allclose(damper(2700.0, 0.04, np.zeros(3), shift), load / np.sqrt(2), rtol=1e-12)
     lean, right = np.radians(10.0), np.radians([35.0, 55.0])
     found = damper(2700.0, 0.04, 0.25 * np.array([np.sin(lean), 0.0, np.cos(lean)]))
     np.testing.assert_allclose(found, load * np.sin(right), rtol=1e-12)
