@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 
 from ..continuation import Settings
-from ..data import Array, UserError
+from ..data import Array
+from ..errors import UserError
 from ..harmonic_balance import families
 from ..harmonic_balance.checkpoint import labels, points_of_curve, resumed_curve
 from ..harmonic_balance.envelope import largest

@@ -23,7 +23,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..continuation import Point, Settings, follow, start
-from ..data import Array, UserError
+from ..data import Array
+from ..errors import UserError
 from ..files.hdf5 import refuse_foreign
 from ..results.checks import Checks
 from ..results.files import FORMAT, Response, write_response

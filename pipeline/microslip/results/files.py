@@ -12,7 +12,8 @@ from typing import Any
 import h5py
 import numpy as np
 
-from ..data import Array, ModalBasis, ModalGroup, UserError
+from ..data import Array, ModalBasis, ModalGroup
+from ..errors import UserError
 from ..files.hdf5 import IMAGINARY, put, sealed
 from ..files.hostile import DAMAGE, reading, refuse_damaged, short
 from ..files.store import ordinary

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..data import Array, ComplexArray, Indices, UserError
+from ..data import Array, ComplexArray, Indices
+from ..errors import UserError
 from ..units import Quantity, counted
 
 if TYPE_CHECKING:
@@ -315,7 +316,8 @@ class Series:
         if self._places and self.converged.any():
             a = np.where(self.converged, self.amplitude, 0.0)
             i = int(a.argmax())
-            said += f"; at most {a[i]:.4g} {self.quantity.said} at {p[i]:.6g} {unit}".rstrip()
+            most = f"at most {a[i]:.4g} {self.quantity.said} at {p[i]:.6g} {unit}".rstrip()
+            said += f"; {most if a[i] else f'{self.readouts[0]} does not move'}"
         if len(self.folds):
             said += f"; folds at {', '.join(f'{f:.6g}' for f in self.folds[:6])} {unit}".rstrip()
         bad = len(self) - int(self.converged.sum())

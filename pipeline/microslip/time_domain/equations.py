@@ -21,7 +21,8 @@ import scipy.linalg
 from ..contact.law import Law
 from ..contact.patch import stuck_stiffness
 from ..contact.set_valued import SetValued
-from ..data import Array, UserError
+from ..data import Array
+from ..errors import UserError
 from ..settings.mistakes import bounded
 from ..system.assembly import Assembly, Contact, Linear
 from .ramp import Ramp, turning_loads

@@ -10,12 +10,13 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-import jax
+import jax.numpy as jnp
 import numpy as np
 import scipy.linalg
 
 from ..contact.set_valued import SetValued
-from ..data import Array, NotConverged, UserError
+from ..data import Array
+from ..errors import NotConverged, UserError
 from ..files.hdf5 import put, refuse_foreign, sealed
 from ..settings.mistakes import bounded
 from ..system.assembly import Contact
@@ -606,7 +607,7 @@ def _closed(contact: Contact) -> bool:
     """Whether a law whose gap is its own presses at q = 0, without a preload that balances it."""
     if contact.preload.any() or isinstance(contact.patch.law, SetValued):
         return False
-    overlap = contact.patch.law.overlap(contact.patch.kinematics @ contact.offset)
+    overlap = contact.patch.law.overlap(jnp.asarray(contact.patch.kinematics @ contact.offset))
     return bool((np.asarray(overlap) > 0).any())
 
 

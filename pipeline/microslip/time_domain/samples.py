@@ -20,7 +20,8 @@ import numpy as np
 
 from ..contact.elements import Spring
 from ..contact.patch import Patch
-from ..data import Array, UserError
+from ..data import Array
+from ..errors import UserError
 from ..files.hdf5 import create, put, seal, seal_state
 from ..files.hostile import DAMAGE, inspect, refuse_damaged, short
 from ..files.store import complete_or_absent, ordinary, put_in_place, refused

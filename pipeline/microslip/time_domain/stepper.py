@@ -20,7 +20,8 @@ import scipy.linalg
 
 from ..contact.law import program
 from ..contact.set_valued import SetValued
-from ..data import Array, UserError
+from ..data import Array
+from ..errors import UserError
 from ..harmonic_balance.forces import repeated
 from . import fourth, loop
 from .bodies import Bodies, Now, Options, Seen
@@ -110,8 +111,8 @@ class Stepper:
     @cached_property
     def bodies(self) -> Bodies:
         enough = np.array(fourth.MISSED * (self.tau * self.equations.fastest) ** 4)
-        own = {"flow": self._flow, "meets": self._meets(self._flow), "braking": self._braking, "enough": enough}
-        return _sent(self._fixed._replace(**own))
+        flow, meets = self._flow, self._meets(self._flow)
+        return _sent(self._fixed._replace(flow=flow, meets=meets, braking=self._braking, enough=enough))
 
     @cached_property
     def _flow(self) -> Flow:
