@@ -10,7 +10,9 @@ solve the same balance on the 24 frequencies alone, Newton's method from the nei
 
 dense    the same compiled contact forces, the Jacobian of all coordinates as one dense matrix, LU
 by hand  forces of one blade's contact after the other, sample after sample in plain Python, with derivatives by
-         differences, and the dense Jacobian; at three frequencies, and as much for all
+         differences, the same search and the dense Jacobian
+pyHarm   (an environment of its own, `sh tests/peers/setup.sh pyharm`) the ring with Jenkins elements in the gaps,
+         written anew as one body whose first coordinates are the motions of the sliders: as few unknowns as can be
 ccx      CalculiX, the whole annulus of vanes without contact in finite elements, linear: eigenmodes, then the steady
          state at the 24 frequencies
 """
@@ -31,6 +33,7 @@ from pathlib import Path
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 import numpy as np
+import scipy.linalg
 
 import microslip as ms
 from microslip.harmonic_balance.blocks import Dense
@@ -40,16 +43,21 @@ from microslip.mistuning.peaks import Highest, highest
 from microslip.mistuning.ring import Tuned
 from microslip.mistuning.samples import Asked, Sliding, amplitudes, sample
 from microslip.mistuning.scatter import Scatter
+from microslip.system.assembly import Assembly
+
+ROOT = Path(__file__).resolve().parents[1]
+PYHARM = ROOT / "build" / "peers" / "pyharm" / "bin" / "python"
 
 RUB = {"interface": "right", "against": "left", "against_sector": 1, "law": "smooth", "normal_force": 20.0,
        "normal_stiffness": 2e5, "tangential_stiffness": 4e5, "friction": 0.2, "points": [1, 1]}  # fmt: skip
 FREQUENCY = np.linspace(280.0, 292.0, 24)
 
 
-def asked(blades: int, stuck: bool = False) -> Asked:
+def asked(blades: int, stuck: bool = False, **contact: object) -> Asked:
     """A wave of 30 degrees from blade to blade."""
     case = {"body": "vane", "excitation": "magnet", "amplitude": 2.0, "monitor": "probe", "modes": 6,
-            "ring": {"blades": blades, "engine_order": max(blades // 12, 1)}, "contacts": [RUB]}  # fmt: skip
+            "ring": {"blades": blades, "engine_order": max(blades // 12, 1)},
+            "contacts": [{**RUB, **contact}]}  # fmt: skip
     tuned = Tuned(ms.assemble(case, vane=ms.sample()).assembly, {})
     return Asked(tuned, (Scatter("frequency", 0.01),), FREQUENCY, 1, {"harmonics": 3, "samples": 64}, stuck)
 
@@ -164,6 +172,40 @@ def textbook(what: Asked, number: int) -> tuple[int, float]:
     return solved, top
 
 
+def written_anew(ring: Assembly) -> tuple[dict[str, object], np.ndarray]:
+    """A ring of Jenkins elements for pyHarm, whose elements connect single coordinates: what the sliders feel, what the
+    cosine and the sine of the load act on, and the rest; and (w, m) its read-outs."""
+    part, k, t1 = ring.joined(1), ring.stiffness.copy(), np.arange(len(ring.contacts)) * 6 + 1
+    slider = k[1, 1]
+    k[t1, t1] = 0.0
+    K = part.K + part.rows.T @ k @ part.rows
+    W = np.vstack([part.rows[t1], part.load.real, -part.load.imag])
+    T = np.linalg.inv(np.vstack([W, scipy.linalg.null_space(W).T]))
+    law = ring.contacts[0].patch.law
+    job = {"M": T.T @ part.M @ T, "C": T.T @ part.C @ T, "K": T.T @ K @ T, "contacts": len(t1), "stiffness": slider,
+           "limit": float(law.held)}  # fmt: skip
+    return job, part.output @ T
+
+
+def pyharm(what: Asked, number: int) -> tuple[float, int, int, float, float]:
+    """CPU seconds of pyHarm for a sample, its points and steps, the highest amplitude of them, and by how much ours at
+    that frequency differs."""
+    ring, w = what.tuned.mistuned(what.deviations(number)), 2 * np.pi * FREQUENCY
+    job, output = written_anew(ring)
+    job |= {"low": w[0], "high": w[-1], "step": w[1] - w[0], **what.balance}
+    with tempfile.TemporaryDirectory() as folder:
+        files = [Path(folder) / name for name in ("job.npz", "out.npz")]
+        np.savez(files[0], **job)
+        alone = {k: v for k, v in os.environ.items() if k not in ("PYTHONPATH", "PYTHONHOME")}
+        command = [PYHARM, ROOT / "benchmarks" / "pyharm_ring.py", *files]
+        subprocess.run(command, check=True, env=alone, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        found = dict(np.load(files[1]))
+    y = np.abs(found["x"] @ output.T).max(axis=1)
+    top = int(y.argmax())
+    mine = Sliding(what.problem(ring), what.tuned_points)(found["omega"][top] / (2 * np.pi))
+    return float(found["cpu"]), len(y), int(found["steps"]), float(y[top]), float(mine.max() / y[top] - 1)
+
+
 def annulus(blades: int, n: tuple[int, int, int], modes: int) -> list[str]:
     """A CalculiX deck of bricks the size of the vane, clamped at one end, each of its own modulus, a spring from tip to
     tip: all modes, then the steady state at 24 frequencies below the first of them. In a band that holds modes CalculiX
@@ -198,7 +240,7 @@ def annulus(blades: int, n: tuple[int, int, int], modes: int) -> list[str]:
 SIZE = np.array([0.005, 0.02, 0.12])
 """m, of the bricks of CalculiX."""
 
-MESHES = (1, 2, 12), (2, 4, 24), (3, 6, 30), (4, 8, 40)
+MESHES = (1, 2, 12), (2, 4, 24), (3, 6, 30), (5, 11, 51)
 """Elements of a brick along its edges."""
 
 
@@ -235,7 +277,22 @@ def main() -> None:
         points = np.mean([len(s.top.frequencies) for _, s in each])
         spent, stuck = np.mean([t for t, _ in each]), timed(sample, linear, 1)[0]
         print(f"{N:7d} {spent:9.2f} {points:7.0f} {1e3 * spent / points / N:15.2f} {stuck:12.3f}", flush=True)
+    jenkins(6 if quick else 24)
     peers(6 if quick else 24)
+
+
+def jenkins(N: int) -> None:
+    """Samples whose gaps hold Jenkins elements, by the program and by pyHarm."""
+    what = asked(N, law="jenkins")
+    sample(what, 0)
+    for number in SAMPLES:
+        spent, found = timed(sample, what, number)
+        print(f"{N} blades with Jenkins elements, sample {number}: {spent:.2f} s, {len(found.top.frequencies)} points")
+        if PYHARM.is_file():
+            peer, points, steps, highest, off = pyharm(what, number)
+            missed = highest / found.top.amplitude - 1
+            print(f"  pyHarm: {peer:.1f} s, {peer / spent:.0f} times; {points} points, {steps} steps, highest "
+                  f"{missed:+.1e} off, where ours differs by {off:+.1e}", flush=True)  # fmt: skip
 
 
 def peers(N: int) -> None:

@@ -1,6 +1,7 @@
 """Friction response of a tuned ring of blades: the book's mode, one and three harmonics, growth over the blades.
 
     python benchmarks/ring_response.py            # 24 blades by one sector; then 12, 24, 48, 100 blades as whole rings
+    python benchmarks/ring_response.py --sector   # the sector alone
     python benchmarks/ring_response.py --quick    # the sector alone, 12 x 2 points, 16 frequencies, one round
 
 The blade of section 5.3 with 20 eigenmodes (a coarse mesh: the sweep does not know of it), 24 in a circle, engine order
@@ -24,7 +25,7 @@ import numpy as np
 
 import microslip as ms
 from microslip.data import ModalBasis
-from microslip.harmonic_balance.problem import AtFrequency
+from microslip.harmonic_balance.problem import AtFrequency, Group
 from microslip.stages.job import open_job
 from microslip.stages.modal import modes_stage
 
@@ -94,8 +95,8 @@ def sector_rows(
 def parts(settings: dict, basis: ModalBasis) -> list[float]:
     """Shares of the wall time of a response: forces alone, with derivatives, linear systems, the rest."""
     system, frequency = ms.assemble(settings["case"], blade=basis, normal_force=FORCE), np.linspace(*settings["sweep"])
-    spent, places = dict.fromkeys(("force", "forces", "jacobian"), 0.0), AtFrequency.__dict__
-    kept = {name: places[name] for name in spent}
+    places = {"force": Group, "forces": Group, "jacobian": AtFrequency}
+    spent, kept = dict.fromkeys(places, 0.0), {name: place.__dict__[name] for name, place in places.items()}
 
     def timed(name: str) -> Any:
         def call(*given: Any) -> Any:
@@ -108,14 +109,14 @@ def parts(settings: dict, basis: ModalBasis) -> list[float]:
         return call
 
     try:
-        for name in spent:
-            setattr(AtFrequency, name, timed(name))
+        for name, place in places.items():
+            setattr(place, name, timed(name))
         began = time.perf_counter()
         ms.harmonic_response(system, frequency)
         whole = time.perf_counter() - began
     finally:
         for name, was in kept.items():
-            setattr(AtFrequency, name, was)
+            setattr(places[name], name, was)
     shares = [value / whole for value in spent.values()]
     return [*shares, 1.0 - sum(shares)]
 
@@ -139,7 +140,9 @@ def growth_rows(basis: ModalBasis, low: float, high: float, rounds: int) -> None
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--quick", action="store_true", help="the sector alone, small, one round")
-    parser.add_argument("--growth", action="store_true", help="whole rings alone, one round")
+    only = parser.add_mutually_exclusive_group()
+    only.add_argument("--sector", action="store_true", help="the sector alone")
+    only.add_argument("--growth", action="store_true", help="whole rings alone, one round")
     parser.add_argument("--low", type=float, default=95.0)
     parser.add_argument("--high", type=float, default=125.0)
     asked = parser.parse_args()
@@ -149,7 +152,7 @@ def main() -> None:
           f"numpy {np.__version__}, jax {jax.__version__}")  # fmt: skip
     if not asked.growth:
         sector_rows(basis, asked.low, asked.high, rounds, *((16, (12, 2)) if asked.quick else (COUNT, POINTS)))
-    if not asked.quick:
+    if not (asked.quick or asked.sector):
         growth_rows(basis, asked.low, asked.high, rounds)
 
 

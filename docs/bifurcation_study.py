@@ -35,7 +35,7 @@ def panels(folder: Path, places: Iterable[Axes]) -> None:
     """The diagrams of the case, without the names of their branches."""
     found = ms.read_bifurcation(folder / "bifurcation.h5")
     for axes, (name, words) in zip(places, SHOWN.items(), strict=True):
-        draw(found[name].branches, [], axes, words, "amplitude of the second mass", "m")
+        draw(found[name].branches, [], axes, words)
         axes.get_legend().remove()
         axes.set_ylabel("amplitude in m")
 

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Any
 
 import jax
 import jax.numpy as jnp
+import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 from closed_forms.oscillators import brusselator
@@ -17,6 +19,7 @@ import microslip as ms
 from microslip.bifurcation import balance, branches, deflation, equilibria, floquet
 from microslip.bifurcation.diagram import Asked, Diagram, diagram
 from microslip.bifurcation.dynamics import Dynamics
+from microslip.bifurcation.recorded import Branches
 from microslip.bifurcation.shooting import Orbit, Shooting
 from microslip.errors import UserError
 
@@ -225,12 +228,20 @@ def test_doubled_orbit_is_what_a_motion_comes_to() -> None:
 
 
 def test_a_branch_is_kept_and_read_again(tmp_path: Path) -> None:
-    branch = circles().branches[1]
+    """With its read-outs' units, which tables, and pictures of what was read, have too."""
+    branch = replace(circles().branches[1], units=("rad", "1"))
     branches.write(tmp_path / "b.h5", branch, "inputs")
     again = branches.kept(tmp_path / "b.h5", "inputs")
     assert again is not None and again.name == branch.name and again.ended == branch.ended
     np.testing.assert_array_equal(again.multipliers, branch.multipliers)
     np.testing.assert_array_equal(again.kind, branch.kind)
+    assert again.units == branch.units and [c for c in branches.columns(again) if "largest" in c] == [
+        f"{branch.outputs[0]}_largest_rad", f"{branch.outputs[1]}_largest_strain"
+    ]  # fmt: skip
+    axes = plt.figure().subplots(1, 2)
+    for i, unit in enumerate(("rad", "m/m")):
+        Branches("circles", "p", "", (again,)).plot(axes[i], i)
+        assert axes[i].get_ylabel().endswith(unit)
     assert branches.kept(tmp_path / "b.h5", "other inputs") is None
     (tmp_path / "b.h5").write_bytes((tmp_path / "b.h5").read_bytes()[:-9])
     assert branches.kept(tmp_path / "b.h5", "inputs") is None

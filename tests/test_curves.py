@@ -206,6 +206,9 @@ def test_over_the_normal_force(case: Path) -> None:
     assert main(["respond", "case.toml", "--over", "normal-force", "-q"]) == 0
     found = rows("over_normal_force.csv")
     np.testing.assert_allclose(found["normal_force_N"][[0, -1]], [15.0, 9.0], rtol=1e-12)
+    (kept,) = read_response("build/lifting/over_normal_force.h5").series
+    np.testing.assert_allclose(kept.parameter, found["normal_force_N"], rtol=1e-12)
+    assert kept.to_xarray().parameter.units == "N" and kept.plot().get_xlabel() == "normal force in N"
     for i, normal in ((0, 15.0), (-1, 9.0)):
         anew = problem(case, normal)
         exact = operating(anew, solve(anew, 2 * np.pi * 100.0, [])).outputs[0, 1]

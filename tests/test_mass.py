@@ -6,6 +6,7 @@ import csv
 import shutil
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,8 +15,9 @@ from small import basis, beam, table
 from microslip.basis import read_basis
 from microslip.case import load_case, run_case
 from microslip.case.loaded import load_bodies
-from microslip.case.settings import BodyOfCase
-from microslip.case.thrown import normal_forces
+from microslip.case.settings import BodyOfCase, CaseSettings
+from microslip.case.surveys import _at_speed
+from microslip.case.thrown import normal_forces, thrown
 from microslip.cli import main
 from microslip.data import CENTRIFUGAL, Array, ModalBasis
 from microslip.errors import UserError
@@ -149,8 +151,8 @@ def test_coordinates_of_a_heavier_body_are_those_of_its_file(folder: Path) -> No
     np.testing.assert_allclose(read, told, rtol=3e-3)
 
 
-def damper(pressed: float, mass: float, centre: Array) -> list[float]:
-    """Normal forces of two flanks under a roof of 90 degrees, which a modal file of a beam stands for."""
+def roof(centre: Array) -> ModalBasis:
+    """Two flanks under a roof of 90 degrees, which a modal file of a beam stands for."""
     body = basis()
     flanks = {"left": [-1.0, 0.0, 1.0], "right": [1.0, 0.0, 1.0]}
     group = body.groups[0, 0]
@@ -158,27 +160,53 @@ def damper(pressed: float, mass: float, centre: Array) -> list[float]:
     for name, normal in flanks.items():
         n = np.array(normal) / np.sqrt(2)
         faces[name] = replace(group.interfaces[name], rotation=np.array([n, np.cross(Y, n), Y]))
-    body = replace(
+    return replace(
         body, groups={(0, 0): replace(group, interfaces=faces)}, centre=centre, rotation_point=np.zeros(3),
         rotation_axis=Y,
     )  # fmt: skip
-    settings = BodyOfCase(name="damper", pressed_at_rpm=pressed, mass=mass)
-    return normal_forces(settings, body, ["left", "right"], "case.toml: bodies.damper.pressed_at_rpm")
+
+
+def damper(pressed: float, mass: float, centre: Array, shift: Array | None = None) -> list[float]:
+    """Normal forces of both flanks."""
+    where, place = "case.toml: bodies.damper.pressed_at_rpm", dict[str, Any]()
+    if shift is not None:
+        place = {"shift": tuple(shift), "turn": 20.0}
+    settings = BodyOfCase(name="damper", pressed_at_rpm=pressed, mass=mass, **place)
+    about = None if shift is None else (Y, np.zeros(3))  # of the body above
+    return normal_forces(settings, roof(centre), ["left", "right"], where, about)
 
 
 Y = np.array([0.0, 1.0, 0.0])
 
 
 def test_a_damper_under_a_roof_presses_both_flanks() -> None:
-    """m r Omega^2 / (2 sin 45 degrees) each, whatever the place along the axis; leaning by 10 degrees one takes more:
-    F sin(45 +- 10 degrees) by the parallelogram of forces."""
+    """m r Omega^2 / (2 sin 45 degrees) each, whatever the place along the axis, whoever puts it there; leaning by
+    10 degrees one takes more: F sin(45 +- 10 degrees) by the parallelogram of forces."""
     load = 0.04 * 0.25 * (2700 * np.pi / 30) ** 2
     for along in (0.0, 0.03):
         found = damper(2700.0, 0.04, np.array([0.0, along, 0.25]))
         np.testing.assert_allclose(found, load / (2 * np.sin(np.pi / 4)), rtol=1e-12)
+    shift = 0.25 * np.array([np.sin(np.radians(20.0)), 0.0, np.cos(np.radians(20.0))])
+    np.testing.assert_allclose(damper(2700.0, 0.04, np.zeros(3), shift), load / np.sqrt(2), rtol=1e-12)
     lean, right = np.radians(10.0), np.radians([35.0, 55.0])
     found = damper(2700.0, 0.04, 0.25 * np.array([np.sin(lean), 0.0, np.cos(lean)]))
     np.testing.assert_allclose(found, load * np.sin(right), rtol=1e-12)
+
+
+def test_along_an_engine_order_line_a_damper_is_pressed_by_the_load_of_each_speed() -> None:
+    """As the square of the speed."""
+    law = {"law": "smooth", "normal_stiffness": 1e6, "tangential_stiffness": 1e6, "friction": 0.3}
+    case = CaseSettings.model_validate({
+        "name": "line", "bodies": [{"name": "damper", "pressed_at_rpm": 2700.0}], "excitation": "shaker",
+        "monitor": "tip-probe", "contacts": [{"interface": face, **law} for face in ("left", "right")],
+        "sweep": {"start": 1.0, "stop": 2.0},
+    })  # fmt: skip
+    whole, half = (
+        thrown(_at_speed(case, [], rpm), {"damper": roof(np.array([0.0, 0.0, 0.25]))}, "case.toml").contacts
+        for rpm in (2700.0, 1350.0)
+    )
+    for one, other in zip(whole, half, strict=True):
+        assert one.normal_force == pytest.approx(4 * (other.normal_force or 0.0), rel=1e-12) and one.normal_force
 
 
 def test_a_body_that_its_contacts_do_not_hold_is_refused() -> None:

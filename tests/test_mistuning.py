@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import scipy.stats
+from scipy.optimize import brentq
 
 import microslip as ms
 from microslip.basis import read_basis, write_basis
@@ -241,6 +242,28 @@ def test_sensitivities_are_differences(tuned: Tuned, blade: int, flowing: bool) 
         p = asked.problem(tuned.mistuned([(s, d)]))
         moved.append(np.abs(amplitudes(p, newton(p.at(point.Omega), point.x, 1e-13)))[0])
     assert found[blade, 0] == pytest.approx((moved[0] - moved[1]) / (2 * h), rel=1e-6)
+
+
+def test_sensitivities_are_one_sided_where_sliding_begins() -> None:
+    """At the frequency where Jenkins elements begin to slide, all blades made slower or faster: the differences to
+    either side are the sums of the sensitivities just before and just behind it (1e-5), which are 4 % apart."""
+    ring, s = Tuned(sector(law="jenkins"), {}), Scatter("frequency", 0.003)
+
+    def moves(f: float, d: float = 0.0) -> tuple[float, float]:
+        whole = ring.mistuned([(s, np.full((6, 2), d))])
+        p = balance.of(whole, form="sides", **FINE)
+        return float(np.abs(amplitudes(p, solve(p, 2 * np.pi * f, [])))[0]), float(Sticking(whole)(f)[0])
+
+    def slope(f: float) -> float:
+        asked = Asked(ring, (s,), np.array([f]), balance=FINE)
+        return float(sensitivities(asked, s, asked.tuned_points[0])[1].sum())
+
+    begins = brentq(lambda f: 1.0 if np.ptp(y := moves(f)) > 1e-11 * y[0] else -1.0, 330.0, 335.0, xtol=1e-10)
+    h, (y, _) = 1e-6, moves(begins)
+    before, behind = slope(begins - 1e-4), slope(begins + 1e-4)
+    assert (moves(begins, h)[0] - y) / h == pytest.approx(before, rel=1e-5)  # faster blades have their peak farther off
+    assert (y - moves(begins, -h)[0]) / h == pytest.approx(behind, rel=1e-5)
+    assert abs(behind / before - 1) > 0.03
 
 
 def test_whitehead_is_never_exceeded() -> None:

@@ -4,14 +4,18 @@ from __future__ import annotations
 
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
+import jax
+import jax.numpy as jnp
 import numpy as np
 import pytest
 import scipy.stats
 from test_mistuning import FINE, SLIPS, sector
 
 from microslip.errors import UserError
+from microslip.harmonic_balance.forces import _with_slopes, beside
 from microslip.mistuning import ensemble
 from microslip.mistuning.peaks import Highest
 from microslip.mistuning.ring import Tuned
@@ -68,6 +72,27 @@ def test_other_peoples_processes(tuned: Tuned) -> None:
     with ThreadPoolExecutor(2) as pool:
         theirs = ensemble.run(asked, 9, workers=3, executor=pool)
     assert theirs.rows.tobytes() == ensemble.run(asked, 9, workers=1).rows.tobytes()
+
+
+@pytest.mark.slow
+def test_contacts_of_many_rings_are_one_batch(tuned: Tuned) -> None:
+    """`jax.vmap` over rings whose contacts differ, without a call back to Python: forces and derivatives are those of
+    each ring alone, and a batch of the same size has the same bits."""
+    s, rng, how = Scatter("friction", 0.1), np.random.default_rng(0), {"samples": 32, "count": 2}
+    every = [tuned.mistuned([(s, s.drawn(6, 1, 0, 1, i))]).contacts for i in range(3)]
+    laws, G = [beside([c.patch.law for c in ring], 1) for ring in every], every[0][0].patch.kinematics
+    u = rng.normal(size=(3, 6, 6, 3)) * 2e-5
+    u[:, :, 0, 0] = 1e-4
+    together = jax.tree.map(lambda *x: jnp.stack([jnp.asarray(one) for one in x]), *laws)
+    batch = jax.jit(jax.vmap(partial(_with_slopes, **how), in_axes=(0, None, 0, None, None)))
+    assert "callback" not in str(jax.make_jaxpr(batch)(together, G, u, 0.01, 0.0))
+    found, again = (batch(together, G, u, 0.01, 0.0) for _ in range(2))
+    assert all((a == b).all() for a, b in zip(found, again, strict=True))
+    for i, law in enumerate(laws):
+        force, slope = _with_slopes(law, G, u[i], 0.01, 0.0, **how)
+        assert np.abs(found[0][i] - force).max() < 1e-12 * np.abs(force).max()
+        assert np.abs(found[1][i] - slope).max() < 1e-12 * np.abs(slope).max()
+    assert np.ptp([np.abs(f).max() for f in found[0][:, :, 1:]]) > 0
 
 
 @pytest.mark.slow

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -12,10 +13,12 @@ import scipy.sparse as sp
 from meshes import body
 from scipy.sparse.linalg import eigsh
 
+from microslip.data import Mesh
 from microslip.errors import UserError
+from microslip.mesh import boundary_facets
 from microslip.mistuning.ring import Tuned
 from microslip.mistuning.scatter import Scatter
-from microslip.mistuning.subset import mistuned
+from microslip.mistuning.subset import mistuned, of_blade_modes
 from microslip.modal.compute import modal_basis
 from microslip.system.assembly import Assembly
 from microslip.system.component import Component, Ring
@@ -24,6 +27,8 @@ N = 5
 PATTERN = np.array([0.3, -1.2, 0.8, 1.1, -0.9])
 MESH = rings.bladed_sector("hexahedron20", N)
 TIP = int(MESH.face_points("top")[0])
+RIM = 0.16
+"""m, where the blade begins."""
 HELD = {"supports": [{"face": "bore"}]}
 
 
@@ -44,19 +49,53 @@ def whole():
     return ring, rings.matrices(ring.mesh, body(**HELD)), rings.matrices(MESH, body(**HELD))
 
 
+@cache
+def in_ring(j):
+    """(3 n, 3 ring) the nodes of sector j, in their own axes, from those of the ring."""
+    ring, n, three = whole()[0], MESH.n_points, np.arange(3)
+    rows = np.broadcast_to(3 * np.arange(n)[:, None, None] + three[:, None], (n, 3, 3))
+    columns = np.broadcast_to(3 * ring.nodes[j][:, None, None] + three, (n, 3, 3))
+    turned = np.broadcast_to(ring.turns[j].T, (n, 3, 3))
+    return sp.csr_matrix((turned.ravel(), (rows.ravel(), columns.ravel())), (3 * n, 3 * ring.mesh.n_points))
+
+
 def frequencies(deviation, count=10):
     """(count,) rad/s of the ring of sectors each (1 + d)^2 as stiff, put together node by node."""
-    ring, tuned, one = whole()
-    n, K = MESH.n_points, 0
-    three = np.arange(3)
-    for j, d in enumerate(deviation):
-        rows = np.broadcast_to(3 * np.arange(n)[:, None, None] + three[:, None], (n, 3, 3))
-        columns = np.broadcast_to(3 * ring.nodes[j][:, None, None] + three, (n, 3, 3))
-        turned = np.broadcast_to(ring.turns[j].T, (n, 3, 3))
-        S = sp.csr_matrix((turned.ravel(), (rows.ravel(), columns.ravel())), (3 * n, 3 * ring.mesh.n_points))[one.free]
-        K = K + (1 + d) ** 2 * S.T @ one.K @ S
+    one = whole()[2]
+    return lowest(ring_of([(1 + d) ** 2 * one.K for d in deviation], one.free), count)
+
+
+def ring_of(K, at):
+    """Stiffness on all nodes of the ring, of K in each sector on some rows of its own."""
+    return sum((S := in_ring(j)[at]).T @ sp.csr_matrix(own) @ S for j, own in enumerate(K))
+
+
+def lowest(K, count=10):
+    """(count,) rad/s of the ring with a stiffness on all its nodes."""
+    tuned = whole()[1]
     K = K[tuned.free][:, tuned.free]
     return np.sqrt(eigsh(K.tocsc(), count, tuned.M.tocsc(), sigma=0, which="LM", v0=np.ones(K.shape[0]))[0])
+
+
+@cache
+def blade(count):
+    """Its nodes in the sector, its modes alone, held at the rim, and (3 n, 3 n) stiffness of the blade that nothing
+    holds."""
+    cells = MESH.cells["hexahedron20"]
+    nodes, at = np.unique(cells[radius(MESH.points[cells].mean(axis=1)) > RIM], return_inverse=True)
+    mesh = Mesh(MESH.points[nodes], {"hexahedron20": at.reshape(-1, 20)}, node_id=np.arange(len(nodes)) + 1)
+    facets = boundary_facets(mesh)["quad8"]
+    root = facets[(radius(mesh.points[facets]) < RIM + 1e-9).all(axis=1)]
+    mesh = replace(mesh, faces={"root": {"quad8": root}})
+    settings = body(
+        supports=[{"face": "root"}], modes={"count": count}, reduction="eigenmodes",
+        output={"gauss": True, "nodal_stress": False},
+    )  # fmt: skip
+    return nodes, modal_basis(mesh, settings).groups[0, 0], rings.matrices(mesh, body()).K
+
+
+def radius(points):
+    return np.hypot(points[..., 0], points[..., 2])
 
 
 def test_uniform_shifts():
@@ -103,6 +142,33 @@ def test_masses_on_the_tips():
         error[count] = np.sqrt(scipy.linalg.eigvalsh(group.K_r, group.M_r)[:10]) / exact - 1
     assert (error[4] > -1e-9).all() and (error[12] < error[4]).all() and error[12].max() < 1e-3
     assert np.abs(mistuned(disc(4), np.zeros(N)).groups[0].omega[:10] / exact - 1).max() > 0.01
+
+
+def test_blades_whose_modes_differ_each_by_itself():
+    """Component modes (CMM) against the whole ring, node by node, in each of whose blades three modes of the blade
+    alone are stiffer or softer by themselves: from above, of the second order."""
+    nodes, own, K = blade(3)
+    at = (3 * nodes[:, None] + np.arange(3)).ravel()
+    push, alike = (K @ own.phi.reshape(-1, 3)) / own.omega, ring_of([whole()[2].K] * N, whole()[2].free)
+    d, error = np.random.default_rng(1).normal(size=(N, 3)), {}
+    for size, counts in ((0.01, (4,)), (0.02, (4, 12))):
+        exact = lowest(alike + ring_of([(push * ((1 + size * one) ** 2 - 1)) @ push.T for one in d], at))
+        for count in counts:
+            error[count, size] = of_blade_modes(disc(count), own, size * d).groups[0].omega[:10] / exact - 1
+    assert (error[4, 0.01] > -1e-9).all() and error[4, 0.01].max() < 4e-5
+    assert np.log2(error[4, 0.02].mean() / error[4, 0.01].mean()) == pytest.approx(2, abs=0.15)
+    assert (error[12, 0.02] < 0.7 * error[4, 0.02]).all()
+    assert np.abs(exact / lowest(alike) - 1).max() > 5e-3
+
+
+def test_a_blade_that_is_not_the_disc_s():
+    """Other cells, or more modes than it has."""
+    own = blade(3)[1]
+    points = own.stresses["gauss"]
+    moved = replace(own, stresses={"gauss": replace(points, points=points.points + 1e-3)})
+    for wrong, modes in ((moved, 3), (own, 4)):
+        with pytest.raises(UserError, match="blade"):
+            of_blade_modes(disc(4), wrong, np.zeros((N, modes)))
 
 
 def test_the_order_of_the_sectors_turns_with_the_ring():

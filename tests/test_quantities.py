@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ import microslip as ms
 from microslip.case.curves import Followed
 from microslip.harmonic_balance.envelope import Envelope, OverOrders
 from microslip.harmonic_balance.readout import measured
+from microslip.pictures.response import _driven_by
 from microslip.system.assembly import Assembly, Output
 from microslip.system.component import Component
 from microslip.units import METRES, Quantity, amplitude_of, counted, percent
@@ -64,3 +66,11 @@ def test_each_read_out_of_two_tones_has_its_own_unit() -> None:
     }  # fmt: skip
     found = ms.two_tones(ms.assemble(case, vane=ms.sample()), [500.0], second=707.3, harmonics=1)
     assert found.units == ("1", "m") and "amplitude_m" in found.columns(1)
+
+
+@pytest.mark.parametrize(("row", "unit"), [("gas", "Pa"), ("shaker", "N")])
+def test_the_picture_of_a_response_tells_the_unit_of_its_load(row: str, unit: str) -> None:
+    """A pressure is none in newtons."""
+    case = {"body": "small", "excitation": row, "amplitude": 20.0, "monitor": "tip-probe", "contacts": []}
+    built = ms.assemble(case, small=small_basis())
+    assert _driven_by(SimpleNamespace(settings=built.settings, built=built)) == f" to 20 {unit} at {row}"

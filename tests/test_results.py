@@ -9,13 +9,15 @@ import subprocess
 import sys
 import time
 from dataclasses import replace
+from types import SimpleNamespace
 
 import h5py
 import numpy as np
 import pytest
 from small import basis as small_basis
 
-from microslip.data import UserError
+from microslip.errors import UserError
+from microslip.harmonic_balance import reduced
 from microslip.results import (
     Body,
     Response,
@@ -223,6 +225,35 @@ def test_response_round_trip(tmp_path):
     with h5py.File(tmp_path / "response.h5") as file:
         assert file["series_0000/bodies/blade/q"].attrs["unit"] == "m kg^1/2"
         assert file["series_0000/frequency"].attrs["unit"] == "Hz"
+
+
+def test_readouts_of_a_file_are_those_that_were_asked_for_in_their_order_and_units(tmp_path):
+    """A monitor may be called like a quantity, and the first one need not be the first in the alphabet."""
+    rows = {"monitors/zeta": ["u_z", "u_x"], "gauges/limit": ["strain"], "monitors/force": ["u_x"]}
+    sizes = {name: (1 + i) * np.ones((len(of), 2)) for i, (name, of) in enumerate(rows.items())}
+    written = response_of({**HEAD, "labels": rows}, {"one": {f: point(f) | sizes for f in (1.0, 2.0)}})
+    write_response(tmp_path / "response.h5", written)
+    (one,) = read_response(tmp_path / "response.h5").series
+    assert one.readouts[:4] == written.series[0].readouts[3:] == ("zeta u_z", "zeta u_x", "limit", "force")
+    assert [one.harmonics(n)[0, 1].real for n in one.readouts[:4]] == [1, 1, 2, 3]
+    seen = one.to_xarray()
+    assert [seen[n].units for n in ("monitors.zeta", "gauges.limit", "monitors.force")] == ["m", "1", "m"]
+    with h5py.File(tmp_path / "response.h5") as file:
+        assert file["series_0000/monitors/force"].attrs["unit"] == "m"
+    assert [one.plot(readout=i).get_ylabel() for i in (1, 2)] == ["amplitude in m", "amplitude in m/m"]
+
+
+def test_what_reads_nothing_but_rounding_reads_nothing():
+    """Of two coordinates that move alike the difference is no motion; of one that hardly moves its own is."""
+    output = np.array([[1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [0.0, 0.0, 3.0]])
+    part = SimpleNamespace(output=output, output_residual=np.zeros((3, 0)), output_given=np.zeros(3))
+    q = np.array([[1.0, 1.0 - 2e-16, 1e-20], [1.0, 1.0 - 1e-6, 0.0]], dtype=complex)
+    found = reduced.read([part, part], q, np.zeros((2, 0)))
+    np.testing.assert_allclose(found, [[0, 1e-6], [0, 1e-6], [3e-20, 0]], rtol=1e-9, atol=0)
+    labels = {"gauges/root": ["strain"], "monitors/tip-probe": ["u_x", "u_y", "u_z"]}
+    still = point(1.0) | {"gauges/root": np.zeros((1, 2), complex)}
+    (one,) = response_of({**HEAD, "labels": labels}, {"one": {1.0: {n: still[n] for n in [*labels, *still]}}}).series
+    assert "root does not move" in repr(one)
 
 
 def test_same_response_same_bytes(tmp_path):

@@ -6,6 +6,7 @@ import contextlib
 import json
 import re
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import meshio
@@ -91,8 +92,12 @@ def test_a_root_moves_its_bodies_through_one_period_as_cosine_and_sine(tmp_path:
 
 
 def test_limit_cycles_by_harmonic_balance_are_the_circles_of_the_normal_form() -> None:
-    """Radius sqrt(p), frequency 1; a motion in time stays on them."""
-    (found,) = cycles(normal_form(), np.zeros(2), -1.0, 1.0, 2, (0.5, 2.0))
+    """Radius sqrt(p), frequency 1; a motion in time stays on them. Tables tell the units of read-outs."""
+    read = replace(normal_form(), units=("rad", "m"))
+    (found,) = cycles(read, np.zeros(2), -1.0, 1.0, 2, (0.5, 2.0))
+    radius = found.columns[f"amplitude {read.labels[0]}_rad"]
+    np.testing.assert_allclose(radius, np.sqrt([o.p for o in found.orbits]), rtol=1e-3)  # of samples
+    assert f"in time {read.labels[1]}_m" in found.columns
     assert found.supercritical and "bound" in found.ended and not found.lost
     for o in found.orbits:
         assert np.hypot(*o.at(np.zeros(1))[0]) == pytest.approx(np.sqrt(o.p), abs=1e-8)

@@ -18,7 +18,7 @@ import gmsh
 import numpy as np
 
 from microslip.cad import checked, name_body, name_face, positive_size, run, surfaces_where
-from microslip.data import UserError
+from microslip.errors import UserError
 
 Tiles = list[tuple[int, int]]  # gmsh's (dimension, tag)
 

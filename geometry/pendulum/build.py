@@ -22,7 +22,7 @@ import gmsh
 import numpy as np
 
 from microslip.cad import checked, name_body, name_face, run, surfaces_where
-from microslip.data import UserError
+from microslip.errors import UserError
 
 DEFAULTS = {  # mm
     "contact_radius": 400.0,  # axis to the centre of contact_tip

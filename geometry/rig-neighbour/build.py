@@ -15,7 +15,7 @@ import gmsh
 import numpy as np
 
 from microslip.cad import checked, name_body, name_face, run, surfaces_where
-from microslip.data import UserError
+from microslip.errors import UserError
 
 DEFAULTS = {  # mm
     "arrangement": 1,

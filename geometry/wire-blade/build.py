@@ -16,7 +16,7 @@ import gmsh
 import numpy as np
 
 from microslip.cad import checked, name_body, name_face, round_section, run, strip_centre, surfaces_where
-from microslip.data import UserError
+from microslip.errors import UserError
 
 DEFAULTS = {  # mm
     "blades": 28,

@@ -19,7 +19,7 @@ import gmsh
 import numpy as np
 
 from microslip.cad import checked, name_body, name_face, positive_size, round_section, run, strip_centre, surfaces_where
-from microslip.data import UserError
+from microslip.errors import UserError
 
 DEFAULTS = {  # mm
     "blades": 28,

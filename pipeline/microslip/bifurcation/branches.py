@@ -12,6 +12,7 @@ import numpy as np
 
 from ..data import Array, ComplexArray
 from ..files import hdf5, store
+from ..units import Quantity
 from .dynamics import Dynamics
 from .orbits import Found
 from .shooting import Orbit
@@ -35,7 +36,8 @@ class Branch:
     """Equilibria, or periodic orbits, along one curve.
 
     Attributes:
-        name. born: of what. ended: why. turns: k of what drives in a period. outputs: names of the w read-outs.
+        name. born: of what. ended: why. turns: k of what drives in a period. outputs: names of the w read-outs. units:
+            of each, SI; empty if they are not known.
         parameter: (k,). period: (k,) s, not a number for equilibria. x: (k, m, n) nodes, one of an equilibrium.
         largest, smallest: (k, w) of the read-outs. multipliers: (k, e) Floquet multipliers, of an equilibrium
             eigenvalues in 1/s. stable: (k,). kind: (k,) of `orbits.Kind`, or ``Hopf``.
@@ -54,6 +56,7 @@ class Branch:
     multipliers: ComplexArray
     stable: Array
     kind: Array
+    units: tuple[str, ...] = ()
 
     def __len__(self) -> int:
         return len(self.parameter)
@@ -107,7 +110,7 @@ def of_orbits(name: str, born: str, ended: str, found: list[Found], each: int = 
         np.array([o.p for o in orbits]), np.array([o.period for o in orbits]), np.array([o.x for o in orbits]),
         np.array([y.max(axis=0) for y in seen]), np.array([y.min(axis=0) for y in seen]),
         np.array([one.multipliers for one in found]), np.array([one.stable for one in found]),
-        np.array([one.kind for one in found]),
+        np.array([one.kind for one in found]), orbits[0].system.units,
     )  # fmt: skip
 
 
@@ -151,8 +154,9 @@ def columns(branch: Branch) -> dict[str, Any]:
                              "parameter": branch.parameter, "stable": branch.stable.astype(int),
                              "period_s": branch.period}  # fmt: skip
     for i, name in enumerate(branch.outputs):
-        key = name.replace(" ", "_")
-        found |= {f"{key}_largest": branch.largest[:, i], f"{key}_smallest": branch.smallest[:, i]}
+        column = Quantity(branch.units[i]).column if branch.units else str
+        for what in ("largest", "smallest"):
+            found[column(f"{name.replace(' ', '_')}_{what}")] = getattr(branch, what)[:, i]
     first = np.abs(branch.multipliers).max(axis=1, initial=0.0)
     decisive = branch.multipliers[:, 0] if branch.multipliers.shape[1] else np.zeros(len(branch), complex)
     return found | {"multiplier_real": decisive.real, "multiplier_imaginary": decisive.imag} | (
@@ -161,6 +165,7 @@ def columns(branch: Branch) -> dict[str, Any]:
 
 
 TEXTS = ("name", "born", "ended")
+LISTS = ("outputs", "units")
 ARRAYS = {"parameter": "", "period": "s", "x": "", "largest": "", "smallest": "", "multipliers": "", "stable": "",
           "kind": ""}  # fmt: skip
 
@@ -168,7 +173,9 @@ ARRAYS = {"parameter": "", "period": "s", "x": "", "largest": "", "smallest": ""
 def put(group: h5py.Group, branch: Branch) -> None:
     for key in TEXTS:
         group.attrs[key] = getattr(branch, key)
-    group.attrs["turns"], group.attrs["outputs"] = branch.turns, "\n".join(branch.outputs)
+    group.attrs["turns"] = branch.turns
+    for key in LISTS:
+        group.attrs[key] = "\n".join(getattr(branch, key))
     for key, unit in ARRAYS.items():
         values = getattr(branch, key)
         hdf5.put(group, key, values.astype(np.int8) if values.dtype == bool else values, unit)
@@ -179,8 +186,8 @@ def get(group: h5py.Group) -> Branch:
     arrays: dict[str, Any] = {key: group[key][()] for key in ARRAYS}
     arrays["multipliers"] = arrays["multipliers"] + 1j * group["multipliers" + hdf5.IMAGINARY][()]
     arrays["stable"], arrays["kind"] = arrays["stable"].astype(bool), np.char.decode(arrays["kind"], "utf-8")
-    outputs = tuple(str(group.attrs["outputs"]).split("\n")) if group.attrs["outputs"] else ()
-    return Branch(turns=int(group.attrs["turns"]), outputs=outputs, **texts, **arrays)
+    lists: dict[str, Any] = {key: tuple(str(group.attrs.get(key, "")).splitlines()) for key in LISTS}
+    return Branch(turns=int(group.attrs["turns"]), **lists, **texts, **arrays)
 
 
 def write(path: Path, branch: Branch, inputs: str) -> None:

@@ -97,9 +97,9 @@ class Cycles:
         return {
             "parameter": np.array([o.p for o in self.orbits]),
             "frequency_Hz": np.array([o.omega / (2 * np.pi) for o in self.orbits]),
-            **{f"amplitude {name}": np.array([s[i] for s in swing]) for i, name in enumerate(self.system.named)},
+            **{self.system.column("amplitude", i): y for i, y in enumerate(np.array(swing).T)},
             "highest_harmonic": np.array([self._tail(o) for o in self.orbits]),
-            **{f"in time {name}": swing for name, swing in zip(self.system.named, in_time.T, strict=True)},
+            **{self.system.column("in time", i): y for i, y in enumerate(in_time.T)},
             "in_time_leaves_by": self._told(lambda c: c.drift),
             "harmonics": self._told(lambda c: c.orbit.count),
             "estimated_error": self._told(lambda c: c.error),

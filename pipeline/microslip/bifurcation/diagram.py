@@ -74,7 +74,7 @@ class Diagram(Collected):
     def plot(self, axes: Axes, label: str = "parameter", read_out: int = 0) -> None:
         """Half of the way from the smallest to the largest value of a read-out, in matplotlib's axes."""
         dots = [(a.orbit.p, float(a.swing[read_out])) for a in self.attractors]
-        draw(self.branches, dots, axes, label, self.system.named[read_out], self.system.unit(read_out), read_out)
+        draw(self.branches, dots, axes, label, read_out)
 
 
 @dataclass(eq=False)
@@ -265,6 +265,7 @@ def _equilibria(system: Dynamics, x: Array, asked: Asked) -> Branch:
     return Branch(
         EQUILIBRIA, "the start", state.status, 1, system.named, P, np.full(len(P), np.nan), X[:, None], seen, seen,
         values, values.real.max(axis=1) <= 0, np.array([r[2] for r in rows]),
+        system.units,
     )  # fmt: skip
 
 

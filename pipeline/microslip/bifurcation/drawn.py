@@ -18,12 +18,12 @@ MARKS = {"Hopf": ("o", "Hopf point"), "fold": ("D", "fold"), "period doubling": 
 
 
 def draw(
-    branches: Sequence[Branch], dots: Sequence[tuple[float, float]], axes: Axes, axis: str, name: str, unit: str = "",
-    read_out: int = 0,
-) -> None:  # fmt: skip
+    branches: Sequence[Branch], dots: Sequence[tuple[float, float]], axes: Axes, axis: str, read_out: int = 0
+) -> None:
     """Branches in the axes: lines where stable, dashes where not, marks where something happens."""
     top = max(float(np.abs(b.swing[:, read_out]).max(initial=0.0)) for b in branches)
-    factor, unit = Quantity(unit).scale(top) if unit in ("m", "rad", "1") else (1.0, unit)
+    name, units = branches[0].outputs[read_out], branches[0].units
+    factor, unit = Quantity(units[read_out]).scale(top) if units else (1.0, "")
     for i, branch in enumerate(branches):
         y = factor * branch.swing[:, read_out]
         colour = "#30343c" if branch.still else f"C{(i - 1) % 10}"

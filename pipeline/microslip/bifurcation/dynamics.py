@@ -12,6 +12,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from ..data import Array
+from ..units import Quantity
 
 jax.config.update("jax_enable_x64", True)
 
@@ -55,9 +56,10 @@ class Dynamics:
         """(w,) of the read-outs."""
         return self.outputs or self.labels
 
-    def unit(self, output: int = 0) -> str:
-        """Of a read-out; empty if it is not known."""
-        return self.units[output] if self.units else ""
+    def column(self, what: str, output: int = 0) -> str:
+        """Name of a column of a table about a read-out, with its unit if that is known."""
+        name = f"{what} {self.named[output]}"
+        return Quantity(self.units[output]).column(name) if self.units else name
 
     @cached_property
     def still(self) -> Callable[[Any, Any], tuple[Any, Any, Any]]:

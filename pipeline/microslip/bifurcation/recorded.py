@@ -34,10 +34,10 @@ class Branches(Collected):
     def __len__(self) -> int:
         return len(self.branches)
 
-    def plot(self, axes: Axes, read_out: int = 0, unit: str = "m") -> None:
+    def plot(self, axes: Axes, read_out: int = 0) -> None:
         """Half of the way from the smallest to the largest value of a read-out, in matplotlib's axes."""
         axis = f"{self.parameter} in {self.unit}".removesuffix(" in ")
-        draw(self.branches, [], axes, axis, self.branches[0].outputs[read_out], unit, read_out)
+        draw(self.branches, [], axes, axis, read_out)
 
     def __repr__(self) -> str:
         return f"<Branches: {self.name}, over {self.parameter}: {', '.join(b.name for b in self.branches)}>"

@@ -17,9 +17,9 @@ from ..system.assembly import Assembly, Contact, Load, Output
 from ..system.component import Component, Ring
 from ..system.spin import Spin, turned
 from .compliance import Springs, residual_share
-from .contacts import axis_of, contact_at, described, of_force, springs_of, swept
+from .contacts import contact_at, described, of_force, springs_of, swept
 from .driving import as_asked, flow_of, loads_of, messages_of, with_field
-from .loaded import Loaded, body_of, load_bodies, place_of
+from .loaded import Loaded, axis_of, body_of, load_bodies, place_of
 from .points import (
     fitting_forces,
     follows_the_force,
@@ -154,7 +154,7 @@ def _spun(
             continue
         where, name = f"{path}: contacts.{c.interface}.ground", settings.ends(c)[1][0]
         b = body_of(bodies, name, path, f"contacts.{c.interface}")
-        spin = c.ground.spin(*axis_of(b), place_of(b))
+        spin = c.ground.spin(*axis_of(b.settings, b.basis), place_of(b))
         other, inert = spins.setdefault(name, (spin, c.ground.inertia))
         if not spin.same(other) or inert != c.ground.inertia:
             raise UserError(

@@ -27,7 +27,7 @@ from ..system.ground import Ground
 from ..system.nodal import Nodal, nodal, static_compliance
 from ..system.pairing import Pairing, facing, in_ring
 from .compliance import Face, Springs, counted_once, static_answer
-from .loaded import Loaded, body_of, place_of
+from .loaded import Loaded, axis_of, body_of, place_of
 from .points import (
     curved_springs,
     nodal_patch,
@@ -125,13 +125,7 @@ def _ground(c: ContactSettings, loaded: list[Loaded], face: Interface) -> Ground
     """How the other side of a contact moves; about the axis of its body, where nothing else is said."""
     if c.ground is None:
         return None
-    return c.ground.ground(*axis_of(loaded[-1]), face, place_of(loaded[0]))
-
-
-def axis_of(b: Loaded) -> tuple[Array, Array]:
-    """Direction and a point of the axis of a body, in the axes of the case."""
-    place = place_of(b)
-    return place.turn @ b.basis.rotation_axis, place.turn @ b.basis.rotation_point + place.shift
+    return c.ground.ground(*axis_of(loaded[-1].settings, loaded[-1].basis), face, place_of(loaded[0]))
 
 
 def memory_of(settings: CaseSettings, points: int, coordinates: int) -> float:

@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 
 from ..continuation import Settings
-from ..data import Array, UserError
+from ..data import Array
+from ..errors import UserError
 from ..harmonic_balance import families
 from ..harmonic_balance.checkpoint import labels, points_of_curve, resumed_curve
 from ..harmonic_balance.envelope import largest
@@ -37,6 +38,8 @@ OVER = ("frequency", "load", "normal_force")
 
 UNITS = {"frequency": "Hz", "load": "of the load", "normal_force": "N"}
 COLUMNS = {"frequency": "frequency_Hz", "load": "load", "normal_force": "normal_force_N"}
+OF_SERIES = {"frequency": "frequency", "load": "load", "normal_force": "normal_force_N"}
+"""What its series runs over, of `results.series.OVER`."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -214,7 +217,7 @@ def _followed(
 ) -> Followed:  # fmt: skip
     """A curve with its points, kept in a series of the journal."""
     told = {**journal.head.get("parameters", {}), one.name: {"normal_force": normal}}
-    journal.say({**journal.head, "parameters": told, "labels": labels(problem), "over": one.over})
+    journal.say({**journal.head, "parameters": told, "labels": labels(problem), "over": OF_SERIES[one.over]})
     report(f"curve over the {one.over.replace('_', ' ')}, {one.label}")
     branch, rows = resumed_curve(family, journal, one.name, report, how)
     return replace(one, rows=rows, status=branch.status)

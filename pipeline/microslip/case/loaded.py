@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..data import Interface, ModalBasis, ModalGroup
+from ..data import Array, Interface, ModalBasis, ModalGroup
 from ..errors import UserError, told_of
 from ..frames import rotation
 from ..modal.speed_range import basis_at
@@ -143,7 +143,17 @@ def body_of(bodies: Mapping[str, Loaded], name: str, path: Path | str, key: str)
 
 def place_of(b: Loaded) -> Place:
     """Where a body stands in the axes of the case."""
+    return placed(b.settings, b.basis)
 
-    R = rotation(b.basis.rotation_axis, np.radians(b.settings.turn))
-    centre = b.basis.rotation_point
-    return Place(R, centre - R @ centre + np.asarray(b.settings.shift))
+
+def placed(b: BodyOfCase, basis: ModalBasis) -> Place:
+    """Where a case puts the body of a modal file."""
+    R = rotation(basis.rotation_axis, np.radians(b.turn))
+    centre = basis.rotation_point
+    return Place(R, centre - R @ centre + np.asarray(b.shift))
+
+
+def axis_of(b: BodyOfCase, basis: ModalBasis) -> tuple[Array, Array]:
+    """Direction and a point of the axis of a body, in the axes of the case."""
+    place = placed(b, basis)
+    return place.turn @ basis.rotation_axis, place.turn @ basis.rotation_point + place.shift

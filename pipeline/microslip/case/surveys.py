@@ -121,7 +121,14 @@ def over_speeds(
 
 
 def _at_speed(settings: CaseSettings, turning: list[str], rpm: float) -> CaseSettings:
-    bodies = tuple(b.model_copy(update={"speed_rpm": rpm}) if b.name in turning else b for b in settings.components)
+    """The case at a speed: of bodies whose files know it, of loose ones that it presses, of centrifugal loads."""
+    own = [
+        {"speed_rpm": b.name in turning, "pressed_at_rpm": b.pressed_at_rpm is not None} for b in settings.components
+    ]
+    bodies = tuple(
+        b.model_copy(update={key: rpm for key, follows in of.items() if follows})
+        for b, of in zip(settings.components, own, strict=True)
+    )
     loads = tuple(x if x.speed_rpm is None else x.model_copy(update={"speed_rpm": rpm}) for x in settings.loads)
     return settings.model_copy(update={"bodies": bodies, "excitations": loads})
 

@@ -10,6 +10,7 @@ import scipy.optimize
 
 from ..data import Array, ModalBasis
 from ..errors import UserError
+from .loaded import axis_of, placed
 from .settings import BodyOfCase, CaseSettings
 
 UNHELD = 0.05
@@ -29,20 +30,30 @@ def thrown(settings: CaseSettings, bases: Mapping[str, ModalBasis], path: Path |
             continue
         where = f"{path}: bodies.{b.name}.pressed_at_rpm"
         faces = {i: face for i, c in enumerate(contacts) for body, face in settings.ends(c) if body == b.name}
-        for i, force in zip(faces, normal_forces(b, bases[b.name], list(faces.values()), where), strict=True):
+        others = [body for i in faces for body, _ in settings.ends(contacts[i]) if body != b.name]
+        holder = next((m for m in settings.components if m.name in others[:1]), b)
+        about = axis_of(holder, bases[holder.name])
+        for i, force in zip(faces, normal_forces(b, bases[b.name], list(faces.values()), where, about), strict=True):
             if contacts[i].normal_force is not None or contacts[i].interference is not None:
                 raise UserError(f"{where}: contacts.{contacts[i].interface} is pressed already; leave one of both out")
             contacts[i] = contacts[i].model_copy(update={"normal_force": force})
     return settings.model_copy(update={"contacts": tuple(contacts)})
 
 
-def normal_forces(b: BodyOfCase, basis: ModalBasis, faces: list[str], where: str) -> list[float]:
+def normal_forces(
+    b: BodyOfCase, basis: ModalBasis, faces: list[str], where: str, about: tuple[Array, Array] | None = None
+) -> list[float]:
     """N, of every face: none pulls, and together they balance m r Omega^2 at the centre of mass, without friction.
 
     Of two flanks under a roof of angle alpha each carries m r Omega^2 / (2 sin(alpha / 2)).
+
+    Args:
+        about: direction and a point of the axis, in the axes of the case: of the body that holds it, whose file knows
+            where it turns; its own if not given.
     """
-    arm = basis.centre - basis.rotation_point
-    radius = arm - (arm @ basis.rotation_axis) * basis.rotation_axis
+    place, (axis, point) = placed(b, basis), about or axis_of(b, basis)
+    arm = place.turn @ basis.centre + place.shift - point
+    radius = place.turn.T @ (arm - (arm @ axis) * axis)
     load: Array = (b.mass or basis.mass) * radius * ((b.pressed_at_rpm or 0.0) * np.pi / 30) ** 2
     known = next(iter(basis.groups.values())).interfaces
     normals = np.array([known[name].rotation[0] for name in faces if name in known]).reshape(-1, 3)

@@ -23,7 +23,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..continuation import Point, Settings, follow, start
-from ..data import Array, UserError
+from ..data import Array
+from ..errors import UserError
 from ..files.hdf5 import refuse_foreign
 from ..results.checks import Checks
 from ..results.files import FORMAT, Response, write_response
@@ -124,8 +125,9 @@ class Backbone:
         known = {"frequency": self.frequency, "parameter": self.amplitude, "damping_ratio": self.damping, "x": self.x}
         known |= {f"checks/{n.name}": np.array([getattr(c, n.name) for c in self.checks]) for n in fields(Checks)}
         status = tuple(c.failure or CONVERGED for c in self.checks)
-        series = Series("nonlinear mode", {"stuck": self.stuck}, self.amplitude, status, known, over=OVER_AMPLITUDE)
         labels = {"parameter": (self.quantity.unit,)}
+        told = {"stuck": self.stuck}
+        series = Series("nonlinear mode", told, self.amplitude, status, known, labels, OVER_AMPLITUDE)
         write_response(path, Response("nonlinear mode", "aft", (series,), description=self.status, labels=labels))
         return Path(path)
 
@@ -146,11 +148,11 @@ class Backbone:
         return self.status == REACHED
 
 
-def _in_words(status: str, points: Sequence[Point], low: float, high: float) -> str:
+def _in_words(status: str, points: Sequence[Point], low: float, high: float, of: Quantity) -> str:
     """Why a curve between two amplitudes ended, without the logarithm that it runs over."""
     if not status.startswith("bound"):
         return status
-    back = f"it came back to {low:.4g} m without reaching {high:.4g} m; take another low"
+    back = f"it came back to {low:.4g} {of.said} without reaching {high:.4g} {of.said}; take another low"
     return REACHED if points[-1].lam > np.log(low) else back
 
 
@@ -199,8 +201,8 @@ def backbone(
     Omega, xi = (np.array([p.x[i] for p in points]) for i in (-2, -1))
     x = np.array([p.x[:-2] * a / problem.length for p, a in zip(points, A, strict=True)]).reshape(len(A), len(z) - 2)
     found = tuple(curve.checks(*one) for one in zip(x, Omega, xi, strict=True))
-    status = next((one.failure for one in found if one.failure), _in_words(state.status, points, low, high))
     quantity = measured(problem.assembly, output)
+    status = next((one.failure for one in found if one.failure), _in_words(state.status, points, low, high, quantity))
     return Backbone(A, Omega, xi / (2 * Omega) if len(A) else xi, x, omega, status, found, quantity)
 
 

@@ -327,14 +327,22 @@ def _alike(a: Linear, b: Linear) -> bool:
     return all(x is y or (x is not None and y is not None and np.array_equal(x, y)) for x, y in pairs)
 
 
+READS = 1e-10
+"""Share of what coordinates as large could make a read-out, below which it reads their rounding: by symmetry, say."""
+
+
 def monitored(part: Linear, q: ComplexArray, force: ComplexArray, share: float = 1.0) -> ComplexArray:
-    """(w,) read-outs under (c,) contact forces less the preload and a share of the loads, of one harmonic."""
-    return moved(part, q, force) + share * part.output_given
+    """(w,) read-outs of one harmonic, see `read`."""
+    return read([part], q[None], force[None], share)[:, 0]
 
 
-def moved(part: Linear, q: ComplexArray, force: ComplexArray) -> ComplexArray:
-    """(w, ...) read-outs by (m, ...) coordinates and (c, ...) contact forces less the preload alone."""
-    return part.output @ q - part.output_residual @ force
+def read(parts: Sequence[Linear], q: ComplexArray, force: ComplexArray, share: float = 1.0) -> ComplexArray:
+    """(w, g) read-outs by coordinates (g, m), contact forces (g, c) less the preload, and a share of the loads, over g
+    harmonics of one wave; parts (g,), equal but for the loads. What is rounding is zero."""
+    output, given = parts[0].output, np.array([part.output_given for part in parts]).T
+    found = output @ q.T - parts[0].output_residual @ force.T + share * given
+    moved = np.sqrt((output != 0) @ np.abs(q.T) ** 2)  # of the coordinates that a read-out has to do with
+    return np.where(np.abs(found) > READS * np.linalg.norm(output, axis=1)[:, None] * moved, found, 0.0)
 
 
 def work(

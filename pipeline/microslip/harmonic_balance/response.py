@@ -69,8 +69,7 @@ def operating(problem: Problem, point: Point) -> Operating:
         for i, s in enumerate(p.slices):
             parts, own, F = [p.parts[h][i] for h in hs], np.array([q[h][i] for h in hs]), f[hs, s]
             share = p.share if hs[0] else 1.0
-            outputs[:, hs] += reduced.moved(parts[0], own.T, F.T)
-            outputs[:, hs] += share * np.array([part.output_given for part in parts]).T
+            outputs[:, hs] += reduced.read(parts, own, F, share)
             if hs[0]:
                 work += reduced.work(parts, at.Omega, hs, own, F, share)
     found = Operating(

@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 
 from .. import continuation
-from ..data import Array, UserError
+from ..data import Array
+from ..errors import UserError
 from ..settings.mistakes import bounded
 from . import pseudo_transient
 from .forces import AFT

@@ -9,6 +9,7 @@ import numpy as np
 
 from ..bifurcation.branches import Branch
 from ..bifurcation.diagram import Diagram
+from ..units import Quantity
 from .plots import COLOURS, empty_figure, plain_axes, save_figure, single_panel
 
 if TYPE_CHECKING:
@@ -42,15 +43,17 @@ def portraits_picture(found: Diagram, path: Path, title: str, unit: str) -> Path
     return save_figure(figure, path)
 
 
-def _portraits(found: Diagram, branch: Branch, axes: Axes, unit: str) -> None:
+def _portraits(found: Diagram, branch: Branch, axes: Axes, parameter_unit: str) -> None:
     for k, i in enumerate(dict.fromkeys(np.linspace(0, len(branch) - 1, SHOWN).round().astype(int).tolist())):
         orbit = branch.orbit(found.system, i)
         y = found.system.seen(orbit.sampled(16), orbit.p)[:, 0]
         y = np.append(y, y[0])
         velocity = np.gradient(np.concatenate([y[-3:-1], y, y[1:3]]), orbit.period / (len(y) - 1))[2:-2]
         style = "-" if branch.stable[i] else (0, (4, 3))
-        label = f"{orbit.p:.4g} {unit}".strip()
+        label = f"{orbit.p:.4g} {parameter_unit}".strip()
         axes.plot(y, velocity, ls=style, lw=1.3, color=COLOURS[k], label=label)
-    axes.set(xlabel=found.system.named[0], ylabel="velocity")
+    unit = Quantity(branch.units[0]).said if branch.units else ""
+    axes.set(xlabel=f"{found.system.named[0]} in {unit}".removesuffix(" in "))
+    axes.set(ylabel=f"velocity in {unit}/s" if unit else "velocity")
     axes.set_title(branch.name, fontsize=9)
     axes.legend(fontsize=7, frameon=False, ncols=3, loc="upper center", bbox_to_anchor=(0.5, -0.14))

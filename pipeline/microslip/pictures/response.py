@@ -62,8 +62,7 @@ def response_picture(
     axes.set_xlabel("excitation frequency in Hz")
     of = f" of {_read(s, first.quantity) if first.number == 0 else first.name}" * (len(shown) == 1)
     axes.set_ylabel(f"amplitude{of and of + ','} in {first.quantity.micro} (0-peak)")
-    to = f" to {s.amplitude:g} N at {s.excitation}" if s.excitation else ""
-    axes.set_title(f"{s.name}: friction response{to}")
+    axes.set_title(f"{s.name}: friction response{_driven_by(result)}")
     axes.grid(True, which="both", alpha=0.25)
     told = "dashed, grey: sticking contacts" if len(shown) > 1 else "dashed: sticking contacts"
     if len(result.responses) > 1:
@@ -73,6 +72,17 @@ def response_picture(
     handles, labels = _by_rows(*axes.get_legend_handles_labels(), columns)
     figure.legend(handles, labels, loc="outside lower center", ncols=columns, fontsize=9, title=told, title_fontsize=8)
     write_png(figure, path)
+
+
+def _driven_by(result: CaseResult) -> str:
+    """The only excitation, if it is one; a force or a pressure."""
+    s, assembly = result.settings, result.built.assembly
+    if not s.excitation:
+        return ""
+    load = assembly.loads[0]
+    groups = next(m for m in assembly.components if m.name == load.component).groups
+    unit = next(iter(groups.values())).excitations[load.row].unit
+    return f" to {s.amplitude:g} {unit} at {s.excitation}"
 
 
 def _curves(

@@ -12,6 +12,7 @@ from ..bifurcation.cycles import Cycles
 from ..roots.diagram import Diagram
 from ..roots.map import Map
 from ..roots.spectrum import Spectrum
+from ..units import Quantity
 from .plots import empty_figure, plain_axes, save_figure, single_panel
 
 
@@ -56,19 +57,24 @@ def cycles_picture(found: Sequence[Cycles], title: str, path: Path) -> Path:
     """Amplitude of limit cycles over the parameter: in blue from supercritical Hopf points, in red from others;
     dots are motions in time."""
     figure, axes = single_panel(7.0, 4.4)
-    name = found[0].system.named[0]
     for number, c in enumerate(found):
         columns, colour = c.columns, KINDS[c.kind]
+        height, seen = (1e6 * columns[c.system.column(what)] for what in ("amplitude", "in time"))
         label = f"{c.hopf.omega / (2 * np.pi):.5g} Hz, {c.kind}"
-        axes.plot(columns["parameter"], 1e6 * columns[f"amplitude {name}"], color=colour, marker=".", label=label)
+        axes.plot(columns["parameter"], height, color=colour, marker=".", label=label)
         axes.plot(c.hopf.p, 0.0, "o", color="white", markeredgecolor=colour, zorder=3)
         axes.plot(
-            columns["parameter"], 1e6 * columns[f"in time {name}"], "o", color=IN_TIME, markeredgecolor="black",
-            markersize=8, zorder=4, label="" if number else TOLD_IN_TIME,
+            columns["parameter"], seen, "o", color=IN_TIME, markeredgecolor="black", markersize=8, zorder=4,
+            label="" if number else TOLD_IN_TIME,
         )  # fmt: skip
-    axes.set(xlabel=title, ylabel=f"amplitude {name} in um")
+    axes.set(xlabel=title, ylabel=_amplitude(found[0]))
     axes.legend(frameon=False, fontsize=9)
     return save_figure(figure, path)
+
+
+def _amplitude(c: Cycles) -> str:
+    """What is drawn a million times as large."""
+    return f"amplitude {c.system.named[0]} in {Quantity(*c.system.units[:1]).micro}"
 
 
 def relief_picture(found: Sequence[tuple[float, Cycles]], titles: tuple[str, str], path: Path) -> Path:
@@ -83,7 +89,7 @@ def relief_picture(found: Sequence[tuple[float, Cycles]], titles: tuple[str, str
         _wall(axes, value, c, 3 * depth)
     axes.set_xlabel(titles[0], labelpad=8)
     axes.set_ylabel(titles[1], labelpad=14)
-    axes.set_zlabel(f"amplitude {found[0][1].system.named[0]} in um")
+    axes.set_zlabel(_amplitude(found[0][1]))
     axes.set_yticks(sorted({value for value, _ in found})[:: -(-len(found) // 8)])
     axes.set_zlim(0.0)
     axes.view_init(24, -62)
@@ -98,9 +104,9 @@ def relief_picture(found: Sequence[tuple[float, Cycles]], titles: tuple[str, str
 def _wall(axes: Any, value: float, c: Cycles, order: int) -> None:
     from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
-    columns, colour, name = c.columns, KINDS[c.kind], c.system.named[0]
-    x, z = np.append(c.hopf.p, columns["parameter"]), 1e6 * np.append(0.0, columns[f"amplitude {name}"])
-    y, dots = np.full(len(x), value), 1e6 * columns[f"in time {name}"]
+    columns, colour = c.columns, KINDS[c.kind]
+    x, z = np.append(c.hopf.p, columns["parameter"]), 1e6 * np.append(0.0, columns[c.system.column("amplitude")])
+    y, dots = np.full(len(x), value), 1e6 * columns[c.system.column("in time")]
     wall = np.concatenate([np.column_stack([x, y, z]), np.column_stack([x, y, 0 * z])[::-1]])
     axes.add_collection3d(Poly3DCollection([wall], facecolor=colour, alpha=0.18, zorder=order))
     axes.plot(x, y, z, color=colour, linewidth=1.8, zorder=order + 1, label=c.kind)

@@ -30,6 +30,9 @@ the square of the samples: 64 leave 2e-4 of forty random systems in the median a
 MOTION = 1e-4
 """Share of the contacts' motion by which the bodies' may differ from it."""
 
+ROUNDING = 1e-9
+"""Share of what a motion as large could make a read-out, in which its rounding lies."""
+
 EXCHANGED = 1e-6
 """Of the energy that goes to and fro in loads and contacts without loss, this much counts as supplied: differences of
 less cannot be told from rounding."""
@@ -217,7 +220,9 @@ def _read_again(response: Response, s: Series, bases: Mapping[str, ModalBasis]) 
         mine = [list(held.labels).index(label) for label in response.labels.get(name, held.labels)]
         kept = np.moveaxis(s.arrays[name][s.converged], -1, 1)
         off = np.abs(read[:, : kept.shape[1], mine] - kept).max(initial=0.0)
-        off /= max(float(np.abs(kept).max(initial=0.0)), 1e-300)
+        q = np.linalg.norm(s.arrays[f"bodies/{component}/q"], axis=2).max(initial=0.0)
+        most = np.linalg.norm(held.rows) * q  # of which a read-out of nothing but rounding is a small share
+        off /= max(float(np.abs(kept).max(initial=0.0)), ROUNDING / MOTION * float(most), 1e-300)
         found.append(_held(s, f"{kind} {rows} against the modal file", off, MOTION))
     return found
 

@@ -12,14 +12,15 @@ from typing import Any
 import h5py
 import numpy as np
 
-from ..data import Array, ModalBasis, ModalGroup, UserError
+from ..data import Array, ModalBasis, ModalGroup
+from ..errors import UserError
 from ..files.hdf5 import IMAGINARY, put, sealed
 from ..files.hostile import DAMAGE, reading, refuse_damaged, short
 from ..files.store import ordinary
 from ..operating.motion import Motion, motion_of
 from ..reduced.coordinates import first_modes, in_modes
 from .journal import is_journal, read_journal
-from .series import Series, unit_of
+from .series import Series
 
 FORMAT = "microslip-response"
 FORMAT_VERSION = "0.2"
@@ -219,7 +220,7 @@ def _write(file: h5py.File, r: Response) -> None:
         put(group, "key", s.key)
         put(group, "status", np.array(s.status or ("",)))
         for name, value in s.arrays.items():
-            put(group, name, value, unit_of(name))
+            put(group, name, value, s.unit(name))
 
 
 def _put_text(file: h5py.File, name: str, text: str) -> None:
@@ -295,4 +296,5 @@ def _read_series(group: h5py.Group, labels: Mapping[str, tuple[str, ...]]) -> Se
         raise ValueError(f"{group.name}: arrays of different lengths")
     parameters = {str(k): float(v) for k, v in json.loads(group.attrs["parameters"]).items()}
     over = str(group.attrs.get("over", "frequency"))
+    arrays = {n: arrays[n] for n in labels if n in arrays} | arrays  # read-outs as they were asked for, not by name
     return Series(str(group.attrs["name"]), parameters, key, status, arrays, labels, over)

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..data import Array, ComplexArray, Indices, UserError
+from ..data import Array, ComplexArray, Indices
+from ..errors import UserError
 from ..units import Quantity, counted
 
 if TYPE_CHECKING:
@@ -23,16 +24,18 @@ READ = ("monitors/", "angles/", "gauges/")
 UNITS = {
     "frequency": "Hz", "Omega": "rad/s", "supplied": "J", "damped": "J", "dissipated": "J", "kinetic": "J",
     "exchanged": "J", "lost": "J", "by_slip": "J", "monitors": "m", "angles": "rad", "gauges": "1",
-    "bodies": "m kg^1/2", "displacement": "m, rad", "force": "N, N m", "limit": "N", "normal_swing": "N",
-    "normal_mean": "N",
+    "bodies": "m kg^1/2", "displacement": "m, rad", "force": "N, N m", "forces": "N, N m", "limit": "N",
+    "normal_swing": "N", "normal_mean": "N",
 }  # fmt: skip
-"""Units by the last part of a name, or by its first one; everything else is a pure number."""
+"""Units by the last part of a name, or by its first one, as of read-outs, whose last part is anybody's choice;
+everything else is a pure number."""
 
 OVER = {
     "frequency": ("frequency", "Hz"),
     "Omega": ("angular frequency", "rad/s"),
     "load": ("share of the load", ""),
     "normal_force": ("share of the normal force", ""),
+    "normal_force_N": ("normal force", "N"),
     "amplitude": ("amplitude", "m"),
 }
 """What a series may run over: in words, and its unit."""
@@ -40,8 +43,8 @@ OVER = {
 
 def unit_of(name: str) -> str:
     """Unit of an array by its name."""
-    parts = name.split("/")
-    return UNITS.get(parts[-1]) or UNITS.get(parts[0], "1")
+    first, last = name.split("/")[0], name.split("/")[-1]
+    return ("" if name.startswith(READ) else UNITS.get(last, "")) or UNITS.get(first, "1")
 
 
 @dataclass(frozen=True)
@@ -118,13 +121,17 @@ class Series:
         Raises:
             UserError: none of that name.
         """
+        name, row = self._place(readout)
+        return np.asarray(self.arrays[name][:, row], dtype=complex)
+
+    def _place(self, readout: str | int) -> tuple[str, int]:
+        """Name of the array of a read-out, and its row."""
         places = self._places
         if isinstance(readout, int) and 0 <= readout < len(places):
             readout = list(places)[readout]
         if readout not in places:
             raise UserError(f"read-out {readout!r}: the response has {', '.join(places) or 'none'}")
-        name, row = places[str(readout)]
-        return np.asarray(self.arrays[name][:, row], dtype=complex)
+        return places[str(readout)]
 
     def monitor(self, name: str) -> ComplexArray:
         """(f, r, H + 1) harmonics of a monitor's rows, m or rad, or of a strain gauge.
@@ -188,7 +195,7 @@ class Series:
         found["dissipated_J"] = self.dissipated
         if "kinetic" in self.arrays:
             found["damping_ratio"] = self.damping_ratio
-        contacts = max(len([n for n in self.arrays if n.endswith("/slipping")]), 1)
+        contacts = max(len([n for n in self.arrays if n.startswith("contacts/") and n.endswith("/slipping")]), 1)
         found |= {name: self._summed(name) / contacts for name in ("slipping", "open")}
         return found | {"converged": self.converged}
 
@@ -213,7 +220,8 @@ class Series:
         if "parameter" in variables:
             coords["parameter"] = variables.pop("parameter")
         for name, rows in self.labels.items():
-            coords[f"{name.split('/', 1)[1]}.row"] = list(rows)
+            if name.startswith(READ):
+                coords[f"{name.split('/', 1)[1]}.row"] = list(rows)
         used = {axis for entry in variables.values() for axis in entry[0]}
         coords = {name: c for name, c in coords.items() if isinstance(c, tuple) or name in used}
         attrs = {"name": self.name, "over": self.over, **self.parameters}
@@ -231,7 +239,14 @@ class Series:
             axes = ("point", f"{owner}.coordinate", "coefficient")
         elif last == "x":
             axes = ("point", "unknown")
-        return axes, values, {"units": unit_of(name)}
+        return axes, values, {"units": self.unit(name)}
+
+    def unit(self, name: str) -> str:
+        """Unit of one of its arrays."""
+        if name != "parameter":
+            return unit_of(name)
+        (told,) = self.labels.get(name, (OVER.get(self.over, ("", ""))[1],))
+        return told or "1"
 
     # pictures --------------------------------------------------------------------------------------------------------
 
@@ -254,7 +269,7 @@ class Series:
         a = self.harmonics(readout)[:, harmonic]
         size = np.where(self.converged, np.abs(a) if harmonic else a.real, np.nan)
         top = float(np.nanmax(np.abs(size), initial=0.0))
-        quantity = Quantity(unit_of(self._places[self.readouts[0] if readout == 0 else str(readout)][0]))
+        quantity = Quantity(unit_of(self._place(readout)[0]))
         scale, unit = (1e6, quantity.micro) if 0 < top < 1e-3 else (1.0, quantity.said)
         x, y = self._drawn(scale * size)
         (drawn,) = axes.plot(x, y, **{"label": self.name, **line})
@@ -301,7 +316,8 @@ class Series:
         if self._places and self.converged.any():
             a = np.where(self.converged, self.amplitude, 0.0)
             i = int(a.argmax())
-            said += f"; at most {a[i]:.4g} {self.quantity.said} at {p[i]:.6g} {unit}".rstrip()
+            most = f"at most {a[i]:.4g} {self.quantity.said} at {p[i]:.6g} {unit}".rstrip()
+            said += f"; {most if a[i] else f'{self.readouts[0]} does not move'}"
         if len(self.folds):
             said += f"; folds at {', '.join(f'{f:.6g}' for f in self.folds[:6])} {unit}".rstrip()
         bad = len(self) - int(self.converged.sum())

@@ -237,7 +237,8 @@ class TwoTones:
             )
         if self.amplitude.size and self.converged.any():
             one, two = (np.where(self.converged, np.abs(self.of(*k)), 0.0).max() for k in ((1, 0), (0, 1)))
-            said += f"; amplitudes at most {one:.4g} and {two:.4g} {Quantity(self.units[0]).said}"
+            most = f"amplitudes at most {one:.4g} and {two:.4g} {Quantity(self.units[0]).said}"
+            said += f"; {most if one or two else f'{self.readouts[0]} does not move'}"
         bad = self.failures
         return f"<TwoTones: {said}; {f'{len(bad)} not converged: {bad[0][1]}' if bad else 'all converged'}>"
 

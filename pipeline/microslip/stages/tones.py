@@ -67,6 +67,8 @@ def _sentences(found: TwoTones, i: int, error: float) -> list[str]:
     said = [f"{f:.6g} Hz: {why}" for f, why in found.failures]
     if not found.converged[i]:
         return said
+    if not found.amplitude[i, 0, 1:].any():
+        return [f"{found.readouts[0]} does not move; read another direction or another monitor.", *said]
     sized = Quantity(found.units[0]).sized
     one, two = (sized(float(abs(found.of(*k)[i]))) for k in ((1, 0), (0, 1)))
     kept = f"{100 * error:.2g} % of the largest amplitude" if np.isfinite(error) else "an unknown share"

@@ -9,7 +9,8 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from ..contact.law import Step, norm
+from ..contact.law import Law, Step, norm, seldom
+from ..contact.patch import Patch
 from ..contact.set_valued import SetValued
 from .inclusion import Meets, solve
 
@@ -85,6 +86,16 @@ class Held(NamedTuple):
 def times(A: Any, x: Any) -> Any:
     """A x over the last axis."""
     return (A * x[..., None, :]).sum(axis=-1) if A.size <= FEW else jnp.einsum("...ij,...j->...i", A, x)
+
+
+def gapes(patch: Patch) -> bool:
+    """Whether its law knows where it opens."""
+    return not bool(_unknown(patch.law, np.zeros((len(patch.points), 3))))
+
+
+@seldom
+def _unknown(law: Law, u: Any) -> Any:
+    return jnp.isnan(law.overlap(u)).any()
 
 
 def untouched(groups: tuple[Group, ...]) -> Held:

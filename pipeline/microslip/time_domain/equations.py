@@ -21,7 +21,8 @@ import scipy.linalg
 from ..contact.law import Law
 from ..contact.patch import stuck_stiffness
 from ..contact.set_valued import SetValued
-from ..data import Array, UserError
+from ..data import Array
+from ..errors import UserError
 from ..settings.mistakes import bounded
 from ..system.assembly import Assembly, Contact, Linear
 from .ramp import Ramp, turning_loads
@@ -195,7 +196,7 @@ def of(assembly: Assembly, Omega: float, second: float | None = None) -> Equatio
     for contact in assembly.contacts:
         _remembers(contact)
     harmonics = tuple(sorted({x.harmonic for x in assembly.loads if x.harmonic}))
-    parts = {h: assembly.joined(h) for h in (0, 1, *harmonics)}
+    parts = {h: assembly.joined(h) for h in sorted({0, 1, *harmonics})}
     mean, first = parts[0], parts[1]
     M, K, C, rows = (_real(a, assembly) for a in (first.M, first.K, first.viscous(Omega), mean.rows))
     if circulating := [c.name for c in assembly.components if any(g.N_r is not None for g in c.groups.values())]:

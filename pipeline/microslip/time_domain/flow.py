@@ -13,7 +13,6 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-import jax
 import jax.numpy as jnp
 import numpy as np
 import scipy.linalg
@@ -24,7 +23,7 @@ from .equations import Equations
 
 
 class Flow(NamedTuple):
-    """Flows over tau 2^k, k = 0, 1, ..., of b blocks of p modes each, s = 2 p + n. All are jax arrays.
+    """Flows over tau 2^k, k = 0, 1, ..., of b blocks of p modes each, s = 2 p + n.
 
     Attributes:
         stack: (K, 2 p + 2 s, s, b), one above the other: how (q_b, v_b, o) moves, and the symmetric matrices, J, of the
@@ -61,7 +60,7 @@ def flow(equations: Equations, tau: float, doublings: int) -> Flow:
         moves.append(twice[:, : 2 * p])
     assert moves[0].shape == (b, 2 * p, 2 * p + n)
     stack = np.ascontiguousarray(np.concatenate([np.array(x) for x in (moves, S, L)], axis=2).transpose(0, 2, 3, 1))
-    return Flow(*jax.device_put((stack, turns, length)))
+    return Flow(stack, turns, length)
 
 
 def flown(A: Any, y: Any, o: Any) -> Any:

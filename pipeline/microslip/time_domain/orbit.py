@@ -10,12 +10,13 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-import jax
+import jax.numpy as jnp
 import numpy as np
 import scipy.linalg
 
 from ..contact.set_valued import SetValued
-from ..data import Array, NotConverged, UserError
+from ..data import Array
+from ..errors import NotConverged, UserError
 from ..files.hdf5 import put, refuse_foreign, sealed
 from ..settings.mistakes import bounded
 from ..system.assembly import Contact
@@ -546,12 +547,13 @@ def _separations(stepper: Stepper, a: Now, b: Now, samples: int, each: int, peri
     weights = np.concatenate([stiff, np.ones_like(stiff)], axis=1)
 
     def far(y: Any) -> float:
-        return float(np.linalg.norm(weights * np.asarray(y)))
+        return float(np.linalg.norm(weights * y))
 
-    if not far(a.y - b.y) > 0 or classification.whole(a.held.states):
+    apart, size = far(np.asarray(a.y) - np.asarray(b.y)), far(np.asarray(a.y))
+    if not apart > 0 or classification.whole(a.held.states):
         return np.zeros(0)
-    b = classification.between(a, b, APART * far(a.y) / far(a.y - b.y))
-    begin, rows = far(a.y - b.y), np.full(samples, samples * each)
+    b = classification.between(a, b, APART * size / apart)
+    begin, rows = APART * size, np.full(samples, samples * each)
     one, other = (_phases(stepper, stepper.run(now, rows, periods)[1]) for now in (a, b))
     if len(one) != len(other):  # one of them became infinite
         return np.zeros(0)
@@ -605,7 +607,7 @@ def _closed(contact: Contact) -> bool:
     """Whether a law whose gap is its own presses at q = 0, without a preload that balances it."""
     if contact.preload.any() or isinstance(contact.patch.law, SetValued):
         return False
-    overlap = contact.patch.law.overlap(jax.device_put(contact.patch.kinematics @ contact.offset))
+    overlap = contact.patch.law.overlap(jnp.asarray(contact.patch.kinematics @ contact.offset))
     return bool((np.asarray(overlap) > 0).any())
 
 

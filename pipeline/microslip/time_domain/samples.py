@@ -16,15 +16,17 @@ from pathlib import Path
 from typing import Any, NamedTuple, Protocol
 
 import h5py
-import jax.numpy as jnp
 import numpy as np
 
 from ..contact.elements import Spring
-from ..data import Array, UserError
+from ..contact.patch import Patch
+from ..data import Array
+from ..errors import UserError
 from ..files.hdf5 import create, put, seal, seal_state
 from ..files.hostile import DAMAGE, inspect, refuse_damaged, short
 from ..files.store import complete_or_absent, ordinary, put_in_place, refused
 from ..harmonic_balance.readout import measured
+from .contacts import gapes
 from .equations import Equations
 from .stepper import KINDS, Now, Seen
 
@@ -101,14 +103,14 @@ class Touch(NamedTuple):
 
 
 def touches(e: Equations) -> tuple[Touch, ...]:
-    found = []
-    for c in e.contacts:
-        law, points = c.patch.law, len(c.patch.points)
-        plane = np.abs(c.patch.kinematics[:, 1:]).max(axis=(0, 1)) > 0
-        rubs = plane & (not isinstance(law, Spring))
-        opens = not np.isnan(np.asarray(law.overlap(jnp.zeros((points, 3))))).any()
-        found.append(Touch(c.name, tuple(map(bool, rubs)), opens))
-    return tuple(found)
+    patches = {id(c.patch): c.patch for c in e.contacts}
+    alike = {i: (_rubs(patch), gapes(patch)) for i, patch in patches.items()}
+    return tuple(Touch(c.name, *alike[id(c.patch)]) for c in e.contacts)
+
+
+def _rubs(patch: Patch) -> tuple[bool, ...]:
+    plane = np.abs(patch.kinematics[:, 1:]).max(axis=(0, 1)) > 0
+    return tuple(map(bool, plane & (not isinstance(patch.law, Spring))))
 
 
 def touches_of(told: Mapping[str, Any]) -> tuple[Touch, ...]:

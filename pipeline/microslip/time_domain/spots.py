@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-import jax
 import jax.numpy as jnp
 import numpy as np
 
@@ -20,7 +19,7 @@ SPARSE = 4
 
 
 class Spots(NamedTuple):
-    """Of n points, as jax arrays. Where all modes move all points, s = m, columns and back are None.
+    """Of n points. Where all modes move all points, s = m, columns and back are None.
 
     Attributes:
         D: (s, 3, n), or (3 n, m) of all modes. columns: (s, n) modes that move each point. back: (l, m) where in the
@@ -42,7 +41,7 @@ def spots(D: Array, D_o: Array, rest: Array) -> Spots:
     s = max(map(len, own))
     given = D_o.transpose(2, 1, 0), rest.T
     if SPARSE * s > m:
-        return Spots(*jax.device_put((D.transpose(1, 0, 2).reshape(3 * n, m), None, None, *given)))
+        return Spots(D.transpose(1, 0, 2).reshape(3 * n, m), None, None, *given)
     columns, few = np.zeros((s, n), int), np.zeros((s, 3, n))
     stands = list[list[int]]([] for _ in range(m))
     for i, modes in enumerate(own):
@@ -52,7 +51,7 @@ def spots(D: Array, D_o: Array, rest: Array) -> Spots:
     back = np.full((max(map(len, stands)), m), s * n)
     for j, found in enumerate(stands):
         back[: len(found), j] = found
-    return Spots(*jax.device_put((few, columns, back, *given)))
+    return Spots(few, columns, back, *given)
 
 
 def by_modes(S: Spots, q: Any, o: Any) -> Any:

@@ -18,13 +18,15 @@ import jax.numpy as jnp
 import numpy as np
 import scipy.linalg
 
+from ..contact.law import program
 from ..contact.set_valued import SetValued
-from ..data import Array, UserError
+from ..data import Array
+from ..errors import UserError
 from ..harmonic_balance.forces import repeated
 from . import fourth, loop
 from .bodies import Bodies, Now, Options, Seen
 from .braking import Braking
-from .contacts import Group, Held, Yielding, force_at, slope_at, untouched
+from .contacts import Group, Held, Yielding, force_at, gapes, slope_at, untouched
 from .equations import Equations
 from .flow import Flow, blocks, flow
 from .ground import moving
@@ -63,8 +65,8 @@ class Stepper:
                     raise UserError(f"{contacts[same[0]].name}: ground: set-valued contacts stand on ground at rest")
                 law = moving(law, ground, np.tile(patch.points, (len(same), 1)))
             G = np.broadcast_to(patch.kinematics, (len(same), *patch.kinematics.shape))
-            found.append(Group(law, *jax.device_put((G, offset))))
-        return tuple(found)
+            found.append(Group(law, G, offset))
+        return _sent(tuple(found))
 
     @cached_property
     def same(self) -> list[list[int]]:
@@ -89,8 +91,7 @@ class Stepper:
     @cached_property
     def options(self) -> Options:
         e = self.equations
-        gapes = [g.law.overlap(jnp.zeros((g.G.shape[0] * g.G.shape[1], 3))) for g in self.groups]
-        opens = bool(gapes) and not any(bool(jnp.isnan(a).any()) for a in gapes)
+        opens = bool(self.same) and all(gapes(e.contacts[same[0]].patch) for same in self.same)
         dissipative = np.linalg.eigvalsh(0.5 * (e.C + e.C.T)).min(initial=0.0) >= -1e-9 * np.abs(e.C).max(initial=0.0)
         bounded = bool(dissipative) and not (e.omega2 < 0).any()  # else (a free body that turns) energy bounds no swing
         leaps = opens and not e.F_0.any() and e.steady is not None and bounded
@@ -104,15 +105,25 @@ class Stepper:
         fine = replace(self, tau=self.tau / 2)
         for name in ("groups", "same", "rows", "numbers", "options", "_fixed"):
             fine.__dict__[name] = getattr(self, name)
+        fine.__dict__["_flow"] = Flow(*(x[:-1] for x in self._flows))
         return fine
 
     @cached_property
     def bodies(self) -> Bodies:
+        enough = np.array(fourth.MISSED * (self.tau * self.equations.fastest) ** 4)
+        flow, meets = self._flow, self._meets(self._flow)
+        return _sent(self._fixed._replace(flow=flow, meets=meets, braking=self._braking, enough=enough))
+
+    @cached_property
+    def _flow(self) -> Flow:
+        return Flow(*(x[1:] for x in self._flows))
+
+    @cached_property
+    def _flows(self) -> Flow:
+        """Those of half the step too, the shortest first."""
         e, halvings = self.equations, self.options.halvings
         period = int(np.ceil(np.log2(2 * np.pi / e.Omega / self.tau))) if self.options.leaps else 0
-        flows = flow(e, self.tau / 2**halvings, halvings + max(period, 0))
-        enough = jnp.asarray(fourth.MISSED * (self.tau * e.fastest) ** 4)
-        return self._fixed._replace(flow=flows, meets=self._meets(flows), braking=self._braking, enough=enough)
+        return flow(e, self.tau / 2 ** (halvings + 1), halvings + 1 + max(period, 0))
 
     @cached_property
     def _fixed(self) -> Bodies:
@@ -127,14 +138,13 @@ class Stepper:
         sways, w = (moved @ still + given) @ e.turning, np.sqrt(np.abs(e.omega2))
         reach = np.linalg.norm(moved, axis=(1, 2)), _most(sways)
         bends = sum(np.linalg.norm(x, axis=(1, 2)) for x in (moved * w, moved @ e.C)), _most(sways @ e.turning)
-        D, D_o, F_0 = e.D[rows], e.D_o[rows], jax.device_put(e.F_0[rows])
-        R, share = (jax.device_put(x[np.ix_(rows, rows)]) for x in (e.R, e.yields))
+        D, D_o, F_0 = e.D[rows], e.D_o[rows], e.F_0[rows]
+        R = e.R[np.ix_(rows, rows)]
         loads = (np.zeros((b * p, n)) if e.push is None else e.push).reshape(b, p, n)
-        arrays = (D, D_o, e.turning, e.omega2.reshape(b, p), steady, reach, bends, loads, -D.T)
-        yielding = Yielding(R, share, F_0) if e.R.any() else None
-        more = jax.device_put((*arrays, np.zeros(()), e.Omega * np.array(e.harmonics, dtype=float)))
-        preload = jax.device_put(D.T @ e.F_0[rows])
-        return Bodies._make((None, yielding, None, None, F_0, *more, self._moved, preload))
+        yielding = Yielding(R, e.yields[np.ix_(rows, rows)], F_0) if R.any() else None
+        arrays = (F_0, D, D_o, e.turning, e.omega2.reshape(b, p), steady, reach, bends, loads, -D.T, np.zeros(()))
+        harmonics = e.Omega * np.array(e.harmonics, dtype=float)
+        return Bodies._make((None, yielding, None, None, *arrays, harmonics, self._moved, D.T @ F_0))
 
     @property
     def _moved(self) -> tuple[Spots, ...]:
@@ -152,7 +162,7 @@ class Stepper:
         D, moved = self.equations.D[self.rows], self._points[0][:, 1:].reshape(-1, len(self.equations.omega2))
         most = 0.5 * self.tau * np.abs(moved @ moved.T).sum(axis=1).reshape(-1, 2).max(axis=1, initial=0.0)
         ends = np.cumsum([g.G.shape[0] * g.G.shape[1] for g in self.groups])[:-1]
-        return Braking(*jax.device_put((0.5 * self.tau * D @ D.T, tuple(np.split(most, ends)))))
+        return Braking(0.5 * self.tau * D @ D.T, tuple(np.split(most, ends)))
 
     def _meets(self, flows: Flow) -> Meets | None:
         """Of set-valued points, see `inclusion`.
@@ -165,9 +175,9 @@ class Stepper:
             return None
         if not e.R.any():
             p = blocks(e)[1]
-            speeds = scipy.linalg.block_diag(*np.asarray(flows.stack[0][:p, p : 2 * p]).transpose(2, 0, 1))
+            speeds = scipy.linalg.block_diag(*flows.stack[0][:p, p : 2 * p].transpose(2, 0, 1))
             D = self._points[0][rigid].reshape(-1, len(e.omega2))
-            return meets(jax.device_put(D @ speeds @ D.T * self.tau))
+            return meets(D @ speeds @ D.T * self.tau)
         names = ", ".join(c.name for c in e.contacts)
         if not rigid.all() or any(g.law.normal is not None for g in self.groups):
             raise UserError(
@@ -186,7 +196,7 @@ class Stepper:
                 f"contacts {names}: some of these bodies yield beside their modes and some do not; keep the residual "
                 "compliance of all contacts, or of none"
             )
-        return meets(jax.device_put(yields))
+        return meets(yields)
 
     @cached_property
     def _spots(self) -> list[tuple[Array, bool]]:
@@ -240,6 +250,12 @@ class Stepper:
         return now, seen._replace(d=seen.d[:, back], force=seen.force[:, back]), told, count
 
 
+@program
+def _sent(arrays: Any) -> Any:
+    """Arrays of numpy as jax has them; all in one call, which takes a fifth of `jax.device_put`."""
+    return arrays
+
+
 def _most(rates: Array) -> Array:
     """(points,) largest size of rows (points, 3, n) times o."""
     return np.linalg.norm(np.abs(rates).sum(axis=2), axis=1)
@@ -249,7 +265,7 @@ def static_force(stepper: Stepper) -> Callable[[Array], tuple[Array, Array]]:
     """Function of modal displacements (m,): modal forces (m,) of contacts that came there on a straight way, and (m, m)
     their slope."""
     groups, bodies = stepper.groups, stepper.bodies
-    states, D = untouched(groups).states, jax.device_put(stepper.equations.D[stepper.rows])
+    states, D = untouched(groups).states, stepper.equations.D[stepper.rows]
     if bodies.meets is not None:
         raise UserError('start: set-valued contacts have no stiffness to find a rest by; begin from "rest"')
     if bodies.yielding is not None:
