@@ -58,8 +58,28 @@ class Stretch(NamedTuple):
     held: Array
 
 
+class OnNormal(Law):
+    """Friction on what a normal law presses, to which a damper may add; its state tells time and path."""
+
+    normal: Normal
+    friction: Friction
+    damping: Array | None
+
+    def limit(self, force: Array, state: Any) -> Array:
+        return self.friction.highest(force[:, 0], state.time) * force[:, 0]
+
+    def slip(self, state: Any) -> Array:
+        return state.slipped.T
+
+    def _pressed(self, u: Array, v: Array) -> Array:
+        force = self.normal.force(u)
+        if self.damping is not None:
+            force = jnp.maximum(force + self.damping * self.normal.stiffness(u) * v, 0.0)
+        return force
+
+
 @settings
-class PointContact(Law):
+class PointContact(OnNormal):
     """Point contact with stick, slip and separation in three dimensions.
 
     The printed tangential force, stiffness times displacement with a stiffness that follows the contact area
@@ -169,12 +189,6 @@ class PointContact(Law):
     def recalled(self, state: PointState, memory: Array) -> PointState | None:
         return state._replace(elastic=memory) if self.friction.constant else None
 
-    def limit(self, force: Array, state: PointState) -> Array:
-        return self.friction.highest(force[:, 0], state.time) * force[:, 0]
-
-    def slip(self, state: PointState) -> Array:
-        return state.slipped.T
-
     def stored(self, u: Array, state: PointState) -> Array:
         stretched = ratio(state.elastic**2, self._springs(state.share))
         return self.normal.stored(u[:, 0]) + 0.5 * jnp.sum(stretched, axis=0)
@@ -204,12 +218,6 @@ class PointContact(Law):
 
     def pressed(self, approach: Array) -> Array:
         return self._pressed(approach, jnp.zeros_like(approach))
-
-    def _pressed(self, u: Array, v: Array) -> Array:
-        force = self.normal.force(u)
-        if self.damping is not None:
-            force = jnp.maximum(force + self.damping * self.normal.stiffness(u) * v, 0.0)
-        return force
 
     def _springs(self, share: Array) -> Array:
         """(2, n) tangential stiffness of the area in contact, N/m."""

@@ -15,7 +15,7 @@ from ..settings.numbers import NotNegative, Positive
 from .friction import Friction, Scattered, creep, halved
 from .law import Array, Law, Step, norm, number, settings, static, value
 from .normal import Normal
-from .point import OwnNormal
+from .point import OnNormal, OwnNormal
 
 if TYPE_CHECKING:
     from .composed import ContactModel
@@ -34,7 +34,7 @@ class RateState(NamedTuple):
 
 
 @settings
-class RateContact(Law):
+class RateContact(OnNormal):
     """Point contact whose friction is mu(|v|) F_N 2/pi arctan(k_S |v|) along -v.
 
     Attributes:
@@ -83,12 +83,6 @@ class RateContact(Law):
         share = 1 / (1 + yielding * self._drag(speed, pressed, time))
         return jnp.concatenate([v.T[:1], share * trial]).T
 
-    def limit(self, force: Array, state: RateState) -> Array:
-        return self.friction.highest(force[:, 0], state.time) * force[:, 0]
-
-    def slip(self, state: RateState) -> Array:
-        return state.slipped.T
-
     def stored(self, u: Array, state: RateState) -> Array:
         return self.normal.stored(u[:, 0])
 
@@ -98,9 +92,6 @@ class RateContact(Law):
     def lost(self, step: Step) -> Array:
         rubbed = 0.5 * jnp.sum((step.force_before + step.force)[:, 1:] * step.moved[:, 1:], axis=1)
         return rubbed + (step.force[:, 0] - self.normal.force(step.u[:, 0])) * step.moved[:, 0]
-
-    def _pressed(self, u: Array, v: Array) -> Array:
-        return jnp.maximum(self.normal.force(u) + self.damping * self.normal.stiffness(u) * v, 0.0)
 
     def _drag(self, speed: Array, pressed: Array, time: Array) -> Array:
         """(n,) friction over the speed, N s/m."""

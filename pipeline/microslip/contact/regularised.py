@@ -23,7 +23,7 @@ from ..settings.numbers import NotNegative, Positive
 from .friction import Friction, creep, halved
 from .law import Array, Law, Step, norm, number, ratio, settings, static, value
 from .normal import Normal
-from .point import OwnNormal, met, touching
+from .point import OnNormal, OwnNormal, met, touching
 
 if TYPE_CHECKING:
     from .composed import ContactModel
@@ -42,7 +42,7 @@ class MassState(NamedTuple):
 
 
 @settings
-class MassContact(Law):
+class MassContact(OnNormal):
     """Point contact with a reduced mass (Sextro Eqs. (3.7-19) to (3.7-30), with the errata).
 
     Mass, springs and dampers are all in proportion to the area in contact, h* (3.7-8, 3.7-16, 3.7-18), which cancels:
@@ -90,12 +90,6 @@ class MassContact(Law):
         slipped = state.slipped + jnp.where(share > 0, velocity * dt, 0.0)
         settled = MassState(tangential, after, velocity, share, slipped, time)
         return jnp.concatenate([pressed[None], force]).T, settled
-
-    def limit(self, force: Array, state: MassState) -> Array:
-        return self.friction.highest(force[:, 0], state.time) * force[:, 0]
-
-    def slip(self, state: MassState) -> Array:
-        return state.slipped.T
 
     def stored(self, u: Array, state: MassState) -> Array:
         """Of the springs, and the motion of P."""
@@ -150,9 +144,6 @@ class MassContact(Law):
         pulled = self._springs() * (x[:2] + self.damping * (v.T[1:] - x[2:])) / self.mass
         moving = jnp.where(share > 0, rate.velocity, pulled)
         return self.force(u, v, state), jnp.concatenate([rate.stretch, moving])
-
-    def _pressed(self, u: Array, v: Array) -> Array:
-        return jnp.maximum(self.normal.force(u) + self.damping * self.normal.stiffness(u) * v, 0.0)
 
     def _springs(self) -> Array:
         """(2, 1) or (2, n) stiffness of the full area, N/m."""
