@@ -302,6 +302,7 @@ class Series:
             a = np.where(self.converged, self.amplitude, 0.0)
             i = int(a.argmax())
             said += f"; at most {a[i]:.4g} {self.quantity.said} at {p[i]:.6g} {unit}".rstrip()
+            said += ", an end" * (len(p) > 1 and i in (0, len(p) - 1))
         if len(self.folds):
             said += f"; folds at {', '.join(f'{f:.6g}' for f in self.folds[:6])} {unit}".rstrip()
         bad = len(self) - int(self.converged.sum())
