@@ -412,3 +412,9 @@ def _pressure_map(axes: Axes, name: str, c: ContactState) -> None:
     axes.set(xlabel="mm along the face", ylabel="mm")
     axes.set_title(f"{name}: {c.normal_force:.4g} N\non {percent(c.closed_share)} of the face", fontsize=10)
     axes.figure.colorbar(shown, ax=axes, label="pressure in MPa", location="bottom", shrink=0.6)
+
+
+def by_rows(handles: list[Any], labels: list[str], columns: int) -> tuple[list[Any], list[str]]:
+    """A legend, which is filled by columns, in the order in which its rows are read."""
+    order = [i for column in range(columns) for i in range(column, len(labels), columns)]
+    return [handles[i] for i in order], [labels[i] for i in order]

@@ -123,7 +123,7 @@ def _material(provenance: Mapping[str, str]) -> str:
     """In words if the settings travel with the file, else as it says."""
     try:
         found = json.loads(provenance.get("settings", "{}")).get("material", {})
-        words = [f"density {found['density']} kg/m³"] if "density" in found else []
+        words = [f"density {found['density']:.9g} kg/m³"] if "density" in found else []
         words += [f"E = {_list(np.atleast_1d(found['young']) / 1e9, 6)} GPa"] if "young" in found else []
         words += [f"nu = {found['poisson']}"] if "poisson" in found else []
     except (ValueError, AttributeError, TypeError):

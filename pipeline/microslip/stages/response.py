@@ -79,6 +79,7 @@ def response_stage(
         if log:
             store.write_text(folder / "convergence.csv", convergence_table(read_response(folder / "response.h5")))
         _tell(summary, report)
+        report(f"page: {folder / 'response.html'}")
         return summary, summary["failed_points"] == 0
 
 
