@@ -53,18 +53,24 @@ LOW, HIGH, WIDTH = -14.0, 4.0, 0.01
 """Bins of the logarithm of amplitudes over the tuned ring's highest, and their width: quantiles are as fine."""
 
 
+KEPT = 2_000_000
+"""Amplitudes of single samples that are kept, 16 MB: 2700 samples of 24 blades at 31 frequencies."""
+
+
 @dataclass
 class Envelope:
     """All blades' amplitudes on f frequencies, sample after sample.
 
     Attributes:
         unit: the tuned ring's highest amplitude. sums: (5, f) count, sum, sum of squares, least, largest, over the
-            unit. bins: (f, b) how many amplitudes fell where.
+            unit. bins: (f, b) how many amplitudes fell where. grids: (f, sectors) of the first samples, up to `KEPT`
+            numbers.
     """
 
     unit: float
     sums: Array
     bins: Array = field(repr=False)
+    grids: list[Array] = field(default_factory=list, repr=False)
 
     @classmethod
     def empty(cls, frequencies: int, unit: float) -> Envelope:
@@ -74,6 +80,8 @@ class Envelope:
 
     def add(self, grid: Array) -> None:
         """Takes in (f, sectors) amplitudes of one sample; NaN are left out."""
+        if (len(self.grids) + 1) * grid.size <= KEPT:
+            self.grids.append(grid)
         y = grid / self.unit
         known = np.isfinite(y)
         z = np.where(known, y, 0.0)
@@ -85,6 +93,15 @@ class Envelope:
         place = np.clip((np.log(np.maximum(z, 1e-300)) - LOW) / WIDTH, 0, self.bins.shape[1] - 1).astype(int)
         rows = np.broadcast_to(np.arange(len(y))[:, None], y.shape)
         np.add.at(self.bins, (rows[known], place[known]), 1)
+
+    def first(self, count: int) -> Envelope:
+        """That of the first samples alone; of all where that is not known any more."""
+        if count > len(self.grids):
+            return self
+        found = Envelope.empty(len(self.bins), self.unit)
+        for grid in self.grids[:count]:
+            found.add(grid)
+        return found
 
     def samples(self, sectors: int) -> int:
         """How many were taken in with a solution somewhere."""

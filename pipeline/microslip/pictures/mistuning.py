@@ -10,7 +10,7 @@ import scipy.stats
 from ..data import Array
 from ..harmonic_balance.readout import measured
 from ..mistuning.ensemble import Ensemble
-from ..mistuning.samples import Sample, sample
+from ..mistuning.samples import Sample
 from ..mistuning.sensitivity import Approximation
 from ..mistuning.statistics import fits
 from .operating import numbers_within
@@ -88,10 +88,8 @@ SHOWN = {"added_mass": (1e3, "g"), "gap": (1e6, "um"), "modal_file": (1.0, "numb
 """What is no share of something nominal, in which unit it is drawn."""
 
 
-def worst_picture(found: Ensemble, path: Path, title: str) -> Path:
+def worst_picture(found: Ensemble, one: Sample, path: Path, title: str) -> Path:
     """The sample with the highest blade: amplitudes round the ring at its peak, and what differs."""
-    at = int(np.nanargmax(found.amplification))
-    one: Sample = sample(found.asked, at)
     figure = empty_figure(9.0, 4.8)
     ring = figure.add_subplot(1, 2, 1, projection="polar")
     N = found.asked.tuned.sectors
@@ -108,7 +106,7 @@ def worst_picture(found: Ensemble, path: Path, title: str) -> Path:
     axes = figure.add_subplot(1, 2, 2)
     plain_axes(axes)
     drawn: list[tuple[str, Array]] = []
-    for s, v in found.asked.deviations(at):
+    for s, v in found.asked.deviations(one.number):
         by, unit = SHOWN.get(s.of, (100.0, "%"))
         name = s.of.replace("_", " ") + (", first mode" if np.ptp(v, axis=1).any() else "")
         drawn.append((f"{name}, {unit}", by * v[:, 0]))
@@ -117,5 +115,5 @@ def worst_picture(found: Ensemble, path: Path, title: str) -> Path:
         axes.bar(np.arange(N) + (i - 0.5 * (len(drawn) - 1)) * width, v, width, color=COLOURS[i % 10], label=name)
     axes.set(xlabel="blade", ylabel="deviation")
     axes.legend(fontsize=9)
-    figure.suptitle(f"{title}: sample {at}, blade {one.top.output}")
+    figure.suptitle(f"{title}: sample {one.number}, blade {one.top.output}")
     return save_figure(figure, path)
