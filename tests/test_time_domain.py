@@ -788,7 +788,8 @@ def test_an_error_made_early_is_seen_at_the_end() -> None:
     the estimate is about what a finer motion differs by."""
     hammer = ms.structure(1.0, 1.0, 0.1, force={0: -1.0}, elements=[ms.stop(25.0, 0.5)])
     found, exact = (
-        ms.integrate(hammer, 2.0, unit="rad/s", settle=0, keep=40, samples=64, steps=n, start="rest") for n in (64, 2048)
+        ms.integrate(hammer, 2.0, unit="rad/s", settle=0, keep=40, samples=64, steps=n, start="rest")
+        for n in (64, 2048)
     )
     closes = found.times("closes")
     assert len(closes) and closes.max() < 0.5 * found.time[-1]
