@@ -34,6 +34,9 @@ from .spots import Spots, spots
 EVENTS = 8192
 """Events that one call of the loop keeps; of more, only their number is known."""
 
+DOUBLINGS = 16
+"""Of the step, for leaps: their number is a multiple of it, so that one program serves steps of many lengths."""
+
 KINDS = ("closes", "opens", "slips", "sticks")
 
 
@@ -109,8 +112,11 @@ class Stepper:
     @cached_property
     def bodies(self) -> Bodies:
         e, halvings = self.equations, self.options.halvings
-        period = int(np.ceil(np.log2(2 * np.pi / e.Omega / self.tau))) if self.options.leaps else 0
-        flows = flow(e, self.tau / 2**halvings, halvings + max(period, 0))
+        doublings = halvings
+        if self.options.leaps:  # over a period at least
+            period = int(np.ceil(np.log2(2 * np.pi / e.Omega / self.tau)))
+            doublings = -(-(halvings + max(period, 0)) // DOUBLINGS) * DOUBLINGS
+        flows = flow(e, self.tau / 2**halvings, doublings)
         enough = jnp.asarray(fourth.MISSED * (self.tau * e.fastest) ** 4)
         return self._fixed._replace(flow=flows, meets=self._meets(flows), braking=self._braking, enough=enough)
 
