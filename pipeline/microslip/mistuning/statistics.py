@@ -7,7 +7,6 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
-import scipy.stats
 from scipy.special import gamma
 
 from ..data import Array
@@ -41,10 +40,12 @@ class Quantile(NamedTuple):
 def quantile(values: Array, share: float, confidence: float = CONFIDENCE) -> Quantile:
     """A quantile of (n,) positive samples, whatever their distribution; the interval holds order statistics between
     which it lies with at least the confidence (binomial distribution)."""
+    from scipy.stats import binom  # a third of a second, which other runs do not need
+
     x = np.sort(np.asarray(values, dtype=float))
     if not len(x):
         return Quantile(share, np.nan, 0.0, np.inf)
-    low, high = (int(scipy.stats.binom.ppf(0.5 + way * confidence / 2, len(x), share)) for way in (-1, 1))
+    low, high = (int(binom.ppf(0.5 + way * confidence / 2, len(x), share)) for way in (-1, 1))
     ends = (float(x[low - 1]) if low else 0.0, float(x[high]) if high < len(x) else np.inf)
     return Quantile(share, float(np.clip(np.quantile(x, share), *ends)), *ends)  # of few, between two it lies outside
 
@@ -163,15 +164,17 @@ SHARES = 0.5, 0.95, 0.99, 0.999
 
 def fits(values: Array) -> list[Fit]:
     """The extreme-value distribution and Weibull's, fitted to (n,) highest amplitudes by maximum likelihood."""
+    from scipy.stats import genextreme, weibull_min
+
     x = np.sort(np.asarray(values, dtype=float))
     if len(x) < 20 or np.ptp(x) == 0:
         return []
     found = []
     shape, location, scale = _by_moments(x)
     for name, kind, start, given, names in (
-        ("generalised extreme value", scipy.stats.genextreme, (shape,), {"loc": location, "scale": scale},
+        ("generalised extreme value", genextreme, (shape,), {"loc": location, "scale": scale},
          ("shape", "location", "scale")),
-        ("Weibull", scipy.stats.weibull_min, (), {"floc": 0.0}, ("exponent", "location", "scale")),
+        ("Weibull", weibull_min, (), {"floc": 0.0}, ("exponent", "location", "scale")),
     ):  # fmt: skip
         made = kind(*(p := kind.fit(x, *start, **given)))
         steps = np.arange(1, len(x) + 1) / len(x)

@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-import scipy.stats
 
 from ..data import Array
 from ..harmonic_balance.readout import measured
@@ -19,6 +18,8 @@ from .plots import COLOURS, empty_figure, plain_axes, save_figure, single_panel
 
 def amplification_picture(found: Ensemble, path: Path, title: str) -> Path:
     """Histogram of the highest blade, its 95 % quantile with the interval, and the extreme-value fit."""
+    from scipy.stats import genextreme
+
     figure, axes = single_panel(8.0, 4.8)
     a = found.amplification[found.solved]
     counts, edges, _ = axes.hist(a, bins=min(max(10, int(np.sqrt(len(a)))), 80), color="#9ec5e8", edgecolor="white")
@@ -30,7 +31,7 @@ def amplification_picture(found: Ensemble, path: Path, title: str) -> Path:
     for fit in fits(a)[:1]:
         p = fit.parameters
         x = np.linspace(edges[0], edges[-1], 300)
-        y = scipy.stats.genextreme.pdf(x, p["shape"], p["location"], p["scale"]) * len(a) * (edges[1] - edges[0])
+        y = genextreme.pdf(x, p["shape"], p["location"], p["scale"]) * len(a) * (edges[1] - edges[0])
         axes.plot(x, y, color=COLOURS[0], label=f"{fit.name}, misfit {fit.distance:.2g}")
     axes.set(xlabel="amplification: highest blade over the tuned ring's highest", ylabel="samples", title=title)
     axes.set_ylim(0, 1.3 * top)
