@@ -448,8 +448,8 @@ def march(
         ahead, began = 1 if dense else min(many, settle - done), time.monotonic()
         rows = np.full(samples, each if dense else each * samples)
         now, seen, listed, count, *among = stepper.run(now, rows, samples if dense else ahead)
-        among = Hardest(float(now.missed) - float(before.missed), float(before.time)) if dense else among[0]
-        hardest = max(hardest, among, key=lambda one: float(one.missed))
+        within = Hardest(float(now.missed) - float(before.missed), float(before.time)) if dense else among[0]
+        hardest = max(hardest, within, key=lambda one: float(one.missed))
         done, happened = done + ahead, happened + count
         if not np.isfinite(seen.mechanical[-1]):
             when, why = _divergence(stepper, before, seen, kept if dense else None)
