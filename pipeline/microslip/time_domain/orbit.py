@@ -447,9 +447,10 @@ def march(
         before, dense = now, done >= settle
         ahead, began = 1 if dense else min(many, settle - done), time.monotonic()
         rows = np.full(samples, each if dense else each * samples)
-        now, seen, listed, count, *among = stepper.run(now, rows, samples if dense else ahead)
-        within = Hardest(float(now.missed) - float(before.missed), float(before.time)) if dense else among[0]
-        hardest = max(hardest, within, key=lambda one: float(one.missed))
+        now, seen, listed, count, among = stepper.advanced(now, rows, samples if dense else ahead)
+        if dense:
+            among = Hardest(float(now.missed) - float(before.missed), float(before.time))
+        hardest = max(hardest, among, key=lambda one: float(one.missed))
         done, happened = done + ahead, happened + count
         if not np.isfinite(seen.mechanical[-1]):
             when, why = _divergence(stepper, before, seen, kept if dense else None)
@@ -534,7 +535,7 @@ class Again:
 
 def _again(stepper: Stepper, begin: Now, samples: int, each: int) -> Again:
     e, steppers = stepper.equations, ((stepper, each), (stepper.halved(), 2 * each))
-    (one, seen), (other, fine) = (s.run(begin, np.full(samples, k))[:2] for s, k in steppers)
+    (one, seen, *_), (other, fine, *_) = (s.run(begin, np.full(samples, k)) for s, k in steppers)
     missed, swing = float(one.missed) - float(begin.missed), math.sqrt(2 * seen.mechanical.max(initial=0.0))
     if not np.isfinite(seen.mechanical[-1] + fine.mechanical[-1]):
         return Again((one, other), math.inf, 1.0, missed, swing)

@@ -227,6 +227,12 @@ class Stepper:
 
     def run(
         self, now: Now, steps: Array, rows: int | None = None, events: int = EVENTS
+    ) -> tuple[Now, Seen, Array, int]:
+        """`advanced`, without its hardest row."""
+        return self.advanced(now, steps, rows, events)[:4]
+
+    def advanced(
+        self, now: Now, steps: Array, rows: int | None = None, events: int = EVENTS
     ) -> tuple[Now, Seen, Array, int, Hardest]:
         """So many rows further, all samples if it is not said, the i-th after steps[i modulo s] of tau, (s,); compiled
         anew for another s alone. It ends early where numbers become infinite, in the last sample then.
