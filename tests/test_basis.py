@@ -20,7 +20,8 @@ import pytest
 import sector
 import small
 
-from microslip.basis import check_basis, open_file, read_basis, write_basis
+from microslip.basis import check_basis, read_basis, write_basis
+from microslip.basis.files import open_file
 from microslip.basis.integrals import modal_mass
 from microslip.data import Mesh, ModalBasis
 from microslip.errors import UserError

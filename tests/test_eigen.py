@@ -14,8 +14,7 @@ from hypothesis import strategies as st
 from meshes import STEEL, body, brick, moved, renumbered, roller_box, rotation_matrix, shaken
 
 from microslip.errors import NotConverged, UserError
-from microslip.fem import discretise
-from microslip.fem.discretise import free_upper
+from microslip.fem.discretise import discretise, free_upper
 from microslip.linalg import eigen
 from microslip.linalg.canonical import clusters, signs, turn_clusters
 from microslip.mesh import read_mesh

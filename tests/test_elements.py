@@ -7,9 +7,9 @@ import pytest
 from meshes import CELLS, QUADRATIC, brick, pipe, shaken
 
 from microslip.errors import UserError
-from microslip.fem import discretise
-from microslip.fem.discretise import face_blocks, quadrature, reference_nodes, shape_functions
-from microslip.mesh import boundary_facets, corner_volumes, mesh_problems, read_mesh
+from microslip.fem.discretise import discretise, face_blocks, quadrature, reference_nodes, shape_functions
+from microslip.mesh import boundary_facets, mesh_problems, read_mesh
+from microslip.mesh.gates import corner_volumes
 from microslip.topology import CELL_TYPES, FACET_CORNERS
 
 FACETS = tuple(FACET_CORNERS)

@@ -15,24 +15,24 @@ from scipy.spatial import cKDTree
 from skfem.helpers import ddot, dot, eye, grad, sym_grad, trace
 
 from microslip.data import Mesh
-from microslip.fem import (
-    centrifugal,
-    discretise,
+from microslip.elasticity import isotropic, orthotropic
+from microslip.fem.discretise import discretise, face_blocks, free_upper, reference_nodes
+from microslip.fem.loads import body_force, centrifugal, pressure, traction
+from microslip.fem.operators import (
     displacement_gradient,
+    engineering,
+    from_tensor,
     green_strain,
     internal_force,
-    isotropic,
     mass,
-    orthotropic,
-    pressure,
     spin_projector,
     stiffness,
     stress_stiffness,
     tangent,
+    tangent_tensor,
+    to_symmetric,
+    to_tensor,
 )
-from microslip.fem.discretise import face_blocks, free_upper, reference_nodes
-from microslip.fem.loads import body_force, traction
-from microslip.fem.operators import engineering, from_tensor, tangent_tensor, to_symmetric, to_tensor
 from microslip.modal.group import inertia_of
 from microslip.modal.rigid import rigid_fields
 

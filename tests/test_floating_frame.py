@@ -12,8 +12,8 @@ from meshes import STEEL, body, brick, shaken, twisted_blade
 from microslip.basis import check_basis, read_basis, write_basis
 from microslip.data import MOTIONS
 from microslip.errors import UserError
-from microslip.fem import discretise, stress_stiffness
-from microslip.fem.discretise import free_upper
+from microslip.fem.discretise import discretise, free_upper
+from microslip.fem.operators import stress_stiffness
 from microslip.linalg import eigen
 from microslip.modal.boundary import fixed_dofs
 from microslip.modal.compute import modal_basis

@@ -15,8 +15,7 @@ from closed_forms.shafts import spinning_mass
 from meshes import STEEL, body, brick, nearest, pipe, twisted_blade
 
 from microslip.basis import check_basis, read_basis, write_basis
-from microslip.fem import discretise
-from microslip.fem.discretise import free_upper
+from microslip.fem.discretise import discretise, free_upper
 from microslip.frames import skew
 from microslip.linalg import eigen
 from microslip.linalg.gyroscopic import (

@@ -15,8 +15,10 @@ from meshes import body, brick
 from pydantic import ValidationError
 from small import basis as small_basis
 
+from microslip.elasticity import isotropic
 from microslip.errors import UserError
-from microslip.fem import discretise, displacement_gradient, green_strain, isotropic
+from microslip.fem.discretise import discretise
+from microslip.fem.operators import displacement_gradient, green_strain
 from microslip.modal.compute import modal_basis
 from microslip.modal.stress import von_mises
 from microslip.operating import MaterialLimits, motion_of

@@ -164,7 +164,8 @@ def static_answer(g, name: str, force):
 
 
 def direct_stress(mesh, u):
-    from microslip.fem import displacement_gradient, green_strain, isotropic
+    from microslip.elasticity import isotropic
+    from microslip.fem.operators import displacement_gradient, green_strain
 
     (b,) = discretise(mesh).blocks
     strain = green_strain(displacement_gradient(b, u), nonlinear=False)

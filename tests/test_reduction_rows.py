@@ -11,7 +11,9 @@ from rings import bladed_sector
 from test_reduction import LOOK, PUSH, SIDE, STATICALLY_EXACT, TIP, full_model, static_answer
 
 from microslip.basis import check_basis, read_basis, write_basis
-from microslip.fem import discretise, displacement_gradient, green_strain, isotropic
+from microslip.elasticity import isotropic
+from microslip.fem.discretise import discretise
+from microslip.fem.operators import displacement_gradient, green_strain
 from microslip.modal.body_rows import body_rows
 from microslip.modal.boundary import fixed_dofs
 from microslip.modal.compute import modal_basis

@@ -11,8 +11,8 @@ from meshes import STEEL, body, brick, nearest, roller_box, shaken, twisted_blad
 from scipy.special import ellipe, ellipeinc, ellipk, ellipkinc
 
 from microslip.errors import UserError
-from microslip.fem import discretise, displacement_gradient, green_strain, internal_force, stress_stiffness
-from microslip.fem.discretise import free_upper
+from microslip.fem.discretise import discretise, free_upper
+from microslip.fem.operators import displacement_gradient, green_strain, internal_force, stress_stiffness
 from microslip.linalg import eigen
 from microslip.modal.boundary import fixed_dofs
 from microslip.modal.compute import modal_basis

@@ -12,8 +12,8 @@ from meshes import CELLS, QUADRATIC, STEEL, body, brick, nearest, pipe, rotation
 from microslip.data import Mesh
 from microslip.elasticity import isotropic
 from microslip.errors import UserError
-from microslip.fem import discretise, displacement_gradient, mass, stiffness
-from microslip.fem.discretise import face_blocks, shape_functions
+from microslip.fem.discretise import discretise, face_blocks, shape_functions
+from microslip.fem.operators import displacement_gradient, mass, stiffness
 from microslip.modal.body_rows import body_rows
 from microslip.modal.compute import modal_basis
 from microslip.modal.rigid import rigid_fields

@@ -8,10 +8,10 @@ import scipy.sparse.linalg as spla
 from meshes import CELLS, QUADRATIC, STEEL, body, brick, pipe, shaken
 
 from microslip.data import Mesh
-from microslip.fem import discretise, displacement_gradient, green_strain, isotropic, mass, orthotropic, stiffness
-from microslip.fem.discretise import face_blocks, free_upper
+from microslip.elasticity import isotropic, orthotropic
+from microslip.fem.discretise import discretise, face_blocks, free_upper
 from microslip.fem.loads import traction
-from microslip.fem.operators import engineering, to_symmetric
+from microslip.fem.operators import displacement_gradient, engineering, green_strain, mass, stiffness, to_symmetric
 from microslip.modal.compute import modal_basis
 from microslip.modal.equilibrium import StaticState, make_model
 from microslip.modal.stress import gauss_set, nodal_set, smoother, von_mises

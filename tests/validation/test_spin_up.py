@@ -21,9 +21,15 @@ import scipy.sparse as sp
 import scipy.sparse.linalg as spla
 from meshes import body, brick
 
-from microslip.fem import discretise, displacement_gradient, green_strain, internal_force
-from microslip.fem.discretise import free_upper
-from microslip.fem.operators import spin_projector, tangent, tangent_tensor
+from microslip.fem.discretise import discretise, free_upper
+from microslip.fem.operators import (
+    displacement_gradient,
+    green_strain,
+    internal_force,
+    spin_projector,
+    tangent,
+    tangent_tensor,
+)
 from microslip.frames import skew
 from microslip.modal.boundary import fixed_dofs
 from microslip.modal.compute import modal_basis

@@ -5,6 +5,5 @@ from .checks import check_basis as check_basis
 from .files import CONVENTIONS as CONVENTIONS
 from .files import FORMAT as FORMAT
 from .files import FORMAT_VERSION as FORMAT_VERSION
-from .files import open_file as open_file
 from .files import read_basis as read_basis
 from .files import write_basis as write_basis

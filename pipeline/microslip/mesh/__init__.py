@@ -1,13 +1,12 @@
 """Any mesh file -> `Mesh`: named faces, unit of length, surface, quality gates. The only caller of meshio."""
 
-from .gates import corner_volumes, longest_over_shortest, mesh_problems, part_numbers
+from .gates import longest_over_shortest, mesh_problems, part_numbers
 from .reading import UNITS, point_data, read_mesh
 from .surface import boundary_facets, faces_from_points
 
 __all__ = [
     "UNITS",
     "boundary_facets",
-    "corner_volumes",
     "faces_from_points",
     "longest_over_shortest",
     "mesh_problems",

@@ -73,28 +73,34 @@ def _sentences(response: Mapping[str, Any]) -> list[str]:
     if lifted:
         named = " and ".join(filter(None, [", ".join(map(number, sorted(lifted)[:-1])), number(max(lifted))]))
         said.append(f"Under F_N = {named} N contacts would lift off: what was found there is not valid.")
+    return [*said, *_stress(response, valid), _worth(response, len(rows), doubtful)]
+
+
+def _stress(response: Mapping[str, Any], valid: Sequence[Mapping[str, Any]]) -> list[str]:
+    """The largest stress of the resonances that are valid."""
+    if not (stressed := [row for row in valid if "stress_amplitude_Pa" in row]):
+        return []
     of_body = f" of {response['stressed_body']}" if "stressed_body" in response else ""
-    if stressed := [row for row in valid if "stress_amplitude_Pa" in row]:
-        worst = max(stressed, key=lambda row: row["stress_amplitude_Pa"])
-        margin = f", reserve factor {number(worst['reserve_factor'], 3)}" if "reserve_factor" in worst else ""
-        force = number(worst["normal_force_N"])
-        said.append(
-            f"The largest stress amplitude{of_body} is {number(1e-6 * worst['stress_amplitude_Pa'])} MPa at "
-            f"{number(worst['frequency_of_stress_Hz'], 5)} Hz under F_N = {force} N{margin}."
-        )
-    uncertain = response.get("estimated_error_of_harmonics")
-    error = ""
+    worst = max(stressed, key=lambda row: row["stress_amplitude_Pa"])
+    margin = f", reserve factor {number(worst['reserve_factor'], 3)}" if "reserve_factor" in worst else ""
+    return [
+        f"The largest stress amplitude{of_body} is {number(1e-6 * worst['stress_amplitude_Pa'])} MPa at "
+        f"{number(worst['frequency_of_stress_Hz'], 5)} Hz under F_N = {number(worst['normal_force_N'])} N{margin}."
+    ]
+
+
+def _worth(response: Mapping[str, Any], count: int, doubtful: int) -> str:
+    """What the numbers of so many resonances are worth."""
+    uncertain, error = response.get("estimated_error_of_harmonics"), ""
     if isinstance(uncertain, float):
         size = percent(uncertain) if uncertain > HARDLY else f"less than {percent(HARDLY)}"
         error = f"; amplitudes are uncertain by {size}{' at most' * (uncertain > HARDLY)}"
         if not math.isfinite(uncertain):
             error = "; how uncertain amplitudes are is not known at some places"
-    if doubtful:
-        are = "is" if doubtful == 1 else "are"
-        said.append(f"{doubtful} of {counted(len(rows), 'resonance')} {are} doubtful and marked{error}.")
-    else:
-        said.append(f"Every resonance passes its checks{error}.")
-    return said
+    if not doubtful:
+        return f"Every resonance passes its checks{error}."
+    are = "is" if doubtful == 1 else "are"
+    return f"{doubtful} of {counted(count, 'resonance')} {are} doubtful and marked{error}."
 
 
 HARDLY = 1e-4
