@@ -125,6 +125,8 @@ def test_no_crossing_beyond_the_speeds_and_none_counted_twice_at_a_station() -> 
     assert [c.speed for c in crossings(tracks, [2])] == [10.0]  # exactly at the middle station
     assert [c.speed for c in crossings(tracks, [1])] == [20.0]  # exactly at the last one
     assert crossings(tracks, [0, -3]) == []
+    line = np.array([[10.0 - 2e-15, 20.0 + 4e-15]])  # a whirl of a free body
+    assert crossings(Tracks(np.array([10.0, 20.0]), np.zeros((1, 2), dtype=np.int64), line, np.ones((1, 1))), [1]) == []
     slow = Tracks(np.array([0.0, 5.0]), np.zeros((1, 2), dtype=np.int64), np.full((1, 2), 20.0), np.ones((1, 1)))
     assert crossings(slow, [2]) == []
 
