@@ -2,8 +2,8 @@
 
 Between two speeds the squared frequency is taken as linear in the squared speed (Southwell: omega^2 =
 omega_0^2 + B Omega^2), which is exact at the stations and makes every crossing a root in closed form.
-Gyroscopic coupling is not in the frequencies of a modal file; the modes with it stand beside (`track_gyroscopic`). It
-parts them with the speed and not with its square, so that they are taken as linear in the speed.
+Gyroscopic coupling is not in the frequencies of a modal file; the modes with it stand beside (`track_gyroscopic`). Of
+these omega^2 = omega_0^2 + B Omega^2 + 2 g omega, with g linear in the speed: two whirls of one mode exactly.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ class Tracks:
         omega: (c, s) rad/s, nan where it does not exist.
         mac: (c, s - 1) modal assurance criterion of each step, nan where there is none.
         solved: rad/s, the speeds whose equilibrium was computed where the others follow from a range; None: all.
-        power: of frequency and speed that go straight from station to station: 2, with gyroscopic coupling 1.
+        whirl: (c, s) rad/s, g of modes with gyroscopic coupling; None: they have none.
     """
 
     speeds: Array
@@ -45,13 +45,25 @@ class Tracks:
     omega: Array
     mac: Array
     solved: Array | None = None
-    power: int = 2
+    whirl: Array | None = None
 
     def frequency(self, curve: int, speeds: Array) -> Array:
         """Hz of one curve at any speeds (rad/s), nan outside its range."""
-        known, p = self.modes[curve] >= 0, self.power
-        x, y = self.speeds[known] ** p, self.omega[curve, known] ** p
-        return np.interp(np.asarray(speeds) ** p, x, y, left=np.nan, right=np.nan) ** (1 / p) / (2 * np.pi)
+        known, at = self.modes[curve] >= 0, np.asarray(speeds)
+        x, y = self.speeds[known], self.omega[curve, known]
+        g = np.zeros_like(y) if self.whirl is None else self.whirl[curve, known]
+        plain = np.interp(at**2, x**2, y**2 - 2 * g * y, left=np.nan, right=np.nan)
+        g = np.interp(at, x, g)
+        return (g + np.sqrt(np.maximum(g**2 + plain, 0.0))) / (2 * np.pi)
+
+    def coupled(self, plain: Sequence[Array]) -> Tracks:
+        """The same curves, those of the modes with gyroscopic coupling. plain: at each station rad/s without it."""
+        g = np.zeros(self.omega.shape)
+        for i, omega in enumerate(plain):
+            here = (self.modes[:, i] >= 0) & (self.modes[:, i] < len(omega)) & (self.omega[:, i] > 0)
+            own = self.omega[here, i]
+            g[here, i] = (own**2 - omega[self.modes[here, i]] ** 2) / (2 * own)
+        return replace(self, whirl=g)
 
 
 @dataclass(frozen=True)
@@ -192,7 +204,7 @@ def track_gyroscopic(basis: ModalBasis) -> Tracks | None:
     held = [g.gyroscopic is not None or not g.speed for g in groups]
     if len(groups) < 2 or not all(held) or not any(g.speed for g in groups) or not all(len(g.phi) for g in groups):
         return None
-    return replace(track([_whirling(g) for g in groups], point_weights(basis)), power=1)
+    return track([_whirling(g) for g in groups], point_weights(basis)).coupled([g.omega for g in groups])
 
 
 def parted(basis: ModalBasis) -> Tracks | None:
@@ -240,14 +252,26 @@ def engine_orders(basis: ModalBasis) -> list[int]:
 def crossings(tracks: Tracks, orders: Sequence[int]) -> list[Crossing]:
     """Where engine orders (omega = order Omega) meet the curves, ascending in speed; a curve that lies on one, as a
     whirl of a free body in the rotating frame, meets none."""
-    found, p = [], tracks.power
-    x = tracks.speeds**p
+    found = []
+    x = tracks.speeds
     for order in sorted({k for k in orders if k > 0}):
         for curve in range(len(tracks.modes)):
-            g = tracks.omega[curve] ** p - order**p * x
-            g[np.abs(g) < 1e-12 * order**p * x] = 0.0
+            g = tracks.omega[curve] - order * x
+            g[np.abs(g) < 1e-12 * order * x] = 0.0
             for i in range(len(x) - 1):
                 if np.isfinite(g[i : i + 2]).all() and g[i] * g[i + 1] <= 0 and g[i] != 0:
-                    speed = float((x[i] + (x[i + 1] - x[i]) * g[i] / (g[i] - g[i + 1])) ** (1 / p))
+                    speed = (
+                        _meeting(tracks, curve, order, float(x[i]), float(x[i + 1])) if g[i + 1] else float(x[i + 1])
+                    )
                     found.append(Crossing(order, curve, speed, order * speed / (2 * np.pi)))
     return sorted(found, key=lambda c: (c.speed, c.order))
+
+
+def _meeting(tracks: Tracks, curve: int, order: int, low: float, high: float) -> float:
+    """Speed (rad/s) between two at which an engine order crosses a curve."""
+    from scipy.optimize import brentq
+
+    def apart(speed: float) -> float:
+        return float(2 * np.pi * tracks.frequency(curve, np.array(speed)) - order * speed)
+
+    return float(brentq(apart, low, high, xtol=1e-12 * high, rtol=1e-14))
