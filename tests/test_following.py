@@ -172,6 +172,9 @@ def test_optima_of_several_cases_stand_on_one_picture(tmp_path: Path, monkeypatc
     np.testing.assert_allclose(before["light"], [[1, 3, 9], [300 / np.pi] * 3, 1e-6 * np.array([2, 10 / 3, 82 / 9])])
     assert "light: lowest at bodies.vane.mass = 1 kg, 2 µm at 95.493 Hz." in page.read_text()
     assert [t.get_text() for t in figures[-1].legends[0].get_texts()] == ["light", "heavy"] and not figures[0].legends
+    Path("light").mkdir()  # a case of that name beside its products
+    assert list(following.found_before(["light"], over, case)) == ["light"]
+    assert list(following.found_before(["build/light"], over, case)) == ["light"]
     for other, said in (("light", "not friction, "), ("none", "type microslip optimum none")):
         with pytest.raises(UserError, match=said):
             following.found_before([other], "friction", case)

@@ -69,9 +69,9 @@ def over_frequency_plot(
     low, high = (f(float(f(x)) for x, _ in curves.values()) for f in (min, max))
     axes.set(xlabel="excitation frequency in Hz", ylabel=quantity, title=title, xlim=(low, high))
     numbers_within(axes.yaxis)
-    drawn, names = axes.get_legend_handles_labels()
-    beside = dict(zip(("handles", "labels"), by_rows(drawn[::-1], names[::-1], 6), strict=True))
-    figure.legend(**beside, loc="outside lower center", ncols=6, fontsize=9, title=told or None, title_fontsize=8)
+    lines, names = axes.get_legend_handles_labels()
+    lines, names = by_rows(lines[::-1], names[::-1], 6)
+    figure.legend(lines, names, loc="outside lower center", ncols=6, fontsize=9, title=told or None, title_fontsize=8)
     return save_figure(figure, path)
 
 

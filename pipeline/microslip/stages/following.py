@@ -282,8 +282,10 @@ def found_before(names: Sequence[str], over: str, case: Case) -> dict[str, Array
     """
     found = {}
     for name in names:
-        folder = Path(name) if Path(name).is_dir() else case.folder.parent / name
+        folder = case.folder.parent / name
+        folder = folder if folder.is_dir() else Path(name)
         if not (file := folder / "optimum.csv").is_file():
+            file = case.folder.parent / name / file.name
             raise UserError(f"--beside {name}: there is no {file}; type microslip optimum {name} --over {over} first")
         asked = [over, "frequency_Hz", case.quantity.column("amplitude"), "what"]
         head, *rows = csv.reader(ordinary(file).read_text(encoding="utf-8").splitlines())
