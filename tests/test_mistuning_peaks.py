@@ -147,7 +147,7 @@ def test_a_solution_that_is_little_higher_is_followed() -> None:
     def respond(f: float) -> np.ndarray:
         return upper(f) if f >= 101.1 or 100.29 < f < 100.3 else np.array([0.95])
 
-    def follow(f: float, behind: float, width: float) -> tuple[list[tuple[float, np.ndarray]], bool]:
+    def follow(f: float, behind: float, width: float, arc: bool) -> tuple[list[tuple[float, np.ndarray]], bool]:
         begun.append(behind)
         return ([(f, upper(f))], False) if f >= 100.3 else ([(100.3, upper(100.3))], True)
 

@@ -20,9 +20,10 @@ from ..data import Array
 Respond = Callable[[float], Array | None]
 """(w,) amplitudes of the read-outs at a frequency (Hz); None where there is no solution."""
 
-Follow = Callable[[float, float, float], tuple[list[tuple[float, Array]], bool]]
+Follow = Callable[[float, float, float, bool], tuple[list[tuple[float, Array]], bool]]
 """Frequencies and amplitudes of the solution that goes on towards a frequency (Hz) from the one at another, the second,
-and whether it ends on the way; the third is the width (Hz) of what is between two points of the sweep."""
+and whether it ends on the way; the third is the width (Hz) of what is between two points of the sweep, the last one
+whether that is worth many steps."""
 
 TOLERANCE = 1e-4
 """Share of the highest amplitude by which it may be missed."""
@@ -82,7 +83,9 @@ def highest(
         promised = told[0] > top * (1 + tolerance) and more - top <= 0.5 * before
         promised = promised and not _beside(told[1], known, failed)
         if more <= top * (1 + (tolerance if promised else LEFT)):
-            break
+            if not search.leads_on(top, tolerance):
+                break
+            continue
         if not promised and search.goes_on(low, high, tolerance):
             continue
         search.look(told[1] if promised else _middle(low, high, failed))
@@ -106,7 +109,7 @@ class _Search:
         self.width = float(np.abs(np.diff(frequency)).max(initial=0.0))
         self.known: dict[float, Array] = {}
         self.failed: list[float] = []
-        self.tried: set[tuple[float, float, float]] = set()
+        self.tried: set[tuple[float, float, float, bool]] = set()
         self.led: set[float] = set()
         self.ends: list[float] = []
 
@@ -134,18 +137,29 @@ class _Search:
             self.known[f] = y
         return len(frequencies)
 
-    def goes_on(self, low: float, high: float, tolerance: float) -> bool:
+    def leads_on(self, top: float, tolerance: float) -> bool:
+        """Whether a solution that is about as high as the top, and beside which there is a lower one, leads to more
+        than is known: not only in this interval."""
+        x = sorted(self.known)
+        for low, high in zip(x, x[1:], strict=False):
+            a, b = self.known[low].max(), self.known[high].max()
+            if min(a, b) < STEADY * max(a, b) and max(a, b) > STEADY * top and self.goes_on(low, high, tolerance, True):
+                return True
+        return False
+
+    def goes_on(self, low: float, high: float, tolerance: float, last: bool = False) -> bool:
         """Whether the higher of two points leads to more at the other one, or on the way there, than is known. Where it
-        ends, a point is looked for beside that."""
+        ends, a point is looked for beside that. last: whether the interval is not halved any more."""
         known = self.known
         far, near = sorted((low, high), key=lambda f: known[f].max())
         told, wide = known[near].max(), high - low > NARROW * self.width
         smooth = wide and known[far].max() > STEADY * told and near not in self.led
         ended = any(abs(near - end) < ENDED * self.width for end in self.ends)
-        if self.follow is None or smooth or ended or (far, near, told) in self.tried:
+        arc = last or not wide
+        if self.follow is None or smooth or ended or (far, near, told, arc) in self.tried:
             return False
-        self.tried.add((far, near, told))
-        points, ends = self.follow(far, near, self.width)
+        self.tried.add((far, near, told, arc))
+        points, ends = self.follow(far, near, self.width, arc)
         higher = {
             f: y for f, y in points if y.max() > (1 + tolerance) * known[far].max() and self.low <= f <= self.high
         }

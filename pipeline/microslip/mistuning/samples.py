@@ -18,7 +18,7 @@ from ..harmonic_balance.reduced import Seen
 from ..harmonic_balance.solver import Point, among, carried, solve, sweep
 from ..system.assembly import Assembly
 from .branch import Branch
-from .peaks import NARROW, Highest, highest
+from .peaks import Highest, highest
 from .ring import Deviations, Tuned
 from .scatter import Scatter
 from .stressed import worst
@@ -142,10 +142,12 @@ class Sliding:
                 return self._kept(frequency, point)
         return None
 
-    def follow(self, frequency: float, behind: float, width: float) -> tuple[list[tuple[float, Array]], bool]:
+    def follow(
+        self, frequency: float, behind: float, width: float, arc: bool
+    ) -> tuple[list[tuple[float, Array]], bool]:  # fmt: skip
         """Hz and (w,) m of the solution that goes on from the one at another frequency: at this one by Newton's method,
-        or on the way there along its arc, and whether it ends; what is known here stays where that is higher. width:
-        Hz, of what is between two points of a sweep."""
+        or on the way there along its arc where asked for, and whether it ends; what is known here stays where that is
+        higher. width: Hz, of what is between two points of a sweep."""
         Omega, before = 2 * np.pi * frequency, self.known.get(frequency)
         beyond = [self.known[f] for f in self.known if (f - behind) * (frequency - behind) <= 0]
         side = sorted(beyond, key=lambda p: abs(p.Omega - Omega))
@@ -156,7 +158,7 @@ class Sliding:
                 return [(frequency, y)], False
         if before is not None:
             self.known[frequency] = before
-        if abs(frequency - behind) > NARROW * width:
+        if not arc:
             return [], False
         points, ends = Branch(self.problem, self.known[behind], Omega, 2 * np.pi * width).onward()
         return [(f, self._read(f, p)) for p in points if (f := p.Omega / (2 * np.pi)) != frequency], ends

@@ -74,10 +74,11 @@ def sensitivity_picture(near: Approximation, path: Path, title: str) -> Path:
     share = (near.sensitivity.sum(axis=2) / near.mean[:, None]).T
     N = len(share)
     order = (np.arange(N) - N // 2) % N
-    most = float(np.abs(share).max())
+    most, f = float(np.abs(share).max()), near.frequency
+    half = 0.5 * float(np.ptp(f)) / max(len(f) - 1, 1) or 0.5  # a cell is about its frequency
     image = axes.imshow(
         share[order], aspect="auto", origin="lower", cmap="RdBu_r", vmin=-most, vmax=most, interpolation="nearest",
-        extent=(near.frequency[0], near.frequency[-1], -(N // 2) - 0.5, N - N // 2 - 0.5),
+        extent=(f[0] - half, f[-1] + half, -(N // 2) - 0.5, N - N // 2 - 0.5),
     )  # fmt: skip
     axes.grid(False)
     axes.set(xlabel="excitation frequency in Hz", ylabel="sectors further", title=title)
