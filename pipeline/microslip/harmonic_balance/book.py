@@ -500,6 +500,9 @@ class BookPatch:
         force, slope = _with_slope(self.points, self.kinematics, u)
         return np.asarray(force), np.asarray(slope)
 
+    def near(self, u: Array, period: float, known: None) -> tuple[Array, None]:
+        return self.force(u, period), None
+
     def rate(self, u: Array, period: float = 1.0) -> None:
         """The forces do not depend on the period."""
 
