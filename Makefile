@@ -20,7 +20,7 @@ MOVED := $(shell [ "$$(cat $(READY) 2>/dev/null)" = "$$(pwd -P)" ] || echo moved
 .DELETE_ON_ERROR:
 .SECONDARY:
 .SECONDEXPANSION:
-.PHONY: disc-brake moved help setup all cases $(CASES) $(BODIES) $(BODIES:%=%-mesh) $(BODIES:%=%-modes) test test-slow test-all peers lint docs bench clean distclean
+.PHONY: disc-brake spin-pit moved help setup all cases $(CASES) $(BODIES) $(BODIES:%=%-mesh) $(BODIES:%=%-modes) test test-slow test-all peers lint docs bench clean distclean
 
 help: ## list the verbs
 	@grep -hE '^[a-z%-]+:.*## ' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 14
@@ -39,6 +39,13 @@ cases: $(CASES) ## every case that is not named like its body
 # Which bodies a case needs stands in its file: run reads it, and works only where a hash has changed.
 $(CASES): %: $(READY)
 	@$(RUN) run pipeline/cases/$*.toml
+
+# The three dampers of section 5.4: the largest strain over the mass, of all on one picture.
+MASSES := --over bodies.damper.mass --low 0.0165 --high 0.16 --points 9
+spin-pit: spin-pit-cottage-roof spin-pit-cylinder spin-pit-asymmetric ## strain over the mass of three dampers
+	@$(RUN) optimum spin-pit-cottage-roof $(MASSES)
+	@$(RUN) optimum spin-pit-cylinder $(MASSES)
+	@$(RUN) optimum spin-pit-asymmetric $(MASSES) --beside spin-pit-cottage-roof --beside spin-pit-cylinder
 
 disc-brake: $(READY) ## does the published disc brake squeal: roots, and how many grow at which speeds
 	@$(RUN) stability geometry/disc-brake

@@ -86,16 +86,16 @@ def sector_rows(
         book = book or cpu
         told = f"| {name} | {wall:.2f} | {cpu:.2f} | {cpu / book:.1f} | {steps / count:.1f} | {failed} |"
         print(f"{told} {top:.1f} | {1e6 * size:.2f} |", flush=True)
-    print("\n| mode | forces alone | forces with derivatives | linear systems | the rest |\n|---|--:|--:|--:|--:|")
+    print("\n| mode | forces alone | derivatives | linear systems | the rest |\n|---|--:|--:|--:|--:|")
     for name, more in ways:
         spent = parts(case(low, high, count, BLADES, points, **more), basis)
         print(f"| {name} | {' | '.join(f'{100 * part:.0f} %' for part in spent)} |", flush=True)
 
 
 def parts(settings: dict, basis: ModalBasis) -> list[float]:
-    """Shares of the wall time of a response: forces alone, with derivatives, linear systems, the rest."""
+    """Shares of the wall time of a response: forces alone, their derivatives, linear systems, the rest."""
     system, frequency = ms.assemble(settings["case"], blade=basis, normal_force=FORCE), np.linspace(*settings["sweep"])
-    places = {"force": Group, "forces": Group, "jacobian": AtFrequency}
+    places = {"near": Group, "slopes": AtFrequency, "jacobian": AtFrequency}
     spent, kept = dict.fromkeys(places, 0.0), {name: place.__dict__[name] for name, place in places.items()}
 
     def timed(name: str) -> Any:

@@ -64,7 +64,7 @@ def spin_pit(build: Path = Path("build"), to: Path = Path("tests/validation")) -
     for name, deviation in SCATTERS.items():
         made = build / name
         if not (made / "samples.csv").is_file():
-            given = [f"name={name}", f"mistuning.scatter.0.deviation={deviation}"]
+            given = [f"name={name}", f"mistuning.scatter.0.deviation={deviation}", "mistuning.samples=40"]
             run_case_file(CASES / "spin-pit-mistuned.toml", given, report=print)
         head, *rows = (made / "samples.csv").read_text().split()
         lines["samples"] = [f"scatter,{head}", *lines["samples"][1:], *(f"{deviation},{row}" for row in rows)]

@@ -147,7 +147,11 @@ def test_resonances_are_followed_over_the_normal_force(response: Response) -> No
 
 
 def test_no_resonance_is_left_out_over_the_normal_force(response: Response) -> None:
-    """Neither one that is there at a single normal force, nor one that a small force moves by more than a quarter."""
+    """Neither one that is there at a single normal force, nor one that a small force moves by more than a quarter, nor
+    one whose frequency is another's in four digits; names rise with the frequency."""
+    beside = {1000.0: {112.04: (112.03, 160.0)}, 100.0: {112.01: (50.0, 112.02)}}
+    lines = families(along(assess(response, small_basis(), "tip-probe"), beside))
+    assert list(lines) == ["near 112.01 Hz", "near 112.04 Hz"]
     whole, low, high = (50.0, 400.0), (50.0, 180.0), (180.0, 400.0)
     found = along(assess(response, small_basis(), "tip-probe"), {
         1000.0: {240.0: whole}, 100.0: {120.0: low, 240.0: high}, 10.0: {80.0: low, 240.0: high},

@@ -118,6 +118,17 @@ def test_an_engine_order_meets_southwells_curve_where_the_closed_form_says(rest:
     np.testing.assert_allclose(tracks.frequency(0, middle), np.sqrt(rest**2 + b * middle**2) / (2 * np.pi), rtol=1e-12)
 
 
+@pytest.mark.parametrize("way", [-1.0, 1.0])
+def test_an_engine_order_meets_a_whirl_between_two_speeds_where_the_closed_form_says(way: float) -> None:
+    """A mass that swings alike in all directions, seen from the frame that turns: omega_0 -+ Omega, which meets k Omega
+    at omega_0 / (k +- 1); without gyroscopic coupling it has omega_0^2 - Omega^2 there."""
+    rest, order, speeds = 100.0, 3, np.array([0.0, 60.0])
+    omega = rest + way * speeds
+    one = Tracks(speeds, np.zeros((1, 2), dtype=np.int64), omega[None], np.ones((1, 1)))
+    (found,) = crossings(one.coupled(np.sqrt(rest**2 - speeds**2)[:, None]), [order])
+    assert found.speed == pytest.approx(rest / (order - way), rel=1e-9)
+
+
 def test_no_crossing_beyond_the_speeds_and_none_counted_twice_at_a_station() -> None:
     tracks = Tracks(
         np.array([0.0, 10.0, 20.0]), np.zeros((1, 3), dtype=np.int64), np.full((1, 3), 20.0), np.ones((1, 2))
@@ -125,6 +136,8 @@ def test_no_crossing_beyond_the_speeds_and_none_counted_twice_at_a_station() -> 
     assert [c.speed for c in crossings(tracks, [2])] == [10.0]  # exactly at the middle station
     assert [c.speed for c in crossings(tracks, [1])] == [20.0]  # exactly at the last one
     assert crossings(tracks, [0, -3]) == []
+    line = np.array([[10.0 - 2e-15, 20.0 + 4e-15]])  # a whirl of a free body
+    assert crossings(Tracks(np.array([10.0, 20.0]), np.zeros((1, 2), dtype=np.int64), line, np.ones((1, 1))), [1]) == []
     slow = Tracks(np.array([0.0, 5.0]), np.zeros((1, 2), dtype=np.int64), np.full((1, 2), 20.0), np.ones((1, 1)))
     assert crossings(slow, [2]) == []
 

@@ -9,11 +9,11 @@ import pytest
 
 from microslip.contact import EXAMPLES
 from microslip.contact.friction import Coulomb
-from microslip.contact.harmonics import force_alone, force_harmonics, fourier
+from microslip.contact.harmonics import force_alone, force_harmonics, force_near, fourier
 from microslip.contact.heights import Polynomial, tabulated
 from microslip.contact.law import march
 from microslip.contact.normal import Preload, Rough
-from microslip.contact.periodic import RECALL, periodic
+from microslip.contact.periodic import RECALL, periodic, unknown
 from microslip.contact.point import PointContact
 from microslip.contact.wear import worn_law
 
@@ -205,6 +205,20 @@ def test_force_and_derivative_belong_to_the_same_number_of_cycles(name: str, apa
     assert np.abs(alone - force).max() < 1e-12 * size
     assert np.abs(exact - force).max() > apart * size
     assert apart or np.abs(fine - force).max() < 1e-7 * size
+
+
+def test_what_is_known_of_a_motion_near_by_changes_no_force() -> None:
+    """The periodic memory is the only one there is; one that is no number counts as nothing known."""
+    example, u = swinging("smooth point")
+    given = {"samples": 32, "count": 100, "chunk": 16, "periodicity": 1e-12}
+    law, period, nothing = example.law, example.period, unknown(example.law, len(u))
+    cold = np.array(force_alone(law, u, period, **given))
+    _, known = force_near(law, 1.05 * u, nothing, period, **given)
+    broken = force_near(law, u.at[3].set(jnp.nan), nothing, period, **given)[1]
+    assert np.array(known.told).all() and not broken.told[3]
+    for begun in (known, broken):
+        warm = np.array(force_near(law, u, begun, period, **given)[0])
+        assert np.abs(warm - cold).max() < 1e-9 * np.abs(cold).max()
 
 
 @pytest.mark.parametrize(("slides", "most"), [(0.5, 2), (3.0, 2)])

@@ -7,9 +7,6 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 import wrong_laws
-from hypothesis import given
-from hypothesis import settings as hypothesis_settings
-from hypothesis import strategies as st
 
 from microslip.contact import EXAMPLES
 from microslip.contact.friction import Coulomb, Scattered
@@ -23,7 +20,8 @@ SAMPLES = 256
 CYCLE, MARCH = 4 * SAMPLES, 8 * SAMPLES
 """Samples of every cycle that is periodic, and of every path that is marched once: one program of a law serves all
 tests."""
-TRIES = hypothesis_settings(max_examples=12, deadline=None, derandomize=True)
+TRIES = range(12)
+"""Seeds of the random paths that a property is tried on: the same ones whatever else is imported."""
 SISTERS = {  # laws that differ from a quick one in their characteristic or heights alone
     "exponential heights, cut", "linear heights", "tabulated heights", "point, rising", "point, heated",
     "point, static and sliding", "point, measured", "Mindlin", "round point", "gapped point",
@@ -87,38 +85,36 @@ def work(force, u):
 
 
 @LAWS
-@TRIES
-@given(seed=st.integers(0, 10**6))
-def test_an_open_contact_carries_nothing(example, seed) -> None:
+def test_an_open_contact_carries_nothing(example) -> None:
     """After being pressed and slid, and pulled apart."""
-    u = np.array(path(seed, example, samples=MARCH))
-    u[MARCH // 2 :, :, 0] = -np.abs(u[MARCH // 2 :, :, 0]) - example.gap
-    force, *_ = MARCHED(example.law, u, example.period / MARCH)
-    assert np.all(np.array(force)[MARCH // 2 :] == 0)
+    for seed in TRIES:
+        u = np.array(path(seed, example, samples=MARCH))
+        u[MARCH // 2 :, :, 0] = -np.abs(u[MARCH // 2 :, :, 0]) - example.gap
+        force, *_ = MARCHED(example.law, u, example.period / MARCH)
+        assert np.all(np.array(force)[MARCH // 2 :] == 0)
 
 
 @LAWS
-@TRIES
-@given(seed=st.integers(0, 10**6))
-def test_friction_stays_in_its_cone(example, seed) -> None:
+def test_friction_stays_in_its_cone(example) -> None:
     """A cone, not a box: the length of the tangential force is limited, not each of its components."""
-    u = path(seed, example, samples=MARCH)
-    force, limits, _ = MARCHED(example.law, u, example.period / MARCH)
-    assert np.all(np.array(force[..., 0]) >= 0)
-    excess = np.linalg.norm(force[..., 1:], axis=-1) - limits
-    assert excess.max() <= (1e-9 + example.inertia) * scale(force)  # bisection leaves 2^-40
+    for seed in TRIES:
+        u = path(seed, example, samples=MARCH)
+        force, limits = map(np.asarray, MARCHED(example.law, u, example.period / MARCH)[:2])
+        assert np.all(force[..., 0] >= 0)
+        excess = np.linalg.norm(force[..., 1:], axis=-1) - limits
+        assert excess.max() <= (1e-9 + example.inertia) * scale(force)  # bisection leaves 2^-40
 
 
 @LAWS
-@TRIES
-@given(seed=st.integers(0, 10**6), lift=st.sampled_from([0.5, 1.0, 3.0]))
-def test_a_closed_cycle_gives_no_energy(example, seed, lift) -> None:
+def test_a_closed_cycle_gives_no_energy(example) -> None:
     """Also where the normal load varies while the contact sticks. The sum's own error is of second order in the step:
     (2 pi 3 / 1024)^2 / 12 = 3e-5 for the third harmonic."""
-    u = path(seed, example, lift=lift, samples=CYCLE)
-    given_back, size = work(np.array(FORCES(example.law, u, example.period, 2)[0]), np.array(u))
-    error = 1e-3 if example.jumps else 5e-5  # the trapezoidal rule is of first order where the force jumps
-    assert np.all(given_back >= -error * size)
+    for seed in TRIES:
+        lift = (0.5, 1.0, 3.0)[seed % 3]
+        u = path(seed, example, lift=lift, samples=CYCLE)
+        given_back, size = work(np.array(FORCES(example.law, u, example.period, 2)[0]), np.array(u))
+        error = 1e-3 if example.jumps else 5e-5  # the trapezoidal rule is of first order where the force jumps
+        assert np.all(given_back >= -error * size)
 
 
 @LAWS
@@ -149,27 +145,28 @@ def test_stuck_and_moved_under_changing_load_gives_no_energy(example, turn) -> N
 
 
 @LAWS
-@TRIES
-@given(seed=st.integers(0, 10**6), angle=st.floats(0, 2 * np.pi))
-def test_turning_the_tangents_turns_the_force(example, seed, angle) -> None:
+def test_turning_the_tangents_turns_the_force(example) -> None:
     """Laws with two stiffnesses are tried with the mirrored tangent instead."""
-    u = path(seed, example)
-    c, s = np.cos(angle), np.sin(angle)
-    turn = np.array([[1, 0, 0], [0, c, -s], [0, s, c]]) if example.isotropic else np.diag([1.0, -1.0, 1.0])
-    force = FORCES(example.law, u, example.period, 2)[0]
-    turned = FORCES(example.law, u @ turn.T, example.period, 2)[0]
-    wrong = np.abs(force @ turn.T - turned).max(axis=-1)
-    if example.jumps:  # where two roots meet rounding decides which one it is: now and then for some samples
-        assert np.quantile(wrong, 0.9) <= 1e-7 * scale(force)
+    wrong = []
+    for seed in TRIES:
+        angle = np.random.default_rng(seed).uniform(0, 2 * np.pi)
+        u = path(seed, example)
+        c, s = np.cos(angle), np.sin(angle)
+        turn = np.array([[1, 0, 0], [0, c, -s], [0, s, c]]) if example.isotropic else np.diag([1.0, -1.0, 1.0])
+        force, turned = (np.asarray(FORCES(example.law, x, example.period, 2)[0]) for x in (u, u @ turn.T))
+        wrong.append(np.abs(force @ turn.T - turned).max(axis=-1) / scale(force))
+    if example.jumps:  # where two roots meet rounding decides: of 300 paths 0.9 % of the samples, > 10 % in one of 27
+        assert np.mean(np.array(wrong) > 1e-7) < 0.05
     else:
-        assert wrong.max() <= 1e-9 * scale(force)
+        assert np.max(wrong) <= 1e-9
 
 
 @pytest.mark.parametrize("name", ["rough point, damped", "portion of a rough contact", "smooth point"])
 def test_an_approach_presses_as_a_step_from_nothing_does(name) -> None:
     """Also of laws that say it without one."""
     law, u = EXAMPLES[name].law, np.linspace(-1, 1.5, 3) * EXAMPLES[name].normal
-    np.testing.assert_allclose(law.pressed(u), Law.pressed(law, u), rtol=1e-14)
+    found, expected = jax.jit(lambda law, u: (law.pressed(u), Law.pressed(law, u)))(law, u)
+    np.testing.assert_allclose(found, expected, rtol=1e-14)
 
 
 @LAWS
@@ -183,29 +180,27 @@ def test_the_same_path_gives_the_same_force_twice(example) -> None:
 def test_every_point_is_on_its_own(example) -> None:
     """Whatever the others do."""
     u, other = path(2, example), path(5, example)
-    together = FORCES(example.law, u, example.period, 2)[0]
-    apart = FORCES(example.law, np.concatenate([other[:, :2], u[:, 2:]], axis=1), example.period, 2)[0]
+    beside = np.concatenate([other[:, :2], u[:, 2:]], axis=1)
+    together, apart = (np.asarray(FORCES(example.law, x, example.period, 2)[0]) for x in (u, beside))
     assert np.allclose(together[:, 2], apart[:, 2], rtol=0, atol=1e-12 * scale(together))
 
 
 @LAWS
-@TRIES
-@given(seed=st.integers(0, 10**6))
-def test_tangent_matches_differences(example, seed) -> None:
+def test_tangent_matches_differences(example) -> None:
     """Off the transitions: where two differences of different length agree among themselves."""
-    u = path(seed, example, points=1, samples=32)
-    direction = path(seed + 1, example, points=1, samples=32)
     dt = example.period / 32
-    tangent = np.array(TANGENT(example.law, u, dt, direction)[1])
-    assert np.all(np.isfinite(tangent))
-
-    def at(h):
-        return np.array(TANGENT(example.law, u + h * direction, dt, direction)[0])
-
-    fine, coarse = ((at(h) - at(-h)) / (2 * h) for h in (1e-6, 1e-5))
-    smooth = np.abs(fine - coarse).max(axis=(1, 2)) < 1e-7 * np.abs(tangent).max()
-    assert np.abs(tangent - fine)[smooth].max() <= 1e-6 * np.abs(tangent).max()
-    assert smooth.sum() > 16
+    for seed in TRIES:
+        u = path(seed, example, points=1, samples=32)
+        direction = path(seed + 1, example, points=1, samples=32)
+        tangent = np.array(TANGENT(example.law, u, dt, direction)[1])
+        assert np.all(np.isfinite(tangent))
+        up, down, above, below = (
+            np.array(TANGENT(example.law, u + h * direction, dt, direction)[0]) for h in (1e-6, -1e-6, 1e-5, -1e-5)
+        )
+        fine, coarse = (up - down) / 2e-6, (above - below) / 2e-5
+        smooth = np.abs(fine - coarse).max(axis=(1, 2)) < 1e-7 * np.abs(tangent).max()
+        assert np.abs(tangent - fine)[smooth].max() <= 1e-6 * np.abs(tangent).max()
+        assert smooth.sum() > 16
 
 
 @LAWS
@@ -247,8 +242,11 @@ def error_of_periodic_derivative(example) -> float:
 
 
 def solved_for(example) -> bool:
-    state = example.law.init(1)
-    return example.law.recalled(state, example.law.memory(jnp.zeros((1, 3)), state)) is not None
+    def recalled(law):
+        state = law.init(1)
+        return law.recalled(state, law.memory(jnp.zeros((1, 3)), state))
+
+    return jax.eval_shape(recalled, example.law) is not None
 
 
 ALIKE = SISTERS | {"rough point", "Hertz point", "rough strips"}
@@ -293,7 +291,7 @@ def test_points_that_share_a_contact_are_the_contact(example) -> None:
     u = path(5, example)
     whole = FORCES(example.law, u, example.period, 2).force
     shared = FORCES(portion(example.law, jnp.asarray(0.125)), np.repeat(u, 8, axis=1), example.period, 2).force
-    together = shared.reshape(len(u), 3, 8, 3).sum(axis=2)
+    together = np.asarray(shared).reshape(len(u), 3, 8, 3).sum(axis=2)
     np.testing.assert_allclose(together, whole, rtol=0, atol=1e-9 * scale(whole))
 
 

@@ -59,6 +59,7 @@ AREA, VOLUME, ENERGY = (
 )
 FORCE = jax.jit(lambda law, u: law.force(u))
 STORED = jax.jit(lambda law, u: law.stored(u))
+LOCAL = jax.jit(lambda law, u: law.local(u))
 
 
 @jax.jit
@@ -172,7 +173,7 @@ def test_level_parts_in_everything_that_heights_are_made_into() -> None:
     u = np.linspace(-0.2, 1.6, 37)
     for made in (
         lambda h: [AREA(combined(h, 3e-6, Linear(), 4e-6)[0], u[::3] + 0.013)],
-        lambda h: [rough_strips(1e8, 1e-5, h, 1e8, 0.3, 7).local(jnp.asarray(1e-5 * u))[0] / 1e3],
+        lambda h: [np.asarray(LOCAL(rough_strips(1e8, 1e-5, h, 1e8, 0.3, 7), 1e-5 * u)[0]) / 1e3],
         lambda h: course(h, 0.3, np.array([0.5, 2.0])).approach,
         lambda h: lubricated(h, [0.3, 0.7], [0.0, 2.0], 0.1),
     ):

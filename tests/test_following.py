@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,8 +14,10 @@ from microslip import cli
 from microslip.basis import write_basis
 from microslip.case import load_case, run_case
 from microslip.cli import main
+from microslip.errors import UserError
 from microslip.harmonic_balance import peak
 from microslip.stages import following
+from microslip.units import METRES
 
 pytestmark = pytest.mark.usefixtures("undrawn")
 
@@ -149,6 +152,32 @@ def test_what_was_found_stays_when_it_is_interrupted(monkeypatch: pytest.MonkeyP
     with pytest.raises(KeyboardInterrupt):
         following.optimum_over(cli._followed(Path("case.toml"), None, ()), points=4, report=third)
     assert [r["what"] for r in table("optimum.csv")] == ["highest resonance"] * 2
+
+
+def test_optima_of_several_cases_stand_on_one_picture(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Their names, values and lowest resonances; tables over another setting and missing ones are refused."""
+    from microslip.pictures import following as drawing
+
+    figures: list[Any] = []
+    over = "bodies.vane.mass"
+    monkeypatch.setattr(drawing, "save_figure", lambda figure, path: figures.append(figure) or path)
+    monkeypatch.chdir(tmp_path)
+    for name, best in (("light", 1.0), ("heavy", 3.0)):
+        case = following.Case(Path("case.toml"), {"name": name}, {}, Path("build") / name)
+        vars(case)["quantity"] = METRES
+        heights = {mass: 1e-6 * (mass / best + best / mass) for mass in (1.0, 3.0, 9.0)}
+        peaks = {mass: peak.HighestPeak(600.0, a, np.zeros(1), "converged") for mass, a in heights.items()}
+        before = following.found_before(["light"] * (name == "heavy"), over, case)
+        *_, page = following.write_optimum(peak.Optimum(best, peaks[best], "converged", peaks, {}), over, case, before)
+    np.testing.assert_allclose(before["light"], [[1, 3, 9], [300 / np.pi] * 3, 1e-6 * np.array([2, 10 / 3, 82 / 9])])
+    assert "light: lowest at bodies.vane.mass = 1 kg, 2 µm at 95.493 Hz." in page.read_text()
+    assert [t.get_text() for t in figures[-1].legends[0].get_texts()] == ["light", "heavy"] and not figures[0].legends
+    Path("light").mkdir()  # a case of that name beside its products
+    assert list(following.found_before(["light"], over, case)) == ["light"]
+    assert list(following.found_before(["build/light"], over, case)) == ["light"]
+    for other, said in (("light", "not friction, "), ("none", "type microslip optimum none")):
+        with pytest.raises(UserError, match=said):
+            following.found_before([other], "friction", case)
 
 
 def test_no_optimum_says_where_to_look(

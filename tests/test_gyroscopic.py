@@ -24,12 +24,13 @@ from microslip.linalg.gyroscopic import (
     hermitian_modes,
     stability_sentence,
 )
-from microslip.modal.campbell import gyroscopic_change, track_gyroscopic
+from microslip.modal.campbell import crossings, gyroscopic_change, track_gyroscopic
 from microslip.modal.compute import modal_basis
 from microslip.modal.equilibrium import equilibrium, make_model
 from microslip.modal.run_up import run_up_terms
 from microslip.reduced.coordinates import in_modes
 from microslip.report.body import report_html
+from microslip.units import to_rpm
 
 ROOT = {"supports": [{"face": "z0"}]}
 QUARTER = np.array([[0.0, -1.0], [1.0, 0.0]])  # n x u in the plane of the rotation
@@ -341,7 +342,11 @@ def test_branches_of_the_campbell_diagram():
     x = tracks.speeds[-1] / first[0, 0]  # omega_0 + Omega over the uncoupled root of omega_0^2 - Omega^2
     assert gyroscopic_change(basis) == pytest.approx(np.sqrt((1 + x) / (1 - x)) - 1, rel=1e-2)
     assert track_gyroscopic(blade(4)) is None  # one speed only
-    page = report_html(basis, {})
+    meets = [c.speed for c in crossings(tracks, [5])]  # omega_0 -+ Omega = 5 Omega
+    np.testing.assert_allclose(meets, first[0, 0] / np.array([6.0, 4.0]), rtol=2e-3)
+    settings = {"settings": '{"rotation": {"engine_orders": [5]}}'}
+    page = report_html(replace(basis, provenance=settings), {})
+    assert all(f">{to_rpm(speed):.0f}<" in page for speed in meets)
     assert "The rotating body is stable" in page and "backward" in page
 
 

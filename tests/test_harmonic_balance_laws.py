@@ -25,9 +25,11 @@ from microslip.contact.law import Law
 from microslip.contact.normal import Normal, Penalty, Preload, Rough
 from microslip.contact.patch import Patch, equilibrium, grid, stuck_stiffness
 from microslip.contact.point import PointContact
+from microslip.contact.thinned import thinned
 from microslip.data import Compliance, Interface, ModalBasis, ModalGroup
 from microslip.errors import NotConverged, UserError
 from microslip.harmonic_balance import response_table, solver
+from microslip.harmonic_balance.forces import AFT
 from microslip.harmonic_balance.problem import Problem
 from microslip.harmonic_balance.reduced import stuck
 from microslip.harmonic_balance.response import HarmonicResponse, harmonic_response, newton, of_body
@@ -220,13 +222,33 @@ def test_old_derivatives_tell_what_was_shown_and_nothing_else() -> None:
     at, rng = problem.at(2 * np.pi * 47.0), np.random.default_rng(1)
     x, way, other = rng.normal(size=(3, problem.size))
     before, after, old = at.tried(x)[1], at.tried(x + 0.1 * way)[1], at.forces(x)[1]
-    ((u_0, F_0),), ((u_1, F_1),), (new,) = before, after, at.secant(old, before, after)
+    ((u_0, F_0, _),), ((u_1, F_1, _),), (new,) = before, after, at.secant(old, before, after)
     np.testing.assert_allclose(np.einsum("nkwlz,nlz->nkw", new, u_1 - u_0), F_1 - F_0, atol=1e-12 * np.abs(F_1).max())
     across = other - way * (other @ way) / (way @ way)
     (moved,) = [group.relative(problem.displacement(across)) for group in problem.groups]
     moved[:, :, 0] -= problem.groups[0].offset
     kept, was = (np.einsum("nkwlz,nlz->nkw", S, moved) for S in (new, old[0]))
     np.testing.assert_allclose(kept, was, atol=1e-9 * np.abs(was).max())
+
+
+def test_few_points_tell_how_many_give_way() -> None:
+    """Sticking under an even pressure exactly; sliding, tilted and twisted, to some hundredths."""
+    patch, width = rough_patch((26, 5)), np.array([1.0, 1.0, 1.0, 0.036, 0.0025, 0.036])
+    few, model = thinned(patch), AFT(patch, 1, 16, 100)
+    assert few is not None and len(few.chosen) < 50 and few.share.sum() == pytest.approx(130)
+    u = np.zeros((1, 6, 3))
+    u[0, 0, 0] = 4e-6
+    tilted = u + 1e-6 * np.random.default_rng(2).normal(size=u.shape) / width[:, None]
+    for motion, apart in ((u, 1e-9), (tilted, 0.05)):
+        whole, told = (m.forces(motion, 0.01)[1] / np.einsum("i,j->ij", width, width)[:, None, :, None]
+                       for m in (model, model.few))  # fmt: skip
+        assert 0 < np.abs(whole - told).max() < apart * np.abs(whole).max()
+
+
+def test_a_patch_that_few_points_cannot_stand_for_is_left_whole() -> None:
+    small, deforms = rough_patch((9, 5)), rough_patch((26, 5))
+    shapes = np.concatenate([deforms.kinematics, np.eye(390).reshape(130, 3, 390)], axis=2)
+    assert thinned(small) is None and thinned(replace(deforms, shapes=shapes)) is None
 
 
 def test_a_start_is_told_by_the_polynomial_that_told_the_last_point() -> None:

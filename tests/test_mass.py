@@ -6,6 +6,7 @@ import csv
 import shutil
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -26,6 +27,7 @@ from microslip.operating.motion import read_out
 from microslip.reduced.coordinates import of_density
 from microslip.results import read_response
 from microslip.settings.body import BodySettings
+from microslip.stages.orbit import _messages
 from microslip.stages.response import Wanted
 from microslip.stages.running import respond
 
@@ -207,6 +209,14 @@ def test_along_an_engine_order_line_a_damper_is_pressed_by_the_load_of_each_spee
     )
     for one, other in zip(whole, half, strict=True):
         assert one.normal_force == pytest.approx(4 * (other.normal_force or 0.0), rel=1e-12) and one.normal_force
+
+
+def test_a_run_up_tells_that_a_damper_stays_pressed_as_at_one_speed() -> None:
+    loose = BodyOfCase(name="damper", pressed_at_rpm=2700.0)
+    built = SimpleNamespace(settings=SimpleNamespace(components=(loose, BodyOfCase(name="blade"))), messages=())
+    for ramp, told in ((True, ["up: the contacts of damper stay pressed as at 2700 rpm."]), (None, [])):
+        equations = SimpleNamespace(ramp=ramp, assembly=SimpleNamespace(components=()))
+        assert _messages([("up", SimpleNamespace(messages=(), equations=equations))], built) == told
 
 
 def test_a_body_that_its_contacts_do_not_hold_is_refused() -> None:

@@ -300,6 +300,21 @@ def test_a_tuned_ring_without_a_peak_is_said(tuned: Tuned, missed: float, end: b
     assert said == [] if words is None else words in said[0]
 
 
+def test_the_highest_sample_is_searched_for_again(tuned: Tuned) -> None:
+    """From below and from above, in steps a quarter as wide, to the same peak; of one that was missed a warning says
+    by how much."""
+    asked = Asked(tuned, (Scatter("frequency", 0.01),), np.linspace(386, 400, 15), stuck=True)
+    found = ensemble.run(asked, 3, workers=1)
+    one = found.search_again()
+    assert found.again is not None and one.number == found.highest == found.column("amplitude").argmax()
+    for top in found.again:
+        assert top.amplitude == pytest.approx(one.top.amplitude, rel=1e-3)
+        assert np.diff(top.frequencies).max() == pytest.approx(0.25)
+    assert not any("first search" in s for s in found.unsure)
+    found.rows[:, 0] *= 0.98
+    assert found.lacked == pytest.approx(0.02, abs=1e-3) and "2 % of the highest" in " ".join(found.unsure)
+
+
 def test_python_warns_as_the_command_line_does() -> None:
     """A band without the tuned ring's peak; and known deviations, as given, are one ring whatever is asked for."""
     pattern = Scatter("frequency", values=(0.0, 0.01))
@@ -318,7 +333,9 @@ def test_fewer_samples_than_are_kept_are_the_first(tuned: Tuned, tmp_path: Path)
     told = list[str]()
     few = ensemble.run(asked, 2, workers=1, file=file, report=told.append)
     assert np.array_equal(few.rows, all_of[:2]) and told == ["the tuned ring"]
-    assert few.envelope.samples(6) == 6
+    alone = ensemble.run(asked, 2, workers=1).envelope
+    assert few.envelope.samples(6) == 2
+    assert np.array_equal(few.envelope.sums, alone.sums) and np.array_equal(few.envelope.bins, alone.bins)
     assert np.array_equal(ensemble.run(asked, 6, workers=1, file=file, report=told.append).rows, all_of)
     assert told == ["the tuned ring"] * 2
 

@@ -45,6 +45,13 @@ def test_masses_in_a_ring(N, find_tuned):
     assert found.misfit < 1e-4 or find_tuned
 
 
+def test_as_many_modes_as_blades_in_columns():
+    """An array of eigenvectors as eigh gives them is not taken for its rows."""
+    f, shapes, tuned = masses_in_a_ring(np.random.default_rng(1).normal(0, 0.02, 9))
+    with pytest.raises(UserError, match="columns"):
+        blades_from_modes(tuned, f, shapes.T, **NOISE, share=(100 / tuned) ** 2)
+
+
 def test_the_tuned_frequencies_are_found():
     """Those of the fundamental mistuning model K = Omega (1 + 2 D) Omega, exactly, from guesses 0.5 % beside them."""
     N, rng = 10, np.random.default_rng(2)

@@ -71,7 +71,7 @@ def fold(w: float, D: float, rng: np.random.Generator) -> tuple[Curve, float]:
     return curve, float(np.sqrt(s[b**2 - (w**2 * (1 + k * s)) ** 2 + w**4 / s >= 0].max()))
 
 
-@pytest.mark.parametrize(("kind", "added"), [(one, 2), (close, 7), (jump, 11), (kink, 10), (fold, 8)])
+@pytest.mark.parametrize(("kind", "added"), [(one, 2), (close, 7), (jump, 14), (kink, 10), (fold, 9)])
 def test_what_is_missed_is_said(kind: Callable[..., tuple[Curve, float]], added: int) -> None:
     """Sweeps with a point a half-power width or fewer: the error is within what is said, which is small; a smooth curve
     takes one or two points more than its sweep."""
@@ -82,7 +82,7 @@ def test_what_is_missed_is_said(kind: Callable[..., tuple[Curve, float]], added:
         grid = np.arange(LOW + rng.uniform(0, 0.3), HIGH, (0.3, 0.7)[i % 2])
         found = highest(curve, grid)
         assert truth / found.amplitude - 1 <= 1.0001 * found.missed + 1e-5, (w, D)
-        assert found.missed < 5e-3
+        assert found.missed < 5e-4
         assert found.amplitude <= truth * (1 + 1e-5)
         points.append(len(found.frequencies) - len(grid))
     assert np.mean(points) <= added
@@ -134,6 +134,26 @@ def test_a_sweep_goes_from_both_ends_to_where_nothing_leads_further() -> None:
     found = highest(respond, grid, at_once=lambda f: None if 100.5 < f < 103.5 else curve(f))
     assert looked[:3] == [103.0, 102.0, 101.0] and not set(looked[3:]) & set(grid)
     assert found.amplitude == highest(curve, grid).amplitude == pytest.approx(truth, rel=1e-4)
+
+
+def test_a_solution_that_is_little_higher_is_followed() -> None:
+    """Of two solutions 7 % apart the higher one, which a sweep leaves at 101.1 Hz, up to its end at 100.3 Hz: there the
+    peak is. Beside that nothing is followed again, though there it goes on."""
+    begun = list[float]()
+
+    def upper(f: float) -> np.ndarray:
+        return np.array([1 + 0.02 * (102 - f)])
+
+    def respond(f: float) -> np.ndarray:
+        return upper(f) if f >= 101.1 or 100.29 < f < 100.3 else np.array([0.95])
+
+    def follow(f: float, behind: float, width: float, arc: bool) -> tuple[list[tuple[float, np.ndarray]], bool]:
+        begun.append(behind)
+        return ([(f, upper(f))], False) if f >= 100.3 else ([(100.3, upper(100.3))], True)
+
+    found = highest(respond, np.arange(95.0, 110.0, 1.0), follow=follow)
+    assert found.amplitude == pytest.approx(1.034, rel=1e-3)
+    assert not any(100.2 < f < 100.31 for f in begun) and len(begun) < 8
 
 
 class Bent:

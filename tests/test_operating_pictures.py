@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -46,6 +47,31 @@ def test_curves(tmp_path):
     assert all(0.01 < dark(p) < 0.6 for p in shown)
 
 
+def kept(monkeypatch) -> list[Any]:
+    """The figures that are saved from now on."""
+    figures: list[Any] = []
+    monkeypatch.setattr(operating, "save_figure", lambda figure, path: figures.append(figure) or path)
+    return figures
+
+
+def test_a_legend_rises_and_is_read_by_rows(tmp_path, monkeypatch):
+    """The light curves are drawn last, and yet the smallest normal force is named first; eight in two rows."""
+    figures, f = kept(monkeypatch), np.linspace(100, 200, 5)
+    operating.over_frequency_plot({float(n): (f, n + f) for n in range(1, 9)}, "y", "t", tmp_path / "a.png")
+    (legend,) = figures[0].legends
+    told = [int(text.get_text().split()[-2]) for text in legend.get_texts()]
+    columns = [told[i : i + 2] for i in (0, 2)] + [[n] for n in told[4:]]
+    assert [c[0] for c in columns] + [c[1] for c in columns if len(c) > 1] == list(range(1, 9))
+
+
+def test_words_beside_the_places_tell_their_range(tmp_path, monkeypatch):
+    figures, cycle = kept(monkeypatch), cycle_stress(motion())
+    share = np.linspace(0, 1, len(cycle.mean))
+    low = replace(cycle, amplitude=1e6 * share, mean=1.4e6 * share - 4e5)
+    operating.haigh_plot(low, LIMITS, endurance(low, LIMITS), "t", tmp_path / "h.png")
+    assert any("mean stress -0.4 to 1 MPa" in text.get_text() for text in figures[0].axes[0].texts)
+
+
 def test_haigh_diagram(tmp_path):
     cycle = cycle_stress(motion())
     worst = endurance(cycle, LIMITS)
@@ -77,7 +103,12 @@ def test_a_map_reaches_down_to_what_is_negative():
     """A contact that counts less work than it gives: its map has colours for all of it."""
     from matplotlib.figure import Figure
 
-    for values, limits in (([-2.0, -1.0], (-2.0, 0.0)), ([1.0, 2.0], (0.0, 2.0)), ([-1.0, 3.0], (-1.0, 3.0))):
+    for values, limits in (
+        ([-2.0, -1.0], (-2.0, 0.0)),
+        ([1.0, 2.0], (0.0, 2.0)),
+        ([-1.0, 3.0], (-1.0, 3.0)),
+        ([0.0, 0.0], (0.0, 1.0)),
+    ):
         patch = SimpleNamespace(places=np.array([[0.0, 0.0], [1e-3, 0.0]]), dissipated=np.array(values))
         axes = Figure().subplots()
         operating._map_panel(axes, patch, "dissipated", "energy", 1.0, "J/m²", "BuPu", True, " ")

@@ -28,7 +28,9 @@ import test_contact_laws as contract
 from microslip.cli import main
 from microslip.contact import composed
 from microslip.contact.kinds import LawKind, sources_of_others
+from microslip.contact.law import Law
 from microslip.contact.settings import ContactLaw
+from microslip.errors import UserError
 from microslip.results import read_response
 
 PAGE = (Path(__file__).parents[1] / "docs" / "own_law.md").read_text(encoding="utf-8")
@@ -145,6 +147,27 @@ def test_the_contract_runs_on_a_law_of_another_package(package: dict[str, str]) 
     call = [sys.executable, "-m", "pytest", str(path), "-k", "pad and not without", "-p", "no:cacheprovider"]
     done = subprocess.run(call, env=package, capture_output=True, text=True)
     assert done.returncode == 0 and int(re.search(r"(\d+) passed", done.stdout)[1]) >= 10, done.stdout
+
+
+class Half(Law):
+    """A law that was begun."""
+
+    def init(self, n):
+        return ()
+
+
+class OfHalf(LawKind):
+    kind: Literal["half"]
+
+    def law(self, contact):
+        return Half()
+
+
+def test_a_law_without_a_method_is_refused_before_anything_is_solved() -> None:
+    own = {"normal_stiffness": 1e4, "tangential_stiffness": 5e3, "friction": 0.3}
+    asked = ContactLaw.model_validate(own).model_copy(update={"law": OfHalf(kind="half")})
+    with pytest.raises(UserError, match="case.toml: law: Half of .* has no method step, limit, slip, stored;"):
+        composed.compose(asked, Path("case.toml"))
 
 
 def test_the_contract_is_there() -> None:

@@ -94,10 +94,12 @@ def test_bodies_that_are_there_get_their_lines_at_the_end(decks_of_plates, capsy
 def test_what_does_not_touch_is_told_and_nothing_is_written(decks_of_plates, capsys):
     away = meshes.moved(plates()["upper"], np.eye(3), np.array([0, 0, 0.001]))
     (decks_of_plates / "away.inp").write_text("\n".join(decks.mesh_lines(away)) + "\n")
-    (decks_of_plates / "part.step").write_text("")
+    for name in ("part.step", "K.mtx", "M.mtx"):
+        (decks_of_plates / name).write_text("")
     for words, said in (
         (["lower.inp", "away.inp"], "touch nowhere"),
         (["lower.inp", "part.step"], "all of one kind"),
+        (["K.mtx", "M.mtx"], "name that of the stiffness alone"),
         (["lower.inp", "lower.inp"], "name of two"),
         (["lower.inp", "none.inp", "joint"], "none.inp: there is no such file"),
     ):

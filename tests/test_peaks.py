@@ -11,6 +11,8 @@ import pytest
 import scipy.optimize
 from test_harmonic_balance_laws import body, modes_with_rows, rough_patch
 
+import microslip as ms
+from microslip.analyses import balanced
 from microslip.contact.friction import Coulomb
 from microslip.contact.normal import Penalty
 from microslip.contact.patch import Patch, grid
@@ -144,6 +146,15 @@ def test_without_a_peak_the_end_is_told():
 def climbing(family, x, lam):
     """value -> the peak of the family uphill from a guess, with its rate."""
     return lambda p: rated(family, p, peak(family(p), np.array(x), lam))
+
+
+def test_a_read_out_that_nothing_moves_has_no_peak():
+    """Two masses of their own: where one resonates the other stands still, whatever rounding climbs to."""
+    two = ms.structure(np.eye(2), np.diag([1.0, 4.0]), 0.02 * np.eye(2), force={0: 1.0}, output=[0, 1])
+    problem = balanced(two, 1)
+    (point,) = sweep(problem, np.array([1.0 / (2 * np.pi)]))
+    top = peaks.Peak(point.x, point.Omega, 1e-36, False, "converged", np.zeros(0))
+    assert peaks.checked(problem, top, 0).converged and peaks.checked(problem, top, 1).status == peaks.STILL
 
 
 def test_optimal_damping_of_a_relaxing_spring():

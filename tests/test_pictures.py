@@ -235,6 +235,23 @@ def test_why_it_cannot_draw(program: str, words: str, tmp_path: Path, monkeypatc
     assert reason is not None and words in reason and "\n" not in reason
 
 
+@pytest.mark.skipif(os.name != "posix", reason="needs a shell")
+def test_a_machine_that_is_too_busy_to_draw_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where no picture of a body comes in time a page says so, on which they would simply be missing."""
+    from microslip.stages import response
+
+    stand_in = tmp_path / "python"
+    stand_in.write_text("#!/bin/sh\nexec sleep 60\n")
+    stand_in.chmod(0o755)
+    monkeypatch.setattr(sys, "executable", str(stand_in))
+    monkeypatch.setattr(pictures, "PATIENCE", 0.1)
+    assert "in 0.1 s, wait until" in (pictures.can_draw() or "")
+    (said,) = response._not_drawn()
+    assert (
+        said.startswith("The pictures of bodies are missing: PyVista drew nothing in 0.1 s, wait") and "--force" in said
+    )
+
+
 def test_egl_is_only_chosen_where_the_user_has_not(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("DISPLAY", raising=False)
     monkeypatch.setenv("VTK_DEFAULT_OPENGL_WINDOW", "vtkOSOpenGLRenderWindow")

@@ -161,6 +161,14 @@ def test_a_result_is_drawn_as_it_is(curve):
         assert np.hypot(x - at, y - amplitude).min() < 1e-9
 
 
+def test_a_result_says_where_its_largest_amplitude_is_no_resonance(curve, tmp_path):
+    """A Duffing curve that ends below its fold rises to its end."""
+    whole, half = ms.load(curve.save(tmp_path / "duffing.h5")), int(curve.amplitude.argmax()) // 2
+    arrays = {name: values[:half] for name, values in whole.arrays.items()}
+    cut = replace(whole, key=whole.key[:half], status=whole.status[:half], arrays=arrays)
+    assert f" at {cut.parameter[-1]:.6g} rad/s, an end;" in repr(cut) and "an end" not in repr(whole)
+
+
 def test_a_saved_result_is_the_same(curve, tmp_path):
     path = curve.save(tmp_path / "duffing.h5")
     again = ms.load(path)

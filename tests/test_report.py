@@ -107,7 +107,7 @@ def test_speeds_stand_beside_each_other_with_crossings() -> None:
     basis = dataclasses.replace(basis, provenance={"settings": settings})
     words = said(report_html(basis, {}))
     assert "Hz at 0 rpm" in words and "Hz at 3000 rpm" in words
-    assert "steel, density 7850.0 kg/m³, E = 210 GPa" in words
+    assert "steel, density 7850 kg/m³, E = 210 GPa" in words
     assert "nonlinear equilibrium, with spin softening" in words
     assert "Where engine orders meet modes" in words
 

@@ -250,6 +250,7 @@ def test_what_reads_nothing_but_rounding_reads_nothing():
     q = np.array([[1.0, 1.0 - 2e-16, 1e-20], [1.0, 1.0 - 1e-6, 0.0]], dtype=complex)
     found = reduced.read([part, part], q, np.zeros((2, 0)))
     np.testing.assert_allclose(found, [[0, 1e-6], [0, 1e-6], [3e-20, 0]], rtol=1e-9, atol=0)
+    assert np.isnan(reduced.read([part], np.full((1, 3), np.nan), np.zeros((1, 0)))).all()
     labels = {"gauges/root": ["strain"], "monitors/tip-probe": ["u_x", "u_y", "u_z"]}
     still = point(1.0) | {"gauges/root": np.zeros((1, 2), complex)}
     (one,) = response_of({**HEAD, "labels": labels}, {"one": {1.0: {n: still[n] for n in [*labels, *still]}}}).series

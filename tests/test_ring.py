@@ -542,14 +542,16 @@ def test_a_case_of_a_cyclic_body_is_refused(tmp_path: Path) -> None:
 
 
 def test_gyroscopic_coupling_splits_the_speeds_of_forward_and_backward_waves() -> None:
-    """On a ring of oscillators whose waves run at omega_k -+ c Omega the critical speeds are omega_k / (e +- c)."""
+    """Oscillators in a ring with Coriolis forces, omega^2 +- 2 c Omega omega = omega_k^2, backward and forward: the
+    critical speeds are omega_k / sqrt(e (e +- 2 c)), from two stations, as waves go between these as whirls do."""
     from microslip.data import GyroscopicModes
 
     c, sectors = 0.2, 12
     basis = chain(sectors, 1e5, 3e4, 0.3, (0.0, 20000.0))
     groups = {}
     for (s, k), g in basis.groups.items():
-        pair = np.array([g.omega[0] - c * g.speed, -(g.omega[0] + c * g.speed)])  # backward, forward
+        mean = np.sqrt(g.omega[0] ** 2 + (c * g.speed) ** 2)
+        pair = np.array([mean - c * g.speed, -(mean + c * g.speed)])  # backward, forward
         waves = pair if multiplicity(k, sectors) == 2 else g.omega
         n = len(waves)
         coupled = GyroscopicModes(waves, np.ones((1, n), complex), np.zeros(n), np.zeros(n), ("",) * n, np.zeros(n))
@@ -557,12 +559,8 @@ def test_gyroscopic_coupling_splits_the_speeds_of_forward_and_backward_waves() -
     found = {r.order: r for r in resonances(replace(basis, groups=groups), (3, 9, 6))}
     omega = {k: 2 * np.pi * closed_form(sectors, k, 1e5, 3e4, 0.3) for k in (3, 6)}
     assert (found[3].direction, found[9].direction, found[6].direction) == ("backward", "forward", "standing")
-    # between the two stations omega^2 is linear in Omega^2, so the straight lines are met to that approximation
-    ends = {3: omega[3] - c * 20000 * np.pi / 30, 9: omega[3] + c * 20000 * np.pi / 30, 6: omega[6]}
-    for e, end in ends.items():
-        w0, top = omega[3 if e != 6 else 6], (20000 * np.pi / 30) ** 2
-        exact = w0 / np.sqrt(e**2 - (end**2 - w0**2) / top)
-        assert found[e].speed == pytest.approx(exact, rel=1e-9)
+    for e, k, way in ((3, 3, c), (9, 3, -c), (6, 6, 0.0)):
+        assert found[e].speed == pytest.approx(omega[k] / np.sqrt(e * (e + 2 * way)), rel=1e-9)
     assert found[3].speed < omega[3] / 3 and found[9].speed > omega[3] / 9
 
 

@@ -6,6 +6,7 @@ import csv
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -24,7 +25,7 @@ from microslip.fem.operators import stiffness
 from microslip.linalg import eigen
 from microslip.modal.equilibrium import equilibrium, make_model
 from microslip.rolling.brush import Brush, fitted, jump, parabola, reached
-from microslip.rolling.slip import row
+from microslip.rolling.slip import Studied, row
 from microslip.stages.job import open_job
 from microslip.stages.modal import modes_stage
 
@@ -73,6 +74,25 @@ def test_a_load_that_falls_lets_go_at_once_what_it_does_not_hold() -> None:
     slides, sticks = BRUSH.carried(np.full(2 * n, 1.0), normal), BRUSH.carried(np.full(2 * n, 1e-4), normal)
     assert slides[n - 1] == pytest.approx(40, rel=1e-12) and slides[n] == pytest.approx(20, rel=1e-12)
     assert sticks[n] == pytest.approx(sticks[n - 1], rel=0.02)
+
+
+def test_the_picture_names_the_time_constants_of_the_table(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """Of the same jumps, though it shows the first four passes of them alone."""
+    pytest.importorskip("matplotlib")
+    from microslip.pictures import tyre
+
+    figures: list[Any] = []
+    monkeypatch.setattr(tyre, "save_figure", lambda figure, path: figures.append(figure) or path)
+    patch = SimpleNamespace(
+        x=np.zeros(1), pressure=np.ones(1), highest=1.0, middle=0.0, length=BRUSH.length, force=40.0
+    )
+    case = SimpleNamespace(jumps=SimpleNamespace(targets=[0.05, 0.3], shown=0.05))
+    studied = Studied(case, patch, BRUSH, 0.0)  # type: ignore[arg-type]
+    tyre.tyre_picture(studied, tmp_path / "tyre.png", "t")
+    lines = figures[0].axes[2].lines
+    for way, fit in (("up", lines[1]), ("down", lines[3])):
+        assert fit.get_label() == f"exponential of {studied.constants[f'{way}_fitted_s'][0]:.3g} s"
+        assert fit.get_xdata()[-1] == pytest.approx(4 * PASS, rel=0.06)
 
 
 def test_numbers_that_are_none_of_a_brush() -> None:

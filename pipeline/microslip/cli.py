@@ -586,7 +586,7 @@ def backbone(
 @app.command
 def optimum(
     case: Path, basis: Path | None = None, /, *, over: str = "normal_force", low: float | None = None,
-    high: float | None = None, points: int = 6, set_: Set = (), quiet: Quiet = False,
+    high: float | None = None, points: int = 6, beside: tuple[str, ...] = (), set_: Set = (), quiet: Quiet = False,
 ) -> None:  # fmt: skip
     """The normal force, or another setting, at which the highest resonance of a case is lowest.
 
@@ -598,6 +598,7 @@ def optimum(
         low: first value of the range that is searched; the smallest of sweep.normal_forces if not given.
         high: last value of it; the largest of sweep.normal_forces if not given.
         points: values from one end to the other at which a sweep looks for it first.
+        beside: a case whose optimum over the same setting was found before, drawn on the same picture; may be repeated.
     """
     from .files.store import making
     from .stages import following
@@ -606,8 +607,9 @@ def optimum(
     with progress(f"optimum {case}", quiet) as report:
         opened = _followed(case, basis, set_)
         with making(opened.folder / "optimum.csv", report):
+            others = following.found_before(beside, over, opened)
             found = following.optimum_over(opened, over, low, high, points, report)
-            files = following.write_optimum(found, over, opened)
+            files = following.write_optimum(found, over, opened, others)
     _say(following.optimum_message(found, over, opened.quantity), quiet)
     for file in files:
         _say(file, quiet)

@@ -22,7 +22,7 @@ from ..results.names import apart
 from ..system.assembly import Assembly
 from .assemble import Built, build
 from .problem import models_of, normal_forces, problem_of
-from .settings import CaseSettings
+from .settings import BodyOfCase, CaseSettings
 
 Report = Callable[[str], None]
 Bases = Mapping[str, ModalBasis]
@@ -122,13 +122,12 @@ def over_speeds(
 
 def _at_speed(settings: CaseSettings, turning: list[str], rpm: float) -> CaseSettings:
     """The case at a speed: of bodies whose files know it, of loose ones that it presses, of centrifugal loads."""
-    own = [
-        {"speed_rpm": b.name in turning, "pressed_at_rpm": b.pressed_at_rpm is not None} for b in settings.components
-    ]
-    bodies = tuple(
-        b.model_copy(update={key: rpm for key, follows in of.items() if follows})
-        for b, of in zip(settings.components, own, strict=True)
-    )
+
+    def at(b: BodyOfCase) -> BodyOfCase:
+        pressed = {} if b.pressed_at_rpm is None else {"pressed_at_rpm": rpm}
+        return b.model_copy(update=pressed | ({"speed_rpm": rpm} if b.name in turning else {}))
+
+    bodies = tuple(map(at, settings.components))
     loads = tuple(x if x.speed_rpm is None else x.model_copy(update={"speed_rpm": rpm}) for x in settings.loads)
     return settings.model_copy(update={"bodies": bodies, "excitations": loads})
 

@@ -136,4 +136,9 @@ def _law(c: ContactModel) -> Law | None:
         law: Law = c.settings.what.law(c)
     except UserError as error:
         raise UserError(f"{c.path}: law: {error}") from error
+    if missing := [name for name in Law.NEEDED if getattr(type(law), name) is getattr(Law, name)]:
+        raise UserError(
+            f"{c.path}: law: {type(law).__name__} of {type(law).__module__} has no method {', '.join(missing)}; add "
+            "what is missing, docs/own_law.md says what each returns"
+        )
     return law

@@ -373,14 +373,14 @@ def _parts(heights: Heights, u: float, v: np.ndarray, film: float) -> tuple[np.n
     breaks = np.unique(np.asarray(heights.breaks(), float))
     x, w = _panels(np.append(breaks[breaks < u], u))
     at, size = heights.jumps()
-    x, weight = np.append(x, at[at < u]), np.append(_density(heights, x) * w, size[at < u])
+    x, weight = np.append(x, at[at < u]), np.append(values(heights, "density", x) * w, size[at < u])
     dry = np.sum((u - x) * weight / (1 + v[:, None] * (u - x)), axis=1)
     x, w = _panels(np.clip(np.append(breaks[(breaks > u) & (breaks < u + film)], [u, u + film]), u, breaks[-1]))
-    thin = np.sum(_density(heights, x) * w) / film
+    thin = np.sum(values(heights, "density", x) * w) / film
     wide = np.append(breaks[breaks > u + film], u + film)
     x, w = _panels(np.log(wide - u))  # of a constant density the integrand is constant over the logarithm
     level = np.sum(size[at > u] / np.maximum(at[at > u] - u, film))
-    return dry, float(thin + np.sum(_density(heights, u + np.exp(x)) * w) + level)
+    return dry, float(thin + np.sum(values(heights, "density", u + np.exp(x)) * w) + level)
 
 
 def _panels(edges: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -388,11 +388,6 @@ def _panels(edges: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     edges = np.unique(edges)
     half = 0.5 * np.diff(edges)[:, None]
     return (edges[:-1, None] + half * (1 + _GAUSS[0])).ravel(), (half * _GAUSS[1]).ravel()
-
-
-def _density(heights: Heights, x: np.ndarray) -> np.ndarray:
-    at = jnp.asarray(x)
-    return np.asarray(jax.jvp(heights.area, (at,), (jnp.ones_like(at),))[1])
 
 
 def smoothed(speed: Array, slope: Array | float) -> Array:

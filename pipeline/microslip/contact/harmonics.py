@@ -14,7 +14,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from .law import Array, Law, point_axes
-from .periodic import periodic, with_slopes
+from .periodic import Known, near, unknown, with_slopes
 
 CHUNK = 120
 """Points treated at a time: their tangents stay in the cache, and memory does not grow with the number of points."""
@@ -62,7 +62,7 @@ def force_harmonics(
     def one(law: Law, u: Array) -> tuple[Array, Array]:
         return _with_derivative(law, u, period, samples, count, periodicity)
 
-    force, slope = _chunked(one, law, u, chunk)
+    force, slope = _chunked(one, law, chunk, u)
     return force, slope
 
 
@@ -72,31 +72,44 @@ def force_alone(
     periodicity: Array | float = 0.0,
 ) -> Array:  # fmt: skip
     """The force of `force_harmonics` without its derivative; in chunks of one size after the same number of cycles."""
+    return force_near(law, u, unknown(law, u.shape[0]), period, samples, count, chunk, periodicity)[0]
+
+
+def force_near(
+    law: Law, u: Array, known: Known, period: Array | float, samples: int, count: int, chunk: int = CHUNK_ALONE,
+    periodicity: Array | float = 0.0,
+) -> tuple[Array, Known]:  # fmt: skip
+    """`force_alone`, begun with what sliders remember of a motion near by, and what they remember now."""
     values, transform = fourier(u.shape[2] // 2, samples)
 
-    def one(law: Law, u: Array) -> tuple[Array]:
+    def one(law: Law, u: Array, *known: Array) -> tuple[Array, ...]:
         path = jnp.einsum("sh,nkh->snk", values, u)
-        return (jnp.einsum("hs,snk->nkh", transform, periodic(law, path, period, count, periodicity).force),)
+        begun = Known(*(jnp.moveaxis(x, 0, -1) for x in known))
+        force, found = near(law, path, period, count, periodicity, transform, begun)
+        return jnp.einsum("hkn->nkh", force), *(jnp.moveaxis(x, -1, 0) for x in found)
 
-    return _chunked(one, law, u, chunk)[0]
+    force, *found = _chunked(one, law, chunk, u, *(jnp.moveaxis(x, -1, 0) for x in known))
+    return force, Known(*(jnp.moveaxis(x, 0, -1) for x in found))
 
 
-def _chunked(one: Callable[[Law, Array], tuple[Array, ...]], law: Law, u: Array, most: int) -> tuple[Array, ...]:
-    """What ``one`` finds for a law and displacements (n, ...), so many points at a time at most."""
-    n = u.shape[0]
+def _chunked(one: Callable[..., tuple[Array, ...]], law: Law, most: int, *given: Array) -> tuple[Array, ...]:
+    """What ``one`` finds for a law and what is given of points (n, ...), so many points at a time at most."""
+    n = given[0].shape[0]
     if n <= most:
-        return one(law, u)
+        return one(law, *given)
     parts = -(-n // most)
     chunk = -(-n // parts)
-    filled = jnp.concatenate([u, jnp.zeros((parts * chunk - n, *u.shape[1:]))]).reshape(parts, chunk, *u.shape[1:])
+    fill = parts * chunk - n
+    whole = [jnp.pad(x, [(0, fill), *[(0, 0)] * (x.ndim - 1)], mode="edge") for x in given]
+    filled = [x.reshape(parts, chunk, *x.shape[1:]) for x in whole]
     leaves, tree = jax.tree_util.tree_flatten(law)
     axes = point_axes(law, n)
     split = [_split(leaf, axis, parts, chunk) for leaf, axis in zip(leaves, axes, strict=True) if axis is not None]
 
-    def part(given: tuple[list[Array], Array]) -> tuple[Array, ...]:
+    def part(given: tuple[list[Array], list[Array]]) -> tuple[Array, ...]:
         per_point = iter(given[0])
         mixed = [leaf if axis is None else next(per_point) for leaf, axis in zip(leaves, axes, strict=True)]
-        return one(jax.tree_util.tree_unflatten(tree, mixed), given[1])
+        return one(jax.tree_util.tree_unflatten(tree, mixed), *given[1])
 
     return tuple(x.reshape(-1, *x.shape[2:])[:n] for x in jax.lax.map(part, (split, filled)))
 

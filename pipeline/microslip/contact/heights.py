@@ -27,6 +27,10 @@ class Heights:
         """Share of the nominal area in contact at approach x*; rises from 0 to 1."""
         raise NotImplementedError
 
+    def density(self, x: Array) -> Array:
+        """Slope of `area` at x*, without its jumps."""
+        return jax.jvp(self.area, (x,), (jnp.ones_like(x),))[1]
+
     def volume(self, x: Array) -> Array:
         """Integral of `area` from minus infinity to x* (3.3-21)."""
         raise NotImplementedError

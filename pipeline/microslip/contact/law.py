@@ -225,8 +225,10 @@ class Law:
     Attributes:
         brakes: whether its friction changes so fast with the velocity that a motion in time needs `slowed`.
         smooth: whether `rates` has a slope everywhere, so that it can be linearised wherever it is.
+        NEEDED: methods without which no law is solved.
     """
 
+    NEEDED: ClassVar[tuple[str, ...]] = ("init", "step", "limit", "slip", "stored")
     brakes: ClassVar[bool] = False
     smooth: ClassVar[bool] = False
 

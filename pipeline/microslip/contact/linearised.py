@@ -18,7 +18,7 @@ import jax.numpy as jnp
 
 from .cycle import blank, stepped
 from .law import Array, Law, State
-from .settling import Ways, directions
+from .settling import Ways, beginning, directions, rolled
 
 BLOCK = 2048
 """Samples times sliders that are differentiated at once, for the cache and for memory that does not grow with them."""
@@ -89,8 +89,9 @@ def linearised(
 
     held = jax.vmap(lambda u, v: _held(law, u, v, dt))(path, ways.rate)
     held = jax.tree_util.tree_map(lambda leaf: jnp.roll(leaf, 1, axis=0).at[0].multiply(whole), held)
+    before = rolled(ways.placed)
     begun = jax.tree_util.tree_map(
-        lambda first, placed: jnp.where(whole, jnp.roll(placed, 1, axis=0), first), ways.begun, ways.placed
+        lambda first, every: jnp.where(whole, every, first), beginning(before, law.init(n)), before
     )
     each = jnp.broadcast_to(jnp.eye(2)[:, None, :, None], (2, m, 2, n))
     sums = jnp.zeros((h, w, 3, 3, n)), jnp.zeros((h, 2, 3, m, n))

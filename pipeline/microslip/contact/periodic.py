@@ -3,8 +3,8 @@
 Most points forget their beginning within a cycle. A point that slides a little in each cycle, always nearly the same
 way, forgets it slowly: its force turns on the friction circle by a small angle per cycle. Where two marched cycles
 differ, the memory x at which a cycle begins is therefore solved for, by Newton's method with the exact derivative of
-the map P from it to the memory at the end, which costs two tangents more. Sliders do not know of each other, so this
-is a 2 x 2 system for each.
+the map P from it to the memory at the end, which costs two tangents more and is used again while it serves. Sliders
+do not know of each other, so this is a 2 x 2 system for each.
 
 A slider that does not slide at all keeps what the first cycle, from rest, has left in it; one that slides ever so
 little forgets that in the end. Between both the limit of infinitely many cycles jumps, so what is solved is
@@ -29,7 +29,7 @@ import jax.numpy as jnp
 from .cycle import blank, march, push
 from .law import Array, Law, State
 from .linearised import Linearised, linearised
-from .settling import Cycle, Ways, cycle, recall, ways
+from .settling import Turn, Ways, beginning, cycle, first_memory, recall, turn, ways
 
 FEWEST = 4
 """Cycles that have to be allowed if sliders are to be solved for; fewer are marched."""
@@ -40,6 +40,7 @@ RECALL = 1e-5
 # Anything from 0.2 and 0.5 to 0.9 and 0.99 does: of 4000 random paths, 1500 of them slow, none took above 20 cycles.
 _STRAIGHT = 0.5  # share of what was missing above which a cycle is marched before another step
 _GAIN = 0.9  # share of it above which the step was in vain
+_SERVES = 0.1  # share of Newton's step above which the next one asks for the derivative again, which is two cycles
 _SOLVED = 1e-8  # share of the largest force to which sliders are solved for at least: derivatives are of the solution
 
 
@@ -69,23 +70,48 @@ class _At(NamedTuple):
     periodic: Array
 
 
+class Known(NamedTuple):
+    """What sliders were found to remember, to begin with where the motion is another one near by.
+
+    Attributes:
+        memory: (..., 2, n) N with which the periodic cycle begins. slope: (2, ..., 2, n) of the memory at its end by
+            that, near by. told: (n,) whether anything is known.
+    """
+
+    memory: Array
+    slope: Array
+    told: Array
+
+
+def unknown(law: Law, n: int) -> Known:
+    """Nothing, of n points."""
+    memory = jnp.zeros_like(law.memory(jnp.zeros((n, 3)), law.init(n)))
+    return Known(memory, jnp.zeros((2, *memory.shape)), jnp.zeros(n, dtype=bool))
+
+
 class _Solving(NamedTuple):
     """Between two cycles of sliders that are solved for.
 
     Attributes:
-        last: the last one. memory: that the next one begins with. tried: (..., n) what each slider missed of the
-            solution when it was solved for last. solved: (..., n) whether the next beginning was solved for.
-        failed: (..., n) how often that was in vain. wait: (..., n) cycles to march before it is tried again.
-        cycles: how many. periodic: whether the memory is periodic.
+        last: the last one. begun: the memory that it began with. memory: that the next one begins with. slope: of the
+            memory at the end by that at the beginning, of the last cycle or an earlier one. renew: whether the next
+            one is asked for it. tried: (..., n) what each slider missed of the solution when it was solved for last.
+            solved: (..., n) whether the next beginning was solved for. failed: (..., n) how often that was in vain.
+            wait: (..., n) cycles to march before it is tried again. cycles: how many. missed: the largest step of
+            Newton's method over the largest force. periodic: whether the memory is periodic.
     """
 
-    last: Cycle
+    last: Turn
+    begun: Array
     memory: Array
+    slope: Array
+    renew: Array
     tried: Array
     solved: Array
     failed: Array
     wait: Array
     cycles: Array
+    missed: Array
     periodic: Array
 
 
@@ -106,9 +132,30 @@ def periodic(
     """
     dt = period / len(path)
     if solves(law, count):
-        return _Sliders(law, path, dt, periodicity, count).periodic
+        return _Sliders(law, path, dt, periodicity, count).periodic()[0]
     loop = _Loop(law, path, dt, periodicity, count)
     return jax.lax.while_loop(loop.unfinished, loop.marching, loop.rest()).found
+
+
+def near(
+    law: Law, path: Array, period: float | Array, count: int, periodicity: float | Array, weights: Array, known: Known
+) -> tuple[Array, Known]:  # fmt: skip
+    """Weighted sums of the force of `periodic`, begun with what is known of a path near by; and what is known then.
+
+    The periodic memory is the only one there is, however it is begun. Laws that cannot be solved for are marched from
+    rest.
+
+    Args:
+        weights: (h, s) of the sums.
+
+    Returns:
+        (h, 3, n) N, and what is known.
+    """
+    if not solves(law, count):
+        return jnp.einsum("hs,snk->hkn", weights, periodic(law, path, period, count, periodicity).force), known
+    found = _Sliders(law, path, period / len(path), periodicity, count, weights, known).solution
+    told = jnp.isfinite(found.memory).all(axis=tuple(range(found.memory.ndim - 1)))
+    return found.last.force, Known(found.memory, found.slope, told)
 
 
 def with_slopes(
@@ -188,48 +235,57 @@ class _Loop:
 
 
 class _Sliders:
-    """A path through a law whose sliders are solved for; arguments as in `periodic`."""
+    """A path through a law whose sliders are solved for; arguments as in `periodic` and `near`."""
 
-    def __init__(self, law: Law, path: Array, dt: Array | float, periodicity: Array | float, count: int) -> None:
+    def __init__(
+        self, law: Law, path: Array, dt: Array | float, periodicity: Array | float, count: int,
+        weights: Array | None = None, known: Known | None = None,
+    ) -> None:  # fmt: skip
         self.law, self.path, self.dt, self.periodicity, self.count = law, path, dt, periodicity, count
-        rest = law.init(path.shape[1])
-        self.rest = law.memory(jnp.zeros(path.shape[1:]), rest)
+        self.weights = jnp.zeros((len(path), 0)) if weights is None else weights.T
+        self.known = unknown(law, path.shape[1]) if known is None else known
+        self.rest = law.memory(jnp.zeros(path.shape[1:]), law.init(path.shape[1]))
         self.ways: Ways = ways(law, path, dt)
-        self.first = cycle(law, self.ways.first, self.rest)
+        self.first = first_memory(law, self.ways, self.rest)
 
     @cached_property
     def solution(self) -> _Solving:
         """Cycles that begin where Newton's method puts them."""
-        each = jnp.zeros((*self.rest.shape[:-2], self.rest.shape[-1]))
-        counted = each.astype(int)
+        known, solved = self.known, jnp.asarray(self.periodicity) > 0
+        new = ~(known.told.all() & solved)
+        memory = jnp.where(new, self.first, known.memory)
+        each, W = jnp.zeros((*memory.shape[:-2], memory.shape[-1])), self.weights.shape[1]
+        counted, none = each.astype(int), Turn(jnp.zeros((W, 3, len(known.told))), jnp.zeros(()), memory)
         begin = _Solving(
-            self.first, self.first.memory, each + jnp.inf, each > 0, counted, counted, jnp.asarray(1),
-            jnp.asarray(False),
+            none, memory, memory, known.slope, new & solved, each + jnp.inf, each > 0, counted, counted,
+            jnp.asarray(1), jnp.asarray(jnp.inf), jnp.asarray(False),
         )  # fmt: skip
         return jax.lax.while_loop(lambda at: (at.cycles < self.count) & ~at.periodic, self._solving, begin)
 
-    @property
-    def periodic(self) -> Periodic:
-        """See `periodic`."""
-        at, last = self.solution, jax.tree_util.tree_map(lambda leaf: leaf[-1], self.ways.placed)
-        return Periodic(at.last.force.swapaxes(1, 2), self.law.recalled(last, at.last.memory), at.cycles)
+    def periodic(self) -> tuple[Periodic, Array]:
+        """See `periodic`, and (s, ..., 2, n) the memory that every step begins with."""
+        at, placed = self.solution, jax.tree_util.tree_map(lambda leaf: leaf[-1], self.ways.placed)
+        last = cycle(self.law, self.ways.all, at.begun)
+        return Periodic(last.force.swapaxes(1, 2), self.law.recalled(placed, last.memory), at.cycles), last.begun
 
     def slopes(self, signals: Array, weights: Array) -> tuple[Periodic, Array]:
         """Tangents of the first cycle, which sliders that stick keep, and of the periodic one."""
-        both = jax.tree_util.tree_map(lambda *both: jnp.stack(both), self.first.begun, self.solution.last.begun)
+        whole, last_begun = self.periodic()
+        first_begun = cycle(self.law, beginning(self.ways.all, self.ways.first), self.rest).begun
         found = jax.lax.map(
             lambda one: linearised(self.law, self.path, self.dt, self.ways, one[0], one[1], signals, weights),
-            (both, jnp.array([False, True])),
+            (jnp.stack([first_begun, last_begun]), jnp.array([False, True])),
         )  # fmt: skip
         first, last = (Linearised(*(leaf[k] for leaf in found)) for k in (0, 1))
         begin = _Newton(last.by_memory)(last.memory + RECALL * first.memory)
-        return self.periodic, jnp.einsum("hwkin->hwkni", last.begun_with(begin))
+        return whole, jnp.einsum("hwkin->hwkni", last.begun_with(begin))
 
     def _solving(self, at: _Solving) -> _Solving:
         """One cycle more, and the next begins where Newton's method expects the solution."""
-        last, slope = recall(self.law, self.ways.all, at.memory)
-        memory, size, newton = last.memory, jnp.abs(last.force).max(), _Newton(slope)
-        missing = memory - at.memory + RECALL * (self.first.memory - at.memory)
+        given = self.law, self.ways.all, self.weights, at.memory
+        last, slope = jax.lax.cond(at.renew, lambda: recall(*given), lambda: (turn(*given), at.slope))
+        memory, size, newton = last.memory, last.size, _Newton(slope)
+        missing = memory - at.memory + RECALL * (self.first - at.memory)
         left = _length(missing)
         step = jnp.where((left > 1e-15 * size)[..., None, :], newton(missing), 0.0)  # below is rounding
 
@@ -241,10 +297,15 @@ class _Sliders:
         wait = jnp.where(vain, failed, jnp.maximum(at.wait - 1, 0))
         use = ready & ~vain & newton.regular & (self.periodicity > 0)
         tried = jnp.where(vain, jnp.inf, jnp.where(use, left, at.tried))  # after waiting it is tried whatever is left
-        marched = jnp.where(self.periodicity > 0, (memory + RECALL * self.first.memory) / (1 + RECALL), memory)
+        marched = jnp.where(self.periodicity > 0, (memory + RECALL * self.first) / (1 + RECALL), memory)
         held = jnp.where(use[..., None, :], at.memory + step, marched)
-        ended = (self.periodicity > 0) & (jnp.abs(step).max() <= jnp.minimum(self.periodicity, _SOLVED) * size)
-        return _Solving(last, held, tried, use, failed, wait, at.cycles + 1, ended)
+        missed = jnp.abs(step).max() / jnp.where(size > 0, size, 1.0)
+        ended, renew = missed <= jnp.minimum(self.periodicity, _SOLVED), missed > _SERVES * at.missed
+        on = jnp.asarray(self.periodicity > 0)
+        count = at.cycles + 1
+        return _Solving(
+            last, at.memory, held, slope, renew & on, tried, use, failed, wait, count, missed, ended & on
+        )  # fmt: skip
 
 
 def _length(memory: Array) -> Array:

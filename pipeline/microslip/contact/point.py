@@ -13,14 +13,13 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import jax
 import jax.numpy as jnp
-import numpy as np
 from jax.custom_derivatives import SymbolicZero
 
 from ..reduced.compliance import BULK_AND_SURFACE
 from ..settings.numbers import NotNegative, Positive, PositiveLength
 from .friction import Friction
 from .kinds import LawKind
-from .law import Array, Law, Step, norm, number, ratio, root, settings, static, value
+from .law import Array, Law, Step, norm, number, ratio, root, seldom, settings, static, value
 from .normal import Hyperbolic, Normal, Preload
 
 if TYPE_CHECKING:
@@ -160,12 +159,7 @@ class PointContact(OnNormal):
 
     @property
     def follows(self) -> float:
-        if self.remembers is None:
-            return 0.0
-        zero = jnp.zeros_like(self.stiffness_1)
-        if not jnp.any(self.stiffness_1 * self.friction.coefficient(zero, zero + 1, zero)):
-            return np.inf
-        return 0.0 if self.damping is None else float(jnp.min(self.damping))
+        return 0.0 if self.remembers is None else float(_follows(self))
 
     def rates(self, u: Array, v: Array, x: Array, time: Array | float, lag: float) -> tuple[Array, Array]:
         """x: tangential force of the springs, N. Friction holds them and the damper beside them, one of the
@@ -572,3 +566,11 @@ class OfPoint(OwnNormal):
     def law(self, contact: ContactModel) -> Law:
         damping = value(self.damping) if self.damping else None
         return PointContact(contact.normal, contact.sliding, *contact.springs, damping)
+
+
+@seldom
+def _follows(law: PointContact) -> Array:
+    """See `Law.follows`, of a law that is a differential equation."""
+    zero = jnp.zeros_like(law.stiffness_1)
+    rubs = jnp.any(law.stiffness_1 * law.friction.coefficient(zero, zero + 1, zero) != 0)
+    return jnp.where(rubs, 0.0 if law.damping is None else jnp.min(law.damping), jnp.inf)

@@ -19,29 +19,30 @@ class Ways(NamedTuple):
     """The steps of a cycle.
 
     Attributes:
-        rate: (s, n, 3) m/s. placed: states at the samples, what they remember apart. begun: states the steps begin
-            with, of the first cycle the first one at rest. first: what the steps of the first cycle are of, `Law.way`;
-            all: those of every other.
+        rate: (s, n, 3) m/s. placed: states at the samples, what they remember apart. all: what steps are of,
+            `Law.way`; first: that of the first step of all, from rest.
     """
 
     rate: Array
     placed: State
-    begun: State
-    first: Any
     all: Any
+    first: Any
 
 
 def ways(law: Law, path: Array, dt: Array | float) -> Ways:
     """Of a periodic path (s, n, 3) m."""
     rate, rest = rates(path, dt), law.init(path.shape[1])
     placed = jax.vmap(lambda u, v: stepped(law, u, v, dt, rest)[1])(path, rate)
-    before = jax.tree_util.tree_map(lambda leaf: jnp.roll(leaf, 1, axis=0), placed)
-    every = jax.vmap(lambda u, v, state: law.way(u, v, dt, state))(path, rate, before)
-    begun, first = _beginning(before, rest), _beginning(every, law.way(path[0], rate[0], dt, rest))
-    return Ways(rate, placed, begun, first, every)
+    every = jax.vmap(lambda u, v, state: law.way(u, v, dt, state))(path, rate, rolled(placed))
+    return Ways(rate, placed, every, law.way(path[0], rate[0], dt, rest))
 
 
-def _beginning(rows: Any, first: Any) -> Any:
+def rolled(rows: Any) -> Any:
+    """A sample later."""
+    return jax.tree_util.tree_map(lambda leaf: jnp.roll(leaf, 1, axis=0), rows)
+
+
+def beginning(rows: Any, first: Any) -> Any:
     """Rows with another first one."""
     return jax.tree_util.tree_map(lambda leaf, one: leaf.at[0].set(one), rows, first)
 
@@ -65,24 +66,64 @@ def cycle(law: Law, ways: Any, memory: Array) -> Cycle:
     return Cycle(force, begun, after)
 
 
-def recall(law: Law, ways: Any, memory: Array) -> tuple[Cycle, Array]:
-    """`cycle`, and (2, ..., 2, n) how the memory at the end follows either direction of that at the beginning."""
+def first_memory(law: Law, ways: Ways, rest: Array) -> Array:
+    """That after the first cycle, from rest."""
 
-    def one(carried: tuple[Array, Array], way: Any) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
-        memory, slope = carried
+    def one(sample: Any, memory: Array) -> Array:
+        return law.drag(jax.tree_util.tree_map(lambda leaf: leaf[sample], ways.all), memory)[1]
+
+    return jax.lax.fori_loop(1, len(ways.rate), one, law.drag(ways.first, rest)[1])
+
+
+class Turn(NamedTuple):
+    """A cycle: (h, 3, n) weighted sums of its forces, N, the largest entry of these, and the memory at its end."""
+
+    force: Array
+    size: Array
+    memory: Array
+
+
+def turn(law: Law, ways: Any, weights: Array, memory: Array) -> Turn:
+    """From a memory at its beginning; ways: `Law.way` of its steps. weights: (s, h) of the sums."""
+
+    def one(at: tuple[Array, Array, Array], row: tuple[Any, Array]) -> tuple[tuple[Array, Array, Array], None]:
+        force, after = law.drag(row[0], at[2])
+        return (*_more(at, force, row[1]), after), None
+
+    (force, size, after), _ = jax.lax.scan(one, (*_none(memory, weights), memory), (ways, weights))
+    return Turn(force, size.max(), after)
+
+
+def recall(law: Law, ways: Any, weights: Array, memory: Array) -> tuple[Turn, Array]:
+    """`turn`, and (2, ..., 2, n) how the memory at the end follows either direction of that at the beginning."""
+
+    def one(at: Any, row: tuple[Any, Array]) -> tuple[Any, None]:
+        *sums, memory, slope = at
 
         def dragged(memory: Array) -> tuple[Array, Array]:
-            force, after = law.drag(way, memory)
+            force, after = law.drag(row[0], memory)
             return after, force
 
         def along(tangent: Array) -> tuple[Array, Array, Array]:
             return jax.jvp(dragged, (memory,), (tangent,), has_aux=True)
 
         after, slope, force = jax.vmap(along, out_axes=(None, 0, None))(slope)
-        return (after, slope), (force, memory)
+        return (*_more(sums, force, row[1]), after, slope), None
 
-    (after, slope), (force, begun) = jax.lax.scan(one, (memory, directions(memory)), ways)
-    return Cycle(force, begun, after), slope
+    begin = (*_none(memory, weights), memory, directions(memory))
+    (force, size, after, slope), _ = jax.lax.scan(one, begin, (ways, weights))
+    return Turn(force, size.max(), after), slope
+
+
+def _none(memory: Array, weights: Array) -> tuple[Array, Array]:
+    """No sums, and no largest force of a point."""
+    n = memory.shape[-1]
+    return jnp.zeros((weights.shape[1], 3, n)), jnp.zeros((3, n))
+
+
+def _more(sums: Any, force: Array, weight: Array) -> tuple[Array, Array]:
+    """With the force (3, n) of a sample."""
+    return sums[0] + weight[:, None, None] * force, jnp.maximum(sums[1], jnp.abs(force))
 
 
 def directions(memory: Array) -> Array:

@@ -23,7 +23,7 @@ import numpy as np
 
 from ..contact.friction import Coulomb
 from ..contact.heights import Heights, Smooth
-from ..contact.law import Law, settings, static
+from ..contact.law import Law, settings, static, values
 from ..contact.normal import Gapped, Greenwood, Hyperbolic, Measured, Normal, Penalty, Potential, Preload, Rough
 from ..contact.patch import Patch
 from ..contact.point import PointContact
@@ -131,19 +131,19 @@ def normal_table(
     """
     run = jax.jit(lambda x, a: (describing_function(law, x, a, 512),))
 
-    def values(s: Array, t: Array) -> Array:
+    def tabulated(s: Array, t: Array) -> Array:
         low, high = np.meshgrid(middle + half * _near(s), middle + half * _near(t), indexing="ij")
         (found,) = in_chunks(run, 0.5 * (low + high).ravel(), 0.5 * np.abs(high - low).ravel(), size=4096)
         return found.reshape(1, 1, *low.shape)
 
     def worth(difference: Array, s: Array, t: Array) -> Array:
-        deepest = jnp.asarray(middle + half * _near(np.maximum(s[:, None], t)).ravel())
-        return np.abs(difference) / np.maximum(np.asarray(law.stiffness(deepest)).reshape(len(s), len(t)), 1.0)
+        deepest = middle + half * _near(np.maximum(s[:, None], t))
+        return np.abs(difference) / np.maximum(values(law, "stiffness", deepest), 1.0)
 
     def make() -> Table:
         ends = ((False, False), (False, False))
         inside = 0.1, 0.5, 0.9
-        parts, left = refined(values, worth, [ends], tolerance, (81, 161), inside)
+        parts, left = refined(tabulated, worth, [ends], tolerance, (81, 161), inside)
         errors = float(left.max()), float(np.quantile(left, 0.99))
         return Table("normal", law_hash(law), {"coefficients": parts}, *errors, tolerance, left.size)
 
@@ -499,6 +499,9 @@ class BookPatch:
         self._one_harmonic(u)
         force, slope = _with_slope(self.points, self.kinematics, u)
         return np.asarray(force), np.asarray(slope)
+
+    def near(self, u: Array, period: float, known: None) -> tuple[Array, None]:
+        return self.force(u, period), None
 
     def rate(self, u: Array, period: float = 1.0) -> None:
         """The forces do not depend on the period."""

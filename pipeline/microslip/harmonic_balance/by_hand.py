@@ -24,6 +24,7 @@ from ..contact.jenkins import Jenkins
 from ..contact.law import Law
 from ..contact.normal import Preload
 from ..contact.patch import Patch
+from ..contact.periodic import Known
 from ..contact.point import PointContact
 from ..data import Array, Indices
 from .forces import AFT, Forces
@@ -39,6 +40,9 @@ class OneCoordinate(AFT):
         """(c, s) the coordinate over a cycle, (s, W) values of the harmonics, (W, s) their transform."""
         values, transform = self.waves(u.shape[2])
         return u[:, 0] @ values.T, values, transform
+
+    def near(self, u: Array, period: float, known: Known | None) -> tuple[Array, None]:
+        return self.force(u, period), None
 
     def rate(self, u: Array, period: float) -> None:
         """The force depends on the path alone."""

@@ -60,7 +60,7 @@ def _peak(
     for key, row in journal.of(series).items():
         if row["peak"] == beside:
             return Resonance(key, float(abs(restored(problem, row)[1].outputs[0, 1])), row["x"])
-    report(f"{series}: peak near {beside:.6g} Hz")
+    report(f"peak near {beside:.6g} Hz")
     found = highest(problem, response, bracket)
     if found is None:
         return None

@@ -8,7 +8,7 @@ displacements u (c, k, W).
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache, partial
 from typing import Any, Protocol
 
@@ -16,10 +16,11 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from ..contact.harmonics import CHUNK, CHUNK_ALONE, force_alone, force_harmonics, fourier
+from ..contact.harmonics import CHUNK, CHUNK_ALONE, force_harmonics, force_near, fourier
 from ..contact.law import Law, often, point_axes, program, seldom
 from ..contact.patch import Patch
-from ..contact.periodic import periodic, with_slopes
+from ..contact.periodic import Known, periodic, unknown, with_slopes
+from ..contact.thinned import thinned
 from ..data import Array
 from .point_cycles import Cycle, Traced, derivative, needs_rate, traced
 from .torus import Torus
@@ -34,6 +35,10 @@ class Forces(Protocol):
 
     def forces(self, u: Array, period: float) -> tuple[Array, Array]:
         """`force` and its derivative (c, k, W, k, W) with respect to u."""
+        ...
+
+    def near(self, u: Array, period: float, known: Any) -> tuple[Array, Any]:
+        """`force`, found from what is known of a motion near by, None if nothing is; and what is known now."""
         ...
 
     def rate(self, u: Array, period: float) -> Array | None:
@@ -98,6 +103,16 @@ class AFT:
         return self.contacts * len(self.patch.points) > CHUNK
 
     @cached_property
+    def few(self) -> AFT:
+        """Of some of the points where they are more than enough, for derivatives that need not be exact."""
+        found = thinned(self.patch) if self.many else None
+        if found is None:
+            return self
+        n = len(self.patch.points)
+        laws = None if self.laws is None else tuple(found.law(law, n) for law in self.laws)
+        return replace(self, patch=found.patch(self.patch), laws=laws)
+
+    @cached_property
     def kinematics(self) -> Any:
         """(n, 3, k) jax array."""
         return jax.device_put(self.patch.kinematics)
@@ -111,10 +126,18 @@ class AFT:
         return self.law, self.kinematics, u, float(period), self.periodicity, *self.torus.waves, self.cycles
 
     def force(self, u: Array, period: float) -> Array:
+        return self.near(u, period, None)[0]
+
+    def near(self, u: Array, period: float, known: Known | None) -> tuple[Array, Known | None]:
         if self.torus is not None:
-            return np.asarray(_on_line(*self._given_on_line(u, period)))
+            return np.asarray(_on_line(*self._given_on_line(u, period))), None
         alone, _ = self._programs
-        return np.asarray(alone(*self._given(u, period)))
+        F, known = alone(*self._given(u, period), self._unknown if known is None else known)
+        return np.asarray(F), known
+
+    @cached_property
+    def _unknown(self) -> Known:
+        return unknown(self.law, self.contacts * len(self.patch.points))
 
     def forces(self, u: Array, period: float) -> tuple[Array, Array]:
         if self.torus is not None:
@@ -196,10 +219,10 @@ def _with_slopes(
 
 def _force(
     law: Law, G: jax.Array, u: jax.Array, period: jax.Array | float, periodicity: jax.Array | float, samples: int,
-    count: int,
-) -> jax.Array:  # fmt: skip
-    force = force_alone(law, _points(G, u), period, samples, count, CHUNK_ALONE, periodicity)
-    return jnp.einsum("nia,cniw->caw", G, force.reshape(u.shape[0], G.shape[0], 3, u.shape[2]))
+    count: int, known: Known,
+) -> tuple[jax.Array, Known]:  # fmt: skip
+    force, known = force_near(law, _points(G, u), known, period, samples, count, CHUNK_ALONE, periodicity)
+    return jnp.einsum("nia,cniw->caw", G, force.reshape(u.shape[0], G.shape[0], 3, u.shape[2])), known
 
 
 def _compiled(how: Any) -> tuple[Any, Any]:
@@ -214,7 +237,10 @@ def _rate(
     law: Law, G: jax.Array, u: jax.Array, period: jax.Array | float, periodicity: jax.Array | float, samples: int,
     count: int,
 ) -> jax.Array:  # fmt: skip
-    return jax.jvp(lambda T: _force(law, G, u, T, periodicity, samples, count), (period,), (jnp.ones(()),))[1]
+    def of(T: jax.Array) -> jax.Array:
+        return _force(law, G, u, T, periodicity, samples, count, unknown(law, u.shape[0] * G.shape[0]))[0]
+
+    return jax.jvp(of, (period,), (jnp.ones(()),))[1]
 
 
 @partial(program, static_argnames=("count",))

@@ -85,17 +85,23 @@ def highest(
             break
         found = climbed(seen, points[i].x, points[i].Omega, within)
         if found.converged and within.low < found.lam < within.high and found.value > best.value:
-            best = checked(problem, found)
+            best = checked(problem, found, output)
     end = max((0, -1), key=lambda k: height[k])
     return best, points[end].Omega if height[end] > best.value else None
 
 
-def checked(problem: Problem, peak: Peak) -> Peak:
-    """A peak that is not called converged if its solution fails its checks (`results.checks`)."""
+def checked(problem: Problem, peak: Peak, output: int = 0) -> Peak:
+    """A peak that is not called converged if its solution fails its checks (`results.checks`), or does not move the
+    read-out but for rounding."""
     if not peak.converged:
         return peak
-    failure = operating(problem, Point(peak.lam, peak.x, CONVERGED, 0.0, 0)).checks.failure
-    return replace(peak, status=failure or peak.status)
+    found = operating(problem, Point(peak.lam, peak.x, CONVERGED, 0.0, 0))
+    still = "" if found.outputs[output, 1] else STILL
+    return replace(peak, status=found.checks.failure or still or peak.status)
+
+
+STILL = "the read-out does not move"
+"""Status of a peak of rounding."""
 
 
 def resonance(peak: Peak) -> HighestPeak:

@@ -22,7 +22,7 @@ from ..settings.mistakes import bounded
 from ..system.assembly import Assembly, Linear
 from . import blocks, by_hand, reduced
 from .blocks import Matrix
-from .forces import Forces
+from .forces import AFT, Forces
 from .joints import Alone, Joints, Sides, alone
 from .point_cycles import Cycle, Traced
 from .reduced import Coefficients, Eliminated, Seen, View
@@ -37,8 +37,8 @@ RELATIVE_AT_MOST = 8
 """Members up to which all are eliminated together, and contacts of theirs up to which steps solve for all motions."""
 
 
-Tried = list[tuple[Array, Array]]
-"""Of every group of contacts the displacements (n, k, W) that were tried, and the forces."""
+Tried = list[tuple[Array, Array, Any]]
+"""Of every group of contacts the displacements (n, k, W) that were tried, the forces, and what is known of them."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,14 +83,27 @@ class Group:
         """See `forces.Forces`."""
         return self._ahead(self.model.force(self._back(u), period))
 
+    def near(self, u: Array, period: float, known: Any) -> tuple[Array, Any]:
+        """See `forces.Forces`."""
+        F, known = self.model.near(self._back(u), period, known)
+        return self._ahead(F), known
+
     def forces(self, u: Array, period: float) -> tuple[Array, Array]:
         """See `forces.Forces`."""
         F, S = self.model.forces(self._back(u), period)
-        if self._turned:
-            (n, k, W, *_), turn = S.shape, self._turns(S.shape[2])
-            half = turn.transpose(0, 2, 1)[:, None] @ S.reshape(n, k, W, k * W)
-            S = (half.reshape(n, k * W * k, W) @ turn).reshape(S.shape)
-        return self._ahead(F), S
+        return self._ahead(F), self._slope_ahead(S)
+
+    def slope(self, u: Array, period: float) -> Array:
+        """(n, k, W, k, W) derivative of the force for steps that are corrected, of few points where there are many."""
+        model = self.model.few if isinstance(self.model, AFT) else self.model
+        return self._slope_ahead(model.forces(self._back(u), period)[1])
+
+    def _slope_ahead(self, S: Array) -> Array:
+        if not self._turned:
+            return S
+        (n, k, W, *_), turn = S.shape, self._turns(S.shape[2])
+        half = turn.transpose(0, 2, 1)[:, None] @ S.reshape(n, k, W, k * W)
+        return (half.reshape(n, k * W * k, W) @ turn).reshape(S.shape)
 
     def rate(self, u: Array, period: float) -> Array | None:
         """See `forces.Forces`."""
@@ -360,11 +373,19 @@ class AtFrequency:
         """(size,) R alone."""
         return self.tried(x)[0]
 
-    def tried(self, x: Array) -> tuple[Array, Tried]:
-        """`residual`, and the displacements and forces it is of."""
-        moved = self._moved(self.problem.displacement(x))
-        forces = [g.force(u, self.period) for g, u in zip(self.problem.groups, moved, strict=True)]
-        return self.residual_of(x, self.along(forces)), list(zip(moved, forces, strict=True))
+    def tried(self, x: Array, near: Tried | None = None) -> tuple[Array, Tried]:
+        """`residual`, and what it is of. near: of a motion near by."""
+        groups, moved = self.problem.groups, self._moved(self.problem.displacement(x))
+        known = [k for *_, k in near] if near else [None] * len(groups)
+        found = [g.near(u, self.period, k) for g, u, k in zip(groups, moved, known, strict=True)]
+        tried = [(u, F, k) for u, (F, k) in zip(moved, found, strict=True)]
+        return self.residual_of(x, self.along([F for _, F, _ in tried])), tried
+
+    def slopes(self, x: Array, whole: bool) -> list[Array]:
+        """Of every group of contacts `Group.slope`, or the whole derivative."""
+        groups, moved = self.problem.groups, self._moved(self.problem.displacement(x))
+        both = list(zip(groups, moved, strict=True))
+        return [g.forces(u, self.period)[1] if whole else g.slope(u, self.period) for g, u in both]
 
     def secant(self, slopes: list[Array], before: Tried, after: Tried) -> list[Array]:
         """Derivatives of the contact forces that tell the change of each contact's force from one motion to another.
@@ -374,7 +395,7 @@ class AtFrequency:
         one too.
         """
         out, p = [], self.problem
-        for g, felt, S, (u_0, F_0), (u_1, F_1) in zip(p.groups, p.felt, slopes, before, after, strict=True):
+        for g, felt, S, (u_0, F_0, _), (u_1, F_1, _) in zip(p.groups, p.felt, slopes, before, after, strict=True):
             way = felt[..., None] * (u_1 - u_0) / (unit := p.scale[g.first][..., None])
             size = np.sum(way**2, axis=(1, 2), keepdims=True)
             along = np.divide(way, size * unit, out=np.zeros_like(way), where=size > 0)

@@ -342,7 +342,7 @@ def read(parts: Sequence[Linear], q: ComplexArray, force: ComplexArray, share: f
     output, given = parts[0].output, np.array([part.output_given for part in parts]).T
     found = output @ q.T - parts[0].output_residual @ force.T + share * given
     moved = np.sqrt((output != 0) @ np.abs(q.T) ** 2)  # of the coordinates that a read-out has to do with
-    return np.where(np.abs(found) > READS * np.linalg.norm(output, axis=1)[:, None] * moved, found, 0.0)
+    return np.where(np.abs(found) <= READS * np.linalg.norm(output, axis=1)[:, None] * moved, 0.0, found)
 
 
 def work(

@@ -42,14 +42,14 @@ def filled_response(
     more = hidden(problem, frequency)
     for f in more:
         if f not in solved:
-            report(f"a mode at {f:.6g} Hz between two frequencies")
+            report(f"a point is added at {f:.6g} Hz, a mode between two of the sweep")
             take(f, between(problem, [solved[g][0] for g in asked], f), True)
     for low, high in pairwise(sorted([*asked, *more])):
         one, other = solved[low][0], solved[high][0]
         before = [f for f in solved if low < f < high]
         if len(before) < one.converged + other.converged:
             for point in last_solutions(problem, one, other):
-                report(f"the curve ends near {point.Omega / (2 * np.pi):.6g} Hz between two frequencies")
+                report(f"a point is added at {point.Omega / (2 * np.pi):.6g} Hz, where the curve ends")
                 take(point.Omega / (2 * np.pi), point, True)
     chosen = asked + [f for f in solved if f not in asked]
     points, found = zip(*(solved[f] for f in chosen), strict=True)

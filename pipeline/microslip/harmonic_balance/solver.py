@@ -84,6 +84,8 @@ def newton(
 ) -> Point:  # fmt: skip
     """Newton's method; derivatives of the forces are used again while they serve.
 
+    Derivatives are those of few points where a contact has many, until a step by them leaves too much.
+
     The contact forces are continuous with a piecewise continuous derivative. Where a step crosses to other pieces |R|
     may rise, though the derivative beyond leads on: so steps are taken whole. Where that does not end, they are halved
     until |R| falls, from the start again.
@@ -95,7 +97,7 @@ def newton(
             that may go by before R is half of what it was; None: all.
     """
     start, fresh, history, left_over = x, False, list[float](), rises
-    halved, last = np.inf, 0
+    halved, last, whole = np.inf, 0, False
     R, seen = at.tried(x)
     contraction = _contraction(at.problem)
     reference, error = float(np.abs(at.reference).max(initial=0.0)) or 1.0, np.inf  # where nothing drives, the length
@@ -113,16 +115,17 @@ def newton(
             words = f"|R|/|x| = {halved:.1e} was not halved in {patience} steps"
             return Point(at.Omega, x, words, error, count, history=tuple(history))
         if slope is None:
-            slope, fresh = at.forces(x)[1], True
+            slope, fresh = at.slopes(x, whole), True
             if not all(np.isfinite(S).all() for S in slope):
-                return Point(at.Omega, x, at.undefined(x), error, count, history=tuple(history))
+                return Point(at.Omega, x, at.undefined(x) or "not a number", error, count, history=tuple(history))
         step = at.jacobian(slope).solve(-R)
-        left, shown = at.tried(x + step)
+        left, shown = at.tried(x + step, seen)
         before, after = np.linalg.norm(R), np.linalg.norm(left)
         if after <= contraction * before:
             slope, fresh = at.secant(slope, seen, shown), False
             x, R, seen = x + step, left, shown
             continue
+        whole = whole or fresh
         if fresh and not rises:
             x, R, seen = _shortened(at, x, R, step, left, shown)
         elif fresh and (after < before or left_over and np.isfinite(after)):
@@ -147,6 +150,11 @@ def _contraction(problem: Problem) -> float:
     return OF_MANY if many and len(problem.slices) == 1 else CONTRACTION
 
 
+def _by_few(problem: Problem) -> bool:
+    """Whether the derivatives of all contacts are those of few points, and cost as little as a step."""
+    return all(isinstance(g.model, AFT) and g.model.few is not g.model for g in problem.groups)
+
+
 def _shortened(
     at: AtFrequency, x: Array, R: Array, step: Array, left: Array, shown: Tried
 ) -> tuple[Array, Array, Tried]:  # fmt: skip
@@ -154,7 +162,7 @@ def _shortened(
     share = 1.0
     while not np.linalg.norm(left) < np.linalg.norm(R) and share > SHORTEST:
         share *= 0.5
-        left, shown = at.tried(x + share * step)
+        left, shown = at.tried(x + share * step, shown)
     return x + share * step, left, shown
 
 
@@ -355,7 +363,7 @@ def sweep(
             starts = [_ahead(good, 2 * np.pi * f), good[-1].x] if len(good) > 1 else [good[-1].x]
         began = time.perf_counter()
         point = solve(problem, 2 * np.pi * float(f), starts, slope)
-        slope = point.slope
+        slope = None if _by_few(problem) else point.slope
         done.append(replace(point, slope=None))
         keep(done[-1])
         solved += 1

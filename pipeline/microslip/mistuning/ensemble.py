@@ -20,8 +20,9 @@ from ..settings.mistakes import whole
 from ..units import counted, percent
 from . import rare
 from .linear import beside, known_of
+from .peaks import LEFT, Highest
 from .ring import positive
-from .samples import Asked, Sample, of_ring, sample
+from .samples import Asked, Sample, again, of_ring, sample
 from .statistics import Envelope, Quantile, quantile
 
 Report = Callable[[str], None]
@@ -58,6 +59,7 @@ class Ensemble:
     Attributes:
         asked. tuned: the ring of equal sectors. rows: (n, len(COLUMNS)) of the samples. envelope: see `Envelope`. rare:
             the 99.9 % quantile by samples that a linear ring chose, see `rare.Rare`; None where none were asked for.
+        again: the peak of the highest sample, searched for again (`search_again`); None before.
     """
 
     asked: Asked
@@ -65,6 +67,7 @@ class Ensemble:
     rows: Array
     envelope: Envelope
     rare: rare.Rare | None = field(default=None)
+    again: tuple[Highest, Highest] | None = field(default=None)
 
     def __len__(self) -> int:
         return len(self.rows)
@@ -95,6 +98,11 @@ class Ensemble:
         if off.any():
             most = float(self.column("missed")[off].max())
             told.append(f"{counted(int(off.sum()), 'sample')} may be {_missed(most)}")
+        if self.again and (low := self.lacked) > LEFT + float(self.column("missed")[self.highest]):
+            told.append(
+                f"the first search missed {percent(low)} of the highest sample's peak, so others and the quantiles may "
+                "be as low; give the sweep more points."
+            )
         if unsolved := int((self.column("unsolved") > 0).sum()):
             told.append(
                 f"{counted(unsolved, 'sample')} lack solutions at some frequencies, counted in the column unsolved."
@@ -105,6 +113,23 @@ class Ensemble:
     def amplification(self) -> Array:
         """(n,) highest amplitude of any blade over that of the tuned ring; NaN where it is not known."""
         return self.column("amplitude") / self.tuned.top.amplitude
+
+    @property
+    def lacked(self) -> float:
+        """Share by which the highest sample's peak is higher by the searches that came after its own; 0 before."""
+        high = [top.amplitude for top in self.again or ()]
+        return max([0.0, *(h / self.column("amplitude")[self.highest] - 1 for h in high)])
+
+    @property
+    def highest(self) -> int:
+        """Number of the sample with the highest blade of all."""
+        return int(np.nanargmax(self.amplification))
+
+    def search_again(self) -> Sample:
+        """The highest sample solved once more, as it was; and its peak searched for again, see `samples.again`."""
+        one = sample(self.asked, self.highest)
+        self.again = again(self.asked, one)
+        return one
 
     def quantile(self, share: float, confidence: float = 0.95) -> Quantile:
         """Of the amplification."""
@@ -133,7 +158,8 @@ def run(
         asked, tuned, np.zeros((0, len(COLUMNS))), Envelope.empty(len(asked.frequency), tuned.top.amplitude)
     )
     found = _kept(file, inputs, found) if file is not None else found
-    found.rows = found.rows[:samples]
+    if len(found) > samples:
+        found.rows, found.envelope = found.rows[:samples], found.envelope.first(samples)
     workers = workers or min(_cores(), -(-samples // EACH))
     with _computed(asked, workers, executor) as of:
         while len(found) < samples and not _narrow(found, until):
@@ -289,7 +315,7 @@ def _one(number: int) -> Sample:
 def _keep(file: Path, inputs: str, found: Ensemble) -> None:
     e = found.envelope
     with store.complete_or_absent(file) as temporary:
-        np.savez(temporary, rows=found.rows, sums=e.sums, bins=e.bins, inputs=np.array(inputs))
+        np.savez(temporary, rows=found.rows, sums=e.sums, bins=e.bins, grids=np.array(e.grids), inputs=np.array(inputs))
 
 
 def _kept(file: Path, inputs: str, found: Ensemble) -> Ensemble:
@@ -299,7 +325,7 @@ def _kept(file: Path, inputs: str, found: Ensemble) -> Ensemble:
     try:
         with np.load(store.ordinary(file), allow_pickle=False) as known:
             if str(known["inputs"]) == inputs and len(known["rows"].shape) == 2:
-                envelope = Envelope(found.envelope.unit, known["sums"].copy(), known["bins"].copy())
+                envelope = Envelope(found.envelope.unit, known["sums"], known["bins"], list(known["grids"]))
                 return Ensemble(found.asked, found.tuned, known["rows"].copy(), envelope)
     except (OSError, ValueError, KeyError):
         return found

@@ -58,16 +58,41 @@ def blades_from_modes(
             tuned frequencies; the deviations are then those whose e have the mean zero.
 
     Raises:
-        UserError: fewer numbers than unknowns, shapes that do not fit the nodal diameters, or a mode that a ring of
-            such blades does not have.
+        UserError: fewer numbers than unknowns, shapes that do not fit the nodal diameters, modes in columns, or a mode
+            that a ring of such blades does not have.
     """
     ring = _Family(np.asarray(tuned, float), np.asarray(share, float), find_tuned, np.shape(shapes)[-1])
-    measured = _Measured.of(ring, frequency, shapes, frequency_noise, shape_noise)
+    try:
+        found = _fitted(ring, frequency, shapes, frequency_noise, shape_noise)
+    except UserError:
+        if not _in_columns(ring, frequency, shapes, frequency_noise, shape_noise):
+            raise
+        raise UserError(IN_COLUMNS) from None
+    if not found.fits and _in_columns(ring, frequency, shapes, frequency_noise, shape_noise):
+        raise UserError(IN_COLUMNS)
+    return found
+
+
+IN_COLUMNS = "shapes: fit as columns and not as rows; give a row for each mode, that is shapes.T"
+
+
+def _fitted(ring: _Family, frequency: ArrayLike, shapes: ArrayLike, noise: float, shape_noise: float) -> FromModes:
+    measured = _Measured.of(ring, frequency, shapes, noise, shape_noise)
     found = scipy.optimize.least_squares(
         lambda y: measured.compare(ring, y)[0], ring.start(measured), lambda y: measured.compare(ring, y)[1],
         x_scale="jac", xtol=1e-12, ftol=1e-12, gtol=1e-12,
     )  # fmt: skip
     return ring.identified(found.x, found.fun, found.jac)
+
+
+def _in_columns(ring: _Family, frequency: ArrayLike, shapes: ArrayLike, noise: float, shape_noise: float) -> bool:
+    """Whether as many modes as blades, which no shape of the array tells apart, fit the other way round."""
+    if np.shape(shapes) != (ring.blades, ring.blades):
+        return False
+    try:
+        return _fitted(ring, frequency, np.transpose(shapes), noise, shape_noise).fits
+    except UserError:
+        return False
 
 
 @dataclass(frozen=True, eq=False)

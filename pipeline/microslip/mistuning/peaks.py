@@ -20,24 +20,26 @@ from ..data import Array
 Respond = Callable[[float], Array | None]
 """(w,) amplitudes of the read-outs at a frequency (Hz); None where there is no solution."""
 
-Follow = Callable[[float, float, float], tuple[list[tuple[float, Array]], bool]]
+Follow = Callable[[float, float, float, bool], tuple[list[tuple[float, Array]], bool]]
 """Frequencies and amplitudes of the solution that goes on towards a frequency (Hz) from the one at another, the second,
-and whether it ends on the way; the third is the width (Hz) of what is between two points of the sweep."""
+and whether it ends on the way; the third is the width (Hz) of what is between two points of the sweep, the last one
+whether that is worth many steps."""
 
 TOLERANCE = 1e-4
 """Share of the highest amplitude by which it may be missed."""
 
-LEFT = 1e-3
+LEFT = 5e-4
 """Share of the highest amplitude by which intervals may tell more, where no parabola does."""
 
-MOST = 15
+MOST = 25
 """Points added at most."""
 
 FAILING = 3
 """Points without a solution among them."""
 
-STEADY = 0.9
-"""Amplitude over that of the neighbouring point above which no other solution is looked for between them."""
+STEADY, NARROW = 0.9, 0.125
+"""Amplitude over that of the neighbouring point above which no other solution is looked for between them, unless they
+are as close as this share of what is between two points of the sweep and still tell different heights."""
 
 
 @dataclass(frozen=True)
@@ -65,10 +67,10 @@ def highest(
     """The highest amplitude of all read-outs in a band.
 
     Args:
-        frequency: (f,) Hz, rising, a sweep that sees every resonance. tolerance, most: see `TOLERANCE`, `MOST`. follow:
-            where it is given, a sweep that jumps goes back on the higher side. at_once: where it is given, what is
-            found with little work from what is known: the sweep goes up as far as that leads, then down from its other
-            end, and the rest is looked for in what is between.
+        frequency: (f,) Hz, rising or falling, a sweep that sees every resonance. tolerance, most: see `TOLERANCE`,
+            `MOST`. follow: where it is given, a sweep that jumps goes back on the higher side. at_once: where it is
+            given, what is found with little work from what is known: the sweep goes as far as that leads, then back
+            from its other end, and the rest is looked for in what is between.
     """
     search = _Search(respond, follow, frequency)
     known, failed = search.known, search.failed
@@ -81,8 +83,10 @@ def highest(
         promised = told[0] > top * (1 + tolerance) and more - top <= 0.5 * before
         promised = promised and not _beside(told[1], known, failed)
         if more <= top * (1 + (tolerance if promised else LEFT)):
-            break
-        if search.goes_on(low, high, tolerance):
+            if not search.leads_on(top, tolerance):
+                break
+            continue
+        if not promised and search.goes_on(low, high, tolerance):
             continue
         search.look(told[1] if promised else _middle(low, high, failed))
         count, before = count + 1, more - top if promised else np.inf
@@ -96,15 +100,18 @@ def highest(
 
 
 class _Search:
-    """Attributes: known: Hz -> (w,) amplitudes. failed: Hz without a solution. tried: ways back that were gone."""
+    """Attributes: known: Hz -> (w,) amplitudes. failed: Hz without a solution. tried: ways back that were gone. led:
+    Hz, whereto they led. ends: Hz, where they ended."""
 
     def __init__(self, respond: Respond, follow: Follow | None, frequency: Array) -> None:
         self.respond, self.follow = respond, follow
         self.low, self.high = float(min(frequency)), float(max(frequency))
-        self.width = float(np.diff(frequency).max(initial=0.0))
+        self.width = float(np.abs(np.diff(frequency)).max(initial=0.0))
         self.known: dict[float, Array] = {}
         self.failed: list[float] = []
-        self.tried: set[tuple[float, float, float]] = set()
+        self.tried: set[tuple[float, float, float, bool]] = set()
+        self.led: set[float] = set()
+        self.ends: list[float] = []
 
     def look(self, f: float) -> None:
         y = self.respond(f)
@@ -114,7 +121,7 @@ class _Search:
             self.known[f] = y
 
     def sweep(self, rest: list[float], at_once: Respond | None) -> None:
-        """Up as far as that leads, down from the other end, then what is between."""
+        """On as far as that leads, back from the other end, then what is between."""
         if at_once is not None:
             rest = rest[self._leads(rest, at_once) :][::-1]
             rest = rest[self._leads(rest, at_once) :]
@@ -130,31 +137,48 @@ class _Search:
             self.known[f] = y
         return len(frequencies)
 
-    def goes_on(self, low: float, high: float, tolerance: float) -> bool:
+    def leads_on(self, top: float, tolerance: float) -> bool:
+        """Whether a solution that is about as high as the top, and beside which there is a lower one, leads to more
+        than is known: not only in this interval."""
+        x = sorted(self.known)
+        for low, high in zip(x, x[1:], strict=False):
+            a, b = self.known[low].max(), self.known[high].max()
+            if min(a, b) < STEADY * max(a, b) and max(a, b) > STEADY * top and self.goes_on(low, high, tolerance, True):
+                return True
+        return False
+
+    def goes_on(self, low: float, high: float, tolerance: float, last: bool = False) -> bool:
         """Whether the higher of two points leads to more at the other one, or on the way there, than is known. Where it
-        ends, a point is looked for beside that."""
+        ends, a point is looked for beside that. last: whether the interval is not halved any more."""
         known = self.known
         far, near = sorted((low, high), key=lambda f: known[f].max())
-        told = known[near].max()
-        if self.follow is None or known[far].max() > STEADY * told or (far, near, told) in self.tried:
+        told, wide = known[near].max(), high - low > NARROW * self.width
+        smooth = wide and known[far].max() > STEADY * told and near not in self.led
+        ended = any(abs(near - end) < ENDED * self.width for end in self.ends)
+        arc = last or not wide
+        if self.follow is None or smooth or ended or (far, near, told, arc) in self.tried:
             return False
-        self.tried.add((far, near, told))
-        points, ends = self.follow(far, near, self.width)
+        self.tried.add((far, near, told, arc))
+        points, ends = self.follow(far, near, self.width, arc)
         higher = {
             f: y for f, y in points if y.max() > (1 + tolerance) * known[far].max() and self.low <= f <= self.high
         }
         known |= higher
+        self.led |= set(higher)
         if ends:
             end = max([near, *higher], key=lambda f: abs(f - near))
+            self.ends.append(end)
             beside = end + BESIDE * (far - end)
             self.look(beside)
-            if beside in known:
-                self.tried.add((beside, end, known[end].max()))
         return bool(higher) or ends
 
 
 BESIDE = 1e-3
 """Share of the way from where a solution ends to a point without it, at which that is looked for."""
+
+
+ENDED = 0.02
+"""Share of what is between two points of the sweep, within which of an end nothing is followed again."""
 
 
 def _beside(f: float, known: dict[float, Array], failed: list[float]) -> bool:

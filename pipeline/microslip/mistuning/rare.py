@@ -15,7 +15,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.stats
 from scipy.special import ndtr, ndtri
 
 from ..data import Array
@@ -50,7 +49,9 @@ class Rare:
 
 def correlation(linear: Array, friction: Array) -> float:
     """Of the ranks of (n,) pairs."""
-    return float(scipy.stats.spearmanr(linear, friction)[0]) if len(linear) > 2 and np.ptp(linear) > 0 else 0.0
+    from scipy.stats import spearmanr
+
+    return float(spearmanr(linear, friction)[0]) if len(linear) > 2 and np.ptp(linear) > 0 else 0.0
 
 
 def chances(linear: Array, samples: int, share: float, correlation: float, pairs: int) -> Array:
@@ -60,10 +61,12 @@ def chances(linear: Array, samples: int, share: float, correlation: float, pairs
         samples: with friction, expected. share: of the samples below the quantile. correlation: of `pairs` ranks; the
             lower end of its interval is taken.
     """
+    from scipy.stats import rankdata
+
     M = len(linear)
     lower = np.tanh(np.arctanh(np.clip(correlation, -MOST, MOST)) - 1.64 / np.sqrt(max(pairs - 3, 1)))
     r = float(np.clip(lower, 0.0, MOST))
-    z = ndtri((scipy.stats.rankdata(linear) - 0.5) / M)
+    z = ndtri((rankdata(linear) - 0.5) / M)
     likely = np.sqrt(ndtr((r * z - ndtri(share)) / np.sqrt(1 - r * r)))
     return _capped((1 - ANY) * likely / likely.sum() + ANY / M, samples)
 
@@ -106,6 +109,8 @@ def estimate(
 def _interval(above: Array, spread: Array, most: Array, alpha: float) -> tuple[Array, Array]:
     """Of weighted counts: gamma distributions of their mean and variance; the upper end with one more of the largest
     weight."""
-    low = scipy.stats.gamma.ppf(alpha / 2, above**2 / spread, scale=spread / above)
+    from scipy.stats import gamma
+
+    low = gamma.ppf(alpha / 2, above**2 / spread, scale=spread / above)
     mean, more = above + most, spread + most**2
-    return low, scipy.stats.gamma.ppf(1 - alpha / 2, mean**2 / more, scale=more / mean)
+    return low, gamma.ppf(1 - alpha / 2, mean**2 / more, scale=more / mean)

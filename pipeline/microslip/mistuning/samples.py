@@ -86,8 +86,7 @@ def sample(asked: Asked, number: int) -> Sample:
 
 def of_ring(asked: Asked, ring: Assembly, number: int = 0) -> Sample:
     """A whole ring: its highest blade over the frequency."""
-    respond = Sticking(ring) if asked.stuck else Sliding(asked.problem(ring), asked.tuned_points)
-    top = highest(respond, asked.frequency, follow=respond.follow, at_once=respond.at_once)
+    top, respond = _searched(asked, ring, asked.frequency)
     grid = np.full((len(asked.frequency), asked.tuned.sectors), np.nan)
     places = {f: i for i, f in enumerate(top.frequencies)}
     for row, f in enumerate(asked.frequency):
@@ -95,6 +94,26 @@ def of_ring(asked: Asked, ring: Assembly, number: int = 0) -> Sample:
             grid[row] = top.amplitudes[places[float(f)]]
     strained = worst(ring, respond.coordinates(top.frequency)) if np.isfinite(top.amplitude) else ()
     return Sample(number, top, grid, *strained)
+
+
+def _searched(asked: Asked, ring: Assembly, frequency: Array) -> tuple[Highest, Sliding | Sticking]:
+    respond = Sticking(ring) if asked.stuck else Sliding(asked.problem(ring), asked.tuned_points)
+    return highest(respond, frequency, follow=respond.follow, at_once=respond.at_once), respond
+
+
+FINER, HIGH = 4, 0.5
+"""Points in the place of one, and the share of the peak above which they are, where a sample is searched again."""
+
+
+def again(asked: Asked, one: Sample) -> tuple[Highest, Highest]:
+    """The peak of a sample by two searches that know nothing of the first one nor of each other: about it in finer
+    steps, one from below, one from above."""
+    ring, f = asked.tuned.mistuned(asked.deviations(one.number)), asked.frequency
+    high = np.nan_to_num(one.grid).max(axis=1) >= HIGH * one.top.amplitude
+    high |= np.abs(f - one.top.frequency) == np.abs(f - one.top.frequency).min()
+    low, up = max(int(high.argmax()) - 1, 0), min(len(f) - int(high[::-1].argmax()), len(f) - 1)
+    fine = np.interp(np.arange(FINER * low, FINER * up + 1) / FINER, np.arange(len(f)), f)
+    return _searched(asked, ring, fine)[0], _searched(asked, ring, fine[::-1])[0]
 
 
 class Sliding:
@@ -123,10 +142,12 @@ class Sliding:
                 return self._kept(frequency, point)
         return None
 
-    def follow(self, frequency: float, behind: float, width: float) -> tuple[list[tuple[float, Array]], bool]:
+    def follow(
+        self, frequency: float, behind: float, width: float, arc: bool
+    ) -> tuple[list[tuple[float, Array]], bool]:  # fmt: skip
         """Hz and (w,) m of the solution that goes on from the one at another frequency: at this one by Newton's method,
-        or on the way there along its arc, and whether it ends; what is known here stays where that is higher. width:
-        Hz, of what is between two points of a sweep."""
+        or on the way there along its arc where asked for, and whether it ends; what is known here stays where that is
+        higher. width: Hz, of what is between two points of a sweep."""
         Omega, before = 2 * np.pi * frequency, self.known.get(frequency)
         beyond = [self.known[f] for f in self.known if (f - behind) * (frequency - behind) <= 0]
         side = sorted(beyond, key=lambda p: abs(p.Omega - Omega))
@@ -137,6 +158,8 @@ class Sliding:
                 return [(frequency, y)], False
         if before is not None:
             self.known[frequency] = before
+        if not arc:
+            return [], False
         points, ends = Branch(self.problem, self.known[behind], Omega, 2 * np.pi * width).onward()
         return [(f, self._read(f, p)) for p in points if (f := p.Omega / (2 * np.pi)) != frequency], ends
 

@@ -7,7 +7,6 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
-import scipy.stats
 from scipy.special import gamma
 
 from ..data import Array
@@ -41,10 +40,12 @@ class Quantile(NamedTuple):
 def quantile(values: Array, share: float, confidence: float = CONFIDENCE) -> Quantile:
     """A quantile of (n,) positive samples, whatever their distribution; the interval holds order statistics between
     which it lies with at least the confidence (binomial distribution)."""
+    from scipy.stats import binom  # a third of a second, which other runs do not need
+
     x = np.sort(np.asarray(values, dtype=float))
     if not len(x):
         return Quantile(share, np.nan, 0.0, np.inf)
-    low, high = (int(scipy.stats.binom.ppf(0.5 + way * confidence / 2, len(x), share)) for way in (-1, 1))
+    low, high = (int(binom.ppf(0.5 + way * confidence / 2, len(x), share)) for way in (-1, 1))
     ends = (float(x[low - 1]) if low else 0.0, float(x[high]) if high < len(x) else np.inf)
     return Quantile(share, float(np.clip(np.quantile(x, share), *ends)), *ends)  # of few, between two it lies outside
 
@@ -53,18 +54,24 @@ LOW, HIGH, WIDTH = -14.0, 4.0, 0.01
 """Bins of the logarithm of amplitudes over the tuned ring's highest, and their width: quantiles are as fine."""
 
 
+KEPT = 2_000_000
+"""Amplitudes of single samples that are kept, 16 MB: 2700 samples of 24 blades at 31 frequencies."""
+
+
 @dataclass
 class Envelope:
     """All blades' amplitudes on f frequencies, sample after sample.
 
     Attributes:
         unit: the tuned ring's highest amplitude. sums: (5, f) count, sum, sum of squares, least, largest, over the
-            unit. bins: (f, b) how many amplitudes fell where.
+            unit. bins: (f, b) how many amplitudes fell where. grids: (f, sectors) of the first samples, up to `KEPT`
+            numbers.
     """
 
     unit: float
     sums: Array
     bins: Array = field(repr=False)
+    grids: list[Array] = field(default_factory=list, repr=False)
 
     @classmethod
     def empty(cls, frequencies: int, unit: float) -> Envelope:
@@ -74,6 +81,8 @@ class Envelope:
 
     def add(self, grid: Array) -> None:
         """Takes in (f, sectors) amplitudes of one sample; NaN are left out."""
+        if (len(self.grids) + 1) * grid.size <= KEPT:
+            self.grids.append(grid)
         y = grid / self.unit
         known = np.isfinite(y)
         z = np.where(known, y, 0.0)
@@ -85,6 +94,15 @@ class Envelope:
         place = np.clip((np.log(np.maximum(z, 1e-300)) - LOW) / WIDTH, 0, self.bins.shape[1] - 1).astype(int)
         rows = np.broadcast_to(np.arange(len(y))[:, None], y.shape)
         np.add.at(self.bins, (rows[known], place[known]), 1)
+
+    def first(self, count: int) -> Envelope:
+        """That of the first samples alone; of all where that is not known any more."""
+        if count > len(self.grids):
+            return self
+        found = Envelope.empty(len(self.bins), self.unit)
+        for grid in self.grids[:count]:
+            found.add(grid)
+        return found
 
     def samples(self, sectors: int) -> int:
         """How many were taken in with a solution somewhere."""
@@ -146,15 +164,17 @@ SHARES = 0.5, 0.95, 0.99, 0.999
 
 def fits(values: Array) -> list[Fit]:
     """The extreme-value distribution and Weibull's, fitted to (n,) highest amplitudes by maximum likelihood."""
+    from scipy.stats import genextreme, weibull_min
+
     x = np.sort(np.asarray(values, dtype=float))
     if len(x) < 20 or np.ptp(x) == 0:
         return []
     found = []
     shape, location, scale = _by_moments(x)
     for name, kind, start, given, names in (
-        ("generalised extreme value", scipy.stats.genextreme, (shape,), {"loc": location, "scale": scale},
+        ("generalised extreme value", genextreme, (shape,), {"loc": location, "scale": scale},
          ("shape", "location", "scale")),
-        ("Weibull", scipy.stats.weibull_min, (), {"floc": 0.0}, ("exponent", "location", "scale")),
+        ("Weibull", weibull_min, (), {"floc": 0.0}, ("exponent", "location", "scale")),
     ):  # fmt: skip
         made = kind(*(p := kind.fit(x, *start, **given)))
         steps = np.arange(1, len(x) + 1) / len(x)

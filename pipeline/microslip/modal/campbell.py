@@ -2,7 +2,8 @@
 
 Between two speeds the squared frequency is taken as linear in the squared speed (Southwell: omega^2 =
 omega_0^2 + B Omega^2), which is exact at the stations and makes every crossing a root in closed form.
-Gyroscopic coupling is not in the frequencies of a modal file; the modes with it stand beside (`track_gyroscopic`).
+Gyroscopic coupling is not in the frequencies of a modal file; the modes with it stand beside (`track_gyroscopic`). Of
+these omega^2 = omega_0^2 + B Omega^2 + 2 g omega, with g linear in the speed: two whirls of one mode exactly.
 """
 
 from __future__ import annotations
@@ -22,6 +23,9 @@ LINK = 0.3
 SURE = 0.8
 """A step with a smaller MAC is drawn as uncertain: add speeds in between."""
 
+VISIBLE = 0.005
+"""A smaller relative change of the frequencies by gyroscopic coupling is told, but neither drawn nor met."""
+
 
 @dataclass(frozen=True)
 class Tracks:
@@ -33,6 +37,7 @@ class Tracks:
         omega: (c, s) rad/s, nan where it does not exist.
         mac: (c, s - 1) modal assurance criterion of each step, nan where there is none.
         solved: rad/s, the speeds whose equilibrium was computed where the others follow from a range; None: all.
+        whirl: (c, s) rad/s, g of modes with gyroscopic coupling; None: they have none.
     """
 
     speeds: Array
@@ -40,12 +45,25 @@ class Tracks:
     omega: Array
     mac: Array
     solved: Array | None = None
+    whirl: Array | None = None
 
     def frequency(self, curve: int, speeds: Array) -> Array:
         """Hz of one curve at any speeds (rad/s), nan outside its range."""
-        known = self.modes[curve] >= 0
-        x, y = self.speeds[known] ** 2, self.omega[curve, known] ** 2
-        return np.sqrt(np.interp(np.asarray(speeds) ** 2, x, y, left=np.nan, right=np.nan)) / (2 * np.pi)
+        known, at = self.modes[curve] >= 0, np.asarray(speeds)
+        x, y = self.speeds[known], self.omega[curve, known]
+        g = np.zeros_like(y) if self.whirl is None else self.whirl[curve, known]
+        plain = np.interp(at**2, x**2, y**2 - 2 * g * y, left=np.nan, right=np.nan)
+        g = np.interp(at, x, g)
+        return (g + np.sqrt(np.maximum(g**2 + plain, 0.0))) / (2 * np.pi)
+
+    def coupled(self, plain: Sequence[Array]) -> Tracks:
+        """The same curves, those of the modes with gyroscopic coupling. plain: at each station rad/s without it."""
+        g = np.zeros(self.omega.shape)
+        for i, omega in enumerate(plain):
+            here = (self.modes[:, i] >= 0) & (self.modes[:, i] < len(omega)) & (self.omega[:, i] > 0)
+            own = self.omega[here, i]
+            g[here, i] = (own**2 - omega[self.modes[here, i]] ** 2) / (2 * own)
+        return replace(self, whirl=g)
 
 
 @dataclass(frozen=True)
@@ -186,7 +204,12 @@ def track_gyroscopic(basis: ModalBasis) -> Tracks | None:
     held = [g.gyroscopic is not None or not g.speed for g in groups]
     if len(groups) < 2 or not all(held) or not any(g.speed for g in groups) or not all(len(g.phi) for g in groups):
         return None
-    return track([_whirling(g) for g in groups], point_weights(basis))
+    return track([_whirling(g) for g in groups], point_weights(basis)).coupled([g.omega for g in groups])
+
+
+def parted(basis: ModalBasis) -> Tracks | None:
+    """`track_gyroscopic` where the coupling changes a frequency by more than `VISIBLE`."""
+    return track_gyroscopic(basis) if gyroscopic_change(basis) > VISIBLE else None
 
 
 def _whirling(g: ModalGroup) -> ModalGroup:
@@ -227,14 +250,28 @@ def engine_orders(basis: ModalBasis) -> list[int]:
 
 
 def crossings(tracks: Tracks, orders: Sequence[int]) -> list[Crossing]:
-    """Where engine orders (omega = order Omega) meet the curves, ascending in speed."""
+    """Where engine orders (omega = order Omega) meet the curves, ascending in speed; a curve that lies on one, as a
+    whirl of a free body in the rotating frame, meets none."""
     found = []
-    x = tracks.speeds**2
+    x = tracks.speeds
     for order in sorted({k for k in orders if k > 0}):
         for curve in range(len(tracks.modes)):
-            g = tracks.omega[curve] ** 2 - order**2 * x
+            g = tracks.omega[curve] - order * x
+            g[np.abs(g) < 1e-12 * order * x] = 0.0
             for i in range(len(x) - 1):
                 if np.isfinite(g[i : i + 2]).all() and g[i] * g[i + 1] <= 0 and g[i] != 0:
-                    speed = float(np.sqrt(x[i] + (x[i + 1] - x[i]) * g[i] / (g[i] - g[i + 1])))
+                    speed = (
+                        _meeting(tracks, curve, order, float(x[i]), float(x[i + 1])) if g[i + 1] else float(x[i + 1])
+                    )
                     found.append(Crossing(order, curve, speed, order * speed / (2 * np.pi)))
     return sorted(found, key=lambda c: (c.speed, c.order))
+
+
+def _meeting(tracks: Tracks, curve: int, order: int, low: float, high: float) -> float:
+    """Speed (rad/s) between two at which an engine order crosses a curve."""
+    from scipy.optimize import brentq
+
+    def apart(speed: float) -> float:
+        return float(2 * np.pi * tracks.frequency(curve, np.array(speed)) - order * speed)
+
+    return float(brentq(apart, low, high, xtol=1e-12 * high, rtol=1e-14))

@@ -41,6 +41,9 @@ ANIMATED, STRESSED = 3, 6
 RING_ROWS, RING_COLUMNS, WAVES = 4, 3, 2
 """Nodal diameters and modes on the sheet of the ring, and waves that move."""
 
+PATIENCE = 600
+"""Seconds in which PyVista has to draw a sphere; two will do where nothing else runs."""
+
 _PROBE = """
 from microslip.pictures.scene import quiet_vtk
 quiet_vtk()
@@ -65,7 +68,9 @@ def _tried(python: str) -> str | None:
     root = str(Path(__file__).parents[2])
     command = [python, "-c", f"import sys; sys.path.insert(0, {root!r})\n{_PROBE}"]
     try:
-        tried = subprocess.run(command, capture_output=True, text=True, timeout=120)
+        tried = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE)
+    except subprocess.TimeoutExpired:
+        return f"PyVista drew nothing in {PATIENCE} s, wait until the machine is less busy"
     except (OSError, subprocess.SubprocessError) as error:
         return f"PyVista could not be tried ({type(error).__name__})"
     if tried.returncode == 0:

@@ -103,29 +103,34 @@ def backbone_plot(found: Mapping[float, Backbone], title: str, path: Path, of: Q
     return save_figure(figure, path)
 
 
-def optimum_plot(found: Optimum, label: str, title: str, path: Path, of: Quantity = METRES) -> Path:
-    """Height and frequency of the highest resonance of what is read over a setting, the optimum marked."""
-    figure = empty_figure(10.5, 4.4)
+def optimum_plot(
+    found: Optimum, label: str, title: str, path: Path, of: Quantity = METRES, name: str = "",
+    beside: Mapping[str, Array] | None = None,
+) -> Path:  # fmt: skip
+    """Height and frequency of the highest resonance of what is read over a setting, the optimum marked.
+
+    Args:
+        name: of what was found, where others stand beside it: name -> (3, k) values of the setting, Hz and amplitudes.
+    """
+    figure = empty_figure(10.5, 4.4 + 0.35 * bool(beside))
     left, right = figure.subplots(1, 2)
     scale, unit = _scale(np.array([found.resonance.amplitude]), of)
     known = {value: one for value, one in found.found.items() if one.status == "converged"}
-    x = np.array(list(known))
-    height = scale * np.array([one.amplitude for one in known.values()])
-    frequency = np.array([one.Omega for one in known.values()]) / (2 * np.pi)
-    for axes, y in ((left, height), (right, frequency)):
-        axes.plot(x, y, "o-", color=COLOURS[0], markersize=4, linewidth=1.6)
-        at = (found.parameter, y[list(known).index(found.parameter)])
+    own = np.array([[value, one.Omega / (2 * np.pi), one.amplitude] for value, one in known.items()]).T
+    curves = {**(beside or {}), name: own}
+    for (said, (x, f, a)), colour in zip(curves.items(), COLOURS, strict=False):
+        for axes, y in ((left, scale * a), (right, f)):
+            axes.plot(x, y, "o-", color=colour, markersize=4, linewidth=1.6, label=said)
+    place = list(known).index(found.parameter)
+    for axes, y in ((left, scale * own[2]), (right, own[1])):
+        at = (found.parameter, y[place])
         axes.plot(*at, "o", markersize=11, mfc="none", mec="#c8382c", mew=1.8)
         plain_axes(axes)
         axes.set_xlabel(label)
-        if x.min() > 0:
-            axes.set_xscale("log")
-            low, high = np.log10(x.min()), np.log10(x.max())
-            ticks = sorted({float(f"{10**e:.2g}") for e in np.linspace(low, high, 6)})
-            axes.set_xticks(ticks, labels=[f"{v:g}" for v in ticks])
-            axes.minorticks_off()
+        _over_ratios(axes, np.concatenate([one[0] for one in curves.values()]))
         if axes is left:
             said_beside(axes, f"{found.parameter:.4g}", at, (0, -18), ha="center", fontsize=9, color="#c8382c")
+    height = scale * np.concatenate([one[2] for one in curves.values()])
     if height.max() > 5 * height.min():
         left.set_yscale("log")
         numbers_within(left.yaxis)
@@ -133,7 +138,19 @@ def optimum_plot(found: Optimum, label: str, title: str, path: Path, of: Quantit
     left.margins(y=0.15)
     right.set_ylabel("its frequency in Hz")
     figure.suptitle(title, fontsize=12)
+    if beside:
+        figure.legend(*left.get_legend_handles_labels(), loc="outside lower center", ncols=4, fontsize=9)
     return save_figure(figure, path)
+
+
+def _over_ratios(axes: Axes, x: Array) -> None:
+    """A logarithmic axis with six numbers, where all are positive."""
+    if x.min() > 0:
+        axes.set_xscale("log")
+        low, high = np.log10(x.min()), np.log10(x.max())
+        ticks = sorted({float(f"{10**e:.2g}") for e in np.linspace(low, high, 6)})
+        axes.set_xticks(ticks, labels=[f"{v:g}" for v in ticks])
+        axes.minorticks_off()
 
 
 def stability_plot(found: Mapping[float, Mapping[float, Stability]], title: str, path: Path) -> Path:

@@ -5,12 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-import scipy.stats
 
 from ..data import Array
 from ..harmonic_balance.readout import measured
 from ..mistuning.ensemble import Ensemble
-from ..mistuning.samples import Sample, sample
+from ..mistuning.samples import Sample
 from ..mistuning.sensitivity import Approximation
 from ..mistuning.statistics import fits
 from .operating import numbers_within
@@ -19,6 +18,8 @@ from .plots import COLOURS, empty_figure, plain_axes, save_figure, single_panel
 
 def amplification_picture(found: Ensemble, path: Path, title: str) -> Path:
     """Histogram of the highest blade, its 95 % quantile with the interval, and the extreme-value fit."""
+    from scipy.stats import genextreme
+
     figure, axes = single_panel(8.0, 4.8)
     a = found.amplification[found.solved]
     counts, edges, _ = axes.hist(a, bins=min(max(10, int(np.sqrt(len(a)))), 80), color="#9ec5e8", edgecolor="white")
@@ -30,7 +31,7 @@ def amplification_picture(found: Ensemble, path: Path, title: str) -> Path:
     for fit in fits(a)[:1]:
         p = fit.parameters
         x = np.linspace(edges[0], edges[-1], 300)
-        y = scipy.stats.genextreme.pdf(x, p["shape"], p["location"], p["scale"]) * len(a) * (edges[1] - edges[0])
+        y = genextreme.pdf(x, p["shape"], p["location"], p["scale"]) * len(a) * (edges[1] - edges[0])
         axes.plot(x, y, color=COLOURS[0], label=f"{fit.name}, misfit {fit.distance:.2g}")
     axes.set(xlabel="amplification: highest blade over the tuned ring's highest", ylabel="samples", title=title)
     axes.set_ylim(0, 1.3 * top)
@@ -73,10 +74,11 @@ def sensitivity_picture(near: Approximation, path: Path, title: str) -> Path:
     share = (near.sensitivity.sum(axis=2) / near.mean[:, None]).T
     N = len(share)
     order = (np.arange(N) - N // 2) % N
-    most = float(np.abs(share).max())
+    most, f = float(np.abs(share).max()), near.frequency
+    half = 0.5 * float(np.ptp(f)) / max(len(f) - 1, 1) or 0.5  # a cell is about its frequency
     image = axes.imshow(
         share[order], aspect="auto", origin="lower", cmap="RdBu_r", vmin=-most, vmax=most, interpolation="nearest",
-        extent=(near.frequency[0], near.frequency[-1], -(N // 2) - 0.5, N - N // 2 - 0.5),
+        extent=(f[0] - half, f[-1] + half, -(N // 2) - 0.5, N - N // 2 - 0.5),
     )  # fmt: skip
     axes.grid(False)
     axes.set(xlabel="excitation frequency in Hz", ylabel="sectors further", title=title)
@@ -88,10 +90,8 @@ SHOWN = {"added_mass": (1e3, "g"), "gap": (1e6, "um"), "modal_file": (1.0, "numb
 """What is no share of something nominal, in which unit it is drawn."""
 
 
-def worst_picture(found: Ensemble, path: Path, title: str) -> Path:
+def worst_picture(found: Ensemble, one: Sample, path: Path, title: str) -> Path:
     """The sample with the highest blade: amplitudes round the ring at its peak, and what differs."""
-    at = int(np.nanargmax(found.amplification))
-    one: Sample = sample(found.asked, at)
     figure = empty_figure(9.0, 4.8)
     ring = figure.add_subplot(1, 2, 1, projection="polar")
     N = found.asked.tuned.sectors
@@ -108,7 +108,7 @@ def worst_picture(found: Ensemble, path: Path, title: str) -> Path:
     axes = figure.add_subplot(1, 2, 2)
     plain_axes(axes)
     drawn: list[tuple[str, Array]] = []
-    for s, v in found.asked.deviations(at):
+    for s, v in found.asked.deviations(one.number):
         by, unit = SHOWN.get(s.of, (100.0, "%"))
         name = s.of.replace("_", " ") + (", first mode" if np.ptp(v, axis=1).any() else "")
         drawn.append((f"{name}, {unit}", by * v[:, 0]))
@@ -117,5 +117,5 @@ def worst_picture(found: Ensemble, path: Path, title: str) -> Path:
         axes.bar(np.arange(N) + (i - 0.5 * (len(drawn) - 1)) * width, v, width, color=COLOURS[i % 10], label=name)
     axes.set(xlabel="blade", ylabel="deviation")
     axes.legend(fontsize=9)
-    figure.suptitle(f"{title}: sample {at}, blade {one.top.output}")
+    figure.suptitle(f"{title}: sample {one.number}, blade {one.top.output}")
     return save_figure(figure, path)

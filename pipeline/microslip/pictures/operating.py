@@ -15,6 +15,7 @@ from ..operating.motion import Motion, displacement
 from ..operating.stress import CycleStress, StressPeaks
 from .plots import (
     COLOURS,
+    by_rows,
     empty_figure,
     length_unit,
     plain_numbers,
@@ -68,7 +69,9 @@ def over_frequency_plot(
     low, high = (f(float(f(x)) for x, _ in curves.values()) for f in (min, max))
     axes.set(xlabel="excitation frequency in Hz", ylabel=quantity, title=title, xlim=(low, high))
     numbers_within(axes.yaxis)
-    figure.legend(loc="outside lower center", ncols=6, fontsize=9, title=told or None, title_fontsize=8)
+    lines, names = axes.get_legend_handles_labels()
+    lines, names = by_rows(lines[::-1], names[::-1], 6)
+    figure.legend(lines, names, loc="outside lower center", ncols=6, fontsize=9, title=told or None, title_fontsize=8)
     return save_figure(figure, path)
 
 
@@ -170,13 +173,13 @@ def haigh_plot(cycle: CycleStress, limits: MaterialLimits, worst: Endurance, tit
 
 
 def _close_up(axes: Axes, mean: Array, amplitude: Array) -> None:
-    """Where the places fill a corner of the diagram alone: a window on them, or words where none has a mean stress."""
+    """Where the places fill a corner of the diagram alone: a window on them, or words where no mean stress shows."""
     (left, right), (_, top) = axes.get_xlim(), axes.get_ylim()
     high = float(amplitude.max())
     if not 0 < high < 0.25 * top:
         return
     if np.ptp(mean) < 0.005 * (right - left):
-        said = f"all places: mean stress {mean.mean():.2g} MPa (no static load),\namplitude up to {high:.3g} MPa"
+        said = f"all places: mean stress {mean.min():.2g} to {mean.max():.2g} MPa,\namplitude up to {high:.3g} MPa"
         line = {"arrowstyle": "-", "color": COLOURS[0]}
         said_beside(axes, said, (mean.mean(), high), (40, 40), fontsize=9, color=COLOURS[0], arrowprops=line)
         return
@@ -245,7 +248,7 @@ def _map_panel(
 
     values, places = scale * getattr(m, name), m.places if lies else m.places[:, ::-1]
     low, high = min(float(values.min()), 0.0), 100.0 if unit.startswith("%") else max(float(values.max()), 0.0)
-    how: dict[str, Any] = {"vmin": low, "vmax": high if high > low else 1e-12, "cmap": colours}
+    how: dict[str, Any] = {"vmin": low, "vmax": high if high > low else 1.0, "cmap": colours}
     edges = grid_of(places)
     if edges is not None:
         shown: Any = axes.pcolormesh(1e3 * edges[0], 1e3 * edges[1], on_grid(places, values), **how)

@@ -13,7 +13,7 @@ import numpy as np
 
 from ..data import Array, ContactState, ModalBasis, ModalGroup
 from ..files.store import complete_or_absent
-from ..modal.campbell import SURE, Crossing, Tracks, crossings, gyroscopic_change, track_gyroscopic
+from ..modal.campbell import SURE, VISIBLE, Crossing, Tracks, crossings, gyroscopic_change, parted
 from ..reduced.truncation import Coordinate, coordinates, percent
 from ..units import from_rpm, rpm_text, to_rpm
 
@@ -198,20 +198,17 @@ def campbell_plot(basis: ModalBasis, tracks: Tracks, orders: Sequence[int], path
     orders = sorted({k for k in orders if k > 0})
     top = _ceiling(tracks, orders)
     rpm = to_rpm(np.linspace(tracks.speeds[0], tracks.speeds[-1], 201))
-    split = track_gyroscopic(basis) if gyroscopic_change(basis) > VISIBLE else None
+    split = parted(basis)
     _curves(axes, tracks, rpm, top)
     if split is not None:
         _split(axes, basis, split, rpm, top)
     for order in orders:
         axes.plot(rpm, order * rpm / 60, color="#5b6270", linewidth=0.9, linestyle=(0, (5, 3)), zorder=1.5)
         _order_label(axes, order, rpm[-1], top)
-    _mark(axes, [c for c in crossings(tracks, orders) if c.frequency <= top])
+    _mark(axes, [c for c in crossings(split or tracks, orders) if c.frequency <= top])
     _campbell_frame(axes, basis, rpm, top, tracks)
     return save_figure(figure, path)
 
-
-VISIBLE = 0.005
-"""A smaller relative change of the frequencies by gyroscopic coupling is told but not drawn."""
 
 _WHIRL = {"forward": "^", "backward": "v", "mixed": "x"}
 
@@ -219,10 +216,8 @@ _WHIRL = {"forward": "^", "backward": "v", "mixed": "x"}
 def _split(axes: Axes, basis: ModalBasis, split: Tracks, rpm: Array, top: float) -> None:
     """The branches with gyroscopic coupling, thin and dark, with the direction at every station."""
     ink = "#30343c"
-    for omega in split.omega:  # the split grows with Omega, not with its square
-        known = np.isfinite(omega)
-        at = to_rpm(split.speeds[known])
-        f = np.interp(rpm, at, omega[known], left=np.nan, right=np.nan) / (2 * np.pi)
+    for c in range(len(split.modes)):
+        f = split.frequency(c, from_rpm(rpm))
         axes.plot(rpm, np.where(f <= top, f, np.nan), color=ink, linewidth=0.9, linestyle=(0, (4, 1.5)), zorder=2.5)
     for way, mark in _WHIRL.items():
         at = [
@@ -314,6 +309,8 @@ def _campbell_frame(axes: Axes, basis: ModalBasis, rpm: Array, top: float, track
         note += f"; dotted: MAC below {SURE:g}, add speeds"
     if (change := gyroscopic_change(basis)) and change <= VISIBLE:
         note += f"; gyroscopic coupling changes them by {100 * change:.2g} % at most"
+    elif change:
+        note += "; engine orders meet the branches with gyroscopic coupling"
     if not shown.all():
         note += f"; {int((~shown).sum())} modes lie above"
     axes.set_title(f"{basis.name}: Campbell diagram", fontweight="bold")
@@ -412,3 +409,9 @@ def _pressure_map(axes: Axes, name: str, c: ContactState) -> None:
     axes.set(xlabel="mm along the face", ylabel="mm")
     axes.set_title(f"{name}: {c.normal_force:.4g} N\non {percent(c.closed_share)} of the face", fontsize=10)
     axes.figure.colorbar(shown, ax=axes, label="pressure in MPa", location="bottom", shrink=0.6)
+
+
+def by_rows(handles: list[Any], labels: list[str], columns: int) -> tuple[list[Any], list[str]]:
+    """A legend, which is filled by columns, in the order in which its rows are read."""
+    order = [i for column in range(columns) for i in range(column, len(labels), columns)]
+    return [handles[i] for i in order], [labels[i] for i in order]

@@ -19,7 +19,7 @@ from ..harmonic_balance.sweeps import overhanging
 from ..results.names import apart
 from ..units import METRES, Quantity
 from .operating import shades
-from .plots import plain_numbers, said_beside, through, write_png
+from .plots import by_rows, plain_numbers, said_beside, through, write_png
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -69,7 +69,7 @@ def response_picture(
         told += f" at $F_N$ = {max(result.responses):g} N"
     told += "; dotted: contacts would lift off, not valid" if any(lifts) else ""
     columns = LEGEND if len(shown) == 1 else 3
-    handles, labels = _by_rows(*axes.get_legend_handles_labels(), columns)
+    handles, labels = by_rows(*axes.get_legend_handles_labels(), columns)
     figure.legend(handles, labels, loc="outside lower center", ncols=columns, fontsize=9, title=told, title_fontsize=8)
     write_png(figure, path)
 
@@ -120,12 +120,6 @@ def _curves(
 
 LEGEND = 6
 """Columns of the legend."""
-
-
-def _by_rows(handles: list[Any], labels: list[str], columns: int) -> tuple[list[Any], list[str]]:
-    """A legend, which is filled by columns, in the order in which its rows are read."""
-    order = [i for column in range(columns) for i in range(column, len(labels), columns)]
-    return [handles[i] for i in order], [labels[i] for i in order]
 
 
 def _stuck_lines(axes: Axes, frequencies: Array, width: float) -> None:

@@ -30,10 +30,11 @@ def tyre_picture(found: Studied, path: Path, title: str) -> Path:
     steady.set(xlabel="slip in %", ylabel="force over normal force", ylim=(0, None), title="steady rolling")
     shown = found.case.jumps.shown
     for i, (first, last) in enumerate(((0.0, shown), (shown, 0.0))):
-        time, force = jump(b, first, last, r.force, 4.0)
-        constant = fitted(time, force)
+        time, force = jump(b, first, last, r.force)
+        constant, seen = fitted(time, force), slice(int(np.ceil(4.0 * len(b.share))) + 1)
+        time, force, end = time[seen], force[seen], force[-1]
         one.plot(time, force / r.force, color=COLOURS[i], label=f"slip {100 * first:g} to {100 * last:g} %")
-        fit = force[-1] + (force[0] - force[-1]) * np.exp(-time / constant)
+        fit = end + (force[0] - end) * np.exp(-time / constant)
         one.plot(time, fit / r.force, ":", color=COLOURS[i], label=f"exponential of {constant:.3g} s")
     one.set(xlabel="time in s", ylabel="force over normal force", title="a jump and back")
     one.legend(fontsize=8)

@@ -12,7 +12,7 @@ import numpy as np
 from ..basis import check_basis
 from ..data import ModalBasis, ModalGroup
 from ..linalg.gyroscopic import stability_sentence
-from ..modal.campbell import crossings, engine_orders, track_basis
+from ..modal.campbell import crossings, engine_orders, parted, track_basis
 from ..reduced.compliance import SUPPLIED, Share, has_residual, sentence, shares
 from ..reduced.coordinates import basis_in_modes
 from ..reduced.quality import sentences
@@ -123,7 +123,7 @@ def _material(provenance: Mapping[str, str]) -> str:
     """In words if the settings travel with the file, else as it says."""
     try:
         found = json.loads(provenance.get("settings", "{}")).get("material", {})
-        words = [f"density {found['density']} kg/m³"] if "density" in found else []
+        words = [f"density {found['density']:.9g} kg/m³"] if "density" in found else []
         words += [f"E = {_list(np.atleast_1d(found['young']) / 1e9, 6)} GPa"] if "young" in found else []
         words += [f"nu = {found['poisson']}"] if "poisson" in found else []
     except (ValueError, AttributeError, TypeError):
@@ -182,16 +182,19 @@ def _campbell(basis: ModalBasis, album: Album) -> list[Piece]:
     tracks = track_basis(basis)
     if tracks is None:
         return []
+    met, coupled = tracks, ""
+    if (split := parted(basis)) is not None:
+        met, coupled = split, ", with gyroscopic coupling, in the rotating frame"
     rows = [
-        [c.order, int(tracks.modes[c.curve][tracks.modes[c.curve] >= 0][0]) + 1]
+        [c.order, int(met.modes[c.curve][met.modes[c.curve] >= 0][0]) + 1]
         + [f"{to_rpm(c.speed):.0f}", f"{c.frequency:.5g}"]
-        for c in crossings(tracks, engine_orders(basis))
+        for c in crossings(met, engine_orders(basis))
     ]
     return [
         Piece("paragraph", "campbell"),
         say(*(range_sentence(k, r) for k, r in sorted(basis.ranges.items()))),
         album.take("campbell"),
-        fold("Where engine orders meet modes", table(["engine order", "mode", "rpm", "Hz"], rows)),
+        fold(f"Where engine orders meet modes{coupled}", table(["engine order", "mode", "rpm", "Hz"], rows)),
     ]
 
 

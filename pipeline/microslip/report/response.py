@@ -195,7 +195,8 @@ def response_pieces(response: Mapping[str, Any], album: Album) -> list[Piece]:
     told = {k: v for k, v in told.items() if not response.get(_TOLD.get(k, ""))}
     words = told.pop("description", "")
     tables = {k: v for k, v in told.items() if isinstance(v, list) and v and isinstance(v[0], Mapping)}
-    facts = [(_label(k), _cell(v).removeprefix(f"{k}: ")) for k, v in told.items() if k not in tables]
+    single = {k: _cell(v).removeprefix(f"{k}: ") for k, v in told.items() if k not in tables}
+    facts = [(_HEADINGS.get(k) or _label(k), v) for k, v in single.items()]
     rest = [n for n in album.left if n not in SHOWN and not n.startswith(("mode_", "modes_", "animation_"))]
     return [
         say(f"{words}." if words else ""),
@@ -215,10 +216,11 @@ _TOLD = {"stuck_frequencies_Hz": "stuck_modes", "estimated_error_of_harmonics": 
 """What need not be told again where the page has a table of something else, or sentences from it."""
 
 _HEADINGS = {
-    "stuck_modes": "Modes with sticking contacts",
+    "stuck_modes": "Modes with sticking contacts, as far as the harmonics reach",
+    "stuck_under_N": "normal force of the modes with sticking contacts in N",
     "rising_at_the_edge": "Where the response still rises at an end of the band",
 }
-"""Titles of tables."""
+"""Titles of tables and names of facts that their keys do not tell."""
 
 
 def _table_of(rows: Sequence[Mapping[str, Any]]) -> Piece:

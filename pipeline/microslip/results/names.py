@@ -13,7 +13,7 @@ def exact(value: float) -> str:
     return next(text for d in _DIGITS if float(text := f"{value:.{d}g}") == value or d == _DIGITS[-1])
 
 
-def apart(values: Sequence[float]) -> list[str]:
-    """Numbers in the fewest digits, six or more, that tell those that differ from each other."""
-    many = ([f"{value:.{d}g}" for value in values] for d in _DIGITS)
+def apart(values: Sequence[float], least: int = _DIGITS[0]) -> list[str]:
+    """Numbers in the fewest digits, `least` or more, that tell those that differ from each other."""
+    many = ([f"{value:.{d}g}" for value in values] for d in range(least, _DIGITS[-1] + 1))
     return next(texts for texts in many if len(set(texts)) == len(set(values)))

@@ -317,6 +317,7 @@ class Series:
             a = np.where(self.converged, self.amplitude, 0.0)
             i = int(a.argmax())
             most = f"at most {a[i]:.4g} {self.quantity.said} at {p[i]:.6g} {unit}".rstrip()
+            most += ", an end" * (len(p) > 1 and i in (0, len(p) - 1))
             said += f"; {most if a[i] else f'{self.readouts[0]} does not move'}"
         if len(self.folds):
             said += f"; folds at {', '.join(f'{f:.6g}' for f in self.folds[:6])} {unit}".rstrip()

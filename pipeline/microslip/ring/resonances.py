@@ -230,7 +230,10 @@ def _tracks_of(basis: ModalBasis, harmonic: int, direction: str) -> Tracks | Non
         for key, g in basis.groups.items()
         if key[1] == harmonic
     }
-    return track_basis(replace(basis, groups=groups), harmonic) if groups else None
+    found = track_basis(replace(basis, groups=groups), harmonic) if groups else None
+    if found is None or not direction:
+        return found
+    return found.coupled([eigenmodes(basis.groups[key]).omega for key in sorted(groups)])
 
 
 def resonances(basis: ModalBasis, orders: Iterable[int]) -> list[Resonance]:

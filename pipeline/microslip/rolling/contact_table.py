@@ -133,7 +133,8 @@ class ContactTable(NamedTuple):
             raise UserError("speed, friction, load: must be finite, speed positive, friction and load 0 or more")
         size = POSES if n > 1 else 1
         which = np.minimum(np.arange(-(-n // size) * size), n - 1).reshape(-1, size)
-        found = [_rolling(self, *(v[which[run]] for v in (*given, loads))) for run in strips.runs(n, size)]
+        runs = (_rolling(self, *(v[which[run]] for v in (*given, loads))) for run in strips.runs(n, size))
+        found = [jax.device_get(run) for run in runs]
         return jax.tree.map(lambda *parts: np.concatenate([p.reshape(-1, *p.shape[2:]) for p in parts])[:n], *found)
 
     def sentence(self) -> str:
@@ -348,6 +349,7 @@ def _judged(table: ContactTable, track: Track, checked: int, seed: int) -> Conta
     p, roll, down = _found(track, table.load, lateral, yaw, read.roll)
     pose, free = (lateral, yaw, roll, down), one / table.radius
     exact = _exact(_mirrored(p), pose, one, free, MU * one, (none,) * 3, table.shear, table.poisson, read.jumps)
+    exact = jax.device_get(exact)
     told = [_told(of, table.load) for of in (read, exact)]
     off = [np.abs(v - w) for v, w in zip(*told, strict=True)]
     off[1] /= told[1][1]

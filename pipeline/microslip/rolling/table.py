@@ -23,7 +23,7 @@ from ..files import hdf5
 from ..files.hostile import reading
 from ..files.store import ordinary
 from .kalker import Coefficients, creep_coefficients
-from .strips import BLOCK, Distribution, Forces, Poses, creep_forces, forces, grid, poses
+from .strips import BLOCK, Distribution, Forces, Poses, creep_forces, forces, grid, posed
 
 POINTS = (19, 36, 33, 39, 13)
 """Of the size of the pull below and above 1/2, its azimuth, its polar angle, a/b."""
@@ -96,7 +96,7 @@ class CreepTable:
         if not ((ratio >= least) & (ratio <= most)).all():
             worst = float(ratio.ravel()[np.argmax(np.abs(np.log(ratio)))])
             raise UserError(f"a, b: a/b is {worst:.4g}, and the table goes from {least:.4g} to {most:.4g}")
-        p = Poses(*map(np.asarray, poses(x, y, turn, a, b, held, np.ones_like(a), shear, self.poisson, **self.how)))
+        p = Poses(*map(np.asarray, posed(x, y, turn, a, b, held, np.ones_like(a), shear, self.poisson, **self.how)))
         stiff = p.stiffness_x * c**2 / held
         at, signs = placed(np.stack([x, p.eta * p.stiffness_y / p.stiffness_x, c * p.phi_x]) * stiff, ratio)
         at = np.stack([*at, np.log(ratio), np.log(p.stiffness_y / p.stiffness_x)]).reshape(5, -1)

@@ -20,6 +20,7 @@ from ..operating.fatigue import Endurance, MaterialLimits, endurance
 from ..operating.motion import Motion, read_out
 from ..operating.stress import CycleStress, StressPeaks, cycle_stress, stress_peaks
 from ..results import Response, Series
+from ..results.names import apart
 from ..results.series import READ, unit_of
 from ..units import METRES, Quantity
 from .stage import Report
@@ -320,7 +321,9 @@ def families(found: Assessment) -> dict[str, list[StressedResonance]]:
                 lines[taken[j]].append(r)
             else:
                 lines.append([r])
-    return {f"near {line[0].frequency:.4g} Hz": line for line in lines}
+    lines.sort(key=lambda line: line[0].frequency)
+    names = apart([line[0].frequency for line in lines], 4)
+    return {f"near {name} Hz": line for name, line in zip(names, lines, strict=True)}
 
 
 def over_force(found: Assessment) -> dict[str, list[tuple[float, float]]]:

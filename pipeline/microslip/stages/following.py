@@ -6,10 +6,12 @@ Each is a table (CSV) and a picture in the case's folder, and sentences for the 
 from __future__ import annotations
 
 import copy
+import csv
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,9 +21,10 @@ from ..case import CaseSettings, checkpoint, load_case
 from ..case.assemble import Built, build
 from ..case.problem import pressed_by, problem_of
 from ..continuation import NO_OPTIMUM
-from ..data import ModalBasis
+from ..data import Array, ModalBasis
 from ..errors import UserError
 from ..files import store
+from ..files.store import ordinary
 from ..files.tables import rows_csv
 from ..harmonic_balance.readout import measured
 from ..results import read_response
@@ -41,6 +44,7 @@ OF_CONTACTS = ("normal_stiffness", "tangential_stiffness", "friction", "roughnes
 """Keys of a contact that `optimum` may change in all of them at once."""
 
 NORMAL_FORCE = "normal_force"
+_NONE: Mapping[str, Array] = MappingProxyType({})
 _UNITS = {
     NORMAL_FORCE: "N", "normal_stiffness": "N/m", "tangential_stiffness": "N/m", "roughness": "m", "mass": "kg",
     "pressed_at_rpm": "rpm", "speed_rpm": "rpm", "weak_springs": "Hz", "turn": "degrees", "phase": "degrees",
@@ -58,6 +62,11 @@ class Case:
     raw: dict[str, Any]
     bases: Mapping[str, ModalBasis]
     folder: Path
+
+    @property
+    def name(self) -> str:
+        """Of the case."""
+        return str(self.raw.get("name", self.path.stem))
 
     @cached_property
     def quantity(self) -> Quantity:
@@ -191,7 +200,7 @@ def _backbone_table(found: Mapping[float, Backbone], case: Case) -> Path:
 
 
 def _title(case: Case, what: str) -> str:
-    return f"{case.raw.get('name', case.path.stem)}: {what}"
+    return f"{case.name}: {what}"
 
 
 # the optimum of a setting --------------------------------------------------------------------------------------------
@@ -241,21 +250,58 @@ def optimum_over(
     return optimum(make, [float(v) for v in values], band, report=report, keep=keep)
 
 
-def write_optimum(found: Optimum, over: str, case: Case) -> list[Path]:
+def write_optimum(found: Optimum, over: str, case: Case, beside: Mapping[str, Array] = _NONE) -> list[Path]:
     """``optimum.csv``: the highest resonance at every value and the optimum; ``pictures/optimum.png``;
-    ``optimum.html``."""
+    ``optimum.html``. beside: see `found_before`."""
     from ..pictures.following import optimum_plot
 
-    files = [_optimum_table(found.found, over, case, found)]
+    files, title = [_optimum_table(found.found, over, case, found)], _title(case, "highest resonance and optimum")
     if any(one.status == "converged" for one in found.found.values()):
         label = over.replace("_", " ") + (unit_of(over) and f" in{unit_of(over)}")
         picture = case.folder / "pictures" / "optimum.png"
-        files.append(optimum_plot(found, label, _title(case, "highest resonance and optimum"), picture, case.quantity))
+        files.append(optimum_plot(found, label, title, picture, case.quantity, case.name, beside))
     said = [
         f"{optimum_message(found, over, case.quantity)}.",
         *([] if is_optimum(found) else [f"{missed(found, over)}."]),
+        *(_lowest_of(name, values, over, case.quantity) for name, values in beside.items()),
     ]
-    return [*files, _page(case, "optimum", _title(case, "highest resonance and optimum"), said, files)]
+    return [*files, _page(case, "optimum", title, said, files)]
+
+
+def found_before(names: Sequence[str], over: str, case: Case) -> dict[str, Array]:
+    """Highest resonances of other cases, from the ``optimum.csv`` that each has left.
+
+    Args:
+        names: of the cases, or the folders of their products.
+
+    Returns:
+        Case -> (3, k): values of the setting, frequencies (Hz) and amplitudes.
+
+    Raises:
+        UserError: a case without that table, or one over another setting or of another quantity.
+    """
+    found = {}
+    for name in names:
+        folder = case.folder.parent / name
+        folder = folder if folder.is_dir() else Path(name)
+        if not (file := folder / "optimum.csv").is_file():
+            file = case.folder.parent / name / file.name
+            raise UserError(f"--beside {name}: there is no {file}; type microslip optimum {name} --over {over} first")
+        asked = [over, "frequency_Hz", case.quantity.column("amplitude"), "what"]
+        head, *rows = csv.reader(ordinary(file).read_text(encoding="utf-8").splitlines())
+        if head != asked:
+            raise UserError(f"{file}: holds {', '.join(head)}, not {', '.join(asked)}; name another case")
+        known = [[float(v) for v in row[:3]] for row in rows if row[3] == "highest resonance"]
+        if not known:
+            raise UserError(f"{file}: holds no resonance; name another case")
+        found[folder.name] = np.array(known).T
+    return found
+
+
+def _lowest_of(name: str, values: Array, over: str, of: Quantity) -> str:
+    """The lowest of the resonances of another case."""
+    value, f, amplitude = values[:, values[2].argmin()]
+    return f"{name}: lowest at {over} = {value:.4g}{unit_of(over)}, {of.sized(amplitude)} at {f:.5g} Hz."
 
 
 def _optimum_table(found: Mapping[float, HighestPeak], over: str, case: Case, best: Optimum | None = None) -> Path:

@@ -24,7 +24,7 @@ from ..files.tables import columns_csv, rows_csv
 from ..harmonic_balance.readout import measured
 from ..mistuning.ensemble import COLUMNS, RARE, Ensemble, choose, ready, run
 from ..mistuning.ring import Tuned
-from ..mistuning.samples import Asked
+from ..mistuning.samples import Asked, Sample
 from ..mistuning.scatter import OF_CONTACTS, Scatter, check
 from ..mistuning.sensitivity import Approximation, approximation
 from ..mistuning.statistics import SHARES, fits
@@ -67,6 +67,10 @@ def _work(stage: Stage, case: CaseJob, workers: int | None) -> Answer:
     except UserError as error:
         text = str(error).removeprefix(f"{case.path}: ").removeprefix("mistuning: ")
         raise UserError(f"{case.path}: mistuning: {text}") from error
+    worst = None
+    if found.solved.any():
+        case.report("the highest sample, searched again from either side")
+        worst = found.search_again()
     stage.begin()
     first = next((s for s in what.scatter if s.of == "frequency" and s.deviation), None)
     lone = first is not None and what.tuned.body(first).sectors == 1 and settings.stuck_ratios is None
@@ -74,7 +78,7 @@ def _work(stage: Stage, case: CaseJob, workers: int | None) -> Answer:
     alone = near is not None and len(what.scatter) > 1
     sentences = [*said(found), *([FIRST_ALONE] if alone else []), *built.messages]
     made = _written(found, near, folder)
-    drawn = _pictures(found, near, folder / "pictures", settings.name) if case.pictures else []
+    drawn = _pictures(found, worst, near, folder / "pictures", settings.name) if worst and case.pictures else []
     page = folder / "mistuning.html"
     store.write_text(page, mistuning_html(f"{settings.name}: mistuned", found, sentences, drawn))
     return Answer([page, *made, *drawn], sentences, bool(found.solved.all()))
@@ -205,7 +209,7 @@ def said(found: Ensemble) -> list[str]:
     ]
     if not count:
         return [*told, *warned, "No sample has a solution."]
-    a, at = found.amplification, int(np.nanargmax(found.amplification))
+    a, at = found.amplification, found.highest
     told.append(
         f"Amplification of the highest blade in {counted(count, 'sample')}: mean {np.nanmean(a):.4g}, 95 % quantile "
         f"{found.quantile(0.95)}, 99 % quantile {found.quantile(0.99)}; the intervals hold with 95 %."
@@ -222,6 +226,12 @@ def said(found: Ensemble) -> list[str]:
         f"The highest of all is {a[at]:.4g}, sample {at}: blade {int(found.column('sector')[at])} at "
         f"{found.column('frequency_Hz')[at]:.6g} Hz."
     )
+    if found.again is not None:
+        up, down = (f"{one.amplitude / top.amplitude:.5g} at {one.frequency:.6g} Hz" for one in found.again)
+        told.append(
+            f"Searched for again in steps of a quarter, its peak is {up} from below and {down} from above; the first "
+            f"search found {a[at]:.5g}."
+        )
     if found.asked.stuck:
         whitehead = 0.5 * (1 + np.sqrt(N))
         told.append(f"Contacts stick. Whitehead's bound for one family of modes and equal damping is {whitehead:.4g}.")
@@ -273,15 +283,13 @@ def _written(found: Ensemble, near: Approximation | None, folder: Path) -> list[
     return [folder / name for name in names]
 
 
-def _pictures(found: Ensemble, near: Approximation | None, folder: Path, case: str) -> list[Path]:
+def _pictures(found: Ensemble, worst: Sample, near: Approximation | None, folder: Path, case: str) -> list[Path]:
     from ..pictures.mistuning import amplification_picture, envelope_picture, sensitivity_picture, worst_picture
 
-    if not found.solved.any():
-        return []
     drawn = [sensitivity_picture(near, folder / "sensitivity.png", f"{case}: sensitivities")] if near else []
     return [
         amplification_picture(found, folder / "amplification.png", f"{case}: highest blade over the tuned ring's"),
         envelope_picture(found, near, folder / "mistuned.png", f"{case}: all blades of all samples"),
-        worst_picture(found, folder / "worst.png", f"{case}: the highest of all samples"),
+        worst_picture(found, worst, folder / "worst.png", f"{case}: the highest of all samples"),
         *drawn,
     ]

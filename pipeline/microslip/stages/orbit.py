@@ -102,6 +102,9 @@ def _messages(found: Sequence[tuple[str, Orbit]], built: Built) -> list[str]:
     for name, one in found:
         if one.equations.ramp and any(c.at(0).group.speed for c in one.equations.assembly.components):
             own.append(f"{name}: the matrices stay those of one speed.")
+        for b in built.settings.components if one.equations.ramp else ():
+            if b.pressed_at_rpm is not None:
+                own.append(f"{name}: the contacts of {b.name} stay pressed as at {b.pressed_at_rpm:g} rpm.")
     return [*own, *built.messages]
 
 

@@ -197,9 +197,15 @@ def _part(file: Path, name: str, home: Path) -> Part:
 def _found(parts: Sequence[Part], unit: str) -> tuple[list[Shape], list[Patch]]:
     """The shapes of the parts, and the patches, with names of their faces."""
     kinds = {part.file.suffix.lower() in CAD for part in parts}
+    named = ", ".join(str(part.file) for part in parts)
+    if all(part.file.suffix.lower() in MATRICES for part in parts):
+        raise UserError(
+            f"{named}: one file of matrices is imported at a time; name that of the stiffness alone, the mass beside "
+            "it is found by its name"
+        )
     if len(kinds) > 1 or any(part.file.suffix.lower() in MATRICES for part in parts):
         raise UserError(
-            f"{', '.join(str(part.file) for part in parts)}: where they touch can be told of CAD files or of meshes, "
+            f"{named}: where they touch can be told of CAD files or of meshes, "
             "all of one kind; import the others one by one"
         )
     shapes, patches = (_of_cad if kinds == {True} else _of_meshes)([part.file for part in parts], unit)

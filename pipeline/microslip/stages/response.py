@@ -79,6 +79,7 @@ def response_stage(
         if log:
             store.write_text(folder / "convergence.csv", convergence_table(read_response(folder / "response.h5")))
         _tell(summary, report)
+        report(f"page: {folder / 'response.html'}")
         return summary, summary["failed_points"] == 0
 
 
@@ -162,6 +163,8 @@ def _finished(points: Checkpoint, result: CaseResult, wanted: Wanted, report: Re
         drawn, files = drawn | more.drawn, files + more.files
         summary["messages"] += more.messages
         summary |= {"stressed_body": more.body} if len(response.bodies) > 1 else {}
+    if wanted.pictures and (result.settings.ring is not None or more is not None):
+        summary["messages"] += _not_drawn()
     summary["checked"] = sentence(response, response.estimated)
     if result.rising:
         summary["checked"] += f"; still rising at {counted(len(result.rising), 'end')} of the band"
@@ -347,6 +350,12 @@ def _can_draw() -> str | None:
     from ..pictures import can_draw
 
     return can_draw()
+
+
+def _not_drawn() -> list[str]:
+    """What a page says whose bodies are not drawn although PyVista is there."""
+    reason = _can_draw() if _is_there("pyvista") else None
+    return [f"The pictures of bodies are missing: {reason}; then run it again with --force."] if reason else []
 
 
 def _is_there(package: str) -> bool:

@@ -61,6 +61,7 @@ class Now(NamedTuple):
         met: (4, contacts) the events of the last step, at: when, s. memory: of `fourth`, what the laws' differential
             equations remember (k, n) and its rate, group by group, and how the accelerations were bent.
             level: (2,) of `fourth`, k of the next step's 2^k, and of the first one's after a leap.
+        missed: m kg^1/2 / s, all that steps have missed so far, as they reckon it themselves.
     """
 
     y: Any
@@ -74,6 +75,14 @@ class Now(NamedTuple):
     at: Any
     memory: Any
     level: Any
+    missed: Any
+
+
+class Hardest(NamedTuple):
+    """The period in which steps missed most: how much, see `Now`, and when it began, s."""
+
+    missed: Any
+    time: Any
 
 
 class Listed(NamedTuple):

@@ -15,7 +15,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import scipy.optimize
-import scipy.stats
+import scipy.special
 
 from ..data import Array
 from ..units import counted
@@ -141,7 +141,7 @@ def _mean(growth: Array, period: float) -> Exponent:
     where the batches do not take all."""
     n = len(growth) // BATCHES * BATCHES
     means = growth[len(growth) - n :].reshape(BATCHES, -1).mean(axis=1) / period
-    spread = scipy.stats.t.ppf(0.975, BATCHES - 1) * means.std(ddof=1) / math.sqrt(BATCHES)
+    spread = scipy.special.stdtrit(BATCHES - 1, 0.975) * means.std(ddof=1) / math.sqrt(BATCHES)
     return Exponent(float(means.mean()), float(spread), n)
 
 

@@ -24,7 +24,7 @@ from ..contact.set_valued import SetValued
 from ..data import Array
 from ..errors import UserError
 from ..settings.mistakes import bounded
-from ..system.assembly import Assembly, Contact, Linear
+from ..system.assembly import Assembly, Contact, Linear, diagonal
 from .ramp import Ramp, turning_loads
 
 SEEN = 1e-12
@@ -72,7 +72,7 @@ class Equations:
         if self.ramp:
             return np.zeros((self.B.shape[1], self.B.shape[1]))
         turns = [np.array([[0.0, -1.0], [1.0, 0.0]]) * h * self.Omega for h in self.harmonics]
-        return scipy.linalg.block_diag(np.zeros((1, 1)), *turns)
+        return diagonal([np.zeros((1, 1)), *turns])
 
     def turned(self, lengths: Array) -> Array:
         """(k, n, n) by which o turns in so many s: the exponentials of `turning`."""
@@ -148,8 +148,7 @@ class Equations:
     def _own(self) -> Array:
         alike = {(id(c.patch), c.offset.tobytes()): c for c in self.contacts}
         known = {key: _stiffest(c) for key, c in alike.items()}
-        each = (known[id(c.patch), c.offset.tobytes()] for c in self.contacts)
-        return scipy.linalg.block_diag(np.zeros((0, 0)), *each)
+        return diagonal([known[id(c.patch), c.offset.tobytes()] for c in self.contacts])
 
     @cached_property
     def fastest(self) -> float:

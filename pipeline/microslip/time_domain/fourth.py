@@ -127,12 +127,14 @@ def step(options: Options, groups: tuple[Group, ...], B: Bodies, k: Any, now: No
     size = _norm(jnp.concatenate([y[:, p:], jnp.sqrt(jnp.abs(B.omega2)) * y[:, :p]])) + 1e-300
     bent, third, kink = _missed(h, now, two.push + three.push, four.push, last.push)
     third = third / size
-    done, level = _judged(options, k, now.level[0], 2 * third * jnp.sqrt(jnp.sqrt(third)) + kink / size, B.enough)
+    missed = 2 * third * jnp.sqrt(jnp.sqrt(third)) + kink / size
+    done, level = _judged(options, k, now.level[0], missed, B.enough)
     first = done & (now.memory[2].h == 0)
     energy = now.energy.at[:3].add(energy).at[3].add(held.lost).at[4].set(held.stored).at[5].add(held.given)
     after = now._replace(
-        y=y, o=o[1], time=now.time + h, push=last.push, held=held, energy=energy, memory=(x, last.rates, bent)
-    )
+        y=y, o=o[1], time=now.time + h, push=last.push, held=held, energy=energy, memory=(x, last.rates, bent),
+        missed=now.missed + missed * size,
+    )  # fmt: skip
     after = jax.tree_util.tree_map(lambda a, b: jnp.where(done, a, b), after, now)
     return done, after._replace(level=jnp.stack([level, jnp.where(first, level, now.level[1])]))
 

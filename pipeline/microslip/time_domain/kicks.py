@@ -35,8 +35,9 @@ def step(options: Options, groups: tuple[Group, ...], B: Bodies, n: Any, now: No
     energy = now.energy + jnp.stack([given, taken, work, held.lost, jnp.zeros(()), held.given])
     energy = energy.at[4].set(held.stored)
     return now._replace(
-        y=y, o=o, time=now.time + dt, push=push, held=held, energy=energy, worst=jnp.maximum(now.worst, held.missed)
-    )
+        y=y, o=o, time=now.time + dt, push=push, held=held, energy=energy, worst=jnp.maximum(now.worst, held.missed),
+        missed=now.missed + 0.5 * dt * jnp.sqrt(jnp.sum((push - now.push) ** 2)),
+    )  # fmt: skip
 
 
 def _flown(options: Options, B: Bodies, n: Any, y: Any, o: Any) -> tuple[Any, Any, Any]:

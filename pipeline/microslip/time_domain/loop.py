@@ -15,7 +15,7 @@ import jax.numpy as jnp
 
 from ..contact.law import program
 from . import fourth, kicks
-from .bodies import Bodies, Listed, Now, Options, Seen, exponent
+from .bodies import Bodies, Hardest, Listed, Now, Options, Seen, exponent
 from .contacts import Group, Held, moved, parts, times, untouched
 
 LEAST = 4
@@ -37,14 +37,14 @@ def begun(options: Options, groups: tuple[Group, ...], B: Bodies, y: Any, o: Any
     held, push = kicks.answered(options, groups, B, q, v, 0 * v, o, moves, dt, before, 0.5)
     zero, none = jnp.zeros(()), jnp.zeros((4, sum(len(g.G) for g in groups)))
     energy = jnp.zeros(6).at[4].set(held.stored)
-    now = Now(y, o, zero, push, held, energy, held.missed, none.astype(bool), none, (), jnp.zeros(2, int))
+    now = Now(y, o, zero, push, held, energy, held.missed, none.astype(bool), none, (), jnp.zeros(2, int), zero)
     return fourth.begun(groups, B, now) if options.halvings else now
 
 
 @partial(program, static_argnums=(0, 1))
 def run(
     options: Options, events: int, groups: tuple[Group, ...], B: Bodies, now: Now, each: Any, rows: Any, steps: Any
-) -> tuple[Now, Listed, Seen, Any]:
+) -> tuple[Now, Listed, Seen, Any, Hardest]:
     """Rows of so many steps each, of which each (s,) is a sample, the first again after the last; as many as are
     asked for, or until numbers are infinite.
 
@@ -52,7 +52,8 @@ def run(
         steps: done so far, all told. events: that are listed.
 
     Returns:
-        Where the motion is; the events; the last s samples, row i at i modulo s; how many rows there were.
+        Where the motion is; the events; the last s samples, row i at i modulo s; how many rows there were;
+        the row in which steps missed most.
     """
     p, s = B.omega2.shape[1], len(each)
     step = partial(one_step, options, groups, B)
@@ -68,8 +69,8 @@ def run(
         return Seen(q.reshape(-1), v.reshape(-1), now.held.d, now.held.force, now.energy, bodies, now.time)
 
     def row(carried: tuple) -> tuple:
-        i, steps, _, now, listed, seen = carried
-        count = each[i % s]
+        i, steps, _, now, listed, seen, hardest = carried
+        before, count = now, each[i % s]
         _, now, listed = jax.lax.while_loop(lambda c: c[0] > 0, on, (count, now, listed))
         steps = steps + count
         now = now._replace(o=oscillators(options, B, steps * B.flow.length[0]))
@@ -77,13 +78,15 @@ def run(
             now = now._replace(held=fourth.at_sample(groups, B, now))
         found = look(now)
         kept = jax.tree_util.tree_map(lambda all_of, one: all_of.at[i % s].set(one), seen, found)
-        return i + 1, steps, jnp.isfinite(found.mechanical), now, listed, kept
+        rise = now.missed - before.missed
+        hardest = Hardest(*(jnp.where(rise > hardest[0], *x) for x in zip((rise, before.time), hardest, strict=True)))
+        return i + 1, steps, jnp.isfinite(found.mechanical), now, listed, kept, hardest
 
     listed = Listed(jnp.zeros((), int), jnp.zeros((events, 3)))
     seen = jax.tree_util.tree_map(lambda one: jnp.zeros((s, *one.shape)), look(now))
-    first = jnp.zeros((), int), steps, jnp.ones((), bool), now, listed, seen
-    i, _, _, now, listed, seen = jax.lax.while_loop(lambda c: (c[0] < rows) & c[2], row, first)
-    return now, listed, seen, i
+    first = jnp.zeros((), int), steps, jnp.ones((), bool), now, listed, seen, Hardest(-jnp.ones(()), now.time)
+    i, _, _, now, listed, seen, hardest = jax.lax.while_loop(lambda c: (c[0] < rows) & c[2], row, first)
+    return now, listed, seen, i, hardest
 
 
 def oscillators(options: Options, B: Bodies, time: Any) -> Any:

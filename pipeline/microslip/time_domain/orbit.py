@@ -23,13 +23,14 @@ from ..system.assembly import Contact
 from ..units import METRES, Quantity, counted
 from . import classification
 from . import samples as kept_samples
+from .bodies import Hardest, Now, Seen
 from .classification import Exponent
 from .equations import Equations
 from .ground import steps_of_waves
 from .samples import ROWS, InMemory, Kept
 from .starts import Periodic
 from .starts import begun as on_its_way
-from .stepper import KINDS, Now, Seen, Stepper, static_force
+from .stepper import KINDS, Stepper, static_force
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -83,8 +84,9 @@ class Orbit:
             ``damped``, and ``contacts``, done on them; of that, and of what moving
             ``ground`` gave them, ``stored`` and ``lost``, nan where a law does not tell.
         events: (e, 3) time in s, number of the contact, kind (an index of `KINDS`). missed: how many are not listed.
-        error: estimate of the largest deviation of a read-out that all periods together leave, a share of the largest
-            read-out, 1 at most; nan if it was not looked for. diverged: time (s) at which numbers became infinite;
+        error: estimate of the largest deviation of a read-out that all periods together leave, those that are not kept
+            too, if each of them was as hard for the steps as the hardest was; a share of the largest read-out at the
+            end, 1 at most; nan if it was not looked for. diverged: time (s) at which numbers became infinite;
             inf: never.
         exponent: the largest Lyapunov exponent, looked for where the motion does not come back; None: it was not.
     """
@@ -439,27 +441,30 @@ def march(
     each = steps_of_a_sample(equations, samples, steps)
     stepper = Stepper(equations, 2 * np.pi / equations.Omega / (each * samples))
     first = on_its_way(stepper, start) if isinstance(start, Periodic) else stepper.start(*begun(equations, start))
-    now, done = kept.begun(first)
+    (now, hardest), done = kept.begun((first, Hardest(-1.0, 0.0)))
     many, happened, reported = 1, 0, time.monotonic()
     while done < settle + keep:
         before, dense = now, done >= settle
         ahead, began = 1 if dense else min(many, settle - done), time.monotonic()
         rows = np.full(samples, each if dense else each * samples)
-        now, seen, listed, count = stepper.run(now, rows, samples if dense else ahead)
+        now, seen, listed, count, among = stepper.advanced(now, rows, samples if dense else ahead)
+        if dense:
+            among = Hardest(float(now.missed) - float(before.missed), float(before.time))
+        hardest = max(hardest, among, key=lambda one: float(one.missed))
         done, happened = done + ahead, happened + count
         if not np.isfinite(seen.mechanical[-1]):
             when, why = _divergence(stepper, before, seen, kept if dense else None)
             return Ended(each * samples, diverged=when, messages=(why,))
         if dense:
             kept.keep(kept_samples.of_period(equations, seen), listed, count - len(listed))
-        kept.mark(now, done)
+        kept.mark((now, hardest), done)
         if time.monotonic() - reported >= PAUSE or done in (settle, settle + keep):
             met = counted(happened, "event")
             report(f"period {done} of {settle + keep}, {float(now.time):.6g} s, {met}")
             reported = time.monotonic()
         took = max(time.monotonic() - began, 1e-6)
         many = int(np.clip(0.5 * PAUSE / took * ahead, 1, FURTHER * ahead))
-    error, told = _error(stepper, now, samples, each, settle + keep)
+    error, told = _error(stepper, first, now, hardest, samples, each, settle + keep)
     exponent = _exponent(stepper, now, kept, samples, each, settle + keep)
     more = tuple(text for text in (told, exponent.message if exponent else "") if text)
     return Ended(
@@ -511,24 +516,58 @@ def _warnings(equations: Equations, kept: Kept, worst: float) -> tuple[str, ...]
     return tuple(said)
 
 
-def _error(stepper: Stepper, now: Now, samples: int, each: int, done: int) -> tuple[float, str]:
+@dataclass(frozen=True)
+class Again:
+    """A period done with the step and with half of it.
+
+    Attributes:
+        ends: where both lead to. differ: the largest deviation of a read-out, infinite where one of them became so.
+            size: the largest read-out. missed: by its steps, see `Now`, and swing: the largest of the motion, both in
+            m kg^1/2 / s.
+    """
+
+    ends: tuple[Now, Now]
+    differ: float
+    size: float
+    missed: float
+    swing: float
+
+
+def _again(stepper: Stepper, begin: Now, samples: int, each: int) -> Again:
+    e, steppers = stepper.equations, ((stepper, each), (stepper.halved(), 2 * each))
+    (one, seen, *_), (other, fine, *_) = (s.run(begin, np.full(samples, k)) for s, k in steppers)
+    missed, swing = float(one.missed) - float(begin.missed), math.sqrt(2 * seen.mechanical.max(initial=0.0))
+    if not np.isfinite(seen.mechanical[-1] + fine.mechanical[-1]):
+        return Again((one, other), math.inf, 1.0, missed, swing)
+    y, exact, order = kept_samples.read(e, seen), kept_samples.read(e, fine), 4 if stepper.options.halvings else 2
+    differ = float(np.abs(y - exact).max(initial=0.0)) * 2**order / (2**order - 1)
+    return Again((one, other), differ, float(np.abs(exact).max(initial=0.0)), missed, swing)
+
+
+def _error(
+    stepper: Stepper, first: Now, now: Now, hardest: Hardest, samples: int, each: int, done: int
+) -> tuple[float, str]:  # fmt: skip
     """What all periods together leave in the read-outs, a share of the largest, and what a reader must know.
 
-    One more period done with half the step tells what one leaves; how two motions that far apart, but for a factor,
-    come nearer or part in `AFTER` periods, or in an eighth of those that were done, tells what all of them leave.
+    The period that follows, done again with half the step, tells what one leaves; the hardest one leaves as much more
+    as its steps missed more, by their own reckoning. Where nothing is missed any more, the first period tells what that
+    is worth. How two motions that far apart, but for a factor, come nearer or part in `AFTER` periods, or in an eighth
+    of those that were done, tells what all periods leave, each as much as the hardest.
     """
-    fine, e = stepper.halved(), stepper.equations
-    found = [s.run(now, np.full(samples, k))[:2] for s, k in ((stepper, each), (fine, 2 * each))]
-    y = [kept_samples.read(e, seen) for _, seen in found]
-    if not all(np.isfinite(seen.mechanical[-1]) for _, seen in found):
+    last = _again(stepper, now, samples, each)
+    known = last if last.differ * last.missed > 0 else _again(stepper, first, samples, each)
+    if not math.isfinite(last.differ + known.differ):
         return 1.0, ""
-    size, order = np.abs(y[1]).max(initial=0.0), 4 if stepper.options.halvings else 2
-    share = float(np.abs(y[0] - y[1]).max(initial=0.0) / (size or 1.0)) * 2**order / (2**order - 1)
-    parts = _separations(stepper, found[0][0], found[1][0], samples, each, min(AFTER, done // 8, samples))
+    size, periods = last.size or known.size or 1.0, min(AFTER, done // 8, samples)
+    told = known.differ / known.missed if known.differ * known.missed > 0 else size / (last.swing or known.swing or 1.0)
+    worst = told * float(hardest.missed)
+    parts = _separations(stepper, *last.ends, samples, each, periods)
+    parts = parts if len(parts) else _separations(stepper, *known.ends, samples, each, periods)
     half = len(parts) // 2
     if not half or not np.isfinite(parts).all():
-        return min(1.0, share * done), ""
-    keeps = float((parts[-half:].sum() / parts[:half].sum()) ** (1 / (len(parts) - half)))
+        return min(1.0, max(last.differ, worst) / size * done), ""
+    keeps = max(float((parts[-half:].sum() / (parts[:half].sum() or 1.0)) ** (1 / (len(parts) - half))), 1e-300)
+    share = max(last.differ, worst) / size
     n = max(done - 1 - len(parts), 0)
     grown = np.expm1(min(n * np.log(keeps), 100.0))  # beyond it nothing is left of what there was
     more = parts[-half:].mean() * (n if abs(keeps - 1) < 1e-9 else keeps * grown / (keeps - 1))

@@ -26,9 +26,10 @@ from ..files.hdf5 import create, put, seal, seal_state
 from ..files.hostile import DAMAGE, inspect, refuse_damaged, short
 from ..files.store import complete_or_absent, ordinary, put_in_place, refused
 from ..harmonic_balance.readout import measured
+from .bodies import Hardest, Now, Seen
 from .contacts import gapes
 from .equations import Equations
-from .stepper import KINDS, Now, Seen
+from .stepper import KINDS
 
 FORMAT = "microslip-orbit"
 FORMAT_VERSION = "0.1"
@@ -59,6 +60,9 @@ EVENTS_OF_CONTACT = 64
 
 PAUSE = 1.0
 """s between two states that are kept."""
+
+Where = tuple[Now, Hardest]
+"""Where a motion is, and the hardest period of it so far."""
 
 
 def of_period(e: Equations, seen: Seen) -> dict[str, Array]:
@@ -126,7 +130,7 @@ class Kept(Protocol):
     missed: int
     """Events that there was no room for."""
 
-    def begun(self, now: Now) -> tuple[Now, int]:
+    def begun(self, where: Where) -> tuple[Where, int]:
         """Where to go on, and how many periods are done."""
         ...
 
@@ -134,7 +138,7 @@ class Kept(Protocol):
         """Samples that follow, and (e, 3) events among them."""
         ...
 
-    def mark(self, now: Now, done: int) -> None:
+    def mark(self, where: Where, done: int) -> None:
         """All that was kept belongs to so many periods."""
         ...
 
@@ -152,8 +156,8 @@ class InMemory:
     parts: list[Mapping[str, Array]] = field(default_factory=list)
     events: list[Array] = field(default_factory=list)
 
-    def begun(self, now: Now) -> tuple[Now, int]:
-        return now, 0
+    def begun(self, where: Where) -> tuple[Where, int]:
+        return where, 0
 
     def keep(self, rows: Mapping[str, Array], events: Array, missed: int) -> None:
         self.parts.append(rows)
@@ -161,7 +165,7 @@ class InMemory:
         self.missed += missed
         self.widest = max(self.widest, float(np.abs(rows["contact_displacement"]).max(initial=0.0)))
 
-    def mark(self, now: Now, done: int) -> None:
+    def mark(self, where: Where, done: int) -> None:
         pass
 
     def strips(self, *names: str) -> Iterator[list[Array]]:
@@ -201,15 +205,15 @@ class InFile:
     filled: int = 0
     happened: int = 0
 
-    def begun(self, now: Now) -> tuple[Now, int]:
+    def begun(self, where: Where) -> tuple[Where, int]:
         import jax
 
         told, leaves = self.recording.state
-        if told.get("motion") != self.number:
-            return now, 0
+        tree: Any = jax.tree_util.tree_structure(where)
+        if told.get("motion") != self.number or len(leaves) != tree.num_leaves:  # or left by another version
+            return where, 0
         self.widest, self.missed, self.filled, self.happened = (told[k] for k in _COUNTS)
-        tree = jax.tree_util.tree_structure(now)
-        return jax.tree_util.tree_unflatten(tree, [jax.numpy.asarray(x) for x in leaves]), int(told["done"])
+        return jax.tree_util.tree_unflatten(tree, leaves), int(told["done"])
 
     def keep(self, rows: Mapping[str, Array], events: Array, missed: int) -> None:
         until = self.filled + len(rows["time"])
@@ -223,9 +227,9 @@ class InFile:
         self.missed += missed + len(events) - len(listed)
         self.widest = max(self.widest, float(np.abs(rows["contact_displacement"]).max(initial=0.0)))
 
-    def mark(self, now: Now, done: int) -> None:
+    def mark(self, where: Where, done: int) -> None:
         if time.monotonic() - self.recording.marked >= PAUSE:
-            self.recording.mark(self, now, done)
+            self.recording.mark(self, where, done)
 
     def strips(self, *names: str) -> Iterator[list[Array]]:
         for begin in range(0, self.filled, STRIP):
@@ -246,7 +250,7 @@ class Recording:
 
     Attributes:
         path: of the product. file: open beside it. state: where a motion was when that was kept last, and the arrays of
-            its `Now`. ended: number of a motion -> what is told of it. marked: s, when the state was kept last.
+            `Where`. ended: number of a motion -> what is told of it. marked: s, when the state was kept last.
     """
 
     path: Path
@@ -259,11 +263,11 @@ class Recording:
     def motion(self, number: int) -> InFile:
         return InFile(self, self.file[f"motion_{number + 1}"], number)
 
-    def mark(self, of: InFile, now: Now, done: int) -> None:
+    def mark(self, of: InFile, where: Where, done: int) -> None:
         import jax
 
         told = {"motion": of.number, "done": done, **{k: getattr(of, k) for k in _COUNTS}}
-        self._keep(told, [np.asarray(x) for x in jax.tree_util.tree_leaves(now)])
+        self._keep(told, [np.asarray(x) for x in jax.tree_util.tree_leaves(where)])
 
     def end(self, number: int, told: dict[str, Any]) -> None:
         self.ended[number] = told

@@ -24,7 +24,7 @@ from ..data import Array
 from ..errors import UserError
 from ..harmonic_balance.forces import repeated
 from . import fourth, loop
-from .bodies import Bodies, Now, Options, Seen
+from .bodies import Bodies, Hardest, Now, Options, Seen
 from .braking import Braking
 from .contacts import Group, Held, Yielding, force_at, gapes, slope_at, untouched
 from .equations import Equations
@@ -228,17 +228,23 @@ class Stepper:
     def run(
         self, now: Now, steps: Array, rows: int | None = None, events: int = EVENTS
     ) -> tuple[Now, Seen, Array, int]:
+        """`advanced`, without its hardest row."""
+        return self.advanced(now, steps, rows, events)[:4]
+
+    def advanced(
+        self, now: Now, steps: Array, rows: int | None = None, events: int = EVENTS
+    ) -> tuple[Now, Seen, Array, int, Hardest]:
         """So many rows further, all samples if it is not said, the i-th after steps[i modulo s] of tau, (s,); compiled
         anew for another s alone. It ends early where numbers become infinite, in the last sample then.
 
         Returns:
             Where the motion is; the samples, the last s of more; (e, 3) events: time in s, contact, kind, an index of
-            `KINDS`; how many there were, which may be more.
+            `KINDS`; how many there were, which may be more; the row in which steps missed most.
         """
         s = len(steps)
         done = int(np.rint(float(now.time) / self.tau))  # or the last digits would hang on how much is done in a call
         fine = 2**self.options.halvings
-        now, listed, seen, i = loop.run(
+        now, listed, seen, i, hardest = loop.run(
             self.options, events, self.groups, self.bodies, now, fine * np.asarray(steps), s if rows is None else rows,
             fine * done,
         )  # fmt: skip
@@ -247,7 +253,7 @@ class Stepper:
         told[:, 1] = self.numbers[told[:, 1].astype(int)] if len(told) else 0
         last = np.arange(max(int(i) - s, 0), int(i)) % s
         seen = Seen._make(np.asarray(x)[last] for x in seen)
-        return now, seen._replace(d=seen.d[:, back], force=seen.force[:, back]), told, count
+        return now, seen._replace(d=seen.d[:, back], force=seen.force[:, back]), told, count, hardest
 
 
 @program
