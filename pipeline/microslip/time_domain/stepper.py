@@ -110,8 +110,8 @@ class Stepper:
     @cached_property
     def bodies(self) -> Bodies:
         enough = np.array(fourth.MISSED * (self.tau * self.equations.fastest) ** 4)
-        own = {"flow": self._flow, "meets": self._meets(self._flow), "braking": self._braking, "enough": enough}
-        return _sent(self._fixed._replace(**own))
+        fixed, meets = self._fixed, self._meets(self._flow)
+        return _sent(fixed._replace(flow=self._flow, meets=meets, braking=self._braking, enough=enough))
 
     @cached_property
     def _flow(self) -> Flow:
