@@ -10,7 +10,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-import jax.numpy as jnp
+import jax
 import numpy as np
 import scipy.linalg
 
@@ -646,7 +646,7 @@ def _closed(contact: Contact) -> bool:
     """Whether a law whose gap is its own presses at q = 0, without a preload that balances it."""
     if contact.preload.any() or isinstance(contact.patch.law, SetValued):
         return False
-    overlap = contact.patch.law.overlap(jnp.asarray(contact.patch.kinematics @ contact.offset))
+    overlap = contact.patch.law.overlap(jax.device_put(contact.patch.kinematics @ contact.offset))
     return bool((np.asarray(overlap) > 0).any())
 
 

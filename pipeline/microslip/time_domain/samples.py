@@ -209,8 +209,8 @@ class InFile:
         import jax
 
         told, leaves = self.recording.state
-        tree: Any = jax.tree_util.tree_structure(where)
-        if told.get("motion") != self.number or len(leaves) != tree.num_leaves:  # or left by another version
+        first, tree = jax.tree_util.tree_flatten(where)
+        if told.get("motion") != self.number or len(leaves) != len(first):  # or left by another version
             return where, 0
         self.widest, self.missed, self.filled, self.happened = (told[k] for k in _COUNTS)
         return jax.tree_util.tree_unflatten(tree, leaves), int(told["done"])

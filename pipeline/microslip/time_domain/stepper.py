@@ -111,8 +111,8 @@ class Stepper:
     @cached_property
     def bodies(self) -> Bodies:
         enough = np.array(fourth.MISSED * (self.tau * self.equations.fastest) ** 4)
-        flow, meets = self._flow, self._meets(self._flow)
-        return _sent(self._fixed._replace(flow=flow, meets=meets, braking=self._braking, enough=enough))
+        fixed, meets = self._fixed, self._meets(self._flow)
+        return _sent(fixed._replace(flow=self._flow, meets=meets, braking=self._braking, enough=enough))
 
     @cached_property
     def _flow(self) -> Flow:
