@@ -36,6 +36,9 @@ from .spots import Spots, spots
 EVENTS = 8192
 """Events that one call of the loop keeps; of more, only their number is known."""
 
+DOUBLINGS = 16
+"""Of the step, for leaps: their number is a multiple of it, so that one program serves steps of many lengths."""
+
 KINDS = ("closes", "opens", "slips", "sticks")
 
 
@@ -121,9 +124,12 @@ class Stepper:
     @cached_property
     def _flows(self) -> Flow:
         """Those of half the step too, the shortest first."""
-        e, halvings = self.equations, self.options.halvings
-        period = int(np.ceil(np.log2(2 * np.pi / e.Omega / self.tau))) if self.options.leaps else 0
-        return flow(e, self.tau / 2 ** (halvings + 1), halvings + 1 + max(period, 0))
+        e, shorter = self.equations, self.options.halvings + 1
+        doublings = shorter
+        if self.options.leaps:  # over a period at least
+            period = int(np.ceil(np.log2(2 * np.pi / e.Omega / self.tau)))
+            doublings = -(-(shorter + max(period, 0)) // DOUBLINGS) * DOUBLINGS
+        return flow(e, self.tau / 2**shorter, doublings)
 
     @cached_property
     def _fixed(self) -> Bodies:
