@@ -207,7 +207,7 @@ def test_a_killed_run_goes_on_and_motions_in_time_swing_as_limit_cycles(belt: Pa
         rows = np.genfromtxt(Path("a", table), delimiter=",", names=True)
         rows = rows[np.isfinite(rows["in_time_leaves_by"])]
         assert len(rows) == checks and (rows["largest_multiplier"][: 3 * (checks == 3)] > 1).all()
-        apart = np.abs(rows["in_time_second_u_x"] / rows["amplitude_second_u_x"] - 1)
+        apart = np.abs(rows["in_time_second_u_x_m"] / rows["amplitude_second_u_x_m"] - 1)
         assert (apart < 1e-4).all() and (rows["in_time_leaves_by"] < 1e-4).all()
     belt.write_text(short)
     run("b")
