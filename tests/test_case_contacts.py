@@ -8,6 +8,7 @@ import subprocess
 import sys
 from contextlib import nullcontext
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import jax
@@ -490,9 +491,9 @@ def test_a_sweep_that_takes_long_is_told_from_its_third_point(monkeypatch) -> No
     monkeypatch.setattr(solver, "solve", slow)
     monkeypatch.setattr(solver.time, "perf_counter", lambda: clock.get("s", 0.0))
     told: list[str] = []
-    solver.sweep(None, np.arange(1.0, 101.0), told.append)
+    solver.sweep(SimpleNamespace(groups=()), np.arange(1.0, 101.0), told.append)
     assert sum("97 frequencies are left" in text for text in told) == 1
     told.clear()
     clock.clear()
-    solver.sweep(None, np.arange(1.0, 51.0), told.append)
+    solver.sweep(SimpleNamespace(groups=()), np.arange(1.0, 51.0), told.append)
     assert not any("are left" in text for text in told)

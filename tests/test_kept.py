@@ -98,7 +98,7 @@ def test_nothing_is_computed_twice(tmp_path: Path) -> None:
             resumed_response(problem, np.linspace(0.5, 0.8, 3), np.ones(1), journal, series, told.append)
     computed = [t.split(": ")[1] for t in told if " of 3 frequencies" in t]
     assert computed == 2 * ["0.5 Hz", "0.65 Hz", "0.8 Hz"]
-    assert len([t for t in told if "a mode at" in t]) == 2
+    assert len([t for t in told if "a mode between" in t]) == 2
 
 
 def test_a_peak_on_a_point_of_the_sweep_is_a_point_still(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

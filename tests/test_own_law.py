@@ -195,7 +195,5 @@ def test_a_law_without_a_cone_fails_the_contract() -> None:
             return jnp.concatenate([pressed[None], force]).T, jnp.stack([u.T[1:], force, slipped])
 
     box = names["Example"](Box(2.4e8, 0.9e8, 0.3, 4e3), normal=1e-5, tangential=1e-5)
-    cone = contract.test_friction_stays_in_its_cone.hypothesis.inner_test
-    with pytest.raises(AssertionError):  # paths of our own: which ones hypothesis tries depends on what is imported
-        for seed in range(10):
-            cone(box, seed)
+    with pytest.raises(AssertionError):
+        contract.test_friction_stays_in_its_cone(box)

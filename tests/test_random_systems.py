@@ -130,7 +130,7 @@ def exchanged(values: Mapping[str, Any]) -> dict[str, Any]:
 
 
 MISTAKES = {
-    "read-outs exchanged": ("amplitude", lambda p: changed(p, reduced, "moved", lambda found, *_: found[::-1])),
+    "read-outs exchanged": ("amplitude", lambda p: changed(p, reduced, "read", lambda found, *_: found[::-1])),
     "rows of read-outs exchanged": ("amplitude", of_parts(lambda part, _: replace(part, output=part.output[::-1]))),
     "damping twice": ("amplitude", damped(2.0)),
     "damping left out": ("amplitude", damped(0.0)),

@@ -73,7 +73,7 @@ def test_added_points_are_kept(tmp_path: Path) -> None:
 
     def impatient(text: str) -> None:
         told.append(text)
-        if len([t for t in told if "ends near" in t]) == 2:
+        if len([t for t in told if "the curve ends" in t]) == 2:
             raise UserError("stopped")
 
     for count in range(3):
@@ -86,7 +86,7 @@ def test_added_points_are_kept(tmp_path: Path) -> None:
         np.testing.assert_array_equal(found.frequency, whole.frequency)
         np.testing.assert_allclose(found.monitor, whole.monitor, rtol=1e-12)
         assert list(found.frequency[found.added]) == [k for k, r in journal.of("one").items() if r["added"]]
-        assert len([t for t in told if "ends near" in t]) == 4 and len(told) == len(set(told)) + 2
+        assert len([t for t in told if "the curve ends" in t]) == 4 and len(told) == len(set(told)) + 2
 
 
 @settings

@@ -41,7 +41,7 @@ RECALL = 1e-5
 _STRAIGHT = 0.5  # share of what was missing above which a cycle is marched before another step
 _GAIN = 0.9  # share of it above which the step was in vain
 _SERVES = 0.1  # share of Newton's step above which the next one asks for the derivative again, which is two cycles
-_SOLVED = 1e-8  # share of the largest force to which sliders are solved for at least: derivatives are of the solution
+_SOLVED = 1e-12  # share of the largest force to which sliders are solved for, as their error is in every answer
 
 
 class Periodic(NamedTuple):
@@ -97,8 +97,9 @@ class _Solving(NamedTuple):
             memory at the end by that at the beginning, of the last cycle or an earlier one. renew: whether the next
             one is asked for it. tried: (..., n) what each slider missed of the solution when it was solved for last.
             solved: (..., n) whether the next beginning was solved for. failed: (..., n) how often that was in vain.
-            wait: (..., n) cycles to march before it is tried again. cycles: how many. missed: the largest step of
-            Newton's method over the largest force. periodic: whether the memory is periodic.
+            wait: (..., n) cycles to march before it is tried again. cycles: how many. step: (..., n) N of Newton's
+            method. missed: how far from the solution the farthest is, over the largest force. periodic: whether the
+            memory is periodic.
     """
 
     last: Turn
@@ -111,6 +112,7 @@ class _Solving(NamedTuple):
     failed: Array
     wait: Array
     cycles: Array
+    step: Array
     missed: Array
     periodic: Array
 
@@ -258,7 +260,7 @@ class _Sliders:
         counted, none = each.astype(int), Turn(jnp.zeros((W, 3, len(known.told))), jnp.zeros(()), memory)
         begin = _Solving(
             none, memory, memory, known.slope, new & solved, each + jnp.inf, each > 0, counted, counted,
-            jnp.asarray(1), jnp.asarray(jnp.inf), jnp.asarray(False),
+            jnp.asarray(1), each + jnp.inf, jnp.asarray(jnp.inf), jnp.asarray(False),
         )  # fmt: skip
         return jax.lax.while_loop(lambda at: (at.cycles < self.count) & ~at.periodic, self._solving, begin)
 
@@ -299,13 +301,21 @@ class _Sliders:
         tried = jnp.where(vain, jnp.inf, jnp.where(use, left, at.tried))  # after waiting it is tried whatever is left
         marched = jnp.where(self.periodicity > 0, (memory + RECALL * self.first) / (1 + RECALL), memory)
         held = jnp.where(use[..., None, :], at.memory + step, marched)
-        missed = jnp.abs(step).max() / jnp.where(size > 0, size, 1.0)
+        long = _length(step)
+        missed = jnp.where(at.renew, long, _still(long, at.step)).max() / jnp.where(size > 0, size, 1.0)
         ended, renew = missed <= jnp.minimum(self.periodicity, _SOLVED), missed > _SERVES * at.missed
-        on = jnp.asarray(self.periodicity > 0)
-        count = at.cycles + 1
+        on, count = jnp.asarray(self.periodicity > 0), at.cycles + 1
         return _Solving(
-            last, at.memory, held, slope, renew & on, tried, use, failed, wait, count, missed, ended & on
+            last, at.memory, held, slope, renew & on, tried, use, failed, wait, count, long, missed, ended & on
         )  # fmt: skip
+
+
+def _still(step: Array, before: Array) -> Array:
+    """How far it is to the solution by a derivative of another cycle, (..., n): steps go on shrinking as they did.
+
+    A derivative that is wrong, as that of a slider which has begun to stick, makes short steps of a long way."""
+    shrunk = jnp.where(before < jnp.inf, jnp.minimum(step / jnp.where(before > 0, before, 1.0), 1.0), 1.0)
+    return jnp.where(step > 0, step / jnp.maximum(1 - shrunk, 1e-9), 0.0)
 
 
 def _length(memory: Array) -> Array:
