@@ -179,7 +179,7 @@ def _scenes(basis: ModalBasis, folder: Path, report: Report) -> dict[str, Path]:
                 keep(f"modes_{_rpm(group)}", views.contact_sheet(studio, group, images))
                 for j, image in enumerate(images):
                     mode = views.mode_caption(studio, image, group, j)  # 256 colours: a third of the size
-                keep(f"mode_{j + 1:02d}_{_rpm(group)}", mode.quantize(256, dither=Image.Dither.NONE))
+                    keep(f"mode_{j + 1:02d}_{_rpm(group)}", mode.quantize(256, dither=Image.Dither.NONE))
             report("animations")
             drawn |= _animations(studio, shown[0], folder)
             report("pictures of stresses")
