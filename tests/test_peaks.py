@@ -17,7 +17,7 @@ from microslip.contact.friction import Coulomb
 from microslip.contact.normal import Penalty
 from microslip.contact.patch import Patch, grid
 from microslip.contact.point import PointContact
-from microslip.continuation import NO_OPTIMUM, Settings, lowest, peak, rated
+from microslip.continuation import NO_OPTIMUM, Settings, extremum, lowest, peak, rated
 from microslip.harmonic_balance import peak as peaks
 from microslip.harmonic_balance.peak import highest, optimum, resonance
 from microslip.harmonic_balance.readout import amplitude
@@ -133,6 +133,19 @@ def test_a_peak_at_a_kink_is_found_and_said_to_be_one():
     found = peak(Roof(0.7), np.array([1.5]), 0.1)
     assert found.converged and found.kink
     assert found.lam == pytest.approx(0.7, abs=1e-7) and found.x[0] == pytest.approx(2, abs=1e-7)
+
+
+def test_a_step_across_a_kink_that_is_longer_than_asked_ends_too(monkeypatch):
+    """Neither the root nor a shorter step is had: the higher end is the peak, within the length of the step."""
+
+    def far(problem, state, settings):
+        return advance(problem, state, replace(settings, step_max=0.1))
+
+    advance = extremum.advance
+    monkeypatch.setattr(extremum, "_pinned", lambda *places: None)
+    monkeypatch.setattr(extremum, "advance", far)
+    found = peak(Roof(0.7), np.array([1.5]), 0.1)
+    assert found.converged and found.lam == pytest.approx(0.7, abs=0.1)
 
 
 def test_without_a_peak_the_end_is_told():

@@ -104,7 +104,7 @@ def _ahead(slope: _Slope, state: State, settings: Settings) -> Peak:
         higher = here.value > there.value
         if after.found and (leaves_up and (comes_down or not higher) or comes_down and higher):
             top = _pinned(slope, there, here, after.found[-1].kink, settings) if leaves_up and comes_down else None
-            length = norm(after.y - state.y)
+            length = min(norm(after.y - state.y), within.step_max)  # the step across a kink may be longer
             if top is None and length > NARROW:
                 within = replace(settings, step_max=0.5 * length)
                 continue
