@@ -65,21 +65,33 @@ def held() -> float:
 
 
 MOST = {"bytes": 1.5e9}
-"""What a process may hold before compiled programs are dropped."""
+"""What a process may hold at the end of a file before compiled programs are dropped."""
+WITHIN_A_FILE = 1e9
+"""How much more within one: its tests share most of their programs, and would trace and compile them again."""
 
 
-@pytest.fixture(autouse=True)
-def programs_are_dropped() -> Iterator[None]:
+def drop(most: float) -> None:
     """Compiled programs are shared by all tests until there are too many: each keeps memory, in pieces of which a
     process may have 65530 mapped (20,000 at 1.5 GB); beyond that the compiler crashes."""
-    yield
-    if "jax" in sys.modules and held() > MOST["bytes"]:
+    if "jax" in sys.modules and held() > most:
         sys.modules["jax"].clear_caches()
         gc.collect()
         if sys.platform == "linux":
             trim = getattr(ctypes.CDLL(None), "malloc_trim", None)  # give it back: glibc alone has it
             trim and trim(0)
         MOST["bytes"] = max(1.5e9, held() + 5e8)
+
+
+@pytest.fixture(autouse=True)
+def programs_are_dropped() -> Iterator[None]:
+    yield
+    drop(MOST["bytes"] + WITHIN_A_FILE)
+
+
+@pytest.fixture(autouse=True, scope="module")
+def programs_of_a_file_are_dropped() -> Iterator[None]:
+    yield
+    drop(MOST["bytes"])
 
 
 PIXEL = bytes.fromhex(
