@@ -4,6 +4,7 @@ Dimensionless as in section 3.7 of W. Sextro: c_N0 = R_Z = mu_0 = omega_0 = 1.
 """
 
 import dataclasses
+import functools
 
 import jax
 import jax.numpy as jnp
@@ -67,6 +68,12 @@ def marched(law, motion, samples, periods=2):
     return np.concatenate([np.full((1, 3), np.nan), force])
 
 
+@functools.cache
+def course(motion, printed):
+    """The integrated equation along two periods, for the tests that compare with it."""
+    return integrate(element(1e-2, 1e3, printed=printed), motion, TIMES, 1e-8)
+
+
 # the limit of no mass ------------------------------------------------------------------------------------------------
 
 
@@ -110,8 +117,8 @@ def test_the_equation_itself_tends_to_the_return_map() -> None:
 @pytest.mark.parametrize("motion", [all_three, pytest.param(shaken, marks=pytest.mark.slow)], ids=["3.7-7", "shaken"])
 def test_steps_converge_to_the_integrated_equation(motion, printed) -> None:
     """Implicit Euler: first order in the step, through stick, slip and separation."""
-    law = element(1e-2, 1e3, damping=0.2, printed=printed)
-    exact = integrate(law, motion, TIMES, 1e-8).force[1:]
+    law = element(1e-2, 1e3, printed=printed)
+    exact = course(motion, printed).force[1:]
     counts = (1000, 4000)
     away = [np.abs(marched(law, motion, n)[:: n // 200][1:] - exact).max() for n in counts]
     assert np.log(away[0] / away[1]) / np.log(4) == pytest.approx(1, abs=0.1)
@@ -134,7 +141,7 @@ def test_a_free_swing_has_its_closed_form() -> None:
 
 def test_friction_of_the_integrated_course_is_the_smoothed_law() -> None:
     """Springs less inertia: mu s(|v|) F_N against v/|v|, whenever it is asked for."""
-    found = integrate(element(1e-2, 1e3), all_three, TIMES, 1e-8)
+    found = course(all_three, False)
     speed = np.hypot(*found.velocity.T)
     closed = found.motion[:, 0] > 0
     expected = np.asarray(smoothed(speed, 1e3)) * found.force[:, 0] / np.maximum(speed, 1e-300)
@@ -200,9 +207,9 @@ def test_the_equation_has_a_limit_as_the_area_goes_to_zero() -> None:
 
 def test_where_the_damper_would_pull_the_point_moves_freely_in_contact() -> None:
     """(3.7-30): no friction in the clipped interval, but spring, damper and inertia go on."""
-    found = integrate(element(damping=2.0), shaken, TIMES, 1e-7)
+    found = integrate(element(damping=2.0), shaken, TIMES[:201], 1e-7)
     clipped = (found.force[:, 0] == 0) & (found.motion[:, 0] > 1e-3)
-    assert clipped.sum() > 100
+    assert clipped.sum() > 50
     assert np.abs(found.friction[clipped]).max() < 1e-15
     assert np.abs(found.force[clipped, 1:]).max() > 1e-4
 
@@ -280,7 +287,7 @@ def test_at_the_printed_damping_of_0_2_it_does_not() -> None:
 def test_a_jump_of_the_share_is_no_obstacle() -> None:
     """The penalty law touches with all of its area at once."""
     law = dataclasses.replace(element(), normal=Penalty(value(1)))
-    found = integrate(law, all_three, TIMES, 1e-6)
+    found = integrate(law, all_three, TIMES[:201], 1e-6)
     opened = found.motion[:, 0] < 0
     assert np.all(np.isfinite(found.force)) and np.all(found.force[opened] == 0)
     assert np.all(np.hypot(*found.friction.T) <= found.force[:, 0] + 1e-9)
@@ -293,9 +300,13 @@ def test_a_preload_that_no_motion_changes() -> None:
     assert found.force[-1, 1] == pytest.approx(2 * float(smoothed(1.0, 1e6)), rel=1e-6)
 
 
+@pytest.fixture(scope="module")
+def steep():
+    return integrate(element(1e-2, 1e8), all_three, TIMES[:121], 1e-8).force
+
+
 @pytest.mark.parametrize("method", ["Radau", "BDF"])
-def test_a_steep_smoothing_is_resolved_whatever_tolerance_is_asked_for(method) -> None:
+def test_a_steep_smoothing_is_resolved_whatever_tolerance_is_asked_for(steep, method) -> None:
     """A creep of 1e-8 is far below 1e-6 of the speeds; left out of the tolerance, the mean error was 0.06."""
-    fine = integrate(element(1e-2, 1e8), all_three, TIMES[:121], 1e-8).force
     coarse = integrate(element(1e-2, 1e8), all_three, TIMES[:121], 1e-6, method).force
-    assert np.abs(coarse - fine).max() < 1e-3
+    assert np.abs(coarse - steep).max() < 1e-3
