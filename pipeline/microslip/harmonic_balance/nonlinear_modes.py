@@ -206,14 +206,14 @@ def backbone(
     return Backbone(A, Omega, xi / (2 * Omega) if len(A) else xi, x, omega, status, found, quantity)
 
 
-def strongest(problem: Problem, low: float, high: float, output: int = 0) -> int:
-    """Number of the mode with sticking contacts that makes the highest resonance of a read-out under the loads, among
-    those between two frequencies (rad/s), or among all if there is none.
+def strongest(problem: Problem, low: float, high: float) -> int:
+    """Number of the mode with sticking contacts that makes the highest resonance of the first read-out, among those
+    between two frequencies (rad/s), or among all if there is none.
 
     With (w phi)(phi^H f) / (phi^H C phi omega) as the height of each.
     """
     part, (omega, shapes) = _only(problem), stuck_modes(problem)
-    seen, driven = np.abs(part.output[output] @ shapes), np.abs(shapes.conj().T @ part.load)
+    seen, driven = np.abs(part.output[0] @ shapes), np.abs(shapes.conj().T @ part.load)
     loss = np.einsum("im,ij,jm->m", shapes.conj(), 0.5 * (part.C + part.C.conj().T), shapes).real * omega
     if part.loss is not None:
         loss += np.einsum("im,ij,jm->m", shapes.conj(), part.loss, shapes).real
@@ -222,10 +222,10 @@ def strongest(problem: Problem, low: float, high: float, output: int = 0) -> int
     return int(np.argmax(np.where(inside, height, 0.0) if height[inside].any() else height))
 
 
-def sliding_amplitude(problem: Problem, mode: int = 0, output: int = 0) -> float:
-    """About the amplitude of a read-out, m, at which the contacts begin to slide in a mode: their largest motion is
-    then `Problem.length`."""
-    curve = _Curve(problem, output)
+def sliding_amplitude(problem: Problem, mode: int) -> float:
+    """About the amplitude of the first read-out, m, at which the contacts begin to slide in a mode: their largest
+    motion is then `Problem.length`."""
+    curve = _Curve(problem, 0)
     curve.linear(problem, mode)
     return float(problem.length / curve.x_scale[0])
 
