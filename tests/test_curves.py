@@ -195,7 +195,8 @@ def test_over_the_load(case: Path) -> None:
     found = rows("over_load.csv")
     f = found["at_frequency_Hz"][0]
     assert 100 < f < 125 and found["load"][[0, -1]].tolist() == [0.1, 1.0]
-    last = followed(of_load(problem(case), f, 0.1, 1.0)).points[-1]
+    family = of_load(problem(case), f, 0.1, 1.0)
+    last = family.points(followed(family))[-1]
     np.testing.assert_allclose(found["amplitude_m"][-1], abs(operating(problem(case), last).outputs[0, 1]), rtol=1e-6)
 
 

@@ -200,6 +200,8 @@ def test_an_angle_is_followed_through_nothing(monkeypatch: pytest.MonkeyPatch) -
     following.optimum_over(case, "friction", 0.1, 0.4, 3)
     np.testing.assert_allclose(asked[0], [-4, -2, 0, 2, 4])
     np.testing.assert_allclose(asked[1], [0.1, 0.2, 0.4])
+    changed = [case.with_("friction", value).settings.contacts for value in asked[1]]
+    assert [c.coefficient for contacts in changed for c in contacts] == list(asked[1])
 
 
 @pytest.mark.slow
