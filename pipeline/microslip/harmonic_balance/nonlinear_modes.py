@@ -191,17 +191,16 @@ def backbone(
     settings = settings or Settings(step=0.05, step_max=0.2, folds=False, branch_points=False)
     bounds = np.log([low, high])
     settings = replace(settings, low=float(bounds[0]) - 1e-9, high=float(bounds[1]), targets=tuple(np.log(asked)))
-    points = list[Point]()
+    points, quantity = list[Point](), measured(problem.assembly, output)
     for state in follow(curve, start(curve, z, float(bounds[0]), settings), settings):
         points += state.found
         if points:
             share = int(100 * min((points[-1].lam - bounds[0]) / (bounds[1] - bounds[0]), 1.0))
-            report(f"{share} of 100 % of the amplitudes: {np.exp(points[-1].lam):.4g} m")
+            report(f"{share} of 100 % of the amplitudes: {quantity.sized(np.exp(points[-1].lam))}")
     A = np.exp([p.lam for p in points])
     Omega, xi = (np.array([p.x[i] for p in points]) for i in (-2, -1))
     x = np.array([p.x[:-2] * a / problem.length for p, a in zip(points, A, strict=True)]).reshape(len(A), len(z) - 2)
     found = tuple(curve.checks(*one) for one in zip(x, Omega, xi, strict=True))
-    quantity = measured(problem.assembly, output)
     status = next((one.failure for one in found if one.failure), _in_words(state.status, points, low, high, quantity))
     return Backbone(A, Omega, xi / (2 * Omega) if len(A) else xi, x, omega, status, found, quantity)
 
