@@ -32,6 +32,7 @@ from ..results.series import Series
 from ..system import assembly
 from ..system.assembly import Linear
 from ..units import METRES, Quantity
+from .checks import checks
 from .problem import AtFrequency, Problem
 from .readout import amplitude, measured
 from .response import operating
@@ -59,7 +60,7 @@ class Backbone:
         amplitude: (k,) of the read-out's first harmonic, in the unit of `quantity`. Omega: (k,) rad/s.
             damping: (k,) ratio.
         x: (k, size), see `Problem`. stuck: rad/s, with sticking contacts. status: why it ended. checks: of its points
-            (`results.checks`), the force that feeds the losses among the bodies' own. quantity: what the read-out
+            (`results.checks`), of which the force that feeds the losses is the load. quantity: what the read-out
             measures.
     """
 
@@ -279,8 +280,11 @@ class _Curve:
         return at.residual_of(x, force), amplitude(at, x, force, slopes, self.output).value
 
     def checks(self, x: Array, Omega: float, xi: float) -> Checks:
-        """Of a point of the mode."""
-        return operating(self._fed(xi), Solved(Omega, x, CONVERGED, 0.0, 0)).checks
+        """Of a point of the mode: the force that feeds the losses supplies xi v . M v."""
+        fed = self._fed(xi)
+        found = operating(fed, Solved(Omega, x, CONVERGED, 0.0, 0))
+        supplied = 2 * np.pi * xi * found.kinetic / Omega  # J per cycle; its share of `damped` is taken back
+        return checks(fed, replace(found, supplied=found.supplied + supplied, damped=found.damped + supplied))
 
     def _fed(self, xi: float) -> Problem:
         parts = tuple(tuple(replace(p, C=p.C - xi * p.M) for p in one) for one in self.problem.parts)
