@@ -133,9 +133,9 @@ def assess(
     for series in response.series:
         if not len(series.key):
             continue
-        report(f"stresses of {name}: {series.name}")
-        motion = response.motion(series, basis, name)
         normal = float(series.parameters.get("normal_force", 0.0))
+        report(f"stresses of {name} under a normal force of {normal:.6g} N")
+        motion = response.motion(series, basis, name)
         size = abs(series.monitor(monitor)[:, 0, 1])
         chosen, at = drawn_points(series, *(DRAWN if everywhere else LOOKED_AT)), tops(series, size)
         peaks = stress_peaks(motion.at(chosen), largest=False)

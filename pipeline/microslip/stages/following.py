@@ -287,7 +287,7 @@ def found_before(names: Sequence[str], over: str, case: Case) -> dict[str, Array
         if not (file := folder / "optimum.csv").is_file():
             file = case.folder.parent / name / file.name
             raise UserError(f"--beside {name}: there is no {file}; type microslip optimum {name} --over {over} first")
-        asked = [over, "frequency_Hz", case.quantity.column("amplitude"), "what"]
+        asked = _optimum_head(over, case)
         head, *rows = csv.reader(ordinary(file).read_text(encoding="utf-8").splitlines())
         if head != asked:
             raise UserError(f"{file}: holds {', '.join(head)}, not {', '.join(asked)}; name another case")
@@ -310,7 +310,13 @@ def _optimum_table(found: Mapping[float, HighestPeak], over: str, case: Case, be
         what = f"optimum: {best.status}" if is_optimum(best) else f"lowest: {best.status}"
         shown.append((best.parameter, best.resonance, what))
     rows = [(f"{v:.10g}", f"{r.Omega / 2 / np.pi:.10g}", f"{r.amplitude:.8g}", what) for v, r, what in shown]
-    return case.table("optimum.csv", (over, "frequency_Hz", case.quantity.column("amplitude"), "what"), rows)
+    return case.table("optimum.csv", _optimum_head(over, case), rows)
+
+
+def _optimum_head(over: str, case: Case) -> list[str]:
+    """Headings of ``optimum.csv``, with their units where they are known."""
+    unit = unit_of(over).strip().replace("/", "_")
+    return [f"{over}_{unit}".removesuffix("_"), "frequency_Hz", case.quantity.column("amplitude"), "what"]
 
 
 def unit_of(over: str) -> str:
