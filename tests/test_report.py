@@ -308,5 +308,13 @@ def test_what_stands_in_a_table_is_told_once_and_rounding_not_at_all() -> None:
     told = {"stuck_modes": modes, "stuck_frequencies_Hz": [874.25], "rising_at_the_edge": []}
     words = said(response_html(told, {}))
     assert words.count("874.25") == 1 and "Modes with sticking contacts" in words and "rising" not in words
+    orders = {
+        "amplitude_m_FN_10_N": ["2e-5"],
+        "resonance_Hz_FN_10_N": ["99.5"],
+        "stress_amplitude_Pa_as_pressed": ["1e6"],
+    }
+    table = said(survey_html("t", [], {"t.csv": orders}, []))
+    assert "FN = 10 N: amplitude in µm" in table and "FN = 10 N: resonance in Hz" in table and "20" in table
+    assert "as pressed: stress amplitude in MPa" in table
     table = said(survey_html("t", [], {"t.csv": {"load_m": ["1.5e-3", "1e-16"], "speed_rad_s": ["2", "3"]}}, []))
     assert "load in µm" in table and "1500" in table and "1e-10" not in table and "speed in rad/s" in table

@@ -272,6 +272,9 @@ _NAMED = {
 
 def _column(key: str) -> tuple[float, str]:
     """Factor and name of a column: lengths and stresses in units for people."""
+    if under := re.fullmatch(r"(.+)_(?:FN_(.+)_N|as_pressed)", key):
+        factor, name = _column(under[1])
+        return factor, f"{f'F_N = {under[2]} N' if under[2] else 'as pressed'}: {name}"
     if key in _NAMED:
         return _NAMED[key]
     for end, (factor, unit) in _FACTORS:

@@ -144,7 +144,7 @@ def _orders(write: Write, settings: CaseSettings, bases: Bases, path: Path, repo
     def tables(found: Mapping[str, OverOrders]) -> Tables:
         first, columns = max(found.values(), key=lambda r: len(r.order)), dict[str, Array]()
         for label, r in found.items():
-            plain = label.replace("$", "").replace(" = ", "_").replace(" ", "_")
+            plain = label.replace("$F_N$", "FN").replace(" = ", "_").replace(" ", "_")
             missing = np.full(len(first.order) - len(r.order), np.nan)
             own = {f"{n}_{plain}": np.append(v, missing) for n, v in r.columns().items() if n not in of_all}
             columns |= {n: v for n, v in first.columns().items() if n in of_all} | own
