@@ -13,11 +13,11 @@ import small
 from hypothesis import given
 from hypothesis import strategies as st
 
-from microslip.data import ModalBasis
+from microslip.data import ContactState, ModalBasis
 from microslip.report.body import report_html
 from microslip.report.page import text
 from microslip.report.response import response_html, survey_html
-from microslip.report.words import certificate, fit_sentence, number_list
+from microslip.report.words import certificate, contact_sentence, fit_sentence, number_list
 
 PNG = bytes.fromhex(
     "89504e470d0a1a0a0000000d4948445200000001000000010802000000907753de0000000c4944415408d763f8ffff3f0005fe02fe"
@@ -301,6 +301,15 @@ def test_the_answer_is_a_resonance_that_is_valid() -> None:
     of_one = response_html({"resonances": rows, "stressed_body": "lower"}, {})
     assert "largest stress amplitude of lower is 41.5 MPa" in said(of_one)
     assert "uncertain by less than 0.01" in words and "32000" in words and "10000" in words and "·10" not in words
+
+
+def test_a_contact_tells_what_is_left_of_its_penetration_where_it_is_no_rounding() -> None:
+    x, one = np.zeros((3, 3)), np.ones(3)
+    state = ContactState(
+        "a", "b", "", "open", 0, 240.0, 0.1, 8e-17, 1.0, 0.0, x[0], x[0], x, 1e6 * one, 1e-6 * one, one
+    )
+    assert "at most 1 MPa; the modes leave it open" in contact_sentence("shroud", state)
+    assert "(penetration left 0.002 µm)" in contact_sentence("shroud", replace(state, penetration=2e-9))
 
 
 def test_what_stands_in_a_table_is_told_once_and_rounding_not_at_all() -> None:

@@ -10,6 +10,7 @@ from typing import Any
 
 from ..units import Quantity, amplitude_of, counted, percent
 from .page import Album, Piece, fold, number, page, say, table
+from .words import ROUNDING
 
 MOST_ROWS = 60
 """Rows of a table that a page shows at once; the others unfold."""
@@ -243,9 +244,6 @@ def _table_of(rows: Sequence[Mapping[str, Any]]) -> Piece:
     cells = [[shown(v, unit) for v, unit in zip(row, units, strict=True)] for row in values]
     return table([name for _, name in columns], cells)
 
-
-ROUNDING = 1e-9
-"""Share of the largest number of a unit in a table below which another one is rounding."""
 
 _FACTORS = (
     *((Quantity(unit).column("amplitude"), (1e6, Quantity(unit).micro)) for unit in ("m", "rad", "1")),
