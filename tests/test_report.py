@@ -309,7 +309,7 @@ def test_a_contact_tells_what_is_left_of_its_penetration_where_it_is_no_rounding
         "a", "b", "", "open", 0, 240.0, 0.1, 8e-17, 1.0, 0.0, x[0], x[0], x, 1e6 * one, 1e-6 * one, one
     )
     assert "at most 1 MPa; the modes leave it open" in contact_sentence("shroud", state)
-    assert "(penetration left 0.002 µm)" in contact_sentence("shroud", replace(state, penetration=2e-9))
+    assert "(penetration left 0.002 µm)" in contact_sentence("shroud", dataclasses.replace(state, penetration=2e-9))
 
 
 def test_what_stands_in_a_table_is_told_once_and_rounding_not_at_all() -> None:
