@@ -12,6 +12,7 @@ import scipy.linalg
 from microslip.case import load_case
 from microslip.case.assemble import Built, build
 from microslip.case.problem import problem_of
+from microslip.case.run import OPEN
 from microslip.data import Array, ModalBasis
 from microslip.harmonic_balance.problem import Problem
 from microslip.harmonic_balance.reduced import stuck
@@ -24,17 +25,23 @@ Bases = Callable[[str], ModalBasis]
 
 @dataclass(frozen=True)
 class Curve:
-    """A response: frequency (f,) in Hz, first harmonics (f, w) of the read-outs, and which points converged (f,)."""
+    """A response: frequency (f,) in Hz, first harmonics (f, w) of the read-outs, which points converged (f,), and the
+    largest share of a contact's points and time that would be open there (f,)."""
 
     frequency: Array
     outputs: Array
     converged: Array
+    open: Array
 
     def largest(self, pick: Callable[[Array], Array]) -> tuple[float, float]:
         """Frequency (Hz) and value of the largest amplitude of a combination of the read-outs."""
         size = np.where(self.converged, np.abs(pick(self.outputs)), 0.0)
         top = int(size.argmax())
         return float(self.frequency[top]), float(size[top])
+
+    def lifts(self, frequency: float) -> bool:
+        """Whether contacts would lift off there, which the book's mode does not follow: not valid."""
+        return bool(self.open[np.abs(self.frequency - frequency).argmin()] > OPEN)
 
 
 def opened(case: str, bases: Bases, *changes: str) -> Built:
@@ -52,8 +59,11 @@ def followed(problem: Problem, frequency: Array, finer: int = 3) -> Curve:
     points = sweep(problem, frequency)
     for _ in range(finer):
         points = _halved(problem, points)
-    first = np.array([operating(problem, p).outputs[:, 1] for p in points])
-    return Curve(np.array([p.Omega for p in points]) / (2 * np.pi), first, np.array([p.converged for p in points]))
+    seen = [operating(problem, p) for p in points]
+    first = np.array([o.outputs[:, 1] for o in seen])
+    lifted = np.array([max((float(c.open.mean()) for c in o.cycles.values()), default=0.0) for o in seen])
+    frequency = np.array([p.Omega for p in points]) / (2 * np.pi)
+    return Curve(frequency, first, np.array([p.converged for p in points]), lifted)
 
 
 def _halved(problem: Problem, points: list[Point]) -> list[Point]:

@@ -398,8 +398,10 @@ def spin_pit() -> None:
     rows = []
     for (shape, mass), (normal, x) in all_of.items():
         f, strain = x.largest(damper_study.bending)
-        rows.append([shape, f"{1e3 * mass:g}", f"{normal:.0f}", f"{f:.1f}", f"{1e6 * strain:.0f}"])
-    fill("dampers.md", "pit", table(["damper", "mass, g", "normal force, N", "resonance, Hz", "strain, µm/m"], rows))
+        doubt = "not valid: contacts would lift off" if x.lifts(f) else ""
+        rows.append([shape, f"{1e3 * mass:g}", f"{normal:.0f}", f"{f:.1f}", f"{1e6 * strain:.0f}", doubt])
+    head = ["damper", "mass, g", "normal force, N", "resonance, Hz", "strain, µm/m", "validity"]
+    fill("dampers.md", "pit", table(head, rows))
     best = [[s, f"{1e3 * m[i]:.1f}", f"{1e6 * strain[i]:.0f}"] for s, (m, strain, i) in over_mass.items()]
     fill("dampers.md", "mass", table(["damper", "best mass, g", "largest strain there, µm/m"], best))
 
@@ -411,7 +413,7 @@ def strain_over_mass(shape: str) -> tuple[Array, Array, int]:
         typed([*asked.split(), "--points", "9"])
     text = (BUILD / f"build/spin-pit-{shape}/optimum.csv").read_text(encoding="utf-8")
     rows = [row for row in csv.DictReader(text.splitlines()) if row["what"] == "highest resonance"]
-    mass, strain = (np.array([float(row[k]) for row in rows]) for k in ("bodies.damper.mass", "amplitude_strain"))
+    mass, strain = (np.array([float(row[k]) for row in rows]) for k in ("bodies.damper.mass_kg", "amplitude_strain"))
     return mass, strain, int(strain.argmin())
 
 

@@ -19,7 +19,6 @@ from microslip.stages.assessment import (
     draw,
     families,
     has_stresses,
-    over_engine_order,
     over_force,
     write_shape,
 )
@@ -214,22 +213,6 @@ def test_a_picture_of_some_contacts_says_how_many(response: Response, tmp_path, 
     found = assess(response, small_basis(), "tip-probe")
     draw(found, small_basis(), "beam", tmp_path, False, {"contacts at resonance": [object()]}, contacts)
     assert titles[0].partition("\n")[2] == said
-
-
-def test_stress_over_engine_orders(response: Response) -> None:
-    """Twice the coordinates, twice the stress and strain; the gauge at the root reads its row."""
-    series = tuple(
-        replace(s, arrays={**s.arrays, "bodies/beam/q": 2 * s.arrays["bodies/beam/q"]}) for s in response.series
-    )
-    both = {3: response, 5: replace(response, series=series)}
-    curves, gauge = (over_engine_order(both, small_basis(), gauge=g) for g in ("", "root"))
-    assert sorted(curves) == [1.0, 10.0, 100.0]
-    for found in (curves, gauge):
-        orders, values = found[10.0]
-        assert list(orders) == [3, 5] and values[1] == pytest.approx(2 * values[0], rel=1e-9)
-    q = response.one(normal_force=1.0).arrays["bodies/beam/q"][:, 1]
-    told = 1e6 * np.abs(q @ GROUP.gauges["root"].rows[0]).max()
-    assert gauge[1.0][1][0] == pytest.approx(told, rel=1e-12)
 
 
 def test_long_sweeps_are_drawn_by_some_of_their_points() -> None:

@@ -18,7 +18,7 @@ from microslip.case.problem import problem_of
 from microslip.cli import main
 from microslip.continuation import Settings
 from microslip.data import ModalBasis
-from microslip.harmonic_balance.families import over_frequency, over_load
+from microslip.harmonic_balance.families import followed, of_frequency, of_load
 from microslip.harmonic_balance.response import operating
 from microslip.harmonic_balance.solver import newton, solve
 from microslip.results import read_response
@@ -85,10 +85,10 @@ def test_over_the_frequency(case: Path, capsys: pytest.CaptureFixture[str]) -> N
     assert main(["respond", "case.toml", "--over", "frequency"]) == 0
     said = capsys.readouterr()
     steps = Settings(points=3000, branch_points=False)  # shorter than from Python: a picture joins the points
-    found, plain = rows("over_frequency.csv"), over_frequency(problem(case), 140.0, 100.0, settings=steps)
-    np.testing.assert_allclose(found["frequency_Hz"], plain.parameter, rtol=1e-10)
+    found, plain = rows("over_frequency.csv"), followed(of_frequency(problem(case), 140.0, 100.0), settings=steps)
+    np.testing.assert_allclose(2 * np.pi * found["frequency_Hz"], plain.lam, rtol=1e-10)
     folds = found["frequency_Hz"][found["fold"] == 1]
-    np.testing.assert_allclose(folds, plain.folds, rtol=1e-10)
+    np.testing.assert_allclose(2 * np.pi * folds, [p.lam for p in plain.of_kind("fold")], rtol=1e-10)
     assert len(folds) >= 2 and "fold" in said.out and found["leg"].max() == len(folds) + 1
     assert "points at most" in said.err or said.err.count("\n") < 5
     assert found["open"].max() > 0.1 and Path("build/lifting/pictures/over_frequency.png").stat().st_size > 10_000
@@ -169,8 +169,8 @@ def test_one_that_comes_back_is_followed_by_another(case: Path, capsys: pytest.C
     first, second = (s.parameter for s in held.series)
     assert first[[0, -1]].tolist() == [103.0, 103.0] and second[[0, -1]].tolist() == [140.0, 103.0]
     steps = Settings(points=3000, branch_points=False)
-    plain = over_frequency(problem(case), 140.0, 103.0, settings=steps)
-    np.testing.assert_allclose(second, plain.parameter, rtol=1e-9)
+    plain = followed(of_frequency(problem(case), 140.0, 103.0), settings=steps)
+    np.testing.assert_allclose(2 * np.pi * second, plain.lam, rtol=1e-9)
     of = found["leg"] > found["leg"][len(first) - 1]
     np.testing.assert_array_equal(of, np.arange(len(of)) >= len(first))
     assert (found["leg"] == 1 + np.cumsum(found["fold"]) - found["fold"] + of).all()
@@ -195,7 +195,8 @@ def test_over_the_load(case: Path) -> None:
     found = rows("over_load.csv")
     f = found["at_frequency_Hz"][0]
     assert 100 < f < 125 and found["load"][[0, -1]].tolist() == [0.1, 1.0]
-    last = over_load(problem(case), f, 0.1, 1.0).points[-1]
+    family = of_load(problem(case), f, 0.1, 1.0)
+    last = family.points(followed(family))[-1]
     np.testing.assert_allclose(found["amplitude_m"][-1], abs(operating(problem(case), last).outputs[0, 1]), rtol=1e-6)
 
 

@@ -15,7 +15,7 @@ from microslip.contact.normal import Penalty
 from microslip.contact.point import PointContact
 from microslip.harmonic_balance import problem as balance
 from microslip.harmonic_balance import response
-from microslip.harmonic_balance.families import OverNormal, over_frequency, over_load, over_normal_force
+from microslip.harmonic_balance.families import OverNormal, followed, of_frequency, of_load, of_normal_force
 from microslip.harmonic_balance.problem import Problem
 from microslip.harmonic_balance.solver import newton, solve
 
@@ -30,14 +30,14 @@ def test_folds_over_the_frequency() -> None:
     """Both of a Duffing oscillator, from either end; between them three motions, which a sweep does not show."""
     problem = balance.of(duffing(), 7, 64, length=1.0)
     told: list[str] = []
-    up = over_frequency(problem, 0.3 / (2 * np.pi), 2.5 / (2 * np.pi), told.append)
-    down = over_frequency(problem, 2.5 / (2 * np.pi), 0.3 / (2 * np.pi))
-    np.testing.assert_allclose(2 * np.pi * up.folds, [1.462616, 1.156018], rtol=1e-6)
-    np.testing.assert_allclose(down.folds[::-1], up.folds, rtol=1e-7)
-    passed = 2 * np.pi * up.parameter - 1.3
-    assert np.count_nonzero(np.diff(np.sign(passed))) == 3 and "Hz" in told[-1]
-    at = response.of_points(problem, up.points[::20], np.zeros(1))
-    assert at.converged.all() and np.abs(at.frequency - up.parameter[::20]).max() < 1e-12
+    family = of_frequency(problem, 0.3 / (2 * np.pi), 2.5 / (2 * np.pi))
+    up, down = followed(family, told.append), followed(family.turned)
+    folds, back = ([p.lam for p in branch.of_kind("fold")] for branch in (up, down))
+    np.testing.assert_allclose(folds, [1.462616, 1.156018], rtol=1e-6)
+    np.testing.assert_allclose(back[::-1], folds, rtol=1e-7)
+    assert np.count_nonzero(np.diff(np.sign(up.lam - 1.3))) == 3 and "Hz" in told[-1]
+    at = response.of_points(problem, family.points(up)[::20], np.zeros(1))
+    assert at.converged.all() and np.abs(at.frequency - up.lam[::20] / family.unit).max() < 1e-12
 
 
 @pytest.mark.parametrize("gap", [0.0, pytest.param(1.0, marks=pytest.mark.slow)])
@@ -48,22 +48,24 @@ def test_contacts_that_nothing_presses_give_the_scale_by_their_gap_or_the_load(g
     body = group(one, {"face": np.outer([1, 0, 0, 0, 0, 0], one), "push": one, "tip": one}, 0.01)
     wall = PointContact(Penalty(jnp.asarray(1.0)), Coulomb(jnp.asarray(0.3)), jnp.asarray(1.0))
     problem = balance.of(held(body, wall, [0], np.zeros(1), np.array([-gap]), 0.1), 5, 128)
-    found = over_frequency(problem, 0.7 / (2 * np.pi), 1.7 / (2 * np.pi))
+    family = of_frequency(problem, 0.7 / (2 * np.pi), 1.7 / (2 * np.pi))
+    found = followed(family)
     assert found.status.startswith("bound") and len(found.points) < 1000
     if not gap:
-        tip = np.abs(response.of_points(problem, found.points, np.ones(1)).monitor)
-        assert 2 * np.pi * found.parameter[np.argmax(tip)] == pytest.approx(2 / (1 + 0.5**0.5), rel=2e-3)
+        tip = np.abs(response.of_points(problem, family.points(found), np.ones(1)).monitor)
+        assert found.lam[np.argmax(tip)] == pytest.approx(2 / (1 + 0.5**0.5), rel=2e-3)
 
 
 def test_over_the_load() -> None:
     """A slider that sticks under little load: at the end of the curve the motion of a sweep under the whole load."""
     problem = balance.of(cantilever(), 5, 128, length=0.0125)
-    found = over_load(problem, 3.9 / (2 * np.pi), 0.05, 1.0)
-    last = found.points[-1]
-    assert found.parameter[-1] == 1.0 and found.status.startswith("bound")
+    family = of_load(problem, 3.9 / (2 * np.pi), 0.05, 1.0)
+    found = followed(family)
+    first, *_, last = family.points(found)
+    assert found.lam[-1] == 1.0 and found.status.startswith("bound")
     exact = solve(problem, 3.9, [])
     np.testing.assert_allclose(last.x, exact.x, rtol=0, atol=1e-8 * np.abs(exact.x).max())
-    stuck = response.operating(found.problem(0.05), found.points[0])
+    stuck = response.operating(family.problem(0.05), first)
     assert stuck.cycles["face"].slipping[0] == 0.0 < response.operating(problem, last).cycles["face"].slipping[0]
 
 
@@ -71,13 +73,15 @@ def test_over_the_load() -> None:
 @pytest.mark.parametrize("factor", [0.85, pytest.param(4.0, marks=pytest.mark.slow)])
 def test_over_the_normal_force(factor: float) -> None:
     """From the force given to another one: there the motion of a problem that is pressed so from the beginning."""
-    found = over_normal_force(ring(), 60.0, 1.0, factor)
-    assert found.parameter[-1] == factor
+    family = of_normal_force(ring(), 60.0, 1.0, factor)
+    found = followed(family)
+    last = family.points(found)[-1]
+    assert found.lam[-1] == factor
     anew = ring(20.0 * factor)
-    exact = newton(anew.at(2 * np.pi * 60.0), found.points[-1].x)
+    exact = newton(anew.at(2 * np.pi * 60.0), last.x)
     assert exact.converged
-    np.testing.assert_allclose(found.points[-1].x, exact.x, rtol=0, atol=1e-8 * np.abs(exact.x).max())
-    a = response.operating(found.problem(factor), found.points[-1]).outputs
+    np.testing.assert_allclose(last.x, exact.x, rtol=0, atol=1e-8 * np.abs(exact.x).max())
+    a = response.operating(family.problem(factor), last).outputs
     np.testing.assert_allclose(a, response.operating(anew, exact).outputs, rtol=1e-7)
 
 
@@ -108,5 +112,5 @@ def test_a_curve_that_has_no_beginning_says_so(monkeypatch: pytest.MonkeyPatch) 
 
     failed = newton(ring().at(300.0), np.full(ring().size, np.nan))
     monkeypatch.setattr(families, "solve", lambda *_: failed)
-    found = over_frequency(ring(), 40.0, 80.0)
-    assert found.points == () and found.status.startswith("no start") and len(found.folds) == 0
+    found = followed(of_frequency(ring(), 40.0, 80.0))
+    assert found.points == () and found.status.startswith("no start")

@@ -110,7 +110,7 @@ def test_optimum_over_the_normal_force(capsys: pytest.CaptureFixture[str]) -> No
     assert main(["optimum", "case.toml", "--points", "4"]) == 0
     rows = table("optimum.csv")
     best = rows[-1]
-    normal, height = float(best["normal_force"]), float(best["amplitude_m"])
+    normal, height = float(best["normal_force_N"]), float(best["amplitude_m"])
     assert 8 < normal < 15 and best["what"] == "optimum: converged"
     assert f"normal force = {normal:.4g}"[:-1] in capsys.readouterr().out
     assert Path("build/sled/pictures/optimum.png").stat().st_size > 10_000
@@ -172,6 +172,7 @@ def test_optima_of_several_cases_stand_on_one_picture(tmp_path: Path, monkeypatc
     np.testing.assert_allclose(before["light"], [[1, 3, 9], [300 / np.pi] * 3, 1e-6 * np.array([2, 10 / 3, 82 / 9])])
     assert "light: lowest at bodies.vane.mass = 1 kg, 2 µm at 95.493 Hz." in page.read_text()
     assert [t.get_text() for t in figures[-1].legends[0].get_texts()] == ["light", "heavy"] and not figures[0].legends
+    assert Path("build/light/optimum.csv").read_text().startswith("bodies.vane.mass_kg,frequency_Hz,amplitude_m,what")
     Path("light").mkdir()  # a case of that name beside its products
     assert list(following.found_before(["light"], over, case)) == ["light"]
     assert list(following.found_before(["build/light"], over, case)) == ["light"]
@@ -200,6 +201,8 @@ def test_an_angle_is_followed_through_nothing(monkeypatch: pytest.MonkeyPatch) -
     following.optimum_over(case, "friction", 0.1, 0.4, 3)
     np.testing.assert_allclose(asked[0], [-4, -2, 0, 2, 4])
     np.testing.assert_allclose(asked[1], [0.1, 0.2, 0.4])
+    changed = [case.with_("friction", value).settings.contacts for value in asked[1]]
+    assert [c.coefficient for contacts in changed for c in contacts] == list(asked[1])
 
 
 @pytest.mark.slow

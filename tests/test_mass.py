@@ -137,7 +137,7 @@ def test_resonances_are_followed_over_the_mass(sample: ModalBasis, folder: Path)
     ends = ["--low", str(0.9 * sample.mass), "--high", str(1.2 * sample.mass), "--points", "3"]
     main(["optimum", str(path), "--over", "bodies.vane.mass", *ends, *band])  # all peaks are alike to rounding
     with (folder / "build/vane/optimum.csv").open(newline="") as file:
-        rows = [(float(r["bodies.vane.mass"]), float(r["frequency_Hz"])) for r in csv.DictReader(file)]
+        rows = [(float(r["bodies.vane.mass_kg"]), float(r["frequency_Hz"])) for r in csv.DictReader(file)]
     mass, frequency = np.array(rows).T
     assert len(mass) == 4  # three followed, and the lowest of them once more
     np.testing.assert_allclose(frequency * np.sqrt(mass), (frequency * np.sqrt(mass))[0], rtol=0.02)

@@ -50,6 +50,24 @@ def test_a_jenkins_element_against_its_closed_form(low, high, sizes):
     assert all((abs(found.amplitude - a) < 1e-9 * a).any() for a in asked)
 
 
+def test_a_mode_that_is_nearly_linear_passes_its_checks():
+    """Its elements take next to nothing, so that its energies are those of its dampers and of what feeds them: with
+    respect to the elements' work alone rounding was a hundredth of a percent, and the mode counted as lost."""
+    K = 2.0 * np.eye(3) - np.eye(3, k=1) - np.eye(3, k=-1)
+    chain = ms.structure(np.eye(3), K, damping_ratio=0.01, elements=[ms.polynomial({3: 0.01}, at=2)], output=[0])
+    mode = ms.backbone(chain, 1e-3, 1e-2, harmonics=1)
+    np.testing.assert_allclose(mode.damping, 0.01, rtol=1e-5)
+    assert mode.complete, mode.status
+
+
+def test_a_mode_fed_too_little_fails_its_checks():
+    """With a tenth less than its damping the forces of its contacts do not move the bodies as they move."""
+    found, curve = backbone(sliding(), 2.0e-5, 2.1e-5), _Curve(replace(sliding(), share=0.0), 0)
+    x, omega, xi = found.x[0], found.Omega[0], 2 * found.Omega[0] * found.damping[0]
+    assert not curve.checks(x, omega, xi).failure
+    assert curve.checks(x, omega, 0.9 * xi).failure.startswith("read-out")
+
+
 def test_a_free_motion_in_time_decays_as_the_curve_says():
     """log(a / b) / pi of neighbouring half swings a > b is the damping ratio at sqrt(a b), to about 1 % of what changes
     within a swing; here it grows by two thirds while the motion falls to a third."""

@@ -42,7 +42,6 @@ def test_curves(tmp_path):
     shown = [
         operating.over_frequency_plot(curves, "amplitude in µm", "t", tmp_path / "a.png"),
         operating.over_normal_force_plot(peaks, "y", "t", tmp_path / "b.png"),
-        operating.over_engine_order_plot({1.0: (np.arange(4), f[:4])}, "stress in MPa", "t", tmp_path / "c.png"),
     ]  # fmt: skip
     assert all(0.01 < dark(p) < 0.6 for p in shown)
 

@@ -74,3 +74,13 @@ def test_the_picture_of_a_response_tells_the_unit_of_its_load(row: str, unit: st
     case = {"body": "small", "excitation": row, "amplitude": 20.0, "monitor": "tip-probe", "contacts": []}
     built = ms.assemble(case, small=small_basis())
     assert _driven_by(SimpleNamespace(settings=built.settings, built=built)) == f" to 20 {unit} at {row}"
+
+
+def test_a_nonlinear_mode_tells_its_progress_in_the_unit_of_its_read_out() -> None:
+    """A strain is none in metres."""
+    rub = {"interface": "right", "normal_stiffness": 2e6, "tangential_stiffness": 4e6, "includes": "bulk+surface"}
+    rub |= {"law": "jenkins", "friction": 0.2, "points": [1, 1], "normal_force": 20.0}
+    case = {"body": "vane", "excitation": "magnet", "modes": 2, "contacts": [rub], "monitor": "root", "harmonics": 1}
+    told = list[str]()
+    found = ms.backbone(ms.assemble(case, vane=ms.sample()), 1e-7, 1.2e-7, report=told.append)
+    assert found.quantity == STRAIN and told[-1].endswith(" nm/m") and not any(t.endswith(" m") for t in told)

@@ -13,11 +13,11 @@ import small
 from hypothesis import given
 from hypothesis import strategies as st
 
-from microslip.data import ModalBasis
+from microslip.data import ContactState, ModalBasis
 from microslip.report.body import report_html
 from microslip.report.page import text
 from microslip.report.response import response_html, survey_html
-from microslip.report.words import certificate, fit_sentence, number_list
+from microslip.report.words import certificate, contact_sentence, fit_sentence, number_list
 
 PNG = bytes.fromhex(
     "89504e470d0a1a0a0000000d4948445200000001000000010802000000907753de0000000c4944415408d763f8ffff3f0005fe02fe"
@@ -303,10 +303,27 @@ def test_the_answer_is_a_resonance_that_is_valid() -> None:
     assert "uncertain by less than 0.01" in words and "32000" in words and "10000" in words and "·10" not in words
 
 
+def test_a_contact_tells_what_is_left_of_its_penetration_where_it_is_no_rounding() -> None:
+    x, one = np.zeros((3, 3)), np.ones(3)
+    state = ContactState(
+        "a", "b", "", "open", 0, 240.0, 0.1, 8e-17, 1.0, 0.0, x[0], x[0], x, 1e6 * one, 1e-6 * one, one
+    )
+    assert "at most 1 MPa; the modes leave it open" in contact_sentence("shroud", state)
+    assert "(penetration left 0.002 µm)" in contact_sentence("shroud", dataclasses.replace(state, penetration=2e-9))
+
+
 def test_what_stands_in_a_table_is_told_once_and_rounding_not_at_all() -> None:
     modes = [{"frequency_Hz": 874.25, "damping_ratio": 0.01, "half_power_width_Hz": 17.5}]
     told = {"stuck_modes": modes, "stuck_frequencies_Hz": [874.25], "rising_at_the_edge": []}
     words = said(response_html(told, {}))
     assert words.count("874.25") == 1 and "Modes with sticking contacts" in words and "rising" not in words
+    orders = {
+        "amplitude_m_FN_10_N": ["2e-5"],
+        "resonance_Hz_FN_10_N": ["99.5"],
+        "stress_amplitude_Pa_as_pressed": ["1e6"],
+    }
+    table = said(survey_html("t", [], {"t.csv": orders}, []))
+    assert "FN = 10 N: amplitude in µm" in table and "FN = 10 N: resonance in Hz" in table and "20" in table
+    assert "as pressed: stress amplitude in MPa" in table
     table = said(survey_html("t", [], {"t.csv": {"load_m": ["1.5e-3", "1e-16"], "speed_rad_s": ["2", "3"]}}, []))
     assert "load in µm" in table and "1500" in table and "1e-10" not in table and "speed in rad/s" in table

@@ -551,7 +551,7 @@ def test_as_many_harmonics_as_the_error_asks_for(folder: Path) -> None:
     assert f",{H}," in (build / "response.csv").read_text().splitlines()[1]
     assert f"<td>{H}</td>" in (build / "response.html").read_text()
     opened = open_case(folder / "case.toml", {"sled": folder / "basis.h5"}, build)
-    assert opened.with_({}).settings.harmonics == H and opened.with_({}).settings.sampled >= 8 * H
+    assert opened.plain.settings.harmonics == H and opened.plain.settings.sampled >= 8 * H
 
 
 def turning_sample(folder: Path) -> None:

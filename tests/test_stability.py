@@ -23,7 +23,7 @@ from microslip.harmonic_balance import problem as balance
 from microslip.harmonic_balance.forces import AFT
 from microslip.harmonic_balance.problem import Group, Problem
 from microslip.harmonic_balance.solver import newton
-from microslip.harmonic_balance.stability import Orbit, Settings, _carrier, hill, judged, multipliers, orbit, stability
+from microslip.harmonic_balance.stability import Orbit, Settings, _carrier, judged, multipliers, orbit, stability
 from microslip.system.assembly import Assembly, Contact, ContactFace, Linear
 
 
@@ -111,6 +111,47 @@ def solved(problem, Omega):
 def slope_of(problem, x, Omega):
     slope = problem.at(Omega).forces(x)[1][0][0].transpose(1, 0, 3, 2)
     return slope.reshape(problem.size, problem.size)
+
+
+def hill(orbit, slope):
+    """Multipliers exp(lambda T) of Hill's method, in the frequency domain, for contacts without memory (G. von Groll,
+    D. J. Ewins, J. Sound Vib. 241, 2001).
+
+    A perturbation exp(lambda t) p(t) with p of H harmonics leads to (lambda^2 M + lambda (2 D M + C) + A) p = 0, D the
+    derivative in time and A = D^2 M + D C + K + T^T k T of the balance itself. Of its 2 m (2 H + 1) eigenvalues those
+    2 m are right whose p is centred about the mean (T. Detroux et al., Comput. Methods Appl. Mech. Eng. 296, 2015).
+
+    Args:
+        slope: (c (2 H + 1), c (2 H + 1)) derivative k of the contact forces' harmonics, the harmonics in the order of
+            `Orbit.displacement`, the c rows of each together.
+    """
+    coefficients, m = orbit.displacement.shape[1], len(orbit.M)
+    D = orbit.Omega * derivative(coefficients // 2)
+    unit = np.eye(coefficients)
+    T = np.kron(unit, orbit.rows)
+    k = np.linalg.solve(np.eye(len(T)) + slope @ np.kron(unit, orbit.compliance), slope)
+    A = np.kron(D @ D, orbit.M) + np.kron(D, orbit.C) + np.kron(unit, orbit.K) + T.T @ k @ T
+    B = 2 * np.kron(D, orbit.M) + np.kron(unit, orbit.C)
+    inverse = np.kron(unit, np.linalg.inv(orbit.M))
+    exponents, shapes = np.linalg.eig(np.block([[np.zeros_like(A), np.eye(len(A))], [-inverse @ A, -inverse @ B]]))
+    size = (np.abs(shapes[: len(A)].reshape(coefficients, m, -1)) ** 2).sum(axis=1)
+    order = np.array([0] + [h for h in range(1, coefficients // 2 + 1) for _ in range(2)])
+    values = []
+    for i in np.argsort(order @ size / size.sum(axis=0), kind="stable"):
+        value = complex(np.exp(exponents[i] * orbit.period))
+        twin = value.real < 0 and abs(value.imag) < 1e-7 * abs(value) and exponents[i].imag < 0  # exp of both is one
+        if not twin and len(values) < 2 * m:
+            values.append(value)
+    largest = np.array(sorted(values, key=lambda z: -abs(z)))
+    return judged(largest, np.zeros(len(largest)), Settings().margin)
+
+
+def derivative(harmonics):
+    """(2 H + 1, 2 H + 1) harmonics of the derivative with respect to Omega t: mean, cos, sin, ..."""
+    D = np.zeros((2 * harmonics + 1, 2 * harmonics + 1))
+    for h in range(1, harmonics + 1):
+        D[2 * h - 1, 2 * h], D[2 * h, 2 * h - 1] = h, -h
+    return D
 
 
 # closed forms ---------------------------------------------------------------------------------------------------------

@@ -101,7 +101,7 @@ def test_respond_over_orders(ring: Path, capsys) -> None:
     ring.write_text(RING + "[orders]\nengine_orders = [1, 2]\n")
     assert main(["respond", "case.toml", "--over", "orders", "-q"]) == 0
     found = rows("build/ring/orders.csv")
-    np.testing.assert_allclose(found["resonance_Hz_F_N_10000_N"], found["stuck_Hz_F_N_10000_N"], rtol=2e-3)
+    np.testing.assert_allclose(found["resonance_Hz_FN_10000_N"], found["stuck_Hz_FN_10000_N"], rtol=2e-3)
     assert found["engine_order"].tolist() == [1, 2]
     assert Path("build/ring/pictures/orders.png").is_file()
     page = Path("build/ring/orders.html").read_text()
@@ -163,7 +163,7 @@ def test_over_orders_the_worst_stress_leads(ring: Path, capsys) -> None:
     assert first.startswith("Over engine orders 1 and 2 the worst stress amplitude is lowest under F_N = ")
     orders, told = rows("build/ring/orders.csv"), rows("build/ring/orders_worst.csv")
     for force, most in zip(told["normal_force_N"], told["stress_amplitude_Pa"], strict=True):
-        assert most == orders[f"stress_amplitude_Pa_F_N_{force:g}_N"].max()
+        assert most == orders[f"stress_amplitude_Pa_FN_{force:g}_N"].max()
     assert f"{1e-6 * told['stress_amplitude_Pa'].min():.4g} MPa" in first
     assert Path("build/ring/pictures/orders_worst.png").stat().st_size > 10000
     assert first.split(":")[0] in Path("build/ring/orders.html").read_text().replace("<sub>N</sub>", "_N")

@@ -471,7 +471,8 @@ def test_a_law_without_a_value_is_named(by) -> None:
         found = swept(rubbed(law=Broken(*parts)), **few)
         assert not found.converged.any() and "Broken" in found.status[0] and "'rub'" in found.status[0]
     else:
-        status = families.over_load(problem.of(rubbed(law=Rooted(*parts)), **few), 5.0, 1e-3, 1.0).status
+        family = families.of_load(problem.of(rubbed(law=Rooted(*parts)), **few), 5.0, 1e-3, 1.0)
+        status = families.followed(family).status
         assert "Rooted" in status and "'rub'" in status
 
 

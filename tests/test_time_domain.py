@@ -556,6 +556,29 @@ def test_contacts_remember_the_balance_that_a_motion_begins_on() -> None:
     assert float(led.held.force[0]) == pytest.approx(found_force(slider, frequency), abs=2e-3)
 
 
+def test_a_start_on_few_harmonics_says_what_they_leave_out() -> None:
+    """Of a slider: one harmonic misses the motion by as much as it says, within a factor of three; nine miss little."""
+    slider, w = systems()["slider"]
+    few, many = (
+        ms.integrate(balanced(slider, h, 16 * h), w, unit="rad/s", settle=0, keep=1, steps=1024, start="balance")
+        for h in (1, 25)
+    )
+    (said,) = few.messages
+    assert "with 1 harmonic leaves out about" in said and not many.messages
+    told = starts.of_balance(few.equations, balanced(slider, 1, 16)).beside
+    off = abs(few.q[:, 0] - many.q[:, 0]).max() / abs(many.q).max()
+    assert off / 3 < told < 3 * off
+
+
+def test_what_reads_rounding_alone_is_zero() -> None:
+    """Of two equal masses pushed alike, their difference, summed up with rounding, and the sum itself."""
+    q = np.outer(np.sin(np.linspace(0, 6, 50)), [1.0, 1.0 + 1e-14])
+    output = np.array([[1.0, -1.0], [1.0, 1.0]])
+    found = samples.without_rounding(q @ output.T, output, q)
+    assert not found[:, 0].any()
+    np.testing.assert_array_equal(found[:, 1], q.sum(axis=1))
+
+
 def found_force(system: object, frequency: float) -> float:
     """N, of the only contact at t = 0, by 101 harmonics."""
     motion = ms.harmonic_response(system, [frequency], harmonics=101, unit="rad/s").motion(0)

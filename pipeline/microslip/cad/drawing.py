@@ -98,9 +98,9 @@ def name_face(name: str, surfaces: Iterable[int]) -> None:
     gmsh.model.addPhysicalGroup(2, tags, name=name)
 
 
-def name_body(volumes: Iterable[int] | None = None) -> None:
-    """Name the volumes, all of them by default, as the physical group "body"."""
-    tags = [tag for _, tag in gmsh.model.getEntities(3)] if volumes is None else sorted(volumes)
+def name_body() -> None:
+    """Name all volumes as the physical group "body"."""
+    tags = [tag for _, tag in gmsh.model.getEntities(3)]
     if not tags:
         raise UserError("the drawing has no volume")
     gmsh.model.addPhysicalGroup(3, tags, name="body")

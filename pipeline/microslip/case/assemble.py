@@ -123,7 +123,6 @@ def build(settings: CaseSettings, bases: Mapping[str, ModalBasis], path: Path | 
 
 
 def _component(settings: CaseSettings, b: Loaded) -> Component:
-
     name, groups = b.settings.name, dict(b.groups) if b.basis.sectors > 1 else {0: b.group}
     component = Component(name, groups, b.basis.sectors, _residual_share(settings, name, b))
     return as_asked(component, settings.damping_as, b.viscous)
@@ -211,7 +210,6 @@ def _loads(
 
 
 def _outputs(settings: CaseSettings, bodies: Mapping[str, Loaded], path: Path | str) -> tuple[Output, ...]:
-
     found = []
     for m in settings.outputs:
         body, name = settings.address(m.monitor)

@@ -191,7 +191,7 @@ def curves(
     """
     asked, built = settings.curve or CurveOfCase(), build(settings, bases, path)
     of = measured(built.assembly)
-    ends, how = _ends(built, asked, over, path), _settings(asked)
+    ends, how = _ends(built, asked, over, path), Settings(points=asked.points, branch_points=False)
     found: list[Followed] = []
     with keep(built) as journal:
         for normal in _forces(built, over, ends, path):
@@ -221,11 +221,6 @@ def _followed(
     report(f"curve over the {one.over.replace('_', ' ')}, {one.label}")
     branch, rows = resumed_curve(family, journal, one.name, report, how)
     return replace(one, rows=rows, status=branch.status)
-
-
-def _settings(asked: CurveOfCase) -> Any:
-
-    return Settings(points=asked.points, branch_points=False)
 
 
 def _ends(built: Built, asked: CurveOfCase, over: str, path: Path | str) -> tuple[float, float]:
@@ -275,7 +270,6 @@ def _resonance(
 
 
 def _family(built: Built, problem: Problem, one: Followed) -> Family:
-
     a, b = one.ends
     if one.over == "frequency":
         return families.of_frequency(problem, a, b)

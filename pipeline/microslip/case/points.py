@@ -180,7 +180,6 @@ def pieces(c: ContactSettings, load: float | None) -> Patch:
 
 
 def _curved(c: ContactSettings, law: Law, points: Array) -> Law:
-
     return law if c.curvature is None else apart(law, gap(points, c.curvature))
 
 
@@ -215,7 +214,6 @@ def _line(c: ContactSettings) -> Line | None:
 
 
 def _ellipse(c: ContactSettings) -> Hertz:
-
     assert c.curvature is not None and c.young is not None
     solid = Solid(c.young, c.poisson)
     return Hertz(solid, solid, *(0.5 / r for r in c.curvature))

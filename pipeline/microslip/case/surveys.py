@@ -133,7 +133,6 @@ def _at_speed(settings: CaseSettings, turning: list[str], rpm: float) -> CaseSet
 
 
 def _force_at(built: Built, asked: Any, rpm: float, path: Path | str) -> float | None:
-
     if asked is None:
         return _one_force(built, path, "speeds")
     if asked == "static":

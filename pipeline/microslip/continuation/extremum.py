@@ -181,11 +181,11 @@ Family = Callable[[float], Rated]
 """The problem at a value of the parameter. Unknowns and scales must mean the same at all of them."""
 
 
-def rated(family: Family, value: float, peak: Peak, share: float = 1e-4) -> Peak:
+def rated(family: Family, value: float, peak: Peak) -> Peak:
     """The peak with the derivative of its height's logarithm, by differences of R and g at the peak's place."""
     if not peak.converged:
         return peak
-    h = share * (abs(value) or 1.0)
+    h = 1e-4 * (abs(value) or 1.0)
     problem = family(value)
     slope = _Slope(problem)
     scaled, y = slope.scaled, slope.scaled.pack(peak.x, peak.lam)

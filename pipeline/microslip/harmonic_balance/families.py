@@ -21,27 +21,6 @@ from .problem import AtFrequency, Problem
 from .solver import CONVERGED, OverLoad, Point, Report, solve
 
 
-@dataclass(frozen=True)
-class Curve:
-    """Motions along a curve.
-
-    Attributes:
-        parameter: (p,) Hz, share of the loads or of the normal forces. points: motions, in order. kinds: of each, see
-            `continuation.Point`: "fold", "bound", ... status: why it ended. problem: the balance at a value.
-    """
-
-    parameter: Array
-    points: tuple[Point, ...]
-    kinds: tuple[str, ...]
-    status: str
-    problem: Callable[[float], Problem]
-
-    @property
-    def folds(self) -> Array:
-        """Values of the parameter at which the curve turns."""
-        return self.parameter[[kind == "fold" for kind in self.kinds]]
-
-
 @dataclass(frozen=True, eq=False)
 class OverNormal:
     """The balance at one frequency over a factor on the normal forces, for `continuation`.
@@ -146,40 +125,6 @@ def of_normal_force(
     Omega = 2 * np.pi * frequency
     equations = OverNormal(problem, Omega, problem.x_scale, abs(high - low) / 10, contacts)
     return Family(equations, low, high, 1.0, "of the normal force", equations.at, lambda _: Omega)
-
-
-def over_frequency(
-    problem: Problem, low: float, high: float, report: Report = lambda _: None, settings: Settings | None = None
-) -> Curve:
-    """From one frequency (Hz) to another, which may be the lower one, through all folds between.
-
-    Args:
-        settings: how the curve is followed; its bounds and direction are those of the frequencies.
-    """
-    return curve(of_frequency(problem, low, high), report, settings)
-
-
-def over_load(
-    problem: Problem, frequency: float, low: float, high: float, report: Report = lambda _: None,
-    settings: Settings | None = None,
-) -> Curve:  # fmt: skip
-    """From one share of the loads that are not steady to another, at a frequency (Hz)."""
-    return curve(of_load(problem, frequency, low, high), report, settings)
-
-
-def over_normal_force(
-    problem: Problem, frequency: float, low: float, high: float, report: Report = lambda _: None,
-    settings: Settings | None = None,
-) -> Curve:  # fmt: skip
-    """From one factor on all normal forces to another, at a frequency (Hz)."""
-    return curve(of_normal_force(problem, frequency, low, high), report, settings)
-
-
-def curve(family: Family, report: Report = lambda _: None, settings: Settings | None = None) -> Curve:
-    """The curve of a family."""
-    branch = followed(family, report, settings)
-    kinds = tuple(p.kind for p in branch.points)
-    return Curve(branch.lam / family.unit, family.points(branch), kinds, branch.status, family.problem)
 
 
 def followed(

@@ -32,6 +32,7 @@ from ..results.series import Series
 from ..system import assembly
 from ..system.assembly import Linear
 from ..units import METRES, Quantity
+from .checks import checks
 from .problem import AtFrequency, Problem
 from .readout import amplitude, measured
 from .response import operating
@@ -59,7 +60,7 @@ class Backbone:
         amplitude: (k,) of the read-out's first harmonic, in the unit of `quantity`. Omega: (k,) rad/s.
             damping: (k,) ratio.
         x: (k, size), see `Problem`. stuck: rad/s, with sticking contacts. status: why it ended. checks: of its points
-            (`results.checks`), the force that feeds the losses among the bodies' own. quantity: what the read-out
+            (`results.checks`), of which the force that feeds the losses is the load. quantity: what the read-out
             measures.
     """
 
@@ -191,29 +192,28 @@ def backbone(
     settings = settings or Settings(step=0.05, step_max=0.2, folds=False, branch_points=False)
     bounds = np.log([low, high])
     settings = replace(settings, low=float(bounds[0]) - 1e-9, high=float(bounds[1]), targets=tuple(np.log(asked)))
-    points = list[Point]()
+    points, quantity = list[Point](), measured(problem.assembly, output)
     for state in follow(curve, start(curve, z, float(bounds[0]), settings), settings):
         points += state.found
         if points:
             share = int(100 * min((points[-1].lam - bounds[0]) / (bounds[1] - bounds[0]), 1.0))
-            report(f"{share} of 100 % of the amplitudes: {np.exp(points[-1].lam):.4g} m")
+            report(f"{share} of 100 % of the amplitudes: {quantity.sized(np.exp(points[-1].lam))}")
     A = np.exp([p.lam for p in points])
     Omega, xi = (np.array([p.x[i] for p in points]) for i in (-2, -1))
     x = np.array([p.x[:-2] * a / problem.length for p, a in zip(points, A, strict=True)]).reshape(len(A), len(z) - 2)
     found = tuple(curve.checks(*one) for one in zip(x, Omega, xi, strict=True))
-    quantity = measured(problem.assembly, output)
     status = next((one.failure for one in found if one.failure), _in_words(state.status, points, low, high, quantity))
     return Backbone(A, Omega, xi / (2 * Omega) if len(A) else xi, x, omega, status, found, quantity)
 
 
-def strongest(problem: Problem, low: float, high: float, output: int = 0) -> int:
-    """Number of the mode with sticking contacts that makes the highest resonance of a read-out under the loads, among
-    those between two frequencies (rad/s), or among all if there is none.
+def strongest(problem: Problem, low: float, high: float) -> int:
+    """Number of the mode with sticking contacts that makes the highest resonance of the first read-out, among those
+    between two frequencies (rad/s), or among all if there is none.
 
     With (w phi)(phi^H f) / (phi^H C phi omega) as the height of each.
     """
     part, (omega, shapes) = _only(problem), stuck_modes(problem)
-    seen, driven = np.abs(part.output[output] @ shapes), np.abs(shapes.conj().T @ part.load)
+    seen, driven = np.abs(part.output[0] @ shapes), np.abs(shapes.conj().T @ part.load)
     loss = np.einsum("im,ij,jm->m", shapes.conj(), 0.5 * (part.C + part.C.conj().T), shapes).real * omega
     if part.loss is not None:
         loss += np.einsum("im,ij,jm->m", shapes.conj(), part.loss, shapes).real
@@ -222,10 +222,10 @@ def strongest(problem: Problem, low: float, high: float, output: int = 0) -> int
     return int(np.argmax(np.where(inside, height, 0.0) if height[inside].any() else height))
 
 
-def sliding_amplitude(problem: Problem, mode: int = 0, output: int = 0) -> float:
-    """About the amplitude of a read-out, m, at which the contacts begin to slide in a mode: their largest motion is
-    then `Problem.length`."""
-    curve = _Curve(problem, output)
+def sliding_amplitude(problem: Problem, mode: int) -> float:
+    """About the amplitude of the first read-out, m, at which the contacts begin to slide in a mode: their largest
+    motion is then `Problem.length`."""
+    curve = _Curve(problem, 0)
     curve.linear(problem, mode)
     return float(problem.length / curve.x_scale[0])
 
@@ -280,8 +280,11 @@ class _Curve:
         return at.residual_of(x, force), amplitude(at, x, force, slopes, self.output).value
 
     def checks(self, x: Array, Omega: float, xi: float) -> Checks:
-        """Of a point of the mode."""
-        return operating(self._fed(xi), Solved(Omega, x, CONVERGED, 0.0, 0)).checks
+        """Of a point of the mode: the force that feeds the losses supplies xi v . M v."""
+        fed = self._fed(xi)
+        found = operating(fed, Solved(Omega, x, CONVERGED, 0.0, 0))
+        supplied = 2 * np.pi * xi * found.kinetic / Omega  # J per cycle; its share of `damped` is taken back
+        return checks(fed, replace(found, supplied=found.supplied + supplied, damped=found.damped + supplied))
 
     def _fed(self, xi: float) -> Problem:
         parts = tuple(tuple(replace(p, C=p.C - xi * p.M) for p in one) for one in self.problem.parts)

@@ -48,8 +48,11 @@ def filled_response(
         one, other = solved[low][0], solved[high][0]
         before = [f for f in solved if low < f < high]
         if len(before) < one.converged + other.converged:
+            told = ""
             for point in last_solutions(problem, one, other):
-                report(f"a point is added at {point.Omega / (2 * np.pi):.6g} Hz, where the curve ends")
+                words = f"a point is added at {point.Omega / (2 * np.pi):.6g} Hz, where the curve ends"
+                if words != told:  # both sides of a fold may read alike
+                    report(told := words)
                 take(point.Omega / (2 * np.pi), point, True)
     chosen = asked + [f for f in solved if f not in asked]
     points, found = zip(*(solved[f] for f in chosen), strict=True)

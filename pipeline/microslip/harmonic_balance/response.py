@@ -14,6 +14,7 @@ from ..continuation import SEARCH
 from ..continuation import peak as climbed
 from ..data import Array, ComplexArray, Compliance, ModalGroup, Rows
 from ..results.checks import UNCHECKED, Checks, exchanged
+from ..results.series import without_rounding
 from ..system.assembly import Assembly, ContactFace, Load, Output, preloaded_contact
 from ..system.component import Component
 from . import problem as balance
@@ -136,11 +137,11 @@ class HarmonicResponse(FrequencyResponse):
     iterations: Array
 
     def columns(self) -> dict[str, Array]:
-        of, name = range(2, self.harmonics.shape[1]), self.quantity.column
-        more = {name(f"amplitude_{h}"): np.abs(self.harmonics[:, h]) for h in of}
+        name, a = self.quantity.column, without_rounding(self.harmonics)
+        more = {name(f"amplitude_{h}"): np.abs(a[:, h]) for h in range(2, a.shape[1])}
         return {
             **super().columns(),
-            name("mean"): self.harmonics[:, 0].real,
+            name("mean"): a[:, 0].real,
             **more,
             "slip_dissipated_J": self.by_slip,
             "slipping": self.slipping.sum(axis=1) / max(self.slipping.shape[1], 1),

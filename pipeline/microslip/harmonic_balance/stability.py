@@ -9,10 +9,6 @@ Numerical Integration, Springer 2006, II.1). Its error is h^2, so that two step 
 Not all of the state is looked at. Perturbations of the motion reach what they can; where no direction is added any
 more the map is closed. A slider that sticks all the time keeps whatever offset it is given: a multiplier of exactly 1
 for each, which no motion reaches and which says nothing about the motion. A slider that slides forgets.
-
-`hill` is the other way, in the frequency domain, from the derivative that harmonic balance has anyway (G. von Groll and
-D. J. Ewins, J. Sound Vib. 241, 2001). It knows perturbations that repeat up to exp(lambda t), which a slider answers
-otherwise than the periodic motion itself: right for contacts without memory only.
 """
 
 from __future__ import annotations
@@ -436,47 +432,3 @@ def _pushed(
 
 def _step(law: Law, dt: float, u: jax.Array, v: jax.Array, state: State) -> tuple[jax.Array, State]:
     return law.step(u, v, dt, state)
-
-
-# in the frequency domain --------------------------------------------------------------------------------------------
-
-
-def hill(orbit: Orbit, slope: Array, settings: Settings | None = None) -> Stability:
-    """Multipliers exp(lambda T) of Hill's method, for contacts without memory.
-
-    A perturbation exp(lambda t) p(t) with p of H harmonics leads to (lambda^2 M + lambda (2 D M + C) + A) p = 0, D the
-    derivative in time and A = D^2 M + D C + K + T^T k T of the balance itself. Of its 2 m (2 H + 1) eigenvalues those
-    2 m are right whose p is centred about the mean (T. Detroux et al., Comput. Methods Appl. Mech. Eng. 296, 2015).
-
-    Args:
-        slope: (c (2 H + 1), c (2 H + 1)) derivative k of the contact forces' harmonics, the harmonics in the order of
-            `Orbit.displacement`, the c rows of each together.
-    """
-    s = settings or Settings()
-    coefficients, m = orbit.displacement.shape[1], len(orbit.M)
-    D = orbit.Omega * _derivative(coefficients // 2)
-    unit = np.eye(coefficients)
-    T = np.kron(unit, orbit.rows)
-    k = np.linalg.solve(np.eye(len(T)) + slope @ np.kron(unit, orbit.compliance), slope)
-    A = np.kron(D @ D, orbit.M) + np.kron(D, orbit.C) + np.kron(unit, orbit.K) + T.T @ k @ T
-    B = 2 * np.kron(D, orbit.M) + np.kron(unit, orbit.C)
-    inverse = np.kron(unit, np.linalg.inv(orbit.M))
-    exponents, shapes = np.linalg.eig(np.block([[np.zeros_like(A), np.eye(len(A))], [-inverse @ A, -inverse @ B]]))
-    size = (np.abs(shapes[: len(A)].reshape(coefficients, m, -1)) ** 2).sum(axis=1)
-    order = np.array([0] + [h for h in range(1, coefficients // 2 + 1) for _ in range(2)])
-    values: list[complex] = []
-    for i in np.argsort(order @ size / size.sum(axis=0), kind="stable"):
-        value = complex(np.exp(exponents[i] * orbit.period))
-        twin = value.real < 0 and abs(value.imag) < 1e-7 * abs(value) and exponents[i].imag < 0  # exp of both is one
-        if not twin and len(values) < 2 * m:
-            values.append(value)
-    largest = np.array(sorted(values, key=lambda z: -abs(z))[: s.largest])
-    return judged(largest, np.zeros(len(largest)), s.margin)
-
-
-def _derivative(harmonics: int) -> Array:
-    """(2 H + 1, 2 H + 1) harmonics of the derivative with respect to Omega t: mean, cos, sin, ..."""
-    D = np.zeros((2 * harmonics + 1, 2 * harmonics + 1))
-    for h in range(1, harmonics + 1):
-        D[2 * h - 1, 2 * h], D[2 * h, 2 * h - 1] = h, -h
-    return D

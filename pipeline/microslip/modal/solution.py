@@ -145,16 +145,14 @@ def certified(searched: Sequence[Searched]) -> list[Searched]:
     return [done[i] for i in range(len(searched))]
 
 
-def shared_shifts(gaps: Sequence[tuple[float, float]], margin: float = 0.05) -> list[float]:
+def shared_shifts(gaps: Sequence[tuple[float, float]]) -> list[float]:
     """For each gap (low, high) a value inside it, as few different ones as possible (interval stabbing).
 
     A certificate needs one shift above the last eigenvalue kept and below the next one; nodal diameters whose gaps
-    overlap are counted with one factorisation.
-
-    Args:
-        margin: share of a gap that is kept clear at each end, so that no shift comes close to an eigenvalue.
+    overlap are counted with one factorisation. A twentieth of a gap is kept clear at each end, so that no shift comes
+    close to an eigenvalue.
     """
-    inner = [(low + margin * (high - low), high - margin * (high - low)) for low, high in gaps]
+    inner = [(low + 0.05 * (high - low), high - 0.05 * (high - low)) for low, high in gaps]
     chosen = [0.0] * len(inner)
     order = sorted(range(len(inner)), key=lambda i: inner[i][1])
     while order:

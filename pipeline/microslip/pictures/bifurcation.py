@@ -16,10 +16,10 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 
-def diagram_picture(found: Diagram, path: Path, title: str, axis: str, read_out: int = 0) -> Path:
+def diagram_picture(found: Diagram, path: Path, title: str, axis: str) -> Path:
     """Half of the way from the smallest to the largest value of a read-out over the parameter."""
     figure, axes = single_panel(10.5, 5.4)
-    found.plot(axes, axis, read_out)
+    found.plot(axes, axis)
     axes.set_title(title, fontweight="bold")
     return save_figure(figure, path)
 

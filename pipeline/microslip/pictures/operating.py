@@ -23,7 +23,6 @@ from .plots import (
     save_figure,
     single_panel,
     through,
-    whole_numbers,
 )
 
 if TYPE_CHECKING:
@@ -117,24 +116,6 @@ def numbers_within(axis: Any) -> None:
     span = np.log10(high / low)
     within = (1.0,) if span > 2.5 else (1.0, 2.0, 5.0) if span > 0.8 else tuple(np.arange(1.0, 10.0))
     plain_numbers(axis, within)
-
-
-def over_engine_order_plot(curves: Curves, quantity: str, title: str, path: Path) -> Path:
-    """A quantity over the engine order for selected normal forces, as in Sextro Figs. 5.5-4 and 5.5-5.
-
-    Args:
-        curves: normal force, N -> engine orders and values.
-    """
-    figure, axes = single_panel(8.0, 5.2)
-    marks = "osD^vP*X"
-    for i, (colour, (normal, (x, y))) in enumerate(zip(shades(len(curves)), sorted(curves.items()), strict=True)):
-        axes.semilogy(
-            x, y, marker=marks[i % len(marks)], color=colour, linewidth=1.4, markersize=5, label=f"$F_N$ = {normal:g} N"
-        )
-    axes.set(xlabel="engine order", ylabel=quantity, title=title)
-    whole_numbers(axes)
-    figure.legend(loc="outside right upper", fontsize=9)
-    return save_figure(figure, path)
 
 
 # fatigue -----------------------------------------------------------------------------------------------------------

@@ -34,20 +34,19 @@ WINDOW = 8
 EVENT_MARKS = (("closes", "v", 4, "meets"), ("slips", "|", 9, "begins to slip"))
 
 
-def orbit_picture(orbit: Orbit, path: Path, title: str, read_out: int = 0) -> Path:
+def orbit_picture(orbit: Orbit, path: Path, title: str) -> Path:
     """What its read-out does, and where there is friction, the ways of contacts in their plane and their loops.
 
     Phase portrait, the last periods with events, the spectrum; where the motion does not repeat, its Poincare section
     and how the spectrum changes. Of a run-up, its size over the frequency, and the spectrum that changes with that.
     """
-    drawn: list[Callable[..., object]] = [orbit.plot, partial(_history, orbit), partial(_spectrum, orbit)]
+    panels: list[Panel] = [orbit.plot, partial(_history, orbit), partial(_spectrum, orbit)]
     if orbit.run_up:
-        drawn = [partial(_over_frequency, orbit), partial(_history, orbit)]
+        panels = [partial(_over_frequency, orbit), partial(_history, orbit)]
     elif not orbit.repeats:
-        drawn.insert(1, partial(_section, orbit))
+        panels.insert(1, partial(_section, orbit))
     if not orbit.repeats and len(orbit.time) >= 2 * WINDOW * orbit.samples:
-        drawn.append(partial(_orders if orbit.run_up else _spectrogram, orbit))
-    panels: list[Panel] = [partial(draw, read_out=read_out) for draw in drawn]
+        panels.append(partial(_orders if orbit.run_up else _spectrogram, orbit))
     areas = loops(orbit)
     rubbing = [i for i in range(len(orbit.touching)) if rubs(orbit, i)]
     for i in sorted(rubbing, key=lambda i: -np.nansum(areas[coordinates(orbit, i)]))[:OF_CONTACTS]:
@@ -82,30 +81,30 @@ def portraits(orbits: Sequence[tuple[str, Orbit]], path: Path, title: str) -> Pa
     return save_figure(figure, path)
 
 
-def _section(orbit: Orbit, axes: Axes, read_out: int) -> None:
+def _section(orbit: Orbit, axes: Axes) -> None:
     """Velocity over displacement after every period: the Poincare section."""
     last = slice(orbit.samples - 1, None, orbit.samples)
-    (y, unit), (v, per_second) = (_sized(x[read_out], orbit.of(read_out)) for x in (orbit.y, orbit.v))
+    (y, unit), (v, per_second) = (_sized(x[0], orbit.of(0)) for x in (orbit.y, orbit.v))
     axes.plot(y[last], v[last], ".", color=COLOURS[1], markersize=5)
-    axes.set(xlabel=f"{orbit.labels[read_out]} in {unit}", ylabel=f"velocity in {per_second}/s")
+    axes.set(xlabel=f"{orbit.labels[0]} in {unit}", ylabel=f"velocity in {per_second}/s")
     axes.set_title(f"Poincaré section, {len(y[last])} periods", fontsize=9)
 
 
-def _over_frequency(orbit: Orbit, axes: Axes, read_out: int) -> None:
+def _over_frequency(orbit: Orbit, axes: Axes) -> None:
     """Displacement over the frequency of the excitation, and its largest size in every period of that."""
-    f, (y, unit) = orbit.frequency, _sized(orbit.y[read_out], orbit.of(read_out))
+    f, (y, unit) = orbit.frequency, _sized(orbit.y[0], orbit.of(0))
     moves = np.flatnonzero(f != f[-1])
     period = np.floor(np.cumsum(f[moves]) * (orbit.time[1] - orbit.time[0])).astype(int)
     begins = np.searchsorted(period, np.unique(period))
     largest = np.maximum.reduceat(np.abs(y[moves]), begins)
     axes.plot(f[moves], y[moves], color=COLOURS[0], linewidth=0.4)
     axes.plot(f[begins], largest, color=COLOURS[1], linewidth=1.4, label="largest in each period")
-    axes.set(xlabel="frequency of the excitation in Hz", ylabel=f"{orbit.labels[read_out]} in {unit}")
+    axes.set(xlabel="frequency of the excitation in Hz", ylabel=f"{orbit.labels[0]} in {unit}")
 
 
-def _orders(orbit: Orbit, axes: Axes, read_out: int) -> None:
+def _orders(orbit: Orbit, axes: Axes) -> None:
     """Spectra as in `_spectrogram`, in Hz over time, and the frequencies of the loads."""
-    middle, multiples, decibels = _spectra(orbit, read_out)
+    middle, multiples, decibels = _spectra(orbit)
     last, f = orbit.Omega / (2 * np.pi), orbit.frequency
     drawn = axes.pcolormesh(
         middle * orbit.period, multiples * last, decibels.T, vmin=-80, vmax=0, cmap="viridis", shading="nearest"
@@ -127,9 +126,9 @@ def _order(orbit: Orbit, harmonic: int) -> str:
     return f"engine order {harmonic * ramp.order}" if turns and ramp else f"excitation, harmonic {harmonic}"
 
 
-def _history(orbit: Orbit, axes: Axes, read_out: int) -> None:
+def _history(orbit: Orbit, axes: Axes) -> None:
     shown = slice(-SHOWN * orbit.samples, None)
-    y, unit = _sized(orbit.y[read_out][shown], orbit.of(read_out))
+    y, unit = _sized(orbit.y[0][shown], orbit.of(0))
     time = orbit.time[shown]
     axes.plot((time - time[0]) / orbit.period, y, color=COLOURS[0], linewidth=1.0)
     for kind, mark, size, words in EVENT_MARKS:
@@ -140,7 +139,7 @@ def _history(orbit: Orbit, axes: Axes, read_out: int) -> None:
             axes.plot((at - time[0]) / orbit.period, place, mark, color=COLOURS[1], markersize=size, label=words, ls="")
     if len(axes.lines) > 1:
         axes.legend(fontsize=8, loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, frameon=False)
-    axes.set(xlabel="time in periods of the excitation", ylabel=f"{orbit.labels[read_out]} in {unit}")
+    axes.set(xlabel="time in periods of the excitation", ylabel=f"{orbit.labels[0]} in {unit}")
 
 
 def _sized(values: Array, of: Quantity = METRES) -> tuple[Array, str]:
@@ -155,15 +154,15 @@ def _times(orbit: Orbit, kind: str, contact: int | None = None) -> Array:
     return np.sort(np.concatenate([np.zeros(0), *(orbit.times(kind, i) for i in chosen if contact in (None, i))]))
 
 
-def _spectrum(orbit: Orbit, axes: Axes, read_out: int) -> None:
+def _spectrum(orbit: Orbit, axes: Axes) -> None:
     """Amplitudes over multiples of the excitation, by a Hann window over all periods that are kept, down to
     `SPECTRUM` of the largest."""
-    y = orbit.y[read_out]
+    y = orbit.y[0]
     window = np.hanning(len(y))
     amplitude: Array = np.abs(np.fft.rfft(window * (y - np.average(y, weights=window)))) * 2 / window.sum()
     multiples = np.arange(len(amplitude)) * orbit.samples / len(y)
     seen = multiples <= min(HIGHEST, orbit.samples / 2)
-    by, unit = orbit.of(read_out).scale(0.1 * amplitude.max(initial=0.0))
+    by, unit = orbit.of(0).scale(0.1 * amplitude.max(initial=0.0))
     scaled, top = by * amplitude, by * amplitude.max(initial=1e-300)
     axes.semilogy(multiples[seen], np.maximum(scaled, 1e-300)[seen], color=COLOURS[2], lw=0.9)
     axes.set(xlabel="multiples of the excitation frequency", ylabel=f"amplitude in {unit}")
@@ -171,9 +170,9 @@ def _spectrum(orbit: Orbit, axes: Axes, read_out: int) -> None:
     plain_numbers(axes.yaxis, (1.0,))
 
 
-def _spectra(orbit: Orbit, read_out: int) -> tuple[Array, Array, Array]:
+def _spectra(orbit: Orbit) -> tuple[Array, Array, Array]:
     """Middles of windows of `WINDOW` periods that overlap; multiples of the excitation; (w, m) dB of the largest."""
-    y, n = orbit.y[read_out] - orbit.y[read_out].mean(), WINDOW * orbit.samples
+    y, n = orbit.y[0] - orbit.y[0].mean(), WINDOW * orbit.samples
     begins = np.arange(0, len(y) - n + 1, orbit.samples)
     sizes = np.abs(np.fft.rfft(np.hanning(n) * y[begins[:, None] + np.arange(n)], axis=1))
     multiples = np.arange(sizes.shape[1]) / WINDOW
@@ -182,9 +181,9 @@ def _spectra(orbit: Orbit, read_out: int) -> tuple[Array, Array, Array]:
     return begins / orbit.samples + 0.5 * WINDOW, multiples[seen], decibels
 
 
-def _spectrogram(orbit: Orbit, axes: Axes, read_out: int) -> None:
+def _spectrogram(orbit: Orbit, axes: Axes) -> None:
     """Spectra of windows in time, in dB of the largest amplitude."""
-    middle, multiples, decibels = _spectra(orbit, read_out)
+    middle, multiples, decibels = _spectra(orbit)
     drawn = axes.pcolormesh(middle, multiples, decibels.T, vmin=-80, vmax=0, cmap="viridis", shading="nearest")
     axes.figure.colorbar(drawn, ax=axes, label="amplitude in dB")  # type: ignore[union-attr]
     axes.set(xlabel="time in periods of the excitation", ylabel="multiples of its frequency")
@@ -222,7 +221,7 @@ def _loop(orbit: Orbit, row: int, name: str, area: float, axes: Axes) -> None:
     axes.set_title(f"loses {area:.4g} J a period", fontsize=9)
 
 
-def chatter_picture(orbit: Orbit, contact: int, path: Path, title: str, read_out: int = 0) -> Path:
+def chatter_picture(orbit: Orbit, contact: int, path: Path, title: str) -> Path:
     """Displacement and velocity over the time of two periods, and the phase portrait, as in Sextro Fig. 4.2-3: impacts
     and where it comes to rest are marked."""
     figure = empty_figure(13.0, 4.3)
@@ -232,18 +231,18 @@ def chatter_picture(orbit: Orbit, contact: int, path: Path, title: str, read_out
     panels = figure.subplots(1, 3)
     impacts = _times(orbit, "closes", contact)
     for axes, values, what, per in (
-        (panels[0], orbit.y[read_out], orbit.labels[read_out], ""),
-        (panels[1], orbit.v[read_out], "velocity", "/s"),
+        (panels[0], orbit.y[0], orbit.labels[0], ""),
+        (panels[1], orbit.v[0], "velocity", "/s"),
     ):
         plain_axes(axes)
-        scaled, unit = _sized(values[seen], orbit.of(read_out))
+        scaled, unit = _sized(values[seen], orbit.of(0))
         axes.plot(orbit.time[seen] - begin, scaled, color=COLOURS[0], linewidth=0.9)
         shown = impacts[impacts >= begin]
         axes.plot(shown - begin, np.interp(shown, orbit.time[seen], scaled), "|", color=COLOURS[1], label="meets")
         _rests(axes, [c for c in first if c.time + c.stays >= begin], begin)
         axes.set(xlabel="time in s", ylabel=f"{what} in {unit}{per}")
     plain_axes(panels[2])
-    orbit.plot(panels[2], read_out)
+    orbit.plot(panels[2])
     panels[0].legend(fontsize=8, loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, frameon=False)
     figure.suptitle(title, fontweight="bold")
     return save_figure(figure, path)

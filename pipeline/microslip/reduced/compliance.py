@@ -126,14 +126,6 @@ def has_residual(group: ModalGroup, reduction: str) -> bool:
     return reduction in SUPPLIED or len(group.omega) < group.n_modes
 
 
-def law_stiffness(group: ModalGroup, reduction: str, a: str, b: str = "", sectors: int = 1) -> float:
-    """Normal stiffness (N/m) a law at contact `a` must bring in series with its surface; inf: the surface only.
-
-    With it, pressing the body between `a` and `b` (or on `a` alone) yields what the full model yields.
-    """
-    return contact_share(group, reduction, "u_n", a, b, sectors).law_stiffness
-
-
 def without_bulk(stiffness: float, share: Share) -> float:
     """What remains (N/m) of a law's stiffness that counts bulk and surface, once what the basis holds is taken out.
 

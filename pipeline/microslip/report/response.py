@@ -10,6 +10,7 @@ from typing import Any
 
 from ..units import Quantity, amplitude_of, counted, percent
 from .page import Album, Piece, fold, number, page, say, table
+from .words import ROUNDING
 
 MOST_ROWS = 60
 """Rows of a table that a page shows at once; the others unfold."""
@@ -244,9 +245,6 @@ def _table_of(rows: Sequence[Mapping[str, Any]]) -> Piece:
     return table([name for _, name in columns], cells)
 
 
-ROUNDING = 1e-9
-"""Share of the largest number of a unit in a table below which another one is rounding."""
-
 _FACTORS = (
     *((Quantity(unit).column("amplitude"), (1e6, Quantity(unit).micro)) for unit in ("m", "rad", "1")),
     ("_Pa", (1e-6, "MPa")),
@@ -272,6 +270,9 @@ _NAMED = {
 
 def _column(key: str) -> tuple[float, str]:
     """Factor and name of a column: lengths and stresses in units for people."""
+    if under := re.fullmatch(r"(.+)_(?:FN_(.+)_N|as_pressed)", key):
+        factor, name = _column(under[1])
+        return factor, f"{f'F_N = {under[2]} N' if under[2] else 'as pressed'}: {name}"
     if key in _NAMED:
         return _NAMED[key]
     for end, (factor, unit) in _FACTORS:

@@ -4,10 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+import numpy as np
+
 from ..data import Array, ContactState, Interface, ModalGroup, SpeedRange
 from ..reduced.truncation import percent
 from ..settings.body import GROUND
 from ..units import to_rpm
+
+ROUNDING = 1e-9
+"""Share of the largest number of a unit in a table or sentence below which another one is rounding."""
 
 RIGID_ENOUGH = 0.05
 """A patch whose fit residual is below this moves as a rigid patch for most purposes."""
@@ -62,8 +67,14 @@ def contact_sentence(name: str, c: ContactState) -> str:
     kept = "the modes leave it open" if c.modes == "open" else "the modes keep it closed"
     return (
         f"contact {name}: {c.face} presses {other} with {c.normal_force:.5g} N on {percent(c.closed_share)} of its "
-        f"area, at most {1e-6 * c.pressure.max():.4g} MPa (penetration left {1e6 * c.penetration:.2g} µm); {kept}."
+        f"area, at most {1e-6 * c.pressure.max():.4g} MPa{_left(c)}; {kept}."
     )
+
+
+def _left(c: ContactState) -> str:
+    """What a contact penetrates still, where it is more than rounding beside its widest gap."""
+    deep = c.penetration > ROUNDING * np.abs(c.gap).max(initial=0.0)
+    return f" (penetration left {1e6 * c.penetration:.2g} µm)" if deep else ""
 
 
 def fit_summary(contacts: Mapping[str, Interface]) -> str:

@@ -47,6 +47,16 @@ def unit_of(name: str) -> str:
     return ("" if name.startswith(READ) else UNITS.get(last, "")) or UNITS.get(first, "1")
 
 
+ROUNDING = 1e-12
+"""Share of the largest harmonic of a point below which another one is rounding: what a symmetric motion has none of."""
+
+
+def without_rounding(harmonics: ComplexArray) -> ComplexArray:
+    """(f, H + 1) amplitudes of a read-out, those that are rounding beside the largest of their point zero."""
+    size = np.abs(harmonics)
+    return np.where(size <= ROUNDING * size.max(axis=1, keepdims=True, initial=0.0), 0.0, harmonics)
+
+
 @dataclass(frozen=True)
 class Series:
     """The f points of one sweep or curve, in order.
@@ -184,7 +194,7 @@ class Series:
         found = {} if self.over == "frequency" else {self.over: self.parameter}
         found["frequency_Hz"] = self.frequency
         if self._places:
-            a = self.harmonics()
+            a = without_rounding(self.harmonics())
             found |= {
                 column("amplitude"): np.abs(a[:, 1]),
                 "phase_rad": np.angle(a[:, 1]),

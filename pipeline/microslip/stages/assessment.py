@@ -15,9 +15,8 @@ import numpy as np
 from ..data import Array, Indices, ModalBasis
 from ..errors import UserError
 from ..harmonic_balance.sweeps import prominent
-from ..operating.cycle import amplitude
 from ..operating.fatigue import Endurance, MaterialLimits, endurance
-from ..operating.motion import Motion, read_out
+from ..operating.motion import Motion
 from ..operating.stress import CycleStress, StressPeaks, cycle_stress, stress_peaks
 from ..results import Response, Series
 from ..results.names import apart
@@ -133,9 +132,9 @@ def assess(
     for series in response.series:
         if not len(series.key):
             continue
-        report(f"stresses of {name}: {series.name}")
-        motion = response.motion(series, basis, name)
         normal = float(series.parameters.get("normal_force", 0.0))
+        report(f"stresses of {name} under a normal force of {normal:.6g} N")
+        motion = response.motion(series, basis, name)
         size = abs(series.monitor(monitor)[:, 0, 1])
         chosen, at = drawn_points(series, *(DRAWN if everywhere else LOOKED_AT)), tops(series, size)
         peaks = stress_peaks(motion.at(chosen), largest=False)
@@ -212,34 +211,6 @@ def tops(series: Series, size: Array) -> Indices:
     points = np.flatnonzero(series.converged)
     at = np.flatnonzero(np.isin(points, _searched(series)))
     return points[prominent(np.asarray(size)[points], at)]
-
-
-def over_engine_order(
-    responses: Mapping[int, Response], basis: ModalBasis, component: str = "", gauge: str = "",
-    only: Array | None = None, first_harmonic: bool = False,
-) -> dict[float, tuple[Array, Array]]:  # fmt: skip
-    """Largest alternating stress of a body over the engine order, for every normal force (Sextro Figs. 5.5-4, 5.5-5).
-
-    Args:
-        responses: engine order -> response, of sweeps over the resonance. gauge: the strain of a gauge instead. only,
-            first_harmonic: see `operating.stress.stress_peaks`.
-
-    Returns:
-        Normal force (N) -> engine orders and MPa (microstrain of a gauge): curves of
-        `pictures.operating.over_engine_order_plot`. Points that did not converge do not count.
-    """
-    found: dict[float, list[tuple[int, float]]] = {}
-    for order, response in sorted(responses.items()):
-        for series in response.series:
-            motion = response.motion(series, basis, component or next(iter(response.bodies)))
-            if gauge:
-                size = 1e6 * amplitude(read_out(motion, gauge, "gauges"))[:, 0]
-            else:
-                peaks = stress_peaks(motion, only=only, first_harmonic=first_harmonic, largest=False)
-                size = 1e-6 * peaks.amplitude
-            highest = float(np.max(size, where=series.converged, initial=0.0))
-            found.setdefault(float(series.parameters.get("normal_force", 0.0)), []).append((order, highest))
-    return {n: (np.array([o for o, _ in rows]), np.array([v for _, v in rows])) for n, rows in found.items()}
 
 
 def has_stresses(basis: ModalBasis, response: Response, component: str = "") -> bool:

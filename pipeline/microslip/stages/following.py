@@ -5,7 +5,6 @@ Each is a table (CSV) and a picture in the case's folder, and sentences for the 
 
 from __future__ import annotations
 
-import copy
 import csv
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -17,11 +16,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..basis import read_basis
-from ..case import CaseSettings, checkpoint, load_case
-from ..case.assemble import Built, build
+from ..case import checkpoint, load_case
+from ..case.assemble import Built
 from ..case.problem import pressed_by, problem_of
 from ..continuation import NO_OPTIMUM
-from ..data import Array, ModalBasis
+from ..data import Array
 from ..errors import UserError
 from ..files import store
 from ..files.store import ordinary
@@ -29,10 +28,9 @@ from ..files.tables import rows_csv
 from ..harmonic_balance.readout import measured
 from ..results import read_response
 from ..results.checks import checked, largest
-from ..settings.mistakes import validate
-from ..settings.toml import override
 from ..units import METRES, Quantity
 from .stage import Report
+from .varied import Varied
 
 if TYPE_CHECKING:
     from ..harmonic_balance.nonlinear_modes import Backbone
@@ -55,12 +53,9 @@ _SIGNED = ("turn", "phase", "place")
 
 
 @dataclass(frozen=True)
-class Case:
-    """A case file and its modal files. Attributes: path. raw: its text as a table. bases: by body. folder: products."""
+class Case(Varied):
+    """A case file and its modal files. Attributes: see `Varied`; folder: of its products."""
 
-    path: Path
-    raw: dict[str, Any]
-    bases: Mapping[str, ModalBasis]
     folder: Path
 
     @property
@@ -71,19 +66,17 @@ class Case:
     @cached_property
     def quantity(self) -> Quantity:
         """What the first read-out measures."""
-        return measured(self.with_({}).assembly)
+        return measured(self.plain.assembly)
 
-    def with_(self, changes: Mapping[str, float]) -> Built:
-        """The assembly, some keys of the case changed."""
-        raw = copy.deepcopy(self.raw)
-        for key, value in changes.items():
-            if key in OF_CONTACTS:
-                for contact in raw.get("contacts", []):
-                    if key in contact:
-                        contact[key] = value
-            elif key != NORMAL_FORCE:
-                override(raw, [f"{key}={value!r}"], self.path)
-        return build(validate(CaseSettings, raw, self.path), self.bases, self.path)
+    @cached_property
+    def plain(self) -> Built:
+        """With its keys as they are."""
+        return self.built({}, "")
+
+    def with_(self, key: str, value: float) -> Built:
+        """With another value of a key; one of `OF_CONTACTS` in every contact that has it."""
+        all_of_them = [f"contacts.{i}.{key}" for i, c in enumerate(self.raw.get("contacts", [])) if key in c]
+        return self.built(dict.fromkeys(all_of_them if key in OF_CONTACTS else [key], value), f"--over {key}")
 
     def table(self, name: str, head: Sequence[str], rows: Iterable[Sequence[str]]) -> Path:
         """A CSV file of the case."""
@@ -129,7 +122,7 @@ def backbones(
     from ..harmonic_balance.nonlinear_modes import backbone, sliding_amplitude, strongest
 
     found: dict[float, Backbone] = {}
-    built, of = case.with_({}), case.quantity
+    built, of = case.plain, case.quantity
     band = [2 * np.pi * f for f in (built.settings.sweep.start, built.settings.sweep.stop)]
     forces = [n for n in normal_forces(built) if n != 0] or normal_forces(built)
     if 0.0 in normal_forces(built):
@@ -222,7 +215,7 @@ def optimum_over(
     """
     from ..harmonic_balance.peak import optimum
 
-    built = case.with_({})
+    built = case.plain
     forces = [n for n in normal_forces(built) if n is not None]
     if over == NORMAL_FORCE and len(forces) > 1:
         low, high = low or min(n for n in forces if n > 0), high or max(forces)
@@ -238,7 +231,7 @@ def optimum_over(
     @lru_cache(maxsize=64)
     def make(value: float) -> Problem:
         normal = value if over == NORMAL_FORCE else forces[-1] if forces else None
-        return problem_of(built if over == NORMAL_FORCE else case.with_({over: value}), normal, length=length)
+        return problem_of(built if over == NORMAL_FORCE else case.with_(over, value), normal, length=length)
 
     sweep = built.settings.sweep
     band = 2 * np.pi * np.linspace(sweep.start, sweep.stop, sweep.points)
@@ -287,7 +280,7 @@ def found_before(names: Sequence[str], over: str, case: Case) -> dict[str, Array
         if not (file := folder / "optimum.csv").is_file():
             file = case.folder.parent / name / file.name
             raise UserError(f"--beside {name}: there is no {file}; type microslip optimum {name} --over {over} first")
-        asked = [over, "frequency_Hz", case.quantity.column("amplitude"), "what"]
+        asked = _optimum_head(over, case)
         head, *rows = csv.reader(ordinary(file).read_text(encoding="utf-8").splitlines())
         if head != asked:
             raise UserError(f"{file}: holds {', '.join(head)}, not {', '.join(asked)}; name another case")
@@ -310,7 +303,13 @@ def _optimum_table(found: Mapping[float, HighestPeak], over: str, case: Case, be
         what = f"optimum: {best.status}" if is_optimum(best) else f"lowest: {best.status}"
         shown.append((best.parameter, best.resonance, what))
     rows = [(f"{v:.10g}", f"{r.Omega / 2 / np.pi:.10g}", f"{r.amplitude:.8g}", what) for v, r, what in shown]
-    return case.table("optimum.csv", (over, "frequency_Hz", case.quantity.column("amplitude"), "what"), rows)
+    return case.table("optimum.csv", _optimum_head(over, case), rows)
+
+
+def _optimum_head(over: str, case: Case) -> list[str]:
+    """Headings of ``optimum.csv``, with their units where they are known."""
+    unit = unit_of(over).strip().replace("/", "_")
+    return [f"{over}_{unit}".removesuffix("_"), "frequency_Hz", case.quantity.column("amplitude"), "what"]
 
 
 def unit_of(over: str) -> str:
@@ -392,7 +391,7 @@ def stabilities(case: Case, report: Report = lambda _: None) -> dict[float, dict
     """
     from ..harmonic_balance.stability import Settings, orbit, stability
 
-    built, found = case.with_({}), dict[float, dict[float, Any]]()
+    built, found = case.plain, dict[float, dict[float, Any]]()
     if built.settings.ring is not None and built.settings.ring.model == "sector":
         raise UserError(
             f'{case.path}: ring.model: "sector" cannot tell whether the sectors stay alike; write model = "full"'

@@ -58,7 +58,7 @@ class Survey:
 
 def survey_stage(
     case_path: Path, basis_file: Path | None, kind: str, assignments: list[str] | None = None, force: bool = False,
-    report: Report = lambda _: None, root: Path = Path("."),
+    report: Report = lambda _: None,
 ) -> tuple[list[Path], list[str], bool]:  # fmt: skip
     """A survey of a case on modal files that are there already, in build/<case>/.
 
@@ -73,8 +73,8 @@ def survey_stage(
         KeyboardInterrupt: after what a curve has found until then is written.
     """
     settings, raw = load_case(case_path, assignments)
-    files = existing_files(settings, case_path, basis_file, root)
-    folder = root / "build" / settings.name
+    files = existing_files(settings, case_path, basis_file, Path("."))
+    folder = Path("build") / settings.name
     stage = Stage(folder / f"{kind}.txt", ("stages.surveying",), force, report)
     with stage.making():
         settings = settings if kind == "identification" else checkpoint.as_found(settings, folder, case_path)
@@ -144,7 +144,7 @@ def _orders(write: Write, settings: CaseSettings, bases: Bases, path: Path, repo
     def tables(found: Mapping[str, OverOrders]) -> Tables:
         first, columns = max(found.values(), key=lambda r: len(r.order)), dict[str, Array]()
         for label, r in found.items():
-            plain = label.replace("$", "").replace(" = ", "_").replace(" ", "_")
+            plain = label.replace("$F_N$", "FN").replace(" = ", "_").replace(" ", "_")
             missing = np.full(len(first.order) - len(r.order), np.nan)
             own = {f"{n}_{plain}": np.append(v, missing) for n, v in r.columns().items() if n not in of_all}
             columns |= {n: v for n, v in first.columns().items() if n in of_all} | own

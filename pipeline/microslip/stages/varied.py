@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from ..case import CaseSettings
-from ..case.assemble import build
+from ..case.assemble import Built, build
 from ..data import ModalBasis
 from ..errors import UserError
 from ..settings.mistakes import validate
@@ -31,7 +31,11 @@ class Varied:
     bases: Mapping[str, ModalBasis]
 
     def under(self, values: Mapping[str, float], where: str) -> Assembly:
-        """The assembly with other values of keys, dotted. where: the key that says so, for messages.
+        """The assembly of `built`."""
+        return self.built(values, where).assembly
+
+    def built(self, values: Mapping[str, float], where: str) -> Built:
+        """The case with other values of keys, dotted. where: the key that says so, for messages.
 
         Raises:
             UserError: a key that is none of the case or the system.
@@ -39,14 +43,13 @@ class Varied:
         raw: dict[str, Any] = copy.deepcopy(dict(self.raw))
         own = [f"{k}={v!r}" for k, v in values.items() if not k.startswith(OF_SYSTEM)]
         others = [f"{k.removeprefix(OF_SYSTEM)}={v!r}" for k, v in values.items() if k.startswith(OF_SYSTEM)]
-        where = f"{self.path}: {where}"
+        where = f"{self.path}: {where}" if where else str(self.path)
         try:
             settings = validate(CaseSettings, override(raw, own, self.path), self.path)
-            built = build(settings, self._systems(others, where) if others else self.bases, self.path)
+            return build(settings, self._systems(others, where) if others else self.bases, self.path)
         except UserError as error:
             text = str(error).removeprefix("--set ").removeprefix(f"{self.path}: ")
             raise UserError(f"{where}: {text}") from error
-        return built.assembly
 
     def _systems(self, assignments: list[str], where: str) -> dict[str, ModalBasis]:
         found = dict(self.bases)

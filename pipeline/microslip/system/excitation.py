@@ -43,27 +43,6 @@ def base_order(orders: Sequence[int]) -> int:
     return base
 
 
-def ring_of(blades: int, orders: Sequence[int], turning: Turning = 1) -> Ring:
-    """The ring whose harmonics are these engine orders.
-
-    Args:
-        orders: positive for patterns that stand in space; negative for those that run round with the rotor and faster,
-            so that they meet its sectors the other way round.
-
-    Raises:
-        UserError: orders that run both ways, which one sector cannot follow together.
-    """
-    base = base_order(orders)
-    for sign in (1, -1):
-        ring = Ring(blades, sign * base)
-        if all((ring.index(abs(e) // base) - turning * e) % blades == 0 for e in orders):
-            return ring
-    raise UserError(
-        f"engine orders {', '.join(map(str, orders))}: they run round the {blades} blades in both directions, so that "
-        "no sector moves as its neighbour does a little later; give orders of one sign, or compute them one by one"
-    )
-
-
 def harmonic_of(order: int, base: int | Ring, turning: Turning = 1) -> int:
     """Which harmonic an engine order is.
 
@@ -168,38 +147,12 @@ def magnets(
     return Pattern(_cleared(P))
 
 
-def sampled(values: Array, highest: int) -> Pattern:
-    """Fourier coefficients of a pattern known at equal steps of a whole turn, from theta = 0 on.
-
-    Raises:
-        UserError: fewer than 2 E + 1 values for the highest order E.
-    """
-    n = len(values)
-    if n < 2 * highest + 1:
-        raise UserError(f"pattern: {n} values do not tell engine order {highest}; give at least {2 * highest + 1}")
-    P = np.fft.rfft(values)[: highest + 1] * (2 / n)
-    P[0] *= 0.5
-    return Pattern(_cleared(P))
-
-
 def _cleared(P: ComplexArray) -> ComplexArray:
     """Sums that cancel leave rounding behind: it is no engine order."""
     return np.where(np.abs(P) > 1e-12 * np.abs(P).max(initial=0.0), P, 0.0)
 
 
 # --- loads ------------------------------------------------------------------------------------------------------------
-
-
-def engine_order(
-    component: str, row: str, amplitude: complex, order: int, base: int | Ring, phase: float = 0.0, turning: Turning = 1
-) -> Load:
-    """An engine order on a row of a component.
-
-    Args:
-        amplitude: 0-peak, N of a unit force, Pa of a unit pressure. phase: rad, by which it leads on the first sector.
-            base: see `harmonic_of`.
-    """
-    return Load(component, row, amplitude * complex(np.exp(1j * phase)), harmonic_of(order, base, turning))
 
 
 def pattern_loads(

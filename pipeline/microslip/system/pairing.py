@@ -36,15 +36,14 @@ class Pairing:
     Attributes:
         frame: (6, 6) six rows of the second face to motions in the first one's frame, see `assembly.ContactFace.frame`.
         gap: m along the first one's normal from its origin to the second one's; negative where they overlap. NaN in
-            own frames, where nobody knows. offset: (2,) m along t1, t2 from the first origin to the second one.
-        angle: rad by which the normals miss being opposite. own_frames: see `in_ring`. messages: for a reader.
+            own frames (`in_ring`), where nobody knows. offset: (2,) m along t1, t2 from the first origin to the
+            second one. angle: rad by which the normals miss being opposite. messages: for a reader.
     """
 
     frame: Array
     gap: float
     offset: Array
     angle: float
-    own_frames: bool = False
     messages: tuple[str, ...] = ()
 
 
@@ -147,7 +146,7 @@ def _met(first: Interface, axes: Array, offset: Array, gap: float) -> Pairing:
     if abs(gap) > NOTICEABLE * np.max(first.extent, initial=0.0) > 0:
         words = "apart" if gap > 0 else "inside each other"
         messages += (f"The faces are drawn {1e3 * abs(gap):.3g} mm {words}; the contact counts from where they touch.",)
-    return Pairing(across(first.rotation, axes, arm), gap, offset, float(np.radians(angle)), False, messages)
+    return Pairing(across(first.rotation, axes, arm), gap, offset, float(np.radians(angle)), messages)
 
 
 def _missing(met: Pairing, first: Interface, second: Interface, axes: Array) -> str:
@@ -186,7 +185,7 @@ def _own_frames(first: Interface, second: Interface, drawn: Place, sector: int, 
         "opposite: each blade's own contact frame is used, as if the wedge between them were filled."
     )
     arm = -offset @ first.rotation[1:]
-    return Pairing(across(first.rotation, axes, arm), float("nan"), offset, float(np.radians(normal)), True, (message,))
+    return Pairing(across(first.rotation, axes, arm), float("nan"), offset, float(np.radians(normal)), (message,))
 
 
 def rigid_points(interface: Interface, counts: tuple[int, int] | None = None) -> tuple[Array, Array]:

@@ -67,6 +67,64 @@ def within(x: Any, pressed: Any, mu: Any) -> Any:
     return jnp.concatenate([normal[:, None], kept[:, None] * x[:, 1:]], axis=1)
 
 
+class Asked(NamedTuple):
+    """What a step asks of points. M, mu, pressed: see `solve`. reach: (p, 3) m, w_0, and 0 of points that do not meet.
+    meet: (p, 3), 1 of those that do."""
+
+    M: Meets
+    reach: Any
+    meet: Any
+    mu: Any
+    pressed: Any
+
+    def motion(self, f: Any) -> Any:
+        """w, (p, 3) m."""
+        return self.reach - (self.M.A @ f.reshape(-1)).reshape(f.shape)
+
+    def aimed(self, f: Any, share: float) -> tuple[Any, Any]:
+        """f + r w, (p, 3) N, and coefficients of friction (p,). share: of `Meets.r` that is r."""
+        w = self.motion(f)
+        return f + share * self.M.r * w, self.mu(norm(w[:, 1:].T))
+
+    def projected(self, f: Any, share: float = 1.0) -> Any:
+        """(p, 3) N."""
+        x, coefficient = self.aimed(f, share)
+        return self.meet * within(x, self.pressed, coefficient)
+
+    def residual(self, f: Any, share: float = 1.0) -> Any:
+        """(p, 3) N."""
+        return self.meet * (f - self.projected(f, share))
+
+    def newton(self, f: Any, share: float) -> Any:
+        """(p, 3) N, a step of Newton's method further."""
+        M, n = self.M, f.size
+        x, coefficient = self.aimed(f, share)
+        P = jax.vmap(jax.jacfwd(lambda a, p, c: within(a[None], p[None], c[None])[0]))(x, self.pressed, coefficient)
+        turned = jnp.eye(n) - share * M.r.reshape(-1)[:, None] * M.A
+        P = jnp.einsum("pij,pjk->pik", self.meet[:, :, None] * P, turned.reshape(*f.shape, -1))
+        J = jnp.eye(n) - P.reshape(n, -1)
+        way = jnp.linalg.solve(J + 1e-12 * jnp.eye(n), self.residual(f, share).reshape(-1))
+        return f - way.reshape(f.shape)
+
+    def until(self, enough: float, most: int, further: Any, f: Any) -> Any:
+        """Forces after as many steps as they need, or at most. further: a step. enough: a share of the largest."""
+
+        def off(f: Any, r: Any) -> Any:
+            return jnp.abs(r).max() / jnp.maximum(jnp.abs(f).max(), jnp.abs(self.M.r * self.reach).max())
+
+        def wanted(carried: tuple) -> Any:
+            i, f, r = carried
+            return (i < most) & (off(f, r) > EXACT)
+
+        def one(carried: tuple) -> tuple:
+            f = further(carried[1])
+            return carried[0] + 1, f, self.residual(f)
+
+        f = jnp.where(jnp.isfinite(f).all(), f, 0.0)
+        r = self.residual(f)
+        return jax.lax.while_loop(wanted, one, (jnp.where(off(f, r) > enough, 0, most), f, r))[1]
+
+
 def solve(M: Meets, w_0: Any, mu: Any, pressed: Any, first: Any) -> tuple[Any, Any, Any]:
     """Forces (p, 3) N, motions w (p, 3) m, and the largest residual as a motion, m.
 
@@ -74,60 +132,10 @@ def solve(M: Meets, w_0: Any, mu: Any, pressed: Any, first: Any) -> tuple[Any, A
         w_0: (p, 3) m of the points without forces; of points that do not meet, -inf along the normal. mu: function of
             the sliding way (p,). pressed: see `within`. first: (p, 3) N to begin with.
     """
-    shape = w_0.shape
-    reach = jnp.where(jnp.isfinite(w_0), w_0, 0.0)
-    meet = jnp.isfinite(w_0[:, :1]) * jnp.ones(3)
-
-    def motion(f: Any) -> Any:
-        return reach - (M.A @ f.reshape(-1)).reshape(shape)
-
-    def project(f: Any, x: Any, w: Any) -> Any:
-        coefficient = mu(norm(w[:, 1:].T))
-        return meet * within(x, pressed, coefficient)
-
-    def residual(f: Any, share: float = 1.0) -> Any:
-        w = motion(f)
-        return meet * (f - project(f, f + share * M.r * w, w))
-
-    def off(f: Any, r: Any) -> Any:
-        return jnp.abs(r).max() / jnp.maximum(jnp.abs(f).max(), jnp.abs(M.r * reach).max())
-
-    def wanted(most: int, carried: tuple) -> Any:
-        i, f, r = carried
-        return (i < most) & (off(f, r) > EXACT)
-
-    def along(share: Any) -> Any:
-        def one(carried: tuple) -> tuple:
-            i, f, _ = carried
-            w = motion(f)
-            f = project(f, f + share * M.r * w, w)
-            return i + 1, f, residual(f)
-
-        return one
-
-    def newton(share: float) -> Any:
-        def one(carried: tuple) -> tuple:
-            i, f, _ = carried
-            w = motion(f)
-            x, coefficient = f + share * M.r * w, mu(norm(w[:, 1:].T))
-            P = jax.vmap(jax.jacfwd(lambda a, p, c: within(a[None], p[None], c[None])[0]))(x, pressed, coefficient)
-            P = meet[:, :, None] * P
-            turned = jnp.eye(w_0.size) - share * M.r.reshape(-1)[:, None] * M.A
-            J = jnp.eye(w_0.size) - jnp.einsum("pij,pjk->pik", P, turned.reshape(*shape, -1)).reshape(w_0.size, -1)
-            way = jnp.linalg.solve(J + 1e-12 * jnp.eye(w_0.size), residual(f, share).reshape(-1))
-            f = f - way.reshape(shape)
-            return i + 1, f, residual(f)
-
-        return one
-
-    def until(share: float, most: int, one: Any, f: Any) -> Any:
-        f = jnp.where(jnp.isfinite(f).all(), f, 0.0)
-        r = residual(f)
-        tried = jnp.where(off(f, r) > share, 0, most)
-        return jax.lax.while_loop(partial(wanted, most), one, (tried, f, r))[1]
-
-    f = until(EXACT, PROJECTIONS, along(1.0), meet * first)
+    meets = jnp.isfinite(w_0[:, :1]) * jnp.ones(3)
+    asked = Asked(M, jnp.where(jnp.isfinite(w_0), w_0, 0.0), meets, mu, pressed)
+    f = asked.until(EXACT, PROJECTIONS, asked.projected, meets * first)
     for share, most in NEWTON:
-        f = until(ENOUGH, most, newton(share), f)
-    f = until(ENOUGH, CAREFUL, along(M.slow), f)
-    return f, motion(f), jnp.abs(ratio(residual(f), M.r)).max(initial=0.0)
+        f = asked.until(ENOUGH, most, partial(asked.newton, share=share), f)
+    f = asked.until(ENOUGH, CAREFUL, partial(asked.projected, share=M.slow), f)
+    return f, asked.motion(f), jnp.abs(ratio(asked.residual(f), M.r)).max(initial=0.0)

@@ -466,10 +466,10 @@ def march(
         many = int(np.clip(0.5 * PAUSE / took * ahead, 1, FURTHER * ahead))
     error, told = _error(stepper, first, now, hardest, samples, each, settle + keep)
     exponent = _exponent(stepper, now, kept, samples, each, settle + keep)
-    more = tuple(text for text in (told, exponent.message if exponent else "") if text)
-    return Ended(
-        each * samples, error, messages=(*_warnings(equations, kept, float(now.worst)), *more), exponent=exponent
-    )
+    more = (*_warnings(equations, kept, float(now.worst)), told, exponent.message if exponent else "")
+    beside = start.messages if isinstance(start, Periodic) else ()
+    messages = (*beside, *(text for text in more if text))
+    return Ended(each * samples, error, messages=messages, exponent=exponent)
 
 
 def _exponent(stepper: Stepper, now: Now, kept: Kept, samples: int, each: int, done: int) -> Exponent | None:

@@ -26,6 +26,7 @@ from ..files.hdf5 import create, put, seal, seal_state
 from ..files.hostile import DAMAGE, inspect, refuse_damaged, short
 from ..files.store import complete_or_absent, ordinary, put_in_place, refused
 from ..harmonic_balance.readout import measured
+from ..harmonic_balance.reduced import READS
 from .bodies import Hardest, Now, Seen
 from .contacts import gapes
 from .equations import Equations
@@ -71,6 +72,7 @@ def of_period(e: Equations, seen: Seen) -> dict[str, Array]:
     rates = seen.q_dot @ e.output.T + e.rates(seen.time) @ e.output_given.T
     if e.output_residual.any() and len(seen.time) > 1:  # what yields at once has no velocity of its own
         rates = rates - np.gradient(seen.force @ e.output_residual.T, seen.time, axis=0)
+    rates = without_rounding(rates, e.output, seen.q_dot)
     found = (seen.time, e.frequency(seen.time), read(e, seen), rates.T, seen.q.T, seen.q_dot.T, seen.d.T, seen.force.T)
     return dict(zip(UNITS, (*found, *energies(e, seen).values()), strict=True))
 
@@ -78,7 +80,16 @@ def of_period(e: Equations, seen: Seen) -> dict[str, Array]:
 def read(e: Equations, seen: Seen) -> Array:
     """(w, s) read-outs."""
     q, force, o = np.asarray(seen.q), np.asarray(seen.force), e.oscillators(np.asarray(seen.time))
-    return (q @ e.output.T - (force - e.F_0) @ e.output_residual.T + o @ e.output_given.T).T
+    found = q @ e.output.T - (force - e.F_0) @ e.output_residual.T + o @ e.output_given.T
+    return without_rounding(found, e.output, q).T
+
+
+def without_rounding(found: Array, output: Array, q: Array) -> Array:
+    """Samples (s, w) of read-outs by coordinates (s, m); zero is one that reads rounding alone, as in
+    `harmonic_balance.reduced.read`."""
+    moved = np.sqrt((q**2 @ (output != 0).T).max(axis=0, initial=0.0))
+    least = READS * np.linalg.norm(output, axis=1) * moved
+    return np.where(np.abs(found).max(axis=0, initial=0.0) <= least, 0.0, found)
 
 
 def energies(e: Equations, seen: Seen) -> dict[str, Array]:

@@ -10,9 +10,11 @@ import numpy as np
 
 from ..data import Array
 from ..errors import NotConverged
+from ..harmonic_balance import accuracy
 from ..harmonic_balance.problem import Problem
 from ..harmonic_balance.response import operating
 from ..harmonic_balance.solver import sweep
+from ..units import counted, percent
 from .contacts import Group, Held, answer, untouched
 from .equations import Equations
 from .stepper import Now, Stepper
@@ -22,6 +24,9 @@ CYCLES = 30
 
 SAMPLES = 4096
 """Of each of them."""
+
+FAR = 0.01
+"""Share of a periodic motion by which a start may miss it before that is told."""
 
 PERIODIC = 1e-12
 """Share of the largest force of a point within which the end of a cycle is that of the one before."""
@@ -33,12 +38,24 @@ class Periodic:
 
     Attributes:
         q, v: (m,) modal displacements and velocities at t = 0. d: (c, W) mean, cos, sin, cos 2, ... of the contact
-            coordinates, m and rad.
+            coordinates, m and rad. beside: estimated share of the motion that its harmonics and samples leave out.
     """
 
     q: Array
     v: Array
     d: Array
+    beside: float = 0.0
+
+    @property
+    def messages(self) -> tuple[str, ...]:
+        """What a reader must know of it."""
+        if self.beside <= FAR:
+            return ()
+        few = counted(self.d.shape[1] // 2, "harmonic")
+        return (
+            f"start: harmonic balance with {few} leaves out about {percent(self.beside)} of the motion, which begins "
+            "beside the periodic one by as much; raise harmonics and samples, or settle.",
+        )
 
 
 def of_balance(e: Equations, problem: Problem) -> Periodic:
@@ -59,7 +76,8 @@ def of_balance(e: Equations, problem: Problem) -> Periodic:
     for one, c in zip(relative, contacts, strict=True):
         one[:, 0] -= c.offset
     d = np.concatenate(relative) if relative else np.zeros((0, problem.coefficients))
-    return Periodic(q.sum(axis=0).real, (turns @ q).real, d)
+    beside = accuracy.SAFETY * accuracy.left_out(problem, point.x, e.Omega)
+    return Periodic(q.sum(axis=0).real, (turns @ q).real, d, beside)
 
 
 def begun(stepper: Stepper, start: Periodic) -> Now:
