@@ -12,7 +12,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from closed_forms.one_harmonic import JenkinsContact, frequency_response
-from test_harmonic_balance_time import slider
+from test_harmonic_balance_time import body, slider
 
 from microslip import continuation
 from microslip.case import CaseResult, CaseSettings, load_case, run_case
@@ -26,7 +26,7 @@ from microslip.contact.normal import Normal, Penalty, Preload, Rough
 from microslip.contact.patch import Patch, equilibrium, grid, stuck_stiffness
 from microslip.contact.point import PointContact
 from microslip.contact.thinned import thinned
-from microslip.data import Compliance, Interface, ModalBasis, ModalGroup
+from microslip.data import ModalBasis, ModalGroup
 from microslip.errors import NotConverged, UserError
 from microslip.harmonic_balance import response_table, solver
 from microslip.harmonic_balance.forces import AFT
@@ -38,21 +38,6 @@ from microslip.system import Body, Contact, Force, Monitor, Spring, System
 
 def value(number: float) -> jax.Array:
     return jnp.asarray(number, dtype=float)
-
-
-def body(rows: np.ndarray, omega: np.ndarray, ratio: float = 0.0) -> ModalGroup:
-    """Modes whose six rows at the interface ``face`` are given."""
-    m = len(omega)
-    face = Interface(
-        np.zeros(3), np.eye(3), rows, np.zeros(m), np.zeros((0, 3)), np.zeros(0), np.zeros((0, 3)), np.zeros((0, 3, m))
-    )
-    return ModalGroup(
-        speed=0.0, omega=omega, kind=("normal",) * m, damping_ratio=np.full(m, ratio), M_r=np.eye(m),
-        K_r=np.diag(omega**2), C_r=np.diag(2 * ratio * omega), G_r=np.zeros((m, m)), phi=np.zeros((0, 3, m)),
-        interfaces={"face": face}, excitations={}, monitors={}, gauges={},
-        compliance=Compliance((), np.zeros((0, 0)), np.zeros((0, 0)), False), stresses={}, u_static=np.zeros((0, 3)),
-        checks={},
-    )  # fmt: skip
 
 
 def oscillator(ratio: float = 0.02) -> ModalGroup:
