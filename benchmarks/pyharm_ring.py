@@ -4,7 +4,8 @@
 
 job: M, C, K of the linear ring in coordinates of which the first `contacts` are the motions of its sliders, one an
 element to the ground, and the next two those that a cosine and a sine of 1 N act on; the rest stand among the modal
-ones. The same analysis runs once over a hundredth of the band (compilation, which numba keeps), then over all of it.
+ones; output: (w, m) read-outs in them. The same analysis runs once over a hundredth of the band (compilation, which
+numba keeps), then over all of it, then in steps of a quarter from the point below the highest to the one above it.
 """
 
 import sys
@@ -21,16 +22,16 @@ job = dict(np.load(sys.argv[1]))
 n, contacts = len(job["M"]), int(job["contacts"])
 
 
-def maestro(share: float) -> Maestro:
+def maestro(low: float, high: float, step: float) -> Maestro:
+    """rad/s."""
     slider = {"type": "Jenkins", "k": float(job["stiffness"]), "mu": 1.0, "N0": float(job["limit"]), "dirs": [0]}
     connectors = {f"slider_{i}": {**slider, "connect": {"ring": [i]}} for i in range(contacts)}
     for i in (0, 1):
         turned = {"dto": 0, "ho": 1, "phi": i * np.pi / 2, "amp": 1.0, "dirs": [0]}
         connectors[f"force_{i}"] = {"type": "GOForcing", **turned, "connect": {"ring": [contacts + i]}}
     matrix = {"M": job["M"], "C": job["C"], "K": job["K"], "G": np.zeros((n, n))}
-    low, high, step = float(job["low"]), float(job["high"]), float(job["step"])
     analysis = {
-        "study": "frf", "puls_inf": low, "puls_sup": low + share * (high - low), "sign_ds": 1, "verbose": False,
+        "study": "frf", "puls_inf": low, "puls_sup": high, "sign_ds": 1, "verbose": False,
         "ds0": step, "ds_max": step, "ds_min": 1e-4 * step, "solver": "NewtonRaphson",
         "solver_options": {"tol_residual": 1e-6, "tol_delta_x": 1e-6, "max_iter": 30},
     }  # fmt: skip
@@ -46,14 +47,26 @@ def maestro(share: float) -> Maestro:
     )
 
 
-for share in (0.01, 1.0):
-    run = maestro(share)
+def answer(low: float, high: float, step: float) -> tuple[float, np.ndarray, np.ndarray, int]:
+    """CPU seconds, rad/s of the points, (p, m) their first harmonics, Re(x exp(i w t)), and all steps."""
+    run = maestro(low, high, step)
     started = time.process_time()
     run.operate()
     cpu = time.process_time() - started
-solved = run.nls["frf"].SolList
-found = [s for s in solved if s.flag_accepted]
-dofs = run.system.expl_dofs
-first = {cs: dofs[(dofs["harm"] == 1) & (dofs["cs"] == cs)].index.to_numpy() for cs in "cs"}
-x = np.array([s.x[first["c"]] - 1j * s.x[first["s"]] for s in found])  # Re(x exp(i w t))
-np.savez(sys.argv[2], x=x, omega=np.array([s.x[-1] for s in found]), cpu=cpu, steps=sum(s.iter_numb for s in solved))
+    solved = run.nls["frf"].SolList
+    found = [s for s in solved if s.flag_accepted]
+    dofs = run.system.expl_dofs
+    first = {cs: dofs[(dofs["harm"] == 1) & (dofs["cs"] == cs)].index.to_numpy() for cs in "cs"}
+    x = np.array([s.x[first["c"]] - 1j * s.x[first["s"]] for s in found])
+    return cpu, np.array([s.x[-1] for s in found]), x, sum(s.iter_numb for s in solved)
+
+
+low, high, step = float(job["low"]), float(job["high"]), float(job["step"])
+answer(low, low + 0.01 * (high - low), step)
+coarse = answer(low, high, step)
+top = coarse[1][np.abs(coarse[2] @ job["output"].T).max(axis=1).argmax()]
+fine = answer(max(top - step, low), min(top + step, high), step / 4)
+cpu, omega, x, steps = (
+    np.hstack([a, b]) if np.ndim(a) < 2 else np.vstack([a, b]) for a, b in zip(coarse, fine, strict=True)
+)
+np.savez(sys.argv[2], x=x, omega=omega, cpu=cpu, steps=steps, coarse=len(coarse[1]))

@@ -10,6 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 import scipy.linalg
+from closed_forms.beams import beam_element
 from integrator import Start, Steady, extrapolated, steady
 
 from microslip.contact.friction import Coulomb
@@ -50,21 +51,25 @@ class Cubic(Law):
         return state.T
 
 
-def group(omega: Array, rows: dict[str, Array], ratio: float) -> ModalGroup:
-    """Modes with an interface ``face`` of six rows, an excitation ``push`` and a monitor ``tip`` of one row each."""
-    m, nowhere = len(omega), np.zeros(3)
+def body(rows: Array, omega: Array, ratio: float = 0.0) -> ModalGroup:
+    """Modes whose six rows at the interface ``face`` are given."""
+    m = len(omega)
     face = Interface(
-        nowhere, np.eye(3), rows["face"], np.zeros(m), np.zeros((0, 3)), np.zeros(0), np.zeros((0, 3)),
-        np.zeros((0, 3, m)),
-    )  # fmt: skip
+        np.zeros(3), np.eye(3), rows, np.zeros(m), np.zeros((0, 3)), np.zeros(0), np.zeros((0, 3)), np.zeros((0, 3, m))
+    )
     return ModalGroup(
         speed=0.0, omega=omega, kind=("normal",) * m, damping_ratio=np.full(m, ratio), M_r=np.eye(m),
         K_r=np.diag(omega**2), C_r=np.diag(2 * ratio * omega), G_r=np.zeros((m, m)), phi=np.zeros((0, 3, m)),
-        interfaces={"face": face}, excitations={"push": Rows(rows["push"][None], ("push",), "m", nowhere)},
-        monitors={"tip": Rows(rows["tip"][None], ("u",), "m", nowhere)}, gauges={},
+        interfaces={"face": face}, excitations={}, monitors={}, gauges={},
         compliance=Compliance((), np.zeros((0, 0)), np.zeros((0, 0)), False), stresses={}, u_static=np.zeros((0, 3)),
         checks={},
     )  # fmt: skip
+
+
+def group(omega: Array, rows: dict[str, Array], ratio: float) -> ModalGroup:
+    """Modes with an interface ``face`` of six rows, an excitation ``push`` and a monitor ``tip`` of one row each."""
+    push, tip = (Rows(rows[n][None], (u,), "m", np.zeros(3)) for n, u in (("push", "push"), ("tip", "u")))
+    return replace(body(rows["face"], omega, ratio), excitations={"push": push}, monitors={"tip": tip})
 
 
 def held(body: ModalGroup, law: Law, directions: list[int], preload: Array, offset: Array, force: float) -> Assembly:
@@ -88,10 +93,7 @@ def bending(elements: int) -> tuple[Array, Array]:
     """Eigenvalues and modes of a clamped beam of length, stiffness and mass per length 1; (displacement, slope)."""
     h, n = 1.0 / elements, 2 * (elements + 1)
     K, M = np.zeros((n, n)), np.zeros((n, n))
-    k = np.array([[12, 6 * h, -12, 6 * h], [6 * h, 4 * h**2, -6 * h, 2 * h**2], [-12, -6 * h, 12, -6 * h],
-                  [6 * h, 2 * h**2, -6 * h, 4 * h**2]]) / h**3  # fmt: skip
-    m = h / 420 * np.array([[156, 22 * h, 54, -13 * h], [22 * h, 4 * h**2, 13 * h, -3 * h**2],
-                            [54, 13 * h, 156, -22 * h], [-13 * h, -3 * h**2, -22 * h, 4 * h**2]])  # fmt: skip
+    k, m = beam_element(h)
     for e in range(elements):
         at = slice(2 * e, 2 * e + 4)
         K[at, at] += k

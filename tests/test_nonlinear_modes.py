@@ -60,6 +60,15 @@ def test_a_mode_that_is_nearly_linear_passes_its_checks():
     assert mode.complete, mode.status
 
 
+def test_a_mode_about_a_preload_takes_few_points():
+    """k = 1 beside a spring of 10 pressed by 0.3, which stays closed: omega^2 = 11 at every amplitude, however far the
+    mean is from zero. Its mean over the amplitude made a curve of more than a thousand points."""
+    pressed = ms.structure(1.0, 1.0, 0.02, elements=[ms.stop(10.0, -0.3)], output=[0])
+    mode = ms.backbone(pressed, 1e-3, 0.02, harmonics=3)
+    assert mode.complete and len(mode.amplitude) < 30
+    np.testing.assert_allclose(mode.Omega, np.sqrt(11.0), rtol=1e-9)
+
+
 def test_a_mode_fed_too_little_fails_its_checks():
     """With a tenth less than its damping the forces of its contacts do not move the bodies as they move."""
     found, curve = backbone(sliding(), 2.0e-5, 2.1e-5), _Curve(replace(sliding(), share=0.0), 0)

@@ -6,6 +6,7 @@ import h5py
 import numpy as np
 import pytest
 import scipy.sparse as sp
+from closed_forms.beams import beam_element
 
 import microslip as ms
 from microslip.basis import check_basis, read_basis, write_basis
@@ -139,10 +140,7 @@ def test_zieglers_pendulum_flutters_from_its_critical_force_on(damping, critical
 def beck(P: float, elements: int = 8) -> tuple:
     """A cantilever with a tangential force at its end, E I, mass and length one, by Hermite's beam elements."""
     h, n = 1 / elements, 2 * elements + 2
-    k = np.array([[12, 6 * h, -12, 6 * h], [6 * h, 4 * h**2, -6 * h, 2 * h**2],
-                  [-12, -6 * h, 12, -6 * h], [6 * h, 2 * h**2, -6 * h, 4 * h**2]]) / h**3  # fmt: skip
-    m = np.array([[156, 22 * h, 54, -13 * h], [22 * h, 4 * h**2, 13 * h, -3 * h**2],
-                  [54, 13 * h, 156, -22 * h], [-13 * h, -3 * h**2, -22 * h, 4 * h**2]]) * h / 420  # fmt: skip
+    k, m = beam_element(h)
     g = np.array([[36, 3 * h, -36, 3 * h], [3 * h, 4 * h**2, -3 * h, -(h**2)],
                   [-36, -3 * h, 36, -3 * h], [3 * h, -(h**2), -3 * h, 4 * h**2]]) / (30 * h)  # fmt: skip
     K, M = np.zeros((n, n)), np.zeros((n, n))

@@ -597,6 +597,13 @@ def test_a_start_that_presses_contacts_deeper_than_loads_do_is_refused() -> None
     assert abs(depth) < 1e-6
 
 
+def test_what_runs_first_is_compiled_once() -> None:
+    """What a motion begins with has the types of what it goes on with, whatever numbers a law makes its state of."""
+    e = equations.of(hitting(patch(Penalty(value(3e5)))), 64.32)
+    now = Stepper(e, 2 * np.pi / 64.32 / 64).start(np.zeros(len(e.omega2)), np.zeros(len(e.omega2)))
+    assert not any(x.weak_type for x in jax.tree_util.tree_leaves(now))
+
+
 def test_a_case_begins_on_its_balance(hammer: Path) -> None:
     """One period is enough, where there is no impact."""
     words = ["orbit", "case.toml", "-q", "--set", "contacts.0.interference=-1.0", "--set", "orbit.settle=0"]

@@ -594,7 +594,7 @@ def optimum(
         case: a case.toml, or the folder that holds it.
         basis: see respond.
         over: normal_force, a key of the contacts (friction, tangential_stiffness, ...: of all), or any key of the
-            case by its dotted name.
+            case by its dotted name, or of its system.toml behind "system.".
         low: first value of the range that is searched; the smallest of sweep.normal_forces if not given.
         high: last value of it; the largest of sweep.normal_forces if not given.
         points: values from one end to the other at which a sweep looks for it first.

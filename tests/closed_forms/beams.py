@@ -155,3 +155,12 @@ def _wright_determinant(frequency: float, speed: float, hub: float, terms: int) 
         w = Polynomial(c)
         tip.append((w.deriv(2)(1.0), w.deriv(3)(1.0)))
     return tip[0][0] * tip[1][1] - tip[0][1] * tip[1][0]
+
+
+def beam_element(h: float) -> tuple[Array, Array]:
+    """Stiffness and mass of a Hermite element of length h, E I and mass per length 1; (displacement, slope) twice."""
+    k = np.array([[12, 6 * h, -12, 6 * h], [6 * h, 4 * h**2, -6 * h, 2 * h**2], [-12, -6 * h, 12, -6 * h],
+                  [6 * h, 2 * h**2, -6 * h, 4 * h**2]]) / h**3  # fmt: skip
+    m = h / 420 * np.array([[156, 22 * h, 54, -13 * h], [22 * h, 4 * h**2, 13 * h, -3 * h**2],
+                            [54, 13 * h, 156, -22 * h], [-13 * h, -3 * h**2, -22 * h, 4 * h**2]])  # fmt: skip
+    return k, m

@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..continuation import Point, Settings, follow, start
+from ..continuation import Point, Settings, State, follow, start
 from ..data import Array
 from ..errors import UserError
 from ..files.hdf5 import refuse_foreign
@@ -193,14 +193,14 @@ def backbone(
     bounds = np.log([low, high])
     settings = replace(settings, low=float(bounds[0]) - 1e-9, high=float(bounds[1]), targets=tuple(np.log(asked)))
     points, quantity = list[Point](), measured(problem.assembly, output)
-    for state in follow(curve, start(curve, z, float(bounds[0]), settings), settings):
+    for state in follow(curve, curve.begun(z, float(bounds[0]), settings), settings):
         points += state.found
         if points:
             share = int(100 * min((points[-1].lam - bounds[0]) / (bounds[1] - bounds[0]), 1.0))
             report(f"{share} of 100 % of the amplitudes: {quantity.sized(np.exp(points[-1].lam))}")
     A = np.exp([p.lam for p in points])
     Omega, xi = (np.array([p.x[i] for p in points]) for i in (-2, -1))
-    x = np.array([p.x[:-2] * a / problem.length for p, a in zip(points, A, strict=True)]).reshape(len(A), len(z) - 2)
+    x = np.array([p.x[:-2] * curve.units(a)[0] for p, a in zip(points, A, strict=True)]).reshape(len(A), len(z) - 2)
     found = tuple(curve.checks(*one) for one in zip(x, Omega, xi, strict=True))
     status = next((one.failure for one in found if one.failure), _in_words(state.status, points, low, high, quantity))
     return Backbone(A, Omega, xi / (2 * Omega) if len(A) else xi, x, omega, status, found, quantity)
@@ -231,10 +231,10 @@ def sliding_amplitude(problem: Problem, mode: int) -> float:
 
 
 class _Curve:
-    """The equations of `backbone` for `continuation`: z = (x / (A / length), Omega, xi), lambda = ln A."""
+    """The equations of `backbone` for `continuation`: z = (x / `units`, Omega, xi), lambda = ln A."""
 
     def __init__(self, problem: Problem, output: int) -> None:
-        self.problem, self.output = problem, output
+        self.problem, self.output, self.held = problem, output, 0.0
         self.x_scale: Array = np.ones(problem.size + 2)
         self.lam_scale = 1.0
 
@@ -258,10 +258,30 @@ class _Curve:
         self.x_scale[-2:] = omega[mode], 0.1 * omega[mode]
         return np.append(z.ravel(), [omega[mode], xi]), float(omega[mode])
 
+    def begun(self, z: Array, lam: float, settings: Settings) -> State:
+        """The first point. A mean that stands there however small the amplitude is (`held`) is not counted in this."""
+        first = start(self, z, lam, settings)
+        if not first.found:
+            return first
+        before, after = self.units(np.exp(lam))[0], first.found[0].x.copy()
+        mean = float(np.abs(after[: self.problem.count] * before[: self.problem.count]).max(initial=0.0))
+        self.held = mean * self.problem.length / self.x_scale[0]
+        after[:-2] *= before / self.units(np.exp(lam))[0]
+        return start(self, after, lam, settings)
+
+    def units(self, A: float) -> tuple[Array, Array]:
+        """(n,) of x at an amplitude, and their derivatives by its logarithm: A / length, of the mean not less than of
+        what is `held`."""
+        unit = np.full(self.problem.size, A / self.problem.length)
+        rate, mean = unit.copy(), slice(self.problem.count)
+        unit[mean] = np.hypot(A, self.held) / self.problem.length
+        rate[mean] = unit[mean] * (A / np.hypot(A, self.held)) ** 2
+        return unit, rate
+
     def evaluate(self, z: Array, lam: float) -> tuple[Array, Array, Array]:
-        """R over the amplitude and y / A - 1 (real and imaginary part), and their derivatives."""
+        """R over its units and y / A - 1 (real and imaginary part), and their derivatives."""
         A, Omega, xi = float(np.exp(lam)), float(z[-2]), float(z[-1])
-        unit = A / self.problem.length
+        unit, rate = self.units(A)
         x, at = z[:-2] * unit, self._at(Omega, xi)
         force, slopes = at.forces(x)
         R, y = at.residual_of(x, force), amplitude(at, x, force, slopes, self.output)
@@ -270,10 +290,12 @@ class _Curve:
         R_xi, y_xi = ((a - b) / (2e-6 * Omega) for a, b in zip(*sides, strict=True))
         n = len(x)
         D = np.zeros((n + 2, n + 2))
-        D[:n, :n], D[:n, n], D[:n, n + 1] = J, at.rate(x, force) / unit, R_xi / unit
+        D[:n, :n], D[:n, n], D[:n, n + 1] = J * unit / unit[:, None], at.rate(x, force) / unit, R_xi / unit
         D[n:, :n] = by_x.real, by_x.imag
         D[n:, n:] = np.array([[y.rate.real, y_xi.real], [y.rate.imag, y_xi.imag]]) / A
-        lam_rate = np.concatenate([J @ z[:-2] - R / unit, _pair(complex(by_x @ z[:-2]) - y.value / A)])
+        ahead = z[:-2] * rate / unit
+        moved = (J @ (unit * ahead) - R * rate / unit) / unit
+        lam_rate = np.concatenate([moved, _pair(complex(by_x @ ahead) - y.value / A)])
         return np.concatenate([R / unit, _pair(y.value / A - 1.0)]), D, lam_rate
 
     def _given(self, at: AtFrequency, x: Array, force: Array, slopes: list[Array]) -> tuple[Array, complex]:

@@ -144,13 +144,10 @@ def optimum_plot(
 
 
 def _over_ratios(axes: Axes, x: Array) -> None:
-    """A logarithmic axis with six numbers, where all are positive."""
-    if x.min() > 0:
+    """A logarithmic axis with round numbers, where all are positive and far enough apart for three of them."""
+    if x.min() > 0 and x.max() > 4 * x.min():
         axes.set_xscale("log")
-        low, high = np.log10(x.min()), np.log10(x.max())
-        ticks = sorted({float(f"{10**e:.2g}") for e in np.linspace(low, high, 6)})
-        axes.set_xticks(ticks, labels=[f"{v:g}" for v in ticks])
-        axes.minorticks_off()
+        numbers_within(axes.xaxis)
 
 
 def stability_plot(found: Mapping[float, Mapping[float, Stability]], title: str, path: Path) -> Path:

@@ -47,8 +47,9 @@ def unit_of(name: str) -> str:
     return ("" if name.startswith(READ) else UNITS.get(last, "")) or UNITS.get(first, "1")
 
 
-ROUNDING = 1e-12
-"""Share of the largest harmonic of a point below which another one is rounding: what a symmetric motion has none of."""
+ROUNDING = 1e-10
+"""Share of the largest harmonic of a point below which another one is rounding and what Newton's method leaves: what a
+symmetric motion has none of."""
 
 
 def without_rounding(harmonics: ComplexArray) -> ComplexArray:

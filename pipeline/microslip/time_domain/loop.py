@@ -38,7 +38,8 @@ def begun(options: Options, groups: tuple[Group, ...], B: Bodies, y: Any, o: Any
     zero, none = jnp.zeros(()), jnp.zeros((4, sum(len(g.G) for g in groups)))
     energy = jnp.zeros(6).at[4].set(held.stored)
     now = Now(y, o, zero, push, held, energy, held.missed, none.astype(bool), none, (), jnp.zeros(2, int), zero)
-    return fourth.begun(groups, B, now) if options.halvings else now
+    now = fourth.begun(groups, B, now) if options.halvings else now
+    return jax.tree_util.tree_map(lambda x: jnp.asarray(x, x.dtype), now)  # as `run` returns it, or it compiles twice
 
 
 @partial(program, static_argnums=(0, 1))
