@@ -87,7 +87,9 @@ def _pressed(built: Built) -> Assembly:
         UserError: contacts that wait for a normal force.
     """
     if waiting := [c.interface for c in built.contacts if swept(c)]:
-        raise UserError(f"contacts.{waiting[0]}: waits for a normal force; give normal_force to assemble, N")
+        raise UserError(
+            f"contacts.{waiting[0]}: waits for a normal force, N; give normal_force to the contact, or to assemble"
+        )
     return built.assembly
 
 

@@ -604,6 +604,7 @@ def optimum(
     from .stages import following
 
     case = _case_file(case)
+    over = "normal_force" if over == "normal-force" else over  # as respond has it
     with progress(f"optimum {case}", quiet) as report:
         opened = _followed(case, basis, set_)
         with making(opened.folder / "optimum.csv", report):
