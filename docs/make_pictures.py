@@ -47,6 +47,7 @@ from microslip.pictures.scene import quiet_vtk
 from microslip.reduced import truncation
 from microslip.reduced.compliance import contact_share, without_bulk
 from microslip.reduction import METHODS
+from microslip.stages import following
 from microslip.stages.closure import closure_stage
 from microslip.stages.job import open_job
 from microslip.stages.meshing import load_mesh, mesh_stage
@@ -385,8 +386,10 @@ def spin_pit() -> None:
     left.legend(fontsize=8)
     over_mass = {shape: strain_over_mass(shape) for shape in damper_study.SHAPES}
     plain(right)
-    for (shape, (mass, strain, best)), colour in zip(over_mass.items(), plots.COLOURS, strict=False):
-        right.loglog(1e3 * mass, 1e6 * strain, "o-", color=colour, label=shape, markersize=3)
+    for (shape, (mass, strain, valid)), colour in zip(over_mass.items(), plots.COLOURS, strict=False):
+        best = strain.argmin()
+        right.loglog(1e3 * mass, 1e6 * strain, "o:", color=colour, mfc="white", markersize=3, linewidth=1)
+        right.plot(1e3 * mass, np.where(valid, 1e6 * strain, np.nan), "o-", color=colour, label=shape, markersize=3)
         right.plot(1e3 * mass[best], 1e6 * strain[best], "o", color=colour, mfc="none", markersize=9)
     right.set(xlabel="damper mass in g", ylabel="largest strain amplitude in µm/m", title="rings: lowest")
     right.set_xticks([16, 26, 42, 75, 117], labels=["16", "26", "42", "75", "117"], minor=False)
@@ -402,19 +405,22 @@ def spin_pit() -> None:
         rows.append([shape, f"{1e3 * mass:g}", f"{normal:.0f}", f"{f:.1f}", f"{1e6 * strain:.0f}", doubt])
     head = ["damper", "mass, g", "normal force, N", "resonance, Hz", "strain, µm/m", "validity"]
     fill("dampers.md", "pit", table(head, rows))
-    best = [[s, f"{1e3 * m[i]:.1f}", f"{1e6 * strain[i]:.0f}"] for s, (m, strain, i) in over_mass.items()]
-    fill("dampers.md", "mass", table(["damper", "best mass, g", "largest strain there, µm/m"], best))
+    best = []
+    for shape, (m, strain, valid) in over_mass.items():
+        i = strain.argmin()
+        best.append([shape, f"{1e3 * m[i]:.1f}", f"{1e6 * strain[i]:.0f}", "" if valid[i] else following.NOT_VALID])
+    fill("dampers.md", "mass", table(["damper", "best mass, g", "largest strain there, µm/m", "validity"], best))
 
 
-def strain_over_mass(shape: str) -> tuple[Array, Array, int]:
-    """Masses (kg) of a damper's shape, the largest strains that `microslip optimum` finds, and which is the lowest."""
+def strain_over_mass(shape: str) -> tuple[Array, Array, Array]:
+    """Masses (kg) of a damper's shape, the largest strains that `microslip optimum` finds, and which are valid."""
     asked = f"optimum {damper_study.CASES}/spin-pit-{shape}.toml --over bodies.damper.mass --low 0.0165 --high 0.16"
     with contextlib.chdir(BUILD):  # where `companion` has left the bodies
         typed([*asked.split(), "--points", "9"])
     text = (BUILD / f"build/spin-pit-{shape}/optimum.csv").read_text(encoding="utf-8")
-    rows = [row for row in csv.DictReader(text.splitlines()) if row["what"] == "highest resonance"]
+    rows = [row for row in csv.DictReader(text.splitlines()) if row["what"].startswith(following.RESONANCE)]
     mass, strain = (np.array([float(row[k]) for row in rows]) for k in ("bodies.damper.mass_kg", "amplitude_strain"))
-    return mass, strain, int(strain.argmin())
+    return mass, strain, np.array([following.NOT_VALID not in row["what"] for row in rows])
 
 
 # static contact ----------------------------------------------------------------------------------------------------

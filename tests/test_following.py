@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -169,7 +170,8 @@ def test_optima_of_several_cases_stand_on_one_picture(tmp_path: Path, monkeypatc
         peaks = {mass: peak.HighestPeak(600.0, a, np.zeros(1), "converged") for mass, a in heights.items()}
         before = following.found_before(["light"] * (name == "heavy"), over, case)
         *_, page = following.write_optimum(peak.Optimum(best, peaks[best], "converged", peaks, {}), over, case, before)
-    np.testing.assert_allclose(before["light"], [[1, 3, 9], [300 / np.pi] * 3, 1e-6 * np.array([2, 10 / 3, 82 / 9])])
+    heights = 1e-6 * np.array([2, 10 / 3, 82 / 9])
+    np.testing.assert_allclose(before["light"], [[1, 3, 9], [300 / np.pi] * 3, heights, [1] * 3])
     assert "light: lowest at bodies.vane.mass = 1 kg, 2 µm at 95.493 Hz." in page.read_text()
     assert [t.get_text() for t in figures[-1].legends[0].get_texts()] == ["light", "heavy"] and not figures[0].legends
     assert Path("build/light/optimum.csv").read_text().startswith("bodies.vane.mass_kg,frequency_Hz,amplitude_m,what")
@@ -179,6 +181,32 @@ def test_optima_of_several_cases_stand_on_one_picture(tmp_path: Path, monkeypatc
     for other, said in (("light", "not friction, "), ("none", "type microslip optimum none")):
         with pytest.raises(UserError, match=said):
             following.found_before([other], "friction", case)
+
+
+def test_an_optimum_where_contacts_would_lift_off_is_marked(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """In the book's mode, beyond 1 % of points and time: in the table, the sentence, the picture and beside others."""
+    from microslip.pictures import following as drawing
+
+    figures: list[Any] = []
+    monkeypatch.setattr(drawing, "save_figure", lambda figure, path: figures.append(figure) or path)
+    monkeypatch.chdir(tmp_path)
+    case = following.Case(Path("case.toml"), {"name": "pit"}, {}, Path("build/pit"))
+    plain = SimpleNamespace(settings=SimpleNamespace(mode="book"), contacts=())
+    vars(case).update(quantity=METRES, plain=plain)
+    share = {1.0: 0.005, 2.0: 0.14, 3.0: 0.33}
+    peaks = {
+        m: peak.HighestPeak(600.0, 1e-6 / m, np.zeros(1), "converged", np.array([0.0, o])) for m, o in share.items()
+    }
+    found = peak.Optimum(3.0, peaks[3.0], "converged", peaks, {})
+    *_, page = following.write_optimum(found, "mass", case)
+    what = [row["what"] for row in csv.DictReader(Path("build/pit/optimum.csv").open())]
+    marked = "highest resonance; not valid: contacts would lift off"
+    assert what == ["highest resonance", marked, marked, "optimum: converged"]
+    assert "is lowest; not valid: contacts would lift off." in page.read_text()
+    np.testing.assert_array_equal(following.found_before(["pit"], "mass", case)["pit"][3], [1, 0, 0])
+    dotted, solid = figures[0].axes[0].get_lines()[:2]
+    assert np.isfinite(dotted.get_ydata()).all() and list(np.isfinite(solid.get_ydata())) == [True, False, False]
+    assert "not valid: contacts lift off" in [t.get_text() for t in figures[0].legends[0].get_texts()]
 
 
 def test_no_optimum_says_where_to_look(

@@ -611,7 +611,7 @@ def optimum(
             others = following.found_before(beside, over, opened)
             found = following.optimum_over(opened, over, low, high, points, report)
             files = following.write_optimum(found, over, opened, others)
-    _say(following.optimum_message(found, over, opened.quantity), quiet)
+    _say(following.told(found, over, opened), quiet)
     for file in files:
         _say(file, quiet)
     if not following.is_optimum(found):

@@ -402,11 +402,16 @@ OPEN = 0.01
 
 def lifted(built: Built, found: HarmonicResponse) -> Array:
     """(f,) bool, points at which contacts would lift off though what stands for their law does not follow it."""
+    return lifts(built, found.open) & found.converged
+
+
+def lifts(built: Built, share: Array) -> Array:
+    """(f,) bool, the same by the shares (f, c) of points and time at which contacts are open."""
     if built.settings.mode == "book":
-        return (found.open > OPEN).any(axis=1) & found.converged
+        return np.asarray((share > OPEN).any(axis=1))
     count = len(built.contacts)  # of a sector; the others of a ring follow
-    never = [i for i in range(found.open.shape[1]) if not built.contacts[i % count].what.opens]
-    return (found.open[:, never] > 0).any(axis=1) & found.converged
+    never = [i for i in range(share.shape[1]) if not built.contacts[i % count].what.opens]
+    return np.asarray((share[:, never] > 0).any(axis=1))
 
 
 def _lifting(built: Built, problem: Problem, found: HarmonicResponse, normal: float) -> list[str]:

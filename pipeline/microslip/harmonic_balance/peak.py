@@ -30,12 +30,14 @@ Make = Callable[[float], Problem]
 
 @dataclass(frozen=True)
 class HighestPeak:
-    """A peak. Attributes: Omega: rad/s. amplitude: m. x: see `Problem`. status: "converged", or what went wrong."""
+    """A peak. Attributes: Omega: rad/s. amplitude: m. x: see `Problem`. status: "converged", or what went wrong.
+    open: (c,) share of its points and time at which each contact is open."""
 
     Omega: float
     amplitude: float
     x: Array
     status: str
+    open: Array | None = None
 
 
 @dataclass(frozen=True)
@@ -100,6 +102,14 @@ def checked(problem: Problem, peak: Peak, output: int = 0) -> Peak:
     return replace(peak, status=found.checks.failure or still or peak.status)
 
 
+def opened(problem: Problem, peak: Peak) -> Array | None:
+    """(c,) share of its points and time at which each contact is open; nothing of a peak that is not known."""
+    if not peak.converged:
+        return None
+    cycles = operating(problem, Point(peak.lam, peak.x, CONVERGED, 0.0, 0)).cycles.values()
+    return np.array([float(cycle.open.mean()) for cycle in cycles])
+
+
 STILL = "the read-out does not move"
 """Status of a peak of rounding."""
 
@@ -130,7 +140,7 @@ def optimum(
         top, end = highest(make(value), Omega, output, report)
         if end is not None:
             rising[value] = end
-        one = found[value] = resonance(top)
+        one = found[value] = replace(resonance(top), open=opened(make(value), top))
         size = measured(make(value).assembly, output).sized(one.amplitude)
         said = f"{one.Omega / (2 * np.pi):.6g} Hz, {size}" if top.converged else top.status
         report(f"highest resonance at {value:.5g}: {said}")

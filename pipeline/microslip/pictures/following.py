@@ -105,22 +105,31 @@ def backbone_plot(found: Mapping[float, Backbone], title: str, path: Path, of: Q
 
 def optimum_plot(
     found: Optimum, label: str, title: str, path: Path, of: Quantity = METRES, name: str = "",
-    beside: Mapping[str, Array] | None = None,
+    beside: Mapping[str, Array] | None = None, valid: Mapping[float, bool] | None = None,
 ) -> Path:  # fmt: skip
-    """Height and frequency of the highest resonance of what is read over a setting, the optimum marked.
+    """Height and frequency of the highest resonance of what is read over a setting, the optimum marked; hollow and
+    dotted what is not valid.
 
     Args:
-        name: of what was found, where others stand beside it: name -> (3, k) values of the setting, Hz and amplitudes.
+        name: of what was found, where others stand beside it: name -> (4, k) values of the setting, Hz, amplitudes, and
+            1 where they are valid. valid: value -> whether what was found there is; all of it if not given.
     """
     figure = empty_figure(10.5, 4.4 + 0.35 * bool(beside))
     left, right = figure.subplots(1, 2)
     scale, unit = _scale(np.array([found.resonance.amplitude]), of)
     known = {value: one for value, one in found.found.items() if one.status == "converged"}
-    own = np.array([[value, one.Omega / (2 * np.pi), one.amplitude] for value, one in known.items()]).T
+    good = valid or {}
+    own = np.array([[v, one.Omega / (2 * np.pi), one.amplitude, good.get(v, True)] for v, one in known.items()]).T
     curves = {**(beside or {}), name: own}
-    for (said, (x, f, a)), colour in zip(curves.items(), COLOURS, strict=False):
+    for (said, (x, f, a, ok)), colour in zip(curves.items(), COLOURS, strict=False):
         for axes, y in ((left, scale * a), (right, f)):
-            axes.plot(x, y, "o-", color=colour, markersize=4, linewidth=1.6, label=said)
+            axes.plot(x, y, "o:", color=colour, markersize=4, markerfacecolor="white", linewidth=1.2)
+            axes.plot(x, np.where(ok > 0, y, np.nan), "o-", color=colour, markersize=4, linewidth=1.6, label=said)
+    doubtful = not all(one[3].all() for one in curves.values())
+    if doubtful:
+        left.plot(
+            [], [], "o:", color="0.3", markersize=4, markerfacecolor="white", label="not valid: contacts lift off"
+        )
     place = list(known).index(found.parameter)
     for axes, y in ((left, scale * own[2]), (right, own[1])):
         at = (found.parameter, y[place])
@@ -138,7 +147,7 @@ def optimum_plot(
     left.margins(y=0.15)
     right.set_ylabel("its frequency in Hz")
     figure.suptitle(title, fontsize=12)
-    if beside:
+    if beside or doubtful:
         figure.legend(*left.get_legend_handles_labels(), loc="outside lower center", ncols=4, fontsize=9)
     return save_figure(figure, path)
 

@@ -19,6 +19,7 @@ from ..basis import read_basis
 from ..case import checkpoint, load_case
 from ..case.assemble import Built
 from ..case.problem import pressed_by, problem_of
+from ..case.run import lifts
 from ..continuation import NO_OPTIMUM
 from ..data import Array
 from ..errors import UserError
@@ -176,7 +177,7 @@ def _page(case: Case, name: str, title: str, sentences: Sequence[str], files: Se
 
     tables = {}
     for file in (f for f in files if f.suffix == ".csv"):
-        head, *rows = [line.split(",") for line in file.read_text(encoding="utf-8").splitlines()]
+        head, *rows = csv.reader(file.read_text(encoding="utf-8").splitlines())
         tables[file.name] = dict(zip(head, zip(*rows, strict=True), strict=True)) if rows else {}
     page = case.folder / f"{name}.html"
     store.write_text(page, survey_html(title, sentences, tables, [f for f in files if f.suffix == ".png"]))
@@ -252,9 +253,10 @@ def write_optimum(found: Optimum, over: str, case: Case, beside: Mapping[str, Ar
     if any(one.status == "converged" for one in found.found.values()):
         label = over.replace("_", " ") + (unit_of(over) and f" in{unit_of(over)}")
         picture = case.folder / "pictures" / "optimum.png"
-        files.append(optimum_plot(found, label, title, picture, case.quantity, case.name, beside))
+        good = {value: valid(one, case) for value, one in found.found.items()}
+        files.append(optimum_plot(found, label, title, picture, case.quantity, case.name, beside, good))
     said = [
-        f"{optimum_message(found, over, case.quantity)}.",
+        f"{told(found, over, case)}.",
         *([] if is_optimum(found) else [f"{missed(found, over)}."]),
         *(_lowest_of(name, values, over, case.quantity) for name, values in beside.items()),
     ]
@@ -268,7 +270,7 @@ def found_before(names: Sequence[str], over: str, case: Case) -> dict[str, Array
         names: of the cases, or the folders of their products.
 
     Returns:
-        Case -> (3, k): values of the setting, frequencies (Hz) and amplitudes.
+        Case -> (4, k): values of the setting, frequencies (Hz), amplitudes, and 1 where they are valid, else 0.
 
     Raises:
         UserError: a case without that table, or one over another setting or of another quantity.
@@ -284,7 +286,7 @@ def found_before(names: Sequence[str], over: str, case: Case) -> dict[str, Array
         head, *rows = csv.reader(ordinary(file).read_text(encoding="utf-8").splitlines())
         if head != asked:
             raise UserError(f"{file}: holds {', '.join(head)}, not {', '.join(asked)}; name another case")
-        known = [[float(v) for v in row[:3]] for row in rows if row[3] == "highest resonance"]
+        known = [[*map(float, row[:3]), NOT_VALID not in row[3]] for row in rows if row[3].startswith(RESONANCE)]
         if not known:
             raise UserError(f"{file}: holds no resonance; name another case")
         found[folder.name] = np.array(known).T
@@ -293,12 +295,29 @@ def found_before(names: Sequence[str], over: str, case: Case) -> dict[str, Array
 
 def _lowest_of(name: str, values: Array, over: str, of: Quantity) -> str:
     """The lowest of the resonances of another case."""
-    value, f, amplitude = values[:, values[2].argmin()]
-    return f"{name}: lowest at {over} = {value:.4g}{unit_of(over)}, {of.sized(amplitude)} at {f:.5g} Hz."
+    value, f, amplitude, valid = values[:, values[2].argmin()]
+    doubt = "" if valid else f"; {NOT_VALID}"
+    return f"{name}: lowest at {over} = {value:.4g}{unit_of(over)}, {of.sized(amplitude)} at {f:.5g} Hz{doubt}."
+
+
+RESONANCE, NOT_VALID = "highest resonance", "not valid: contacts would lift off"
+"""What a row of ``optimum.csv`` is, and behind it what makes one doubtful."""
+
+
+def valid(one: HighestPeak, case: Case) -> bool:
+    """Whether no contact is open at a resonance though what stands for its law does not follow it."""
+    return one.open is None or not lifts(case.plain, one.open[None])[0]
+
+
+def told(found: Optimum, over: str, case: Case) -> str:
+    """`optimum_message`, and whether it is valid."""
+    doubt = "" if valid(found.resonance, case) else f"; {NOT_VALID}"
+    return f"{optimum_message(found, over, case.quantity)}{doubt}"
 
 
 def _optimum_table(found: Mapping[float, HighestPeak], over: str, case: Case, best: Optimum | None = None) -> Path:
-    shown = [(v, r, "highest resonance" if r.status == "converged" else r.status) for v, r in found.items()]
+    known = {True: RESONANCE, False: f"{RESONANCE}; {NOT_VALID}"}
+    shown = [(v, r, known[valid(r, case)] if r.status == "converged" else r.status) for v, r in found.items()]
     if best is not None:
         what = f"optimum: {best.status}" if is_optimum(best) else f"lowest: {best.status}"
         shown.append((best.parameter, best.resonance, what))
