@@ -381,7 +381,9 @@ def spin_pit() -> None:
     plain(left)
     for mass, colour in zip(damper_study.PRINTED, plots.COLOURS, strict=False):
         _, x = all_of["cottage-roof", mass]
-        left.semilogy(x.frequency, 1e6 * np.abs(x.outputs[:, 0]), color=colour, label=f"{1e3 * mass:g} g")
+        strain, valid = 1e6 * np.abs(x.outputs[:, 0]), np.array([not x.lifts(f) for f in x.frequency])
+        left.semilogy(x.frequency, strain, ":", color=colour, linewidth=1.2)
+        left.semilogy(x.frequency, np.where(valid, strain, np.nan), color=colour, label=f"{1e3 * mass:g} g")
     left.set(xlabel="frequency in Hz", ylabel="strain amplitude in µm/m", title="cottage roof")
     left.legend(fontsize=8)
     over_mass = {shape: strain_over_mass(shape) for shape in damper_study.SHAPES}
