@@ -671,13 +671,15 @@ def test_a_body_that_can_be_made_is(folder: Path) -> None:
         running.respond(folder / "case.toml", None)
 
 
-def test_where_contacts_that_never_open_would_is_told(folder: Path) -> None:
+def test_what_jenkins_elements_do_not_follow_is_told(folder: Path) -> None:
     """Jenkins elements under 0.05 N, which are too weakly pressed, and under 500 N, which are not."""
     text = CASE.replace('law = "smooth"\npoints = [2, 2]\n', 'law = "jenkins"\n').replace("[50.0]", "[0.05, 500.0]")
     (folder / "case.toml").write_text(text.replace("start = 300.0", "start = 250.0"))
     told, _ = respond(folder)
     (said,) = [t for t in told if "does not follow" in t]
     assert said.startswith("warning: At F_N = 0.05 N the contacts would lift off between") and 'law = "smooth"' in said
+    (said,) = [t for t in told if "alone" in t]
+    assert said.startswith("warning: At F_N = 0.05 N and ") and 'slides_along = "t2"' in said
     summary = json.loads((folder / "build/vane/response.json").read_text())
     assert any("does not follow" in message for message in summary["messages"])
 

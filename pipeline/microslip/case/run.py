@@ -10,6 +10,8 @@ from pathlib import Path
 import numpy as np
 import scipy.linalg
 
+from ..contact.harmonics import fourier
+from ..contact.jenkins import Jenkins
 from ..data import Array, ComplexArray, ModalBasis
 from ..errors import UserError
 from ..harmonic_balance import FrequencyResponse
@@ -204,7 +206,7 @@ def _answered(
         found, peaks = _swept(problem, frequency, limits, report, journal, key)
         responses[key], resonances[key] = found, [(one.frequency, one.amplitude) for one in peaks]
         messages += _not_periodic(key, found.unsteady, built.settings)
-        messages += _lifting(built, problem, found, key) + _pulling(built, found, key)
+        messages += _lifting(built, problem, found, key) + _pulling(built, found, key) + _across(problem, found, key)
         messages += [] if _still(found) else left.out(problem, found, peaks, key)
         if key == max(responses):
             stiff = _stuck(problem.assembly)
@@ -437,6 +439,26 @@ def _pulling(built: Built, found: HarmonicResponse, normal: float) -> list[str]:
         f"At F_N = {normal:g} N the contacts would lift off between {low:.4g} and {high:.4g} Hz, which law = "
         '"jenkins" does not follow; write law = "smooth" in the contacts.'
     ]
+
+
+def _across(problem: Problem, found: HarmonicResponse, normal: float) -> list[str]:
+    """A message on the Jenkins elements whose spring without a slider pulls most above what friction would hold."""
+    worst, said, first = 1.0, list[str](), 0
+    wave = fourier(problem.harmonics, 8 * (problem.harmonics + 1))[0][:, 1:]
+    for contact in problem.assembly.contacts:
+        law, rows = contact.patch.law, slice(first, first := first + contact.patch.count)
+        if not isinstance(law, Jenkins) or not law.held:
+            continue
+        ways = contact.patch.kinematics[:, 3 - law.slider] @ found.contact[found.converged, rows, 1:] @ wave.T
+        force = float(law.across) * np.abs(ways).max(axis=(1, 2), initial=0.0)
+        if force.max(initial=0.0) > worst * float(law.held):
+            worst, at = float(force.max() / law.held), found.frequency[found.converged][force.argmax()]
+            said = [
+                f"At F_N = {normal:g} N and {at:.5g} Hz {contact.name} is pulled along t{3 - law.slider} by up to "
+                f"{percent(worst)} of what friction holds, and law = \"jenkins\" slides along t{law.slider} alone; "
+                f'write law = {{ kind = "jenkins", slides_along = "t{3 - law.slider}" }}, or law = "smooth".'
+            ]
+    return said
 
 
 def _not_periodic(normal: float, unsteady: Array, settings: CaseSettings) -> list[str]:
