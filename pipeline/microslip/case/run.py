@@ -455,7 +455,7 @@ def _across(problem: Problem, found: HarmonicResponse, normal: float) -> list[st
             worst, at = float(force.max() / law.held), found.frequency[found.converged][force.argmax()]
             said = [
                 f"At F_N = {normal:g} N and {at:.5g} Hz {contact.name} is pulled along t{3 - law.slider} by up to "
-                f"{percent(worst)} of what friction holds, and law = \"jenkins\" slides along t{law.slider} alone; "
+                f'{percent(worst)} of what friction holds, and law = "jenkins" slides along t{law.slider} alone; '
                 f'write law = {{ kind = "jenkins", slides_along = "t{3 - law.slider}" }}, or law = "smooth".'
             ]
     return said
