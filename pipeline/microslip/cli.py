@@ -645,14 +645,20 @@ def check(file: Path, /, *, short: Short = False, quiet: Quiet = False) -> None:
     energy, read-outs, tables.
 
     Args:
-        file: a basis.h5, or a response.h5.
+        file: a basis.h5, a response.h5, or a folder with either or both.
     """
+    there = [file / name for name in ("basis.h5", "response.h5") if (file / name).is_file()]
+    for one in there or [_modal_file(file)]:
+        _check(one, short, quiet)
+
+
+def _check(file: Path, short: bool, quiet: bool) -> None:
+    """One file, which may be either."""
     from .basis import check_basis, read_basis
     from .basis.files import OtherFormat
     from .results.files import FORMAT
     from .ring.expansion import ring_checks
 
-    file = _modal_file(file)
     try:
         basis = read_basis(file)
     except OtherFormat as other:
