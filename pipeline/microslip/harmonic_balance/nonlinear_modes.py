@@ -35,6 +35,7 @@ from ..units import METRES, Quantity
 from .checks import checks
 from .problem import AtFrequency, Problem
 from .readout import amplitude, measured
+from .reduced import untouched
 from .response import operating
 from .solver import CONVERGED, Report
 from .solver import Point as Solved
@@ -189,6 +190,7 @@ def backbone(
     """
     curve = _Curve(replace(problem, stiffness=tuple(HELD * k for k in problem.stiffness), share=0.0), output)
     z, omega = curve.linear(problem, mode)
+    curve.x_scale[:-2] *= _growth(problem, mode)
     settings = settings or Settings(step=0.05, step_max=0.2, folds=False, branch_points=False)
     bounds = np.log([low, high])
     settings = replace(settings, low=float(bounds[0]) - 1e-9, high=float(bounds[1]), targets=tuple(np.log(asked)))
@@ -220,6 +222,16 @@ def strongest(problem: Problem, low: float, high: float) -> int:
     height = seen * driven / np.maximum(loss, 1e-12 * omega**2)
     inside = (omega >= low) & (omega <= high)
     return int(np.argmax(np.where(inside, height, 0.0) if height[inside].any() else height))
+
+
+def _growth(problem: Problem, mode: int) -> float:
+    """How many times as far the contacts move in the mode without them that is most like a mode with sticking ones (in
+    kinetic energy): the way a nonlinear mode goes in its unknowns."""
+    part, k = _only(problem), problem.stiffness[0]
+    held, free = (assembly.stuck_modes(*of)[1] for of in ((part, k), (untouched(part), np.zeros((0, 0)))))
+    like = int(np.abs(free.conj().T @ part.M @ held[:, mode]).argmax())
+    stays = np.linalg.solve(np.eye(part.count) + part.residual @ k, part.rows @ held[:, mode])
+    return max(1.0, float(np.abs(part.rows @ free[:, like]).max() / np.abs(stays).max()))
 
 
 def sliding_amplitude(problem: Problem, mode: int) -> float:
