@@ -229,9 +229,9 @@ def choose(
     ready(asked, int(known.sum()), samples)
     report(f"{rare.EACH * samples} samples of the linear ring")
     linear = beside(asked)
-    before = np.array([linear(asked.deviations(int(i))) for i in np.flatnonzero(known)]).T
-    told, way = max((rare.correlation(z, found.amplification[known]), i) for i, z in enumerate(before))
-    every = np.array([linear(asked.deviations(FIRST + i))[way] for i in range(rare.EACH * samples)])
+    before = np.array([linear(asked.deviations(int(i))) for i in np.flatnonzero(known)])
+    told = rare.correlation(before, found.amplification[known])
+    every = np.array([linear(asked.deviations(FIRST + i)) for i in range(rare.EACH * samples)])
     pi = rare.chances(every, samples, RARE, told, int(known.sum()))
     chosen, inputs = rare.chosen(pi, asked.seed), f"{inputs} {len(found)} {samples}"
     high = _read(file, inputs)
