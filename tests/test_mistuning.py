@@ -21,7 +21,7 @@ from microslip.mistuning.linear import answer, beside
 from microslip.mistuning.peaks import Highest, highest
 from microslip.mistuning.ring import Tuned
 from microslip.mistuning.samples import Asked, Sample, Sliding, Sticking, amplitudes, sample
-from microslip.mistuning.scatter import Scatter
+from microslip.mistuning.scatter import OF_CONTACTS, Scatter
 from microslip.mistuning.sensitivity import Linearised, sensitivities, softening, spread
 from microslip.mistuning.statistics import Envelope, fits, quantile
 from microslip.mistuning.weibull import exponent
@@ -590,14 +590,17 @@ def test_correlations_are_as_asked() -> None:
 
 
 def test_a_table_tells_its_blades(tmp_path: Path) -> None:
-    """Rows in any order, numbered from 1: the same ring; one blade twice is none."""
+    """Rows in any order, numbered from 1: the same ring; one blade twice is none, nor are some of all blades."""
     from microslip.stages.mistuning import _measured
 
     (file := tmp_path / "blades.csv").write_text("blade,frequency_Hz\n3,101\n1,99\n4,102\n2,98\n")
     assert _measured(file, "frequency") == pytest.approx([-0.01, -0.02, 0.01, 0.02])
-    file.write_text("blade,deviation\n3,0.1\n1,0.2\n3,0.3\n")
-    with pytest.raises(UserError, match="blade"):
-        _measured(file, "frequency")
+    for text, words in (("blade,deviation\n3,0.1\n1,0.2\n3,0.3\n", "each once"),
+                        ("blade,deviation\n1,0.1\n0,0.2\n", "2 of 4"),
+                        ("frequency_Hz\n99\n0\n", "above zero"), ("frequency_Hz\n99\nnan\n", "finite")):  # fmt: skip
+        file.write_text(text)
+        with pytest.raises(UserError, match=words):
+            _measured(file, "frequency", 4)
 
 
 def test_not_every_blade_of_an_odd_ring_is_against_the_next() -> None:
@@ -627,6 +630,11 @@ def test_first_order_spreads_as_samples_do(together: float, neighbours: float) -
         ({"of": "friction", "deviation": 0.1, "contact": "root"}, "root"),
         ({"of": "added_mass", "values": (0.001,), "at": "nose"}, "monitor"),
         ({"of": "frequency", "deviation": 0.1, "together": 2.0}, "correlation"),
+        ({"of": "friction", "deviation": 0.1, "component": "vane"}, "body: nothing depends"),
+        ({"of": "frequency", "deviation": 0.1, "at": "probe"}, "at: nothing depends"),
+        ({"of": "frequency", "values": (0.1, 0.0), "neighbours": 0.5}, "neighbours: nothing depends"),
+        ({"of": "friction", "deviation": 0.1}, "friction: nothing depends"),
+        ({"of": "gap", "deviation": 1e-5}, "gap: nothing depends"),
     ],
 )
 def test_bad_scatter(tuned: Tuned, given: dict[str, object], words: str) -> None:
@@ -634,4 +642,4 @@ def test_bad_scatter(tuned: Tuned, given: dict[str, object], words: str) -> None
     with pytest.raises(UserError, match=words):
         s = Scatter(**given)  # type: ignore[arg-type]
         tuned.check((s,))
-        ensemble.ready(Asked(tuned, (s,), np.array([287.3]), balance=FINE), 40, 0)
+        ensemble.ready(Asked(tuned, (s,), np.array([287.3]), balance=FINE, stuck=s.of in OF_CONTACTS), 40, 0)

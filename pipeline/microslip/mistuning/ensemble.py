@@ -23,6 +23,7 @@ from .linear import beside, known_of
 from .peaks import LEFT, Highest
 from .ring import positive
 from .samples import Asked, Sample, again, of_ring, sample
+from .scatter import OF_CONTACTS
 from .statistics import Envelope, Quantile, quantile
 
 Report = Callable[[str], None]
@@ -205,6 +206,7 @@ def ready(asked: Asked, samples: int, chosen: int) -> None:
     for number in range(min(samples, DRAWN)):
         for s, values in asked.deviations(number):
             positive(s, values)
+    felt(asked)
     whole("rare", chosen)
     if chosen:
         if not any(s.random for s in asked.scatter):
@@ -212,6 +214,15 @@ def ready(asked: Asked, samples: int, chosen: int) -> None:
         known_of(asked)
         if samples < BEFORE:
             raise UserError(f"rare: {samples} plain samples tell too little of the linear ring; ask for {BEFORE}")
+
+
+def felt(asked: Asked) -> None:
+    """Raise `UserError` where contacts stick, and what scatters in them does not change their stiffness."""
+    for s, values in asked.deviations(0) if asked.stuck else ():
+        if s.of not in OF_CONTACTS or not values.any():
+            continue
+        if np.array_equal(asked.tuned.mistuned([(s, values)]).stiffness, asked.tuned.whole.stiffness):
+            raise UserError(f"{s.of}: nothing depends on it where contacts stick (stuck); leave one of both out")
 
 
 def choose(
