@@ -307,14 +307,18 @@ def main() -> None:
 
 def scaling(blades: tuple[int, ...], samples: int) -> None:
     """Growth with the blades, of samples 1, 2, ..."""
-    print(f"{'blades':>7} {'s/sample':>9} {'points':>7} {'ms/point/blade':>15} {'sticking, s':>12}", flush=True)
-    for N in blades:
-        what, linear = asked(N), asked(N, stuck=True)
-        sample(what, 0)  # with the tuned ring's solutions, from which all begin
-        each = [timed(sample, what, n) for n in range(1, samples + 1)]
-        points = np.mean([len(s.top.frequencies) for _, s in each])
-        spent, stuck = np.mean([t for t, _ in each]), timed(sample, linear, 1)[0]
-        print(f"{N:7d} {spent:9.2f} {points:7.0f} {1e3 * spent / points / N:15.2f} {stuck:12.3f}", flush=True)
+    print(
+        f"{'law':>8} {'blades':>7} {'s/sample':>9} {'points':>7} {'ms/point/blade':>15} {'sticking, s':>12}", flush=True
+    )
+    for law in ("smooth", "jenkins"):
+        for N in blades:
+            what, linear = asked(N, law=law), asked(N, stuck=True, law=law)
+            sample(what, 0)  # with the tuned ring's solutions, from which all begin
+            each = [timed(sample, what, n) for n in range(1, samples + 1)]
+            points = np.mean([len(s.top.frequencies) for _, s in each])
+            spent, stuck = np.mean([t for t, _ in each]), timed(sample, linear, 1)[0]
+            per = 1e3 * spent / points / N
+            print(f"{law:>8} {N:7d} {spent:9.2f} {points:7.0f} {per:15.2f} {stuck:12.3f}", flush=True)
 
 
 def six_that_slide() -> Asked:
