@@ -500,6 +500,20 @@ def test_the_linear_ring_is_highest_at_its_peak(tuned: Tuned) -> None:
     assert (found > 1.5 * grid).any()
 
 
+def test_chosen_samples_of_a_ring_that_sticks(tuned: Tuned, tmp_path: Path) -> None:
+    """The linear ring knows all but second order: the quantile is that of all samples that were drawn, to 1 %, and
+    what a killed run left is not solved again."""
+    asked = Asked(tuned, (Scatter("frequency", 0.003),), np.linspace(330.0, 344.0, 8), balance=FINE, stuck=True)
+    found, linear = ensemble.run(asked, 20, workers=1), beside(asked)
+    told = ensemble.choose(found, 6, workers=1, file=tmp_path / "rare.npz")
+    drawn = [linear(asked.deviations(ensemble.FIRST + i)) for i in range(told.drawn)]
+    assert told.correlation > 0.99 and told.drawn == 6 * rare.EACH
+    assert told.quantile.value == pytest.approx(np.quantile(drawn, 0.999) / found.tuned.top.amplitude, rel=0.01)
+    left, lines = (tmp_path / "rare.npz").read_bytes(), list[str]()
+    assert ensemble.choose(found, 6, workers=1, file=tmp_path / "rare.npz", report=lines.append) == told
+    assert len(lines) == 1 and (tmp_path / "rare.npz").read_bytes() == left
+
+
 def test_the_linear_ring_answers_as_contacts_do_on_average(tuned: Tuned) -> None:
     """k u is the mean over all phases of the tangent's force, turned back: 1e-12."""
     asked = Asked(tuned, (Scatter("frequency", 0.002),), np.array([SLIPS]), balance=FINE)

@@ -63,13 +63,15 @@ class Beside:
         """The highest amplitude of a sample in the band, m."""
         own = self.own(deviations)
         square = np.unique([*self.square, *self.resonances(own)])
-        known = dict(zip(square, self.amplitudes(square, own), strict=True))
+        y = self.amplitudes(square, own)
+        known, top = dict(zip(square, y, strict=True)), float(y.max())
         for _ in range(ROUNDS):
             told = told_by(known)
-            if told is None or told[0] <= (1 + TOLERANCE) * max(y.max() for y in known.values()):
+            if told is None or told[0] <= (1 + TOLERANCE) * top:
                 break
             known[told[1]] = self.amplitudes(np.array([told[1]]), own)[0]
-        return float(max(y.max() for y in known.values()))
+            top = max(top, float(known[told[1]].max()))
+        return top
 
     def own(self, deviations: Deviations) -> Array:
         """(n,) deviations of the columns."""
