@@ -2,6 +2,8 @@
 
     python benchmarks/mistuning.py               # 12 to 96 blades, and all peers: a quarter of an hour
     python benchmarks/mistuning.py --quick       # 6 and 12
+    python benchmarks/mistuning.py --scaling     # 12 to 48 blades alone, six samples each
+    python benchmarks/mistuning.py --rare 40     # the 99.9 % quantile by chosen samples, so often: a quarter of an hour
 
 CPU seconds of one thread, compiled programs warm. The ring: sample vanes (6 modes, H = 3, 64 samples, one point a
 gap), a wave of 30 degrees from blade to blade whatever their number, blade frequencies scattered by 1 %, 24 frequencies
@@ -26,8 +28,10 @@ import shutil
 import subprocess
 import tempfile
 import time
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, fields, replace
-from functools import lru_cache
+from functools import lru_cache, partial
+from multiprocessing import get_context
 from pathlib import Path
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")
@@ -39,6 +43,9 @@ import microslip as ms
 from microslip.harmonic_balance.blocks import Dense
 from microslip.harmonic_balance.problem import AtFrequency, Problem
 from microslip.harmonic_balance.solver import CONVERGED, Point
+from microslip.mistuning import rare
+from microslip.mistuning.ensemble import FIRST
+from microslip.mistuning.linear import Beside, beside
 from microslip.mistuning.peaks import Highest, highest, told_by
 from microslip.mistuning.ring import Tuned
 from microslip.mistuning.samples import Asked, Sliding, amplitudes, sample
@@ -287,17 +294,94 @@ def timed(call, *given) -> tuple[float, object]:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--quick", action="store_true")
-    quick = parser.parse_args().quick
-    print(f"{'blades':>7} {'s/sample':>9} {'points':>7} {'ms/point/blade':>15} {'sticking, s':>12}", flush=True)
-    for N in (6, 12) if quick else (12, 24, 48, 96):
-        what, linear = asked(N), asked(N, stuck=True)
-        sample(what, 0)  # with the tuned ring's solutions, from which all begin
-        each = [timed(sample, what, n) for n in (1, 2)]
-        points = np.mean([len(s.top.frequencies) for _, s in each])
-        spent, stuck = np.mean([t for t, _ in each]), timed(sample, linear, 1)[0]
-        print(f"{N:7d} {spent:9.2f} {points:7.0f} {1e3 * spent / points / N:15.2f} {stuck:12.3f}", flush=True)
-    jenkins(6 if quick else 24)
-    peers(6 if quick else 24)
+    parser.add_argument("--scaling", action="store_true")
+    parser.add_argument("--rare", type=int, default=0)
+    given = parser.parse_args()
+    if given.rare:
+        return rare_quantile(given.rare)
+    scaling((12, 24, 48) if given.scaling else (6, 12) if given.quick else (12, 24, 48, 96), 6 if given.scaling else 2)
+    if not given.scaling:
+        jenkins(6 if given.quick else 24)
+        peers(6 if given.quick else 24)
+
+
+def scaling(blades: tuple[int, ...], samples: int) -> None:
+    """Growth with the blades, of samples 1, 2, ..."""
+    print(
+        f"{'law':>8} {'blades':>7} {'s/sample':>9} {'points':>7} {'ms/point/blade':>15} {'sticking, s':>12}", flush=True
+    )
+    for law in ("smooth", "jenkins"):
+        for N in blades:
+            what, linear = asked(N, law=law), asked(N, stuck=True, law=law)
+            sample(what, 0)  # with the tuned ring's solutions, from which all begin
+            each = [timed(sample, what, n) for n in range(1, samples + 1)]
+            points = np.mean([len(s.top.frequencies) for _, s in each])
+            spent, stuck = np.mean([t for t, _ in each]), timed(sample, linear, 1)[0]
+            per = 1e3 * spent / points / N
+            print(f"{law:>8} {N:7d} {spent:9.2f} {points:7.0f} {per:15.2f} {stuck:12.3f}", flush=True)
+
+
+def six_that_slide() -> Asked:
+    """Six vanes whose Jenkins elements slide most of the time: 84 % of the peak that sticking contacts give."""
+    rub = {**RUB, "law": "jenkins", "normal_force": 3.0}
+    case = {"body": "vane", "excitation": "magnet", "amplitude": 2.0, "monitor": "probe", "modes": 2,
+            "ring": {"blades": 6, "engine_order": 1}, "contacts": [rub]}  # fmt: skip
+    tuned = Tuned(ms.assemble(case, vane=ms.sample()).assembly, {})
+    balance, band = {"harmonics": 1, "samples": 32}, np.linspace(320.0, 341.0, 11)
+    return Asked(tuned, (Scatter("frequency", 0.01),), band, 1, balance)
+
+
+PLAIN, CHOSEN, SHARE = 40, 50, 0.999
+"""Samples that tell the correlation; those that are chosen, about; of the samples below the quantile."""
+
+
+def chosen_once(
+    what: Asked, linear: Beside, told: float, repeat: int
+) -> tuple[rare.Rare, np.ndarray, np.ndarray, float, float]:
+    """One estimate of the quantile, its amplitudes and their pi, and CPU seconds of the linear ring and of friction."""
+    first = FIRST + repeat * rare.EACH * CHOSEN
+    light, z = timed(lambda: np.array([linear(what.deviations(first + i)) for i in range(rare.EACH * CHOSEN)]))
+    pi = rare.chances(z, CHOSEN, SHARE, told, PLAIN)
+    picked = rare.chosen(pi, repeat)
+    heavy, y = timed(lambda: np.array([sample(what, first + int(i)).top.amplitude for i in picked]))
+    return rare.estimate(y, pi[picked], len(pi), SHARE, told), y, pi[picked], light, heavy
+
+
+def rare_quantile(repeats: int) -> None:
+    """The 99.9 % quantile by chosen samples, again and again, beside plain samples drawn from all that were chosen, as
+    often as they were likely to be."""
+    what = six_that_slide()
+    linear, before = beside(what), np.array([sample(what, i).top.amplitude for i in range(PLAIN)])
+    told = rare.correlation(np.array([linear(what.deviations(i)) for i in range(PLAIN)]), before)
+    print(f"ranks of {PLAIN} samples correlate by {told:.3f}", flush=True)
+    with ProcessPoolExecutor(2, get_context("spawn")) as pool:
+        found = []
+        for one in pool.map(partial(chosen_once, what, linear, told), range(repeats)):
+            found.append(one)
+            print(f"  {one[0].quantile}, {one[0].samples} chosen, CPU {one[3]:.1f} and {one[4]:.1f} s", flush=True)
+    y, weight = np.concatenate([f[1] for f in found]), np.concatenate([1 / f[2] for f in found])
+    order = np.argsort(-y)
+    above = np.cumsum(weight[order]) / (repeats * rare.EACH * CHOSEN)
+    truth = float(y[order][np.searchsorted(above, 1 - SHARE)])
+    off = np.array([f[0].quantile.value for f in found]) / truth - 1
+    held = np.mean([f[0].quantile.low <= truth <= f[0].quantile.high for f in found])
+    light, heavy, number = (sum(each) for each in zip(*((f[3], f[4], f[0].samples) for f in found), strict=True))
+    print(f"the quantile {truth:.5g} m; chosen {number / repeats:.1f}: error {np.sqrt(np.mean(off**2)):.4f}, in the "
+          f"mean {off.mean():+.4f}, {100 * held:.0f} % of the intervals hold it; plain samples for one, by the share "
+          f"above, {np.median([f[0].worth / f[0].samples for f in found]):.0f}")  # fmt: skip
+    equal = number / repeats * (1 + light / heavy)
+    print(f"CPU: linear {light / repeats:.1f} s, friction {heavy / repeats:.1f} s, {heavy / number:.3f} s each: as "
+          f"{equal:.1f} samples")  # fmt: skip
+    for count in (int(round(number / repeats)), 20 * CHOSEN, round(20 * equal)):
+        print(f"plain {count}: error {plain_error(y[order], np.append(0.0, above), truth, count):.4f}")
+
+
+def plain_error(y: np.ndarray, above: np.ndarray, truth: float, count: int, repeats: int = 4000) -> float:
+    """Root mean square error of the quantile by so many plain samples, from (n,) falling y and (n + 1,) shares above;
+    all that is below the last is as high as that."""
+    g = np.random.default_rng(0)
+    drawn = np.append(y, y[-1])[np.searchsorted(above, g.random((repeats, count))) - 1]
+    return float(np.sqrt(np.mean((np.quantile(drawn, SHARE, axis=1) / truth - 1) ** 2)))
 
 
 def jenkins(N: int) -> None:

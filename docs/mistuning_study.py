@@ -59,7 +59,7 @@ def first_order() -> tuple[list[str], list[list[str]]]:
 
 def spin_pit(build: Path = Path("build"), to: Path = Path("tests/validation")) -> None:
     """The figures of 5.6 from the runs of both scatters, as the tables that tests/validation/test_sextro_5_6.py reads:
-    half an hour of CPU time where they are not there yet."""
+    a quarter of an hour of CPU time where they are not there yet."""
     lines = {"envelopes": [""], "samples": [""]}
     for name, deviation in SCATTERS.items():
         made = build / name

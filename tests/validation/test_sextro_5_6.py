@@ -1,9 +1,9 @@
 """Sextro, Dynamical Contact Problems with Friction, 2nd ed., section 5.6: the mistuned spin-pit rig of 5.4.
 
 sextro_5_6_envelopes.csv and sextro_5_6_samples.csv are of 40 whole rings of 30 blades with friction for each of the two
-scatters, seed 1, beside first order from the tuned ring: `python docs/mistuning_study.py` makes them in half an hour.
-The book has one arrangement of the blades instead, and prints curves without their contacts and loads, so that what it
-says of them is tested. One sample solved again shows that the tables are what the program gives.
+scatters, seed 1, beside first order from the tuned ring: `python docs/mistuning_study.py` makes them in a quarter of an
+hour of CPU time. The book has one arrangement of the blades instead, and prints curves without their contacts and
+loads, so that what it says of them is tested. One sample solved again shows that the tables are what the program gives.
 """
 
 from __future__ import annotations
@@ -56,11 +56,14 @@ def test_exponent_over_sensitivity() -> None:
 
 
 def test_the_rig() -> None:
-    """30 blades, the first bending resonance printed at 100.2 Hz: ours is 8 % higher, as contacts and blades differ."""
+    """30 blades, the first bending resonance printed at 100.2 Hz: ours is 8 % higher, as contacts and blades differ.
+    Peaks may be higher between two points by 0.05 % with the small scatter, five with the large one by up to 3 %."""
     e = of(ENVELOPES, SMALL)
     assert e["frequency_Hz"][e["tuned_m"].argmax()] == pytest.approx(1.08 * 100.2, rel=0.01)
     for scatter in (SMALL, LARGE):
         assert (of(SAMPLES, scatter)["unsolved"] == 0).all() and len(of(SAMPLES, scatter)) == 40
+    assert of(SAMPLES, SMALL)["missed"].max() < 5e-4
+    assert (of(SAMPLES, LARGE)["missed"] > 5e-4).sum() == 5 and of(SAMPLES, LARGE)["missed"].max() < 0.03
 
 
 def test_small_scatter_agrees_with_first_order() -> None:

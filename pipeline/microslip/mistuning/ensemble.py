@@ -23,6 +23,7 @@ from .linear import beside, known_of
 from .peaks import LEFT, Highest
 from .ring import positive
 from .samples import Asked, Sample, again, of_ring, sample
+from .scatter import OF_CONTACTS
 from .statistics import Envelope, Quantile, quantile
 
 Report = Callable[[str], None]
@@ -205,6 +206,7 @@ def ready(asked: Asked, samples: int, chosen: int) -> None:
     for number in range(min(samples, DRAWN)):
         for s, values in asked.deviations(number):
             positive(s, values)
+    felt(asked)
     whole("rare", chosen)
     if chosen:
         if not any(s.random for s in asked.scatter):
@@ -212,6 +214,15 @@ def ready(asked: Asked, samples: int, chosen: int) -> None:
         known_of(asked)
         if samples < BEFORE:
             raise UserError(f"rare: {samples} plain samples tell too little of the linear ring; ask for {BEFORE}")
+
+
+def felt(asked: Asked) -> None:
+    """Raise `UserError` where contacts stick, and what scatters in them does not change their stiffness."""
+    for s, values in asked.deviations(0) if asked.stuck else ():
+        if s.of not in OF_CONTACTS or not values.any():
+            continue
+        if np.array_equal(asked.tuned.mistuned([(s, values)]).stiffness, asked.tuned.whole.stiffness):
+            raise UserError(f"{s.of}: nothing depends on it where contacts stick (stuck); leave one of both out")
 
 
 def choose(
@@ -229,9 +240,9 @@ def choose(
     ready(asked, int(known.sum()), samples)
     report(f"{rare.EACH * samples} samples of the linear ring")
     linear = beside(asked)
-    before = np.array([linear(asked.deviations(int(i))) for i in np.flatnonzero(known)]).T
-    told, way = max((rare.correlation(z, found.amplification[known]), i) for i, z in enumerate(before))
-    every = np.array([linear(asked.deviations(FIRST + i))[way] for i in range(rare.EACH * samples)])
+    before = np.array([linear(asked.deviations(int(i))) for i in np.flatnonzero(known)])
+    told = rare.correlation(before, found.amplification[known])
+    every = np.array([linear(asked.deviations(FIRST + i)) for i in range(rare.EACH * samples)])
     pi = rare.chances(every, samples, RARE, told, int(known.sum()))
     chosen, inputs = rare.chosen(pi, asked.seed), f"{inputs} {len(found)} {samples}"
     high = _read(file, inputs)

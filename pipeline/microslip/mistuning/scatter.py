@@ -88,6 +88,20 @@ class Scatter:
         for key, least in (("together", 0.0), ("neighbours", -1.0)):
             if not least <= getattr(self, key) <= 1.0:
                 raise UserError(f"{key}: {getattr(self, key):g} is no correlation between {least:g} and 1")
+        self._heard()
+
+    def _heard(self) -> None:
+        """Raise `UserError` for what is given and nothing depends on."""
+        drawn = self.deviation > 0
+        for key, name, depends in (
+            ("component", "body", self.of in OF_BLADES), ("contact", "contact", self.of in OF_CONTACTS),
+            ("at", "at", self.of == "added_mass"), ("together", "together", self.of in MODAL and drawn),
+            ("neighbours", "neighbours", drawn), ("distribution", "distribution", drawn),
+            ("arrangement", "arrangement", not drawn),
+        ):  # fmt: skip
+            if not depends and getattr(self, key) != type(self).__dataclass_fields__[key].default:
+                how = "drawn by a deviation" if drawn else "whose values are known"
+                raise UserError(f"{name}: nothing depends on it for {self.of} {how}; leave it out")
 
     @property
     def random(self) -> bool:

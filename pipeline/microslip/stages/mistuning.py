@@ -151,7 +151,9 @@ def _others(
 
 def _scatter(s: ScatterOfCase, number: int, built: Built, path: Path, others: Mapping[int, Assembly]) -> Scatter:
     where = f"scatter.{number} ({s.of})"
-    values = _measured(path.parent / s.file, s.of) if s.file else s.values
+    ring = built.assembly.ring
+    blades = ring.blades if ring is not None and s.arrangement != "drawn" else None
+    values = _measured(path.parent / s.file, s.of, blades) if s.file else s.values
     contact = s.contact
     if contact is not None and s.of in OF_CONTACTS:
         named = {c.interface: x.name for c, x in zip(built.contacts, built.assembly.contacts, strict=True)}
@@ -161,9 +163,9 @@ def _scatter(s: ScatterOfCase, number: int, built: Built, path: Path, others: Ma
                        s.together, s.neighbours)  # fmt: skip
 
 
-def _measured(file: Path, of: str) -> tuple[float, ...]:
+def _measured(file: Path, of: str, blades: int | None = None) -> tuple[float, ...]:
     """Deviations in a table: its column ``deviation``, or ``frequency_Hz`` over its mean, less 1; in the order of its
-    rows, or of its column ``blade`` or ``sector``."""
+    rows, or of its column ``blade`` or ``sector``, which then has all blades of a ring of so many."""
     try:
         with store.ordinary(file).open(newline="", encoding="utf-8-sig") as text:
             rows = list(csv.DictReader(line for line in text if not line.startswith("#")))
@@ -173,7 +175,9 @@ def _measured(file: Path, of: str) -> tuple[float, ...]:
         raise UserError(f"file: {file}: cannot be read as comma-separated values ({error})") from error
     for name in ("deviation", "frequency_Hz"):
         if rows and name in rows[0]:
-            found = _column(file, rows, name)[_places(file, rows)]
+            found = _column(file, rows, name)[_places(file, rows, blades)]
+            if name == "frequency_Hz" and found.min() <= 0:
+                raise UserError(f"file: {file}: column {name}: holds {found.min():g}; a frequency is above zero")
             return tuple(found if name == "deviation" else found / found.mean() - 1)
     raise UserError(f"file: {file}: has no row, or neither a column deviation nor frequency_Hz; add one for {of}")
 
@@ -188,13 +192,17 @@ def _column(file: Path, rows: list[dict[str, str]], name: str) -> Array:
     return found
 
 
-def _places(file: Path, rows: list[dict[str, str]]) -> Indices:
+def _places(file: Path, rows: list[dict[str, str]], blades: int | None) -> Indices:
     """Rows in the order in which blades stand round the ring, where the table numbers them."""
     for name in ("blade", "sector"):
         if name in rows[0]:
             numbers = _column(file, rows, name)
             if (np.sort(numbers) - numbers.min() != np.arange(len(numbers))).any():
                 raise UserError(f"file: {file}: column {name}: must number all blades round the ring, each once")
+            if blades is not None and len(rows) != blades:
+                raise UserError(
+                    f"file: {file}: column {name}: numbers {len(rows)} of {blades} blades; give all, or leave it out"
+                )
             return np.argsort(numbers)
     return np.arange(len(rows))
 
