@@ -84,6 +84,18 @@ def test_equations_hold_where_the_case_control_chooses_them(tmp_path):
     assert "MPC = 6 of the case control is not defined" in constrained(tmp_path, [], ["MPC = 6"]).lost[0]
 
 
+def test_a_deck_in_small_letters_is_the_same(tmp_path):
+    """Nastran has no case; `thru` of an RBE2 left out all nodes between its ends."""
+    cards = ["PARAM,WTMASS,0.5", "MAT1,1,2.1+11,,0.3,7.8D3", "PSOLID,1,1"]
+    cards += ["SPC1,7,123,1,THRU,4", "RBE2,6,12,123,5,THRU,8"]
+    large = constrained(tmp_path, cards, ["SPC = 7"])
+    small = constrained(tmp_path, [card.lower() for card in cards], ["spc = 7"])
+    for read in (small, large):
+        assert read.node_id[read.links.items[-1].members].tolist() == [5, 6, 7, 8]
+        assert read.node_id[read.point_sets["SPC 7"]].tolist() == [1, 2, 3, 4] and read.supports["SPC 7"] == "xyz"
+        assert read.materials[0].density == 3900
+
+
 @pytest.mark.parametrize(
     "card",
     [
