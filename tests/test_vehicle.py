@@ -398,9 +398,10 @@ def swaying(first: float, side: float = 1.0) -> dict[str, np.ndarray]:
     angle = first + np.linspace(0, 4.2 * np.pi, 421)
     c, s = np.cos(angle), np.sin(angle)
     return {
-        "time_s": 0.02 * (angle - first), "angle_rad": angle, "speed_m_per_s": 23 + c, "lateral_m": side * 1e-3 * (1 + s),
-        "normal_force_N": 6e4 * (1 + 0.2 * s), "longitudinal_creepage": 1e-3 * (1 + 0.5 * c),
-        "lateral_creepage": side * 5e-4 * s, "spin_1_per_m": side * 0.1 * (1 + 0.3 * c),
+        "time_s": 0.02 * (angle - first), "angle_rad": angle, "speed_m_per_s": 23 + c,
+        "lateral_m": side * 1e-3 * (1 + s), "normal_force_N": 6e4 * (1 + 0.2 * s),
+        "longitudinal_creepage": 1e-3 * (1 + 0.5 * c), "lateral_creepage": side * 5e-4 * s,
+        "spin_1_per_m": side * 0.1 * (1 + 0.3 * c),
     }  # fmt: skip
 
 
