@@ -66,12 +66,12 @@ def test_constraints_of_the_chosen_set_are_supports(tmp_path):
     assert not read.supports and "several sets of SPC" in read.not_held[0]
 
 
-def constrained(folder, cards, control=()):
+def constrained(folder, cards, control=(), system=None):
     """A cube of two bricks with more cards."""
     text = bulk(meshes.brick("hexahedron", (1, 1, 2), (0.02, 0.01, 0.03)))
     text = text.replace("CEND", "\n".join(["CEND", *control])).replace("ENDDATA", "\n".join([*cards, "ENDDATA"]))
     (folder / "a.bdf").write_text(text)
-    return read_mesh(folder / "a.bdf", "m")
+    return read_mesh(folder / "a.bdf", "m", system)
 
 
 def test_equations_hold_where_the_case_control_chooses_them(tmp_path):
@@ -82,6 +82,18 @@ def test_equations_hold_where_the_case_control_chooses_them(tmp_path):
     left = constrained(tmp_path, cards)
     assert left.links is None and "the only set of MPC, of which the case control chooses none" in left.lost[0]
     assert "MPC = 6 of the case control is not defined" in constrained(tmp_path, [], ["MPC = 6"]).lost[0]
+
+
+def test_a_deck_in_small_letters_is_the_same(tmp_path):
+    """Nastran has no case; `thru` of an RBE2 left out all nodes between its ends."""
+    cards = ["PARAM,WTMASS,0.5", "MAT1,1,2.1+11,,0.3,7.8D3", "PSOLID,1,1"]
+    cards += ["SPC1,7,123,1,THRU,4", "RBE2,6,12,123,5,THRU,8"]
+    large = constrained(tmp_path, cards, ["SPC = 7"], "m-kg-s")
+    small = constrained(tmp_path, [card.lower() for card in cards], ["spc = 7"], "m-kg-s")
+    for read in (small, large):
+        assert read.node_id[read.links.items[-1].members].tolist() == [5, 6, 7, 8]
+        assert read.node_id[read.point_sets["SPC 7"]].tolist() == [1, 2, 3, 4] and read.supports["SPC 7"] == "xyz"
+        assert read.materials[0].density == 3900
 
 
 @pytest.mark.parametrize(

@@ -209,6 +209,22 @@ def test_an_optimum_where_contacts_would_lift_off_is_marked(tmp_path: Path, monk
     assert "not valid: contacts lift off" in [t.get_text() for t in figures[0].legends[0].get_texts()]
 
 
+def test_what_was_not_found_stands_in_the_table_with_its_commas(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, undrawn: None
+) -> None:
+    """And on the page, which could not be made of it."""
+    monkeypatch.chdir(tmp_path)
+    case = following.Case(Path("case.toml"), {"name": "pit"}, {}, Path("build/pit"))
+    vars(case)["quantity"] = METRES
+    said = "energy: contacts take less than their laws count, by 14 %; raise samples"
+    peaks = {m: peak.HighestPeak(600.0, 1e-6 / m, np.zeros(1), s) for m, s in ((1.0, "converged"), (2.0, said))}
+    found = peak.Optimum(1.0, peaks[1.0], f"lost between 1 and 2: {said}", peaks, {})
+    *_, page = following.write_optimum(found, "mass", case)
+    what = [row["what"] for row in csv.DictReader(Path("build/pit/optimum.csv").open())]
+    assert what == ["highest resonance", said, f"lowest: lost between 1 and 2: {said}"]
+    assert "raise samples</td>" in page.read_text()
+
+
 def test_no_optimum_says_where_to_look(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

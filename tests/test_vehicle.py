@@ -390,6 +390,34 @@ def given(folder: Path, columns: dict[str, np.ndarray], *changes: str) -> Given:
     return recorded(load_kinematics(written(folder, columns), ["kinematics.turns=1", *changes])[0], folder).wheel
 
 
+QUICK = ("kinematics.places=24", 'wear.profile="kept"', "model.elements=[8,8]")
+
+
+def swaying(first: float, side: float = 1.0) -> dict[str, np.ndarray]:
+    """Two turns and a bit of a wheel, all of which hangs on its angle, from a first one on (rad). side: -1 mirrors."""
+    angle = first + np.linspace(0, 4.2 * np.pi, 421)
+    c, s = np.cos(angle), np.sin(angle)
+    return {
+        "time_s": 0.02 * (angle - first), "angle_rad": angle, "speed_m_per_s": 23 + c,
+        "lateral_m": side * 1e-3 * (1 + s), "normal_force_N": 6e4 * (1 + 0.2 * s),
+        "longitudinal_creepage": 1e-3 * (1 + 0.5 * c), "lateral_creepage": side * 5e-4 * s,
+        "spin_1_per_m": side * 0.1 * (1 + 0.3 * c),
+    }  # fmt: skip
+
+
+def test_a_place_of_the_wheel_is_the_same_wherever_its_file_begins(tmp_path: Path) -> None:
+    """The table over the circumference is by the angle of the wheel, not by how far it has turned in the file."""
+    wheels = (given(tmp_path, swaying(first), *QUICK) for first in (0.0, 2.0))
+    one, other = (wheel.at(wheel.new(), 0.0).each for wheel in wheels)
+    np.testing.assert_allclose(other, one, rtol=5e-3)
+
+
+def test_the_left_wheel_of_a_mirrored_file_wears_as_the_right_one(tmp_path: Path) -> None:
+    left = given(tmp_path, swaying(0.0, -1.0), *QUICK, 'kinematics.side="left"')
+    right = given(tmp_path, swaying(0.0), *QUICK)
+    np.testing.assert_allclose(left.at(left.new(), 0.0).taken, right.at(right.new(), 0.0).taken, rtol=1e-9)
+
+
 def test_a_case_of_a_vehicle_refuses_what_it_does_not_compare(
     rolling: wearing.Rolling, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

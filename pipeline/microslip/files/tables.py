@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import csv
+import io
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
@@ -10,9 +12,12 @@ from .store import write_text
 
 
 def rows_csv(head: Iterable[str], rows: Iterable[Iterable[str | float]], digits: int = 8) -> str:
-    """Texts stand as they are, numbers with so many significant digits."""
-    cells = ((v if isinstance(v, str) else f"{v:.{digits}g}" for v in row) for row in rows)
-    return "\n".join(",".join(row) for row in (head, *cells)) + "\n"
+    """Numbers with so many significant digits; texts in quotes where they hold a comma (RFC 4180)."""
+    text = io.StringIO()
+    lines = csv.writer(text, lineterminator="\n")
+    lines.writerow(head)
+    lines.writerows([v if isinstance(v, str) else f"{v:.{digits}g}" for v in row] for row in rows)
+    return text.getvalue()
 
 
 def columns_csv(columns: Mapping[str, Iterable[Any]], digits: int) -> str:

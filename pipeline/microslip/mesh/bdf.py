@@ -94,17 +94,17 @@ def read_bdf(path: Path) -> RawMesh:
 
 
 def _cards(text: str) -> Iterator[_Card]:
-    """Name and fields of every card, its continuations joined."""
-    lines = text.splitlines()
-    begin = next((i for i, line in enumerate(lines) if re.match(r"\s*BEGIN\s+BULK", line, re.IGNORECASE)), -1)
+    """Name and fields of every card in capitals, its continuations joined."""
+    lines = text.upper().splitlines()
+    begin = next((i for i, line in enumerate(lines) if re.match(r"\s*BEGIN\s+BULK", line)), -1)
     card = _Card()
     for number, line in enumerate(lines[begin + 1 :], begin + 2):
         line = line.split("$")[0].expandtabs(8).rstrip()
         if not line:
             continue
-        if re.match(r"\s*ENDDATA\b", line, re.IGNORECASE):
+        if re.match(r"\s*ENDDATA\b", line):
             break
-        if re.match(r"\s*INCLUDE\b", line, re.IGNORECASE):
+        if re.match(r"\s*INCLUDE\b", line):
             raise Damaged("it includes another file; write the bulk data in one")
         words = _fields(line)
         if words[0] == "" or words[0][0] in "+*":
@@ -113,7 +113,7 @@ def _cards(text: str) -> Iterator[_Card]:
             continue
         if card:
             yield card
-        card = _Card([words[0].upper().rstrip("*").strip(), *words[1:]])
+        card = _Card([words[0].rstrip("*").strip(), *words[1:]])
         card.line = number
     if card:
         yield card
@@ -144,7 +144,7 @@ def _whole(card: list[str], place: int, otherwise: int | None = None) -> int:
 
 def _real(card: list[str], place: int) -> float | None:
     """A number as Nastran writes it: 1.5-3 is 1.5E-3. None: blank."""
-    text = _at(card, place).upper().replace("D", "E")
+    text = _at(card, place).replace("D", "E")
     if not text:
         return None
     try:
@@ -158,7 +158,7 @@ def _listed(card: list[str], first: int) -> list[int]:
     words = [w for w in card[first:] if w]
     members: list[int] = []
     for i, word in enumerate(words):
-        if word.upper() == "THRU":
+        if word == "THRU":
             if not members or i + 1 >= len(words) or not words[i + 1].isdecimal() or len(words[i + 1]) > 9:
                 raise Damaged(f"{card[0]} {_at(card, 1)} holds THRU without its ends")
             members += range(members[-1] + 1, min(int(words[i + 1]), members[-1] + 10**8))
@@ -238,7 +238,7 @@ def _material(cards: Cards, property_: int) -> DeckMaterial:
 
 def _density(cards: Cards, card: list[str]) -> float | None:
     """RHO times PARAM WTMASS, which turns a weight into a mass."""
-    factor = next((_real(c, 2) for c in cards.get("PARAM", []) if _at(c, 1).upper() == "WTMASS"), None)
+    factor = next((_real(c, 2) for c in cards.get("PARAM", []) if _at(c, 1) == "WTMASS"), None)
     density = _real(card, 5)
     return density if density is None or factor is None else density * factor
 

@@ -46,8 +46,8 @@ def _pairs(found: TwoTones, i: int) -> Piece:
 
 def _points(found: TwoTones) -> Piece:
     unit = Quantity(found.units[0]).said
-    head = ["first in Hz", "second in Hz", f"(1, 0) in {unit}", f"(0, 1) in {unit}", "supplied in W", "", "damped in W",
-            "contacts in W", ""]  # fmt: skip
+    head = ["first in Hz", "second in Hz", f"(1, 0) in {unit}", f"(0, 1) in {unit}", "first supplies, W", "second, W",
+            "damped in W", "contacts in W", ""]  # fmt: skip
     numbers = zip(
         found.first, found.second, np.abs(found.of(1, 0)), np.abs(found.of(0, 1)), *found.supplied.T, found.damped,
         found.lost, strict=True,

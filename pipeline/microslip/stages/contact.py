@@ -33,7 +33,7 @@ def contact_stage(
     with store.making(summary, report):
         tables = write_tables(folder, {f"{name}.csv": columns for name, columns in found.tables.items()}, 10)
         files = [*draw(found, folder), *tables, summary]
-        store.write_text(summary, rows_csv(("what", "value"), ((f'"{a}"', f'"{b}"') for a, b in rows)))
+        store.write_text(summary, rows_csv(("what", "value"), rows))
     width = max(len(what) for what, _ in found.told)
     lines = [f"{what:{width}}  {value}" for what, value in found.told]
     return [*lines, *found.sentences, *map(str, sorted(files))]

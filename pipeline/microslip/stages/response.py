@@ -21,6 +21,7 @@ from ..case.settings import FIRST_HARMONICS
 from ..data import Array, ModalBasis
 from ..errors import UserError
 from ..files import store
+from ..files.tables import rows_csv
 from ..harmonic_balance.response import HarmonicResponse
 from ..harmonic_balance.sweeps import overhanging
 from ..report.response import JUMPS, highest, lifted_forces, response_html
@@ -367,15 +368,14 @@ def _is_there(package: str) -> bool:
 
 def convergence_table(response: Response) -> str:
     """CSV text: a row a point with its status, steps, and the error before every Newton step."""
-    rows = ["sweep,frequency_Hz,peak,status,iterations,error,errors before each step"]
+    rows = []
     for s in response.series:
         columns = [s.arrays.get(n, np.full(len(s.key), np.nan)) for n in ("peak", "iterations", "error")]
         history = s.arrays.get("history", np.zeros((len(s.key), 0)))
         for f, status, peak, steps, error, errors in zip(s.frequency, s.status, *columns, history, strict=True):
             each = " ".join(f"{e:.1e}" for e in errors if e)
-            said = status.replace(",", ";")
-            rows.append(f"{s.name},{f:.10g},{peak > 0:d},{said},{steps:.0f},{error:.1e},{each}")
-    return "\n".join(rows) + "\n"
+            rows.append([s.name, f"{f:.10g}", f"{peak > 0:d}", status, f"{steps:.0f}", f"{error:.1e}", each])
+    return rows_csv("sweep,frequency_Hz,peak,status,iterations,error,errors before each step".split(","), rows)
 
 
 def summarise(result: CaseResult) -> dict[str, Any]:

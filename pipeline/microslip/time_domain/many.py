@@ -54,7 +54,7 @@ class Reached:
 
     @property
     def y(self) -> Array:
-        """(n, keep, w) read-outs after every period, m; without what bodies yield beside their modes."""
+        """(n, keep, w) read-outs after every period, in their units; without what bodies yield beside their modes."""
         o = self.equations.oscillators(0.0)
         return self.q @ self.equations.output.T + self.equations.output_given @ o
 

@@ -129,7 +129,8 @@ def _sound(k: Kinematics, path: Path) -> None:
 
 
 class Places:
-    """Equal angles of each whole turn of a file, and the contacts there; arrays (places, turns of the file).
+    """Equal angles of the wheel in each whole turn of a file, from its angle 0 on, and the contacts there; arrays
+    (places, turns of the file).
 
     Attributes: k. track. side. load: mean normal force, N. lateral: (POSES,) of the wheelset, m. y: of it, m, at every
         place. shape: (6, POSES) of new wheels: half axes, m, place on the wheel's profile, m, incline, normal force,
@@ -142,7 +143,8 @@ class Places:
         """
         self.k, self.track, self.side, self.load = k, track, side, float(np.mean(k.normal_force))
         self.lateral = np.linspace(k.lateral.min() - 1e-6, k.lateral.max() + 1e-6, POSES)
-        angle = k.angle[0] + 2 * np.pi * (np.arange(k.turns) + np.arange(places)[:, None] / places)
+        begun, whole = k.angle[0], 2 * np.pi
+        angle = begun + (whole * np.arange(places)[:, None] / places - begun) % whole + whole * np.arange(k.turns)
         self.y, self.force, self.speed, self.xi, self.eta, self.phi = (
             np.interp(angle, k.angle, v) for v in (k.lateral, k.normal_force, k.speed, k.xi, k.eta, k.phi)
         )
