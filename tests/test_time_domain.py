@@ -208,7 +208,7 @@ def test_the_impact_oscillator_of_the_book_is_chaotic_and_does_not_come_to_rest(
     leaves an impact exp(-0.018 pi) = 0.945 of its speed or more: the push turns before leaps end, ten in a period."""
     chaos = orbit.run(equations.of(hitting(BOOK), 23.63), 60, 40, 64)
     assert chaos.said.startswith("chaotic") and chaos.repeats == 0
-    leaping = orbit.run(equations.of(hitting(BOOK), 9.845), 10, 8)
+    leaping = orbit.run(equations.of(hitting(BOOK), 9.845), 10, 8, 64)
     assert 8 < leaping.impacts < 12 and not classification.chatter(leaping, 0)
 
 
