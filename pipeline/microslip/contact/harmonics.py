@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -23,8 +24,9 @@ CHUNK_ALONE = 480
 """The same of forces without tangents: the fewer parts, the less often each operation begins."""
 
 
-def fourier(harmonics: int, samples: int) -> tuple[Array, Array]:
-    """(s, 2 H + 1) values of 1, cos, sin, cos 2, ... at the samples, and (2 H + 1, s) its inverse, the transform.
+def fourier(harmonics: int, samples: int) -> tuple[Any, Any]:
+    """(s, 2 H + 1) values of 1, cos, sin, cos 2, ... at the samples, and (2 H + 1, s) its inverse, the transform; of
+    numpy.
 
     Raises:
         ValueError: fewer than 2 H + 1 samples cannot hold H harmonics.
@@ -36,7 +38,7 @@ def fourier(harmonics: int, samples: int) -> tuple[Array, Array]:
     values = np.column_stack([np.ones(samples), *pairs])
     weights = np.full(2 * harmonics + 1, 2.0 / samples)
     weights[0] = 1.0 / samples
-    return jnp.asarray(values), jnp.asarray(weights[:, None] * values.T)
+    return values, weights[:, None] * values.T
 
 
 @partial(jax.jit, static_argnames=("samples", "count", "chunk"))

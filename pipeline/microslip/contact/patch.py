@@ -233,7 +233,7 @@ def stuck_stiffness(patch: Patch, u: Array) -> Array:
     """
     G = patch.kinematics
     at = np.einsum("nia,da->dni", G, np.atleast_2d(u))
-    slopes = np.einsum("nia,dnij,njb->dab", G, _known(patch, _tangents(patch.law, jnp.asarray(at))), G)
+    slopes = np.einsum("nia,dnij,njb->dab", G, _known(patch, _tangents(patch.law, at)), G)
     return slopes.reshape(*u.shape, -1)
 
 

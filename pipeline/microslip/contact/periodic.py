@@ -21,10 +21,11 @@ slider that Newton's step does not bring closer goes on so for a while, longer e
 from __future__ import annotations
 
 from functools import cached_property, partial
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 
 from .cycle import blank, march, push
 from .law import Array, Law, State
@@ -78,15 +79,15 @@ class Known(NamedTuple):
             that, near by. told: (n,) whether anything is known.
     """
 
-    memory: Array
-    slope: Array
-    told: Array
+    memory: Any
+    slope: Any
+    told: Any
 
 
 def unknown(law: Law, n: int) -> Known:
-    """Nothing, of n points."""
-    memory = jnp.zeros_like(law.memory(jnp.zeros((n, 3)), law.init(n)))
-    return Known(memory, jnp.zeros((2, *memory.shape)), jnp.zeros(n, dtype=bool))
+    """Nothing, of n points; of numpy, as operations one by one would compile a program each."""
+    shape = jax.eval_shape(lambda law: law.memory(jnp.zeros((n, 3)), law.init(n)), law).shape
+    return Known(np.zeros(shape), np.zeros((2, *shape)), np.zeros(n, dtype=bool))
 
 
 class _Solving(NamedTuple):

@@ -38,8 +38,13 @@ def begun(options: Options, groups: tuple[Group, ...], B: Bodies, y: Any, o: Any
     zero, none = jnp.zeros(()), jnp.zeros((4, sum(len(g.G) for g in groups)))
     energy = jnp.zeros(6).at[4].set(held.stored)
     now = Now(y, o, zero, push, held, energy, held.missed, none.astype(bool), none, (), jnp.zeros(2, int), zero)
-    now = fourth.begun(groups, B, now) if options.halvings else now
-    return jax.tree_util.tree_map(lambda x: jnp.asarray(x, x.dtype), now)  # as `run` returns it, or it compiles twice
+    return typed(fourth.begun(groups, B, now) if options.halvings else now)
+
+
+def typed(traced: Any) -> Any:
+    """With types of their own, which plain numbers in a law's state do not have: loops give back what they are given,
+    or their step is traced and their program compiled twice."""
+    return jax.tree_util.tree_map(lambda x: jnp.asarray(x, x.dtype), traced)
 
 
 @partial(program, static_argnums=(0, 1))
@@ -149,7 +154,7 @@ def _unmet(overlap: Any, u: Any, w: Any, fastest: Any, bent: Any) -> Any:
 def _told(B: Bodies, n: Any, now: Now, after: Now, done: Any = True) -> Now:
     """With the events of n short steps, if they were done."""
     met, at = _met(now, after.held, B.flow.length[0] * n)
-    return after._replace(met=met & done, at=at)
+    return typed(after._replace(met=met & done, at=at))
 
 
 def _met(before: Now, held: Held, dt: Any) -> tuple[Any, Any]:
