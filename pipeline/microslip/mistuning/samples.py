@@ -213,9 +213,8 @@ def _amplitudes(at: AtFrequency, point: Point, harmonic: int = 1) -> ComplexArra
 
 def read(at: AtFrequency, q: list[ComplexArray], force: Array, share: float, harmonic: int = 1) -> ComplexArray:
     """(w,) read-outs in a harmonic, from the parts' coordinates, (W, c) forces and a share of the loads."""
-    p, F = at.problem, at.amplitudes(force)[harmonic]
-    parts = zip(p.parts[harmonic], q, p.slices, strict=True)
-    return np.sum([reduced.monitored(part, own, F[s], share) for part, own, s in parts], axis=0)
+    F = at.amplitudes(force)[harmonic]
+    return reduced.monitored(at.problem.read[harmonic], np.concatenate(q), F, share)
 
 
 class Sticking:
