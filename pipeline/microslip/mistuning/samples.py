@@ -123,7 +123,7 @@ def again(asked: Asked, one: Sample) -> tuple[Highest, Highest]:
     return _searched(asked, ring, fine)[0], _searched(asked, ring, fine[::-1])[0]
 
 
-CLOSE = 1e-2
+CLOSE = 1e-3
 """Of R over x, below which Newton's method begins without looking for another start."""
 
 SEARCHED = 1e-8
