@@ -104,6 +104,29 @@ def test_points_without_a_solution(width: float) -> None:
     assert truth / found.amplitude - 1 <= found.missed < 0.05
 
 
+@pytest.mark.parametrize("by", ["at_once", "follow"])
+def test_what_a_point_beside_it_leads_to_is_no_gap(by: str) -> None:
+    """A frequency of the sweep where nothing leads until the search has a point nearer by, found from there later."""
+    curve, _ = one(102.0, 0.005, np.random.default_rng(0))
+    grid, seen = np.arange(95.0, 110.0, 1.0), list[float]()
+
+    def respond(f: float) -> np.ndarray | None:
+        seen.append(f)
+        return None if f == 102.0 else curve(f)
+
+    def at_once(f: float) -> np.ndarray | None:
+        nearest = min((abs(f - x) for x in seen if x != f), default=np.inf)
+        return None if f == 102.0 and nearest > 0.6 else curve(f)
+
+    def follow(f: float, behind: float, width: float, arc: bool) -> tuple[list[tuple[float, np.ndarray]], bool]:
+        return ([(f, curve(f))] if abs(f - behind) < 0.6 else []), False
+
+    given = {"at_once": at_once} if by == "at_once" else {"follow": follow}
+    found = highest(respond, grid, **given)
+    assert not found.failed and 102.0 in found.frequencies
+    assert highest(respond, grid).failed == (102.0,)
+
+
 @pytest.mark.slow
 def test_a_contact_that_opens() -> None:
     """Five vanes whose contacts open, so that there are two solutions beside the peak and sweeps jump: a coarse one

@@ -125,19 +125,19 @@ def _around(D: Array, behind: Array, before: Array, r: Array) -> Array:
         return _solved(A.reshape(n * s, n * s), r.ravel()).reshape(n, s)
     out, kept = np.arange(1, n - n % 2, 2), np.arange(0, n, 2)
     X = _solved(D[out], np.concatenate([r[out, :, None], before[out], behind[out]], axis=2))
-    own, to_before, to_behind = X[..., 0], X[..., 1 : 1 + s], X[..., 1 + s :]
-    D, r, behind, before = D[kept].copy(), r[kept].copy(), behind[kept].copy(), before[kept].copy()
+    D, r, after, ahead = D[kept].copy(), r[kept].copy(), behind[kept], before[kept]
     m = len(out)  # the part behind the kept ones 0 to m - 1, and before those 1 to m, on from 0 if there is none
     up, down = np.arange(m), np.arange(1, m + 1) % len(kept)
-    for at, block in ((up, behind), (down, before)):
-        r[at] -= (block[at] @ own[..., None])[..., 0]
-    D[up] -= behind[up] @ to_before
-    D[down] -= before[down] @ to_behind
-    behind[up], before[down] = -behind[up] @ to_behind, -before[down] @ to_before
+    behind_it, before_it = after[up] @ X, ahead[down] @ X
+    r[up] -= behind_it[..., 0]
+    r[down] -= before_it[..., 0]
+    D[up] -= behind_it[..., 1 : 1 + s]
+    D[down] -= before_it[..., 1 + s :]
+    after[up], ahead[down] = -behind_it[..., 1 + s :], -before_it[..., 1 : 1 + s]
     x = np.empty((n, s))
-    x[kept] = _around(D, behind, before, r)
+    x[kept] = _around(D, after, ahead, r)
     between = np.concatenate([x[out - 1], x[(out + 1) % n]], axis=1)[..., None]
-    x[out] = own - (X[..., 1:] @ between)[..., 0]
+    x[out] = X[..., 0] - (X[..., 1:] @ between)[..., 0]
     return x
 
 

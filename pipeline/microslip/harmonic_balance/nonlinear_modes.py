@@ -326,7 +326,7 @@ class _Curve:
 
     def _at(self, Omega: float, xi: float) -> AtFrequency:
         problem = self._fed(xi)
-        return AtFrequency(problem, Omega, tuple(one.directly(Omega) for one in problem.eliminated))
+        return AtFrequency(problem, Omega, problem.stacked([one.directly(Omega) for one in problem.eliminated]))
 
 
 def _pair(value: complex) -> Array:

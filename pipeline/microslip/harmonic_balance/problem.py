@@ -8,6 +8,7 @@ with the number of its blades, not with its cube.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from itertools import product
@@ -25,7 +26,7 @@ from .blocks import Matrix
 from .forces import AFT, Forces
 from .joints import Alone, Joints, Sides, alone
 from .point_cycles import Cycle, Traced
-from .reduced import Coefficients, Eliminated, Seen, View
+from .reduced import Coefficients, Driven, Eliminated, Poles, ReadOuts, Seen, View
 
 SOFTER = 0.7
 """Share of the reference stiffness that serves where the assembly with all of it is at resonance without damping."""
@@ -301,11 +302,45 @@ class Problem:
 
     def at(self, Omega: float) -> AtFrequency:
         """The problem at one frequency (rad/s)."""
-        views = [one.at(Omega) for one in self.eliminated]
-        if all(views):
-            return AtFrequency(self, Omega, tuple(v for v in views if v))
+        if self._poles is not None:
+            found = [reduced.joined(poles, Omega) for poles in self._poles]
+            if all(both is not None for both in found):
+                return AtFrequency(self, Omega, tuple(both for both in found if both is not None))
+        elif all(views := [one.at(Omega) for one in self.eliminated]):
+            return AtFrequency(self, Omega, self.stacked([v for v in views if v]))
         softer = self._softer
-        return AtFrequency(softer, Omega, tuple(one.directly(Omega) for one in softer.eliminated))
+        return AtFrequency(softer, Omega, softer.stacked([one.directly(Omega) for one in softer.eliminated]))
+
+    def stacked(self, views: Sequence[View]) -> tuple[ComplexArray, ...]:
+        """Of each of `alike`, (n, 2, H + 1, c, 1 + c) `View.both` of its parts."""
+        return tuple(np.array([views[i].both for i in parts]) for parts, _ in self.alike)
+
+    @cached_property
+    def read(self) -> list[ReadOuts]:
+        """Harmonic -> read-outs of the coordinates of all parts, one after the other."""
+        return [ReadOuts.of(parts) for parts in self.parts]
+
+    @cached_property
+    def _poles(self) -> list[list[Poles]] | None:
+        """Of each of `alike`, those of its parts together; None where a part has none, or other harmonics together."""
+        out = []
+        for parts, _ in self.alike:
+            each = [found for i in parts if (found := self.eliminated[i].poles) is not None]
+            if len(each) < len(parts) or not _same([[(one.harmonics, one.values) for one in own] for own in each]):
+                return None
+            out.append([Poles.of(together) for together in zip(*each, strict=True)])
+        return out
+
+    @cached_property
+    def driven(self) -> list[tuple[Indices, list[Driven]]]:
+        """Parts by their numbers, and by harmonics whose matrices are the same, what moves the coordinates of them."""
+        found: dict[Any, list[int]] = {}
+        for parts, _ in self.alike:
+            for i in parts:
+                key = tuple((tuple(d.harmonics), d.given.shape) for d in self.eliminated[i].driven)
+                found.setdefault(key, []).append(int(i))
+        each = [(parts, zip(*(self.eliminated[i].driven for i in parts), strict=True)) for parts in found.values()]
+        return [(np.array(parts), [Driven.of(together) for together in own]) for parts, own in each]
 
     @cached_property
     def _softer(self) -> Problem:
@@ -332,11 +367,13 @@ class AtFrequency:
     """The residual at one frequency.
 
     R = v - v_ref + D p in each harmonic and part, in units of `Problem.scale`: p = E^T (F(E v + u_0) - F_0) - k v.
+
+    Attributes: both: of each of `Problem.alike`, see `Problem.stacked`.
     """
 
     problem: Problem
     Omega: float
-    views: tuple[View, ...]
+    both: tuple[ComplexArray, ...]
 
     @property
     def period(self) -> float:
@@ -366,8 +403,11 @@ class AtFrequency:
                 if side is not None:
                     np.add.at(pressed, side, np.abs(g.preload).max(axis=1, keepdims=True))
         pressed *= p.length / p.scale
-        moved = [np.abs(one.compliance[0]) @ pressed[s] for one, s in zip(self.views, p.slices, strict=True)]
-        return float(np.finfo(float).eps * np.abs(np.hstack(moved) / p.scale).max(initial=0.0))
+        seen = [
+            (np.abs(both[:, 0, :, :, 1:]) @ pressed[at][:, None, :, None])[..., 0] / p.scale[at][:, None]
+            for (_, at), both in zip(p.alike, self.both, strict=True)
+        ]
+        return float(np.finfo(float).eps * max((one.max(initial=0.0) for one in seen), default=0.0))
 
     def residual(self, x: Array) -> Array:
         """(size,) R alone."""
@@ -459,8 +499,8 @@ class AtFrequency:
     @cached_property
     def _alone(self) -> list[Alone] | None:
         p, found = self.problem, list[Alone]()
-        for parts, at in p.alike:
-            D, k = self._both(parts)[:, 0, :, :, 1:], np.array([p.stiffness[i] for i in parts])
+        for (parts, at), both in zip(p.alike, self.both, strict=True):
+            D, k = both[:, 0, :, :, 1:], np.array([p.stiffness[i] for i in parts])
             one = alone(at, parts, D, k, p.sides)
             if one is None:
                 return None
@@ -501,10 +541,19 @@ class AtFrequency:
 
     def modal(self, x: Array, force: Array) -> list[list[ComplexArray]]:
         """Harmonic -> part -> (m,) amplitudes of the bodies' coordinates."""
-        p = self.problem
-        g = self.amplitudes(self._excess(p.displacement(x), force))
-        each = [one.coordinates(self.Omega, p.share, g[:, at]) for one, at in zip(p.eliminated, p.slices, strict=True)]
-        return [list(parts) for parts in zip(*each, strict=True)]
+        return self.coordinates(self._excess(self.problem.displacement(x), force), self.problem.share)
+
+    def coordinates(self, excess: Array, share: float) -> list[list[ComplexArray]]:
+        """The same, under a share of the loads that are not steady and (W, c) contact forces beyond those of the
+        stiffness taken into the parts."""
+        p, g = self.problem, self.amplitudes(excess)
+        found: dict[tuple[int, int], ComplexArray] = {}
+        for parts, each in p.driven:
+            own = np.array([g[:, p.slices[i]] for i in parts])
+            for one in each:
+                q = one.coordinates(self.Omega, share, own)
+                found |= {(h, i): q[n, j] for j, h in enumerate(one.harmonics) for n, i in enumerate(parts)}
+        return [[found[h, i] for i in range(len(p.slices))] for h in range(len(g))]
 
     def amplitudes(self, v: Array) -> ComplexArray:
         """(H + 1, c) complex amplitudes of (W, c) real ones."""
@@ -552,21 +601,17 @@ class AtFrequency:
     def _applied(self, force: Array, which: slice, driven: float = 1.0) -> Array:
         """(n, W, c) D, its derivative or both, applied to (W, c), less the reference times a factor."""
         share = driven * self.problem.share
-        if len(self.views) == 1:
+        if len(self.problem.slices) == 1:
             return self._real[0].beyond(force[None], which, driven, share)[0]
         out = np.empty((which.stop, *force.shape))
         for (_, at), D in zip(self.problem.alike, self._real, strict=True):
             out[:, :, at] = D.beyond(force[:, at].transpose(1, 0, 2), which, driven, share).transpose(1, 2, 0, 3)
         return out
 
-    def _both(self, parts: Indices) -> ComplexArray:
-        """(n, 2, H + 1, c, 1 + c) `View.both` of parts."""
-        return np.array([self.views[i].both for i in parts]) if len(parts) > 1 else self.views[parts[0]].both[None]
-
     @cached_property
     def _real(self) -> list[Coefficients]:
         """Of each of `Problem.alike`."""
-        return [Coefficients.of(self._both(parts)) for parts, _ in self.problem.alike]
+        return [Coefficients.of(both) for both in self.both]
 
 
 def _places(g: Group, begins: Indices) -> list[tuple[int, tuple[int, int], slice, slice, float]]:
@@ -649,6 +694,12 @@ def eliminated(assembly: Assembly, harmonic: int, together: bool) -> tuple[Linea
     if together:
         return (assembly.joined(harmonic),)
     return tuple(assembly.part(m, harmonic) for m in assembly.components)
+
+
+def _same(each: Sequence[Sequence[tuple[Array, Array]]]) -> bool:
+    """Whether all have the same first arrays, and second ones of the same shapes."""
+    kinds = {tuple((tuple(first), second.shape) for first, second in one) for one in each}
+    return len(kinds) <= 1
 
 
 def _numbered(assembly: Assembly, together: bool) -> tuple[tuple[int, ...], dict[tuple[int, int], Array]]:

@@ -144,8 +144,8 @@ def _tied(at: AtFrequency, springs: list[list[Array]], q: Places) -> AtFrequency
         for h, (row, ties, places) in enumerate(zip(p.parts, springs, q, strict=True))
     )
     by_part = zip(zip(*parts, strict=True), p.stiffness, strict=True)
-    views = tuple(Eliminated(one, k).directly(at.Omega) for one, k in by_part)
-    return replace(at, problem=replace(p, parts=parts), views=views)
+    views = [Eliminated(one, k).directly(at.Omega) for one, k in by_part]
+    return replace(at, problem=replace(p, parts=parts), both=p.stacked(views))
 
 
 def _component(problem: Problem, part: int, motion: Array) -> str:

@@ -22,7 +22,7 @@ resonance of the body with sticking contacts, without damping, another k does.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 
 import numpy as np
@@ -135,11 +135,12 @@ class Coefficients:
 
 @dataclass(frozen=True, eq=False)
 class Poles:
-    """The inverse of s^2 M + s C + K + T^H k' T as a sum over its eigenvalues, of some harmonics of one part.
+    """The inverse of s^2 M + s C + K + T^H k' T as a sum over its eigenvalues, of some harmonics of one part, or of n.
 
     Attributes:
-        harmonics: (g,). values: (2m,) eigenvalues. left: (c, 2m), right: (g, 2m, 1 + c) what stands on both sides of
-            1/(s - value), of the loads in the first column. static: (g, c, 1 + c) what is added to the sums.
+        harmonics: (g,). values: (..., 2m) eigenvalues. left: (..., c, 2m), right: (..., g, 2m, 1 + c) what stands on
+            both sides of 1/(s - value), of the loads in the first column. static: (..., g, c, 1 + c) what is added to
+            the sums.
     """
 
     harmonics: Array
@@ -148,14 +149,20 @@ class Poles:
     right: ComplexArray
     static: ComplexArray
 
+    @classmethod
+    def of(cls, each: Sequence[Poles]) -> Poles:
+        """Of n parts in the same harmonics."""
+        arrays = (np.array([getattr(one, key) for one in each]) for key in ("values", "left", "right", "static"))
+        return cls(each[0].harmonics, *arrays)
+
     @cached_property
     def _near(self) -> Array:
-        return MET * np.abs(self.values)
+        return MET * np.abs(self.values[..., None, :])
 
     @cached_property
     def _damped(self) -> bool:
         """Whether no frequency is an eigenvalue."""
-        return bool((np.abs(self.values.real) > self._near).all())
+        return bool((np.abs(self.values.real)[..., None, :] > self._near).all())
 
     @cached_property
     def _turning(self) -> ComplexArray:
@@ -166,18 +173,20 @@ class Poles:
     def _falling(self) -> ComplexArray:
         return -self._turning
 
-    def at(self, Omega: float) -> View | None:
-        """These harmonics at a frequency (rad/s); None where it or one of its harmonics is, within `MET`, an
-        eigenvalue."""
-        away = Omega * self._turning - self.values
+    def at(self, Omega: float) -> ComplexArray | None:
+        """(..., 2, g, c, 1 + c) see `View.both`, at a frequency (rad/s); None where it or one of its harmonics is,
+        within `MET`, an eigenvalue."""
+        away = Omega * self._turning - self.values[..., None, :]
         if not self._damped and (np.abs(away) <= self._near).any():
             return None
-        g = np.empty((2, *away.shape), complex)
-        np.divide(1.0, away, out=g[0])
-        np.multiply(g[0] * g[0], self._falling, out=g[1])  # its derivative
-        both = (self.left * g[:, :, None]) @ self.right
-        both[0] += self.static
-        return View(both)
+        c, (*n, g, m) = self.left.shape[-2], away.shape
+        once = np.divide(1.0, away)[..., None, :]
+        rows = np.empty((*n, g, 2, c, m), complex)  # the value's above those of its derivative: half as many products
+        np.multiply(self.left[..., None, :, :], once, out=rows[..., 0, :, :])
+        np.multiply(rows[..., 0, :, :], once * self._falling[..., None], out=rows[..., 1, :, :])
+        both = (rows.reshape(*n, g, 2 * c, m) @ self.right).reshape(*n, g, 2, c, 1 + c)
+        both[..., 0, :, :] += self.static
+        return np.asarray(both.swapaxes(-4, -3))
 
 
 @dataclass(frozen=True, eq=False)
@@ -195,40 +204,20 @@ class Eliminated:
         that the numbers subtracted are without bounds."""
         if self.poles is None:
             return self._far(Omega)
-        found = [group.at(Omega) for group in self.poles]
-        if len(found) == 1:
-            return found[0]
-        H, c = len(self.parts), len(self.stiffness)
-        both = np.empty((2, H, c, 1 + c), complex)
-        for group, one in zip(self.poles, found, strict=True):
-            if one is None:
-                return None
-            both[:, group.harmonics] = one.both
-        return View(both)
-
-    def coordinates(self, Omega: float, share: float, g: ComplexArray) -> list[ComplexArray]:
-        """Harmonic -> (m,) amplitudes of the coordinates at a frequency (rad/s), under a share of the loads that are
-        not steady and (H + 1, c) contact forces beyond those of the stiffness k."""
-        out: dict[int, ComplexArray] = {}
-        for same, held, driven, given in self._driven:
-            part, h = self.parts[same[0]], np.array(same)
-            w = h[:, None, None] * Omega
-            right = driven * np.where(h, share, 1.0)[:, None] - g[h] @ given
-            A = held - w**2 * part.M + 1j * w * part.C
-            out |= zip(same, np.linalg.solve(A, right[..., None])[..., 0], strict=True)
-        return [out[i] for i in range(len(self.parts))]
+        both = joined(self.poles, Omega)
+        return None if both is None else View(both)
 
     @cached_property
-    def _driven(self) -> list[tuple[list[int], ComplexArray, ComplexArray, ComplexArray]]:
-        """Harmonics by equal matrices, their stiffness K + T^H k' T (m, m), loads (harmonics, m), and (c, m) what
-        contact forces beyond those of k do."""
+    def driven(self) -> list[Driven]:
+        """By equal matrices, what loads and contact forces beyond those of k do."""
         found = []
         for same in self._same:
             part, T, k = self.parts[same[0]], self.parts[same[0]].rows, self.stiffness
             P, W = (np.linalg.inv(np.eye(part.count) + a) for a in (part.yielding @ k, k @ part.yielding))
             held = k @ P
             loads = np.array([self.parts[i].load - T.conj().T @ (held @ self.parts[i].given) for i in same])
-            found.append((same, part.stiff + T.conj().T @ held @ T, loads, (T.conj().T @ W).T))
+            stiff, given = part.stiff + T.conj().T @ held @ T, (T.conj().T @ W).T
+            found.append(Driven(np.array(same), stiff, part.M, part.C, loads, given))
         return found
 
     def directly(self, Omega: float) -> View:
@@ -297,14 +286,58 @@ class Eliminated:
         h = int(poles.harmonics[-1])
         sizes = np.abs(poles.values)
         for Omega in (0.97 * np.exp(np.log(sizes).mean()), 1.01 * sizes.min()):
-            view = poles.at(float(Omega) / max(h, 1))
-            if view is None:
+            both = poles.at(float(Omega) / max(h, 1))
+            if both is None:
                 return False
             exact = seen(self.parts[h], self.stiffness, float(Omega) / max(h, 1), h)
-            for a, b in ((view.compliance[0, -1], exact.compliance), (view.reference[0, -1], exact.reference)):
+            for a, b in ((both[0, -1, :, 1:], exact.compliance), (both[0, -1, :, 0], exact.reference)):
                 if not np.abs(a - b).max(initial=0.0) <= 1e-10 * np.abs(b).max(initial=1e-300):
                     return False
         return True
+
+
+def joined(poles: Sequence[Poles], Omega: float) -> ComplexArray | None:
+    """(..., 2, H + 1, c, 1 + c) see `View.both`, of all harmonics together; None where `Poles.at` is."""
+    found = [group.at(Omega) for group in poles]
+    if len(found) == 1 or any(one is None for one in found):
+        return found[0] if len(found) == 1 else None
+    *n, _, c, columns = poles[0].static.shape
+    both = np.empty((*n, 2, sum(len(group.harmonics) for group in poles), c, columns), complex)
+    for group, one in zip(poles, found, strict=True):
+        both[..., group.harmonics, :, :] = one
+    return both
+
+
+@dataclass(frozen=True, eq=False)
+class Driven:
+    """What moves the coordinates of one part, or of n, in harmonics whose matrices are the same.
+
+    Attributes:
+        harmonics: (g,). stiff: (..., m, m) K + T^H k' T. M, C: (..., m, m). loads: (..., g, m). given: (..., c, m) what
+            contact forces beyond those of k do.
+    """
+
+    harmonics: Array
+    stiff: ComplexArray
+    M: Array
+    C: Array
+    loads: ComplexArray
+    given: ComplexArray
+
+    @classmethod
+    def of(cls, each: Sequence[Driven]) -> Driven:
+        """Of n parts in the same harmonics."""
+        arrays = (np.array([getattr(one, f.name) for one in each]) for f in fields(cls)[1:])
+        return cls(each[0].harmonics, *arrays)
+
+    def coordinates(self, Omega: float, share: float, g: ComplexArray) -> ComplexArray:
+        """(..., g, m) amplitudes at a frequency (rad/s), under a share of the loads that are not steady and contact
+        forces (..., H + 1, c) beyond those of the stiffness k."""
+        h = self.harmonics
+        w = h[:, None, None] * Omega
+        right = self.loads * np.where(h, share, 1.0)[:, None] - g[..., h, :] @ self.given
+        A = self.stiff[..., None, :, :] - w**2 * self.M[..., None, :, :] + 1j * w * self.C[..., None, :, :]
+        return np.asarray(np.linalg.solve(A, right[..., None])[..., 0])
 
 
 MET = 1e-6
@@ -331,12 +364,27 @@ READS = 1e-10
 """Share of what coordinates as large could make a read-out, below which it reads their rounding: by symmetry, say."""
 
 
-def monitored(part: Linear, q: ComplexArray, force: ComplexArray, share: float = 1.0) -> ComplexArray:
+@dataclass(frozen=True, eq=False)
+class ReadOuts:
+    """What is read of a body, or of several, in one harmonic; see `system.assembly.Linear`."""
+
+    output: ComplexArray
+    output_residual: ComplexArray
+    output_given: ComplexArray
+
+    @classmethod
+    def of(cls, parts: Sequence[Linear]) -> ReadOuts:
+        """Of the coordinates and contact forces of all parts, one after the other."""
+        rows, beside = (np.hstack([getattr(one, key) for one in parts]) for key in ("output", "output_residual"))
+        return cls(rows, beside, np.sum([one.output_given for one in parts], axis=0))
+
+
+def monitored(part: Linear | ReadOuts, q: ComplexArray, force: ComplexArray, share: float = 1.0) -> ComplexArray:
     """(w,) read-outs of one harmonic, see `read`."""
     return read([part], q[None], force[None], share)[:, 0]
 
 
-def read(parts: Sequence[Linear], q: ComplexArray, force: ComplexArray, share: float = 1.0) -> ComplexArray:
+def read(parts: Sequence[Linear | ReadOuts], q: ComplexArray, force: ComplexArray, share: float = 1.0) -> ComplexArray:
     """(w, g) read-outs by coordinates (g, m), contact forces (g, c) less the preload, and a share of the loads, over g
     harmonics of one wave; parts (g,), equal but for the loads. What is rounding is zero."""
     output, given = parts[0].output, np.array([part.output_given for part in parts]).T

@@ -167,10 +167,14 @@ def _shortened(
 
 
 def solve(
-    problem: Problem, Omega: float, starts: list[Array], slope: Any = None, along_load: bool = True
+    problem: Problem, Omega: float, starts: list[Array], slope: Any = None, along_load: bool = True,
+    tolerance: float = 1e-10,
 ) -> Point:  # fmt: skip
     """Newton's method from one start after the other, then from the sticking contact, then from rest in
     pseudo-time, then along the load, which of many bodies takes minutes.
+
+    Args:
+        tolerance: of Newton's method from starts, see `newton`.
 
     Raises:
         UserError: a frequency that is not positive.
@@ -178,7 +182,7 @@ def solve(
     bounded("frequency", Omega / (2 * np.pi), gt=0)
     at, spent, status = problem.at(Omega), 0, ""
     history: tuple[float, ...] = ()
-    for way in _ways(problem, at, [*starts, at.reference], slope, along_load):
+    for way in _ways(problem, at, [*starts, at.reference], slope, along_load, tolerance):
         point = way()
         spent, history = spent + point.iterations, (*history, *point.history)
         if point.converged or point.away:
@@ -204,14 +208,14 @@ def _cause(at: AtFrequency, point: Point) -> str:
 
 
 def _ways(
-    problem: Problem, at: AtFrequency, starts: list[Array], slope: Any, along_load: bool
+    problem: Problem, at: AtFrequency, starts: list[Array], slope: Any, along_load: bool, tolerance: float
 ) -> Iterator[Callable[[], Point]]:  # fmt: skip
     rises = _rises(problem)
     patient = rises or not pseudo_transient.serves(problem)
     way = partial(newton, rises=rises) if patient else among
-    yield from (partial(way, at, x, slope=slope) for x in starts)
+    yield from (partial(way, at, x, slope=slope, tolerance=tolerance) for x in starts)
     if not patient:
-        yield from (partial(newton, at, x, rises=rises) for x in starts[:PATIENT])
+        yield from (partial(newton, at, x, tolerance, rises=rises) for x in starts[:PATIENT])
     if pseudo_transient.serves(problem):
         yield partial(from_rest, problem, at.Omega)
     if along_load:
@@ -223,9 +227,9 @@ AMONG, PATIENCE = 20, 8
 before: what arrives takes some five."""
 
 
-def among(at: AtFrequency, x: Array, slope: Any = None) -> Point:
+def among(at: AtFrequency, x: Array, slope: Any = None, tolerance: float = 1e-10) -> Point:
     """Newton's method among many bodies."""
-    return newton(at, x, most=AMONG, slope=slope, rises=0, patience=PATIENCE)
+    return newton(at, x, tolerance, most=AMONG, slope=slope, rises=0, patience=PATIENCE)
 
 
 PATIENT = 2

@@ -106,7 +106,8 @@ class Ensemble:
             )
         if unsolved := int((self.column("unsolved") > 0).sum()):
             told.append(
-                f"{counted(unsolved, 'sample')} lack solutions at some frequencies, counted in the column unsolved."
+                f"in {counted(unsolved, 'sample')} no solution was found at some frequencies of the sweep (column "
+                "unsolved); give it more points."
             )
         return told
 
@@ -278,8 +279,9 @@ def _missed(share: float) -> str:
 def _row(one: Sample) -> list[float]:
     top = one.top
     solved = np.isfinite(top.amplitude)
+    unsolved = np.isnan(one.grid).all(axis=1).sum()  # points that the search added elsewhere in vain are in `missed`
     return [top.amplitude, top.frequency, top.output, one.localisation if solved else np.nan, top.missed,
-            len(top.failed), top.at_end, one.stress, one.strain]  # fmt: skip
+            unsolved, top.at_end, one.stress, one.strain]  # fmt: skip
 
 
 def _narrow(found: Ensemble, until: float | None) -> bool:

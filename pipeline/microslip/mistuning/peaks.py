@@ -72,9 +72,9 @@ def highest(
             given, what is found with little work from what is known: the sweep goes as far as that leads, then back
             from its other end, and the rest is looked for in what is between.
     """
-    search = _Search(respond, follow, frequency)
+    search = _Search(respond, follow, at_once, frequency)
     known, failed = search.known, search.failed
-    search.sweep([float(f) for f in frequency], at_once)
+    search.sweep([float(f) for f in frequency])
     before = np.inf  # what was left where a parabola placed the last point
     count, may_fail = 0, len(failed) + FAILING
     while known and count < most and len(failed) < may_fail:
@@ -83,13 +83,15 @@ def highest(
         promised = told[0] > top * (1 + tolerance) and more - top <= 0.5 * before
         promised = promised and not _beside(told[1], known, failed)
         if more <= top * (1 + (tolerance if promised else LEFT)):
-            if not search.leads_on(top, tolerance):
+            if not search.leads_on(top, tolerance) and not search.mended():
                 break
             continue
         if not promised and search.goes_on(low, high, tolerance):
             continue
         search.look(told[1] if promised else _middle(low, high, failed))
         count, before = count + 1, more - top if promised else np.inf
+    while search.mended():
+        pass
     if not known:
         return Highest(-1, np.nan, np.nan, np.nan, np.zeros(0), np.zeros((0, 0)), tuple(failed), False)
     x, y = _table(known)
@@ -101,16 +103,20 @@ def highest(
 
 class _Search:
     """Attributes: known: Hz -> (w,) amplitudes. failed: Hz without a solution. tried: ways back that were gone. led:
-    Hz, whereto they led. ends: Hz, where they ended."""
+    Hz, whereto they led. ends: Hz, where they ended. looked: Hz without a solution that were looked for again, and what
+    was known beside them then."""
 
-    def __init__(self, respond: Respond, follow: Follow | None, frequency: Array) -> None:
-        self.respond, self.follow = respond, follow
+    def __init__(
+        self, respond: Respond, follow: Follow | None, at_once: Respond | None, frequency: Array
+    ) -> None:  # fmt: skip
+        self.respond, self.follow, self.at_once = respond, follow, at_once
         self.low, self.high = float(min(frequency)), float(max(frequency))
         self.width = float(np.abs(np.diff(frequency)).max(initial=0.0))
         self.known: dict[float, Array] = {}
         self.failed: list[float] = []
         self.tried: set[tuple[float, float, float, bool]] = set()
         self.led: set[float] = set()
+        self.looked: set[tuple[float, float, float]] = set()
         self.ends: list[float] = []
 
     def look(self, f: float) -> None:
@@ -120,11 +126,11 @@ class _Search:
         else:
             self.known[f] = y
 
-    def sweep(self, rest: list[float], at_once: Respond | None) -> None:
+    def sweep(self, rest: list[float]) -> None:
         """On as far as that leads, back from the other end, then what is between."""
-        if at_once is not None:
-            rest = rest[self._leads(rest, at_once) :][::-1]
-            rest = rest[self._leads(rest, at_once) :]
+        if self.at_once is not None:
+            rest = rest[self._leads(rest, self.at_once) :][::-1]
+            rest = rest[self._leads(rest, self.at_once) :]
         for f in rest:
             self.look(f)
 
@@ -136,6 +142,24 @@ class _Search:
                 return count
             self.known[f] = y
         return len(frequencies)
+
+    def mended(self) -> bool:
+        """Whether one of the points without a solution is found by now, from what is known about it or on either side
+        of it."""
+        for f in self.failed:
+            sides = max((x for x in self.known if x < f), default=f), min((x for x in self.known if x > f), default=f)
+            if (f, *sides) in self.looked:
+                continue
+            self.looked.add((f, *sides))
+            y = self.at_once(f) if self.at_once else None
+            for near in sides:
+                if y is None and near != f and self.follow is not None:
+                    y = dict(self.follow(f, near, self.width, False)[0]).get(f)
+            if y is not None:
+                self.failed.remove(f)
+                self.known[f] = y
+                return True
+        return False
 
     def leads_on(self, top: float, tolerance: float) -> bool:
         """Whether a solution that is about as high as the top, and beside which there is a lower one, leads to more

@@ -98,7 +98,14 @@ def of_ring(asked: Asked, ring: Assembly, number: int = 0) -> Sample:
 
 def _searched(asked: Asked, ring: Assembly, frequency: Array) -> tuple[Highest, Sliding | Sticking]:
     respond = Sticking(ring) if asked.stuck else Sliding(asked.problem(ring), asked.tuned_points)
-    return highest(respond, frequency, follow=respond.follow, at_once=respond.at_once), respond
+    top = highest(respond, frequency, follow=respond.follow, at_once=respond.at_once)
+    return top if not np.isfinite(top.amplitude) else _ended(top, respond.ended(top.frequency)), respond
+
+
+def _ended(top: Highest, y: Array) -> Highest:
+    """With (w,) amplitudes of more digits at the highest."""
+    amplitudes = np.where((top.frequencies == top.frequency)[:, None], y, top.amplitudes)
+    return replace(top, output=int(y.argmax()), amplitude=float(y.max()), amplitudes=amplitudes)
 
 
 FINER, HIGH = 4, 0.5
@@ -116,6 +123,13 @@ def again(asked: Asked, one: Sample) -> tuple[Highest, Highest]:
     return _searched(asked, ring, fine)[0], _searched(asked, ring, fine[::-1])[0]
 
 
+CLOSE = 1e-3
+"""Of R over x, below which Newton's method begins without looking for another start."""
+
+SEARCHED = 1e-8
+"""Of R over x, to which the search solves; the highest is solved to the end."""
+
+
 class Sliding:
     """Amplitudes of a ring with friction at any frequency, each started from what is known nearby.
 
@@ -131,13 +145,14 @@ class Sliding:
     def __call__(self, frequency: float) -> Array | None:
         """(w,) m."""
         Omega = 2 * np.pi * frequency
-        return self._kept(frequency, solve(self.problem, Omega, self._starts(Omega), self.slope, along_load=False))
+        point = solve(self.problem, Omega, self._starts(Omega), self.slope, along_load=False, tolerance=SEARCHED)
+        return self._kept(frequency, point)
 
     def at_once(self, frequency: float) -> Array | None:
         """(w,) m, by Newton's method from what is known nearby or not at all."""
         Omega = 2 * np.pi * frequency
         for x in self._starts(Omega):
-            point = among(self._at(Omega), x, self.slope)
+            point = among(self._at(Omega), x, self.slope, SEARCHED)
             if point.converged:
                 return self._kept(frequency, point)
         return None
@@ -152,7 +167,7 @@ class Sliding:
         beyond = [self.known[f] for f in self.known if (f - behind) * (frequency - behind) <= 0]
         side = sorted(beyond, key=lambda p: abs(p.Omega - Omega))
         for count in (2, 1):
-            point = among(self._at(Omega), carried(side[:count], Omega))
+            point = among(self._at(Omega), carried(side[:count], Omega), tolerance=SEARCHED)
             y = self._kept(frequency, point)
             if y is not None and (before is None or y.max() > np.abs(amplitudes(self.problem, before)).max()):
                 return [(frequency, y)], False
@@ -162,6 +177,12 @@ class Sliding:
             return [], False
         points, ends = Branch(self.problem, self.known[behind], Omega, 2 * np.pi * width).onward()
         return [(f, self._read(f, p)) for p in points if (f := p.Omega / (2 * np.pi)) != frequency], ends
+
+    def ended(self, frequency: float) -> Array:
+        """(w,) m at a frequency that was solved for, by Newton's method to its end."""
+        known = self.known[frequency]
+        y = self._kept(frequency, among(self._at(known.Omega), known.x))
+        return self._read(frequency, known) if y is None else y
 
     def _read(self, frequency: float, point: Point) -> Array:
         self.known[frequency] = point
@@ -181,15 +202,24 @@ class Sliding:
         return at.modal(point.x, at.force(point.x))[1]
 
     def _starts(self, Omega: float) -> list[Array]:
-        """Where Newton's method may begin: the two that leave least, of those carried on from either side, which may be
-        those of a jump, and from both, and the tuned ring's."""
-        near, at = self._near(Omega, 4), self._at(Omega)
+        """Where Newton's method may begin: what is near carried on, by two points or four. Where that leaves much, of
+        all the two that leave least: also carried on from either side, which may be those of a jump, and the tuned
+        ring's."""
+        near, left = self._near(Omega, 4), dict[tuple[int, ...], tuple[float, Array]]()
         sides = [[p for p in near if (p.Omega > Omega) is above] for above in (False, True)]
-        told = [points[:n] for points, most in ((sides[0], 3), (sides[1], 3), (near, 4)) for n in (2, most)]
-        told.append(sorted(self.tuned, key=lambda p: abs(p.Omega - Omega))[:3])
-        different = {tuple(map(id, points)): points for points in told if points}.values()
-        starts = [carried(points, Omega) for points in different]
-        return sorted(starts, key=lambda x: float(np.linalg.norm(at.residual(x))))[:2]
+        tuned = sorted(self.tuned, key=lambda p: abs(p.Omega - Omega))[:3]
+        for told in ((near[:2], near), (*(side[:n] for side in sides for n in (2, 3)), tuned)):
+            for points in told:
+                if points and (key := tuple(map(id, points))) not in left:
+                    left[key] = self._left(points, Omega)
+            if left and min(share for share, _ in left.values()) <= CLOSE:
+                break
+        return [x for _, x in sorted(left.values(), key=lambda one: one[0])[:2]]
+
+    def _left(self, points: list[Point], Omega: float) -> tuple[float, Array]:
+        """What solutions leave that are carried on, of R over x, and whereto."""
+        x = carried(points, Omega)
+        return float(np.linalg.norm(self._at(Omega).residual(x)) / np.linalg.norm(x)), x
 
     def _at(self, Omega: float) -> AtFrequency:
         """The balance at a frequency, the last one kept."""
@@ -213,9 +243,8 @@ def _amplitudes(at: AtFrequency, point: Point, harmonic: int = 1) -> ComplexArra
 
 def read(at: AtFrequency, q: list[ComplexArray], force: Array, share: float, harmonic: int = 1) -> ComplexArray:
     """(w,) read-outs in a harmonic, from the parts' coordinates, (W, c) forces and a share of the loads."""
-    p, F = at.problem, at.amplitudes(force)[harmonic]
-    parts = zip(p.parts[harmonic], q, p.slices, strict=True)
-    return np.sum([reduced.monitored(part, own, F[s], share) for part, own, s in parts], axis=0)
+    F = at.amplitudes(force)[harmonic]
+    return reduced.monitored(at.problem.read[harmonic], np.concatenate(q), F, share)
 
 
 class Sticking:
@@ -230,6 +259,7 @@ class Sticking:
         force = self.k @ found.reference
         return np.abs(reduced.monitored(self.part, found.modal, force))
 
+    ended = __call__
     follow = at_once = None  # of linear equations there is one solution, found alike everywhere
 
     def coordinates(self, frequency: float) -> list[ComplexArray]:

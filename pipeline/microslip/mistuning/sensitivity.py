@@ -124,9 +124,7 @@ class Linearised:
         v = p.displacement(self.matrix.solve(-(R / p.scale).ravel()))
         changed = self.felt(v) + (0.0 if force is None else force)
         held = np.hstack([v[:, s] @ k.T for s, k in zip(p.slices, p.stiffness, strict=True)])
-        g = self.at.amplitudes(changed - held)
-        each = zip(p.eliminated, p.slices, strict=True)
-        dq = [one.coordinates(self.at.Omega, 0.0, g[:, s])[1] for one, s in each]
+        dq = self.at.coordinates(changed - held, 0.0)[1]
         return dq, read(self.at, dq, changed, 0.0)
 
     def pushes(self) -> list[list[ComplexArray]]:
