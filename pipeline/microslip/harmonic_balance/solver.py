@@ -168,13 +168,13 @@ def _shortened(
 
 def solve(
     problem: Problem, Omega: float, starts: list[Array], slope: Any = None, along_load: bool = True,
-    tolerance: float = 1e-10,
+    tolerance: float = 1e-10, report: Report = lambda _: None,
 ) -> Point:  # fmt: skip
     """Newton's method from one start after the other, then from the sticking contact, then from rest in
     pseudo-time, then along the load, which of many bodies takes minutes.
 
     Args:
-        tolerance: of Newton's method from starts, see `newton`.
+        tolerance: of Newton's method from starts, see `newton`. report: is told of ways that take long.
 
     Raises:
         UserError: a frequency that is not positive.
@@ -182,7 +182,9 @@ def solve(
     bounded("frequency", Omega / (2 * np.pi), gt=0)
     at, spent, status = problem.at(Omega), 0, ""
     history: tuple[float, ...] = ()
-    for way in _ways(problem, at, [*starts, at.reference], slope, along_load, tolerance):
+    for way, said in _ways(problem, at, [*starts, at.reference], slope, along_load, tolerance):
+        if said:
+            report(said)
         point = way()
         spent, history = spent + point.iterations, (*history, *point.history)
         if point.converged or point.away:
@@ -209,17 +211,18 @@ def _cause(at: AtFrequency, point: Point) -> str:
 
 def _ways(
     problem: Problem, at: AtFrequency, starts: list[Array], slope: Any, along_load: bool, tolerance: float
-) -> Iterator[Callable[[], Point]]:  # fmt: skip
+) -> Iterator[tuple[Callable[[], Point], str]]:  # fmt: skip
+    """Ways to a solution, and what is said of those that take long."""
     rises = _rises(problem)
     patient = rises or not pseudo_transient.serves(problem)
     way = partial(newton, rises=rises) if patient else among
-    yield from (partial(way, at, x, slope=slope, tolerance=tolerance) for x in starts)
+    yield from ((partial(way, at, x, slope=slope, tolerance=tolerance), "") for x in starts)
     if not patient:
-        yield from (partial(newton, at, x, tolerance, rises=rises) for x in starts[:PATIENT])
+        yield from ((partial(newton, at, x, tolerance, rises=rises), "") for x in starts[:PATIENT])
     if pseudo_transient.serves(problem):
-        yield partial(from_rest, problem, at.Omega)
+        yield partial(from_rest, problem, at.Omega), "once more from rest"
     if along_load:
-        yield partial(_raised, problem, at.Omega)
+        yield partial(_raised, problem, at.Omega), "once more along the load"
 
 
 AMONG, PATIENCE = 20, 8
@@ -360,13 +363,14 @@ def sweep(
             done.append(known[float(f)])
             continue
         failed = sum(not p.converged for p in done)
-        report(f"{i + 1} of {len(frequency)} frequencies: {f:.6g} Hz" + (f", {failed} not converged" if failed else ""))
+        told = f"{i + 1} of {len(frequency)} frequencies: {f:.6g} Hz" + (f", {failed} not converged" if failed else "")
+        report(told)
         good = _behind(done)
         starts = [] if start is None or done else [start]
         if good:
             starts = [_ahead(good, 2 * np.pi * f), good[-1].x] if len(good) > 1 else [good[-1].x]
         began = time.perf_counter()
-        point = solve(problem, 2 * np.pi * float(f), starts, slope)
+        point = solve(problem, 2 * np.pi * float(f), starts, slope, report=partial(_also, report, told))
         slope = None if _by_few(problem) else point.slope
         done.append(replace(point, slope=None))
         keep(done[-1])
@@ -380,6 +384,10 @@ def sweep(
             done[i] = _walked(problem, done[i + 1], done[i])
             keep(done[i])
     return done
+
+
+def _also(report: Report, told: str, said: str) -> None:
+    report(f"{told}; {said}")
 
 
 LONG, TIMED = 600.0, 3
