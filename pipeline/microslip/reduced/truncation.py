@@ -39,8 +39,8 @@ class Coordinate:
 
     @property
     def share(self) -> float:
-        """Part of the static compliance that all kept modes hold."""
-        return float(self.shares[-1]) if len(self.shares) else 0.0
+        """Part of the static compliance that all kept modes hold, all of it where the rest is rounding."""
+        return 1.0 if not self.residual else float(self.shares[-1]) if len(self.shares) else 0.0
 
     @property
     def residual(self) -> float:
