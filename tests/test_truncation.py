@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 import small
@@ -104,7 +102,7 @@ def test_modes_for() -> None:
     c = Coordinate("x u_n", "translation", "m/N", 2.0, 1.9, np.array([0.5, 0.9, 0.95]))
     assert (c.modes_for(0.4), c.modes_for(0.9), c.modes_for(0.99)) == (1, 2, None)
     assert c.share == 0.95 and c.residual == pytest.approx(0.1)
-    rounded = replace(c, modal=(1 - 1e-9) * c.static, shares=np.array([0.5, 1 - 1e-9]))
+    rounded = dataclasses.replace(c, modal=(1 - 1e-9) * c.static, shares=np.array([0.5, 1 - 1e-9]))
     assert rounded.share == 1.0 and rounded.residual == 0.0
 
 
