@@ -289,7 +289,8 @@ class _Sliders:
         last, slope = jax.lax.cond(at.renew, lambda: recall(*given), lambda: (turn(*given), at.slope))
         memory, size, newton = last.memory, last.size, _Newton(slope)
         change = memory - at.memory  # of what sticks it is rounding, and what is regained tells the step exactly
-        change = jnp.where((_length(change) > 1e-15 * size)[..., None, :], change, 0.0)
+        rounding = np.finfo(float).eps * len(self.path) * size  # of so many steps
+        change = jnp.where((_length(change) > rounding)[..., None, :], change, 0.0)
         missing = change + RECALL * (self.first - at.memory)
         left, step = _length(missing), newton(missing)
 
