@@ -205,21 +205,17 @@ class Sliding:
         """Where Newton's method may begin: what is near carried on, by two points or four. Where that leaves much, of
         all the two that leave least: also carried on from either side, which may be those of a jump, and the tuned
         ring's."""
-        near, left = self._near(Omega, 4), dict[tuple[int, ...], tuple[float, Array]]()
+        near, at = self._near(Omega, 4), self._at(Omega)
         sides = [[p for p in near if (p.Omega > Omega) is above] for above in (False, True)]
         tuned = sorted(self.tuned, key=lambda p: abs(p.Omega - Omega))[:3]
+        left = dict[tuple[int, ...], tuple[float, Array]]()
         for told in ((near[:2], near), (*(side[:n] for side in sides for n in (2, 3)), tuned)):
-            for points in told:
-                if points and (key := tuple(map(id, points))) not in left:
-                    left[key] = self._left(points, Omega)
-            if left and min(share for share, _ in left.values()) <= CLOSE:
+            for points in filter(None, told):
+                x = carried(points, Omega)
+                left[tuple(map(id, points))] = float(np.linalg.norm(at.residual(x))), x
+            if any(size <= CLOSE * np.linalg.norm(x) for size, x in left.values()):
                 break
         return [x for _, x in sorted(left.values(), key=lambda one: one[0])[:2]]
-
-    def _left(self, points: list[Point], Omega: float) -> tuple[float, Array]:
-        """What solutions leave that are carried on, of R over x, and whereto."""
-        x = carried(points, Omega)
-        return float(np.linalg.norm(self._at(Omega).residual(x)) / np.linalg.norm(x)), x
 
     def _at(self, Omega: float) -> AtFrequency:
         """The balance at a frequency, the last one kept."""
