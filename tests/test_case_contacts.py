@@ -483,7 +483,7 @@ def test_a_sweep_that_takes_long_is_told_from_its_third_point(monkeypatch) -> No
 
     clock = {}
 
-    def slow(problem, Omega, starts, slope=None):
+    def slow(problem, Omega, starts, slope=None, **_):
         clock["n"] = clock.get("n", 0) + 1
         clock["s"] = clock.get("s", 0.0) + (100.0 if clock["n"] <= 2 else 7.0)
         return solver.Point(Omega, np.zeros(1), "converged", 0.0, 1)
