@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -18,6 +18,7 @@ from .. import continuation
 from ..continuation import Branch, Settings, State
 from ..data import Array
 from .problem import AtFrequency, Problem
+from .reduced import stuck, stuck_damping, untouched
 from .solver import CONVERGED, OverLoad, Point, Report, solve
 
 
@@ -74,6 +75,7 @@ class Family:
     Attributes:
         equations: see `continuation.Equations`. begin, end: of its lambda. unit: lambda of one unit of the parameter
             that people read. words: "Hz", ... problem, Omega: the balance and the frequency (rad/s) at a lambda.
+        narrow: (m, 2) values of lambda that no step may pass unseen, and how wide what is there is.
     """
 
     equations: continuation.Equations
@@ -83,6 +85,7 @@ class Family:
     words: str
     problem: Callable[[float], Problem]
     Omega: Callable[[float], float]
+    narrow: Array = field(default_factory=lambda: np.zeros((0, 2)))
 
     @property
     def turned(self) -> Family:
@@ -98,17 +101,52 @@ class Family:
         return tuple(Point(self.Omega(p.lam), p.x, CONVERGED, 0.0, p.evaluations) for p in branch.points)
 
     def settings(self, given: Settings | None = None) -> Settings:
-        """How the curve is followed, between its own ends."""
-        given = given or Settings(points=3000, branch_points=False, angle=0.5, step=0.05, step_max=0.5)
+        """How the curve is followed, between its own ends; what is narrow is hit."""
+        hit = tuple(self.narrow[:, 0].tolist())
+        given = given or Settings(points=3000, branch_points=False, angle=0.5, step=0.05, step_max=0.5, targets=hit)
         way = 1 if self.end > self.begin else -1
         return replace(given, low=min(self.begin, self.end), high=max(self.begin, self.end), direction=way)
+
+    def advanced(self, equations: continuation.Equations, state: State, given: Settings) -> State:
+        """The next state, by steps of half the way to what is narrow, or of its width, where a step hides it."""
+        after = continuation.advance(equations, state, given)
+        if not self._hides(state, after):
+            return after
+        at, width = self.narrow.T
+        longest = np.maximum(0.5 * np.abs(state.y[-1] * equations.lam_scale - at), width).min() / equations.lam_scale
+        return continuation.advance(equations, state, replace(given, step_max=min(given.step_max, float(longest))))
+
+    def _hides(self, before: State, after: State) -> bool:
+        """Whether a step passes something narrow that is not hit, or that is higher than both of its ends."""
+        low, high = sorted(float(s.y[-1]) * self.equations.lam_scale for s in (before, after))
+        seen = HIGHER * max(float(np.abs(s.y[:-1]).max(initial=0.0)) for s in (before, after))
+        hit = {p.lam: float(np.abs(p.x / self.equations.x_scale).max(initial=0.0)) for p in after.found}
+        return any(
+            hit.get(at, np.inf) > seen for at, width in self.narrow.tolist() if low < at < high and high - low > width
+        )
+
+
+HIGHER = 1.2
+"""Times the ends of a step, from which on what it passes is looked at in shorter ones."""
 
 
 def of_frequency(problem: Problem, low: float, high: float) -> Family:
     """Over the frequency, Hz."""
     a, b = 2 * np.pi * low, 2 * np.pi * high
     scaled = replace(problem, lam_scale=abs(b - a) / 10)
-    return Family(scaled, a, b, 2 * np.pi, "Hz", lambda _: scaled, lambda Omega: Omega)
+    return Family(scaled, a, b, 2 * np.pi, "Hz", lambda _: scaled, lambda Omega: Omega, _resonances(problem))
+
+
+def _resonances(problem: Problem) -> Array:
+    """(m, 2) rad/s of the modes with sticking contacts and of those without, and the half-power widths of the damped
+    ones; between both friction makes resonances wide."""
+    part, k = problem.assembly.joined(1), problem.assembly.stiffness
+    found = []
+    for one, held in ((part, k), (untouched(part), np.zeros((0, 0)))):
+        Omega = 2 * np.pi * stuck(one, held)
+        found.append(np.column_stack([Omega, 2 * Omega * stuck_damping(one, held)]))
+    modes = np.concatenate(found)
+    return modes[modes[:, 1] > 0]
 
 
 def of_load(problem: Problem, frequency: float, low: float, high: float) -> Family:
@@ -151,7 +189,7 @@ def followed(
     else:
         state, points = begun.state, list(begun.points)
     while not state.status:
-        state = equations.told(continuation.advance(equations, state, settings))
+        state = equations.told(family.advanced(equations, state, settings))
         keep(state)
         points += state.found
         if state.found:
