@@ -15,6 +15,7 @@ import sys
 import tomllib
 from collections.abc import Callable, Iterator
 from functools import cache
+from importlib.metadata import EntryPoint
 from pathlib import Path
 from types import ModuleType
 from typing import Any, Literal
@@ -26,7 +27,7 @@ pytest.importorskip("jax")
 import test_contact_laws as contract
 
 from microslip.cli import main
-from microslip.contact import composed
+from microslip.contact import composed, kinds
 from microslip.contact.kinds import LawKind, sources_of_others
 from microslip.contact.law import Law
 from microslip.contact.settings import ContactLaw
@@ -170,6 +171,28 @@ def test_a_law_without_a_method_is_refused_before_anything_is_solved() -> None:
         composed.compose(asked, Path("case.toml"))
 
 
+def test_a_force_of_another_shape_is_refused_before_anything_is_solved() -> None:
+    names, _ = run_page()
+    Pad = names["Pad"]
+
+    @names["settings"]
+    class Turned(Pad):  # type: ignore[misc, valid-type]
+        def step(self, u, v, dt, state):
+            force, after = Pad.step(self, u, v, dt, state)
+            return force.T, after
+
+    class OfTurned(LawKind):
+        kind: Literal["turned"]
+
+        def law(self, contact):
+            return Turned(1e4, 5e3, 0.3, 40.0)
+
+    own = {"normal_stiffness": 1e4, "tangential_stiffness": 5e3, "friction": 0.3}
+    asked = ContactLaw.model_validate(own).model_copy(update={"law": OfTurned(kind="turned")})
+    with pytest.raises(UserError, match=r"law: step of Turned gives two points a force of shape \(3, 2\);"):
+        composed.compose(asked, Path("case.toml"))
+
+
 def test_the_contract_is_there() -> None:
     assert len(list(cases())) >= 10
 
@@ -197,3 +220,9 @@ def test_a_law_without_a_cone_fails_the_contract() -> None:
     box = names["Example"](Box(2.4e8, 0.9e8, 0.3, 4e3), normal=1e-5, tangential=1e-5)
     with pytest.raises(AssertionError):
         contract.test_friction_stays_in_its_cone(box)
+
+
+def test_what_another_package_misnames_is_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(kinds, "entry_points", lambda group: [EntryPoint("pad", "json:OfNothing", group)])
+    with pytest.warns(UserWarning, match="microslip.law: pad of another package, json:OfNothing, cannot be loaded"):
+        assert kinds.of_others("law") == {}

@@ -15,6 +15,7 @@ from typing import Any
 __version__ = "0.1.0"
 
 PUBLIC = {
+    "errors": "UserError",
     "basis": "read_basis write_basis",
     "results.files": "read_response",
     "time_domain.recorded": "load read_orbits",

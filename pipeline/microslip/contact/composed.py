@@ -6,6 +6,9 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 
+import jax
+import jax.numpy as jnp
+
 from ..errors import UserError
 from .friction import Friction, OfCoulomb
 from .heights import Heights
@@ -141,4 +144,12 @@ def _law(c: ContactModel) -> Law | None:
             f"{c.path}: law: {type(law).__name__} of {type(law).__module__} has no method {', '.join(missing)}; add "
             "what is missing, docs/own_law.md says what each returns"
         )
+    if not type(law).__module__.startswith(f"{__name__.split('.')[0]}."):
+        two = jnp.zeros((2, 3))
+        shape = jax.eval_shape(lambda: law.step(two, two, 1.0, law.init(2))[0]).shape
+        if shape != two.shape:
+            raise UserError(
+                f"{c.path}: law: step of {type(law).__name__} gives two points a force of shape {shape}; it has to be "
+                "(2, 3), a row for each point along n, t1 and t2"
+            )
     return law

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from importlib.metadata import entry_points
-
 import jax.numpy as jnp
 import numpy as np
 
@@ -12,6 +10,7 @@ from .friction import Coulomb, Falling, Friction, Heated, Scattered, StaticSlidi
 from .friction import Exponential as Rising
 from .heights import Cut, Exponential, Gaussian, Heights, Linear, Polynomial, tabulated
 from .hertz import Hertz
+from .kinds import of_others
 from .law import Array
 from .law import Example as Example
 from .normal import Gapped, Hyperbolic, Penalty, Potential, Rough, measured
@@ -90,5 +89,5 @@ EXAMPLES: dict[str, Example] = {
         mindlin(Hertz(_STEEL, _STEEL, 5.0, 20.0), 0.3, 3e-5, 4), 1.2e-5, 8e-6, isotropic=False
     ),
     "Iwan": Example(Iwan(_ROUGH, _value(0.3), _C, *segalman(5, -0.5, 0.1, 0.05)), 1.2e-5, 8e-6),
-} | {entry.name: entry.load() for entry in entry_points(group="microslip.example")}
+} | of_others("example")
 """Name -> law, those of other packages last."""

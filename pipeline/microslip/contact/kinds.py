@@ -10,8 +10,9 @@ A kind is a class of settings with ``kind: Literal["its name"]`` that makes its 
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterable
-from importlib.metadata import EntryPoint, entry_points
+from importlib.metadata import entry_points
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Union
@@ -41,12 +42,21 @@ class Kind(Model):
 
 def kinds(section: str, *own: type[Kind]) -> Any:
     """The annotation of a section: any of its kinds, told apart by `kind`; those of other packages last."""
-    known = (*own, *(entry.load() for entry in _of_others(section)))
+    known = (*own, *of_others(section).values())
     return Annotated[Union[known], Field(discriminator="kind")]  # noqa: UP007
 
 
-def _of_others(section: str) -> list[EntryPoint]:
-    return sorted(entry_points(group=f"microslip.{section}"), key=lambda entry: entry.name)
+def of_others(section: str) -> dict[str, Any]:
+    """Name -> what other packages give under it; what cannot be loaded is left out with a warning."""
+    found = dict[str, Any]()
+    for entry in sorted(entry_points(group=f"microslip.{section}"), key=lambda entry: entry.name):
+        try:
+            found[entry.name] = entry.load()
+        except Exception as error:
+            package = entry.dist.name if entry.dist else "another package"
+            said = f"microslip.{section}: {entry.name} of {package}, {entry.value}, cannot be loaded ({error})"
+            warnings.warn(f"{said}; it is left out: mend or remove its package", stacklevel=2)
+    return found
 
 
 def sources_of_others(contacts: Iterable[ContactLaw]) -> dict[str, Path]:
