@@ -14,6 +14,7 @@ import microslip as ms
 from microslip.contact.friction import Coulomb
 from microslip.contact.normal import Penalty
 from microslip.contact.point import PointContact
+from microslip.continuation import Settings
 from microslip.harmonic_balance import problem as balance
 from microslip.harmonic_balance import response
 from microslip.harmonic_balance.families import OverNormal, followed, of_frequency, of_load, of_normal_force
@@ -125,3 +126,9 @@ def test_a_narrow_resonance_is_not_stepped_over(damping: float) -> None:
     curve = ms.follow(system, 0.5, 1.5, harmonics=1, unit="rad/s")
     assert curve.amplitude.max() == pytest.approx(1e-4 / (2 * damping), rel=1e-3)
     assert curve.converged.all() and len(curve.amplitude) < 50
+
+
+def test_a_curve_that_ended_early_says_so() -> None:
+    system = ms.structure(1.0, 1.0, 0.04, force={0: 1.0}, elements=[ms.jenkins(1e-3, 1e-6)])
+    curve = ms.follow(system, 0.5, 1.5, harmonics=1, unit="rad/s", settings=Settings(points=5))
+    assert repr(curve).endswith("; ended early: points: 5 are found; allow more to go on>")

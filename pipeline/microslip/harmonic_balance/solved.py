@@ -44,6 +44,10 @@ class Motions(Series):
         }  # fmt: skip
         self.__dict__.update(own)
 
+    def __repr__(self) -> str:
+        early = self.ended and not self.ended.startswith("bound")
+        return f"{super().__repr__()[:-1]}; ended early: {self.ended}>" if early else super().__repr__()
+
     def __len__(self) -> int:
         return len(self.points)
 
