@@ -288,11 +288,9 @@ class _Sliders:
         given = self.law, self.ways.all, self.weights, at.memory
         last, slope = jax.lax.cond(at.renew, lambda: recall(*given), lambda: (turn(*given), at.slope))
         memory, size, newton = last.memory, last.size, _Newton(slope)
-        change = memory - at.memory  # of what sticks it is rounding, and what is regained tells the step exactly
-        rounding = np.finfo(float).eps * len(self.path) * size  # of so many steps
-        change = jnp.where((_length(change) > rounding)[..., None, :], change, 0.0)
-        missing = change + RECALL * (self.first - at.memory)
-        left, step = _length(missing), newton(missing)
+        missing = memory - at.memory + RECALL * (self.first - at.memory)
+        left = _length(missing)
+        step = jnp.where((left > 1e-15 * size)[..., None, :], newton(missing), 0.0)  # below is rounding
 
         # the step is straight, the circle is not: a cycle brings it back
         across = at.solved & (left > _STRAIGHT * at.tried)
