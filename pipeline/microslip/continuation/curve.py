@@ -480,7 +480,7 @@ def _nearest(segment: Segment, kept: dict[float, tuple[Array, Array]], u: float)
 def _fold(scaled: Scaled, segment: Segment, settings: Settings) -> tuple[Array, Array]:
     """The fold in a segment; if the curve cannot be found between its ends, the end with the extreme lambda."""
     try:
-        return root(scaled, segment, settings, lambda y, t: float(t[-1]))
+        return root(scaled, segment, settings, lambda y, t: float(t[-1]), 1e-8)  # lambda then to the square of it
     except Lost:
         rising = segment.ta[-1] > 0
         return (segment.a, segment.ta) if (segment.a[-1] > segment.b[-1]) == rising else (segment.b, segment.tb)

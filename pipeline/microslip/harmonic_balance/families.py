@@ -103,7 +103,8 @@ class Family:
     def settings(self, given: Settings | None = None) -> Settings:
         """How the curve is followed, between its own ends; what is narrow is hit."""
         hit = tuple(self.narrow[:, 0].tolist())
-        given = given or Settings(points=3000, branch_points=False, angle=0.5, step=0.05, step_max=0.5, targets=hit)
+        longest = {"points": 3000, "angle": 0.5, "step": 0.1, "step_max": 0.5, "contraction": 0.1}
+        given = given or Settings(**longest, branch_points=False, targets=hit)
         way = 1 if self.end > self.begin else -1
         return replace(given, low=min(self.begin, self.end), high=max(self.begin, self.end), direction=way)
 
@@ -119,11 +120,12 @@ class Family:
     def _hides(self, before: State, after: State) -> bool:
         """Whether a step passes something narrow that is not hit, or that is higher than both of its ends."""
         low, high = sorted(float(s.y[-1]) * self.equations.lam_scale for s in (before, after))
+        passed = [at for at, width in self.narrow.tolist() if low < at < high and high - low > width]
+        if not passed:
+            return False
         seen = HIGHER * max(float(np.abs(s.y[:-1]).max(initial=0.0)) for s in (before, after))
         hit = {p.lam: float(np.abs(p.x / self.equations.x_scale).max(initial=0.0)) for p in after.found}
-        return any(
-            hit.get(at, np.inf) > seen for at, width in self.narrow.tolist() if low < at < high and high - low > width
-        )
+        return any(hit.get(at, np.inf) > seen for at in passed)
 
 
 HIGHER = 1.2

@@ -181,12 +181,12 @@ class Poles:
             return None
         c, (*n, g, m) = self.left.shape[-2], away.shape
         once = np.divide(1.0, away)[..., None, :]
-        rows = np.empty((*n, g, 2, c, m), complex)  # the value's above those of its derivative: half as many products
-        np.multiply(self.left[..., None, :, :], once, out=rows[..., 0, :, :])
-        np.multiply(rows[..., 0, :, :], once * self._falling[..., None], out=rows[..., 1, :, :])
-        both = (rows.reshape(*n, g, 2 * c, m) @ self.right).reshape(*n, g, 2, c, 1 + c)
-        both[..., 0, :, :] += self.static
-        return np.asarray(both.swapaxes(-4, -3))
+        rows = np.empty((*n, 2, g, c, m), complex)
+        np.multiply(self.left[..., None, :, :], once, out=rows[..., 0, :, :, :])
+        np.multiply(rows[..., 0, :, :, :], once * self._falling[..., None], out=rows[..., 1, :, :, :])
+        both = rows @ self.right[..., None, :, :, :]
+        both[..., 0, :, :, :] += self.static
+        return np.asarray(both)
 
 
 @dataclass(frozen=True, eq=False)

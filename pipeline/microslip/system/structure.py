@@ -49,6 +49,10 @@ class Element:
     name: str | None = None
     length: float | None = None
 
+    def __post_init__(self) -> None:
+        if not isinstance(self.law, Law):
+            raise UserError(f"element: law: {self.law!r} is no law; make the element by polynomial, jenkins, stop, ...")
+
     def row(self, count: int) -> Array:
         """(n,) its displacement per unit of n coordinates.
 
@@ -83,8 +87,10 @@ def polynomial(stiffness: Mapping[int, float], at: Any = 0, to: Any = None, name
             `Element`.
 
     Raises:
-        UserError: no power, or one that is no whole number from 1 on.
+        UserError: no powers, or one that is no whole number from 1 on.
     """
+    if not isinstance(stiffness, Mapping):
+        raise UserError(f"polynomial: stiffness: {stiffness!r}: give it by power, as {{3: 0.05}} of k u^3")
     if not stiffness or any(p != int(p) or p < 1 for p in stiffness):
         raise UserError(f"polynomial: powers {list(stiffness)}: give one or more whole numbers, 1 or larger")
     bounded("polynomial: stiffness", list(stiffness.values()))
@@ -233,6 +239,11 @@ def _modal_damping(M: Array, K: Array, ratio: float | Sequence[float]) -> Array:
     """C of ratios D: M X diag(2 D omega) X^T M."""
     given = np.atleast_1d(np.asarray(ratio, dtype=float))
     bounded("structure: damping_ratio", given, ge=0)
+    if given.max(initial=0.0) >= 1:
+        raise UserError(
+            f"structure: damping_ratio: {given.max():g} lets nothing vibrate; a share of critical damping is meant, "
+            "5 % is 0.05"
+        )
     if not given.any():
         return np.zeros_like(M)
     squares, X = scipy.linalg.eigh(K, M)
@@ -256,6 +267,8 @@ def _force(force: Any, n: int, key: str = "force") -> Array:
 
 
 def _contacts(elements: Sequence[Element], component: str, K: Array, force: Array) -> tuple[Contact, ...]:
+    if not isinstance(elements, Sequence) or not all(isinstance(e, Element) for e in elements):
+        raise UserError("structure: elements: give a list of them, as [ms.jenkins(1.0, 0.5)]")
     patches: dict[str, Patch] = {}  # equal elements are evaluated together
     found = []
     for i, e in enumerate(elements, 1):
