@@ -132,3 +132,11 @@ def test_a_curve_that_ended_early_says_so() -> None:
     system = ms.structure(1.0, 1.0, 0.04, force={0: 1.0}, elements=[ms.jenkins(1e-3, 1e-6)])
     curve = ms.follow(system, 0.5, 1.5, harmonics=1, unit="rad/s", settings=Settings(points=5))
     assert repr(curve).endswith("; ended early: points: 5 are found; allow more to go on>")
+
+
+def test_amplitudes_far_above_what_a_slider_yields_by_take_few_points() -> None:
+    """A thousand times: the peak is what the force leaves that friction does not take, (F - 4 R / pi) / (c Omega)."""
+    slides = ms.structure(1.0, 1.0, 0.02, force={0: 100.0}, elements=[ms.jenkins(1.0, 0.5)])
+    curve = ms.follow(slides, 0.9, 1.1, harmonics=1, samples=64, unit="rad/s")
+    assert curve.ended.startswith("bound") and len(curve) < 300
+    assert curve.amplitude.max() == pytest.approx((100.0 - 4 * 0.5 / np.pi) / 0.02, rel=2e-4)

@@ -103,13 +103,13 @@ class Family:
     def settings(self, given: Settings | None = None) -> Settings:
         """How the curve is followed, between its own ends; what is narrow is hit."""
         hit = tuple(self.narrow[:, 0].tolist())
-        longest = {"points": 3000, "angle": 0.5, "step": 0.1, "step_max": 0.5, "contraction": 0.1}
-        given = given or Settings(**longest, branch_points=False, targets=hit)
+        given = given or replace(ALONG, targets=hit)
         way = 1 if self.end > self.begin else -1
         return replace(given, low=min(self.begin, self.end), high=max(self.begin, self.end), direction=way)
 
     def advanced(self, equations: continuation.Equations, state: State, given: Settings) -> State:
         """The next state, by steps of half the way to what is narrow, or of its width, where a step hides it."""
+        given = replace(given, step_max=_longest(state, given.step_max))
         after = continuation.advance(equations, state, given)
         if not self._hides(state, after):
             return after
@@ -127,6 +127,19 @@ class Family:
         hit = {p.lam: float(np.abs(p.x / self.equations.x_scale).max(initial=0.0)) for p in after.found}
         return any(hit.get(at, np.inf) > seen for at in passed)
 
+
+ALONG = Settings(points=3000, branch_points=False, angle=0.5, step=0.1, step_max=0.5, contraction=0.1)
+"""How curves are followed, if not told otherwise."""
+
+
+def _longest(state: State, step: float) -> float:
+    """The longest step from a state: as given, but for x, which may change by `STEADY` of what it is."""
+    x, t = np.linalg.norm(state.y[:-1]), state.tangent
+    return step / math.hypot(t[-1], np.linalg.norm(t[:-1]) / max(1.0, STEADY / step * float(x)))
+
+
+STEADY = 0.05
+"""Share by which x may change in a step however large it is: friction is hardly seen where all slides by far."""
 
 HIGHER = 1.2
 """Times the ends of a step, from which on what it passes is looked at in shorter ones."""
