@@ -203,13 +203,14 @@ def followed(
         points = list(state.found)
     else:
         state, points = begun.state, list(begun.points)
+    far = 0
     while not state.status:
         state = equations.told(family.advanced(equations, state, settings))
         keep(state)
         points += state.found
         if state.found:
-            said = f"{points[-1].lam / family.unit:.6g} {family.words}"
-            report(f"{len(points)} of {settings.points} points at most, {said}")
+            far = max(far, int(100 * (points[-1].lam - family.begin) / (family.end - family.begin)))
+            report(f"{far} of 100 % of the way, {len(points)} points, {points[-1].lam / family.unit:.6g} {family.words}")
     return Branch(tuple(points), state.status, state)
 
 

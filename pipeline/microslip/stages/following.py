@@ -219,11 +219,13 @@ def optimum_over(
     built = case.plain
     forces = [n for n in normal_forces(built) if n is not None]
     if over == NORMAL_FORCE and len(forces) > 1:
-        low, high = low or min(n for n in forces if n > 0), high or max(forces)
+        low = min(n for n in forces if n > 0) if low is None else low
+        high = max(forces) if high is None else high
     signed = over.rpartition(".")[2] in _SIGNED
     if low is None or high is None or not low < high or not (low > 0 or signed):
-        kind = "numbers, the first one smaller" if signed else "positive numbers"
-        raise UserError(f"{over}: give --low and --high, two {kind}, between which its optimum is looked for")
+        kind = "numbers" if signed else "positive numbers"
+        given = "" if low is None or high is None else f" from {low:g} to {high:g} there is no range;"
+        raise UserError(f"{over}:{given} give --low and --high, two {kind}, the first one smaller")
     if over == NORMAL_FORCE and not forces:
         raise UserError(f"{case.path}: no contact is pressed by the sweep's normal forces; there is nothing to change")
     between = float(np.sqrt(low * high)) if over == NORMAL_FORCE else forces[-1] if forces else None
