@@ -342,6 +342,7 @@ def test_gyroscopic_forces_in_the_damping_matrix_are_solved_exactly():
         (lambda: ms.structure(1.0, 1.0, elements=ms.jenkins(1.0, 1.0)), "elements: give a list"),
         (lambda: ms.structure(1.0, 1.0, damping_ratio=5.0), "5 % is 0.05"),
         (lambda: ms.polynomial([1.0, 2.0]), "give it by power"),
+        (lambda: ms.follow(ms.structure(1.0, 1.0, force={0: 1.0}), 1.0, 1.0), "stop: 1 is the start too"),
         (lambda: ms.Element(5.0, 0), "5.0 is no law"),
         (lambda: ms.structure(1.0, 1.0, elements=[ms.jenkins(1.0, 1.0, at=5)]), "there is no coordinate 5"),
         (lambda: ms.structure(np.eye(2), np.eye(2), elements=[ms.stop(1.0, 0.1, at=[1.0])]), "weights of shape (1,)"),

@@ -247,6 +247,8 @@ def follow(
         [1.463, 1.156]
     """
     problem, hertz = _driven(balanced(system, harmonics, samples)), _hertz(unit)
+    if start == stop:
+        raise UserError(f"stop: {stop:g} is the start too; give two ends between which the curve is followed")
     if over == "frequency":
         bounded("start", start, gt=0)
         bounded("stop", stop, gt=0)
