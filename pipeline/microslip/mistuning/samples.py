@@ -140,7 +140,7 @@ class Sliding:
         self.problem, self.tuned = problem, tuned
         self.known: dict[float, Point] = {}
         self.slope: Any = None
-        self.last: AtFrequency | None = None
+        self.balances: dict[float, AtFrequency] = {}
 
     def __call__(self, frequency: float) -> Array | None:
         """(w,) m."""
@@ -169,7 +169,7 @@ class Sliding:
         for count in (2, 1):
             point = among(self._at(Omega), carried(side[:count], Omega), tolerance=SEARCHED)
             y = self._kept(frequency, point)
-            if y is not None and (before is None or y.max() > np.abs(amplitudes(self.problem, before)).max()):
+            if y is not None and (before is None or y.max() > self._amplitudes(before).max()):
                 return [(frequency, y)], False
         if before is not None:
             self.known[frequency] = before
@@ -186,19 +186,21 @@ class Sliding:
 
     def _read(self, frequency: float, point: Point) -> Array:
         self.known[frequency] = point
-        return np.abs(amplitudes(self.problem, point))
+        return self._amplitudes(point)
+
+    def _amplitudes(self, point: Point) -> Array:
+        return np.abs(_amplitudes(self._at(point.Omega), point))
 
     def _kept(self, frequency: float, point: Point) -> Array | None:
         self.slope = point.slope
         if not point.converged:
             return None
-        self.known[frequency] = replace(point, slope=None)
-        return np.abs(_amplitudes(self._at(point.Omega), point))
+        return self._read(frequency, replace(point, slope=None))
 
     def coordinates(self, frequency: float) -> list[ComplexArray]:
         """(m,) first harmonics of the coordinates, part by part, at a frequency that was solved for."""
         point = self.known[frequency]
-        at = self.problem.at(point.Omega)
+        at = self._at(point.Omega)
         return at.modal(point.x, at.force(point.x))[1]
 
     def _starts(self, Omega: float) -> list[Array]:
@@ -218,10 +220,10 @@ class Sliding:
         return [x for _, x in sorted(left.values(), key=lambda one: one[0])[:2]]
 
     def _at(self, Omega: float) -> AtFrequency:
-        """The balance at a frequency, the last one kept."""
-        if self.last is None or self.last.Omega != Omega:
-            self.last = self.problem.at(Omega)
-        return self.last
+        """The balance at a frequency, kept: the search comes back to most."""
+        if Omega not in self.balances:
+            self.balances[Omega] = self.problem.at(Omega)
+        return self.balances[Omega]
 
     def _near(self, Omega: float, most: int) -> list[Point]:
         return sorted(self.known.values(), key=lambda p: abs(p.Omega - Omega))[:most]
