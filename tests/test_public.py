@@ -324,6 +324,9 @@ def test_gyroscopic_forces_in_the_damping_matrix_are_solved_exactly():
     np.testing.assert_allclose(curve.amplitude, np.abs(first), rtol=1e-7)
 
 
+SLIDER = ms.structure(1.0, 1.0, 0.02, force={0: 0.3}, elements=[ms.jenkins(1.0, 0.5)])
+
+
 # mistakes -------------------------------------------------------------------------------------------------------------
 
 
@@ -342,7 +345,14 @@ def test_gyroscopic_forces_in_the_damping_matrix_are_solved_exactly():
         (lambda: ms.structure(1.0, 1.0, elements=ms.jenkins(1.0, 1.0)), "elements: give a list"),
         (lambda: ms.structure(1.0, 1.0, damping_ratio=5.0), "5 % is 0.05"),
         (lambda: ms.polynomial([1.0, 2.0]), "give it by power"),
-        (lambda: ms.follow(ms.structure(1.0, 1.0, force={0: 1.0}), 1.0, 1.0), "stop: 1 is the start too"),
+        (lambda: ms.structure(1.0, 1.0, force={0: "1 N"}), "force of coordinate 0: '1 N' is no number"),
+        (lambda: ms.structure([[1, 2], [3]], 1.0), "M: is no matrix of numbers"),
+        (lambda: ms.structure(1.0, 1.0, elements=[ms.jenkins(1.0, 1.0, at=0, to=0)]), "nothing moves it"),
+        (lambda: ms.follow(ms.structure(1.0, 1.0, force={0: 1.0}), 0.5, 2.0), "no contact or element"),
+        (lambda: ms.backbone(ms.structure(1.0, 1.0, force={0: 1.0}), 0.1, 1.0), "no contact or element"),
+        (lambda: ms.harmonic_response(SLIDER, ["300"]), "frequency: ['300'] is no number"),
+        (lambda: ms.follow(SLIDER, 0.5, 2.0, settings={"pionts": 10}), "there is no pionts"),
+        (lambda: ms.follow(SLIDER, 1.0, 1.0), "stop: 1 is the start too"),
         (lambda: ms.Element(5.0, 0), "5.0 is no law"),
         (lambda: ms.structure(1.0, 1.0, elements=[ms.jenkins(1.0, 1.0, at=5)]), "there is no coordinate 5"),
         (lambda: ms.structure(np.eye(2), np.eye(2), elements=[ms.stop(1.0, 0.1, at=[1.0])]), "weights of shape (1,)"),

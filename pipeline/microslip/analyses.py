@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -71,9 +71,7 @@ def balanced(system: System, harmonics: int | None = None, samples: int | None =
         asked = {"harmonics": harmonics, "samples": samples}
         return problem_of(system, None, **{key: n for key, n in asked.items() if n is not None})
     if not isinstance(system, Assembly):
-        raise UserError(
-            f"system: {type(system).__name__} is no assembly; make one by structure, or by case(...).pressed"
-        )
+        raise UserError(f"system: {type(system).__name__} is no assembly; make one by structure or assemble")
     H = 3 if harmonics is None else harmonics
     if samples is not None and samples < 4 * H:
         raise UserError(f"samples: {samples} are too few for {H} harmonics; take {4 * H} at least, better {16 * H}")
@@ -217,7 +215,7 @@ def follow(
     system: System, start: float, stop: float, *,
     over: Literal["frequency", "load", "normal_force"] = "frequency", frequency: float | None = None,
     harmonics: int | None = None, samples: int | None = None, unit: Literal["Hz", "rad/s"] = "Hz",
-    settings: Settings | None = None, report: Report = lambda _: None,
+    settings: Settings | Mapping[str, Any] | None = None, report: Report = lambda _: None,
 ) -> Motions:  # fmt: skip
     """Steady forced vibration along the whole curve of its motions, through folds, stable or not.
 
@@ -225,17 +223,19 @@ def follow(
         system: what vibrates, with its loads. start, stop: of the frequency in the unit, or of the factor on the loads
             that are not steady, or on all normal forces; the first may be the larger one.
         frequency: in the unit, at which load or normal force vary. harmonics, samples: see `harmonic_response`.
-        settings: of the steps along the curve. report: is told what is under way.
+        settings: of the steps along the curve where they are to be others: ``{"points": 10000}`` for more of them than
+            3000, ``{"step_max": 0.1}`` for shorter ones than 0.5, a twentieth of the range, and all others of
+            `continuation.Settings`. report: is told what is under way.
 
     Returns:
         A `Motions`, with ``folds`` and, in ``ended``, why the curve ended ("bound: ..." where it reached the stop).
         Where it comes back to the start or gets stuck, the points of another curve follow, begun at the stop
         (``arrays["branch"]`` is 1 there), and ``ended`` tells of both. Whether a motion is stable is not told. Over the
         frequency the modes with sticking contacts and those without are among the points; a resonance that is narrow
-        elsewhere may be passed over: give ``settings`` with a shorter ``step_max``.
+        elsewhere may be passed over: give a shorter ``step_max``.
 
     Raises:
-        UserError: a frequency that is not positive, or one that is missing.
+        UserError: a frequency that is not positive, or one that is missing; nothing nonlinear; a setting there is not.
 
     Examples:
         Both folds of Duffing's oscillator:
@@ -247,6 +247,7 @@ def follow(
         [1.463, 1.156]
     """
     problem, hertz = _driven(balanced(system, harmonics, samples)), _hertz(unit)
+    _bends(problem, "harmonic_response")
     if start == stop:
         raise UserError(f"stop: {stop:g} is the start too; give two ends between which the curve is followed")
     if over == "frequency":
@@ -308,10 +309,17 @@ def backbone(
         raise UserError(f"output: there is no read-out {output}; {has}")
     if not 0 <= mode < (modes := len(problem.parts[1][0].M)):
         raise UserError(f"mode: there is no mode {mode}; there are {modes}, counted from 0")
+    _bends(problem, "the eigenvalues of its matrices")
     bounded("low", low, gt=0)
     if not high > low:
         raise UserError(f"high: {high:g} is not above low, {low:g}; give the smaller amplitude first")
     return nonlinear_modes.backbone(problem, low, high, mode, output, report=report)
+
+
+def _bends(problem: Problem, other: str) -> None:
+    """Refuse what has neither a contact nor an element."""
+    if not problem.groups:
+        raise UserError(f"system: has no contact or element, so it is linear and no curve bends; take {other}")
 
 
 def _over(over: str, unit: str) -> str:

@@ -7,8 +7,8 @@ order in which it passes them, the unstable ones between two folds too.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from typing import Any
 
@@ -17,6 +17,7 @@ import numpy as np
 from .. import continuation
 from ..continuation import Branch, Settings, State
 from ..data import Array
+from ..errors import UserError
 from .problem import AtFrequency, Problem
 from .reduced import stuck, stuck_damping, untouched
 from .solver import CONVERGED, OverLoad, Point, Report, solve
@@ -100,10 +101,17 @@ class Family:
         """The motions of a branch."""
         return tuple(Point(self.Omega(p.lam), p.x, CONVERGED, 0.0, p.evaluations) for p in branch.points)
 
-    def settings(self, given: Settings | None = None) -> Settings:
-        """How the curve is followed, between its own ends; what is narrow is hit."""
-        hit = tuple(self.narrow[:, 0].tolist())
-        given = given or replace(ALONG, targets=hit)
+    def settings(self, given: Settings | Mapping[str, Any] | None = None) -> Settings:
+        """How the curve is followed, between its own ends; what is narrow is hit.
+
+        Raises:
+            UserError: a setting that there is not.
+        """
+        if not isinstance(given, Settings):
+            if odd := set(given or ()) - {f.name for f in fields(Settings)}:
+                names = ", ".join(f.name for f in fields(Settings))
+                raise UserError(f"settings: there is no {', '.join(sorted(odd))}; there are {names}")
+            given = replace(ALONG, **{"targets": tuple(self.narrow[:, 0].tolist()), **(given or {})})
         way = 1 if self.end > self.begin else -1
         return replace(given, low=min(self.begin, self.end), high=max(self.begin, self.end), direction=way)
 
@@ -183,7 +191,7 @@ def of_normal_force(
 def followed(
     family: Family,
     report: Report = lambda _: None,
-    settings: Settings | None = None,
+    settings: Settings | Mapping[str, Any] | None = None,
     begun: Branch | None = None,
     keep: Callable[[State], None] = lambda _: None,
 ) -> Branch:
@@ -210,12 +218,13 @@ def followed(
         points += state.found
         if state.found:
             far = max(far, int(100 * (points[-1].lam - family.begin) / (family.end - family.begin)))
-            report(f"{far} of 100 % of the way, {len(points)} points, {points[-1].lam / family.unit:.6g} {family.words}")
+            said = f"{len(points)} points, {points[-1].lam / family.unit:.6g} {family.words}"
+            report(f"{far} of 100 % of the way, {said}")
     return Branch(tuple(points), state.status, state)
 
 
 def from_both_ends(
-    family: Family, report: Report = lambda _: None, settings: Settings | None = None
+    family: Family, report: Report = lambda _: None, settings: Settings | Mapping[str, Any] | None = None
 ) -> tuple[Branch, ...]:
     """The curve of a family, and another one from the other end where the first does not arrive there.
 

@@ -60,6 +60,8 @@ def bounded(what: str, value: Any, gt: float | None = None, ge: float | None = N
         UserError: one that is not finite or out of its bounds.
     """
     try:
+        if np.asarray(value).dtype.kind in "SU":  # which numpy reads numbers from
+            raise TypeError
         at = np.asarray(value, dtype=float)
     except (TypeError, ValueError):
         raise UserError(f"{what}: {value!r} is no number; correct it") from None

@@ -57,10 +57,13 @@ class Element:
         """(n,) its displacement per unit of n coordinates.
 
         Raises:
-            UserError: no such coordinate.
+            UserError: no such coordinate, or one that both ends have.
         """
         to = 0.0 if self.to is None else _row(self.to, count, "element: to")
-        return _row(self.at, count, "element: at") - to
+        row = _row(self.at, count, "element: at") - to
+        if not row.any():
+            raise UserError(f"element: to: {self.to!r} is where its other end is; nothing moves it")
+        return row
 
 
 def _row(at: Any, count: int, key: str) -> Array:
@@ -217,7 +220,10 @@ def structure(
 
 
 def _matrix(A: Any, key: str) -> Array:
-    A = np.atleast_2d(np.asarray(A, dtype=float))
+    try:
+        A = np.atleast_2d(np.asarray(A, dtype=float))
+    except (TypeError, ValueError):
+        raise UserError(f"structure: {key}: is no matrix of numbers; give rows of the same length") from None
     if A.ndim != 2 or len(A) != A.shape[1]:
         raise UserError(f"structure: {key}: has shape {A.shape}; give a square matrix")
     bounded(f"structure: {key}", A)
@@ -255,6 +261,8 @@ def _force(force: Any, n: int, key: str = "force") -> Array:
     if force is None:
         return np.zeros(n, dtype=complex)
     if isinstance(force, Mapping):
+        for i, v in force.items():
+            bounded(f"structure: {key} of coordinate {i}", v if isinstance(v, str) else [np.real(v), np.imag(v)])
         f = sum(
             (v * _row(i, n, f"structure: {key}").astype(complex) for i, v in force.items()), np.zeros(n, dtype=complex)
         )
