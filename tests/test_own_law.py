@@ -193,6 +193,51 @@ def test_a_force_of_another_shape_is_refused_before_anything_is_solved() -> None
         composed.compose(asked, Path("case.toml"))
 
 
+class Misspelt(Law):
+    """A law whose energy speaks of a name there is not."""
+
+    def init(self, n):
+        return np.zeros(n)
+
+    def step(self, u, v, dt, state):
+        return u, state
+
+    def limit(self, force, state):
+        return state
+
+    def slip(self, state):
+        return np.zeros((2, 2))
+
+    def stored(self, u, state):
+        return self.presed * u[:, 0]
+
+
+class OfMisspelt(LawKind):
+    kind: Literal["misspelt"]
+
+    def law(self, contact):
+        return Misspelt()
+
+
+def test_the_pages_friction_makes_a_contact() -> None:
+    names, _ = run_page()
+    own = {"normal_stiffness": 1e4, "tangential_stiffness": 5e3, "friction": 0.3}
+    kind = names["OfTiring"](kind="tiring", mu_0=0.3, force_p=40.0)
+    made = composed.compose(ContactLaw.model_validate(own).model_copy(update={"friction": kind}), Path("case.toml"))
+    two = np.full((2, 3), 40.0 / 1e4)
+    force, _ = made.law.step(two, two, 1.0, made.law.init(2))
+    np.testing.assert_allclose(np.hypot(force[:, 1], force[:, 2]), 0.15 * 40.0, rtol=1e-6)
+
+
+def test_a_mistake_in_its_code_is_told_by_file_and_line() -> None:
+    own = {"normal_stiffness": 1e4, "tangential_stiffness": 5e3, "friction": 0.3}
+    asked = ContactLaw.model_validate(own).model_copy(update={"law": OfMisspelt(kind="misspelt")})
+    with pytest.raises(
+        UserError, match=r"case.toml: law: .*test_own_law.py, line \d+, in stored: AttributeError: .*pres"
+    ):
+        composed.compose(asked, Path("case.toml"))
+
+
 def test_the_contract_is_there() -> None:
     assert len(list(cases())) >= 10
 

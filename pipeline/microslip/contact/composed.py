@@ -6,10 +6,8 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 
-import jax
-import jax.numpy as jnp
-
 from ..errors import UserError
+from . import others
 from .friction import Friction, OfCoulomb
 from .heights import Heights
 from .hertz import Hertz
@@ -135,21 +133,7 @@ def _rigid(settings: ContactLaw, path: Path) -> ContactModel:
 def _law(c: ContactModel) -> Law | None:
     if c.friction is None or (c.stiffness is None and not c.settings.what.rigid):
         return None
-    try:
-        law: Law = c.settings.what.law(c)
-    except UserError as error:
-        raise UserError(f"{c.path}: law: {error}") from error
-    if missing := [name for name in Law.NEEDED if getattr(type(law), name) is getattr(Law, name)]:
-        raise UserError(
-            f"{c.path}: law: {type(law).__name__} of {type(law).__module__} has no method {', '.join(missing)}; add "
-            "what is missing, docs/own_law.md says what each returns"
-        )
-    if not type(law).__module__.startswith(f"{__name__.split('.')[0]}."):
-        two = jnp.zeros((2, 3))
-        shape = jax.eval_shape(lambda: law.step(two, two, 1.0, law.init(2))[0]).shape
-        if shape != two.shape:
-            raise UserError(
-                f"{c.path}: law: step of {type(law).__name__} gives two points a force of shape {shape}; it has to be "
-                "(2, 3), a row for each point along n, t1 and t2"
-            )
+    key = f"{c.path}: law"
+    law: Law = others.running(lambda: c.settings.what.law(c), key, c.settings.what)
+    others.tried(law, key, c.settings.what, c.friction)
     return law
