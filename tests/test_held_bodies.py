@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 import scipy.linalg
 
-from microslip.case.loaded import on_weak_springs
+import microslip as ms
+from microslip.case.weak_springs import on_weak_springs, raising
 from microslip.errors import UserError
 from microslip.system import Body, Contact, Force, Monitor, Spring, System
 
@@ -34,3 +35,30 @@ def test_hold_gives_every_rigid_motion_one_frequency_and_leaves_the_elastic_ones
 def test_what_is_held_already_is_not_held_again() -> None:
     with pytest.raises(UserError, match="bodies.pin.weak_springs: the body is held already"):
         on_weak_springs(pair(True).basis().groups[0, 0], 3.0, "bodies.pin.weak_springs")
+
+
+def test_springs_that_are_not_weak_are_told() -> None:
+    """A mass on another one, which a spring k holds, in a stiff contact: k + m (2 pi f)^2 over both masses."""
+    k, f = 1e5, 10.0
+    ground = Spring("ground", "a", (k, k, k))
+    face, back = Contact("face", "a", (1, 0, 0), t2=(0, 0, 1)), Contact("face", "b", (-1, 0, 0), t2=(0, 0, -1))
+    held = System("held", [Body("a", 1.0, free="x")], [ground], [face], [Force("push", "a", (1, 0, 0))], [])
+    loose = System("loose", [Body("b", 1.0, free="x")], [], [back], [], [Monitor("b", "b")])
+    case = {
+        "name": "two", "excitation": "held:push", "amplitude": 1.0, "monitor": "loose:b", "direction": "x",
+        "bodies": [{"name": "held"}, {"name": "loose", "weak_springs": f}],
+        "contacts": [{"interface": "held:face", "against": "loose:face", "normal_stiffness": 1e10,
+                      "tangential_stiffness": 1e10, "friction": 0.3, "width": 0.01, "height": 0.01}],
+        "sweep": {"start": 20.0, "stop": 60.0, "points": 9, "normal_forces": [100.0]},
+    }  # fmt: skip
+    built = ms.assemble(case, held=held.basis(), loose=loose.basis())
+    own = (2 * np.pi * f) ** 2
+    share = 100 * 0.5 * own / (k + own)
+    [said] = raising(built, 100.0)
+    assert (
+        f"weak springs of loose raise the mode with sticking contacts at {np.sqrt((k + own) / 2) / 2 / np.pi:.5g}"
+        in said
+    )
+    assert f"by about {share:.2g} %" in said
+    softer = {**case, "bodies": [{"name": "held"}, {"name": "loose", "weak_springs": f / 2}]}
+    assert not raising(ms.assemble(softer, held=held.basis(), loose=loose.basis()), 100.0)

@@ -17,6 +17,7 @@ from ..reduced.coordinates import first_modes, in_modes, of_density
 from ..system.pairing import Place
 from .driving import damped, on_springs
 from .settings import BodyOfCase, CaseSettings
+from .weak_springs import on_weak_springs
 
 
 @dataclass(frozen=True)
@@ -102,22 +103,6 @@ def _of_mass(groups: dict[int, ModalGroup], mass: float, basis: ModalBasis, key:
         raise UserError(f"{key}: the modal file of '{basis.name}' does not know the body's mass; leave it out")
     with told_of(key):
         return {k: of_density(g, mass / basis.mass) for k, g in groups.items()}
-
-
-def on_weak_springs(group: ModalGroup, frequency: float, key: str) -> ModalGroup:
-    """The group on springs that give each of its rigid motions a frequency (Hz); elastic modes are left alone.
-
-    Raises:
-        UserError: the body has no rigid motion.
-    """
-    rigid = group.omega == 0
-    if not rigid.any():
-        raise UserError(
-            f"{key}: the body is held already; weak_springs are for bodies with free = true, leave them out"
-        )
-    V = np.eye(len(group.M_r)) if group.to_diagonal is None else group.to_diagonal
-    P = group.M_r @ V[:, rigid]
-    return replace(group, K_r=group.K_r + (2 * np.pi * frequency) ** 2 * P @ P.conj().T)
 
 
 def _at_speed(b: BodyOfCase, basis: ModalBasis, path: Path | str, key: str) -> dict[int, ModalGroup]:

@@ -38,6 +38,7 @@ from .edges import Rising
 from .problem import book_models, normal_forces, pressed_by, problem_of
 from .readouts import Readout, readouts
 from .settings import FIRST_HARMONICS, CaseSettings
+from .weak_springs import raising
 
 Keep = Callable[[Built], AbstractContextManager[Journal]]
 Answer = tuple[dict[float, "HarmonicResponse"], dict[float, list[tuple[float, float]]], tuple[Array, Array], list[str]]
@@ -140,6 +141,7 @@ def _run(
         *built.messages,
         *_by_the_book(built),
         *_between(built),
+        *raising(built, max(forces, default=None)),
         *_of_stuck_modes(built, max(forces, default=None)),
         *messages,
         *_too_coarse(settings, *stuck),

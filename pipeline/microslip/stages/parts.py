@@ -309,7 +309,7 @@ def case_lines(
     driven, n = parts[patches[0].parts[0]].name, patches[0].normal
     axis = "xyz"[int(np.abs(n).argmax())] if n is not None else "x"
     low, high = _band(shapes, UNITS[unit])
-    springs = [f", weak_springs = {low / 10:.2g}" * bool(part.keys.get("free")) for part in parts]
+    springs = [f", weak_springs = {low / 100:.2g}" * bool(part.keys.get("free")) for part in parts]
     bodies = ",\n".join(f'    {{ name = "{part.name}"{s} }}' for part, s in zip(parts, springs, strict=True))
     lines = [
         f'name = "{body_name(home.resolve().name)}"',
