@@ -24,7 +24,7 @@ from .curves import read_table
 from .heights import Heights
 from .keys import Columns, FileName
 from .kinds import Kind, beside
-from .law import Array, number, settings, value, values
+from .law import Array, number, program, settings, value, values
 
 if TYPE_CHECKING:
     from .settings import Temperature
@@ -66,7 +66,18 @@ class Friction:
 
     def columns(self, speeds: np.ndarray, pressed: float) -> dict[str, np.ndarray]:
         """Name -> values at speeds (m/s) under a normal force (N), for a table."""
-        return {"coefficient": np.array(self.coefficient(jax.device_put(speeds), jnp.full(len(speeds), pressed)))}
+        return {"coefficient": coefficients(self, speeds, pressed)}
+
+
+@program
+def _coefficient(friction: Friction, speed: Array, pressed: Array) -> Array:
+    return friction.coefficient(speed, pressed)
+
+
+def coefficients(friction: Friction, speed: ArrayLike, pressed: ArrayLike) -> np.ndarray:
+    """(n,) `Friction.coefficient` of numpy by one program; done operation by operation each would be compiled."""
+    speed, pressed = np.broadcast_arrays(np.atleast_1d(np.asarray(speed, float)), np.asarray(pressed, float))
+    return np.array(_coefficient(friction, speed, pressed))
 
 
 FASTEST = 50.0

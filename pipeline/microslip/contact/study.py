@@ -5,8 +5,8 @@ Every table is a CSV of `microslip contact`, and the picture of the same name is
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 
 import jax
@@ -17,9 +17,9 @@ from ..errors import UserError, told_of
 from . import microslip
 from . import settings as S
 from .composed import ContactModel, compose
-from .friction import FASTEST, OfLubricated, lubricated, smoothed
+from .friction import FASTEST, OfLubricated, coefficients, lubricated, smoothed
 from .jenkins import Jenkins
-from .law import history, values
+from .law import history, program, values
 from .layer import Layer, quasi_static_error
 from .normal import Preload, Rough
 from .point import PointContact
@@ -103,17 +103,16 @@ def _working(c: ContactModel) -> tuple[float, float] | None:
 
 def approach_under(c: ContactModel, force: float) -> float:
     """Approach (m) at a normal force (N), by bisection down to rounding."""
-    one = jax.jit(lambda law, u: law.force(u[None])[0])
     low, high = -1e-9, force / c.normal_0 + (c.roughness or 1e-6)
     for _ in range(200):
-        if float(one(c.normal, jnp.asarray(high))) >= force:
+        if values(c.normal, "force", high) >= force:
             break
         high *= 2
     else:
         raise UserError(f"{c.path}: motion.normal_force: {force:g} N is more than the normal law reaches; lower it")
     for _ in range(80):
         middle = 0.5 * (low + high)
-        low, high = (middle, high) if float(one(c.normal, jnp.asarray(middle))) < force else (low, middle)
+        low, high = (middle, high) if values(c.normal, "force", middle) < force else (low, middle)
     return high
 
 
@@ -211,7 +210,7 @@ def _motion(c: ContactModel, working: tuple[float, float] | None, found: _Findin
     time = np.arange(motion.cycles * motion.samples + 1) / (motion.samples * motion.frequency)
     path = _path(motion, working[0])
     amplitudes = _amplitudes(c, working)
-    u = np.asarray(jax.vmap(path)(jax.device_put(time)))
+    u = np.asarray(_displacements(*path.args, time))
     loops = _loop_paths(amplitudes, working[0], motion, time)
     if isinstance(c.law, MassContact):
         told = integrate(c.law, path, time)
@@ -261,18 +260,21 @@ def _point(c: ContactModel, u: np.ndarray, force: np.ndarray, slip: np.ndarray, 
     return place
 
 
-def _path(motion: S.Motion, mean: float) -> Callable[[jax.Array], jax.Array]:
+def _path(motion: S.Motion, mean: float) -> partial[jax.Array]:
     """Displacement (3,) in m over the time in s."""
     rows = [(mean, *motion.normal[1:]), motion.t1, motion.t2]
     most = max(map(len, rows)) | 1  # a missing last sine is zero
-    table = jnp.array([[*row, *[0.0] * (most - len(row))] for row in rows])
-    omega = 2 * np.pi * motion.frequency
+    table = np.array([[*row, *[0.0] * (most - len(row))] for row in rows])
+    return partial(_displacement, table, np.array([0.0, motion.drift, 0.0]), 2 * np.pi * motion.frequency)
 
-    def path(t: jax.Array) -> jax.Array:
-        waves = [jnp.ones(())] + [f(h * omega * t) for h in range(1, most // 2 + 1) for f in (jnp.cos, jnp.sin)]
-        return table @ jnp.stack(waves) + jnp.array([0.0, motion.drift, 0.0]) * t
 
-    return path
+def _displacement(table: np.ndarray, drift: np.ndarray, omega: float, t: jax.Array) -> jax.Array:
+    orders = range(1, table.shape[1] // 2 + 1)
+    waves = [jnp.ones(())] + [f(h * omega * t) for h in orders for f in (jnp.cos, jnp.sin)]
+    return table @ jnp.stack(waves) + drift * t
+
+
+_displacements = program(jax.vmap(_displacement, (None, None, None, 0)))
 
 
 def _amplitudes(c: ContactModel, working: tuple[float, float]) -> tuple[float, ...]:
@@ -282,7 +284,7 @@ def _amplitudes(c: ContactModel, working: tuple[float, float]) -> tuple[float, .
     if motion.amplitudes or motion.drift:
         return motion.amplitudes
     share = float(values(c.normal, "share", working[0]))
-    mu = float(c.friction.coefficient(jnp.zeros(1), jnp.array([working[1]]))[0])
+    mu = float(coefficients(c.friction, 0.0, working[1])[0])
     if working[1] <= 0 or share <= 0 or mu <= 0:
         return ()
     slides = mu * working[1] / (c.stiffness.tangential[0] * share)
@@ -321,7 +323,7 @@ def _slips(c: ContactModel, force: np.ndarray, slip: np.ndarray, time: np.ndarra
     if isinstance(c.law, PointContact | Jenkins):
         moved = np.linalg.norm(np.diff(slip, axis=0, prepend=slip[:1]), axis=1)
         return moved > 1e-9 * max(float(np.ptp(slip, axis=0).max()), 1e-300)
-    held = np.asarray(c.friction.coefficient(jnp.zeros(len(force)), jax.device_put(force[:, 0]))) * force[:, 0]
+    held = coefficients(c.friction, 0.0, force[:, 0]) * force[:, 0]
     return np.hypot(force[:, 1], force[:, 2]) > (1 - 1e-6) * held
 
 
@@ -331,7 +333,7 @@ def _of_a_cycle(
 ) -> None:  # fmt: skip
     last = slice(len(u) - motion.samples - 1, None)
     assert c.friction is not None
-    mu = float(c.friction.coefficient(jnp.zeros(1), jnp.array([max(working[1], 0.0)]))[0])
+    mu = float(coefficients(c.friction, 0.0, max(working[1], 0.0))[0])
     found.told.append(("slip limit at the working point", _engineering(mu * max(working[1], 0.0), "N")))
     what = "energy dissipated in the last cycle" if not motion.drift else "work of friction in the last period"
     found.told.append((what, _engineering(_work(u[last], force[last]), "J")))
@@ -413,7 +415,7 @@ def _wear(c: ContactModel, found: _Findings) -> None:
 def _sliding_friction(c: ContactModel, given: S.Wear) -> float:
     assert c.friction is not None
     mean = c.friction.without_scatter()
-    return float(mean.coefficient(jnp.array([given.speed]), jnp.array([given.normal_force]))[0])
+    return float(coefficients(mean, given.speed, given.normal_force)[0])
 
 
 def _wear_coefficient(given: S.Wear, mu: float) -> float:
@@ -439,7 +441,7 @@ def _limits(c: ContactModel, found: _Findings) -> None:
 
 def _element_margin(law: MassContact, frequency: float, tolerance: float) -> str:
     """(3.7-45): the mass element's own frequency sqrt(c_R0/m) far above that of the motion."""
-    own = float(jnp.sqrt(law.stiffness_1 / law.mass)) / (2 * np.pi)
+    own = float(np.sqrt(np.asarray(law.stiffness_1) / np.asarray(law.mass))) / (2 * np.pi)
     error = quasi_static_error(frequency / own)
     verdict = "may" if error <= tolerance else "must not"
     return (

@@ -23,11 +23,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-import jax.numpy as jnp
 import numpy as np
 
 from ..errors import NotConverged, UserError
-from .friction import Friction
+from .friction import Friction, coefficients
 from .heights import Heights, Tabulated, as_table, summed
 from .law import program
 from .normal import Rough
@@ -352,7 +351,7 @@ def run_in(
     time = np.asarray(time, float)
     if not force > 0 or not speed >= 0 or len(time) == 0 or time[0] != 0 or np.any(np.diff(time) < 0):
         raise UserError("wear: needs a positive force, a speed of 0 or more, and times that rise from 0")
-    power = float(friction.coefficient(jnp.asarray([speed]), jnp.asarray([force]))[0]) * force * speed
+    power = float(coefficients(friction, speed, force)[0]) * force * speed
     tables = [as_table(normal.heights)]
     for dt in np.diff(time):
         law = worn_law(

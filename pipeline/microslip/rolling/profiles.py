@@ -46,13 +46,18 @@ class Profile:
             return UnivariateSpline(self.y, self.z, k=5, s=len(self.y) * self.noise**2, ext=2)
         return CubicSpline(self.y, self.z, extrapolate=False)
 
+    @cached_property
+    def inclined(self) -> CubicSpline | UnivariateSpline:
+        """The derivative of the curve."""
+        return self.curve.derivative()
+
     def height(self, y: ArrayLike) -> Array:
         """z, m; NaN beyond its ends."""
         return self._of(self.curve, y)
 
     def slope(self, y: ArrayLike) -> Array:
         """dz/dy; NaN beyond its ends."""
-        return self._of(self.curve.derivative(), y)
+        return self._of(self.inclined, y)
 
     def _of(self, curve: CubicSpline | UnivariateSpline, y: ArrayLike) -> Array:
         at = np.asarray(y, dtype=float)

@@ -7,6 +7,7 @@ are found as the right one: the left one's pose is mirrored first, and what it f
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -164,6 +165,7 @@ def _height(track: Track, gaps: list[Gap], vertical: float) -> float:
     """z of the axle's middle, below that of the nominal radius, where the patches carry a force (N) together, m."""
     touch = min(float(np.nanmin(g.gap)) for g in gaps)
 
+    @cache  # the search asks for its ends again
     def missing(down: float) -> float:
         lifted = sum(_lifted(p) for g in gaps for p in _pressed(track, g, touch + down))
         return float(vertical ** (2 / 3) - lifted ** (2 / 3))
@@ -196,7 +198,8 @@ def across(track: Track, pose: Pose, side: str, patch: Patch) -> tuple[Array, Ar
 class Gap(NamedTuple):
     """Above the rail, over the wheel's profile, (k,). Attributes: on_wheel: y of the profile; x, y, z: of the point of
     its circle that comes nearest to the rail, m, the axle's middle as high as the nominal radius; gap: vertical, m;
-    radius: m; slope: of the gap along the surface, beyond the rail that at its end; arc: from point to point, m."""
+    radius: m; slope: of the gap along the surface, beyond the rail that at its end; arc, step: from point to point,
+    along the surface and in y, m."""
 
     on_wheel: Array
     x: Array
@@ -206,6 +209,7 @@ class Gap(NamedTuple):
     radius: Array
     slope: Array
     arc: Array
+    step: Array
 
 
 def _gap(track: Track, pose: Pose) -> Gap:
@@ -231,10 +235,11 @@ def _gap(track: Track, pose: Pose) -> Gap:
             f"{track.rail_at + track.rail.y[-1]:.4g} m; correct the positions (at, pose.lateral)"
         )
     incline = np.arctan(np.gradient(z, y))
-    arc = np.gradient(y) / np.cos(incline)
+    step = np.gradient(y)
+    arc = step / np.cos(incline)
     slope = np.gradient(gap) * np.cos(incline) / arc
     known = np.flatnonzero(np.isfinite(slope))
-    return Gap(y_w, x, y, z, gap, r, np.interp(np.arange(len(slope)), known, slope[known]), arc)
+    return Gap(y_w, x, y, z, gap, r, np.interp(np.arange(len(slope)), known, slope[known]), arc, step)
 
 
 class Pressed(NamedTuple):
@@ -265,7 +270,7 @@ def _stretch(track: Track, gap: Gap, run: Array, level: float) -> Pressed:
     slope of the gap from one edge to the other. The middle of the patch is the centre of the squared penetration (over
     x too, hence 2.5)."""
     _, least = _summit(gap.gap, int(run[np.argmin(gap.gap[run])]))
-    weight = (level - gap.gap[run]) ** 2.5 * np.gradient(gap.y)[run]
+    weight = (level - gap.gap[run]) ** 2.5 * gap.step[run]
     at = float(np.sum(weight * run) / np.sum(weight))
     y = float(np.interp(at, np.arange(len(gap.y)), gap.y))
     angle = float(np.arctan(track.rail.slope(y - track.rail_at)))
@@ -288,7 +293,8 @@ def _half_width(gap: Gap, at: float, A: float, approach: float) -> float:
 
     tried = np.append(0.0, np.geomspace(0.005, 1.01, 30)) * float(half_width(A, np.array(CONFORMAL * A), approach))
     first = 2 + int(np.argmax(wider(tried[2:]) <= 0))
-    return brentq(wider, tried[first - 1], tried[first], xtol=1e-9) if wider(tried[first - 1]) > 0 else tried[first - 1]
+    least, number = tried[first - 1], cache(wider)
+    return brentq(number, least, tried[first], xtol=1e-9) if number(least) > 0 else least
 
 
 def _summit(gap: Array, i: int) -> tuple[float, float]:

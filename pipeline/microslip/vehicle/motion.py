@@ -17,7 +17,7 @@ import numpy as np
 
 from ..contact.law import program
 from .creep import Creep, linear
-from .touch import Touch, at
+from .touch import Touch, at, touched
 
 Array = Any
 Q = 6
@@ -195,7 +195,7 @@ def sunk(t: Touch, each: float, stiffness: Array) -> tuple[float, float]:
 
 def steady(v: Vehicle) -> Array:
     """(13,) of round wheels that run straight, by Kalker's linear theory."""
-    t = at(v.over, v.reach, jnp.zeros(()))
+    t = touched(v.over, v.reach, 0.0)
     x = np.zeros(STATES)
     x[1], rail = sunk(t, v.each, v.stiffness)
     x[4:6], x[2 * Q] = rail, v.speed / float(t.radius[0])

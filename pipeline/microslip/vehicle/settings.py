@@ -21,7 +21,7 @@ from ..settings.numbers import Model, Name, NotNegative, Number, Positive, _tupl
 from ..settings.toml import read_settings
 from ..system.lumped import Body, Link, System
 from .motion import Vehicle, sunk
-from .touch import Touch, at, touching
+from .touch import Touch, touched, touching
 
 Three = Annotated[tuple[NotNegative, NotNegative, NotNegative], BeforeValidator(_tuple)]
 Inertia = Annotated[tuple[Positive, Positive, Positive], BeforeValidator(_tuple)]
@@ -145,7 +145,7 @@ class VehicleCase(Model):
         found = touching(track, each, self.running.reach)
         M, C, K = self.lumped().matrices()
         _, spin, _ = self.vehicle.inertia
-        held = K[1, 1] * sunk(at(found.over, found.reach, 0.0), each, K)[0]  # of the suspension, as it has sunk
+        held = K[1, 1] * sunk(touched(found.over, found.reach, 0.0), each, K)[0]  # of the suspension, as it has sunk
         return Vehicle(M, C, K, spin, self.vehicle.load + held, self.running.torque, self.running.speed, found.over,
                        found.reach, each, self.friction, elastic.shear, elastic.poisson)  # fmt: skip
 

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import jax.numpy as jnp
 import numpy as np
 
+from ..contact.law import program
 from ..errors import UserError
 from ..rolling.wheelset import Patch, Pose, Track, patches
 
@@ -122,3 +123,7 @@ def at(over: Touch, reach: float, y: Array) -> Touch:
         ((2 - t) * t - 1) * t, (3 * t - 5) * t * t + 2, ((4 - 3 * t) * t + 1) * t, (t - 1) * t * t
     ])  # fmt: skip
     return Touch(*(0.5 * jnp.asarray(v)[:, i + jnp.arange(-1, 3)] @ weights for v in over))
+
+
+touched = program(at)
+"""`at`, compiled."""

@@ -17,7 +17,7 @@ from ..results import Journal
 from ..rolling.strips import creep_forces, tractions
 from ..rolling.wear import deposited, smoothed
 from .motion import LEAST, Contacts, Q, Turn, Vehicle, resampled, steady, steps_of_a_turn, turned
-from .touch import Touch, at
+from .touch import Touch, touched
 
 STRIP = 2.5e-4
 """m, width of a strip of the tread."""
@@ -244,7 +244,7 @@ def groove(depth: Array) -> Array:
 def deepest(v: Vehicle) -> float:
     """m, of a groove that fills the gap which new wheels have at the edge of their contact: half of the approach (of a
     circle, Hertz). Deeper ones turn the curvature in the middle, and the contact splits."""
-    return 0.5 * float((v.each / at(v.over, v.reach, 0.0).spring[0]) ** (2 / 3))
+    return 0.5 * (v.each / float(np.asarray(touched(v.over, v.reach, 0.0).spring)[0])) ** (2 / 3)
 
 
 def _stays_on(one: Turn, v: Vehicle) -> None:
