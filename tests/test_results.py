@@ -66,6 +66,21 @@ def sweep(asked: list[float], added: Sequence[float] = (), near: Sequence[tuple[
     return Series("a", {}, f, status, arrays, {"monitors/tip": ("u_x",)})
 
 
+@pytest.mark.parametrize("estimated", [None, 0.25, np.inf])
+def test_what_is_not_known_is_null_in_the_file(tmp_path, estimated: float | None) -> None:
+    """An error that is unknown, one that is not estimated, a number that a table lacks: read back as they were."""
+    rows = ({"frequency_Hz": 10.0, "damping_ratio": np.nan, "doubt": ""},)
+    path, settings = tmp_path / "response.h5", {"x": 1.0}
+    write_response(
+        path, Response("a", "aft", (sweep([10.0]),), settings=settings, resonances=rows, estimated=estimated)
+    )
+    found = read_response(path)
+    assert found.estimated == estimated and np.isnan(found.resonances[0]["damping_ratio"])
+    with h5py.File(path) as file:
+        texts = [file[n][()].tobytes() for n in ("resonances", "estimated", "settings") if n in file]
+    assert not any(word in text for text in texts for word in (b"NaN", b"Infinity"))
+
+
 def test_the_table_has_every_point_of_every_series() -> None:
     """In order of the frequency, peaks with the amplitude that they have; cells of a series without a point there are
     empty; a peak at a point of the sweep is asked for; points of one series that differ in the tenth digit are two

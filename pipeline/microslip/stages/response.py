@@ -108,7 +108,7 @@ def _work(
         _unfinished(points)
         raise
     summary = _finished(points, result, wanted, stage.report)
-    store.write_text(stage.product, json.dumps(summary, indent=1) + "\n")
+    store.write_json(stage.product, summary)
     pictures = [folder / "pictures" / name for name in summary["pictures"].values()]
     return Made([*pictures, *(folder / name for name in summary["files"])])
 
