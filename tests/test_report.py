@@ -294,6 +294,9 @@ def test_the_answer_is_a_resonance_that_is_valid() -> None:
     rows += [peak(1e4, 171.1, 80.65e-6)]
     for row, stress in zip(rows, (900e6, 3e6, 41.5e6), strict=True):
         row |= {"stress_amplitude_Pa": stress, "frequency_of_stress_Hz": row["frequency_Hz"]}
+    for unknown in (None, np.inf):
+        words = said(response_html({"resonances": rows, "estimated_error_of_harmonics": unknown}, {}))
+        assert "how uncertain amplitudes are is not known at some places" in words
     words = said(response_html({"resonances": rows, "estimated_error_of_harmonics": 1.3e-13}, {}))
     assert "highest resonance found is 80.65 µm at 171.1 Hz" in words and "lowest with 12.74 µm" in words
     assert "Under FN = 20 N contacts would lift off" in words

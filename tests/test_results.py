@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import csv
 import os
 import random
 import signal
 import subprocess
 import sys
 import time
+from collections.abc import Sequence
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -26,6 +28,7 @@ from microslip.results import (
     read_journal,
     read_response,
     response_of,
+    response_table,
     write_response,
 )
 
@@ -47,6 +50,50 @@ def point(frequency: float, status: str = "converged") -> dict:
         "frequency": frequency, "status": status, "error": 1e-12 * frequency, "iterations": 7,
         "x": np.cos(frequency * np.arange(9)), "bodies/blade/q": q, **monitors,
     }  # fmt: skip
+
+
+def sweep(asked: list[float], added: Sequence[float] = (), near: Sequence[tuple[float, float]] = ()) -> Series:
+    """A series with an amplitude of three times the frequency: points asked for and added, Hz, and peaks -> the point
+    beside which each was searched for."""
+    peaks = dict(near)
+    f = np.array(sorted({*asked, *added, *peaks}))
+    arrays = {
+        "frequency": f, "peak": np.array([peaks.get(x, 0.0) for x in f]), "added": np.isin(f, added).astype(int),
+        "iterations": np.full(len(f), 4), "harmonics": np.ones(len(f)), "monitors/tip": np.zeros((len(f), 1, 2)),
+    }  # fmt: skip
+    arrays["monitors/tip"][:, 0, 1] = 3 * f
+    status = tuple("converged" if x < 35 else "fold" for x in f)
+    return Series("a", {}, f, status, arrays, {"monitors/tip": ("u_x",)})
+
+
+@pytest.mark.parametrize("estimated", [None, 0.25, np.inf])
+def test_what_is_not_known_is_null_in_the_file(tmp_path, estimated: float | None) -> None:
+    """An error that is unknown, one that is not estimated, a number that a table lacks: read back as they were."""
+    rows = ({"frequency_Hz": 10.0, "damping_ratio": np.nan, "doubt": ""},)
+    path, settings = tmp_path / "response.h5", {"x": 1.0}
+    write_response(
+        path, Response("a", "aft", (sweep([10.0]),), settings=settings, resonances=rows, estimated=estimated)
+    )
+    found = read_response(path)
+    assert found.estimated == estimated and np.isnan(found.resonances[0]["damping_ratio"])
+    with h5py.File(path) as file:
+        texts = [file[n][()].tobytes() for n in ("resonances", "estimated", "settings") if n in file]
+    assert not any(word in text for text in texts for word in (b"NaN", b"Infinity"))
+
+
+def test_the_table_has_every_point_of_every_series() -> None:
+    """In order of the frequency, peaks with the amplitude that they have; cells of a series without a point there are
+    empty; a peak at a point of the sweep is asked for; points of one series that differ in the tenth digit are two
+    rows, one of two series that differ by rounding is one."""
+    two = sweep([10.0, 20.0, 40.0], [30.0], [(20.0, 20.0), (20.00000001, 20.0)])
+    table = response_table({5.0: sweep([10.0, 20.0 * (1 + 1e-15), 40.0], [], [(12.5, 10.0)]), 7.0: two})
+    rows = list(csv.DictReader(table.splitlines()))
+    assert [float(r["frequency_Hz"]) for r in rows] == [10.0, 12.5, 20.0, 20.00000001, 30.0, 40.0]
+    assert [r["amplitude_m_FN_5_N"] for r in rows] == ["30", "37.5", "60", "", "", "120"]
+    assert [r["amplitude_m_FN_7_N"] for r in rows] == ["30", "", "60", "60", "90", "120"]
+    assert [r["converged_FN_5_N"] for r in rows] == ["1", "1", "1", "", "", "0"]
+    assert [r["asked"] for r in rows] == ["1", "0", "1", "0", "0", "1"]
+    assert not any(r[name] for r in rows[3:5] for name in r if name.endswith("_FN_5_N"))
 
 
 def same(a: dict, b: dict) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import random
 import shutil
@@ -240,6 +241,18 @@ def test_up_to_date_means_same_inputs_and_untouched_product(tmp_path: Path) -> N
     store.note_product(product, inputs)
     product.unlink()
     assert not store.is_up_to_date(product, inputs)
+
+
+def test_json_is_json(tmp_path: Path) -> None:
+    """Numbers that are not finite are null at any depth, of numpy too; the rest stays as it is."""
+
+    def refused(word: str) -> None:
+        raise ValueError(word)
+
+    told = {"b": [np.float64(np.inf), (1.5, np.nan)], "a": {"c": -np.inf, "d": [None, True, "NaN", 3]}}
+    store.write_json(tmp_path / "a.json", told)
+    found = json.loads((tmp_path / "a.json").read_text(), parse_constant=refused)
+    assert found == {"b": [None, [1.5, None]], "a": {"c": None, "d": [None, True, "NaN", 3]}}
 
 
 def test_every_file_of_a_product_counts(tmp_path: Path) -> None:

@@ -12,6 +12,7 @@ import errno
 import glob
 import hashlib
 import json
+import math
 import os
 import platform
 import stat
@@ -185,6 +186,28 @@ def write_text(path: Path | str, text: str) -> None:
     """Write a text file, complete or absent."""
     with complete_or_absent(path) as temporary:
         temporary.write_text(text, encoding="utf-8")
+
+
+def write_json(path: Path | str, value: Any, **how: Any) -> None:
+    """Write `json_text` in lines, complete or absent."""
+    write_text(path, json_text(value, indent=1, **how) + "\n")
+
+
+def json_text(value: Any, **how: Any) -> str:
+    """A value as JSON, in which numbers that are not finite are null, which every program can read.
+
+    Args:
+        how: for `json.dumps`.
+    """
+    return json.dumps(_finite(value), allow_nan=False, **how)
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return {key: _finite(one) for key, one in value.items()}
+    if isinstance(value, list | tuple):
+        return [_finite(one) for one in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def hash_file(path: Path | str) -> str:
@@ -371,7 +394,7 @@ def note_product(product: Path | str, inputs: Mapping[str, Any], files: Iterable
         **git_state(Path(__file__).parent),
         **more,
     }
-    write_text(sidecar_path(product), json.dumps(note, indent=1, sort_keys=True) + "\n")
+    write_json(sidecar_path(product), note, sort_keys=True)
 
 
 def git_state(folder: Path) -> dict[str, Any]:

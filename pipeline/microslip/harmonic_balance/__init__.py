@@ -6,4 +6,3 @@ kinematics of a rigid contact patch.
 
 from .sweeps import FrequencyResponse as FrequencyResponse
 from .sweeps import peaks as peaks
-from .sweeps import response_table as response_table

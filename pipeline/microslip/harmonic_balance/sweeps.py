@@ -1,16 +1,14 @@
-"""A sweep over frequency: what it holds, its table, and where its resonances are."""
+"""A sweep over frequency: what it holds, and where its resonances are."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
 import numpy as np
 
 from ..data import Array, Indices
-from ..files.tables import columns_csv
-from ..results.names import apart as told_apart
 from ..units import METRES, Quantity
 
 
@@ -171,13 +169,3 @@ def resonances(response: FrequencyResponse, found: Sequence[P]) -> list[P]:
     at = np.flatnonzero(order >= np.count_nonzero(ok))
     kept = prominent(height[order], at)
     return [found[i] for i in order[kept] - np.count_nonzero(ok)]
-
-
-def response_table(responses: Mapping[float, FrequencyResponse]) -> str:
-    """CSV text: the frequencies asked for and, per normal force, amplitude, phase, energies and what else a response
-    has."""
-    first = next(iter(responses.values()))
-    columns = {"frequency_Hz": first.frequency[first.asked]}
-    for force, r in zip(told_apart(list(responses)), responses.values(), strict=True):
-        columns |= {f"{name}_FN_{force}_N": column[r.asked] for name, column in r.columns().items()}
-    return columns_csv(columns, 9)

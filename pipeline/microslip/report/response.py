@@ -92,16 +92,19 @@ def _stress(response: Mapping[str, Any], valid: Sequence[Mapping[str, Any]]) -> 
 
 def _worth(response: Mapping[str, Any], count: int, doubtful: int) -> str:
     """What the numbers of so many resonances are worth."""
-    uncertain, error = response.get("estimated_error_of_harmonics"), ""
-    if isinstance(uncertain, float):
-        size = percent(uncertain) if uncertain > HARDLY else f"less than {percent(HARDLY)}"
-        error = f"; amplitudes are uncertain by {size}{' at most' * (uncertain > HARDLY)}"
-        if not math.isfinite(uncertain):
-            error = "; how uncertain amplitudes are is not known at some places"
+    error = _uncertain(response["estimated_error_of_harmonics"]) if "estimated_error_of_harmonics" in response else ""
     if not doubtful:
         return f"Every resonance passes its checks{error}."
     are = "is" if doubtful == 1 else "are"
     return f"{doubtful} of {counted(count, 'resonance')} {are} doubtful and marked{error}."
+
+
+def _uncertain(share: float | None) -> str:
+    """How uncertain amplitudes are, by a share of them; None, as JSON has it, or infinite where nobody knows."""
+    if share is None or not math.isfinite(share):
+        return "; how uncertain amplitudes are is not known at some places"
+    size = percent(share) if share > HARDLY else f"less than {percent(HARDLY)}"
+    return f"; amplitudes are uncertain by {size}{' at most' * (share > HARDLY)}"
 
 
 HARDLY = 1e-4
@@ -237,6 +240,8 @@ def _table_of(rows: Sequence[Mapping[str, Any]]) -> Piece:
             largest[unit] = max(largest.get(unit, 0.0), abs(v) if known else 0.0)
 
     def shown(value: Any, unit: str) -> str:
+        if value is None or (isinstance(value, float) and math.isnan(value)):
+            return ""
         if not isinstance(value, float):
             return _cell(value)
         return number(0.0 if abs(value) < ROUNDING * largest[unit] else value, 5 if unit in _EXACT else 4)

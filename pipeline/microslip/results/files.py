@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import json
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -16,7 +17,7 @@ from ..data import Array, ModalBasis, ModalGroup
 from ..errors import UserError
 from ..files.hdf5 import IMAGINARY, put, sealed
 from ..files.hostile import DAMAGE, reading, refuse_damaged, short
-from ..files.store import ordinary
+from ..files.store import json_text, ordinary
 from ..operating.motion import Motion, motion_of
 from ..reduced.coordinates import first_modes, in_modes
 from .journal import is_journal, read_journal
@@ -210,7 +211,8 @@ def _write(file: h5py.File, r: Response) -> None:
         file.attrs[name] = getattr(r, name)
     file.attrs["finished"] = int(r.finished)
     for name in ("settings", "labels", "resonances", "messages", "stuck_modes", "estimated"):
-        _put_text(file, name, json.dumps(getattr(r, name)))
+        if (told := getattr(r, name)) is not None:
+            _put_text(file, name, json_text(told))
     bodies = {k: {**vars(b), "harmonics": [[n, int(c)] for n, c in b.harmonics]} for k, b in r.bodies.items()}
     _put_text(file, "bodies", json.dumps(bodies))
     for i, s in enumerate(r.series):
@@ -272,12 +274,22 @@ def _response(file: h5py.File) -> Response:
         bodies={k: _body(b) for k, b in told["bodies"].items()},
         labels=labels,
         settings=told["settings"],
-        resonances=tuple(told["resonances"]),
+        resonances=tuple(map(_known, told["resonances"])),
         finished=bool(file.attrs["finished"]),
         messages=tuple(told["messages"]),
-        stuck_modes=tuple(json.loads(file["stuck_modes"][()].tobytes())) if "stuck_modes" in file else (),
-        estimated=json.loads(file["estimated"][()].tobytes()) if "estimated" in file else None,
+        stuck_modes=tuple(map(_known, json.loads(file["stuck_modes"][()].tobytes()))) if "stuck_modes" in file else (),
+        estimated=_estimated(json.loads(file["estimated"][()].tobytes())) if "estimated" in file else None,
     )
+
+
+def _known(row: Mapping[str, Any]) -> dict[str, Any]:
+    """A row of a table: null stands for no number."""
+    return {name: math.nan if value is None else value for name, value in row.items()}
+
+
+def _estimated(told: float | None) -> float:
+    """An error of which null says that it may be of any size."""
+    return math.inf if told is None else told
 
 
 def _read_series(group: h5py.Group, labels: Mapping[str, tuple[str, ...]]) -> Series:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from ..data import Array
+
 _DIGITS = range(6, 18)
 """Of a number in a name; a double has 17 at most."""
 
@@ -13,7 +15,12 @@ def exact(value: float) -> str:
     return next(text for d in _DIGITS if float(text := f"{value:.{d}g}") == value or d == _DIGITS[-1])
 
 
+def digits(values: Sequence[float] | Array, least: int = _DIGITS[0]) -> int:
+    """The fewest significant digits, `least` or more, that tell numbers that differ from each other."""
+    differ = len(set(values))
+    return next(d for d in range(least, _DIGITS[-1] + 1) if len({f"{v:.{d}g}" for v in values}) == differ)
+
+
 def apart(values: Sequence[float], least: int = _DIGITS[0]) -> list[str]:
-    """Numbers in the fewest digits, `least` or more, that tell those that differ from each other."""
-    many = ([f"{value:.{d}g}" for value in values] for d in range(least, _DIGITS[-1] + 1))
-    return next(texts for texts in many if len(set(texts)) == len(set(values)))
+    """Numbers in so many `digits`."""
+    return [f"{value:.{digits(values, least)}g}" for value in values]

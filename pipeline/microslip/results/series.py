@@ -171,6 +171,11 @@ class Series:
         return self._summed("dissipated")
 
     @property
+    def by_slip(self) -> Array:
+        """(f,) friction forces times path slid, J per cycle."""
+        return self._summed("by_slip")
+
+    @property
     def damping_ratio(self) -> Array:
         """(f,) effective damping ratio: what is lost in a cycle over 4 pi times the kinetic energy of the motion; of
         one coordinate C / (2 M Omega)."""

@@ -44,7 +44,7 @@ def answered(stage: Stage, inputs: Mapping[str, Any], work: Callable[[], Answer]
             path.unlink(missing_ok=True)
         names = [str(path.relative_to(folder)) for path in found.files]
         told = {"files": names, "said": list(found.said), "whole": bool(found.whole)}
-        store.write_text(stage.product, json.dumps(told, indent=1) + "\n")
+        store.write_json(stage.product, told)
         return Made(found.files)
 
     stage.make(inputs, make)

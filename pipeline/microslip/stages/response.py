@@ -25,7 +25,7 @@ from ..files.tables import rows_csv
 from ..harmonic_balance.response import HarmonicResponse
 from ..harmonic_balance.sweeps import overhanging
 from ..report.response import JUMPS, highest, lifted_forces, response_html
-from ..results import Response, read_journal, read_response, response_of, write_response
+from ..results import Response, read_journal, read_response, response_of, response_table, write_response
 from ..results.checks import sentence
 from ..results.series import CONVERGED
 from ..units import counted, percent, to_rpm
@@ -108,7 +108,7 @@ def _work(
         _unfinished(points)
         raise
     summary = _finished(points, result, wanted, stage.report)
-    store.write_text(stage.product, json.dumps(summary, indent=1) + "\n")
+    store.write_json(stage.product, summary)
     pictures = [folder / "pictures" / name for name in summary["pictures"].values()]
     return Made([*pictures, *(folder / name for name in summary["files"])])
 
@@ -144,12 +144,11 @@ def _tell(summary: Mapping[str, Any], report: Report) -> None:
 
 def _finished(points: Checkpoint, result: CaseResult, wanted: Wanted, report: Report) -> dict[str, Any]:
     """Tables, pictures and files of a case that has run, and their summary."""
-    from ..harmonic_balance import response_table
-
     folder, summary = points.file.parent, summarise(result)
     points.begin()
-    store.write_text(folder / "response.csv", response_table(result.responses))
     response = _response(points, result, summary)
+    series = {normal: response.one(normal_force=normal) for normal in result.responses}
+    store.write_text(folder / "response.csv", response_table(series))
     summary["resonances"] = _judged(response, result, summary["resonances"])
     drawn = _drawn(result, summary["resonances"], folder) if wanted.pictures else {}
     response = replace(response, resonances=tuple(summary["resonances"]))
