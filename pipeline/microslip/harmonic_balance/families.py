@@ -210,7 +210,8 @@ def followed(
         points += state.found
         if state.found:
             far = max(far, int(100 * (points[-1].lam - family.begin) / (family.end - family.begin)))
-            report(f"{far} of 100 % of the way, {len(points)} points, {points[-1].lam / family.unit:.6g} {family.words}")
+            at = f"{points[-1].lam / family.unit:.6g} {family.words}"
+            report(f"{far} of 100 % of the way, {len(points)} points, {at}")
     return Branch(tuple(points), state.status, state)
 
 
