@@ -340,8 +340,9 @@ def marched_map(patch, side, u, samples=256):
     from microslip.harmonic_balance.point_cycles import traced
     from microslip.operating.contact_maps import contact_map
 
-    force, cycle = traced(patch.law, patch.kinematics, u, 0.01, samples, 4)
-    return contact_map(patch, side, np.asarray(force), cycle.dissipated, cycle.slipping, cycle.open, u.shape[1] // 2)
+    force, c = traced(patch.law, patch.kinematics, u, 0.01, samples, 4)
+    work = float(c.dissipated.sum())
+    return contact_map(patch, side, np.asarray(force), c.taken, c.slipping, c.open, u.shape[1] // 2, work)
 
 
 def test_contact_map_of_a_patch_that_slides_under_constant_load():
@@ -381,6 +382,20 @@ def test_contact_map_of_a_patch_that_opens_at_one_edge():
     assert found.open.max() > 0.3 and found.open[np.argmin(np.abs(y))] == 0
 
 
+@pytest.mark.parametrize(("rocked", "said"), [(3e-6, ""), (5e-3, " as area opens\n")])
+def test_where_nothing_slips_a_map_tells_no_work_of_samples(rocked: float, said: str) -> None:
+    """Friction that holds all: what is lost is lost by area that opens, nowhere negative, and the work at 48 samples
+    differs; where nothing opens, nothing is lost, and nothing is said of it."""
+    from microslip.pictures.operating import _left
+
+    patch, u0 = linear_patch(normal=50.0, friction=5.0)
+    u = np.zeros((6, 5))
+    u[:, 0], u[5, 1], u[1, 2], u[1, 3] = u0, rocked, 2e-7, 1e-7
+    found = marched_map(patch, small_basis().groups[0, 0].interfaces["right"], u, 48)
+    assert (found.dissipated >= 0).all() and (found.loss > 0) == bool(said)
+    assert _left(found).startswith(said) and ("48 samples" in _left(found)) == bool(said) == (found.unbalanced != 0)
+
+
 def test_tractions_of_a_contact_map_add_up_to_the_forces_of_its_group():
     """Also where the wave leads by a phase, at whose zero the samples begin: mean and first harmonic, 1e-12."""
     from microslip.harmonic_balance.forces import AFT
@@ -392,12 +407,12 @@ def test_tractions_of_a_contact_map_add_up_to_the_forces_of_its_group():
     u[0, :, 0], u[0, 1, 1:], u[0, 2, 1:] = u0, (1.5e-5, 4e-6), (-3e-6, 1e-5)
     g = Group(AFT(patch, 1, 64, 100), np.arange(6)[None], None, zero, zero, np.array([0.7]), (0,))
     (F,), ((force, cycle),) = g.force(u, 0.01), g.traced(u, 0.01)
-    side, shares = small_basis().groups[0, 0].interfaces["right"], (cycle.slipping, cycle.open)
-    found = contact_map(patch, side, np.asarray(force), cycle.dissipated, *shares, 1, 0.7)
+    side, what = small_basis().groups[0, 0].interfaces["right"], (cycle.taken, cycle.slipping, cycle.open)
+    found = contact_map(patch, side, np.asarray(force), *what, 1, float(cycle.dissipated.sum()), 0.7)
     whole = -np.einsum("n,nah->ah", patch.areas, found.tractions)
     np.testing.assert_allclose(whole[:, 0], F[:3, 0], rtol=0, atol=1e-12 * np.abs(F).max())
     np.testing.assert_allclose(whole[:, 1], F[:3, 1] - 1j * F[:3, 2], rtol=0, atol=1e-12 * np.abs(F).max())
-    assert found.loss == pytest.approx(g.point_cycles(u, 0.01)[0].dissipated.sum(), rel=1e-12) and found.loss > 1e-4
+    assert found.loss == pytest.approx(g.point_cycles(u, 0.01)[0].lost.sum(), rel=1e-12) and found.loss > 1e-4
 
 
 def test_contact_map_as_vtu(tmp_path):

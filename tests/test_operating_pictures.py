@@ -54,13 +54,26 @@ def kept(monkeypatch) -> list[Any]:
 
 
 def test_a_legend_rises_and_is_read_by_rows(tmp_path, monkeypatch):
-    """The light curves are drawn last, and yet the smallest normal force is named first; eight in two rows."""
+    """The smallest normal force is named first; eight in two rows."""
     figures, f = kept(monkeypatch), np.linspace(100, 200, 5)
     operating.over_frequency_plot({float(n): (f, n + f) for n in range(1, 9)}, "y", "t", tmp_path / "a.png")
     (legend,) = figures[0].legends
     told = [int(text.get_text().split()[-2]) for text in legend.get_texts()]
     columns = [told[i : i + 2] for i in (0, 2)] + [[n] for n in told[4:]]
     assert [c[0] for c in columns] + [c[1] for c in columns if len(c) > 1] == list(range(1, 9))
+
+
+def test_curves_that_coincide_are_all_seen_and_what_is_missing_is_marked(tmp_path, monkeypatch):
+    """Each is thinner than the one it covers; a cross for every point without a solution, told once and last."""
+    figures, f = kept(monkeypatch), np.linspace(100, 200, 5)
+    y = np.array([1.0, np.nan, 3, 4, 5])
+    operating.over_frequency_plot({1.0: (f, y), 2.0: (f, y), 3.0: (f, f)}, "y", "t", tmp_path / "a.png")
+    lines = figures[0].axes[0].get_lines()
+    drawn = [line.get_linewidth() for line in lines if line.get_label().startswith("$F_N$")]
+    assert drawn == sorted(set(drawn), reverse=True) and len(drawn) == 3
+    crosses = [line.get_xydata() for line in lines if line.get_marker() == "x"]
+    assert [list(c[:, 0]) for c in crosses] == [[125.0], [125.0]] and crosses[0][0, 1] != crosses[1][0, 1]
+    assert [t.get_text() for t in figures[0].legends[0].get_texts()].count("did not converge") == 1
 
 
 def test_words_beside_the_places_tell_their_range(tmp_path, monkeypatch):

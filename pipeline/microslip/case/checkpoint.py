@@ -164,9 +164,9 @@ def maps_at(built: Built, normal: float, row: Mapping[str, Any]) -> list[Contact
     for contact in problem.assembly.contacts[:MOST_MAPS]:
         component = next(m for m in problem.assembly.components if m.name == contact.first.component)
         side = next(iter(component.groups.values())).interfaces[contact.first.interface]
-        c, force = seen[contact.name].cycle, np.asarray(seen[contact.name].force)
-        what = c.dissipated, c.slipping, c.open
-        found_map = contact_map(contact.patch, side, force, *what, problem.harmonics, contact.phase)
+        force, c = seen[contact.name]
+        what = c.taken, c.slipping, c.open, problem.harmonics, float(c.dissipated.sum())
+        found_map = contact_map(contact.patch, side, np.asarray(force), *what, contact.phase)
         maps.append(replace(found_map, name=contact.name))
     _check_energy([c.name for c in problem.assembly.contacts], maps, row)
     return maps
@@ -177,8 +177,8 @@ def _check_energy(names: list[str], maps: list[ContactMap], row: Mapping[str, An
     kept = [float(row[f"contacts/{name}/dissipated"]) for name in names]
     most = SAME_ENERGY * (sum(map(abs, kept)) + 1e-3 * abs(float(row["supplied"])))
     for name, found, energy in zip(names, maps, kept, strict=False):
-        if not abs(found.loss - energy) <= most:
+        if not abs(found.work - energy) <= most:
             raise UserError(
-                f"contact map of {name}: {found.loss:.6g} J per cycle, where the response has {energy:.6g} J; no map "
+                f"contact map of {name}: {found.work:.6g} J per cycle, where the response has {energy:.6g} J; no map "
                 "is drawn: report it, the response itself is not touched by it"
             )

@@ -32,7 +32,7 @@ from ..contact.sliders import Iwan, Strips
 from ..data import Array, ComplexArray
 from ..errors import UserError
 from .orbits import TOLERANCE, Orbits, orbits
-from .point_cycles import Cycle, Traced
+from .point_cycles import Cycle, Traced, above_rounding
 from .tables import Spline, Table, in_chunks, kept, law_hash, refined
 
 NORMAL_TOLERANCE = 1e-3
@@ -541,7 +541,8 @@ def _point_cycles(points: Points, G: jax.Array, u: jax.Array) -> tuple[jax.Array
     def one(u: jax.Array) -> tuple[jax.Array, ...]:
         normal, t = _motion(G, u)
         found, force = sliders(points.law, normal[0], points.strips), points.across(normal[0], t)
-        lost = np.pi * (force[0] * t[1] - force[1] * t[0] + force[2] * t[3] - force[3] * t[2])
+        works = jnp.stack([force[0] * t[1], -force[1] * t[0], force[2] * t[3], -force[3] * t[2]])
+        lost = np.pi * above_rounding(works, 0)
         slips = (found.springs * half_axes(t)[0] > found.limits).any(axis=0)
         swing = normal[0] + jnp.sqrt(jnp.sum(normal[1:] ** 2, axis=0)) * wave[:, None]
         pressed = jax.lax.map(lambda x: sliders(points.law, x, 0).pressed, swing)

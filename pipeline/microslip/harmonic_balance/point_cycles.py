@@ -38,6 +38,11 @@ class Cycle(NamedTuple):
     open: Array
     unsteady: float
 
+    @property
+    def taken(self) -> Array:
+        """(n,) J that the law counts as lost; the work done on the points where it counts nothing."""
+        return np.where(np.isfinite(self.lost), self.lost, self.dissipated)
+
 
 class Traced(NamedTuple):
     """What a force model makes of the points of a patch in time: force (s, n, 3) N of s samples of a cycle along n, t1,
@@ -75,6 +80,9 @@ def above_rounding(terms: Any, axes: Any) -> Any:
 ROUNDING = 1e-13
 """Share of the work that goes to and fro in a cycle below which what is lost is not told from zero."""
 
+OF_STEPS = 1e-10
+"""The same of what the law counts, which adds up the rounding of every step and of a cycle that is periodic so far."""
+
 
 def derivative(coefficients: int) -> Array:
     """(W, W) harmonics mean, cos, sin, cos 2, ... of a signal's derivative over Omega t from its own."""
@@ -109,5 +117,7 @@ def _point_cycles(
     size = jnp.abs(jnp.einsum("nia,sni->sa", G, force)[:, :3]).max()
     unsteady = jnp.where(size > 0, jnp.abs(change).max() / jnp.where(size > 0, size, 1.0), 0.0)
     by_slip = jnp.sum(mean[..., 1:] * slid * moves[..., None], axis=(0, 2))
-    work = above_rounding(force * ahead / samples, (0, 2))
-    return work, by_slip, lost.sum(axis=0), slips.mean(axis=0), open_.mean(axis=0), unsteady, force
+    works = force * ahead / samples
+    work, lost = above_rounding(works, (0, 2)), lost.sum(axis=0)
+    lost = jnp.where(abs(lost) < OF_STEPS * abs(works).sum(axis=(0, 2)), 0.0, lost)  # not a number stays one
+    return work, by_slip, lost, slips.mean(axis=0), open_.mean(axis=0), unsteady, force

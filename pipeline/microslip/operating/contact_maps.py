@@ -24,7 +24,10 @@ class ContactMap:
             harmonic, which may go below nothing. traction: (n,) Pa, largest swing of the
             tangential traction about its mean. tractions: (n, 3, H + 1) complex harmonics, Pa along n, t1, t2, of the
             traction on the body, the mean first; pressure is negative there.
-        dissipated: (n,) J/m2 a cycle, work done on the contact. sticking, slipping, open: (n,) shares of the cycle.
+        dissipated: (n,) J/m2 a cycle that the law counts as lost, in friction, dampers and stretched area that opens;
+            the work done on the contact where it counts nothing. sticking, slipping, open: (n,) shares of the cycle.
+        work: J a cycle, done on the whole patch, as the balance has it. samples: of the cycle, by whose steps the two
+            differ.
         by_samples: the largest change of a pressure or traction from one sample to the next, over the largest of all:
             how far least and most may be off.
     """
@@ -43,6 +46,8 @@ class ContactMap:
     sticking: Array
     slipping: Array
     open: Array
+    work: float
+    samples: int
     by_samples: float
 
     @property
@@ -60,17 +65,23 @@ class ContactMap:
         """J per cycle of the whole patch."""
         return float(self.areas @ self.dissipated)
 
+    @property
+    def unbalanced(self) -> float:
+        """J per cycle by which the work that the balance has differs from `loss`; 0 where the shown digits hold."""
+        rest = self.work - self.loss
+        return rest if abs(rest) > 0.01 * abs(self.loss) else 0.0
+
 
 def contact_map(
-    patch: Patch, side: Interface, force: Array, dissipated: Array, slipping: Array, open_: Array, harmonics: int,
-    phase: float = 0.0,
+    patch: Patch, side: Interface, force: Array, taken: Array, slipping: Array, open_: Array, harmonics: int,
+    work: float, phase: float = 0.0,
 ) -> ContactMap:  # fmt: skip
     """A patch from what a force model says of its n points in a cycle; nothing is computed anew.
 
     Args:
-        side: where it is drawn. force: (s, n, 3) N along n, t1, t2 in s samples of the cycle. dissipated: (n,) J a
-            cycle. slipping, open_: (n,) shares of the cycle. harmonics: H, of the tractions. phase: rad by which
-            the wave leads the samples in the first harmonic.
+        side: where it is drawn. force: (s, n, 3) N along n, t1, t2 in s samples of the cycle. taken: (n,) J lost in
+            it. slipping, open_: (n,) shares of it. harmonics: H, of the tractions. work: J a cycle, done on the patch.
+            phase: rad by which the wave leads the samples in the first harmonic.
     """
     p = force / patch.areas[None, :, None]
     swing = p[..., 1:] - p[..., 1:].mean(axis=0)
@@ -82,8 +93,8 @@ def contact_map(
         patch.interface, patch.points, patch.areas, side.origin, side.rotation,
         p[..., 0].mean(axis=0), p[..., 0].min(axis=0), p[..., 0].max(axis=0),
         np.linalg.norm(swing, axis=-1).max(axis=0),
-        -waves_of, dissipated / patch.areas, np.maximum(1.0 - slipping - open_, 0.0), slipping, open_,
-        float(jumps / max(np.abs(p).max(initial=0.0), 1e-300)),
+        -waves_of, taken / patch.areas, np.maximum(1.0 - slipping - open_, 0.0), slipping, open_,
+        work, len(p), float(jumps / max(np.abs(p).max(initial=0.0), 1e-300)),
     )  # fmt: skip
 
 

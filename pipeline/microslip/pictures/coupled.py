@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -14,12 +14,14 @@ from ..units import METRES, Quantity
 from .operating import numbers_within, shades
 from .plots import (
     empty_figure,
+    mark_missing,
     plain_axes,
     plain_numbers,
     said_beside,
     save_figure,
     single_panel,
     whole_numbers,
+    widths,
 )
 
 if TYPE_CHECKING:
@@ -80,10 +82,11 @@ def over_orders_picture(found: Mapping[str, OverOrders], path: Path, title: str)
     upper, *lower = figure.subplots(3 if stressed else 2, 1, sharex=True)
     for axes in (upper, *lower):
         plain_axes(axes)
-    for colour, (label, r) in zip(shades(len(found)), found.items(), strict=True):
-        upper.plot(r.order, r.frequency, "o-", color=colour, markersize=4, linewidth=1.3, label=label)
+    for width, colour, (label, r) in zip(widths(len(found)), shades(len(found)), found.items(), strict=True):
+        line: dict[str, Any] = {"color": colour, "markersize": 3 + width, "linewidth": width}
+        upper.plot(r.order, r.frequency, "o-", label=label, **line)
         for axes, values in zip(lower, (1e6 * r.amplitude, 1e-6 * r.stress), strict=False):
-            axes.plot(r.order, values, "o-", color=colour, markersize=4, linewidth=1.3)
+            axes.plot(r.order, values, "o-", **line)
     last = list(found.values())[-1]
     upper.plot(last.order, last.stuck, color="0.6", linewidth=1, linestyle="--", label="sticking contacts")
     upper.set_ylabel("resonance in Hz")
@@ -133,6 +136,7 @@ def envelope_picture(found: Envelope, path: Path, title: str) -> Path:
     for i, (a, ok) in enumerate(zip(found.monitor, found.converged, strict=True)):
         label = f"each of {len(found.monitor)} combinations" if i == 0 else None
         axes.plot(found.frequency, np.where(ok, 1e6 * np.abs(a), np.nan), color="0.45", linewidth=0.6, label=label)
+    mark_missing(axes, found.frequency[~found.converged.all(axis=0)], "#b3261e")
     _in_millionths(axes, found.quantity)
     axes.set_xlim(found.frequency[0], found.frequency[-1])
     axes.set_xlabel("excitation frequency in Hz")
@@ -155,6 +159,9 @@ def speed_line_picture(
     for axes in (upper, lower):
         plain_axes(axes)
     upper.plot(rpm, 1e6 * amplitude, color="#1f5f99", linewidth=1.6)
+    if (lost := np.isnan(amplitude)).any():
+        mark_missing(upper, rpm[lost], "#1f5f99")
+        upper.legend(fontsize=8)
     _in_millionths(upper, of)
     upper.set_title(title)
     for i, (colour, force) in enumerate(zip(shades(normal.shape[1]), normal.T, strict=True)):

@@ -21,6 +21,7 @@ from .plots import (
     said_beside,
     save_figure,
     single_panel,
+    widths,
 )
 
 if TYPE_CHECKING:
@@ -37,12 +38,12 @@ def curve_plot(found: Sequence[Followed], path: Path, title: str) -> Path:
     figure, axes = single_panel(9.0, 5.6)
     scale, unit = _scale(0.1 * np.concatenate([one.amplitude for one in found]), found[0].quantity)
     colours = shades(len(found)) if len(found) > 1 else [COLOURS[0]]
-    for colour, one in zip(colours, found, strict=True):
+    for width, colour, one in zip(widths(len(found)), colours, found, strict=True):
         x, y = one.parameter, scale * one.amplitude
         ends = [0, *np.flatnonzero(one.fold), len(x) - 1]
         for leg, (a, b) in enumerate(zip(ends[:-1], ends[1:], strict=True)):
             line, label = "--" if leg % 2 else "-", one.label.replace("F_N", "$F_N$") if leg == 0 else None
-            axes.plot(x[a : b + 1], y[a : b + 1], line, color=colour, linewidth=1.6, label=label)
+            axes.plot(x[a : b + 1], y[a : b + 1], line, color=colour, linewidth=width, label=label)
         size = 6 if one.fold.sum() < 8 else 3.5
         axes.plot(x[one.fold], y[one.fold], "o", color=colour, markersize=size, markerfacecolor="white", zorder=4)
         if one.early:
@@ -88,11 +89,12 @@ def backbone_plot(found: Mapping[float, Backbone], title: str, path: Path, of: Q
     left, right = figure.subplots(1, 2)
     ends = [np.sqrt(one.amplitude[:1] * one.amplitude[-1:]) for one in found.values()]
     scale, unit = _scale(0.1 * np.concatenate([[1e-9], *ends]), of)
-    for colour, (normal, one) in zip(shades(len(found)), sorted(found.items()), strict=True):
+    order = sorted(found.items())
+    for width, colour, (normal, one) in zip(widths(len(order)), shades(len(order)), order, strict=True):
         x, label = scale * one.amplitude, f"$F_N$ = {normal:g} N"
-        left.semilogx(x, one.Omega / (2 * np.pi), color=colour, linewidth=1.7, label=label)
+        left.semilogx(x, one.Omega / (2 * np.pi), color=colour, linewidth=width, label=label)
         left.axhline(one.stuck / (2 * np.pi), color=colour, linewidth=0.8, linestyle=":")
-        right.semilogx(x, 100 * one.damping, color=colour, linewidth=1.7, label=label)
+        right.semilogx(x, 100 * one.damping, color=colour, linewidth=width, label=label)
     for axes, quantity in ((left, "frequency in Hz (dotted: contacts stuck)"), (right, "damping ratio in %")):
         plain_axes(axes)
         axes.set(xlabel=f"amplitude of the read-out in {unit} (0-peak)", ylabel=quantity)
@@ -163,11 +165,12 @@ def stability_plot(found: Mapping[float, Mapping[float, Stability]], title: str,
     """Largest multiplier over the frequency, a curve a normal force (N); what is not stable stands out."""
     figure, axes = single_panel(9.0, 5.0)
     axes.axhline(1.0, color="#333", linewidth=1.0)
-    for colour, (normal, points) in zip(shades(len(found)), sorted(found.items()), strict=True):
+    order = sorted(found.items())
+    for width, colour, (normal, points) in zip(widths(len(order)), shades(len(order)), order, strict=True):
         f = np.array(sorted(points))
         growth = np.array([points[x].growth for x in f])
         lost = np.array([not points[x].stable for x in f], dtype=bool)
-        axes.plot(f, growth, color=colour, linewidth=1.5, label=f"$F_N$ = {normal:g} N")
+        axes.plot(f, growth, color=colour, linewidth=width, label=f"$F_N$ = {normal:g} N")
         axes.plot(f[lost], growth[lost], "o", color="#c8382c", markersize=5)
     axes.set(
         xlabel="excitation frequency in Hz", ylabel="largest Floquet multiplier (red dots: not stable)", title=title

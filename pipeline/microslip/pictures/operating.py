@@ -13,16 +13,19 @@ from ..operating.cycle import at_time, farthest_at
 from ..operating.fatigue import Endurance, MaterialLimits, allowed_amplitude, vibration_margin
 from ..operating.motion import Motion, displacement
 from ..operating.stress import CycleStress, StressPeaks
+from ..units import counted
 from .plots import (
     COLOURS,
     by_rows,
     empty_figure,
     length_unit,
+    mark_missing,
     plain_numbers,
     said_beside,
     save_figure,
     single_panel,
     through,
+    widths,
 )
 
 if TYPE_CHECKING:
@@ -52,24 +55,26 @@ def over_frequency_plot(
     """A quantity over the frequency (Hz) for every normal force, on a logarithmic scale.
 
     Args:
-        curves: NaN where a point did not converge. quantity: label of the ordinate with its unit. lifted: normal force,
-            N -> which points are not valid, because contacts would lift off; they are dotted.
+        curves: NaN where a point did not converge, which is marked. quantity: label of the ordinate with its unit.
+            lifted: normal force, N -> which points are not valid, because contacts would lift off; they are dotted.
     """
     figure, axes = single_panel(9.0, 6.0)
     pairs = list(zip(shades(len(curves)), sorted(curves.items()), strict=True))
     told = ""
-    for colour, (normal, (x, y)) in reversed(pairs):  # the light ones on top
+    for width, (colour, (normal, (x, y))) in zip(widths(len(pairs)), pairs, strict=True):
         off = (lifted or {}).get(normal, np.zeros(len(x), dtype=bool))
         if off.any():
-            axes.semilogy(*through(x, np.where(off, y, np.nan)), color=colour, linewidth=1.8, linestyle=":")
+            axes.semilogy(*through(x, np.where(off, y, np.nan)), color=colour, linewidth=width, linestyle=":")
             told = "dotted: contacts would lift off, not valid"
         line = {"linestyle": ":" if off.all() else "-", "label": f"$F_N$ = {normal:g} N"}
-        axes.semilogy(*through(x, np.where(off, np.nan, y)), color=colour, linewidth=1.6, **line)
+        axes.semilogy(*through(x, np.where(off, np.nan, y)), color=colour, linewidth=width, **line)
+    for row, (colour, (_, (x, y))) in enumerate(pairs):
+        mark_missing(axes, x[np.isnan(y)], colour, row)
     low, high = (f(float(f(x)) for x, _ in curves.values()) for f in (min, max))
     axes.set(xlabel="excitation frequency in Hz", ylabel=quantity, title=title, xlim=(low, high))
     numbers_within(axes.yaxis)
     lines, names = axes.get_legend_handles_labels()
-    lines, names = by_rows(lines[::-1], names[::-1], 6)
+    lines, names = by_rows(lines, names, 6)
     figure.legend(lines, names, loc="outside lower center", ncols=6, fontsize=9, title=told or None, title_fontsize=8)
     return save_figure(figure, path)
 
@@ -182,7 +187,7 @@ def _margin(worst: Endurance) -> str:
 _PANELS = (
     ("pressure_mean", "mean pressure", 1e-6, "MPa", "YlOrRd"),
     ("traction", "swing of the traction", 1e-6, "MPa", "YlOrRd"),
-    ("dissipated", "energy per cycle", 1.0, "J/m²", "BuPu"),
+    ("dissipated", "lost per cycle", 1.0, "J/m²", "BuPu"),
     ("slipping", "slips", 100.0, "% of the cycle", "viridis"),
     ("open", "separated", 100.0, "% of the cycle", "viridis"),
 )
@@ -203,13 +208,20 @@ def contact_map_plot(maps: Sequence[ContactMap], title: str, path: Path) -> Path
     for j, (m, lies) in enumerate(zip(maps, flat, strict=True)):
         for i, panel in enumerate(_PANELS):
             _map_panel(table[i, j], m, *panel, lies, "\n" if narrow else ": ")
-        told = f"{m.name}: {m.normal_force:.4g} N, {_energy(m.loss)} a cycle"
+        told = f"{m.name}: {m.normal_force:.4g} N, {_energy(m.loss)} a cycle{_left(m)}"
         table[0, j].set_title(f"{told}\n{table[0, j].get_title()}", fontsize=9.5)
         for axes in table[:-1, j]:
             axes.tick_params(labelbottom=False)
         table[-1, j].set_xlabel(("t1" if lies else "t2") + " in mm", fontsize=9)
     figure.suptitle(title, fontweight="bold")
     return save_figure(figure, path)
+
+
+def _left(m: ContactMap) -> str:
+    """How a patch loses energy that slips nowhere, and what its samples leave in the balance."""
+    opens = " as area opens" if _energy(m.loss) != "0 J" and not m.slipping.any() else ""
+    left = _energy(m.unbalanced)
+    return opens + ("" if left == "0 J" else f"\n{left} more not balanced by {counted(m.samples, 'sample')}")
 
 
 def _energy(joules: float) -> str:
@@ -239,15 +251,16 @@ def _map_panel(
     axes.set_ylabel(("t2" if lies else "t1") + " in mm", fontsize=9)
     axes.tick_params(labelsize=8)
     axes.set_title(f"{label}{between}{_span(values)} {unit}", fontsize=9.5)
-    bar = axes.figure.colorbar(shown, ax=axes, shrink=0.95, pad=0.02, aspect=10, ticks=MaxNLocator(4))
+    ticks: Any = MaxNLocator(4) if high > low else [0.0]
+    bar = axes.figure.colorbar(shown, ax=axes, shrink=0.95, pad=0.02, aspect=10, ticks=ticks)
     bar.ax.tick_params(labelsize=7.5)
 
 
 def _span(values: Array) -> str:
-    """Smallest and largest value; one where all are the same."""
-
+    """Smallest and largest value; one where both read the same."""
     low, high = float(values.min()), float(values.max())
-    return f"{high:.3g} everywhere, in" if high - low <= 1e-3 * abs(high) else f"{low:.3g} to {high:.3g}"
+    told = f"{low:.3g} to {high:.3g}"
+    return f"{high:.3g} everywhere, in" if told == f"{high:.3g} to {high:.3g}" else told
 
 
 # the body ----------------------------------------------------------------------------------------------------------

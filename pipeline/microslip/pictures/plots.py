@@ -78,6 +78,24 @@ def through(x: Array, y: Array, each: int = 8) -> tuple[Array, Array]:
     return fine, out
 
 
+def widths(count: int) -> list[float]:
+    """Widths of curves that may coincide, in the order in which they are drawn: those below are wider, so that all are
+    seen. A single one is as wide as the last."""
+    return np.linspace(1.6 + min(1.2 * (count - 1), 3.2), 1.6, count).tolist()
+
+
+def mark_missing(axes: Axes, x: Array, colour: Any, row: int = 0) -> None:
+    """Crosses at the lower edge where a curve has no point that converged, those of each curve in a row of its own; the
+    first ones of an axes are told in the legend."""
+    if not len(x):
+        return
+    told = "did not converge"
+    label = "_" if told in axes.get_legend_handles_labels()[1] else told
+    height = np.full(len(x), 0.015 + 0.02 * row)
+    how: dict[str, Any] = {"ms": 5, "mew": 1.3, "clip_on": False, "zorder": 5, "label": label}
+    axes.plot(x, height, "x", color=colour, transform=axes.get_xaxis_transform(), **how)
+
+
 def said_beside(axes: Axes, text: str, at: tuple[float, float], shift: tuple[float, float], **how: Any) -> None:
     """Words beside a place of a diagram, so many points to the right and above it."""
     axes.annotate(text, at, xytext=shift, textcoords="offset points", **how)

@@ -19,7 +19,7 @@ from ..harmonic_balance.sweeps import overhanging
 from ..results.names import apart
 from ..units import METRES, Quantity
 from .operating import shades
-from .plots import by_rows, plain_numbers, said_beside, through, write_png
+from .plots import by_rows, mark_missing, plain_numbers, said_beside, through, widths, write_png
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -98,7 +98,7 @@ def _curves(
     axes.plot(free.frequency, 1e6 * np.abs(free.monitor), color="0.6", lw=1, ls=style, label=f"no contact{of}")
     forces, colours = sorted(result.responses), shades(len(result.responses))
     lifts = False
-    for colour, normal, said in zip(colours, forces, apart(forces), strict=True):
+    for width, colour, normal, said in zip(widths(len(forces)), colours, forces, apart(forces), strict=True):
         r, peaks = result.responses[normal], result.resonances[normal]
         apart_from_it = [f for f, _ in overhanging(r, peaks)]
         if w.number:
@@ -109,12 +109,15 @@ def _curves(
         on = ~np.isin(f, apart_from_it)
         if (off := lifted(built, r)).any():
             off = np.interp(f, r.frequency, off) > 0
-            axes.plot(*through(f[on], np.where(off, amplitude, np.nan)[on]), color=colour, lw=1.8, ls=":")
+            axes.plot(*through(f[on], np.where(off, amplitude, np.nan)[on]), color=colour, lw=width, ls=":")
             amplitude, lifts = np.where(off, np.nan, amplitude), True
         line, label = style if np.isfinite(amplitude).any() else ":", f"$F_N$ = {said} N{of}"
         single = [(f, 1e6 * a) for f, a in peaks if f in apart_from_it]
         axes.plot(*np.reshape(single, (-1, 2)).T, "o", color=colour, ms=4)
-        axes.plot(*through(f[on], amplitude[on]), color=colour, lw=1.6, ls=line, label=label)
+        axes.plot(*through(f[on], amplitude[on]), color=colour, lw=width, ls=line, label=label)
+    for row, (colour, normal) in enumerate(zip(colours, forces * (w.number == 0), strict=False)):
+        r = result.responses[normal]
+        mark_missing(axes, r.frequency[~r.converged], colour, row)
     return lifts
 
 

@@ -90,6 +90,19 @@ class Assessment:
         valid = [r for r in self.resonances if r.normal_force not in self.not_valid]
         return min(valid or self.resonances, key=key, default=None)
 
+    @property
+    def slipping(self) -> StressedResonance | None:
+        """The valid resonance at which the contacts slip for the largest share of the cycle; `highest` where none
+        does."""
+        valid = [r for r in self.resonances if r.normal_force not in self.not_valid]
+        most = max(valid, key=self._slips, default=None)
+        return self.highest if most is None or not self._slips(most) > 0 else most
+
+    def _slips(self, r: StressedResonance) -> float:
+        """Sum of the shares of the cycle in which its contacts slip."""
+        arrays = self.sweeps[r.normal_force][0].arrays
+        return sum(float(a[r.stressed]) for n, a in arrays.items() if n.endswith("/slipping"))
+
     def at(self, r: StressedResonance) -> tuple[Motion, CycleStress]:
         """Motion and stress where a resonance stresses the body most."""
         motion = self.sweeps[r.normal_force][1].at(r.stressed)
@@ -259,9 +272,10 @@ def draw(
     top = found.highest
     if top is not None:
         drawn |= _at_worst(found, top, basis, case, folder, scenes)
+    rubs = found.slipping
     for title, patches in (maps or {}).items():
         path = folder / f"{title.replace(' ', '_')}.png"
-        where = f", {top.stressed_at:.5g} Hz, $F_N$ = {top.normal_force:g} N" if top is not None else ""
+        where = f", {rubs.stressed_at:.5g} Hz, $F_N$ = {rubs.normal_force:g} N" if rubs is not None else ""
         some = f"\n{len(patches)} of {contacts} contacts are shown" if len(patches) < contacts else ""
         drawn[title] = operating.contact_map_plot(patches, f"{case}: {title}{where}{some}", path)
     return drawn

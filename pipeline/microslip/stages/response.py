@@ -312,8 +312,9 @@ def _lifted_off(result: CaseResult, found: assessment.Assessment) -> dict[float,
 def _maps(
     result: CaseResult, found: assessment.Assessment, report: Report
 ) -> tuple[dict[str, list[ContactMap]], list[str]]:
-    """Title -> contacts at the worst resonance; nothing, and why, where they do not agree with the response."""
-    top = found.highest
+    """Title -> contacts at the resonance at which they slip most; nothing, and why, where they do not agree with the
+    response."""
+    top = found.slipping
     assert top is not None
     report(f"contacts at {top.stressed_at:.6g} Hz")
     series = found.sweeps[top.normal_force][0]
@@ -329,7 +330,8 @@ def _maps(
 def _for_paraview(
     found: assessment.Assessment, basis: ModalBasis, maps: Mapping[str, list[ContactMap]], folder: Path
 ) -> list[Path]:
-    """The operating shape and the contacts at the worst resonance as VTU; nothing without meshio."""
+    """The operating shape at the worst resonance and the contacts where they slip most as VTU; nothing without
+    meshio."""
     if not _is_there("meshio"):
         return []
     from ..operating.contact_maps import write_contact_vtu
