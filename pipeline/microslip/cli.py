@@ -213,7 +213,7 @@ def run(
 
     Args:
         path: a body.toml, a system.toml, a case.toml, or the folder that holds it; the name of a body or a case; a
-            folder or file of products.
+            folder or file of products; or the word sample, as respond has it.
     """
     from .basis import read_basis
     from .stages.job import holds_a_case_alone, open_job, system_file
@@ -222,8 +222,9 @@ def run(
     from .stages.running import run_body, run_case_file, run_system
     from .stages.summary import frequency_lines
 
+    if str(path) == "sample" and not path.exists():
+        return respond(path, set_=set_, no_stress=no_stress, no_pictures=no_pictures, force=force, quiet=quiet)
     wanted = Wanted("none" if no_stress else "all", not no_pictures)
-
     path = meant(path)
     path = path / "case.toml" if holds_a_case_alone(path) else path
     if is_rolling(path) or is_tyre(path):

@@ -326,9 +326,11 @@ def open_file(path: Path | str) -> h5py.File:
     path = Path(path)
     if not ordinary(path).is_file():
         raise UserError(f"{path}: no such modal file; make it first or correct the path")
-    refuse_damaged(path, _TRIAL, "write it again")
+    refuse_damaged(path, _TRIAL, AGAIN)
     return _open(path)
 
+
+AGAIN = "make it again by microslip modes, or by the program that wrote it"
 
 _TRIAL = "from microslip.basis.files import _open, _read; _read(_open(path))"
 
@@ -337,7 +339,7 @@ def _open(path: Path) -> h5py.File:
     try:
         file = h5py.File(path, "r")
     except DAMAGE as error:
-        raise UserError(f"{path}: is damaged or no HDF5 file ({short(error)}); write it again") from error
+        raise UserError(f"{path}: is damaged or no HDF5 file ({short(error)}); {AGAIN}") from error
     try:
         _accept(file, path)
     except BaseException:
@@ -351,15 +353,15 @@ def _accept(file: h5py.File, path: Path) -> None:
         form, version = file.attrs.get("format"), file.attrs.get("format_version")
         known = form == FORMAT
     except DAMAGE as error:
-        raise UserError(f"{path}: is damaged ({short(error)}); write it again") from error
+        raise UserError(f"{path}: is damaged ({short(error)}); {AGAIN}") from error
     if not known:
         raise OtherFormat(path, form)
     if not isinstance(version, str) or version.split(".")[0] != FORMAT_VERSION.split(".")[0]:
-        raise UserError(f"{path}: has format version {version}, this program reads {FORMAT_VERSION}; write it again")
+        raise UserError(f"{path}: has format version {version}, this program reads {FORMAT_VERSION}; {AGAIN}")
     try:
         inspect(file)
     except DAMAGE as error:
-        raise UserError(f"{path}: is damaged or no modal file ({short(error)}); write it again") from error
+        raise UserError(f"{path}: is damaged or no modal file ({short(error)}); {AGAIN}") from error
 
 
 def read_basis(path: Path | str) -> ModalBasis:
@@ -376,7 +378,7 @@ def _read_or_refuse(file: h5py.File, path: Path) -> ModalBasis:
     try:
         return _read(file)
     except DAMAGE as error:
-        raise UserError(f"{path}: is damaged or incomplete ({short(error)}); write it again") from error
+        raise UserError(f"{path}: is damaged or incomplete ({short(error)}); {AGAIN}") from error
 
 
 def _read(file: h5py.File) -> ModalBasis:

@@ -23,7 +23,7 @@ def name_picked(rules: Sequence[dict[str, Any]], marks: Marks) -> None:
     for rule in rules:
         picked = pick(rule, marks)
         if not picked:
-            way = {k: v for k, v in rule.items() if k != "name" and v is not None}
+            way = ", ".join(f"{k} = {v!r}" for k, v in rule.items() if k != "name" and v is not None)
             raise UserError(
                 f"geometry.faces: no surface answers to {way} of face {rule.get('name')!r}; the file "
                 f"has {len(marks)} surfaces, list them with: microslip info FILE"

@@ -79,6 +79,11 @@ def _renumbered(rule: dict[str, Any], own: list[int] | None, heirs: dict[int, in
     if own is not None:
         return {"name": rule.get("name"), "surfaces": own}
     if rule.get("surfaces") is not None:
+        if missing := sorted(set(rule["surfaces"]) - set(heirs.values())):
+            raise UserError(
+                f"geometry.faces: face {rule.get('name')!r}: there is no surface {', '.join(map(str, missing))}; list "
+                "them with: microslip info FILE"
+            )
         left = [tag for tag, old in heirs.items() if old in rule["surfaces"] and tag not in taken]
         return {**rule, "surfaces": left}
     return rule

@@ -31,7 +31,9 @@ class HostileFile(ValueError):
 
 
 def short(error: BaseException) -> str:
-    """The first line of what went wrong."""
+    """The first line of what went wrong, where it is not that of a file whose end is missing."""
+    if "truncated file" in str(error):
+        return "its end is missing"
     return " ".join((str(error).splitlines() or ["unreadable"])[0].split())[:120]
 
 
