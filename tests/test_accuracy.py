@@ -158,6 +158,18 @@ def test_too_few_harmonics_of_a_slider_are_told():
     assert "At F_N = 8 N the amplitude at 17 Hz" in message
 
 
+def test_places_without_a_finer_solution_are_told_once_with_what_to_do():
+    """Of all normal forces together; the first three places, and how many more."""
+    left = _Left(SimpleNamespace(settings=SimpleNamespace(balanced=3, sampled=64)), None)
+    assert left.unknown() == []
+    left.lost = {20.0: [10.0, 11.0, 12.0, 13.0, 14.0], 1e5: [7.25]}
+    (said,) = left.unknown()
+    assert "at 10, 11, 12 Hz and 2 more under F_N = 20 N; at 7.25 Hz under F_N = 100000 N, so" in said
+    assert "harmonics = 6, samples = 128" in said and "--stability" in said
+    left.lost = {float(n): [1.0] for n in range(5)}
+    assert "at 1 Hz under F_N = 2 N and 2 more normal forces, so" in left.unknown()[0]
+
+
 @pytest.mark.slow
 def test_a_case_says_where_its_harmonics_are_too_few():
     """One harmonic at a contact that slides and opens is remarked on; seven are not."""

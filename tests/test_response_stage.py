@@ -425,10 +425,16 @@ def test_a_point_that_fails_is_kept_with_its_status(folder: Path, monkeypatch: p
 
     monkeypatch.setattr(solver, "newton", stubborn)
     told, converged = respond(folder, "sweep.points=5")
-    assert not converged and any("points did not converge" in t and "360 Hz" in t for t in told)
+    assert not converged and any("1 point did not converge" in t and "360 Hz" in t for t in told)
     series = read_response(folder / "build/vane/response.h5").series[0]
     assert [s for s in series.status if s != "converged"] == ["iteration limit: no convergence"]
-    assert json.loads((folder / "build/vane/response.json").read_text())["failed_points"] == 1
+    summary = json.loads((folder / "build/vane/response.json").read_text())
+    where = "at 360 Hz under F_N = 50 N; response.csv marks them by 0 in converged_FN_50_N"
+    assert summary["failed_points"] == 1 and summary["unsolved"] == running.unsolved(folder / "build/vane")
+    assert summary["unsolved"] == f"1 of {len(series)} points did not converge, {where}"
+    table = np.genfromtxt(folder / "build/vane/response.csv", delimiter=",", names=True)
+    assert table["frequency_Hz"][table["converged_FN_50_N"] == 0] == [360.0]
+    assert (folder / "build/vane/response.html").read_text().count("did not converge, at 360 Hz under F") == 1
     monkeypatch.setattr(solver, "newton", newton)
     told, converged = respond(folder, "sweep.points=5", force=True)
     assert converged

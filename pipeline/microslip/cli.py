@@ -219,7 +219,7 @@ def run(
     from .stages.job import holds_a_case_alone, open_job, system_file
     from .stages.places import is_case, is_rolling, is_tyre, meant
     from .stages.response import Wanted
-    from .stages.running import run_body, run_case_file, run_system
+    from .stages.running import run_body, run_case_file, run_system, unsolved
     from .stages.summary import frequency_lines
 
     if str(path) == "sample" and not path.exists():
@@ -243,8 +243,9 @@ def run(
             print("\n".join(frequency_lines(read_basis(job.basis_file))))
     _say(page, quiet)
     if not converged:
-        marked = page.name if page.name in ("two_tones.html", "mistuning.html") else "response.csv"
-        raise NotConverged(f"some points of the response did not converge; they are marked in {marked}")
+        others = page.name in ("two_tones.html", "mistuning.html")
+        some = f"some points of the response did not converge; they are marked in {page.name}"
+        raise NotConverged(some if others else unsolved(page.parent) or some)
 
 
 @app.command
@@ -352,7 +353,7 @@ def respond(
     for file in files if stability else ():
         _say(file, quiet)
     if not converged:
-        raise NotConverged("some points of the response did not converge; they are marked in response.csv")
+        raise NotConverged(running.unsolved(table.parent, compare_book))
 
 
 @app.command

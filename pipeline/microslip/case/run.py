@@ -28,6 +28,7 @@ from ..harmonic_balance.solver import Point
 from ..harmonic_balance.sweeps import overhanging
 from ..results import Journal
 from ..results.checks import cause
+from ..results.names import apart
 from ..system.assembly import Assembly, Linear
 from ..units import Quantity, counted, percent
 from . import edges
@@ -144,6 +145,7 @@ def _run(
         *raising(built, max(forces, default=None)),
         *_of_stuck_modes(built, max(forces, default=None)),
         *messages,
+        *left.unknown(),
         *_too_coarse(settings, *stuck),
         *_not_converged(responses),
         *_idle(idle),
@@ -338,12 +340,14 @@ class _Left:
     """What harmonics and samples that are left out would change.
 
     tolerance: their number is looked for, until the share of an amplitude is within it; None: it is given. most: the
-    largest share, None where nothing is judged. errors: normal force (N) -> Hz -> share, of what is judged.
+    largest share, None where nothing is judged. errors: normal force (N) -> Hz -> share, of what is judged. lost:
+    normal force (N) -> Hz, where no solution with more of them was found, and nobody knows the share.
     """
 
     def __init__(self, built: Built, tolerance: float | None) -> None:
         self.built, self.tolerance, self.most = built, tolerance, None
         self.errors: dict[float, dict[float, float]] = {}
+        self.lost: dict[float, list[float]] = {}
 
     most: float | None
 
@@ -371,22 +375,33 @@ class _Left:
         }
         if not looked_at:
             return []
+        if lost := [point.Omega / (2 * np.pi) for point, _, share in looked_at if not np.isfinite(share)]:
+            self.lost[normal] = lost
         point, e, share = max(looked_at, key=lambda one: one[2])
         self.most = max(self.most or 0.0, share)
         where = f"At F_N = {normal:g} N the amplitude at {point.Omega / (2 * np.pi):.6g} Hz is uncertain"
         balanced = counted(problem.harmonics, "harmonic")
-        if share <= (TRUNCATION if self.tolerance is None else self.tolerance):
+        if share <= (TRUNCATION if self.tolerance is None else self.tolerance) or not np.isfinite(share):
             return []
         if self.tolerance is not None:
             return [f"{where} by about {percent(share)} with {balanced}, above harmonics_error; no solution with more "
                     "was found."]  # fmt: skip
-        if not np.isfinite(share):
-            finer = f"twice the harmonics ({e.harmonics}) and samples ({e.samples})"
-            return [f"{where}: with {finer} no solution was found."]
         what = "harmonics" if e.by_harmonics > e.by_samples else "samples"
         said = f"mostly for want of {what}, with {balanced} and {e.samples} samples; raise {what}"
         said += f" (and samples to {16 * (problem.harmonics + 2)} or more)." if what == "harmonics" else "."
         return [f"{where} by about {percent(share)}, {said}"]
+
+    def unknown(self) -> list[str]:
+        """A message on all places whose error nobody knows, and what to do about them."""
+        if not self.lost:
+            return []
+        s = self.built.settings
+        return [
+            f"With twice the harmonics and samples no solution was found {at_places(self.lost)}, so how uncertain "
+            f"amplitudes are there is not known: respond with more of them (harmonics = {2 * s.balanced}, samples = "
+            f"{2 * s.sampled}; its points begin at their neighbours) and more sweep.points there; if these fail too, "
+            "microslip respond CASE --stability tells whether what was found is stable."
+        ]
 
     def _enough(
         self, problem: Problem, found: HarmonicResponse, point: Point, estimate: Error, share: float, normal: float
@@ -532,6 +547,25 @@ REMEDIES = {
 """What to do about a cause, where the status of the point does not say it."""
 
 
+SAID = 3
+"""Frequencies, and normal forces, that a sentence names; the others are counted."""
+
+
+def at_places(places: Mapping[float, Sequence[float]]) -> str:
+    """Normal force (N) -> frequencies (Hz), in words."""
+    said = [
+        f"at {_some([f'{f:.6g}' for f in at], ' Hz')} under F_N = {force} N"
+        for force, at in zip(apart(list(places)), places.values(), strict=True)
+    ]
+    return _some(said, "", "; ", " normal forces")
+
+
+def _some(names: Sequence[str], unit: str, between: str = ", ", what: str = "") -> str:
+    """The first of some names, and how many more there are."""
+    more = f" and {len(names) - SAID} more{what}" if len(names) > SAID else ""
+    return between.join(names[:SAID]) + unit + more
+
+
 def _not_converged(responses: Mapping[float, HarmonicResponse]) -> list[str]:
     """A message for each normal force and cause."""
     found = []
@@ -540,7 +574,7 @@ def _not_converged(responses: Mapping[float, HarmonicResponse]) -> list[str]:
         for why in dict.fromkeys(map(cause, failed.values())):
             at = [f for f, text in failed.items() if cause(text) == why]
             remedy = REMEDIES.get(why, REMEDIES["iteration limit"])
-            many = f"At F_N = {normal:g} N {len(at)} of {len(r.frequency)} points did not converge"
+            many = f"At F_N = {normal:g} N {counted(len(at), 'point')} did not converge"
             said = f"{many}, first at {at[0]:.6g} Hz: {failed[at[0]]}"
             found.append(said + (f"; {remedy}." if remedy else "."))
     return found

@@ -36,10 +36,10 @@ def response_html(summary: Mapping[str, Any], pictures: Mapping[str, Path]) -> s
 def answer(response: Mapping[str, Any], album: Album) -> list[Piece]:
     """What a person came for: sentences, the resonances, the curve."""
     rows = response.get("resonances", [])
-    failed = response.get("failed_points")
+    failed = response.get("unsolved")
     return [
         say(*_sentences(response), tone="lead"),
-        say(f"{failed} points did not converge; they are marked in the table." if failed else "", tone="bad"),
+        say(f"{failed}." if failed else "", tone="bad"),
         _resonances(rows) if rows else say(""),
         say(_of_others(response) if rows else ""),
         album.take(SHOWN[0]),
@@ -216,7 +216,7 @@ def response_pieces(response: Mapping[str, Any], album: Album) -> list[Piece]:
     ]
 
 
-_TOLD = {"stuck_frequencies_Hz": "stuck_modes", "estimated_error_of_harmonics": "resonances"}
+_TOLD = {"stuck_frequencies_Hz": "stuck_modes", "estimated_error_of_harmonics": "resonances", "unsolved": "unsolved"}
 """What need not be told again where the page has a table of something else, or sentences from it."""
 
 _HEADINGS = {

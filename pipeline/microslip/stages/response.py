@@ -16,7 +16,7 @@ import numpy as np
 from ..basis import read_basis
 from ..case import CaseResult, CaseSettings, checkpoint, load_case, run_case
 from ..case.assemble import build
-from ..case.run import lifted
+from ..case.run import at_places, lifted
 from ..case.settings import FIRST_HARMONICS
 from ..data import Array, ModalBasis
 from ..errors import UserError
@@ -25,8 +25,9 @@ from ..files.tables import rows_csv
 from ..harmonic_balance.response import HarmonicResponse
 from ..harmonic_balance.sweeps import overhanging
 from ..report.response import JUMPS, highest, lifted_forces, response_html
-from ..results import Response, read_journal, read_response, response_of, response_table, write_response
+from ..results import Response, Series, read_journal, read_response, response_of, response_table, write_response
 from ..results.checks import sentence
+from ..results.names import apart
 from ..results.series import CONVERGED
 from ..units import counted, percent, to_rpm
 from . import assessment
@@ -149,6 +150,7 @@ def _finished(points: Checkpoint, result: CaseResult, wanted: Wanted, report: Re
     response = _response(points, result, summary)
     series = {normal: response.one(normal_force=normal) for normal in result.responses}
     store.write_text(folder / "response.csv", response_table(series))
+    summary["unsolved"] = unsolved(series)
     summary["resonances"] = _judged(response, result, summary["resonances"])
     drawn = _drawn(result, summary["resonances"], folder) if wanted.pictures else {}
     response = replace(response, resonances=tuple(summary["resonances"]))
@@ -211,7 +213,7 @@ def _doubt(result: CaseResult, normal: float, frequency: float, status: str, err
     ):
         return f"beside it is {JUMPS}, higher perhaps: respond --over frequency"
     if not np.isfinite(error):
-        return "uncertain: with more harmonics and samples no solution was found"
+        return "uncertain: no solution with more harmonics"
     return f"uncertain by about {percent(error)}: raise harmonics and samples" if error > UNCERTAIN else ""
 
 
@@ -407,6 +409,24 @@ def summarise(result: CaseResult) -> dict[str, Any]:
         "failed_points": failed,
         "messages": list(result.messages),
     }
+
+
+def unsolved(series: Mapping[float, Series]) -> str:
+    """How many points of a case are no solutions, which, and where that is marked; nothing where all are.
+
+    Args:
+        series: normal force (N) -> its points.
+    """
+    failed = {n: [f for f, _ in s.failures] for n, s in series.items() if s.failures}
+    if not failed:
+        return ""
+    many, whole = sum(map(len, failed.values())), sum(map(len, series.values()))
+    named = dict(zip(series, apart(list(series)), strict=True))[next(iter(failed))]
+    more = " and so on" if len(failed) > 1 else ""
+    return (
+        f"{many} of {counted(whole, 'point')} did not converge, {at_places(failed)}; response.csv marks them by 0 in "
+        f"converged_FN_{named}_N{more}"
+    )
 
 
 RIGID = 1e-6

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -149,6 +150,13 @@ def respond(
     summary, converged = response_stage(case_path, files, folder, assignments, force, report, log, wanted)
     _tell(summary, report)
     return folder / "response.csv", converged
+
+
+def unsolved(folder: Path, compared: bool = False) -> str:
+    """Which points of the response in a folder did not converge; compared: in the other mode too, where it was."""
+    folders = [folder, folder / "aft", folder / "book"] if compared else [folder]
+    told = [json.loads(file.read_text()) for f in folders if (file := f / "response.json").is_file()]
+    return "; ".join(f"{t['mode']}: " * compared + t["unsolved"] for t in told if t.get("unsolved"))
 
 
 def _tell(summary: Mapping[str, Any], report: Report) -> None:
