@@ -137,7 +137,7 @@ def test_a_linked_journal_is_copied_first(tmp_path: Path, link: Any) -> None:
 
 
 @pytest.mark.parametrize("kind", ["pipe", "device", "folder", "link to a pipe"])
-@pytest.mark.parametrize("name", ["response.json", "response.json.json", "response.csv"])
+@pytest.mark.parametrize("name", ["response.json", "response.record.json", "response.csv"])
 def test_what_is_no_file_is_no_product(name: str, kind: str, folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     before = odd(folder / BUILD / name, kind).lstat()
     assert name in refused(["respond", ".", "-q"], capsys)
@@ -347,7 +347,7 @@ def test_a_full_disk_in_the_middle_of_a_response(
     line = refused(["respond", ".", "-q", "--set", "amplitude=4.0"], capsys)
     assert f"{BUILD}/response.h5" in line and "nothing" not in line
     changed = {p.name for p, data in before.items() if not p.is_file() or p.read_bytes() != data}
-    assert changed == {"response.csv", "response.json.json", "response.points"}
+    assert changed == {"response.csv", "response.record.json", "response.points"}
     monkeypatch.setattr(os, "replace", replace)
     assert main(["respond", ".", "-q"]) == 0
     assert (folder / BUILD / "response.csv").read_bytes() == before[folder / BUILD / "response.csv"]

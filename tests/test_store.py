@@ -271,8 +271,11 @@ def test_every_file_of_a_product_counts(tmp_path: Path) -> None:
     os.utime(product, (0, 0))
     assert store.nothing_to_do(product, {}, report=told.append) and len(told) == 1 and product.stat().st_mtime > 0
     assert not store.nothing_to_do(product, {}, force=True) and not store.nothing_to_do(product, {"more": 1})
+    former = tmp_path / "response.json.json"  # where the sidecar of this product stood before
+    former.write_text("{}")
     store.unfinished(product)
     store.unfinished(product)
+    assert not former.exists() and not (tmp_path / "response.record.json").exists()
     assert not store.is_up_to_date(product, {})
 
 

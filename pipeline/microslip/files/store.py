@@ -1,8 +1,8 @@
 """Files that are complete or absent, their hashes, and the rule that decides whether a product is up to date.
 
-A product ``X`` may have a sidecar ``X.json`` with the hash of exactly the inputs and settings it was made from
-(key ``inputs``), of the product itself, of every further file that was written with it (``files``), and with what
-changes from run to run (time, commit). The product itself holds nothing volatile.
+A product ``X`` may have a sidecar ``X.json`` (``X.record.json``, if it is ``X.json`` itself) with the hash of exactly
+the inputs and settings it was made from (key ``inputs``), of the product itself, of every further file that was written
+with it (``files``), and with what changes from run to run (time, commit). The product itself holds nothing volatile.
 """
 
 from __future__ import annotations
@@ -334,9 +334,9 @@ def _taken(lock: int, file: Path, why: str, report: Callable[[str], None]) -> bo
 
 
 def sidecar_path(product: Path | str) -> Path:
-    """Where the sidecar of a product stands."""
+    """Where the sidecar of a product stands: ``basis.h5.json``, ``response.record.json`` of ``response.json``."""
     product = Path(product)
-    return product.with_name(product.name + ".json")
+    return product.with_name(f"{product.stem}.record.json" if product.suffix == ".json" else f"{product.name}.json")
 
 
 def nothing_to_do(
@@ -374,7 +374,8 @@ def unfinished(product: Path | str) -> None:
         UserError: no right to.
     """
     try:
-        sidecar_path(product).unlink(missing_ok=True)
+        for name in {sidecar_path(product).name, f"{Path(product).name}.json"}:  # as it was called first
+            Path(product).with_name(name).unlink(missing_ok=True)
     except OSError as error:
         raise UserError(refused(sidecar_path(product), error)) from error
 
