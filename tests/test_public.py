@@ -42,7 +42,7 @@ def curve():
 def test_both_folds_of_duffings_oscillator(curve):
     """As found with 12 harmonics and 256 samples by another route."""
     np.testing.assert_allclose(curve.folds, [1.462616482, 1.156017684], rtol=0, atol=1e-8)
-    assert curve.ended.startswith("bound") and curve.converged.all() and not curve.failures
+    assert curve.ended == "bound: 2.5 rad/s is reached" and curve.converged.all() and not curve.failures
     q, W = curve.harmonics()[:, 1], curve.parameter
     one = (1 - W**2 + 0.05j * W + 0.75 * 0.05 * abs(q) ** 2) * q  # of one harmonic
     assert np.abs(one - 0.4).max() < 0.05 * np.abs(q).max()
@@ -59,6 +59,7 @@ def test_a_curve_that_comes_back_is_followed_by_another():
     passed = ms.follow(duffing(), 0.3, 2.5, harmonics=3, unit="rad/s", settings=Settings(targets=(1.4,)))
     np.testing.assert_allclose(passed.amplitude[passed.parameter == 1.4], three[::-1], rtol=1e-6)
     assert "begun at the stop: bound" in found.ended
+    assert ms.follow(duffing(), 0.01, 0.012, harmonics=1).ended == "bound: 0.012 Hz is reached"
     x, _ = found.plot().get_lines()[0].get_data()
     assert np.isnan(x).sum() == 1 and "branch" not in passed.arrays
 

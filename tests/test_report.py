@@ -329,4 +329,27 @@ def test_what_stands_in_a_table_is_told_once_and_rounding_not_at_all() -> None:
     assert "FN = 10 N: amplitude in µm" in table and "FN = 10 N: resonance in Hz" in table and "20" in table
     assert "as pressed: stress amplitude in MPa" in table
     table = said(survey_html("t", [], {"t.csv": {"load_m": ["1.5e-3", "1e-16"], "speed_rad_s": ["2", "3"]}}, []))
-    assert "load in µm" in table and "1500" in table and "1e-10" not in table and "speed in rad/s" in table
+    assert "load in mm" in table and "1.5" in table and "1e-13" not in table and "speed in rad/s" in table
+
+
+def test_a_page_has_one_unit_of_length_and_tells_rows_apart() -> None:
+    """Lengths in mm from 1 mm on, in every table; five points beside a fold, and a mean that Newton's method leaves."""
+    near = [f"377.42{i}1" for i in range(5)]
+    a, mean = ["1.53e-3", "9.8e-4", "2e-5", "1e-3", "1e-3"], ["7.981e-11", "-1e-10", "3.5e-7", "0", "0"]
+    curve = {"frequency_Hz": near, "amplitude_m": a, "mean_m": mean}
+    table = said(survey_html("t", [], {"t.csv": curve, "u.csv": {"amplitude_m": ["2e-5"]}}, []))
+    assert "µm" not in table and table.count("amplitude in mm") == 2 and "1.53" in table and "0.98" in table
+    assert all(n in table for n in ("377.421", "377.424", "0.00035"))
+    assert "·10" not in table and "7.981" not in table
+    words = said(response_html({"resonances": [peak(1.0, 2.0, 1.53e-3), peak(2.0, 2.0, 9.8e-4)]}, {}))
+    assert "is 1.53 mm at 2 Hz" in words and "lowest with 0.98 mm" in words and "amplitude in mm" in words
+
+
+def test_alike_warnings_fold_below_the_first_of_them() -> None:
+    """Two kinds, told by turns: each kind stands together, and no sentence is cut."""
+    one, two = (
+        f"At F_N = {{}} N the amplitude at 90 Hz is uncertain{end}" for end in (": no solution.", ", raise it.")
+    )
+    words = said(response_html({"messages": [w.format(n) for n in (20, 50, 80) for w in (one, two)]}, {}))
+    at = [words.index(part) for part in ("20 N the amplitude at 90 Hz is uncertain: no", "2 more", "= 80 N", ", raise")]
+    assert at == sorted(at) and words.count("2 more of the same kind") == 2 and "..." not in words

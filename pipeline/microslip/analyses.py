@@ -228,11 +228,11 @@ def follow(
             `continuation.Settings`. report: is told what is under way.
 
     Returns:
-        A `Motions`, with ``folds`` and, in ``ended``, why the curve ended ("bound: ..." where it reached the stop).
-        Where it comes back to the start or gets stuck, the points of another curve follow, begun at the stop
-        (``arrays["branch"]`` is 1 there), and ``ended`` tells of both. Whether a motion is stable is not told. Over the
-        frequency the modes with sticking contacts and those without are among the points; a resonance that is narrow
-        elsewhere may be passed over: give a shorter ``step_max``.
+        A `Motions`, with ``folds`` and, in ``ended``, why the curve ended: "bound: 60 Hz is reached", the stop or
+        the start again. Where it comes back to the start or gets stuck, the points of another curve follow, begun at
+        the stop (``arrays["branch"]`` is 1 there), and ``ended`` tells of both. Whether a motion is stable is not told.
+        Over the frequency the modes with sticking contacts and those without are among the points; a resonance that is
+        narrow elsewhere may be passed over: give a shorter ``step_max``.
 
     Raises:
         UserError: a frequency that is not positive, or one that is missing; nothing nonlinear; a setting there is not.
@@ -262,7 +262,7 @@ def follow(
     else:
         raise UserError(f"over: '{over}' is none of frequency, load, normal_force")
     found = families.from_both_ends(family, report, settings)
-    family = replace(family, unit=family.unit * hertz) if over == "frequency" else family
+    family = replace(family, unit=family.unit * hertz, words=unit) if over == "frequency" else family
     points = [p for one in found for p in one.points]
     known = {
         "parameter": np.array([p.lam for p in points]) / family.unit,
@@ -272,9 +272,10 @@ def follow(
     }
     if len(found) > 1:
         known["branch"] = np.repeat([0.0, 1.0], [len(one.points) for one in found])
+    ended = "; another curve, begun at the stop: ".join(map(family.ended, found))
     return Motions(
         "curve", [p for one in found for p in family.points(one)], lambda v: family.problem(v * family.unit),
-        over=_over(over, unit), known=known, ended="; another curve, begun at the stop: ".join(b.status for b in found),
+        over=_over(over, unit), known=known, ended=ended,
     )  # fmt: skip
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
@@ -66,7 +66,7 @@ def percent(share: float) -> str:
 class Quantity:
     """What a read-out measures. Attributes: unit: SI, as rows of the modal file name it: "m", "rad", "1" of a strain.
 
-    Numbers stand in it in files and columns; people see them a million times as large, in µm, µrad or µm/m.
+    Numbers stand in it in files and columns; people see them larger, in µm or mm, µrad, µm/m.
     """
 
     unit: str = "m"
@@ -89,6 +89,10 @@ class Quantity:
         """A value with the unit in which its number is neither long nor a power of ten: 0.00193 m -> "1.93 mm"."""
         factor, unit = self.scale(value)
         return f"{value * factor:.{digits}g} {unit}"
+
+    def shared(self, values: Iterable[float]) -> tuple[float, str]:
+        """Factor and name of the unit of many that stand together: that of the largest, no less than a millionth."""
+        return self.scale(max(max((abs(v) for v in values if math.isfinite(v)), default=0.0), 2e-6))
 
     def scale(self, value: float) -> tuple[float, str]:
         """Factor and name of that unit: 0.00193 m -> (1e3, "mm")."""

@@ -146,14 +146,15 @@ class Followed:
             [np.mean([v for n, v in row.items() if n.endswith(f"/{what}")] or [0.0]) for row in self.rows]
         )  # fmt: skip
 
-    def sentences(self) -> list[str]:
-        """What was found."""
+    def sentences(self, by: tuple[float, str] | None = None) -> list[str]:
+        """What was found. by: factor and name of the unit of amplitudes; their own if not given."""
         unit, begin = UNITS[self.over], self.ends[0]
         if not self.rows:
             key = "band" if self.over == "frequency" else self.over
             return [f"{self.label}: {self.status}; begin elsewhere than at {begin:.6g} {unit} (curve.{key})."]
         top, folds = int(np.argmax(self.amplitude)), self.parameter[self.fold]
-        said = f"{self.label}: {len(self.rows)} points, at most {self.amplitude[top]:.4g} {self.quantity.said} at "
+        factor, name = by or self.quantity.shared(self.amplitude)
+        said = f"{self.label}: {len(self.rows)} points, at most {factor * self.amplitude[top]:.4g} {name} at "
         said += f"{self.parameter[top]:.6g} {unit}; "
         if len(folds) > 4:
             said += f"{len(folds)} folds between {folds.min():.6g} and {folds.max():.6g} {unit}."

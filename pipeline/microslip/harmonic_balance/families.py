@@ -97,6 +97,12 @@ class Family:
         """Whether a curve arrived at the other end, and did not come back to where it began."""
         return branch.status.startswith("bound") and branch.points[-1].lam == self.end
 
+    def ended(self, branch: Branch) -> str:
+        """Why a branch ended, the end that it reached in the parameter that people read."""
+        if not branch.status.startswith("bound"):
+            return branch.status
+        return f"bound: {branch.points[-1].lam / self.unit:.6g} {self.words} is reached"
+
     def points(self, branch: Branch) -> tuple[Point, ...]:
         """The motions of a branch."""
         return tuple(Point(self.Omega(p.lam), p.x, CONVERGED, 0.0, p.evaluations) for p in branch.points)

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 def curve_plot(found: Sequence[Followed], path: Path, title: str) -> Path:
     """Amplitude over frequency, load or normal force; folds marked, every second leg between folds dashed."""
     figure, axes = single_panel(9.0, 5.6)
-    scale, unit = _scale(0.1 * np.concatenate([one.amplitude for one in found]), found[0].quantity)
+    scale, unit = found[0].quantity.shared(np.concatenate([one.amplitude for one in found]))
     colours = shades(len(found)) if len(found) > 1 else [COLOURS[0]]
     for width, colour, one in zip(widths(len(found)), colours, found, strict=True):
         x, y = one.parameter, scale * one.amplitude

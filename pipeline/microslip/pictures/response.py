@@ -51,7 +51,8 @@ def response_picture(
     shown = shown or result.readouts[:1]
     figure = Figure(figsize=(9, 6), dpi=130, layout="constrained")
     axes = figure.subplots()
-    lifts = [_curves(axes, result, w, rows, style, len(shown) > 1) for w, style in zip(shown, STYLES, strict=False)]
+    by, unit = shown[0].quantity.shared(_heights(result, rows, shown[0].quantity))
+    lifts = [_curves(axes, result, w, rows, style, len(shown) > 1, by) for w, style in zip(shown, STYLES, strict=False)]
     if any(np.abs(line.get_ydata()).max(initial=0.0) > 0 for line in axes.get_lines()):
         axes.set_yscale("log")
         plain_numbers(axes.yaxis, (1.0,))
@@ -61,7 +62,7 @@ def response_picture(
     s, first = result.settings, shown[0]
     axes.set_xlabel("excitation frequency in Hz")
     of = f" of {_read(s, first.quantity) if first.number == 0 else first.name}" * (len(shown) == 1)
-    axes.set_ylabel(f"amplitude{of and of + ','} in {first.quantity.micro} (0-peak)")
+    axes.set_ylabel(f"amplitude{of and of + ','} in {unit} (0-peak)")
     axes.set_title(f"{s.name}: friction response{_driven_by(result)}")
     axes.grid(True, which="both", alpha=0.25)
     told = "dashed, grey: sticking contacts" if len(shown) > 1 else "dashed: sticking contacts"
@@ -72,6 +73,14 @@ def response_picture(
     handles, labels = by_rows(*axes.get_legend_handles_labels(), columns)
     figure.legend(handles, labels, loc="outside lower center", ncols=columns, fontsize=9, title=told, title_fontsize=8)
     write_png(figure, path)
+
+
+def _heights(result: CaseResult, rows: Sequence[Mapping[str, Any]], of: Quantity) -> list[float]:
+    """Amplitudes of the resonances that are valid, of all read-outs of a quantity; those of the sweeps without any."""
+    columns = [w.column for w in result.readouts if w.quantity == of] + [of.column("amplitude")]
+    valid = [row for row in rows if "not valid" not in row.get("doubt", "")] or rows
+    found = [float(row[c]) for row in valid for c in columns if c in row]
+    return found or [float(np.abs(r.monitor[r.converged]).max(initial=0.0)) for r in result.responses.values()]
 
 
 def _driven_by(result: CaseResult) -> str:
@@ -86,16 +95,18 @@ def _driven_by(result: CaseResult) -> str:
 
 
 def _curves(
-    axes: Axes, result: CaseResult, w: Readout, rows: Sequence[Mapping[str, Any]], style: str, named: bool
+    axes: Axes, result: CaseResult, w: Readout, rows: Sequence[Mapping[str, Any]], style: str, named: bool,
+    by: float,
 ) -> bool:  # fmt: skip
-    """Draw a read-out without contact and for every normal force; whether contacts would lift off somewhere."""
+    """Draw a read-out without contact and for every normal force, its amplitudes times a factor; whether contacts would
+    lift off somewhere."""
     of, built = f", {w.name}" * named, result.built
     free = result.free
     if w.number:
         read = replace(built.assembly, outputs=built.assembly.outputs[w.number :])
         grid = np.linspace(result.settings.sweep.start, result.settings.sweep.stop, result.settings.sweep.points)
         free = free_response(replace(built, assembly=read), grid)
-    axes.plot(free.frequency, 1e6 * np.abs(free.monitor), color="0.6", lw=1, ls=style, label=f"no contact{of}")
+    axes.plot(free.frequency, by * np.abs(free.monitor), color="0.6", lw=1, ls=style, label=f"no contact{of}")
     forces, colours = sorted(result.responses), shades(len(result.responses))
     lifts = False
     for width, colour, normal, said in zip(widths(len(forces)), colours, forces, apart(forces), strict=True):
@@ -105,14 +116,14 @@ def _curves(
             r = replace(r, monitor=r.outputs[:, w.number, 1])
             told = {row["frequency_Hz"]: row[w.column] for row in rows if row["normal_force_N"] == normal}
             peaks = [(f, told[f]) for f, _ in peaks if f in told]
-        f, amplitude = _with_peaks(r, peaks)
+        f, amplitude = _with_peaks(r, peaks, by)
         on = ~np.isin(f, apart_from_it)
         if (off := lifted(built, r)).any():
             off = np.interp(f, r.frequency, off) > 0
             axes.plot(*through(f[on], np.where(off, amplitude, np.nan)[on]), color=colour, lw=width, ls=":")
             amplitude, lifts = np.where(off, np.nan, amplitude), True
         line, label = style if np.isfinite(amplitude).any() else ":", f"$F_N$ = {said} N{of}"
-        single = [(f, 1e6 * a) for f, a in peaks if f in apart_from_it]
+        single = [(f, by * a) for f, a in peaks if f in apart_from_it]
         axes.plot(*np.reshape(single, (-1, 2)).T, "o", color=colour, ms=4)
         axes.plot(*through(f[on], amplitude[on]), color=colour, lw=width, ls=line, label=label)
     for row, (colour, normal) in enumerate(zip(colours, forces * (w.number == 0), strict=False)):
@@ -174,10 +185,9 @@ def comparison_picture(
     write_png(figure, path)
 
 
-def _with_peaks(r: FrequencyResponse, peaks: list[tuple[float, float]]) -> tuple[Array, Array]:
-    """Frequency, Hz, and amplitude, millionths of its unit, at the points of a sweep and at the peaks found between
-    them."""
+def _with_peaks(r: FrequencyResponse, peaks: list[tuple[float, float]], by: float) -> tuple[Array, Array]:
+    """Frequency, Hz, and amplitude times a factor at the points of a sweep and at the peaks found between them."""
     f = np.concatenate([r.frequency, [f for f, _ in peaks]])
     amplitude = np.concatenate([np.where(r.converged, np.abs(r.monitor), np.nan), [a for _, a in peaks]])
     order = np.argsort(f, kind="stable")
-    return f[order], 1e6 * amplitude[order]
+    return f[order], by * amplitude[order]

@@ -5,10 +5,11 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
-from ..units import Quantity, amplitude_of, counted, percent
+from ..units import METRES, Quantity, amplitude_of, counted, percent
 from .page import Album, Piece, fold, number, page, say, table
 from .words import ROUNDING
 
@@ -40,7 +41,7 @@ def answer(response: Mapping[str, Any], album: Album) -> list[Piece]:
     return [
         say(*_sentences(response), tone="lead"),
         say(f"{failed}." if failed else "", tone="bad"),
-        _resonances(rows) if rows else say(""),
+        _resonances(rows, _factors(response)) if rows else say(""),
         say(_of_others(response) if rows else ""),
         album.take(SHOWN[0]),
         *album.begun(f"{SHOWN[0]} of "),
@@ -64,12 +65,13 @@ def _sentences(response: Mapping[str, Any]) -> list[str]:
     lifted, valid = lifted_forces(rows), _valid(rows)
     first, *others = response.get("read_outs", [""])
     of = f" of {first}" if others else ""
-    said = [f"The highest resonance{' found' if doubtful else ''}{of} is {_peak(highest(rows) or {})}"]
+    peak = partial(_peak, factors=_factors(response))
+    said = [f"The highest resonance{' found' if doubtful else ''}{of} is {peak(highest(rows) or {})}"]
     forces = {r["normal_force_N"] for r in valid}
     tops = [max((r for r in valid if r["normal_force_N"] == n), key=_size) for n in forces]
     ends = {r["normal_force_N"] for r in response.get("rising_at_the_edge", [])}
     if len(tops) > 1 and not ends and not any(JUMPS in row.get("doubt", "") for row in rows):
-        said[0] += f"; it is lowest with {_peak(min(tops, key=_size))}"
+        said[0] += f"; it is lowest with {peak(min(tops, key=_size))}"
     said[0] += "."
     if lifted:
         named = " and ".join(filter(None, [", ".join(map(number, sorted(lifted)[:-1])), number(max(lifted))]))
@@ -135,13 +137,14 @@ def _size(row: Mapping[str, Any]) -> float:
     return amplitude_of(row)[0]
 
 
-def _peak(row: Mapping[str, Any]) -> str:
+def _peak(row: Mapping[str, Any], factors: Factors) -> str:
     size, of = amplitude_of(row)
+    factor, unit = factors.get(of.column(""), (1e6, of.micro))
     force = number(row["normal_force_N"])
-    return f"{number(1e6 * size)} {of.micro} at {number(row['frequency_Hz'], 5)} Hz under F_N = {force} N"
+    return f"{number(factor * size)} {unit} at {number(row['frequency_Hz'], 5)} Hz under F_N = {force} N"
 
 
-def _resonances(rows: Sequence[Mapping[str, Any]]) -> Piece:
+def _resonances(rows: Sequence[Mapping[str, Any]], factors: Factors) -> Piece:
     """The table of resonances: what speaks against one stands beside its amplitude, and marks its row."""
     doubts = any(row.get("doubt") for row in rows)
     first = ["normal_force_N", "frequency_Hz", *(k for k in rows[0] if k.startswith("amplitude_"))]
@@ -149,21 +152,18 @@ def _resonances(rows: Sequence[Mapping[str, Any]]) -> Piece:
         k for k in ("stress_amplitude_Pa", "reserve_factor", "damping_ratio") if k in rows[0]
     ]
     order = [*first, *(k for k in dict.fromkeys(k for row in rows for k in row) if k not in (*first, "doubt"))]
-    return _table_of([{k: row.get(k, "") for k in order} for row in rows])
+    return _table_of([{k: row.get(k, "") for k in order} for row in rows], factors)
 
 
 def warnings(messages: Sequence[str]) -> Piece:
-    """What a reader must know; sentences that differ in names and numbers alone are told once, the others unfold."""
+    """What a reader must know; of sentences that differ in names and numbers alone the first, the others fold below."""
     alike: dict[str, list[str]] = {}
     for message in messages:
         alike.setdefault(_DIFFERS.sub("#", message), []).append(message)
-    told, folded = list[str](), list[Piece]()
+    pieces = list[Piece]()
     for first, *others in alike.values():
-        times = "once" if len(others) == 1 else f"{len(others)} times"
-        told.append(first + (f" The same {times} more, below." if others else ""))
-        if others:
-            folded.append(fold(f'{len(others)} more like "{first[:60].rstrip()} ..."', say(*others)))
-    return Piece("box", [say(*told), *folded], tone="warn")
+        pieces += [say(first), fold(f"{len(others)} more of the same kind", say(*others))][: 1 + bool(others)]
+    return Piece("box", pieces, tone="warn")
 
 
 _DIFFERS = re.compile(r"'[^']*'|^[\w.@-]+:|\b[\w-]*\d[\w.+-]*")
@@ -176,11 +176,14 @@ def survey_html(
     """The page of a survey: what was found in words, pictures and tables (file name -> column -> values)."""
     album = Album({p.name: p for p in pictures})
     pieces = [say(*sentences, tone="note"), *album.begun("")]
-    for name, columns in tables.items():
-        rows = [
-            dict(zip(columns, map(_number_or_words, row), strict=True)) for row in zip(*columns.values(), strict=True)
-        ]
-        shown = _table_of(rows) if rows else say("")
+    told = {
+        name: [dict(zip(columns, map(_number_or_words, row), strict=True))
+               for row in zip(*columns.values(), strict=True)]
+        for name, columns in tables.items()
+    }  # fmt: skip
+    factors = _factors(told)
+    for name, rows in told.items():
+        shown = _table_of(rows, factors) if rows else say("")
         heading = f"Numbers in {name}" if name.endswith(".csv") else name
         pieces += [Piece("h2", heading), shown if len(rows) <= MOST_ROWS else fold(f"{len(rows)} rows", shown)]
     return page(title, pieces)
@@ -199,6 +202,7 @@ def response_pieces(response: Mapping[str, Any], album: Album) -> list[Piece]:
     told = {k: v for k, v in told.items() if not response.get(_TOLD.get(k, ""))}
     words = told.pop("description", "")
     tables = {k: v for k, v in told.items() if isinstance(v, list) and v and isinstance(v[0], Mapping)}
+    factors = _factors(response)
     single = {k: _cell(v).removeprefix(f"{k}: ") for k, v in told.items() if k not in tables}
     facts = [(_HEADINGS.get(k) or _label(k), v) for k, v in single.items()]
     rest = [n for n in album.left if n not in SHOWN and not n.startswith(("mode_", "modes_", "animation_"))]
@@ -209,7 +213,7 @@ def response_pieces(response: Mapping[str, Any], album: Album) -> list[Piece]:
             piece
             for k, v in tables.items()
             if k != "resonances"
-            for piece in (Piece("h3", _HEADINGS.get(k) or _label(k).capitalize()), _table_of(v))
+            for piece in (Piece("h3", _HEADINGS.get(k) or _label(k).capitalize()), _table_of(v, factors))
         ),
         *(album.take(name, name) for name in rest),
         table((), facts),
@@ -227,37 +231,87 @@ _HEADINGS = {
 """Titles of tables and names of facts that their keys do not tell."""
 
 
-def _table_of(rows: Sequence[Mapping[str, Any]]) -> Piece:
+Factors = Mapping[str, tuple[float, str]]
+"""End of the names of numbers that are shown in another unit -> factor and that unit."""
+
+
+def _factors(told: Mapping[str, Any]) -> Factors:
+    """Of all numbers of a page: lengths in µm or mm by the largest valid resonance, or by all where it has none."""
+    valid = _valid(told.get("resonances", ()))
+    rows = valid or [row for v in told.values() if isinstance(v, list) for row in v if isinstance(row, Mapping)]
+    numbers = [(_of_column(k)[0], v) for row in rows for k, v in row.items() if isinstance(v, float)]
+    found = {of.column(""): of.shared(v for k, v in numbers if _ends(k, of.column(""))) for of in QUANTITIES}
+    return {**found, "_Pa": (1e-6, "MPa")}
+
+
+QUANTITIES = METRES, Quantity("rad"), Quantity("1")
+"""What read-outs measure."""
+
+
+def _ends(key: str, end: str) -> bool:
+    """Whether a name ends so; of angles and strains those of a vibration alone."""
+    return key.endswith(end) and (end in ("_m", "_Pa") or "amplitude" in key or key.startswith("mean"))
+
+
+def _table_of(rows: Sequence[Mapping[str, Any]], factors: Factors) -> Piece:
     """Of rows that have the same names. What is rounding beside the largest number of its unit is a zero."""
-    columns = [_column(key) for key in rows[0]]
+    columns = [_column(key, factors) for key in rows[0]]
     units = [name.rpartition(" in ")[2] for _, name in columns]
-    scaled = [zip(row.values(), (factor for factor, _ in columns), strict=True) for row in rows]
-    values = [[v * f if isinstance(v, float) else v for v, f in row] for row in scaled]
+    values = [[v * f if isinstance(v, float) else v for v, (f, _) in zip(row.values(), columns, strict=True)]
+              for row in rows]  # fmt: skip
     largest: dict[str, float] = {}
     for row in values:
         for unit, v in zip(units, row, strict=True):
             known = isinstance(v, float) and math.isfinite(v)
             largest[unit] = max(largest.get(unit, 0.0), abs(v) if known else 0.0)
-
-    def shown(value: Any, unit: str) -> str:
-        if value is None or (isinstance(value, float) and math.isnan(value)):
-            return ""
-        if not isinstance(value, float):
-            return _cell(value)
-        return number(0.0 if abs(value) < ROUNDING * largest[unit] else value, 5 if unit in _EXACT else 4)
-
-    cells = [[shown(v, unit) for v, unit in zip(row, units, strict=True)] for row in values]
-    return table([name for _, name in columns], cells)
+    named = zip(rows[0], units, zip(*values, strict=True), strict=True)
+    cells = [_column_of_cells(key, unit, column, largest[unit]) for key, unit, column in named]
+    return table([name for _, name in columns], [list(row) for row in zip(*cells, strict=True)])
 
 
-_FACTORS = (
-    *((Quantity(unit).column("amplitude"), (1e6, Quantity(unit).micro)) for unit in ("m", "rad", "1")),
-    ("_Pa", (1e-6, "MPa")),
-    ("_m", (1e6, "µm")),
+def _column_of_cells(key: str, unit: str, values: Sequence[Any], largest: float) -> list[str]:
+    """Numbers of a column, those that are rounding zero; of what the rows are over in so many digits that they differ
+    as far as is known."""
+    least = (OF_MEANS if "mean" in _of_column(key)[0] else ROUNDING) * largest
+    known = ["" if v is None or (isinstance(v, float) and math.isnan(v)) else v for v in values]
+    shown = [0.0 if isinstance(v, float) and abs(v) < least else v for v in known]
+    first = 5 if unit in _EXACT else 4
+    most = SURE if unit in _EXACT or key in _OVER else first
+    for digits in range(first, most + 1):
+        cells = [number(v, digits) if isinstance(v, float) else _cell(v) for v in shown]
+        if digits == most or len(set(cells)) == len({f"{v:.{SURE}g}" if isinstance(v, float) else v for v in shown}):
+            break
+    return cells
+
+
+OF_MEANS = 1e-5
+"""Share of the largest number of a unit in a table below which a mean is what Newton's method leaves."""
+SURE = 9
+"""Digits to which rows of a table are told apart."""
+_OVER = ("normal_force_N", "load")
+"""Columns, besides those of `_EXACT`, that a curve runs over."""
+
+_UNITS = (
+    "N",
+    "Hz",
+    "m",
+    "mm",
+    "µm",
+    "m/m",
+    "mm/m",
+    "µm/m",
+    "rad",
+    "mrad",
+    "µrad",
+    "s",
+    "Pa",
+    "MPa",
+    "rpm",
+    "W",
+    "J",
+    "K",
+    "rad/s",
 )
-"""Ends of names of numbers that are shown in another unit."""
-
-_UNITS = ("N", "Hz", "m", "mm", "µm", "m/m", "µm/m", "rad", "µrad", "s", "Pa", "MPa", "rpm", "W", "J", "K", "rad/s")
 _EXACT = ("Hz", "rpm", "rad/s")
 """Units of what is shown to a digit more."""
 
@@ -273,15 +327,22 @@ _NAMED = {
 """Columns that people know by other names."""
 
 
-def _column(key: str) -> tuple[float, str]:
+def _of_column(key: str) -> tuple[str, str]:
+    """Name of a column of which a table has one for every normal force, and the words for that force."""
+    under = re.fullmatch(r"(.+)_(?:FN_(.+)_N|as_pressed)", key)
+    return (key, "") if under is None else (under[1], f"F_N = {under[2]} N: " if under[2] else "as pressed: ")
+
+
+def _column(key: str, factors: Factors) -> tuple[float, str]:
     """Factor and name of a column: lengths and stresses in units for people."""
-    if under := re.fullmatch(r"(.+)_(?:FN_(.+)_N|as_pressed)", key):
-        factor, name = _column(under[1])
-        return factor, f"{f'F_N = {under[2]} N' if under[2] else 'as pressed'}: {name}"
+    key, under = _of_column(key)
+    if under:
+        factor, name = _column(key, factors)
+        return factor, f"{under}{name}"
     if key in _NAMED:
         return _NAMED[key]
-    for end, (factor, unit) in _FACTORS:
-        if key.endswith(end):
+    for end, (factor, unit) in factors.items():
+        if _ends(key, end):
             return factor, _label(f"{key.rpartition('_')[0]}_{unit}")
     return 1.0, _label(key)
 

@@ -286,7 +286,7 @@ class Series:
         size = np.where(self.converged, np.abs(a) if harmonic else a.real, np.nan)
         top = float(np.nanmax(np.abs(size), initial=0.0))
         quantity = Quantity(unit_of(self._place(readout)[0]))
-        scale, unit = (1e6, quantity.micro) if 0 < top < 1e-3 else (1.0, quantity.said)
+        scale, unit = quantity.scale(10 * top) if top else (1.0, quantity.said)
         x, y = self._drawn(scale * size)
         (drawn,) = axes.plot(x, y, **{"label": self.name, **line})
         turns = np.isin(self.parameter, self.folds)

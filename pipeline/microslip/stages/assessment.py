@@ -265,7 +265,7 @@ def draw(
         drawn["stress over normal force"] = operating.over_normal_force_plot(
             lines,
             f"largest stress amplitude of {found.whose} in MPa",
-            f"{case}: resonances over the normal force",
+            f"{case}: largest stress of {found.whose} at its resonances",
             folder / "stress_over_normal_force.png",
             found.not_valid,
         )

@@ -302,11 +302,12 @@ def _curve(over: str, points: Checkpoint, settings: CaseSettings, bases: Bases, 
     title, name = f"{settings.name}: over the {over.replace('_', ' ')}", f"over_{over}"
     response = _written(points, found, whole)
     failed = sum(int((~s.converged).sum()) for s in response.series)
+    by = found[0].quantity.shared(a for one in found for a in one.amplitude)
     drawn, arrived = [one for one in found if len(one.rows) > 1], sum(one.complete for one in found)
     return Survey(
         {f"{name}.csv": columns},
         {f"pictures/{name}.png": lambda p: curve_plot(drawn, p, title)} if drawn else {},
-        [*(words for one in found for words in one.sentences()), sentence(response, None)],
+        [*(words for one in found for words in one.sentences(by)), sentence(response, None)],
         sum(one.early for one in found) + (arrived < sum(one.legs is None for one in found)) + failed,
         whole,
     )
