@@ -231,8 +231,8 @@ def follow(
         A `Motions`, with ``folds`` and, in ``ended``, why the curve ended: "bound: 60 Hz is reached", the stop or
         the start again. Where it comes back to the start or gets stuck, the points of another curve follow, begun at
         the stop (``arrays["branch"]`` is 1 there), and ``ended`` tells of both. Whether a motion is stable is not told.
-        Over the frequency the modes with sticking contacts and those without are among the points; a resonance that is narrow
-        elsewhere may be passed over: give ``settings`` with a shorter ``step_max``.
+        Over the frequency the modes with sticking contacts and those without are among the points; a resonance that is
+        narrow elsewhere may be passed over: give ``settings`` with a shorter ``step_max``.
 
     Raises:
         UserError: a frequency that is not positive, or one that is missing.
