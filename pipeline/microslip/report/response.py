@@ -270,18 +270,24 @@ def _table_of(rows: Sequence[Mapping[str, Any]], factors: Factors) -> Piece:
 
 
 def _column_of_cells(key: str, unit: str, values: Sequence[Any], largest: float) -> list[str]:
-    """Numbers of a column, those that are rounding zero; of what the rows are over in so many digits that they differ
-    as far as is known."""
+    """Numbers of a column, those that are rounding zero; of what the rows are over in so many digits that a number
+    differs from those above and below."""
     least = (OF_MEANS if "mean" in _of_column(key)[0] else ROUNDING) * largest
     known = ["" if v is None or (isinstance(v, float) and math.isnan(v)) else v for v in values]
     shown = [0.0 if isinstance(v, float) and abs(v) < least else v for v in known]
     first = 5 if unit in _EXACT else 4
     most = SURE if unit in _EXACT or key in _OVER else first
-    for digits in range(first, most + 1):
-        cells = [number(v, digits) if isinstance(v, float) else _cell(v) for v in shown]
-        if digits == most or len(set(cells)) == len({f"{v:.{SURE}g}" if isinstance(v, float) else v for v in shown}):
-            break
-    return cells
+    beside = zip([None, *shown[:-1]], shown, [*shown[1:], None], strict=True)
+    return [_apart(v, [w for w in (a, b) if isinstance(w, float)], first, most) for a, v, b in beside]
+
+
+def _apart(value: Any, others: Sequence[float], first: int, most: int) -> str:
+    """A number in the fewest digits that tell it from others."""
+    if not isinstance(value, float):
+        return _cell(value)
+    others = [w for w in others if f"{w:.{most}g}" != f"{value:.{most}g}"]
+    enough = (d for d in range(first, most) if number(value, d) not in [number(w, d) for w in others])
+    return number(value, next(enough, most if others else first))
 
 
 OF_MEANS = 1e-5
