@@ -278,9 +278,9 @@ def _oriented(found: Corrected, orientation: int) -> Array:
 
 
 def _angle(a: Array, b: Array) -> float:
-    """Between two vectors, exact for small angles too."""
-    a, b = a / norm(a), b / norm(b)
-    return 2.0 * math.atan2(norm(a - b), norm(a + b))
+    """Between two vectors, within 2e-8."""
+    along = float(a @ b)
+    return math.atan2(math.sqrt(max(float(a @ a) * float(b @ b) - along * along, 0.0)), along)
 
 
 def _tried(scaled: Scaled, state: State, guess: Array, length: float, settings: Settings) -> _Trial:

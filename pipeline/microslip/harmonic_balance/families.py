@@ -16,6 +16,7 @@ import numpy as np
 
 from .. import continuation
 from ..continuation import Branch, Settings, State
+from ..continuation.newton import norm
 from ..data import Array
 from ..errors import UserError
 from .problem import AtFrequency, Problem
@@ -148,8 +149,8 @@ ALONG = Settings(points=3000, branch_points=False, angle=0.5, step=0.1, step_max
 
 def _longest(state: State, step: float) -> float:
     """The longest step from a state: as given, but for x, which may change by `STEADY` of what it is."""
-    x, t = np.linalg.norm(state.y[:-1]), state.tangent
-    return step / math.hypot(t[-1], np.linalg.norm(t[:-1]) / max(1.0, STEADY / step * float(x)))
+    x, t = norm(state.y[:-1]), state.tangent
+    return step / math.hypot(t[-1], norm(t[:-1]) / max(1.0, STEADY / step * x))
 
 
 STEADY = 0.05
@@ -208,10 +209,9 @@ def followed(
     """
     settings, equations = family.settings(settings), _Noted(family)
     if begun is None or begun.state is None:
-        first = solve(family.problem(family.begin), family.Omega(family.begin), [])
-        if not first.converged:
-            return Branch((), f"no start: {first.status}", None)
-        state = equations.told(continuation.start(equations, first.x, family.begin, settings))
+        state = _begun(family, equations, settings)
+        if isinstance(state, str):
+            return Branch((), f"no start: {state}", None)
         begun = Branch((), state.status, state)
         keep(state)
         points = list(state.found)
@@ -229,6 +229,19 @@ def followed(
     return Branch(tuple(points), state.status, state)
 
 
+def _begun(family: Family, equations: _Noted, settings: Settings) -> State | str:
+    """The first state; where there is none, why. Where all is smooth the linear response leads there at once."""
+    problem, Omega = family.problem(family.begin), family.Omega(family.begin)
+    if equations.smooth:
+        state = continuation.start(equations, problem.at(Omega).reference, family.begin, settings)
+        if not state.status:
+            return state
+    first = solve(problem, Omega, [])
+    if not first.converged:
+        return first.status
+    return equations.told(continuation.start(equations, first.x, family.begin, settings))
+
+
 def from_both_ends(
     family: Family, report: Report = lambda _: None, settings: Settings | Mapping[str, Any] | None = None
 ) -> tuple[Branch, ...]:
@@ -244,22 +257,20 @@ def from_both_ends(
 
 
 class _Noted:
-    """The equations of a family; where they had no value last is kept, for whoever asks why a curve ended."""
+    """The equations of a family; where they were asked for last is kept, for whoever asks why a curve ended."""
 
     def __init__(self, family: Family) -> None:
-        self.family, self.place = family, (np.zeros(0), 0.0)
+        self.family, self.last = family, (np.zeros(0), 0.0)
         self.x_scale, self.lam_scale = family.equations.x_scale, family.equations.lam_scale
         self.smooth = getattr(family.equations, "smooth", False)
 
     def evaluate(self, x: Array, lam: float) -> tuple[Array, Array, Array]:
-        R, J, slope = self.family.equations.evaluate(x, lam)
-        if not math.isfinite(float(R @ R + np.vdot(J, J))):
-            self.place = x.copy(), lam
-        return R, J, slope
+        self.last = x, lam
+        return self.family.equations.evaluate(x, lam)
 
     def told(self, state: State) -> State:
         """A state; one that no step leads on from says so if that is because a law has no value."""
-        x, lam = self.place
+        x, lam = self.last
         if len(x) and state.status.startswith(("stuck", "no start")):
             at = self.family.problem(lam).at(self.family.Omega(lam))
             return replace(state, status=f"stuck: {at.undefined(x)}" if at.undefined(x) else state.status)
