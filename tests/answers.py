@@ -29,12 +29,13 @@ OWN = ("iterations", "history", "error", "x", "peak", "added", "checks/", "excha
 
 @dataclass(frozen=True)
 class Answer:
-    """All products of a case: response.csv, .h5, .json, and the rows of resonances in .html."""
+    """All products of a case: response.csv, .h5, .json, the rows of resonances in .html and their unit."""
 
     text: str
     response: Response
     summary: Raw
     page: list[list[str]]
+    unit: str
 
     @property
     def table(self) -> dict[str, Array]:
@@ -52,12 +53,13 @@ class Answer:
 def answer(folder: Path) -> Answer:
     """The products in a folder, which agree with each other."""
     page = (folder / "response.html").read_text(encoding="utf-8")
-    found = re.search(r"<th>amplitude in[^<]*</th>.*?<tbody>(.*?)</tbody>", page, re.S)
-    cells = [re.findall(r"<td[^>]*>(.*?)</td>", row) for row in (found[1].split("</tr>") if found else [])]
+    found = re.search(r"<th>amplitude in ([^<]*)</th>.*?<tbody>(.*?)</tbody>", page, re.S)
+    cells = [re.findall(r"<td[^>]*>(.*?)</td>", row) for row in (found[2].split("</tr>") if found else [])]
     summary = json.loads((folder / "response.json").read_text())
     made = Answer(
-        (folder / "response.csv").read_text(), read_response(folder / "response.h5"), summary, [c for c in cells if c]
-    )
+        (folder / "response.csv").read_text(), read_response(folder / "response.h5"), summary, [c for c in cells if c],
+        found[1] if found else "",
+    )  # fmt: skip
     _agree(made)
     return made
 
@@ -68,7 +70,9 @@ def _agree(a: Answer) -> None:
     shown = a.page if rows else []  # without one, that table tells what rises at the edge of the band
     for row, told, cells in zip(rows, a.response.resonances, shown, strict=True):  # the summary has stresses besides
         np.testing.assert_allclose(*([r[k] for k in told if k != "doubt"] for r in (row, told)), rtol=1e-12)
-        assert {text(number(told["frequency_Hz"], 5)), text(number(1e6 * amplitude_of(told)[0]))} <= {*cells}
+        amplitude, quantity = amplitude_of(told)
+        factor = next(f for f in (1.0, 1e3, 1e6, 1e9) if quantity.scale(1 / f)[1] == a.unit)
+        assert {text(number(told["frequency_Hz"], 5)), text(number(factor * amplitude))} <= {*cells}
     size = a.response.series[0].quantity.column("amplitude")
     names = [name for name in a.table if name.startswith(f"{size}_FN_")]
     for name, series in zip(names, a.response.series, strict=True):
