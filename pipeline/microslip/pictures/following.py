@@ -118,10 +118,10 @@ def optimum_plot(
     """
     figure = empty_figure(10.5, 4.4 + 0.35 * bool(beside))
     left, right = figure.subplots(1, 2)
-    scale, unit = _scale(np.array([found.resonance.amplitude]), of)
     known = {value: one for value, one in found.found.items() if one.status == "converged"}
     good = valid or {}
     own = np.array([[v, one.Omega / (2 * np.pi), one.amplitude, good.get(v, True)] for v, one in known.items()]).T
+    scale, unit = of.shared(own[2])  # as its page has it
     curves = {**(beside or {}), name: own}
     for (said, (x, f, a, ok)), colour in zip(curves.items(), COLOURS, strict=False):
         for axes, y in ((left, scale * a), (right, f)):
