@@ -157,7 +157,7 @@ def peaked(what: Asked, number: int, of: Asked, kind=Problem) -> Highest:
     solutions that another one has found."""
     problem = kind(**own(what.problem(what.tuned.mistuned(what.deviations(number)))))
     ring = Sliding(problem, of.tuned_points)
-    return highest(ring, FREQUENCY, follow=ring.follow, at_once=ring.at_once)
+    return highest(ring, FREQUENCY, follow=ring.follow, at_once=ring.at_once, tells=ring.tells)
 
 
 def textbook(what: Asked, number: int) -> tuple[int, float]:

@@ -108,13 +108,13 @@ class Cyclic:
                     one[: len(block), : block.shape[1]] = block
         r, found = np.zeros((n, most)), np.empty_like(right)
         r[filled] = right[self.order]
-        found[self.order] = _around(D, after, before, r)[filled]
+        found[self.order] = around(D, after, before, r)[filled]
         if np.isfinite(found).all() and np.abs(found).max() < 1e10 * np.abs(right).max(initial=1e-300):
             return found
         return Dense(self.dense()).solve(right)
 
 
-def _around(D: Array, behind: Array, before: Array, r: Array) -> Array:
+def around(D: Array, behind: Array, before: Array, r: Array) -> Array:
     """(n, s) x of a ring, D_i x_i + behind_i x_(i+1) + before_i x_(i-1) = r_i, by cyclic reduction: every second part
     is eliminated, all at once as they do not know each other, and what is left is a ring of half as many."""
     n, s = r.shape
@@ -135,7 +135,7 @@ def _around(D: Array, behind: Array, before: Array, r: Array) -> Array:
     D[down] -= before_it[..., 1 + s :]
     after[up], ahead[down] = -behind_it[..., 1 + s :], -before_it[..., 1 : 1 + s]
     x = np.empty((n, s))
-    x[kept] = _around(D, after, ahead, r)
+    x[kept] = around(D, after, ahead, r)
     between = np.concatenate([x[out - 1], x[(out + 1) % n]], axis=1)[..., None]
     x[out] = X[..., 0] - (X[..., 1:] @ between)[..., 0]
     return x
@@ -152,21 +152,15 @@ def _solved(A: Array, B: Array) -> Array:
         return np.full_like(B, np.nan)
 
 
-def one_plus(
-    pieces: dict[tuple[int, int], Array], sizes: list[int], coefficients: int, by_parts: bool = False
-) -> Matrix:
-    """1 + the blocks (i, j) -> (W s_i, W s_j), as what can be solved fastest. The blocks (i, i) are overwritten.
-
-    Args:
-        by_parts: whether vectors are ordered by parts, each by its harmonics.
-    """
+def one_plus(pieces: dict[tuple[int, int], Array], sizes: list[int], coefficients: int) -> Matrix:
+    """1 + the blocks (i, j) -> (W s_i, W s_j), as what can be solved fastest. The blocks (i, i) are overwritten."""
     n = len(sizes)
     diagonal = [pieces[i, i] for i in range(n)]
     for block, s in zip(diagonal, sizes, strict=True):
         block.flat[:: coefficients * s + 1] += 1.0
     if n == 1:
         return Dense(diagonal[0])
-    order = np.arange(coefficients * sum(sizes)) if by_parts else _order(sizes, coefficients)
+    order = _order(sizes, coefficients)
     whole = Cyclic(diagonal, [None] * n, [None] * n, order)
     if n > 2 and all((i - j) % n in (0, 1, n - 1) for i, j in pieces):
         whole.behind[:] = [pieces.get((i, (i + 1) % n)) for i in range(n)]
@@ -179,8 +173,6 @@ def one_plus(
     for (i, j), block in pieces.items():
         if i != j:
             A[begins[i] : begins[i + 1], begins[j] : begins[j + 1]] = block
-    if by_parts:
-        return Dense(A)
     out = np.empty_like(A)
     out[np.ix_(whole.order, whole.order)] = A
     return Dense(out)

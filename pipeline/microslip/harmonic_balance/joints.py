@@ -4,12 +4,13 @@ With the motions v of both sides of every contact (`problem.Problem`, form ``sid
 
     dv + D (E^T S E dv - k dv) = -R,    d = E v
 
-where S, the derivative of the forces, feels the relative motions d alone. With A = 1 - D k of each body by itself
+where S, the derivative of the forces, and k feel few of the coordinates: three of a patch with one point. Of these
+alone, and with A = 1 - D k of each body by itself,
 
     dv = -A^-1 R - A^-1 D E^T S dd,    (1 + E A^-1 D E^T S) dd = -E A^-1 R
 
-and of d only what S feels: three coordinates of a patch with one point. A is what the body does without contacts, and
-singular where that is at resonance without damping: then the sides are solved for.
+and what they tell of the forces moves the others. A is what the body does without contacts, and singular where that is
+at resonance without damping: then the sides are solved for.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from functools import cached_property
 import numpy as np
 
 from ..data import Array, ComplexArray, Indices
-from .blocks import Matrix, one_plus
+from .blocks import Dense, Matrix, around
 
 LEFT = 1e-6
 """Share of the right side that a step may leave: of Newton's method, which sees the rest in the next one."""
@@ -32,54 +33,183 @@ class Sides:
     """The m sides of n contacts, of k coordinates at most that the contacts feel.
 
     Attributes:
-        contact, part: (m,) numbers of theirs. sign: (m,). at: (m, k) their coordinates among all, whose number where
-            there are fewer. own: (m, k) the same among those of the part, -1 where there are fewer.
+        contact, part: (m,) numbers of theirs. sign: (m,) 1 of a first side, -1 of a second one. at: (m, k) their
+            coordinates, `count` where there are fewer. count: of all coordinates.
     """
 
     contact: Indices
     part: Indices
     sign: Array
     at: Indices
-    own: Indices
+    count: int
 
-    def pairs(self, parts: Indices) -> tuple[Indices, Indices]:
-        """(2, q) sides of one of the parts, each with each, and (q,) which of the parts."""
-        one, other = np.nonzero((self.part[:, None] == self.part) & np.isin(self.part, parts)[:, None])
-        return np.array([one, other]), np.searchsorted(parts, self.part[one])
+    @cached_property
+    def of_contacts(self) -> tuple[Indices, Indices]:
+        """(n,) first and second sides, m where there is none."""
+        found = np.full((2, self.contact.max(initial=-1) + 1), len(self.contact))
+        found[(self.sign < 0).astype(int), self.contact] = np.arange(len(self.contact))
+        return found[0], found[1]
+
+    def of_parts(self, parts: Indices) -> Indices:
+        """(p, r) sides of each of some parts, m where there are fewer than r."""
+        each = [np.flatnonzero(self.part == i) for i in parts]
+        out = np.full((len(each), max(map(len, each), default=0)), len(self.part))
+        for row, own in zip(out, each, strict=True):
+            row[: len(own)] = own
+        return out
+
+    @cached_property
+    def met(self) -> tuple[Indices, Indices, Indices]:
+        """(2, q) sides of one part, each with each, ordered by the contacts of both; (u,) where those of the same two
+        contacts begin, and (2, u) these."""
+        pairs = np.array(np.nonzero(self.part[:, None] == self.part))
+        i, j = self.contact[pairs]
+        pairs = pairs[:, np.lexsort((j, i))]
+        both = self.contact[pairs]
+        begins = np.flatnonzero(np.append(True, (np.diff(both) != 0).any(axis=0))[: pairs.shape[1]])
+        return pairs, begins, both[:, begins]
+
+    @cached_property
+    def ring(self) -> Indices | None:
+        """(u,) whether the second of two contacts that meet is the first (0), the one behind it (1) or the one before
+        it (2); None where others meet."""
+        i, j = self.met[2]
+        n = len(self.of_contacts[0])
+        away = (j - i) % max(n, 1)
+        return np.where(away == n - 1, 2, away) if n > 2 and np.isin(away, (0, 1, n - 1)).all() else None
+
+
+@dataclass(frozen=True, eq=False)
+class Parts:
+    """The sides of p parts with as many coordinates.
+
+    Attributes:
+        numbers: (p,) rising. at: (p, c) their coordinates among all. sides: (p, r) see `Sides.of_parts`. own: (p, r k)
+            what contacts feel of the coordinates, c where there are fewer. stiffness: (p, r k, r k) what of that of
+            the contacts is taken into them. met: (4, v) numbers among the pairs of `Sides.met`, of the part here, and
+            of both sides among its own.
+    """
+
+    numbers: Indices
+    at: Indices
+    sides: Indices
+    own: Indices
+    stiffness: Array
+    met: Indices
+
+    @classmethod
+    def of(cls, numbers: Indices, at: Indices, sides: Sides, stiffness: Array) -> Parts:
+        """stiffness: (p, c, c)."""
+        (p, c), found = at.shape, sides.of_parts(numbers)
+        among = np.vstack([sides.at, np.full((1, sides.at.shape[1]), sides.count)])[found]
+        own = np.where(among < sides.count, among - at[:, :1, None], c).reshape(p, found.shape[1] * among.shape[2])
+        wide = np.pad(stiffness, ((0, 0), (0, 1), (0, 1)))
+        held = wide[np.arange(p)[:, None, None], own[:, :, None], own[:, None, :]]
+        (one, other), place = sides.met[0], np.zeros((2, len(sides.part) + 1), int)
+        place[0, found], place[1, found] = np.arange(p)[:, None], np.arange(found.shape[1])
+        met = np.flatnonzero(np.isin(sides.part[one], numbers))
+        return cls(numbers, at, found, own, held, np.array([met, *place[:, one[met]], place[1, other[met]]]))
+
+    def felt(self, v: Array) -> Array:
+        """(p, W, r k) of (m, W, k) of all sides."""
+        wide = np.concatenate([v, np.zeros((1, *v.shape[1:]))])[self.sides]
+        return wide.swapaxes(1, 2).reshape(len(wide), v.shape[1], self.own.shape[1])
 
 
 @dataclass(frozen=True, eq=False)
 class Alone:
-    """What p parts with as many coordinates do without contacts.
+    """What parts with as many coordinates do without contacts.
 
     Attributes:
-        places: (p, c) their coordinates among all. inverse, loose: (p, H + 1, c, c) A^-1 and A^-1 D. pairs: (2, q) see
-            `Sides`. between: (q, W k, W k) `loose` from forces on the second of a pair to motions of the first.
+        parts. compliance: (p, H + 1, c, r k) D from what contacts feel to all coordinates. inverse, loose: (p, H + 1,
+            r k, r k) A^-1 and A^-1 D of what contacts feel.
     """
 
-    places: Indices
+    parts: Parts
+    compliance: ComplexArray
     inverse: ComplexArray
     loose: ComplexArray
-    pairs: Indices
+
+
+@dataclass(frozen=True, eq=False)
+class Apart:
+    """All parts without contacts, at one frequency.
+
+    Attributes: each. sides. between: (u, W k, W k) E A^-1 D E^T, by the pairs of contacts of `Sides.met`.
+    """
+
+    each: list[Alone]
+    sides: Sides
     between: Array
 
+    def step(self, R: Array, S: Array) -> Array | None:
+        """(W, c) dv of (W, c) dv + D (E^T S E - k) dv = R; None where it is not found this way."""
+        s = self.sides
+        free = self._made(np.vstack([R.T, np.zeros((1, len(R)))])[s.at].swapaxes(1, 2), "inverse")
+        d = self._relative(free)
+        force = _across(S, self._solved(S, d.reshape(len(d), -1)).reshape(d.shape))
+        given = s.sign[:, None, None] * force[s.contact]
+        moved = free - self._made(given, "loose")
+        off = force - _across(S, self._relative(moved))
+        if not np.abs(off).max(initial=0.0) <= LEFT * np.abs(force).max(initial=0.0):
+            return None
+        out = R.copy()
+        for one in self.each:
+            p = one.parts
+            beyond = p.felt(given) - p.felt(moved) @ p.stiffness.swapaxes(1, 2)
+            out[:, p.at] -= applied(one.compliance, beyond[..., None])[..., 0].swapaxes(0, 1)
+        return out
 
-def alone(places: Indices, parts: Indices, D: ComplexArray, k: Array, sides: Sides) -> Alone | None:
-    """What parts do without contacts; None where one is at resonance there.
+    def _made(self, v: Array, by: str) -> Array:
+        """(m, W, k) what one of the matrices of `Alone` makes of (m, W, k) of the sides."""
+        out = np.empty((len(v) + 1, *v.shape[1:]))
+        for one in self.each:
+            p, r = one.parts.sides.shape
+            found = applied(getattr(one, by), one.parts.felt(v)[..., None])
+            out[one.parts.sides] = found.reshape(p, v.shape[1], r, v.shape[2]).swapaxes(1, 2)
+        return out[:-1]
 
-    Args:
-        places: (p, c), see `Alone`. parts: (p,) numbers, rising. D: (p, H + 1, c, c). k: (p, c, c).
-    """
-    try:
-        inverse = np.linalg.inv(np.eye(k.shape[-1]) - D @ k[:, None]).astype(complex)
-    except np.linalg.LinAlgError:
-        return None
-    loose, (pairs, which) = inverse @ D, sides.pairs(parts)
-    own = sides.own[pairs]
-    rows, columns = own[0][:, None, :, None], own[1][:, None, None, :]
-    wide = np.pad(loose, ((0, 0), (0, 0), (0, 1), (0, 1)))
-    met = wide[which[:, None, None, None], np.arange(D.shape[1])[:, None, None], rows, columns]
-    return Alone(places, inverse, loose, pairs, _of_coefficients(met))
+    def _relative(self, v: Array) -> Array:
+        """(n, W, k) E of what (m, W, k) sides move by."""
+        wide = np.concatenate([v, np.zeros((1, *v.shape[1:]))])
+        first, second = self.sides.of_contacts
+        return wide[first] - wide[second]
+
+    def _solved(self, S: Array, right: Array) -> Array:
+        """(n, W k) d of (1 + E A^-1 D E^T S) d = right."""
+        (n, s), (i, j), ring = right.shape, self.sides.met[2], self.sides.ring
+        blocks = self.between @ S[j]
+        blocks[i == j] += np.eye(s)
+        if ring is not None:
+            D, behind, before = A = np.zeros((3, n, s, s))
+            A[ring, i] = blocks
+            return around(D, behind, before, right)
+        A = np.zeros((n, s, n, s))
+        A[i, :, j] = blocks
+        return Dense(A.reshape(n * s, n * s)).solve(right.ravel()).reshape(n, s)
+
+
+def apart(sides: Sides, each: list[tuple[Parts, ComplexArray]]) -> Apart | None:
+    """All parts without contacts, of their D (p, H + 1, c, c); None where one is at resonance there."""
+    found = list[Alone]()
+    pairs, begins, _ = sides.met
+    k, harmonics = sides.at.shape[1], each[0][1].shape[1]
+    met = np.empty((pairs.shape[1], harmonics, k, k), complex)
+    for parts, D in each:
+        (p, f), r = parts.own.shape, parts.sides.shape[1]
+        wide, of = np.pad(D, ((0, 0), (0, 0), (0, 1), (0, 1))), np.arange(p)[:, None]
+        compliance = wide[of, :, :, parts.own].transpose(0, 2, 3, 1)
+        felt = compliance[of, :, parts.own].transpose(0, 2, 1, 3)
+        try:
+            inverse = np.linalg.inv(np.eye(f) - felt @ parts.stiffness[:, None]).astype(complex)
+        except np.linalg.LinAlgError:
+            return None
+        loose = inverse @ felt
+        found.append(Alone(parts, compliance[:, :, :-1], inverse, loose))
+        own, i, a, b = parts.met
+        met[own] = loose.reshape(p, harmonics, r, k, r, k)[i, :, a, :, b]
+    met *= np.prod(sides.sign[pairs], axis=0)[:, None, None, None]
+    return Apart(found, sides, _of_coefficients(np.add.reduceat(met, begins)))
 
 
 def _of_coefficients(M: ComplexArray) -> Array:
@@ -94,24 +224,24 @@ def _of_coefficients(M: ComplexArray) -> Array:
     return out.reshape(q, (2 * H - 1) * k, (2 * H - 1) * k)
 
 
+def _across(S: Array, d: Array) -> Array:
+    """(n, W, k) forces S d."""
+    return (S @ d.reshape(len(d), -1, 1)).reshape(d.shape)
+
+
 @dataclass(frozen=True, eq=False)
 class Joints:
     """1 + D (E^T S E - k), see above.
 
     Attributes:
-        alone: of all parts, see `alone`; None: of one there is nothing. slopes: (n, k, W, k, W) S of the contacts.
-        sides: theirs. scale: (c,) of a unit of x. blocks: the same matrix, of the sides.
+        apart: None where there is no such thing. slopes: (n, W k, W k) S of the contacts. scale: (c,) of a unit of x.
+        blocks: the same matrix, of the sides.
     """
 
-    alone: list[Alone] | None
+    apart: Apart | None
     slopes: Array
-    sides: Sides
     scale: Array
     blocks: Callable[[], Matrix]
-
-    @property
-    def coefficients(self) -> int:
-        return self.slopes.shape[2]
 
     def dense(self) -> Array:
         return self._of_sides.dense()
@@ -126,70 +256,12 @@ class Joints:
 
     def solve(self, right: Array) -> Array:
         """See `blocks.Matrix`."""
-        R = right.reshape(self.coefficients, -1) * self.scale
-        with np.errstate(all="ignore"):
-            dv = self._step(R)
-        if dv is None or not np.isfinite(dv).all():
-            return self._of_sides.solve(right)
-        return (dv / self.scale).ravel()
-
-    def _step(self, R: Array) -> Array | None:
-        """(W, c) dv of (W, c) A dv + D E^T S E dv = R; None where it is not found this way."""
-        if self.alone is None:
-            return None
-        free = np.empty_like(R)
-        for one in self.alone:
-            free[:, one.places] = _applied(one.inverse, R[:, one.places])
-        force = self._across(self._relative.solve(self._felt(free).ravel()))
-        dv = free - self._answered(force)
-        off = force - self._across(self._felt(dv))
-        return dv if np.abs(off).max(initial=0.0) <= LEFT * np.abs(force).max(initial=0.0) else None
-
-    def _felt(self, v: Array) -> Array:
-        """(n, W, k) relative motions that the contacts feel, from (W, c)."""
-        s = self.sides
-        own = np.hstack([v, np.zeros((len(v), 1))])[:, s.at].transpose(1, 0, 2)
-        out = np.zeros((len(self.slopes), *own.shape[1:]))
-        np.add.at(out, s.contact, s.sign[:, None, None] * own)
-        return out
-
-    @cached_property
-    def _matrices(self) -> Array:
-        """(n, W k, W k) S, ordered by harmonics."""
-        n, k, W, *_ = self.slopes.shape
-        return self.slopes.transpose(0, 2, 1, 4, 3).reshape(n, W * k, W * k)
-
-    def _across(self, d: Array) -> Array:
-        """(n, W, k) forces S d."""
-        n, k, W, *_ = self.slopes.shape
-        return (self._matrices @ d.reshape(n, W * k, 1)).reshape(n, W, k)
-
-    def _answered(self, force: Array) -> Array:
-        """(W, c) A^-1 D E^T of forces."""
-        s = self.sides
-        given = np.zeros((self.coefficients, len(self.scale) + 1))
-        given[:, s.at] = (s.sign[:, None, None] * force[s.contact]).transpose(1, 0, 2)
-        out = np.empty((self.coefficients, len(self.scale)))
-        for one in self.alone or []:
-            out[:, one.places] = _applied(one.loose, given[:, one.places])
-        return out
-
-    @cached_property
-    def _relative(self) -> Matrix:
-        """1 + E A^-1 D E^T S, contact by contact."""
-        pieces: dict[tuple[int, int], Array] = {}
-        (n, k, W, *_), s = self.slopes.shape, self.sides
-        for one in self.alone or []:
-            i, j = s.contact[one.pairs]
-            found = one.between @ (np.prod(s.sign[one.pairs], axis=0)[:, None, None] * self._matrices[j])
-            for key, block in zip(zip(i.tolist(), j.tolist(), strict=True), found, strict=True):
-                pieces[key] = pieces[key] + block if key in pieces else block
-        return one_plus(pieces, [k] * n, W, by_parts=True)
-
-
-def _applied(D: ComplexArray, v: Array) -> Array:
-    """(W, p, c) what matrices (p, H + 1, c, c) make of (W, p, c)."""
-    return applied(D, v.transpose(1, 0, 2)[..., None])[..., 0].transpose(1, 0, 2)
+        if self.apart is not None:
+            with np.errstate(all="ignore"):
+                dv = self.apart.step(right.reshape(-1, len(self.scale)) * self.scale, self.slopes)
+            if dv is not None and np.isfinite(dv).all():
+                return (dv / self.scale).ravel()
+        return self._of_sides.solve(right)
 
 
 def applied(D: ComplexArray, V: Array) -> Array:

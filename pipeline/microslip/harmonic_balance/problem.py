@@ -24,7 +24,7 @@ from ..system.assembly import Assembly, Linear
 from . import blocks, by_hand, reduced
 from .blocks import Matrix
 from .forces import AFT, Forces
-from .joints import Alone, Joints, Sides, alone
+from .joints import Apart, Joints, Parts, Sides, apart
 from .point_cycles import Cycle, Traced
 from .reduced import Coefficients, Driven, Eliminated, Poles, ReadOuts, Seen, View
 
@@ -290,9 +290,13 @@ class Problem:
         for row, (*_, own) in zip(at, of, strict=True):
             row[: len(own)] = own
         part = np.searchsorted(begins, at[:, 0], "right") - 1
-        at = at[:, self.ways]
-        inside = np.where(at < self.count, at - begins[part, None], -1)
-        return Sides(np.array([i for i, *_ in of]), part, np.array([sign for _, sign, _ in of]), at, inside)
+        return Sides(np.array([i for i, *_ in of]), part, np.array([s for _, s, _ in of]), at[:, self.ways], self.count)
+
+    @cached_property
+    def with_sides(self) -> list[Parts]:
+        """Of each of `alike`."""
+        k = [np.array([self.stiffness[i] for i in parts]) for parts, _ in self.alike]
+        return [Parts.of(*own, self.sides, held) for own, held in zip(self.alike, k, strict=True)]
 
     @cached_property
     def without(self) -> list[Array]:
@@ -490,22 +494,16 @@ class AtFrequency:
         if len(p.slices) == 1 and len(p.sides.contact) <= RELATIVE_AT_MOST:
             return self._of_sides(slopes)
         n, a, W = sum(map(len, p.ranks)), len(p.ways), p.coefficients
-        S = np.zeros((n, a, W, a, W))
+        S = np.zeros((n, W, a, W, a))
         for i, own in zip(p.ranks, slopes, strict=True):
             has = p.ways[p.ways < own.shape[1]]
-            S[i, : len(has), :, : len(has)] = own[:, has][:, :, :, has]
-        return Joints(self._alone, S, p.sides, p.scale, partial(self._of_sides, slopes))
+            S[i, :, : len(has), :, : len(has)] = own[:, has][:, :, :, has].transpose(0, 2, 1, 4, 3)
+        return Joints(self._apart, S.reshape(n, W * a, W * a), p.scale, partial(self._of_sides, slopes))
 
     @cached_property
-    def _alone(self) -> list[Alone] | None:
-        p, found = self.problem, list[Alone]()
-        for (parts, at), both in zip(p.alike, self.both, strict=True):
-            D, k = both[:, 0, :, :, 1:], np.array([p.stiffness[i] for i in parts])
-            one = alone(at, parts, D, k, p.sides)
-            if one is None:
-                return None
-            found.append(one)
-        return found
+    def _apart(self) -> Apart | None:
+        p = self.problem
+        return apart(p.sides, list(zip(p.with_sides, (both[:, 0, :, :, 1:] for both in self.both), strict=True)))
 
     def _of_sides(self, slopes: list[Array]) -> Matrix:
         p = self.problem

@@ -25,6 +25,9 @@ Follow = Callable[[float, float, float, bool], tuple[list[tuple[float, Array]], 
 and whether it ends on the way; the third is the width (Hz) of what is between two points of the sweep, the last one
 whether that is worth many steps."""
 
+Tells = Callable[[float, float], bool]
+"""Whether the solution at a frequency (Hz) is where the one at another leads, as what is known beyond that tells."""
+
 TOLERANCE = 1e-4
 """Share of the highest amplitude by which it may be missed."""
 
@@ -62,7 +65,7 @@ class Highest:
 
 def highest(
     respond: Respond, frequency: Array, tolerance: float = TOLERANCE, most: int = MOST, follow: Follow | None = None,
-    at_once: Respond | None = None,
+    at_once: Respond | None = None, tells: Tells | None = None,
 ) -> Highest:  # fmt: skip
     """The highest amplitude of all read-outs in a band.
 
@@ -70,9 +73,10 @@ def highest(
         frequency: (f,) Hz, rising or falling, a sweep that sees every resonance. tolerance, most: see `TOLERANCE`,
             `MOST`. follow: where it is given, a sweep that jumps goes back on the higher side. at_once: where it is
             given, what is found with little work from what is known: the sweep goes as far as that leads, then back
-            from its other end, and the rest is looked for in what is between.
+            from its other end, and the rest is looked for in what is between. tells: where it is given, no solution is
+            followed to where it is told to lead.
     """
-    search = _Search(respond, follow, at_once, frequency)
+    search = _Search(respond, follow, at_once, tells, frequency)
     known, failed = search.known, search.failed
     search.sweep([float(f) for f in frequency])
     before = np.inf  # what was left where a parabola placed the last point
@@ -107,9 +111,9 @@ class _Search:
     was known beside them then."""
 
     def __init__(
-        self, respond: Respond, follow: Follow | None, at_once: Respond | None, frequency: Array
+        self, respond: Respond, follow: Follow | None, at_once: Respond | None, tells: Tells | None, frequency: Array
     ) -> None:  # fmt: skip
-        self.respond, self.follow, self.at_once = respond, follow, at_once
+        self.respond, self.follow, self.at_once, self.tells = respond, follow, at_once, tells
         self.low, self.high = float(min(frequency)), float(max(frequency))
         self.width = float(np.abs(np.diff(frequency)).max(initial=0.0))
         self.known: dict[float, Array] = {}
@@ -163,26 +167,42 @@ class _Search:
 
     def leads_on(self, top: float, tolerance: float) -> bool:
         """Whether a solution that is about as high as the top, and beside which there is a lower one, leads to more
-        than is known: not only in this interval."""
+        than is known: not only in this interval. A wide one is halved while what is known does not tell."""
         x = sorted(self.known)
         for low, high in zip(x, x[1:], strict=False):
             a, b = self.known[low].max(), self.known[high].max()
-            if min(a, b) < STEADY * max(a, b) and max(a, b) > STEADY * top and self.goes_on(low, high, tolerance, True):
+            if min(a, b) >= STEADY * max(a, b) or max(a, b) <= STEADY * top or self._told(low, high):
+                continue
+            middle = 0.5 * (low + high)
+            if self.tells is not None and self._wide(low, high) and middle not in self.failed:
+                self.look(middle)
+                return True
+            if self.goes_on(low, high, tolerance, True):
                 return True
         return False
+
+    def _wide(self, low: float, high: float) -> bool:
+        return high - low > NARROW * self.width
+
+    def _told(self, low: float, high: float) -> bool:
+        """Whether the higher of two points leads to the other one."""
+        far, near = sorted((low, high), key=lambda f: float(self.known[f].max()))
+        return self.tells is not None and self.tells(far, near)
 
     def goes_on(self, low: float, high: float, tolerance: float, last: bool = False) -> bool:
         """Whether the higher of two points leads to more at the other one, or on the way there, than is known. Where it
         ends, a point is looked for beside that. last: whether the interval is not halved any more."""
         known = self.known
         far, near = sorted((low, high), key=lambda f: known[f].max())
-        told, wide = known[near].max(), high - low > NARROW * self.width
+        told, wide = known[near].max(), self._wide(low, high)
         smooth = wide and known[far].max() > STEADY * told and near not in self.led
         ended = any(abs(near - end) < ENDED * self.width for end in self.ends)
         arc = last or not wide
         if self.follow is None or smooth or ended or (far, near, told, arc) in self.tried:
             return False
         self.tried.add((far, near, told, arc))
+        if self._told(low, high):
+            return False
         points, ends = self.follow(far, near, self.width, arc)
         higher = {
             f: y for f, y in points if y.max() > (1 + tolerance) * known[far].max() and self.low <= f <= self.high

@@ -98,7 +98,7 @@ def of_ring(asked: Asked, ring: Assembly, number: int = 0) -> Sample:
 
 def _searched(asked: Asked, ring: Assembly, frequency: Array) -> tuple[Highest, Sliding | Sticking]:
     respond = Sticking(ring) if asked.stuck else Sliding(asked.problem(ring), asked.tuned_points)
-    top = highest(respond, frequency, follow=respond.follow, at_once=respond.at_once)
+    top = highest(respond, frequency, follow=respond.follow, at_once=respond.at_once, tells=respond.tells)
     return top if not np.isfinite(top.amplitude) else _ended(top, respond.ended(top.frequency)), respond
 
 
@@ -126,8 +126,11 @@ def again(asked: Asked, one: Sample) -> tuple[Highest, Highest]:
 CLOSE = 1e-3
 """Of R over x, below which Newton's method begins without looking for another start."""
 
-SEARCHED = 1e-8
+SEARCHED = 1e-7
 """Of R over x, to which the search solves; the highest is solved to the end."""
+
+TELLS = 0.5
+"""Share of the way from one solution to another, from there on which it leads where it is carried on."""
 
 
 class Sliding:
@@ -164,8 +167,7 @@ class Sliding:
         or on the way there along its arc where asked for, and whether it ends; what is known here stays where that is
         higher. width: Hz, of what is between two points of a sweep."""
         Omega, before = 2 * np.pi * frequency, self.known.get(frequency)
-        beyond = [self.known[f] for f in self.known if (f - behind) * (frequency - behind) <= 0]
-        side = sorted(beyond, key=lambda p: abs(p.Omega - Omega))
+        side = self._beyond(frequency, behind)
         for count in (2, 1):
             point = among(self._at(Omega), carried(side[:count], Omega), tolerance=SEARCHED)
             y = self._kept(frequency, point)
@@ -177,6 +179,17 @@ class Sliding:
             return [], False
         points, ends = Branch(self.problem, self.known[behind], Omega, 2 * np.pi * width).onward()
         return [(f, self._read(f, p)) for p in points if (f := p.Omega / (2 * np.pi)) != frequency], ends
+
+    def tells(self, frequency: float, behind: float) -> bool:
+        """See `peaks.Tells`: a straight line through two solutions."""
+        near, found = self.known[behind].x, self.known[frequency]
+        told = carried(self._beyond(frequency, behind)[:2], found.Omega)
+        return bool(np.linalg.norm(told - found.x) < TELLS * np.linalg.norm(near - found.x))
+
+    def _beyond(self, frequency: float, behind: float) -> list[Point]:
+        """What is known from `behind` on away from a frequency, the nearest first."""
+        away = [f for f in self.known if (f - behind) * (frequency - behind) <= 0]
+        return [self.known[f] for f in sorted(away, key=lambda f: abs(f - frequency))]
 
     def ended(self, frequency: float) -> Array:
         """(w,) m at a frequency that was solved for, by Newton's method to its end."""
@@ -258,7 +271,7 @@ class Sticking:
         return np.abs(reduced.monitored(self.part, found.modal, force))
 
     ended = __call__
-    follow = at_once = None  # of linear equations there is one solution, found alike everywhere
+    follow = at_once = tells = None  # of linear equations there is one solution, found alike everywhere
 
     def coordinates(self, frequency: float) -> list[ComplexArray]:
         """See `Sliding`."""
