@@ -11,8 +11,8 @@ import scipy.linalg
 
 from microslip.case import load_case
 from microslip.case.assemble import Built, build
+from microslip.case.messages import OPEN
 from microslip.case.problem import problem_of
-from microslip.case.run import OPEN
 from microslip.data import Array, ModalBasis
 from microslip.harmonic_balance.problem import Problem
 from microslip.harmonic_balance.reduced import stuck

@@ -16,7 +16,7 @@ from test_results import sweep
 
 from microslip.case.checkpoint import series_name
 from microslip.case.comparison import Pair, comparison_table, paired, sentence
-from microslip.case.run import _lifting
+from microslip.case.messages import lifting
 from microslip.cli import main
 from microslip.errors import UserError
 from microslip.harmonic_balance.orbits import orbits
@@ -134,7 +134,7 @@ def test_the_contact_of_a_whole_ring_that_lifts_off_is_named() -> None:
     share = np.zeros((3, 4))
     share[1, 3] = 0.25
     found = SimpleNamespace(converged=np.ones(3, dtype=bool), open=share, frequency=np.array([10.0, 20.0, 30.0]))
-    (said,) = _lifting(built, ring, found, 5.0)
+    (said,) = lifting(built, ring, found, 5.0)
     assert "points of right of 3 would lift off, for 25 % of points and time at 20 Hz" in said
 
 

@@ -17,8 +17,8 @@ from test_harmonic_balance_time import body, slider
 from microslip import continuation
 from microslip.case import CaseResult, CaseSettings, load_case, run_case
 from microslip.case.assemble import build
+from microslip.case.messages import not_periodic
 from microslip.case.problem import problem_of
-from microslip.case.run import _not_periodic
 from microslip.contact.friction import Coulomb, Falling
 from microslip.contact.heights import Polynomial
 from microslip.contact.law import Law
@@ -533,7 +533,7 @@ def test_a_case_says_when_sliders_are_settled(tmp_path: Path) -> None:
         found[periodicity] = harmonic_response(problem, np.array([60.0]), np.ones(1)).monitor[0]
     assert found[1e-10] == pytest.approx(found[0.0], rel=1e-8)
     assert found[1e-2] == pytest.approx(found[0.0], rel=1e-2)
-    (message,) = _not_periodic(5.0, np.array([4e-3]), settings)
+    (message,) = not_periodic(5.0, np.array([4e-3]), settings)
     assert "up to 0.4 % in the next one; lower periodicity." in message
 
 

@@ -213,7 +213,7 @@ def test_what_the_command_line_says_of_it(tmp_path: Path, monkeypatch: pytest.Mo
 
 def test_stuck_damping_says_what_open_contacts_make_of_it(tmp_path: Path) -> None:
     """phi^T C phi / (2 omega) of the bars without a joint, ten times what was asked for, stands in a message."""
-    from microslip.case.run import _of_stuck_modes
+    from microslip.case.messages import of_stuck_modes
 
     b = strips(tmp_path, 'damping = "stuck"\ndamping_ratio = 0.001', joint=100 * STIFF)
     part = b.pressed(1e3).joined(1)
@@ -221,9 +221,9 @@ def test_stuck_damping_says_what_open_contacts_make_of_it(tmp_path: Path) -> Non
     omega = np.sqrt(np.maximum(values, 0.0))
     D = np.einsum("im,ij,jm->m", shapes, part.C, shapes) / np.maximum(2 * omega, 1.0)
     most = D[(omega > 1.0) & (omega < 2 * np.pi * 60.0)].max()
-    (said,) = _of_stuck_modes(b, 1e3)
+    (said,) = of_stuck_modes(b, 1e3)
     assert most > 5e-3 and f"{100 * most:.3g} %" in said
-    assert not _of_stuck_modes(strips(tmp_path), 1e3)
+    assert not of_stuck_modes(strips(tmp_path), 1e3)
 
 
 @pytest.mark.parametrize("normal", [1e5, 1e7])

@@ -10,8 +10,6 @@ from pathlib import Path
 import numpy as np
 import scipy.linalg
 
-from ..contact.harmonics import fourier
-from ..contact.jenkins import Jenkins
 from ..data import Array, ComplexArray, ModalBasis
 from ..errors import UserError
 from ..harmonic_balance import FrequencyResponse
@@ -21,22 +19,20 @@ from ..harmonic_balance.checkpoint import labels, resumed_response
 from ..harmonic_balance.cost import GIB
 from ..harmonic_balance.problem import Problem
 from ..harmonic_balance.readout import measured
-from ..harmonic_balance.reduced import stuck, stuck_damping, untouched
+from ..harmonic_balance.reduced import stuck, stuck_damping
 from ..harmonic_balance.refinement import filled_response
 from ..harmonic_balance.response import HarmonicResponse, Resonance, refined_peaks
 from ..harmonic_balance.solver import Point
-from ..harmonic_balance.sweeps import overhanging
 from ..results import Journal
-from ..results.checks import cause
-from ..results.names import apart
 from ..system.assembly import Assembly, Linear
 from ..units import Quantity, counted, percent
 from . import edges
+from . import messages as say
 from .assemble import Built, build
 from .checkpoint import series_name
 from .contacts import memory_of, swept
 from .edges import Rising
-from .problem import book_models, normal_forces, pressed_by, problem_of
+from .problem import normal_forces, pressed_by, problem_of
 from .readouts import Readout, readouts
 from .settings import FIRST_HARMONICS, CaseSettings
 from .weak_springs import raising
@@ -135,63 +131,27 @@ def _run(
     with keep(built) if keep else nullcontext() as journal:
         responses, resonances, stuck, messages = _answered(built, forces, frequency, report, journal, left)
     free = free_response(built, frequency)
-    idle = [normal for normal, r in responses.items() if _still(r)]
+    idle = [normal for normal, r in responses.items() if say.still(r)]
     resonances |= {normal: [] for normal in idle}
     at_the_ends = edges.rising({n: r for n, r in responses.items() if n not in idle}, resonances)
     messages = [
         *built.messages,
-        *_by_the_book(built),
-        *_between(built),
+        *say.by_the_book(built),
+        *say.between_equilibria(built),
         *raising(built, max(forces, default=None)),
-        *_of_stuck_modes(built, max(forces, default=None)),
+        *say.of_stuck_modes(built, max(forces, default=None)),
         *messages,
         *left.unknown(),
-        *_too_coarse(settings, *stuck),
-        *_not_converged(responses),
-        *_idle(idle),
-        *_overhanging(responses, resonances),
+        *say.too_coarse(settings, *stuck),
+        *say.not_converged(responses),
+        *say.idle(idle),
+        *say.overhangs(responses, resonances),
         *edges.messages(at_the_ends),
     ]
     return CaseResult(
         settings, responses, free, stuck[0], resonances, built.speed, tuple(messages), built,
         tuple(at_the_ends), left.most, stuck[1], left.errors,
     )  # fmt: skip
-
-
-STILL = 1e-10
-"""Share of the contacts' motion below which a read-out counts as one that does not move: rounding."""
-
-
-def _still(response: FrequencyResponse) -> bool:
-    """Whether nothing moves the first read-out, so that its peaks are none."""
-    ok = response.converged
-    moved = float(np.abs(response.slip[ok]).max(initial=0.0))
-    return 0 < moved and float(np.abs(response.monitor[ok]).max(initial=0.0)) <= STILL * moved
-
-
-def _overhanging(
-    responses: Mapping[float, FrequencyResponse], resonances: Mapping[float, list[tuple[float, float]]]
-) -> list[str]:  # fmt: skip
-    """A message on resonances that a sweep jumps past."""
-    found = {normal: overhanging(r, resonances[normal]) for normal, r in responses.items()}
-    return [
-        f"At F_N = {normal:g} N the resonance at {', '.join(f'{f:.6g}' for f, _ in peaks)} Hz overhangs: beside it "
-        "there are several motions at one frequency, and the sweep came along another one (a dot in the picture); "
-        "microslip respond CASE --over frequency draws the whole curve."
-        for normal, peaks in found.items()
-        if peaks
-    ]
-
-
-def _idle(forces: Sequence[float]) -> list[str]:
-    """A message where nothing moves the first read-out."""
-    if not forces:
-        return []
-    pressed = ", ".join(f"{normal:g}" for normal in forces)
-    return [
-        f"At F_N = {pressed} N the first read-out does not move while the contacts do: it has no resonances; read "
-        "another direction or another monitor."
-    ]
 
 
 def _answered(
@@ -209,9 +169,10 @@ def _answered(
         limits = np.array([c.coefficient * (key if swept(c) else c.normal_force or 0.0) for c in built.contacts])
         found, peaks = _swept(problem, frequency, limits, report, journal, key)
         responses[key], resonances[key] = found, [(one.frequency, one.amplitude) for one in peaks]
-        messages += _not_periodic(key, found.unsteady, built.settings)
-        messages += _lifting(built, problem, found, key) + _pulling(built, found, key) + _across(problem, found, key)
-        messages += [] if _still(found) else left.out(problem, found, peaks, key)
+        messages += say.not_periodic(key, found.unsteady, built.settings)
+        messages += say.lifting(built, problem, found, key) + say.pulling(built, found, key)
+        messages += say.across(problem, found, key)
+        messages += [] if say.still(found) else left.out(problem, found, peaks, key)
         if key == max(responses):
             stiff = _stuck(problem.assembly)
     return responses, resonances, stiff, messages
@@ -274,23 +235,6 @@ def _book_can(built: Built, path: Path | str) -> None:
         except UserError as error:
             more = ", or isotropic = true in a curved contact" if "along t1 and t2" in str(error) else ""
             raise UserError(f'{path}: contacts.{c.name}: {error}{more}, or write mode = "aft"') from error
-
-
-def _by_the_book(built: Built) -> list[str]:
-    """That it is the book's mode, and how far its tables are off."""
-    if built.settings.mode != "book":
-        return []
-    models = book_models(built.assembly, built.settings.strips)
-    errors: dict[str, str] = {}  # of every table, by the hash of its law
-    for i, c in enumerate(built.assembly.contacts):
-        for table in models[i].tables:
-            of = f"the stiffness (normal law of {c.name})" if table.kind == "normal" else "what friction holds (orbits)"
-            errors.setdefault(table.law, f"{table.error:.2g} of {of}")
-    return [
-        "Book mode (Sextro 5.2): one harmonic, normal forces that do not change friction within a cycle, elliptic "
-        f"orbits; its tables are off by at most {' and '.join(errors.values())}. microslip respond CASE --compare-book "
-        "shows what the mode leaves out."
-    ]
 
 
 def free_response(built: Built, frequency: Array) -> FrequencyResponse:
@@ -397,7 +341,7 @@ class _Left:
             return []
         s = self.built.settings
         return [
-            f"With twice the harmonics and samples no solution was found {at_places(self.lost)}, so how uncertain "
+            f"With twice the harmonics and samples no solution was found {say.at_places(self.lost)}, so how uncertain "
             f"amplitudes are there is not known: respond with more of them (harmonics = {2 * s.balanced}, samples = "
             f"{2 * s.sampled}; its points begin at their neighbours) and more sweep.points there; if these fail too, "
             "microslip respond CASE --stability tells whether what was found is stable."
@@ -413,168 +357,3 @@ class _Left:
         if (n := e.problem.harmonics) > problem.harmonics:
             said = f"at F_N = {normal:g} N and {point.Omega / (2 * np.pi):.6g} Hz an error of about {percent(share)}"
             raise _TooFew(n, f"{said} is left with {counted(problem.harmonics, 'harmonic')}; all once more with {n}")
-
-
-OPEN = 0.01
-"""Share of points and time that may be open in the book's mode before a message is made."""
-
-
-def lifted(built: Built, found: HarmonicResponse) -> Array:
-    """(f,) bool, points at which contacts would lift off though what stands for their law does not follow it."""
-    return lifts(built, found.open) & found.converged
-
-
-def lifts(built: Built, share: Array) -> Array:
-    """(f,) bool, the same by the shares (f, c) of points and time at which contacts are open."""
-    if built.settings.mode == "book":
-        return np.asarray((share > OPEN).any(axis=1))
-    count = len(built.contacts)  # of a sector; the others of a ring follow
-    never = [i for i in range(share.shape[1]) if not built.contacts[i % count].what.opens]
-    return np.asarray((share[:, never] > 0).any(axis=1))
-
-
-def _lifting(built: Built, problem: Problem, found: HarmonicResponse, normal: float) -> list[str]:
-    """A message where points would lift off in the book's mode, whose friction does not know of it."""
-    if built.settings.mode != "book" or not lifted(built, found).any():
-        return []
-    share = np.where(found.converged[:, None], found.open, 0.0)
-    at, which = np.unravel_index(int(share.argmax()), share.shape)
-    return [
-        f"At F_N = {normal:g} N points of {problem.assembly.contacts[which].name} would lift off, for "
-        f"{percent(share[at, which])} of points and time at {found.frequency[at]:.6g} Hz; the book's mode takes "
-        'their friction for that of a closed contact: compare with mode = "aft".'
-    ]
-
-
-def _pulling(built: Built, found: HarmonicResponse, normal: float) -> list[str]:
-    """A message where contacts that do not open would."""
-    pulls = lifted(built, found)
-    if not normal or built.settings.mode == "book" or not pulls.any():
-        return []
-    low, high = found.frequency[pulls][[0, -1]]
-    return [
-        f"At F_N = {normal:g} N the contacts would lift off between {low:.4g} and {high:.4g} Hz, which law = "
-        '"jenkins" does not follow; write law = "smooth" in the contacts.'
-    ]
-
-
-def _across(problem: Problem, found: HarmonicResponse, normal: float) -> list[str]:
-    """A message on the Jenkins elements whose spring without a slider pulls most above what friction would hold."""
-    worst, said, first = 1.0, list[str](), 0
-    wave = fourier(problem.harmonics, 8 * (problem.harmonics + 1))[0][:, 1:]
-    for contact in problem.assembly.contacts:
-        law, rows = contact.patch.law, slice(first, first := first + contact.patch.count)
-        if not isinstance(law, Jenkins) or not law.held:
-            continue
-        ways = contact.patch.kinematics[:, 3 - law.slider] @ found.contact[found.converged, rows, 1:] @ wave.T
-        force = float(law.across) * np.abs(ways).max(axis=(1, 2), initial=0.0)
-        if force.max(initial=0.0) > worst * float(law.held):
-            worst, at = float(force.max() / law.held), found.frequency[found.converged][force.argmax()]
-            said = [
-                f"At F_N = {normal:g} N and {at:.5g} Hz {contact.name} is pulled along t{3 - law.slider} by up to "
-                f'{percent(worst)} of what friction holds, and law = "jenkins" slides along t{law.slider} alone; '
-                f'write law = {{ kind = "jenkins", slides_along = "t{3 - law.slider}" }}, or law = "smooth".'
-            ]
-    return said
-
-
-def _not_periodic(normal: float, unsteady: Array, settings: CaseSettings) -> list[str]:
-    worst = float(unsteady.max(initial=0.0))
-    if worst < 1e-3:
-        return []
-    todo = "lower periodicity" if settings.periodicity > 1e-4 else "raise cycles"
-    return [
-        f"At F_N = {normal:g} N the sliders were not periodic after {settings.cycles} cycles at most: contact forces "
-        f"change by up to {percent(worst)} in the next one; {todo}."
-    ]
-
-
-def _of_stuck_modes(built: Built, normal: float | None) -> list[str]:
-    """How much more damping of the stuck modes takes where contacts slide or open. normal: N, see `Built.pressed`."""
-    asked = built.settings.stuck_ratios
-    if asked is None or not built.settings.contacts:
-        return []
-    part = built.pressed(normal).joined(1)
-    f, D = (of(untouched(part), np.zeros((0, 0))) for of in (stuck, stuck_damping))
-    inside = np.flatnonzero((D > 2 * max(asked)) & (f < built.settings.sweep.stop * built.settings.balanced))
-    if not len(inside):
-        return []
-    at = inside[D[inside].argmax()]
-    return [
-        f"Damping of the stuck modes takes more where contacts slide or open: {100 * D[at]:.3g} % at {f[at]:.5g} Hz, a "
-        'mode without contacts. There damping = "structural" keeps what the bodies have.'
-    ]
-
-
-def _between(built: Built) -> list[str]:
-    """A message where the static normal force is one between two equilibria of a speed range."""
-    error = max(b.group.checks.get("normal_force_error", 0.0) for b in built.bodies.values())
-    if built.settings.sweep.normal_forces != "static" or not error:
-        return []
-    return [f"The static normal force is interpolated between two equilibria of the speed range, to {error:.3g} N."]
-
-
-def _too_coarse(settings: CaseSettings, stuck: Array, damping: Array) -> list[str]:
-    """Where the step is wider than the resonances with sticking contacts (Hz), the narrowest ones that friction leaves.
-
-    Modes narrower than the step have points of their own, but a peak on the flank of another may show at none of them.
-    """
-    sweep = settings.sweep
-    step = (sweep.stop - sweep.start) / (sweep.points - 1)
-    inside = np.flatnonzero((stuck > sweep.start) & (stuck < sweep.stop))
-    if not len(inside):
-        return []
-    widths = 2 * damping[inside] * stuck[inside]
-    at, width = float(stuck[inside[widths.argmin()]]), float(widths.min())
-    if step <= 4 * width:
-        return []
-    return [
-        f"The step of {step:.3g} Hz is wide against a resonance with sticking contacts ({at:.5g} Hz, half-power width "
-        f"{width:.3g} Hz). Modes narrower than the step have points of their own and peaks are searched for between "
-        "the points, but one close beside a higher one may be missing; raise sweep.points to see."
-    ]
-
-
-REMEDIES = {
-    "energy": "",
-    "fold": "microslip respond CASE --over frequency draws the curve",
-    "gaping contacts": "press them by a normal force or an interference, or hold the bodies",
-    "iteration limit": "change sweep.points a little or the normal force",
-    "no balance": "",
-    "not a number": "see the law's settings",
-    "read-out": "",
-}
-"""What to do about a cause, where the status of the point does not say it."""
-
-
-SAID = 3
-"""Frequencies, and normal forces, that a sentence names; the others are counted."""
-
-
-def at_places(places: Mapping[float, Sequence[float]]) -> str:
-    """Normal force (N) -> frequencies (Hz), in words."""
-    said = [
-        f"at {_some([f'{f:.6g}' for f in at], ' Hz')} under F_N = {force} N"
-        for force, at in zip(apart(list(places)), places.values(), strict=True)
-    ]
-    return _some(said, "", "; ", " normal forces")
-
-
-def _some(names: Sequence[str], unit: str, between: str = ", ", what: str = "") -> str:
-    """The first of some names, and how many more there are."""
-    more = f" and {len(names) - SAID} more{what}" if len(names) > SAID else ""
-    return between.join(names[:SAID]) + unit + more
-
-
-def _not_converged(responses: Mapping[float, HarmonicResponse]) -> list[str]:
-    """A message for each normal force and cause."""
-    found = []
-    for normal, r in responses.items():
-        failed = {f: text for f, text, ok in zip(r.frequency, r.status, r.converged, strict=True) if not ok}
-        for why in dict.fromkeys(map(cause, failed.values())):
-            at = [f for f, text in failed.items() if cause(text) == why]
-            remedy = REMEDIES.get(why, REMEDIES["iteration limit"])
-            many = f"At F_N = {normal:g} N {counted(len(at), 'point')} did not converge"
-            said = f"{many}, first at {at[0]:.6g} Hz: {failed[at[0]]}"
-            found.append(said + (f"; {remedy}." if remedy else "."))
-    return found

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .plots import COLOURS, empty_figure, length_unit, plain_axes, save_figure, single_panel
+from ..units import METRES
+from .plots import COLOURS, empty_figure, plain_axes, save_figure, single_panel
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -62,9 +63,8 @@ def _seconds(values: np.ndarray) -> tuple[np.ndarray, str]:
 
 def _metres(*values: np.ndarray) -> tuple[list[np.ndarray], str]:
     """Several lengths in one unit."""
-    scaled, unit = length_unit(np.concatenate([np.ravel(v) for v in values]))
-    ends = np.cumsum([np.size(v) for v in values])[:-1]
-    return [part.reshape(v.shape) for part, v in zip(np.split(scaled, ends), values, strict=True)], unit
+    scale, unit = METRES.scale(max(float(np.abs(v).max(initial=0.0)) for v in values))
+    return [scale * v for v in values], unit
 
 
 def _number(value: float, unit: str) -> str:

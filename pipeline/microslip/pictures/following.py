@@ -14,8 +14,6 @@ from .operating import numbers_within, shades
 from .plots import (
     COLOURS,
     empty_figure,
-    length_scale,
-    length_unit,
     plain_axes,
     plain_numbers,
     said_beside,
@@ -77,18 +75,12 @@ def _for_reading(axes: Axes, found: Sequence[Followed], scale: float) -> None:
         axes.autoscale(axis="both" if name == "y" else "x")
 
 
-def _scale(values: Array, of: Quantity) -> tuple[float, str]:
-    """Factor and unit in which values of a quantity need no powers of ten."""
-    _, unit = length_unit(values)
-    return length_scale(unit), unit.removesuffix("m") + of.said
-
-
 def backbone_plot(found: Mapping[float, Backbone], title: str, path: Path, of: Quantity = METRES) -> Path:
     """Frequency and damping ratio over the amplitude of what is read, a curve a normal force (N)."""
     figure = empty_figure(10.5, 4.4)
     left, right = figure.subplots(1, 2)
     ends = [np.sqrt(one.amplitude[:1] * one.amplitude[-1:]) for one in found.values()]
-    scale, unit = _scale(0.1 * np.concatenate([[1e-9], *ends]), of)
+    scale, unit = of.shared(np.concatenate(ends))
     order = sorted(found.items())
     for width, colour, (normal, one) in zip(widths(len(order)), shades(len(order)), order, strict=True):
         x, label = scale * one.amplitude, f"$F_N$ = {normal:g} N"

@@ -13,12 +13,11 @@ from ..operating.cycle import at_time, farthest_at
 from ..operating.fatigue import Endurance, MaterialLimits, allowed_amplitude, vibration_margin
 from ..operating.motion import Motion, displacement
 from ..operating.stress import CycleStress, StressPeaks
-from ..units import counted
+from ..units import METRES, counted
 from .plots import (
     COLOURS,
     by_rows,
     empty_figure,
-    length_unit,
     mark_missing,
     plain_numbers,
     said_beside,
@@ -300,11 +299,10 @@ def stress_picture(
     for label, values, unit, colours in fields:
         image = views.stress_tile(studio, values, grown * shape, camera, 0.8, unit, colours, mark=mark)
         tiles.append(captioned(image, label, size=16))
-    amount, unit = length_unit(np.array([size]))
     ring = "" if mark is None else f" Ring: the worst place{'' if _seen(studio, mark) else ', on the far side'}."
     note = (
         f"Drawn at {degrees:.0f} degrees of the cycle, {grown:g} times as large; largest displacement "
-        f"{amount[0]:.3g} {unit}; grey lines: at rest.{ring}"
+        f"{METRES.sized(size, 3)}; grey lines: at rest.{ring}"
     )
     return captioned(side_by_side(tiles), title, note, 20)
 

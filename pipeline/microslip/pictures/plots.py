@@ -15,7 +15,7 @@ from ..data import Array, ContactState, ModalBasis, ModalGroup
 from ..files.store import complete_or_absent
 from ..modal.campbell import SURE, VISIBLE, Crossing, Tracks, crossings, gyroscopic_change, parted
 from ..reduced.truncation import Coordinate, coordinates, percent
-from ..units import from_rpm, rpm_text, to_rpm
+from ..units import METRES, from_rpm, rpm_text, to_rpm
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -123,7 +123,7 @@ def plain_numbers(axis: Axis, within: tuple[float, ...]) -> None:
 def closure_curve_plot(curve: ContactCurve, title: str, path: Path) -> Path:
     """Normal force of a closure over the approach of its faces, and its slope, the stiffness of the contact."""
     figure = empty_figure(10.5, 3.9)
-    x, unit = length_unit(curve.approach)
+    scale, unit = METRES.scale(float(np.abs(curve.approach).max()))
     panels = (
         (curve.force, "normal force in N"),
         (curve.stiffness, "stiffness in N/m"),
@@ -131,25 +131,13 @@ def closure_curve_plot(curve: ContactCurve, title: str, path: Path) -> Path:
     )
     for axes, (y, name) in zip(figure.subplots(1, 3), panels, strict=True):
         plain_axes(axes)
-        axes.plot(x, y, "-o", color=COLOURS[0], linewidth=1.6, markersize=4)
+        axes.plot(scale * curve.approach, y, "-o", color=COLOURS[0], linewidth=1.6, markersize=4)
         axes.set_xlabel(f"approach of the faces in {unit}")
         axes.set_ylabel(name)
         axes.set_ylim(0, 1.08 * max(float(y.max()), 1e-300))
         axes.ticklabel_format(axis="y", scilimits=(-3, 5), useMathText=True)
     figure.suptitle(title, fontweight="bold")
     return save_figure(figure, path)
-
-
-def length_unit(values: Array) -> tuple[Array, str]:
-    """Lengths (m) in a unit that needs no powers of ten."""
-    top = float(np.abs(values).max())
-    unit = next((u for u in ("m", "mm", "µm") if top * length_scale(u) >= 0.1), "nm")
-    return values * length_scale(unit), unit
-
-
-def length_scale(unit: str) -> float:
-    """How many of a unit of `length_unit` are a metre."""
-    return {"m": 1.0, "mm": 1e3, "µm": 1e6, "nm": 1e9}[unit]
 
 
 # --- compliance ----------------------------------------------------------------------------------------------------

@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..case import CaseResult, CaseSettings
+from ..case.messages import lifted
 from ..case.readouts import Readout
-from ..case.run import free_response, lifted
+from ..case.run import free_response
 from ..data import Array
 from ..harmonic_balance import FrequencyResponse
 from ..harmonic_balance.sweeps import overhanging

@@ -11,8 +11,8 @@ import numpy as np
 from ..data import Array, Indices, ModalBasis, ModalGroup
 from ..ring.expansion import expand, multiplicity, sector_rotation
 from ..ring.resonances import eigenmodes
+from ..units import METRES
 from .lettering import captioned, colour_bar, nice, sheet, stacked
-from .plots import length_unit
 from .scene import Camera, Stage, Surface, axes_towards, face_triangles, fit, surface
 from .views import AREA, _map, at_speed, hertz, mode_scale
 
@@ -200,8 +200,8 @@ def operating_ring(bodies: Sequence[Round], axis: Array, point: Array, title: st
     strongest = int((parts**2).sum(axis=1).argmax())
     size = np.linalg.norm(moved, axis=1).max()
     grown = nice(SWING * _diameter(still - point, axis) / max(float(size), 1e-300))
-    amount, unit = length_unit(np.array([size, np.abs(parts[strongest]).max()]))
-    value = parts[strongest] / max(float(np.abs(parts[strongest]).max()), 1e-300)
+    most = float(np.abs(parts[strongest]).max())
+    value, (scale, unit) = parts[strongest] / max(most, 1e-300), METRES.scale(most)
     stage = Stage()
     try:
         drawn = still + grown * moved
@@ -210,10 +210,10 @@ def operating_ring(bodies: Sequence[Round], axis: Array, point: Array, title: st
     finally:
         stage.close()
     bar = colour_bar(
-        _map(COLOURS), f"{-amount[1]:.3g}", f"{amount[1]:.3g}", f"{DIRECTIONS[strongest]} displacement in {unit}",
+        _map(COLOURS), f"{-scale * most:.3g}", f"{scale * most:.3g}", f"{DIRECTIONS[strongest]} displacement in {unit}",
         image.width,
     )  # fmt: skip
-    told = f"{note}, {grown:g} times as large; largest displacement {amount[0]:.3g} {unit}."
+    told = f"{note}, {grown:g} times as large; largest displacement {METRES.sized(size, 3)}."
     return captioned(stacked([image, bar], 4), title, told, 20)
 
 

@@ -18,8 +18,8 @@ import numpy as np
 from ..basis import read_basis
 from ..case import checkpoint, load_case
 from ..case.assemble import Built
+from ..case.messages import lifts
 from ..case.problem import pressed_by, problem_of
-from ..case.run import lifts
 from ..continuation import NO_OPTIMUM
 from ..data import Array
 from ..errors import UserError

@@ -16,7 +16,7 @@ import numpy as np
 from ..basis import read_basis
 from ..case import CaseResult, CaseSettings, checkpoint, load_case, run_case
 from ..case.assemble import build
-from ..case.run import at_places, lifted
+from ..case.messages import at_places, lifted
 from ..case.settings import FIRST_HARMONICS
 from ..data import Array, ModalBasis
 from ..errors import UserError
