@@ -139,7 +139,7 @@ def test_a_contact_that_opens() -> None:
         walks.append(np.array([0.0 if (y := walk(f)) is None else y.max() for f in grid]))
     top = max(walk.max() for walk in walks)
     ring = Sliding(asked.problem(tuned.whole))
-    found = highest(ring, np.arange(342.0, 358.0, 5.0), follow=ring.follow, at_once=ring.at_once)
+    found = highest(ring, np.arange(342.0, 358.0, 5.0), follow=ring.follow, at_once=ring.at_once, tells=ring.tells)
     assert found.missed < 0.1
     assert top / found.amplitude - 1 <= found.missed
     assert max(walks[0]) < 0.8 * top
@@ -177,6 +177,34 @@ def test_a_solution_that_is_little_higher_is_followed() -> None:
     found = highest(respond, np.arange(95.0, 110.0, 1.0), follow=follow)
     assert found.amplitude == pytest.approx(1.034, rel=1e-3)
     assert not any(100.2 < f < 100.31 for f in begun) and len(begun) < 8
+
+
+@pytest.mark.parametrize("told", [True, False])
+def test_nothing_is_followed_to_where_it_leads_anyway(told: bool) -> None:
+    """Beside a jump near the peak: nothing where the higher side is told to lead to the lower one, and only what is no
+    wider than an eighth of the sweep's steps where it is not."""
+    smooth, truth = one(101.3, 0.006, np.random.default_rng(0))
+    widths = list[float]()
+
+    def follow(f: float, behind: float, width: float, arc: bool) -> tuple[list[tuple[float, np.ndarray]], bool]:
+        widths.extend([abs(f - behind)] if arc else [])
+        return [], False
+
+    def curve(f: float) -> np.ndarray:
+        return smooth(f) * (1.0 if f < 101.45 else 0.5)
+
+    found = highest(curve, np.arange(95.0, 110.0, 1.0), follow=follow, tells=lambda f, behind: told)
+    assert found.amplitude == pytest.approx(truth, rel=1e-4)
+    assert not widths if told else widths and max(widths) <= 0.125
+
+
+def test_what_a_solution_leads_to_is_told_by_those_beyond_it() -> None:
+    """Of x = (f, f^2) a line through two points leads to a third one nearby; of one that jumps it does not."""
+    ring = Sliding(Bent([0.0, 1.0], [0.0, 1.0]))
+    for f, height in ((1.0, 0.0), (1.2, 0.0), (1.4, 0.0), (1.6, 0.5)):
+        ring.known[f] = Point(2 * np.pi * f, np.array([f, f**2 - height]), CONVERGED, 0.0, 0)
+    assert ring.tells(1.4, 1.2) and ring.tells(1.0, 1.2)
+    assert not ring.tells(1.6, 1.4) and not ring.tells(1.4, 1.6)
 
 
 class Bent:
