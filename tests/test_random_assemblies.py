@@ -22,6 +22,7 @@ from test_assembly_cyclic import FACES
 from microslip.basis import write_basis
 from microslip.data import Array
 from microslip.frames import rotation
+from microslip.harmonic_balance import problem as balance
 from microslip.harmonic_balance import solver
 from microslip.harmonic_balance.solver import newton
 from microslip.modal.compute import modal_basis
@@ -74,6 +75,20 @@ def same(a: Answer, b: Answer, share: float, *change: Change) -> bool:
     wrong = {name: f"{size:.1e}" for name, size in found.items() if not size <= share}
     assert not wrong and all(s.converged.mean() > 0.8 for s in a.response.series)
     return True
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_steps_by_relative_motions_are_those_of_the_sides(place: Path, seed: int) -> None:
+    """Bodies in a row, between others and at its ends: the step of Newton's method from what contacts feel alone solves
+    the system of all sides, whatever the derivatives of the forces are: 1e-9."""
+    case = opened(draw(seed, hard=1.5).written(place / f"row-{seed}"), root=place / f"row-{seed}")
+    p, rng = balance.of(case.built.pressed(20.0), form="sides", harmonics=2, samples=32), np.random.default_rng(seed)
+    felt = [f[..., None] & np.ones(p.coefficients, dtype=bool) for f in p.felt]
+    slopes = [1e4 * rng.normal(size=(*f.shape, *f.shape[1:])) * f[..., None, None] * f[:, None, None] for f in felt]
+    J, right = p.at(2 * np.pi * 110.0).jacobian(slopes), rng.normal(size=p.size)
+    step = J.apart.step(right.reshape(-1, p.count) * p.scale, J.slopes)
+    assert len(p.alike) == 2
+    assert J.dense() @ (step / p.scale).ravel() == pytest.approx(right, abs=1e-9)
 
 
 one_or_several = pytest.mark.parametrize(

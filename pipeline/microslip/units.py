@@ -80,11 +80,6 @@ class Quantity:
         """The unit behind a number: m, rad, m/m."""
         return "m/m" if self.unit == "1" else self.unit
 
-    @property
-    def micro(self) -> str:
-        """That of a millionth: µm, µrad, µm/m."""
-        return f"µ{self.said}"
-
     def sized(self, value: float, digits: int = 4) -> str:
         """A value with the unit in which its number is neither long nor a power of ten: 0.00193 m -> "1.93 mm"."""
         factor, unit = self.scale(value)

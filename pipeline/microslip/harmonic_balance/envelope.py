@@ -123,7 +123,7 @@ def over_orders(
         )
         columns = (np.array(column) for column in zip(*rows, strict=True))
         whole = OverOrders(*columns, quantity=measured(problem.assembly))
-        what = f"{f:.6g} Hz, {top.amplitude:.4g} {whole.quantity.said}"
+        what = f"{f:.6g} Hz, {whole.quantity.sized(top.amplitude)}"
         what += f", {1e-6 * top.stress:.4g} MPa" if np.isfinite(top.stress) else ""
         report(f"engine order {e}{under}: {what if np.isfinite(f) else 'no resonance in the band'}")
         keep(whole)

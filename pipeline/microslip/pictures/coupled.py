@@ -31,10 +31,10 @@ if TYPE_CHECKING:
     from ..harmonic_balance.identification import Identified, NodalDiagram
 
 
-def _in_millionths(axes: Axes, of: Quantity) -> None:
-    """Amplitudes of a quantity on a logarithmic scale with plain numbers."""
+def _amplitudes(axes: Axes, unit: str) -> None:
+    """Amplitudes on a logarithmic scale with plain numbers."""
     _logarithmic(axes)
-    axes.set_ylabel(f"amplitude in {of.micro} (0-peak)")
+    axes.set_ylabel(f"amplitude in {unit} (0-peak)")
 
 
 def _logarithmic(axes: Axes) -> None:
@@ -78,6 +78,8 @@ def over_orders_picture(found: Mapping[str, OverOrders], path: Path, title: str)
         found: label, such as a normal force, -> resonances.
     """
     stressed = any(np.isfinite(r.stress).any() for r in found.values())
+    last = list(found.values())[-1]
+    scale, unit = last.quantity.shared(np.concatenate([r.amplitude for r in found.values()]))
     figure = empty_figure(9.0, 9.5 if stressed else 7.0)
     upper, *lower = figure.subplots(3 if stressed else 2, 1, sharex=True)
     for axes in (upper, *lower):
@@ -85,12 +87,11 @@ def over_orders_picture(found: Mapping[str, OverOrders], path: Path, title: str)
     for width, colour, (label, r) in zip(widths(len(found)), shades(len(found)), found.items(), strict=True):
         line: dict[str, Any] = {"color": colour, "markersize": 3 + width, "linewidth": width}
         upper.plot(r.order, r.frequency, "o-", label=label, **line)
-        for axes, values in zip(lower, (1e6 * r.amplitude, 1e-6 * r.stress), strict=False):
+        for axes, values in zip(lower, (scale * r.amplitude, 1e-6 * r.stress), strict=False):
             axes.plot(r.order, values, "o-", **line)
-    last = list(found.values())[-1]
     upper.plot(last.order, last.stuck, color="0.6", linewidth=1, linestyle="--", label="sticking contacts")
     upper.set_ylabel("resonance in Hz")
-    _in_millionths(lower[0], last.quantity)
+    _amplitudes(lower[0], unit)
     if stressed:
         _logarithmic(lower[1])
         lower[1].set_ylabel("largest stress amplitude in MPa")
@@ -107,11 +108,12 @@ def worst_order_picture(found: Sequence[OverOrders], path: Path, title: str) -> 
     stressed = any(np.isfinite(r.stress).any() for r in found)
     of: Literal["stress", "amplitude"] = "stress" if stressed else "amplitude"
     rows = [w for r in found if (w := worst(r, of)) is not None]
-    best, scale = lowest(rows), 1e-6 if stressed else 1e6
+    best = lowest(rows)
+    scale, unit = (1e-6, "MPa") if stressed else found[0].quantity.shared(w.value for w in rows)
     figure, axes = single_panel(9.0, 5.5)
     x, y = [w.normal_force for w in rows], [scale * w.value for w in rows]
     axes.plot(x, y, "o-", color="#1f5f99", markersize=4, linewidth=1.6)
-    told = f"lowest: {scale * best.value:.3g} {'MPa' if stressed else found[0].quantity.micro}"
+    told = f"lowest: {scale * best.value:.3g} {unit}"
     told += f" under {best.normal_force:.4g} N"
     axes.plot(best.normal_force, scale * best.value, "o", ms=10, mfc="none", mec="#b3261e", mew=1.6, label=told)
     for w in rows:
@@ -122,8 +124,8 @@ def worst_order_picture(found: Sequence[OverOrders], path: Path, title: str) -> 
     axes.set_yscale("log")
     axes.margins(y=0.15)
     numbers_within(axes.yaxis)
-    what = "stress amplitude in MPa" if stressed else f"amplitude in {found[0].quantity.micro}"
-    axes.set(xlabel="normal force in N", ylabel=f"worst {what}", title=title)
+    what = "stress amplitude" if stressed else "amplitude"
+    axes.set(xlabel="normal force in N", ylabel=f"worst {what} in {unit}", title=title)
     axes.legend(fontsize=9)
     return save_figure(figure, path)
 
@@ -131,13 +133,14 @@ def worst_order_picture(found: Sequence[OverOrders], path: Path, title: str) -> 
 def envelope_picture(found: Envelope, path: Path, title: str) -> Path:
     """Smallest and largest amplitude over the frequency, with every combination (Sextro Fig. 5.4-2)."""
     figure, axes = single_panel(9.0, 6.0)
-    low, high, between = 1e6 * found.low, 1e6 * found.high, "between the smallest and the largest"
+    (scale, unit), between = found.quantity.shared(found.high), "between the smallest and the largest"
+    low, high = scale * found.low, scale * found.high
     axes.fill_between(found.frequency, low, high, color="#9ec5e8", alpha=0.6, linewidth=0, label=between)
     for i, (a, ok) in enumerate(zip(found.monitor, found.converged, strict=True)):
         label = f"each of {len(found.monitor)} combinations" if i == 0 else None
-        axes.plot(found.frequency, np.where(ok, 1e6 * np.abs(a), np.nan), color="0.45", linewidth=0.6, label=label)
+        axes.plot(found.frequency, np.where(ok, scale * np.abs(a), np.nan), color="0.45", linewidth=0.6, label=label)
     mark_missing(axes, found.frequency[~found.converged.all(axis=0)], "#b3261e")
-    _in_millionths(axes, found.quantity)
+    _amplitudes(axes, unit)
     axes.set_xlim(found.frequency[0], found.frequency[-1])
     axes.set_xlabel("excitation frequency in Hz")
     axes.set_title(title)
@@ -158,11 +161,12 @@ def speed_line_picture(
     upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=[2, 1])
     for axes in (upper, lower):
         plain_axes(axes)
-    upper.plot(rpm, 1e6 * amplitude, color="#1f5f99", linewidth=1.6)
+    scale, unit = of.shared(amplitude)
+    upper.plot(rpm, scale * amplitude, color="#1f5f99", linewidth=1.6)
     if (lost := np.isnan(amplitude)).any():
         mark_missing(upper, rpm[lost], "#1f5f99")
         upper.legend(fontsize=8)
-    _in_millionths(upper, of)
+    _amplitudes(upper, unit)
     upper.set_title(title)
     for i, (colour, force) in enumerate(zip(shades(normal.shape[1]), normal.T, strict=True)):
         lower.plot(rpm, force, color=colour, linewidth=1.4, label=f"contact {i + 1}")

@@ -171,18 +171,19 @@ def comparison_picture(
     rows = -(-len(marched) // 3)
     columns = min(len(marched), 3)
     figure = Figure(figsize=(4.2 * columns + 0.6, 3.2 * rows + 0.9), dpi=110, layout="constrained")
+    scale, unit = of.shared(np.concatenate([a for _, a in (*marched.values(), *book.values())]))
     panels = figure.subplots(rows, columns, squeeze=False, sharex=True)
     for axes in panels.ravel()[len(marched) :]:
         axes.remove()
     for axes, force, told in zip(panels.ravel(), marched, apart(list(marched)), strict=False):
-        axes.semilogy(marched[force][0], 1e6 * marched[force][1], color="#1f4e79", lw=2.2, label="marched in time")
-        axes.semilogy(book[force][0], 1e6 * book[force][1], color="#d1603d", lw=1.4, ls="--", label="book")
+        axes.semilogy(marched[force][0], scale * marched[force][1], color="#1f4e79", lw=2.2, label="marched in time")
+        axes.semilogy(book[force][0], scale * book[force][1], color="#d1603d", lw=1.4, ls="--", label="book")
         axes.set_title(f"$F_N$ = {told} N", fontsize=10)
         axes.grid(True, which="both", alpha=0.25)
     panels[0, 0].legend(fontsize=9, title=f"marched: H = {case.harmonics}", title_fontsize=8)
     figure.suptitle(f"{case.name}: the book's mode beside the marched laws", fontsize=11)
     figure.supxlabel("excitation frequency in Hz", fontsize=10)
-    figure.supylabel(f"first harmonic of the read-out in {of.micro} (0-peak)", fontsize=10)
+    figure.supylabel(f"first harmonic of the read-out in {unit} (0-peak)", fontsize=10)
     write_png(figure, path)
 
 

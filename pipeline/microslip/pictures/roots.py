@@ -57,9 +57,10 @@ def cycles_picture(found: Sequence[Cycles], title: str, path: Path) -> Path:
     """Amplitude of limit cycles over the parameter: in blue from supercritical Hopf points, in red from others;
     dots are motions in time."""
     figure, axes = single_panel(7.0, 4.4)
+    scale, unit = _shared(found)
     for number, c in enumerate(found):
         columns, colour = c.columns, KINDS[c.kind]
-        height, seen = (1e6 * columns[c.system.column(what)] for what in ("amplitude", "in time"))
+        height, seen = (scale * columns[c.system.column(what)] for what in ("amplitude", "in time"))
         label = f"{c.hopf.omega / (2 * np.pi):.5g} Hz, {c.kind}"
         axes.plot(columns["parameter"], height, color=colour, marker=".", label=label)
         axes.plot(c.hopf.p, 0.0, "o", color="white", markeredgecolor=colour, zorder=3)
@@ -67,14 +68,15 @@ def cycles_picture(found: Sequence[Cycles], title: str, path: Path) -> Path:
             columns["parameter"], seen, "o", color=IN_TIME, markeredgecolor="black", markersize=8, zorder=4,
             label="" if number else TOLD_IN_TIME,
         )  # fmt: skip
-    axes.set(xlabel=title, ylabel=_amplitude(found[0]))
+    axes.set(xlabel=title, ylabel=f"amplitude {found[0].system.named[0]} in {unit}")
     axes.legend(frameon=False, fontsize=9)
     return save_figure(figure, path)
 
 
-def _amplitude(c: Cycles) -> str:
-    """What is drawn a million times as large."""
-    return f"amplitude {c.system.named[0]} in {Quantity(*c.system.units[:1]).micro}"
+def _shared(found: Sequence[Cycles]) -> tuple[float, str]:
+    """Factor and unit of the amplitudes of all."""
+    column = found[0].system.column("amplitude")
+    return Quantity(*found[0].system.units[:1]).shared(np.concatenate([c.columns[column] for c in found]))
 
 
 def relief_picture(found: Sequence[tuple[float, Cycles]], titles: tuple[str, str], path: Path) -> Path:
@@ -85,11 +87,12 @@ def relief_picture(found: Sequence[tuple[float, Cycles]], titles: tuple[str, str
     """
     figure = empty_figure(8.0, 6.2)
     axes: Any = figure.add_subplot(projection="3d", computed_zorder=False)
+    scale, unit = _shared([c for _, c in found])
     for depth, (value, c) in enumerate(reversed(found)):  # the nearest is drawn last
-        _wall(axes, value, c, 3 * depth)
+        _wall(axes, value, c, 3 * depth, scale)
     axes.set_xlabel(titles[0], labelpad=8)
     axes.set_ylabel(titles[1], labelpad=14)
-    axes.set_zlabel(_amplitude(found[0][1]))
+    axes.set_zlabel(f"amplitude {found[0][1].system.named[0]} in {unit}")
     axes.set_yticks(sorted({value for value, _ in found})[:: -(-len(found) // 8)])
     axes.set_zlim(0.0)
     axes.view_init(24, -62)
@@ -101,12 +104,12 @@ def relief_picture(found: Sequence[tuple[float, Cycles]], titles: tuple[str, str
     return save_figure(figure, path)
 
 
-def _wall(axes: Any, value: float, c: Cycles, order: int) -> None:
+def _wall(axes: Any, value: float, c: Cycles, order: int, scale: float) -> None:
     from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
     columns, colour = c.columns, KINDS[c.kind]
-    x, z = np.append(c.hopf.p, columns["parameter"]), 1e6 * np.append(0.0, columns[c.system.column("amplitude")])
-    y, dots = np.full(len(x), value), 1e6 * columns[c.system.column("in time")]
+    x, z = np.append(c.hopf.p, columns["parameter"]), scale * np.append(0.0, columns[c.system.column("amplitude")])
+    y, dots = np.full(len(x), value), scale * columns[c.system.column("in time")]
     wall = np.concatenate([np.column_stack([x, y, z]), np.column_stack([x, y, 0 * z])[::-1]])
     axes.add_collection3d(Poly3DCollection([wall], facecolor=colour, alpha=0.18, zorder=order))
     axes.plot(x, y, z, color=colour, linewidth=1.8, zorder=order + 1, label=c.kind)

@@ -139,7 +139,7 @@ def _size(row: Mapping[str, Any]) -> float:
 
 def _peak(row: Mapping[str, Any], factors: Factors) -> str:
     size, of = amplitude_of(row)
-    factor, unit = factors.get(of.column(""), (1e6, of.micro))
+    factor, unit = factors.get(of.column("")) or of.shared([size])
     force = number(row["normal_force_N"])
     return f"{number(factor * size)} {unit} at {number(row['frequency_Hz'], 5)} Hz under F_N = {force} N"
 

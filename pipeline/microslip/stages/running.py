@@ -170,7 +170,7 @@ def _tell(summary: Mapping[str, Any], report: Report) -> None:
 def _at(row: Mapping[str, Any]) -> str:
     """Frequency and amplitude of a row of a table."""
     amplitude, of = amplitude_of(row)
-    return f"{row['frequency_Hz']:.6g} Hz, {amplitude:.4g} {of.said}"
+    return f"{row['frequency_Hz']:.6g} Hz, {of.sized(amplitude)}"
 
 
 def compare_book(

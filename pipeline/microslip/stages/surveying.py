@@ -200,8 +200,7 @@ def _worst_sentences(found: Sequence[OverOrders]) -> list[str]:
 
 def _worst_sentence(rows: Sequence[Worst], of: str, found: Sequence[OverOrders]) -> str:
     best, orders = lowest(rows), number_list([int(e) for e in found[0].order])
-    quantity = found[0].quantity
-    value = f"{1e-6 * best.value:.4g} MPa" if of == "stress" else f"{1e6 * best.value:.4g} {quantity.micro}"
+    value = f"{1e-6 * best.value:.4g} MPa" if of == "stress" else found[0].quantity.sized(best.value)
     where = f"{value} at engine order {best.order}, {best.frequency:.5g} Hz"
     what = f"Over engine orders {orders} the worst {of}{' amplitude' if of == 'stress' else ''}"
     if len(found) == 1:
