@@ -209,6 +209,8 @@ def test_what_the_command_line_says_of_it(tmp_path: Path, monkeypatch: pytest.Mo
         assert main(["respond", "case.toml", "--set", f"{key}={value}", "-q"]) == 2
     with pytest.raises(UserError, match="damping_ratio"):
         strips(tmp_path, 'damping = "stuck"')
+    with pytest.raises(UserError, match="write a number as damping_ratio"):
+        strips(tmp_path, "damping = 0.02")
 
 
 def test_stuck_damping_says_what_open_contacts_make_of_it(tmp_path: Path) -> None:

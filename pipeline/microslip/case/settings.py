@@ -273,6 +273,12 @@ class MonitorOfCase(Model):
     direction: Literal["x", "y", "z"] = "x"
 
 
+def _no_ratio(value: Any) -> Any:
+    if isinstance(value, int | float):
+        raise ValueError('says what damping is of ("modal", "structural", "stuck"); write a number as damping_ratio')
+    return value
+
+
 class CaseSettings(Model):
     """A whole case.toml.
 
@@ -307,7 +313,7 @@ class CaseSettings(Model):
     monitors: Annotated[tuple[MonitorOfCase, ...], BeforeValidator(_tuple)] = ()
     mode: Literal["aft", "book"] = "aft"
     strips: Annotated[int, Field(ge=0, le=1000)] = 0
-    damping: Literal["modal", "structural", "stuck"] | None = None
+    damping: Annotated[Literal["modal", "structural", "stuck"] | None, BeforeValidator(_no_ratio)] = None
     damping_ratio: Ratio | Ratios | None = None
     harmonics: Literal["auto"] | Annotated[int, Field(ge=1, le=200)] = 3
     harmonics_error: Annotated[Positive, Field(le=0.5)] | None = None
