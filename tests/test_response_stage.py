@@ -594,7 +594,7 @@ def test_a_strain_gauge_is_strain_everywhere_and_an_angle_is_rad(
     np.testing.assert_allclose(*zip(*found, strict=True), rtol=2e-3)
     (resonance,) = json.loads((build / "response.json").read_text())["resonances"]
     assert "amplitude_m" not in resonance and resonance[column] == pytest.approx(max(read.values()))
-    assert any(t.endswith(f" {of.said}") for t in told)
+    assert any(t.endswith(of.sized(resonance[column])) for t in told)
     _, unit = of.shared([resonance[column]])
     assert f"amplitude in {unit}" in (build / "response.html").read_text()
     assert series.quantity == of and series.to_xarray()[f"{kind}.{name}"].attrs["units"] == of.unit
