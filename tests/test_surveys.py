@@ -95,6 +95,13 @@ def test_identify_finds_the_stiffness_of_the_truth(ring: Path, capsys) -> None:
     assert "is up to date" not in capsys.readouterr().err
 
 
+@pytest.mark.parametrize("given", ["", 'engine_orders = "all"', "points = 11"])
+def test_all_engine_orders_are_asked_for_by_a_table_that_says_no_more(ring: Path, given: str) -> None:
+    ring.write_text(f"{RING}[orders]\n{given}\n")
+    case, _ = load_case(ring)
+    assert case.orders is not None and case.orders.engine_orders == "all"
+
+
 @pytest.mark.slow
 def test_respond_over_orders(ring: Path, capsys) -> None:
     """Each order's largest resonance stands where the linear ring has it (contacts stick)."""

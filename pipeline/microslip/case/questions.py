@@ -29,7 +29,7 @@ class OrdersOfCase(Model):
 
     @model_validator(mode="after")
     def _some(self) -> OrdersOfCase:
-        if self.engine_orders == () or 0 in self.engine_orders:
+        if self.engine_orders != "all" and (not self.engine_orders or 0 in self.engine_orders):
             raise ValueError('engine_orders: give one or more whole numbers other than 0, or "all"')
         return self
 

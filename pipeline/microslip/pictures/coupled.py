@@ -95,7 +95,7 @@ def over_orders_picture(found: Mapping[str, OverOrders], path: Path, title: str)
     if stressed:
         _logarithmic(lower[1])
         lower[1].set_ylabel("largest stress amplitude in MPa")
-    lower[-1].set_xlabel("engine order")
+    lower[-1].set(xlabel="engine order", xlim=(last.order.min() - 0.5, last.order.max() + 0.5))
     whole_numbers(lower[-1])
     upper.set_title(title)
     figure.legend(loc="outside lower center", ncols=4, fontsize=9)
