@@ -307,7 +307,7 @@ def test_left_and_right_wheels_mirror() -> None:
 
 
 STEEP = {"wheel": ms.circle(0.025, 0.044), "rail": ms.circle(0.02, 0.0355)}
-"""Touch at 60 degrees for a shift of 4.35 mm to the flange, as y/0.02 = (y - 4.35 mm)/0.025."""
+"""Touch at 55 degrees for a shift of 4.1 mm to the flange, as y/0.02 = (y - 4.1 mm)/0.025."""
 
 
 def turned(about: int, angle: float) -> np.ndarray:
@@ -336,10 +336,10 @@ def moved(of: Track, pose: ms.Pose, p: Any, time: float) -> tuple[np.ndarray, np
 @pytest.mark.parametrize("side", ["left", "right"])
 @pytest.mark.parametrize("yaw", [0.02, -0.012])
 def test_creepages_are_those_of_the_wheels_rigid_motion(side: str, yaw: float) -> None:
-    """On the tread and on a flange of 60 degrees, the contact's velocity by differences of the wheel's motion in time;
-    there the usual omega r sin(yaw) cos(angle)/V is four times too small."""
+    """On the tread and on a flange of 58 degrees, the contact's velocity by differences of the wheel's motion in time;
+    there the usual omega r sin(yaw) cos(angle)/V is a third of it."""
     toward = 1.0 if side == "right" else -1.0
-    for shape, lateral, steepest in ((STEEP, 2.45e-3, 1.0), ({}, 2.2e-3, 0.02)):  # 1.8 mm by the roll
+    for shape, lateral, steepest in ((STEEP, 2.26e-3, 1.0), ({}, 2.2e-3, 0.02)):  # 1.8 mm by the roll
         of = track(**shape)
         pose = ms.Pose(toward * lateral, yaw, toward * -0.004, 3.0, 6.4)
         (p,) = ms.patches(of, pose, side, 1e4)
@@ -364,10 +364,10 @@ def test_creepages_are_those_of_the_wheels_rigid_motion(side: str, yaw: float) -
 @pytest.mark.parametrize("side", ["left", "right"])
 def test_a_wheel_is_in_equilibrium_with_its_friction(side: str, yaw: float) -> None:
     """Vertical forces on a flange; moments about the axle by the power of the rigid motion: forces on the wheel times
-    its velocities are what friction takes. All slides across nearly alone: N = P/(cos +- mu sin)."""
+    its velocities are what friction takes. N = P/(cos +- F_y/N sin)."""
     of, mu = track(**STEEP), 0.3
     toward = 1.0 if side == "right" else -1.0
-    pose = ms.Pose(toward * 4.35e-3, yaw, 0.0, 3.0, 6.6)
+    pose = ms.Pose(toward * 4.1e-3, yaw, 0.0, 3.0, 6.6)
     (p,) = ms.patches(of, pose, side, 1e4, mu)
     f = ms.creep_forces(p.xi, p.eta, p.phi, p.a, p.b, p.normal_force, mu, G, NU)
     felt = p.felt(f.x[0], f.y[0], f.moment[0], np.array([0.0, *p.axle]))
@@ -375,20 +375,21 @@ def test_a_wheel_is_in_equilibrium_with_its_friction(side: str, yaw: float) -> N
     axle = turned(2, yaw) @ [0, 1, 0]
     power = felt[0] * pose.speed - pose.turning * felt[3:] @ axle
     slip = f.x[0] * p.xi + f.y[0] * p.eta + f.moment[0] * p.phi
-    assert power == pytest.approx(slip * p.speed, rel=0.01)
+    assert power == pytest.approx(slip * p.speed, rel=0.02)  # N moves by 4e-4 of the speed
     climbs = np.sign(yaw) * toward  # towards the flange, friction carries
-    steep = abs(p.angle)
-    across = -climbs * toward * f.y[0] / p.normal_force
-    assert across * np.sin(steep) + np.cos(steep) == pytest.approx(1e4 / p.normal_force, rel=1e-6)
-    assert 0.15 < climbs * across <= mu
+    steep, across = abs(p.angle), -climbs * toward * f.y[0] / p.normal_force
+    assert 0.15 < across <= mu
+    carried = np.cos(steep) + climbs * across * np.sin(steep)
+    assert carried == pytest.approx(1e4 / p.normal_force, rel=1e-7)
     alone = ms.patches(of, pose, side, 1e4)[0]
-    assert (p.normal_force / alone.normal_force < 0.75) == (climbs > 0)
+    assert alone.normal_force == pytest.approx(1e4 / np.cos(alone.angle), rel=1e-7)
+    assert climbs * np.log(alone.normal_force / p.normal_force) > 0.15
 
 
 def test_friction_that_holds_a_wheel_down_is_told() -> None:
     """mu tan(60 degrees) > 1: no normal force lifts a wheel that runs down its flange."""
     with pytest.raises(UserError, match="friction drags the wheel down"):
-        ms.patches(track(**STEEP), ms.Pose(4.35e-3, -0.02, 0.0, 3.0, 6.522), "right", 1e4, 0.7)
+        ms.patches(track(**STEEP), ms.Pose(4.1e-3, -0.02, 0.0, 3.0, 6.6), "right", 1e4, 0.9)
 
 
 def test_an_axle_shares_its_load_by_its_roll() -> None:

@@ -243,11 +243,12 @@ def _carried(
         height = _height(track, gaps, load)
         found = [_touching(track, pose, s, g, height) for s, g in zip(sides, gaps, strict=True)]
         lift = _lifts(found, drag)
-        if abs(sum(lift) - vertical) <= BALANCED * vertical:
-            return _Carried(found, lift, load)
+        normal = sum(p.lifted(0.0) for of in found for p in of)
         if not sum(lift) > 0 or load > HELD_DOWN * vertical:
             break
-        at, left = np.log(load), np.log(sum(lift) / vertical)
+        at, left = np.log(load), np.log(load / vertical * sum(lift) / normal)
+        if abs(left) <= BALANCED:
+            return _Carried(found, lift, load)
         slope = (left - before[1]) / (at - before[0]) if turn else 1.0
         load, before = float(np.exp(at - left / np.clip(slope, 0.2, 5.0))), (at, left)
     steep = max((p for of in found for p in of), key=lambda p: p.normal_force)
