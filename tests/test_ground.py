@@ -14,7 +14,7 @@ import microslip as ms
 from microslip.case.driving import SpectrumOfCase
 from microslip.cli import main
 from microslip.contact.friction import Coulomb, Exponential, Friction, scattered
-from microslip.contact.law import Law, value
+from microslip.contact.law import Law, history, value
 from microslip.contact.normal import Penalty
 from microslip.contact.patch import Patch
 from microslip.contact.point import PointContact
@@ -25,7 +25,7 @@ from microslip.system.assembly import Assembly, ContactFace, Load, Output, prelo
 from microslip.system.component import Component
 from microslip.system.ground import Ground, spectrum
 from microslip.time_domain import equations, orbit
-from microslip.time_domain.stepper import Stepper
+from microslip.time_domain.stepper import KINDS, Stepper
 
 pytestmark = pytest.mark.usefixtures("undrawn")
 
@@ -98,6 +98,36 @@ def test_stick_slip_on_a_belt_is_its_closed_form() -> None:
     slipping = (np.pi + 2 * np.arctan2(V / OMEGA, top - middle)) / OMEGA
     period = 2 * (top - middle) / V + slipping
     assert np.diff(slips).mean() == pytest.approx(period, rel=5e-3)
+
+
+def test_creep_near_the_limit_is_no_slip_and_a_slip_is_counted_once() -> None:
+    """Speeds of creep that pass 6.3 / k_S, to and fro, are none; from 64 / k_S on one slip, until below 6.3 / k_S."""
+    slope, dt = 1e6, 1e-3
+    creeps = 10.0 + 20.0 * np.sin(np.linspace(0, 30, 100))
+    slides = np.concatenate([np.linspace(30, 3000, 20), 60 + 20 * np.sin(np.linspace(0, 30, 100)), [20, 10, 7, 3, 1]])
+    speed = np.concatenate([creeps, slides, creeps, slides]) / slope
+    u = np.zeros((len(speed), 1, 3))
+    u[:, 0, 0], u[:, 0, 1] = 1e-5, np.cumsum(speed) * dt
+    moved = np.diff(np.asarray(history(rate(Coulomb(value(0.3)), slope), u, dt).slip)[:, 0, 0]) > 0
+    assert (moved[1:] & ~moved[:-1]).sum() == 2
+    begins = len(creeps) + int(np.argmax(slides > 64)) - 1
+    assert moved.argmax() == begins and not moved[: len(creeps) - 1].any() and not moved[-2:].any()
+
+
+@pytest.mark.parametrize("slope", [1e6, pytest.param(1e10, marks=pytest.mark.slow)])
+def test_every_slip_of_the_closed_form_is_counted_once(slope: float) -> None:
+    """Stick-slip on a belt, let go where it sticks, whatever the smoothing: as many as times at which it is fast."""
+    law = rate(Exponential(value(0.8), value(0.55), value(1e4)), slope)
+    Omega, keep, steps = OMEGA / 8, 4, 8192
+    e = equations.of(rubbing(law, Ground(V)), Omega)
+    s = Stepper(e, 2 * np.pi / Omega / steps, accounts=False)
+    each = np.where(np.arange(MOST) < 64 * keep, steps // 64, 0)
+    _, seen, listed, *_ = s.run(s.start(0 * e.omega2, 0 * e.omega2), each)
+    listed = listed[listed[:, 0] > 0.1]  # the belt takes the mass along first
+    slips, sticks = (listed[listed[:, 2] == KINDS.index(kind), 0] for kind in ("slips", "sticks"))
+    fast = seen.q_dot[: 64 * keep] @ e.output[0] < -5 * V
+    assert len(slips) == (fast[1:] & ~fast[:-1]).sum() > 3
+    assert len(slips) - len(sticks) in (0, 1) and (np.diff(slips) > 0.5).all()
 
 
 def test_steady_sliding_holds_the_spring_by_the_friction_at_the_belts_speed() -> None:
