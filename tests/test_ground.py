@@ -11,6 +11,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import microslip as ms
+from microslip.case.assemble import Built
 from microslip.case.driving import SpectrumOfCase
 from microslip.cli import main
 from microslip.contact.friction import Coulomb, Exponential, Friction, scattered
@@ -325,3 +326,54 @@ def test_the_friction_oscillator_of_the_book_slips_in_one_size_and_on_waves_in_s
     assert np.ptp(on_waves) > 0.4 * np.mean(on_waves) and max(on_waves) > 1.3 * max(speeds)
     assert len(on_waves) > len(speeds) and np.ptp(wavy.y[0]) > np.ptp(flat.y[0])
     assert flat.balance < 1e-9 and wavy.balance < 1e-9
+
+
+# from Python ---------------------------------------------------------------------------------------------------------
+
+BRAKE = {
+    "interface": "right", "normal_stiffness": 2e5, "tangential_stiffness": 4e5, "points": [1, 1],
+    "includes": "bulk+surface", "friction": {"kind": "exponential", "mu_0": 0.9, "mu_inf": 0.1, "rate": 1.0},
+    "law": {"kind": "rate", "slope": 1e3}, "ground": {"velocity": 1.0},
+}  # fmt: skip
+
+
+def braked(force: float, **more: object) -> Built:
+    """The vane's tip on ground that moves, as a dict that asks for nothing and has no excitation."""
+    case = {"body": "vane", "monitor": "probe", "contacts": [{**BRAKE, "normal_force": force}], **more}
+    return ms.assemble(case, vane=ms.sample())
+
+
+def test_moving_ground_is_assembled_from_a_dict_and_needs_no_excitation() -> None:
+    for more in ({}, {"orbit": {"frequency": 100.0}}, {"stability": {"frequency": [0.0, 1e3]}}):
+        assembly = braked(20.0, **more).assembly
+        assert assembly.contacts[0].ground == Ground(1.0) and not assembly.loads
+    pressed = ms.assemble(
+        {"body": "vane", "monitor": "probe", "contacts": [BRAKE], "orbit": {"frequency": 100.0}}, vane=ms.sample(),
+        normal_force=20.0,
+    )  # fmt: skip
+    assert pressed.assembly.contacts[0].preload[0] == pytest.approx(20.0)
+    with pytest.raises(UserError, match="harmonic balance cannot take"):
+        ms.harmonic_response(pressed, [100.0])
+    still = {key: value for key, value in BRAKE.items() if key not in ("ground", "law")}
+    alone = {"body": "vane", "monitor": "probe", "contacts": [{**still, "normal_force": 20.0}]}
+    with pytest.raises(UserError, match="nothing drives it"):
+        ms.harmonic_response(ms.assemble(alone, vane=ms.sample()), [100.0])
+
+
+def test_a_case_in_a_file_needs_an_excitation_where_no_ground_moves(tmp_path: Path) -> None:
+    text = 'name = "c"\nbody = "vane"\nmonitor = "probe"\n[orbit]\nfrequency = 100.0\n[[contacts]]\ninterface = "right"\n'
+    text += "normal_force = 1.0\nnormal_stiffness = 1e6\ntangential_stiffness = 1e6\nfriction = 0.1\npoints = [1, 1]\n"
+    (tmp_path / "c.toml").write_text(text)
+    with pytest.raises(UserError, match="excitation: give excitation"):
+        ms.assemble("c.toml", tmp_path, vane=ms.sample())
+
+
+@pytest.mark.slow
+def test_roots_about_sliding_are_on_the_axis_at_the_hopf_points() -> None:
+    """Of what a dict describes: `ms.bifurcate` over the normal force, and `ms.stability` there."""
+    points = ms.bifurcate(braked, 1.0, 100.0, orbits=False).hopf
+    assert len(points) == 2
+    for point in points:
+        roots = ms.stability(braked(point.p), frequency=(0, 2000))
+        i = np.abs(roots.roots.s.imag - point.omega).argmin()
+        assert roots.roots.s[i] == pytest.approx(1j * point.omega, abs=1e-8 * point.omega)

@@ -78,6 +78,17 @@ def balanced(system: System, harmonics: int | None = None, samples: int | None =
     return balance.of(system, H, max(64, 16 * H) if samples is None else samples)
 
 
+def whole_of(system: System) -> Assembly:
+    """The assembly of what is analysed.
+
+    Raises:
+        UserError: a case whose contacts wait for a normal force.
+    """
+    if isinstance(system, Problem):
+        return system.assembly
+    return _pressed(system) if isinstance(system, Built) else system
+
+
 def _pressed(built: Built) -> Assembly:
     """The assembly of a case.
 
@@ -379,10 +390,9 @@ def integrate(
     """
     from .time_domain import equations, orbit, recorded, reference, starts
 
-    assembly = _pressed(system) if isinstance(system, Built) else system
+    assembly = whole_of(system)
     if method not in ("stepper", "reference"):
         raise UserError(f"method: '{method}' is none of stepper, reference")
-    assembly = assembly.assembly if isinstance(assembly, Problem) else assembly
     turn = 2 * np.pi * _hertz(unit)
     found = equations.of(assembly, turn * frequency, None if second is None else turn * second)
     if second is not None and start == "balance":
@@ -429,8 +439,7 @@ def integrate_many(
     """
     from .time_domain import equations, many
 
-    assembly = _pressed(system) if isinstance(system, Built) else system
-    assembly = assembly.assembly if isinstance(assembly, Problem) else assembly
+    assembly = whole_of(system)
     found = equations.of(assembly, 2 * np.pi * frequency * _hertz(unit))
     return many.run(found, np.asarray(displacements), np.asarray(velocities), settle, keep, steps)
 
@@ -470,8 +479,7 @@ def run_up(
     from .time_domain import equations, orbit, recorded
     from .time_domain.ramp import Ramp
 
-    assembly = _pressed(system) if isinstance(system, Built) else system
-    assembly = assembly.assembly if isinstance(assembly, Problem) else assembly
+    assembly = whole_of(system)
     turn = 2 * np.pi * _hertz(unit)
     ramp = Ramp(turn * start, turn * stop, time, order, euler)
     found = equations.of_ramp(assembly, ramp)
@@ -482,7 +490,7 @@ def run_up(
 
 
 def bifurcate(
-    system: Dynamics | Callable[[float], Assembly], start: float, stop: float, *, x: Any = None,
+    system: Dynamics | Callable[[float], Assembly | Built], start: float, stop: float, *, x: Any = None,
     frequency: float | None = None, unit: Literal["Hz", "rad/s"] = "Hz", orbits: bool = True, doublings: int = 1,
     attractors: Sequence[float] = (), starts: int = 64, deflate: Sequence[float] = (), nodes: int = 32,
     step: float = 0.08, points: int = 400, report: Report = lambda _: None,
@@ -528,8 +536,8 @@ def bifurcate(
         begin = np.zeros(made.count) if x is None else np.asarray(x, dtype=float)
     else:
         Omega = None if frequency is None else 2 * np.pi * frequency * _hertz(unit)
-        made = mechanics.dynamics(system, min(start, stop), max(start, stop), Omega)
-        begin = equilibrium(of(system(start))) if x is None else np.asarray(x, dtype=float)
+        made = mechanics.dynamics(lambda p: whole_of(system(p)), min(start, stop), max(start, stop), Omega)
+        begin = equilibrium(of(whole_of(system(start)))) if x is None else np.asarray(x, dtype=float)
     asked = diagram.Asked(
         start, stop, orbits, doublings, nodes, step, points, tuple(attractors), starts, deflate=tuple(deflate)
     )
