@@ -434,7 +434,6 @@ def test_a_rigid_contact_of_a_case_is_that_of_the_same_system_by_hand(
         ("contacts.0.normal_stiffness=1e6", "is rigid; leave normal_stiffness out"),
         ("contacts.0.interference=1e-6", "rigid bodies cannot overlap"),
         ("contacts.0.curvature=[0.1, 0.1]", "belongs to flat patches"),
-        ("contacts.0.ground.velocity=0.1", "stand on ground at rest"),
         ('contacts.0.law={kind="set-valued", restitution=1.5}', "restitution: must not be greater than 1"),
         ('contacts.0.friction={kind="coulomb", mu=0.3, deviation=0.1}', "no heat and no chance"),
     ],
