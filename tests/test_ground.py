@@ -361,8 +361,9 @@ def test_moving_ground_is_assembled_from_a_dict_and_needs_no_excitation() -> Non
 
 
 def test_a_case_in_a_file_needs_an_excitation_where_no_ground_moves(tmp_path: Path) -> None:
-    text = 'name = "c"\nbody = "vane"\nmonitor = "probe"\n[orbit]\nfrequency = 100.0\n[[contacts]]\ninterface = "right"\n'
-    text += "normal_force = 1.0\nnormal_stiffness = 1e6\ntangential_stiffness = 1e6\nfriction = 0.1\npoints = [1, 1]\n"
+    text = 'name = "c"\nbody = "vane"\nmonitor = "probe"\n[orbit]\nfrequency = 100.0\n'
+    text += '[[contacts]]\ninterface = "right"\nnormal_force = 1.0\nnormal_stiffness = 1e6\n'
+    text += "tangential_stiffness = 1e6\nfriction = 0.1\npoints = [1, 1]\n"
     (tmp_path / "c.toml").write_text(text)
     with pytest.raises(UserError, match="excitation: give excitation"):
         ms.assemble("c.toml", tmp_path, vane=ms.sample())

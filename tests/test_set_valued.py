@@ -186,8 +186,8 @@ def rubbing_block(law: object, ground: Ground, force: float = 0.0) -> equations.
 
 
 def test_a_blade_rubs_a_casing_and_is_taken_along() -> None:
-    """Pressed on a round casing that passes: it slides under mu F_N, so that its spring holds F = mu F_N in the mean, and
-    swings about that undamped as Coulomb's friction leaves it; the casing gives mu F_N V."""
+    """Pressed on a round casing that passes: it slides under mu F_N, which its spring holds in the mean, and swings
+    about that undamped as Coulomb's friction leaves it; the casing gives mu F_N V."""
     from test_ground import NORMAL, OMEGA, STIFFNESS
 
     mu, V = 0.3, 1.0

@@ -347,7 +347,8 @@ def _hertz(unit: str) -> float:
 def integrate(
     system: System, frequency: float, *, second: float | None = None, unit: Literal["Hz", "rad/s"] = "Hz",
     settle: int = 100, keep: int = 20,
-    samples: int = 256, steps: int | None = None, start: Literal["static", "rest", "balance"] = "static",
+    samples: int = 256, steps: int | None = None,
+    start: Literal["static", "rest", "balance"] | Mapping[str, Any] = "static",
     method: Literal["stepper", "reference"] = "stepper", tolerance: float = 1e-9, file: Path | str | None = None,
     report: Report = lambda _: None,
 ) -> Orbit:  # fmt: skip
@@ -365,7 +366,10 @@ def integrate(
             where contacts open, close or slide; else of second.
         start: ``static``, at rest under the steady loads; ``rest``, at rest in the preloaded state; ``balance``, on
             the vibration that harmonic balance finds, its contacts remembering it. Of an assembly `IN_TIME` harmonics
-            are taken; a balance or a case has its own.
+            are taken; a balance or a case has its own. Or where the bodies are let go: ``{"displacement": ...,
+            "velocity": ...}``, m and m/s, each of all coordinates or coordinate -> value, of bodies from modal files
+            those of their modes; ``{"mode": 1, "amplitude": ...}``, of the first read-out in a mode of the bodies
+            without their contacts.
         method: ``reference`` is CVODE, an integrator for stiff equations that chooses its own steps by a relative
             tolerance: slower, of laws that are differential equations, and what the stepper is proved on.
         file: samples are written there as they come and read when they are asked for, so that a long motion needs no
@@ -397,16 +401,17 @@ def integrate(
     found = equations.of(assembly, turn * frequency, None if second is None else turn * second)
     if second is not None and start == "balance":
         raise UserError('second: "balance" begins on a periodic vibration; take "static" or "rest"')
+    rest: Any = starts.released(found, start) if isinstance(start, Mapping) else start
     if method == "reference":
-        if start == "balance" or file is not None:
-            raise UserError('method: "reference" begins from "static" or "rest", and writes no file; use the stepper')
-        return reference.run(found, settle, keep, samples, start, tolerance, report)
+        if rest == "balance" or file is not None:
+            raise UserError('method: "reference" begins on no vibration, and writes no file; use the stepper')
+        return reference.run(found, settle, keep, samples, rest, tolerance, report)
     begin: orbit.Start | starts.Periodic
     if start == "balance":
         many = IN_TIME if isinstance(system, Assembly) else None
         begin = starts.of_balance(found, balanced(system, many, many and 16 * many))
     else:
-        begin = start
+        begin = rest
     if file is None:
         return orbit.run(found, settle, keep, samples, steps, begin, report)
     asked = recorded.Asked(f"{frequency:.6g} {unit}", found, settle, keep, samples, steps, begin)
@@ -416,15 +421,18 @@ def integrate(
 def integrate_many(
     system: System, frequency: float, displacements: ArrayLike, velocities: ArrayLike, *,
     unit: Literal["Hz", "rad/s"] = "Hz", settle: int = 100, keep: int = 20, steps: int | None = None,
+    exponents: bool = False,
 ) -> Reached:  # fmt: skip
     """Which motions many starts lead to: all of them integrated by one compiled program, for basins of attraction.
 
     Args:
         system, unit, settle, keep, steps: see `integrate`. displacements, velocities: (n, k) of the system's
-            coordinates at t = 0, m and m/s; of bodies from modal files those of their modes.
+            coordinates at t = 0, m and m/s; of bodies from modal files those of their modes. exponents: look for the
+            largest Lyapunov exponent of each, which takes up to four times as long.
 
     Returns:
-        A `Reached`: ``attractor`` and ``repeats`` of each start, ``impacts``, read-outs ``y`` after every period.
+        A `Reached`: ``attractor`` and ``repeats`` of each start, ``impacts``, read-outs ``y`` and their velocities
+        ``y_dot`` after every period, ``exponents``.
 
     Raises:
         UserError: starts that are not (n, k); steps that are too few for the springs of the contacts.
@@ -441,7 +449,7 @@ def integrate_many(
 
     assembly = whole_of(system)
     found = equations.of(assembly, 2 * np.pi * frequency * _hertz(unit))
-    return many.run(found, np.asarray(displacements), np.asarray(velocities), settle, keep, steps)
+    return many.run(found, np.asarray(displacements), np.asarray(velocities), settle, keep, steps, exponents)
 
 
 def run_up(

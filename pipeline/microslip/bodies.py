@@ -7,11 +7,11 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .basis import read_basis
 import numpy as np
 
 from . import sliding
 from .analyses import whole_of
+from .basis import read_basis
 from .case.assemble import Built, build
 from .case.contacts import swept
 from .case.settings import UNPRESSED, CaseSettings, unasked_sweep
