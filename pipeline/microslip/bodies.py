@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 
 Report = Callable[[str], None]
 
+
 def sample() -> Path:
     """The modal file that travels with the package: a twisted steel vane, 8 x 40 x 160 mm.
 

@@ -70,7 +70,7 @@ def hopf_between(system: Dynamics, before: State, after: State, settings: Settin
     ends = [eigenvalues(system, s.y[:-1] * scaled.x_scale, s.y[-1] * scaled.lam_scale) for s in (before, after)]
     counts = sorted(int((e.real > 0).sum()) for e in ends)
     segment = Segment(before.y, after.y, before.tangent, after.tangent, False)
-    found = []
+    found = list[Hopf]()
     for k in range(counts[0], counts[1] - 1, 2):
         try:
             y, _ = root(scaled, segment, settings, real(k), 1e-6)

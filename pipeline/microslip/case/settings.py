@@ -344,9 +344,9 @@ class CaseSettings(Model):
         if not isinstance(raw, dict) or "sweep" in raw:
             return raw
         band = unasked_sweep(raw)
-        asks = isinstance(raw.get("orbit"), dict) and band != NO_SWEEP
-        asks = asks or raw.get("stability") or raw.get("bifurcation") or raw.get("two_tones")
-        return raw | {"sweep": band} if asks else raw
+        asks = [raw.get(key) for key in ("stability", "bifurcation", "two_tones")]
+        in_time = isinstance(raw.get("orbit"), dict) and band != NO_SWEEP
+        return raw | {"sweep": band} if in_time or any(asks) else raw
 
     @property
     def is_only_followed(self) -> bool:

@@ -19,7 +19,7 @@ import scipy.optimize
 import scipy.special
 
 from ..data import Array
-from ..units import counted
+from ..units import counted, percent
 from .stepper import Now, Stepper
 
 if TYPE_CHECKING:
@@ -46,6 +46,9 @@ REBOUNDS = 4
 
 LINES = 5
 """Combinations k of the second frequency up to which lines are looked for."""
+
+SETTLED = 1e-3
+"""Share of its size by which a motion may drift in half of the periods that are kept and have come to rest."""
 
 LATTICE = 0.02
 """Share of the points after every period that may lie off the closed curve of a quasi-periodic motion."""
@@ -207,8 +210,8 @@ def second_frequency(orbit: Orbit) -> float:
 
 
 def kind(orbit: Orbit) -> str:
-    """``periodic``, ``quasi-periodic``, ``chaotic``; ``settling``: the separation of neighbours shrinks, so it goes to
-    a motion that comes back; ``run-up``; ``open``: it is not known; ``diverged``; ``short``: less than two periods
+    """``periodic``, ``quasi-periodic``, ``chaotic``; ``settling``: it comes back, but drifts, or the separation of
+    neighbours shrinks, so that it goes to a motion that comes back; ``run-up``; ``open``: it is not known; ``diverged``; ``short``: less than two periods
     are kept."""
     if math.isfinite(orbit.diverged):
         return "diverged"
@@ -217,7 +220,7 @@ def kind(orbit: Orbit) -> str:
     if len(orbit.time) // orbit.samples < 2:
         return "short"
     if orbit.repeats:
-        return "periodic"
+        return "settling" if orbit.drifts > SETTLED else "periodic"
     if orbit.exponent is None or not math.isfinite(orbit.exponent.value):
         return "open"
     if math.isfinite(second_frequency(orbit)):
@@ -235,7 +238,11 @@ def said(orbit: Orbit) -> str:
     if what == "short":
         return "too short to say whether it repeats"
     kept, inside = len(orbit.time) // orbit.samples, "them" if p > 1 else "it"
+    if what == "settling" and p:
+        what = "drifting"
     words = {
+        "drifting": f"still settles, by {percent(orbit.drifts)} of its size in {counted(kept - kept // 2, 'period')}; "
+        f"comes back after {counted(p, 'period')} within 0.1 %",
         "periodic": f"comes back after {counted(p, 'period')}",
         "chaotic": f"chaotic, largest Lyapunov exponent {orbit.exponent}",
         "quasi-periodic": f"quasi-periodic, second frequency {second_frequency(orbit):.5g} of the excitation's",

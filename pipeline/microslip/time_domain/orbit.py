@@ -173,6 +173,17 @@ class Orbit:
         return comes_back(*self.stroboscopic)
 
     @cached_property
+    def drifts(self) -> float:
+        """Share of its size by which a motion that comes back is elsewhere at the end of the last half of the periods
+        that are kept than at its beginning: it has not come to rest where that is more than `classification.SETTLED`."""
+        after, size = self.stroboscopic
+        last = after[:, after.shape[1] // 2 :]
+        if not self.repeats or not size:
+            return 0.0
+        begin = (last.shape[1] - 1) % self.repeats
+        return float(np.abs(last[:, -1] - last[:, begin]).max(initial=0.0) / size)
+
+    @cached_property
     def stroboscopic(self) -> tuple[Array, float]:
         """(2 m, periods) modal coordinates, times their frequency, and velocities after every period; the largest of
         them at any time, m kg^1/2 / s."""
