@@ -933,12 +933,12 @@ def test_a_start_that_is_none_is_refused_by_its_key(start: dict) -> None:
 def test_a_case_lets_its_bodies_go_without_an_excitation(hammer: Path, capsys: pytest.CaptureFixture) -> None:
     (hammer / "case.toml").write_text((hammer / "case.toml").read_text().replace("motion = ", "# motion = "))
     assert main(["orbit", "case.toml", "-q"]) == 2 and "give excitation" in capsys.readouterr().err
-    let_go = ["--set", "orbit.start={mode=1, amplitude=-1e-5}", "--set", "orbit.settle=0", "--no-pictures", "-q"]
+    let_go = ["--set", "orbit.release={mode=1, amplitude=-1e-5}", "--set", "orbit.settle=0", "--no-pictures", "-q"]
     assert main(["orbit", "case.toml", *let_go]) == 0
     (found,) = ms.read_orbits(hammer / "build" / "hammer" / "orbit.h5")
     assert found.y[0, 0] == pytest.approx(-1e-5, rel=0.1) and found.count("closes") > 0
-    assert main(["orbit", "case.toml", "--set", "orbit.start={mode=99, amplitude=1e-5}", "-q"]) == 2
-    assert "start: mode" in capsys.readouterr().err
+    assert main(["orbit", "case.toml", "--set", "orbit.release={mode=99, amplitude=1e-5}", "-q"]) == 2
+    assert "release: mode" in capsys.readouterr().err
 
 
 def test_many_starts_tell_their_exponents_and_velocities() -> None:

@@ -43,7 +43,6 @@ from .questions import (
     RangesOfCase,
     SpeedsOfCase,
     StabilityOfCase,
-    StartOfCase,
     TwoTonesOfCase,
 )
 
@@ -375,7 +374,7 @@ class CaseSettings(Model):
     def _fits_together(self) -> CaseSettings:
         free = self.bifurcation or self.stability or self.is_only_built or any(s.motion for s in self.springs)
         free = free or any(c.ground is not None for c in self.contacts)
-        free = free or self.orbit is not None and isinstance(self.orbit.start, StartOfCase)
+        free = free or self.orbit is not None and self.orbit.release is not None
         moved = free and not self.excitation and not self.excitations
         for short, many in (("body", "bodies"), ("excitation", "excitations"), ("monitor", "monitors")):
             if bool(getattr(self, short)) == bool(getattr(self, many)) and not (moved and short == "excitation"):

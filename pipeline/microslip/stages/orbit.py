@@ -13,7 +13,7 @@ from ..case import CaseSettings
 from ..case.assemble import Built
 from ..case.contacts import swept
 from ..case.problem import problem_of
-from ..case.questions import OrbitOfCase, RunUpOfCase, StartOfCase
+from ..case.questions import OrbitOfCase, RunUpOfCase
 from ..errors import UserError, told_of
 from ..files import store
 from ..files.tables import columns_csv
@@ -86,9 +86,9 @@ def _asked(settings: CaseSettings, built: Built, case_path: Path) -> list[record
 
 def _rest(e: equations.Equations, asked: OrbitOfCase, path: Path) -> orbit.Start:
     """Where bodies stand, or are let go."""
-    if isinstance(asked.start, StartOfCase):
+    if asked.release is not None:
         with told_of(f"{path}: orbit"):
-            return starts.released(e, asked.start.model_dump())
+            return starts.released(e, asked.release.model_dump(), "release")
     assert asked.start != "balance"
     return asked.start
 
