@@ -560,6 +560,11 @@ MEANING_CASE: dict[str, tuple[str, str]] = {
     "orbit.steps": ("", "of each; if not given, 150 in a period of the fastest motion with closed contacts, and 512 at "
                     "least"),
     "orbit.start": ("", "at rest under the steady loads, or as preloaded; or on the vibration of harmonic balance"),
+    "orbit.release.displacement": ("m", "where the bodies are let go, instead of `start`: coordinates of all of them, "
+                                   "those of their modes, zero if not given"),
+    "orbit.release.velocity": ("m/s", "of these coordinates"),
+    "orbit.release.mode": ("", "or a mode of the bodies without their contacts, by its number from 1"),
+    "orbit.release.amplitude": ("m", "of the first monitor in that mode"),
     "orbit.normal_force": ("N", "of the contacts that the sweep presses"),
     "two_tones.start": ("Hz", "of the first tone"),
     "two_tones.stop": ("Hz", "if several points are asked for"),

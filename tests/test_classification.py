@@ -143,3 +143,15 @@ def test_the_area_of_a_hysteresis_loop_is_the_energy_lost_in_the_steps() -> None
     assert area == pytest.approx(classification.lost(found), rel=1e-4)
     assert area == pytest.approx(4 * held * (0.5 * np.ptp(found.y[0]) - held / k), rel=1e-4)
     assert found.slips == 2 and classification.rubs(found, 0) and found.said.endswith("2 slips in it")
+
+
+def test_a_motion_that_drifts_has_not_come_to_rest() -> None:
+    """At the resonance of a damping ratio of 0.05 %: what is left of the start falls by 0.3 % a period, so that one
+    period is like the next within 0.1 % long before the motion is what it will be."""
+    slow = ms.structure(1.0, 1.0, 0.001, force={0: 0.001}, output=0)
+    early, late = (ms.integrate(slow, 1.0, unit="rad/s", settle=n, keep=20, samples=16) for n in (500, 3000))
+    assert early.repeats == late.repeats == 1
+    left = np.exp(-0.0005 * 2 * np.pi * np.array([511.0, 520.0]))
+    assert early.drifts == pytest.approx((left[0] - left[1]) / (1 - left[1]), rel=0.01) and late.drifts < 1e-5
+    assert classification.kind(early) == "settling" and early.said.startswith("still settles, by 0.")
+    assert classification.kind(late) == "periodic"

@@ -11,10 +11,11 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import microslip as ms
+from microslip.case.assemble import Built
 from microslip.case.driving import SpectrumOfCase
 from microslip.cli import main
 from microslip.contact.friction import Coulomb, Exponential, Friction, scattered
-from microslip.contact.law import Law, value
+from microslip.contact.law import Law, history, value
 from microslip.contact.normal import Penalty
 from microslip.contact.patch import Patch
 from microslip.contact.point import PointContact
@@ -25,7 +26,7 @@ from microslip.system.assembly import Assembly, ContactFace, Load, Output, prelo
 from microslip.system.component import Component
 from microslip.system.ground import Ground, spectrum
 from microslip.time_domain import equations, orbit
-from microslip.time_domain.stepper import Stepper
+from microslip.time_domain.stepper import KINDS, Stepper
 
 pytestmark = pytest.mark.usefixtures("undrawn")
 
@@ -98,6 +99,36 @@ def test_stick_slip_on_a_belt_is_its_closed_form() -> None:
     slipping = (np.pi + 2 * np.arctan2(V / OMEGA, top - middle)) / OMEGA
     period = 2 * (top - middle) / V + slipping
     assert np.diff(slips).mean() == pytest.approx(period, rel=5e-3)
+
+
+def test_creep_near_the_limit_is_no_slip_and_a_slip_is_counted_once() -> None:
+    """Speeds of creep that pass 6.3 / k_S, to and fro, are none; from 64 / k_S on one slip, until below 6.3 / k_S."""
+    slope, dt = 1e6, 1e-3
+    creeps = 10.0 + 20.0 * np.sin(np.linspace(0, 30, 100))
+    slides = np.concatenate([np.linspace(30, 3000, 20), 60 + 20 * np.sin(np.linspace(0, 30, 100)), [20, 10, 7, 3, 1]])
+    speed = np.concatenate([creeps, slides, creeps, slides]) / slope
+    u = np.zeros((len(speed), 1, 3))
+    u[:, 0, 0], u[:, 0, 1] = 1e-5, np.cumsum(speed) * dt
+    moved = np.diff(np.asarray(history(rate(Coulomb(value(0.3)), slope), u, dt).slip)[:, 0, 0]) > 0
+    assert (moved[1:] & ~moved[:-1]).sum() == 2
+    begins = len(creeps) + int(np.argmax(slides > 64)) - 1
+    assert moved.argmax() == begins and not moved[: len(creeps) - 1].any() and not moved[-2:].any()
+
+
+@pytest.mark.parametrize("slope", [1e6, pytest.param(1e10, marks=pytest.mark.slow)])
+def test_every_slip_of_the_closed_form_is_counted_once(slope: float) -> None:
+    """Stick-slip on a belt, let go where it sticks, whatever the smoothing: as many as times at which it is fast."""
+    law = rate(Exponential(value(0.8), value(0.55), value(1e4)), slope)
+    Omega, keep, steps = OMEGA / 8, 4, 8192
+    e = equations.of(rubbing(law, Ground(V)), Omega)
+    s = Stepper(e, 2 * np.pi / Omega / steps, accounts=False)
+    each = np.where(np.arange(MOST) < 64 * keep, steps // 64, 0)
+    _, seen, listed, *_ = s.run(s.start(0 * e.omega2, 0 * e.omega2), each)
+    listed = listed[listed[:, 0] > 0.1]  # the belt takes the mass along first
+    slips, sticks = (listed[listed[:, 2] == KINDS.index(kind), 0] for kind in ("slips", "sticks"))
+    fast = seen.q_dot[: 64 * keep] @ e.output[0] < -5 * V
+    assert len(slips) == (fast[1:] & ~fast[:-1]).sum() > 3
+    assert len(slips) - len(sticks) in (0, 1) and (np.diff(slips) > 0.5).all()
 
 
 def test_steady_sliding_holds_the_spring_by_the_friction_at_the_belts_speed() -> None:
@@ -295,3 +326,55 @@ def test_the_friction_oscillator_of_the_book_slips_in_one_size_and_on_waves_in_s
     assert np.ptp(on_waves) > 0.4 * np.mean(on_waves) and max(on_waves) > 1.3 * max(speeds)
     assert len(on_waves) > len(speeds) and np.ptp(wavy.y[0]) > np.ptp(flat.y[0])
     assert flat.balance < 1e-9 and wavy.balance < 1e-9
+
+
+# from Python ---------------------------------------------------------------------------------------------------------
+
+BRAKE = {
+    "interface": "right", "normal_stiffness": 2e5, "tangential_stiffness": 4e5, "points": [1, 1],
+    "includes": "bulk+surface", "friction": {"kind": "exponential", "mu_0": 0.9, "mu_inf": 0.1, "rate": 1.0},
+    "law": {"kind": "rate", "slope": 1e3}, "ground": {"velocity": 1.0},
+}  # fmt: skip
+
+
+def braked(force: float, **more: object) -> Built:
+    """The vane's tip on ground that moves, as a dict that asks for nothing and has no excitation."""
+    case = {"body": "vane", "monitor": "probe", "contacts": [{**BRAKE, "normal_force": force}], **more}
+    return ms.assemble(case, vane=ms.sample())
+
+
+def test_moving_ground_is_assembled_from_a_dict_and_needs_no_excitation() -> None:
+    for more in ({}, {"orbit": {"frequency": 100.0}}, {"stability": {"frequency": [0.0, 1e3]}}):
+        assembly = braked(20.0, **more).assembly
+        assert assembly.contacts[0].ground == Ground(1.0) and not assembly.loads
+    pressed = ms.assemble(
+        {"body": "vane", "monitor": "probe", "contacts": [BRAKE], "orbit": {"frequency": 100.0}}, vane=ms.sample(),
+        normal_force=20.0,
+    )  # fmt: skip
+    assert pressed.assembly.contacts[0].preload[0] == pytest.approx(20.0)
+    with pytest.raises(UserError, match="harmonic balance cannot take"):
+        ms.harmonic_response(pressed, [100.0])
+    still = {key: value for key, value in BRAKE.items() if key not in ("ground", "law")}
+    alone = {"body": "vane", "monitor": "probe", "contacts": [{**still, "normal_force": 20.0}]}
+    with pytest.raises(UserError, match="nothing drives it"):
+        ms.harmonic_response(ms.assemble(alone, vane=ms.sample()), [100.0])
+
+
+def test_a_case_in_a_file_needs_an_excitation_where_no_ground_moves(tmp_path: Path) -> None:
+    text = 'name = "c"\nbody = "vane"\nmonitor = "probe"\n[orbit]\nfrequency = 100.0\n'
+    text += '[[contacts]]\ninterface = "right"\nnormal_force = 1.0\nnormal_stiffness = 1e6\n'
+    text += "tangential_stiffness = 1e6\nfriction = 0.1\npoints = [1, 1]\n"
+    (tmp_path / "c.toml").write_text(text)
+    with pytest.raises(UserError, match="excitation: give excitation"):
+        ms.assemble("c.toml", tmp_path, vane=ms.sample())
+
+
+@pytest.mark.slow
+def test_roots_about_sliding_are_on_the_axis_at_the_hopf_points() -> None:
+    """Of what a dict describes: `ms.bifurcate` over the normal force, and `ms.stability` there."""
+    points = ms.bifurcate(braked, 1.0, 100.0, orbits=False).hopf
+    assert len(points) == 2
+    for point in points:
+        roots = ms.stability(braked(point.p), frequency=(0, 2000))
+        i = np.abs(roots.roots.s.imag - point.omega).argmin()
+        assert roots.roots.s[i] == pytest.approx(1j * point.omega, abs=1e-8 * point.omega)

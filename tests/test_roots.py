@@ -388,3 +388,12 @@ def test_thousands_of_roots_far_outside_turn_the_phase_and_are_no_roots_inside()
     roots = grow + 1j * np.sqrt(w[:2] ** 2 - grow**2)
     assert missed(Q, window, roots[:0]).missed == 2
     assert missed(Q, window, roots).missed == 0
+
+
+def test_a_root_that_joins_an_equal_one_is_a_branch_of_its_own() -> None:
+    from microslip.roots.diagram import Diagram
+
+    s = (np.array([1j]), np.array([1j, 1j]), np.array([1j, 1j]))
+    error, window = tuple(np.zeros(len(x)) for x in s), Window((-1.0, 1.0), (0.0, 2.0))
+    found = Diagram("speed", np.arange(3.0), s, error, 0.0, window, None)
+    assert found.branches.shape == (2, 3) and np.isnan(found.branches).sum() == 1

@@ -9,12 +9,14 @@ import numpy as np
 import pytest
 
 import microslip as ms
-from microslip.contact.friction import StaticSliding
+from microslip.contact.friction import Coulomb, StaticSliding
 from microslip.contact.law import value
-from microslip.contact.normal import Preload
+from microslip.contact.normal import Penalty, Preload
+from microslip.contact.point import PointContact
 from microslip.contact.set_valued import SetValued
 from microslip.errors import UserError
-from microslip.time_domain import equations
+from microslip.system.ground import Ground
+from microslip.time_domain import equations, orbit
 from microslip.time_domain.inclusion import meets, solve
 from microslip.time_domain.stepper import Stepper
 
@@ -142,3 +144,95 @@ def test_what_cannot_be_is_refused() -> None:
         more = equations.of(ms.structure(np.eye(4), np.eye(4), elements=[ms.friction(1.0), ms.jenkins(1.0, 1.0)]), 1.0)
         Stepper(replace(more, R=0.1 * np.eye(2)), 0.1).bodies  # noqa: B018
     assert yields.R[0, 0] > 0
+
+
+# ground that moves ---------------------------------------------------------------------------------------------------
+
+
+def test_a_block_on_a_belt_sticks_at_its_velocity_and_slips_as_an_oscillator() -> None:
+    """Held by 0.3 N at rest and 0.2 N sliding, on a belt of 0.01 m/s, m = k = 1: it goes with the belt to 0.3 m, swings
+    about 0.2 m with the amplitude that this and the belt's velocity give, and sticks at 0.1 m again, pi + 2 arctan(V /
+    0.1) later. The belt gives V times the friction, whatever is lost in sliding or stored in the spring."""
+    V, static, sliding = 0.01, 0.3, 0.2
+    belt = ms.structure(1.0, 1.0, output=0, elements=[ms.friction(sliding, static=static, velocity=V)])
+    errors = []
+    for steps in (1024, 4096):
+        found = ms.integrate(belt, 0.2, unit="rad/s", settle=0, keep=4, samples=512, steps=steps)
+        t, y, v, force = found.time, found.y[0], found.v[0], found.force[0]
+        slips, sticks = found.times("slips"), found.times("sticks")[1:]
+        first = t < slips[0] - 0.1
+        np.testing.assert_allclose(np.diff(y[first]), V * np.diff(t[first]), rtol=1e-9)
+        np.testing.assert_allclose(force[first], -y[first], rtol=(40 / steps) ** 2)
+        size, slipping = math.hypot(static - sliding, V), math.pi + 2 * math.atan(V / (static - sliding))
+        swing = (t > slips[0] + 0.1) & (t < sticks[0] - 0.1)
+        phase = t[swing] - slips[0] - math.atan(V / (static - sliding))
+        bounds = [np.abs(y[swing] - sliding - size * np.cos(phase)).max(), abs(v.min() + size)]
+        bounds += [np.abs(sticks[:3] - slips[:3] - slipping).max()]
+        bounds += [np.abs(np.diff(slips) - slipping - 2 * (static - sliding) / V).max()]
+        errors.append(max(bounds))
+        given = -V * np.cumsum(0.5 * (force[1:] + force[:-1])) * (t[1] - t[0])
+        moved = found.energy["ground"]
+        np.testing.assert_allclose(moved[1:] - moved[0], given, atol=3e-3 * moved[-1])
+        assert found.drift < 1e-12 and found.balance < 1e-10
+        assert found.energy["mechanical"][-1] == pytest.approx(moved[-1] - found.energy["lost"][-1], rel=1e-9)
+    assert errors[1] < 0.5 * errors[0] < 0.05
+
+
+def rubbing_block(law: object, ground: Ground, force: float = 0.0) -> equations.Equations:
+    """A mass on a spring along the ground, free along the normal, pressed on it by 14 N."""
+    from test_ground import rubbing
+
+    return equations.of(rubbing(law, ground, force), 20.0)
+
+
+def test_a_blade_rubs_a_casing_and_is_taken_along() -> None:
+    """Pressed on a round casing that passes: it slides under mu F_N, which its spring holds in the mean, and swings
+    about that undamped as Coulomb's friction leaves it; the casing gives mu F_N V."""
+    from test_ground import NORMAL, OMEGA, STIFFNESS
+
+    mu, V = 0.3, 1.0
+    found = orbit.run(rubbing_block(SetValued(Coulomb(value(mu)), value(0.0), value(0.0)), Ground(V)), 0, 2, 256, 4096)
+    held = mu * NORMAL / STIFFNESS
+    np.testing.assert_allclose(found.y[0], held * (1 - np.cos(OMEGA * found.time)), atol=1e-3 * held)
+    np.testing.assert_allclose(found.force[1], -mu * NORMAL, rtol=1e-9)
+    given = np.diff(found.energy["ground"]) / np.diff(found.time)
+    np.testing.assert_allclose(given, mu * NORMAL * V, rtol=1e-9)
+    assert found.drift < 1e-12 and found.balance < 1e-10
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("pushes", [True, False])
+def test_a_casing_that_is_not_round_is_followed(pushes: bool) -> None:
+    """The blade keeps to the waves without a gap, and what it does is the limit of stiffer and stiffer springs in the
+    place of the rigid contact; what the casing gives is what is lost, stored and left in the bodies."""
+    begins_flat = ((1e-5, 2.5e-3, 0.5 * math.pi), (1e-5, 4e-3, -0.5 * math.pi))
+    wave = Ground(0.02, 0.0, begins_flat, pushes)
+
+    def moved(law: object) -> orbit.Orbit:
+        return orbit.run(rubbing_block(law, wave, 3.0), 0, 2, 128, 32768, "rest")
+
+    rigid = moved(SetValued(Coulomb(value(0.3)), value(0.0), value(0.0)))
+    assert (rigid.force[0] > 0).all() and rigid.drift < 1e-8  # forces to 1e-9 of the largest
+    assert rigid.balance < 1e-10
+    passed = rigid.y[0] - 0.02 * rigid.time
+    height = sum(a * np.sin(2 * np.pi / length * passed + phase) for a, length, phase in wave.waves)
+    assert np.ptp(rigid.y[1] + height) < 1e-4 * np.ptp(height)
+    away = []
+    for k in (1e6, 1e7):
+        soft = moved(PointContact(Penalty(value(k)), Coulomb(value(0.3)), value(k)))
+        away.append(np.abs(soft.y[0] - rigid.y[0]).max() / np.abs(rigid.y[0]).max())
+    assert away[1] < 0.3 * away[0] < 0.05
+
+
+@pytest.mark.slow
+def test_a_rigid_contact_on_a_body_that_yields_is_one_with_springs() -> None:
+    """What yields beside the modes, R, is in series with the contact: the rigid one on a body that yields moves as one
+    whose springs are 1 / R, on wavy ground that passes; energies too."""
+    wave, k = Ground(0.02, 0.0, ((1e-5, 2.5e-3, 0.0),)), 1e6
+    rigid = rubbing_block(SetValued(Coulomb(value(0.3)), value(0.0), value(0.0)), wave, 3.0)
+    rigid = replace(rigid, R=np.diag([1 / k, 1 / k, 1 / k, 0, 0, 0]))
+    sprung = rubbing_block(PointContact(Penalty(value(k)), Coulomb(value(0.3)), value(k)), wave, 3.0)
+    one, other = (orbit.run(e, 0, 1, 64, 8192, "rest") for e in (rigid, sprung))
+    np.testing.assert_allclose(one.y, other.y, atol=2e-3 * np.abs(other.y).max())
+    np.testing.assert_allclose(one.energy["ground"], other.energy["ground"], atol=1e-2 * other.energy["ground"].max())
+    assert one.balance < 1e-9 and one.drift < 1e-2

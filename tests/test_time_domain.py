@@ -277,11 +277,12 @@ def test_orbit_of_a_case_says_the_same_in_table_page_and_file(hammer: Path, caps
     folder = hammer / "build" / "hammer"
     head, row = (line.split(",") for line in (folder / "orbit.csv").read_text().splitlines())
     told = dict(zip(head, map(float, row), strict=True))
-    by_hand = orbit.run(equations.of(hitting(BOOK), 64.32), 60, 4, 64)
-    assert told["largest_m"] == pytest.approx(by_hand.y[0].max(), rel=1e-6)
+    by_hand = orbit.run(equations.of(hitting(BOOK), 64.32), 60, 4, 1024)
+    seen, whole = by_hand.y[0, 15::16].max(), by_hand.y[0].max()
+    assert 1.03 * seen < 0.99 * whole < told["largest_m"] < 1.001 * whole
     with h5py.File(folder / "orbit.h5") as file:
         group = file["motion_1"]
-        assert group["displacement"][0].max() == pytest.approx(told["largest_m"], rel=1e-7)
+        assert group["displacement"][0].max() == pytest.approx(seen, rel=1e-6)
         assert len(group["event"]) == by_hand.count("closes") + by_hand.count("opens")
     page = (folder / "orbit.html").read_text(encoding="utf-8")
     assert METRES.sized(max(abs(told["smallest_m"]), abs(told["largest_m"]))) in page and "periodic" in page
@@ -434,7 +435,6 @@ def test_a_rigid_contact_of_a_case_is_that_of_the_same_system_by_hand(
         ("contacts.0.normal_stiffness=1e6", "is rigid; leave normal_stiffness out"),
         ("contacts.0.interference=1e-6", "rigid bodies cannot overlap"),
         ("contacts.0.curvature=[0.1, 0.1]", "belongs to flat patches"),
-        ("contacts.0.ground.velocity=0.1", "stand on ground at rest"),
         ('contacts.0.law={kind="set-valued", restitution=1.5}', "restitution: must not be greater than 1"),
         ('contacts.0.friction={kind="coulomb", mu=0.3, deviation=0.1}', "no heat and no chance"),
     ],
@@ -895,3 +895,80 @@ def test_loss_factors_in_time_are_told(damping: str) -> None:
     built = ms.assemble({**case, "damping": damping}, vane=ms.sample())
     found = ms.integrate(built, 300.0, settle=0, keep=1)
     assert any("at 300 Hz" in text for text in found.messages) == (damping == "structural")
+
+
+# starts --------------------------------------------------------------------------------------------------------------
+
+
+def pair() -> ms.Assembly:
+    """Two masses between three springs, whose modes are 1 and sqrt 3 rad/s."""
+    return ms.structure(np.eye(2), np.array([[2.0, -1.0], [-1.0, 2.0]]), output=[0, 1])
+
+
+def test_a_motion_begins_at_a_displacement_a_velocity_or_in_a_mode() -> None:
+    """Against the closed form in both modes."""
+    how = {"unit": "rad/s", "settle": 0, "keep": 1, "samples": 64}
+    found = ms.integrate(pair(), 1.0, start={"displacement": [1.0, 0.5], "velocity": {1: 0.3}}, **how)
+    w, t = np.sqrt([1.0, 3.0])[:, None], found.time
+    q, v = np.array([[0.75], [0.25]]), np.array([[0.15], [-0.15]])
+    modes = q * np.cos(w * t) + v / w * np.sin(w * t)
+    np.testing.assert_allclose(found.y, [modes[0] + modes[1], modes[0] - modes[1]], atol=1e-12)
+    second = ms.integrate(pair(), 1.0, start={"mode": 2, "amplitude": 0.1}, **how)
+    np.testing.assert_allclose(second.y, 0.1 * np.array([[1.0], [-1.0]]) * np.cos(w[1] * t), atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    "start",
+    [
+        {"mode": 3, "amplitude": 1.0}, {"mode": 1.5, "amplitude": 1.0}, {"mode": 1}, {"place": [1.0, 1.0]},
+        {"displacement": [1.0]}, {"displacement": "far"}, {"displacement": {5: 1.0}}, {"velocity": {0: "fast"}},
+        {"mode": 1, "amplitude": 1.0, "velocity": [1.0, 1.0]}, {"displacement": [math.nan, 0.0]},
+    ],
+)  # fmt: skip
+def test_a_start_that_is_none_is_refused_by_its_key(start: dict) -> None:
+    with pytest.raises(UserError, match="start: "):
+        ms.integrate(pair(), 1.0, start=start)
+
+
+def test_a_case_lets_its_bodies_go_without_an_excitation(hammer: Path, capsys: pytest.CaptureFixture) -> None:
+    (hammer / "case.toml").write_text((hammer / "case.toml").read_text().replace("motion = ", "# motion = "))
+    assert main(["orbit", "case.toml", "-q"]) == 2 and "give excitation" in capsys.readouterr().err
+    let_go = ["--set", "orbit.release={mode=1, amplitude=-1e-5}", "--set", "orbit.settle=0", "--no-pictures", "-q"]
+    assert main(["orbit", "case.toml", *let_go]) == 0
+    (found,) = ms.read_orbits(hammer / "build" / "hammer" / "orbit.h5")
+    assert found.y[0, 0] == pytest.approx(-1e-5, rel=0.1) and found.count("closes") > 0
+    assert main(["orbit", "case.toml", "--set", "orbit.release={mode=99, amplitude=1e-5}", "-q"]) == 2
+    assert "release: mode" in capsys.readouterr().err
+
+
+def test_many_starts_tell_their_exponents_and_velocities() -> None:
+    """Of a slider that holds: -c / 2 within the interval; read-outs are those of a motion alone."""
+    held = ms.structure(1.0, 1.0, 0.1, force={0: 0.3}, elements=[ms.jenkins(1.0, 10.0)], output=0)
+    how = {"unit": "rad/s", "settle": 10, "keep": 40}
+    found = ms.integrate_many(held, 1.0, [[0.1], [0.4]], [[0.0], [0.2]], exponents=True, **how)
+    for one in found.exponents:
+        assert abs(one.value + 0.05) < 2 * one.uncertainty < 0.02 and one.sign == -1
+    alone = ms.integrate(held, 1.0, start={"displacement": [0.4], "velocity": [0.2]}, steps=found.steps, **how)
+    np.testing.assert_allclose(found.y[1, -1], alone.y[:, -1], atol=1e-12)
+    np.testing.assert_allclose(found.y_dot[1, -1], alone.v[:, -1], atol=1e-12)
+    with pytest.raises(UserError, match="exponents: take 40 periods"):
+        ms.integrate_many(held, 1.0, [[0.1]], [[0.0]], settle=1, keep=2, exponents=True)
+
+
+@pytest.mark.slow
+def test_many_chaotic_starts_have_the_exponent_of_duffings_oscillator() -> None:
+    """0.1556 1/s by its variational equation from 256 starts, of the damping 0.25 and the push 0.4."""
+    duffing = ms.structure(1.0, -1.0, 0.25, force={0: 0.4}, elements=[ms.polynomial({3: 1.0})], output=0)
+    x = np.random.default_rng(0).uniform(-1.0, 1.0, (12, 1))
+    found = ms.integrate_many(duffing, 1.0, x, 0 * x, unit="rad/s", settle=80, keep=100, exponents=True)
+    values = np.array([one.value for one in found.exponents])
+    assert np.mean(values) == pytest.approx(0.1556, abs=3 * np.std(values) / np.sqrt(len(values)))
+    assert all(one.sign == 1 for one in found.exponents)
+
+
+def test_extremes_of_a_table_lie_between_its_samples() -> None:
+    from microslip.stages.orbit import _row
+
+    swing = ms.structure(1.0, 1.0, 0.2, force={0: 0.2}, output=0)
+    row = _row(ms.integrate(swing, 1.0, unit="rad/s", settle=200, keep=1, samples=32))
+    assert row["largest_m"] == pytest.approx(1.0, abs=1e-5) and row["smallest_m"] == pytest.approx(-1.0, abs=1e-5)

@@ -78,6 +78,17 @@ def balanced(system: System, harmonics: int | None = None, samples: int | None =
     return balance.of(system, H, max(64, 16 * H) if samples is None else samples)
 
 
+def whole_of(system: System) -> Assembly:
+    """The assembly of what is analysed.
+
+    Raises:
+        UserError: a case whose contacts wait for a normal force.
+    """
+    if isinstance(system, Problem):
+        return system.assembly
+    return _pressed(system) if isinstance(system, Built) else system
+
+
 def _pressed(built: Built) -> Assembly:
     """The assembly of a case.
 
@@ -336,7 +347,8 @@ def _hertz(unit: str) -> float:
 def integrate(
     system: System, frequency: float, *, second: float | None = None, unit: Literal["Hz", "rad/s"] = "Hz",
     settle: int = 100, keep: int = 20,
-    samples: int = 256, steps: int | None = None, start: Literal["static", "rest", "balance"] = "static",
+    samples: int = 256, steps: int | None = None,
+    start: Literal["static", "rest", "balance"] | Mapping[str, Any] = "static",
     method: Literal["stepper", "reference"] = "stepper", tolerance: float = 1e-9, file: Path | str | None = None,
     report: Report = lambda _: None,
 ) -> Orbit:  # fmt: skip
@@ -354,7 +366,10 @@ def integrate(
             where contacts open, close or slide; else of second.
         start: ``static``, at rest under the steady loads; ``rest``, at rest in the preloaded state; ``balance``, on
             the vibration that harmonic balance finds, its contacts remembering it. Of an assembly `IN_TIME` harmonics
-            are taken; a balance or a case has its own.
+            are taken; a balance or a case has its own. Or where the bodies are let go: ``{"displacement": ...,
+            "velocity": ...}``, m and m/s, each of all coordinates or coordinate -> value, of bodies from modal files
+            those of their modes; ``{"mode": 1, "amplitude": ...}``, of the first read-out in a mode of the bodies
+            without their contacts.
         method: ``reference`` is CVODE, an integrator for stiff equations that chooses its own steps by a relative
             tolerance: slower, of laws that are differential equations, and what the stepper is proved on.
         file: samples are written there as they come and read when they are asked for, so that a long motion needs no
@@ -379,24 +394,24 @@ def integrate(
     """
     from .time_domain import equations, orbit, recorded, reference, starts
 
-    assembly = _pressed(system) if isinstance(system, Built) else system
+    assembly = whole_of(system)
     if method not in ("stepper", "reference"):
         raise UserError(f"method: '{method}' is none of stepper, reference")
-    assembly = assembly.assembly if isinstance(assembly, Problem) else assembly
     turn = 2 * np.pi * _hertz(unit)
     found = equations.of(assembly, turn * frequency, None if second is None else turn * second)
     if second is not None and start == "balance":
         raise UserError('second: "balance" begins on a periodic vibration; take "static" or "rest"')
+    rest: Any = starts.released(found, start) if isinstance(start, Mapping) else start
     if method == "reference":
-        if start == "balance" or file is not None:
-            raise UserError('method: "reference" begins from "static" or "rest", and writes no file; use the stepper')
-        return reference.run(found, settle, keep, samples, start, tolerance, report)
+        if rest == "balance" or file is not None:
+            raise UserError('method: "reference" begins on no vibration, and writes no file; use the stepper')
+        return reference.run(found, settle, keep, samples, rest, tolerance, report)
     begin: orbit.Start | starts.Periodic
     if start == "balance":
         many = IN_TIME if isinstance(system, Assembly) else None
         begin = starts.of_balance(found, balanced(system, many, many and 16 * many))
     else:
-        begin = start
+        begin = rest
     if file is None:
         return orbit.run(found, settle, keep, samples, steps, begin, report)
     asked = recorded.Asked(f"{frequency:.6g} {unit}", found, settle, keep, samples, steps, begin)
@@ -406,15 +421,18 @@ def integrate(
 def integrate_many(
     system: System, frequency: float, displacements: ArrayLike, velocities: ArrayLike, *,
     unit: Literal["Hz", "rad/s"] = "Hz", settle: int = 100, keep: int = 20, steps: int | None = None,
+    exponents: bool = False,
 ) -> Reached:  # fmt: skip
     """Which motions many starts lead to: all of them integrated by one compiled program, for basins of attraction.
 
     Args:
         system, unit, settle, keep, steps: see `integrate`. displacements, velocities: (n, k) of the system's
-            coordinates at t = 0, m and m/s; of bodies from modal files those of their modes.
+            coordinates at t = 0, m and m/s; of bodies from modal files those of their modes. exponents: look for the
+            largest Lyapunov exponent of each, which takes up to four times as long.
 
     Returns:
-        A `Reached`: ``attractor`` and ``repeats`` of each start, ``impacts``, read-outs ``y`` after every period.
+        A `Reached`: ``attractor`` and ``repeats`` of each start, ``impacts``, read-outs ``y`` and their velocities
+        ``y_dot`` after every period, ``exponents``.
 
     Raises:
         UserError: starts that are not (n, k); steps that are too few for the springs of the contacts.
@@ -429,10 +447,9 @@ def integrate_many(
     """
     from .time_domain import equations, many
 
-    assembly = _pressed(system) if isinstance(system, Built) else system
-    assembly = assembly.assembly if isinstance(assembly, Problem) else assembly
+    assembly = whole_of(system)
     found = equations.of(assembly, 2 * np.pi * frequency * _hertz(unit))
-    return many.run(found, np.asarray(displacements), np.asarray(velocities), settle, keep, steps)
+    return many.run(found, np.asarray(displacements), np.asarray(velocities), settle, keep, steps, exponents)
 
 
 def run_up(
@@ -470,8 +487,7 @@ def run_up(
     from .time_domain import equations, orbit, recorded
     from .time_domain.ramp import Ramp
 
-    assembly = _pressed(system) if isinstance(system, Built) else system
-    assembly = assembly.assembly if isinstance(assembly, Problem) else assembly
+    assembly = whole_of(system)
     turn = 2 * np.pi * _hertz(unit)
     ramp = Ramp(turn * start, turn * stop, time, order, euler)
     found = equations.of_ramp(assembly, ramp)
@@ -482,7 +498,7 @@ def run_up(
 
 
 def bifurcate(
-    system: Dynamics | Callable[[float], Assembly], start: float, stop: float, *, x: Any = None,
+    system: Dynamics | Callable[[float], Assembly | Built], start: float, stop: float, *, x: Any = None,
     frequency: float | None = None, unit: Literal["Hz", "rad/s"] = "Hz", orbits: bool = True, doublings: int = 1,
     attractors: Sequence[float] = (), starts: int = 64, deflate: Sequence[float] = (), nodes: int = 32,
     step: float = 0.08, points: int = 400, report: Report = lambda _: None,
@@ -528,8 +544,8 @@ def bifurcate(
         begin = np.zeros(made.count) if x is None else np.asarray(x, dtype=float)
     else:
         Omega = None if frequency is None else 2 * np.pi * frequency * _hertz(unit)
-        made = mechanics.dynamics(system, min(start, stop), max(start, stop), Omega)
-        begin = equilibrium(of(system(start))) if x is None else np.asarray(x, dtype=float)
+        made = mechanics.dynamics(lambda p: whole_of(system(p)), min(start, stop), max(start, stop), Omega)
+        begin = equilibrium(of(whole_of(system(start)))) if x is None else np.asarray(x, dtype=float)
     asked = diagram.Asked(
         start, stop, orbits, doublings, nodes, step, points, tuple(attractors), starts, deflate=tuple(deflate)
     )

@@ -7,25 +7,27 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
+from . import sliding
+from .analyses import whole_of
 from .basis import read_basis
 from .case.assemble import Built, build
 from .case.contacts import swept
-from .case.settings import CaseSettings
+from .case.settings import UNPRESSED, CaseSettings, unasked_sweep
 from .data import ModalBasis
 from .errors import UserError
 from .settings.mistakes import bounded, validate
 from .settings.toml import load_toml
 from .stages.job import job_of, open_job
 from .stages.places import modal_files
+from .system.assembly import Assembly
 
 if TYPE_CHECKING:
     from .roots.diagram import Diagram
     from .roots.spectrum import Spectrum
 
 Report = Callable[[str], None]
-
-UNSAID: dict[str, Any] = {"name": "assembly", "sweep": {"start": 1.0, "stop": 2.0, "normal_forces": [0.0]}}
-"""Of a case as a dict, where it does not say it: its name, and a sweep that nobody asks for."""
 
 
 def sample() -> Path:
@@ -78,7 +80,8 @@ def stability(
 
     Args:
         body: a body.toml of matrices or its folder, a modal file or basis, matrices (M, C, K),
-            none of which need be symmetric, sparse or not, or a `linalg.parametric.Family`.
+            none of which need be symmetric, sparse or not, a `linalg.parametric.Family`; or an assembly, about its
+            steady sliding.
         frequency: Hz, from, to; of a body.toml, what its [stability] says if not given. growth: 1/s, from, to. Both may
             be left out where there are no more than 300 coordinates.
         over: parameter that matrices scale with, and values: of it, rising; then the roots at each of them come from
@@ -89,7 +92,8 @@ def stability(
 
     Raises:
         UserError: several speeds and none chosen, matrices of different sizes or with numbers that are not finite, a
-            window without area, an unknown parameter, a value at which a matrix is not defined.
+            window without area, an unknown parameter, a value at which a matrix is not defined; an assembly whose
+            contacts wait for a normal force or cannot be linearised. NotConverged: no steady sliding is found.
 
     Examples:
         A double pendulum under a follower force flutters:
@@ -110,6 +114,10 @@ def stability(
         growth = window[0] if math.isinf(growth[0]) and math.isinf(growth[1]) else growth
         neutral, body, at = neutral or q.asked.neutral, q.family(), {**q.at, **(at or {})}
         frequency = frequency or window[1]
+    if isinstance(body, Assembly | Built):
+        equations = sliding.of(whole_of(body))
+        C, K = sliding.linearised(equations, sliding.equilibrium(equations))
+        body = np.eye(len(K)), C, K
     return roots_of(body, frequency, growth, over, values, at, accuracy, neutral, certify, speed, report)
 
 
@@ -140,7 +148,7 @@ def assemble(
         'right'
     """
     path = Path(folder) / "case" if isinstance(case, Mapping) else Path(folder) / case
-    raw = {**UNSAID, **case} if isinstance(case, Mapping) else load_toml(path)
+    raw = _said(case) if isinstance(case, Mapping) else load_toml(path)
     settings = validate(CaseSettings, raw, path)
     unknown = sorted(set(bases) - {b.name for b in settings.components})
     if unknown:
@@ -159,3 +167,9 @@ def assemble(
         own = [c.model_copy(update=pressed) if b else c for c, b in zip(settings.contacts, bare, strict=True)]
         settings = settings.model_copy(update={"contacts": tuple(own)})
     return build(settings, found, path)
+
+
+def _said(case: Mapping[str, Any]) -> dict[str, Any]:
+    """The keys of a case, with a name and a sweep that nobody asks for where it does not say them."""
+    sweep = {**unasked_sweep(case), "normal_forces": list(UNPRESSED)}
+    return {"name": "assembly", "sweep": sweep, **case}

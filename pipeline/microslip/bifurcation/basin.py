@@ -10,6 +10,7 @@ from ..continuation import newton
 from ..data import Array
 from . import equilibria, floquet, flow
 from .dynamics import Dynamics
+from .orbits import extremes
 from .shooting import Orbit, Shooting
 
 SETTLE, WATCH = 60, 10
@@ -63,7 +64,8 @@ def attractors(system: Dynamics, centre: Array, p: float, count: int, seed: int,
                 found.append(orbit)
                 counts.append(1)
                 last = way[-int(np.ceil(orbit.period * EACH / slow)) - 1 :]
-                swings.append(0.5 * np.ptp(system.seen(last, p), axis=0))
+                largest, smallest = extremes(system.seen(last, p), closed=False)
+                swings.append(0.5 * (largest - smallest))
             else:
                 counts[same] += 1
     return [Attractor(o, n / count, y) for o, n, y in zip(found, counts, swings, strict=True)]

@@ -14,7 +14,7 @@ from ..data import Array, ComplexArray
 from ..files import hdf5, store
 from ..units import Quantity
 from .dynamics import Dynamics
-from .orbits import Found
+from .orbits import Found, extremes
 from .shooting import Orbit
 
 if TYPE_CHECKING:
@@ -104,11 +104,11 @@ class Branch:
 def of_orbits(name: str, born: str, ended: str, found: list[Found], each: int = 8) -> Branch:
     """A branch of periodic orbits, read at so many times a node."""
     orbits = [one.orbit for one in found]
-    seen = [o.system.seen(o.sampled(each), o.p) for o in orbits]
+    ends = [extremes(o.system.seen(o.sampled(each), o.p)) for o in orbits]
     return Branch(
         name, born, ended, orbits[0].turns, orbits[0].system.named,
         np.array([o.p for o in orbits]), np.array([o.period for o in orbits]), np.array([o.x for o in orbits]),
-        np.array([y.max(axis=0) for y in seen]), np.array([y.min(axis=0) for y in seen]),
+        np.array([largest for largest, _ in ends]), np.array([smallest for _, smallest in ends]),
         np.array([one.multipliers for one in found]), np.array([one.stable for one in found]),
         np.array([one.kind for one in found]), orbits[0].system.units,
     )  # fmt: skip

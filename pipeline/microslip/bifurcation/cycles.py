@@ -21,6 +21,7 @@ from .condensed import equations
 from .diagram import Asked, diagram
 from .dynamics import Dynamics
 from .equilibria import Hopf
+from .orbits import extremes
 from .shooting import Orbit
 from .switching import OFF
 
@@ -39,7 +40,10 @@ FASTEST = 4.0
 """Step times the fastest root up to which the method of order 8 is stable, with room."""
 
 TURNS = np.arange(256) / 256
-"""Times in periods at which a swing is read."""
+"""Times in periods at which a motion is held against its orbit."""
+
+EACH = 16
+"""Times of a period for each harmonic at which extremes are read, at least."""
 
 
 @dataclass(frozen=True)
@@ -92,7 +96,7 @@ class Cycles:
     def columns(self) -> dict[str, Array]:
         """Column -> (o,) values: parameter, frequency, half of the way from the smallest to the largest read-out, and
         the share of the highest harmonic in the first; of checked orbits also what time says of them, else NaN."""
-        swing = [np.ptp(self.system.seen(o.at(TURNS), o.p), axis=0) / 2 for o in self.orbits]
+        swing = [_swing(self.system.seen(o.at(_turns(o)), o.p)) for o in self.orbits]
         in_time = self._told(lambda c: c.swing, len(self.system.named))
         return {
             "parameter": np.array([o.p for o in self.orbits]),
@@ -171,7 +175,19 @@ def in_time(system: Dynamics, orbit: Harmonics, periods: int = PERIODS) -> tuple
     if not run.success:
         return float("inf"), np.full(len(system.named), np.nan)
     seen = system.seen(run.y.T[-len(TURNS) :] * size, orbit.p)
-    return float(np.abs(run.y.T - own).max() / (np.ptp(own, axis=0).max() / 2)), np.ptp(seen, axis=0) / 2
+    return float(np.abs(run.y.T - own).max() / (np.ptp(own, axis=0).max() / 2)), _swing(seen)
+
+
+def _turns(orbit: Harmonics) -> Array:
+    """Times in periods at which its extremes are read."""
+    count = max(len(TURNS), EACH * orbit.count)
+    return np.arange(count) / count
+
+
+def _swing(y: Array) -> Array:
+    """(w,) half of the way from the smallest to the largest value of a period (s, w)."""
+    largest, smallest = extremes(y)
+    return 0.5 * (largest - smallest)
 
 
 def refined(

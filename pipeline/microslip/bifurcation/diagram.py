@@ -275,9 +275,13 @@ def _ahead(system: Dynamics, state: State, x: Array, p: float) -> float:
 
 
 def _hopf(system: Dynamics, still: Branch, i: int) -> Hopf:
-    """The Hopf point of a branch."""
+    """The Hopf point of a branch; of several at one place each has a pair of its own."""
+    rows = still.of_kind("Hopf")
+    place = np.column_stack([still.x[rows, 0] / system.scale, still.parameter[rows] / system.parameter_scale])
+    here = rows[np.abs(place - place[rows == i]).max(axis=1) < equilibria.NEAR]
     pairs = still.multipliers[i][still.multipliers[i].imag > 0]
-    omega = pairs[np.argmin(np.abs(pairs.real))].imag
+    crossing = np.sort(pairs[np.argsort(np.abs(pairs.real), kind="stable")[: len(here)]].imag)
+    omega = crossing[np.flatnonzero(here == i)[0]]
     return equilibria.hopf(system, still.x[i, 0], float(still.parameter[i]), float(omega))
 
 

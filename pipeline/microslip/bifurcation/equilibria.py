@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -70,23 +70,52 @@ def hopf_between(system: Dynamics, before: State, after: State, settings: Settin
     ends = [eigenvalues(system, s.y[:-1] * scaled.x_scale, s.y[-1] * scaled.lam_scale) for s in (before, after)]
     counts = sorted(int((e.real > 0).sum()) for e in ends)
     segment = Segment(before.y, after.y, before.tangent, after.tangent, False)
-    found = []
+    found = list[Hopf]()
     for k in range(counts[0], counts[1] - 1, 2):
         try:
             y, _ = root(scaled, segment, settings, real(k), 1e-6)
         except Lost:
             continue
         x, p = y[:-1] * scaled.x_scale, float(y[-1] * scaled.lam_scale)
-        value = eigenvalues(system, x, p)[k]
-        if abs(value.imag) > 1e-6 * np.abs(eigenvalues(system, x, p)).max():
-            found.append(_sought(system, x, p, abs(value.imag)))
+        values = eigenvalues(system, x, p)
+        pairs = values[values.imag > 1e-6 * np.abs(values).max()]
+        if len(pairs):
+            one = _sought(system, x, p, float(pairs[np.argmin(np.abs(pairs.real))].imag))
+            new = [h for h in (one, *_beside(system, one)) if not any(_is_same(system, h, other) for other in found)]
+            found += new[:1]
     return found
+
+
+NEAR = 1e-5
+"""Share of the largest eigenvalue within which another one is on the imaginary axis too, of its frequency within which
+two are one, and of the scales within which two points of a branch are."""
+
+
+def _beside(system: Dynamics, one: Hopf) -> Iterator[Hopf]:
+    """The Hopf points at the same place, where rounding alone chooses which pair is nearest to the axis."""
+    values = eigenvalues(system, one.x, one.p)
+    size = NEAR * np.abs(values).max()
+    for value in values[(values.imag > size) & (np.abs(values.real) < size)]:
+        if abs(value.imag - one.omega) > NEAR * one.omega:
+            yield _sought(system, one.x, one.p, float(value.imag))
+
+
+def _is_same(system: Dynamics, one: Hopf, other: Hopf) -> bool:
+    apart = np.abs((one.x - other.x) / np.asarray(system.scale)).max()
+    place = max(apart, abs(one.p - other.p) / system.parameter_scale) < NEAR
+    return bool(place and abs(one.omega - other.omega) < NEAR * one.omega)
 
 
 def _sought(system: Dynamics, x: Array, p: float, omega: float) -> Hopf:
     try:
         return hopf(system, x, p, omega)
     except (Lost, np.linalg.LinAlgError) as error:
+        values = eigenvalues(system, x, p)
+        if (np.abs(values - 1j * omega) < NEAR * omega).sum() > 1:
+            raise UserError(
+                f"near {p:.4g} of the parameter several pairs of roots cross the imaginary axis at {omega:.4g} rad/s: "
+                "parts that are alike and not coupled; follow one of them, or couple them"
+            ) from error
         raise UserError(
             f"near {p:.4g} of the parameter no single pair of roots crosses the imaginary axis at {omega:.4g} rad/s: "
             "without damping pairs run along it until two of them meet; give the bodies damping"

@@ -158,6 +158,19 @@ class RunUpOfCase(Model):
         return self
 
 
+class ReleaseOfCase(Model):
+    """Where the bodies of a motion in time are let go.
+
+    displacement: of the coordinates of all bodies, those of their modes, one body after the other. velocity: of them.
+    mode: number of a mode of the bodies without their contacts. amplitude: of the first monitor in it.
+    """
+
+    displacement: Annotated[tuple[Number, ...], BeforeValidator(_finite_vector)] | None = None
+    velocity: Annotated[tuple[Number, ...], BeforeValidator(_finite_vector)] | None = None
+    mode: Annotated[int, Field(ge=1)] | None = None
+    amplitude: Number | None = None
+
+
 class OrbitOfCase(Model):
     """The motion in time from a start, by `microslip orbit`.
 
@@ -166,7 +179,7 @@ class OrbitOfCase(Model):
     that are left to themselves. keep: periods that are kept. samples: of each. steps: of each, if not given as many as
     the fastest motion with closed contacts needs. start: at rest, ``static`` under the steady
     loads, ``rest`` as preloaded; or ``balance``, on the vibration that harmonic balance finds with the case's
-    harmonics. normal_force: N, of the contacts that the sweep presses.
+    harmonics. release: where the bodies are let go, instead of start. normal_force: N, of the contacts that the sweep presses.
     """
 
     frequency: Several | None = None
@@ -177,6 +190,7 @@ class OrbitOfCase(Model):
     samples: Annotated[int, Field(ge=8, le=8192)] = 256
     steps: Annotated[int, Field(ge=1, le=100000000)] | None = None
     start: Literal["static", "rest", "balance"] = "static"
+    release: ReleaseOfCase | None = None
     normal_force: NotNegative | None = None
 
     @model_validator(mode="after")
@@ -185,6 +199,8 @@ class OrbitOfCase(Model):
             raise ValueError("frequency: give frequency (Hz) or Omega (rad/s), one or more of them, or run_up")
         if self.run_up and (wrong := sorted(self.model_fields_set & {"settle", "keep"})):
             raise ValueError(f"{wrong[0]}: a run-up is kept from its beginning to its end; leave it out")
+        if self.release is not None and "start" in self.model_fields_set:
+            raise ValueError("release: gives the start; leave start out, or release")
         if self.run_up and self.start == "balance":
             raise ValueError('start: a run-up begins at rest; write "static" or "rest"')
         return self

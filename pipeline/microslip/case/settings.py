@@ -340,27 +340,41 @@ class CaseSettings(Model):
     @classmethod
     def _swept(cls, raw: Any) -> Any:
         """A case that asks for a motion in time alone needs no sweep: it is an octave on either side."""
-        if isinstance(raw, dict) and isinstance(asked := raw.get("orbit"), dict) and "sweep" not in raw:
-            raw = raw | {"sweep": band_of(asked)} if band_of(asked) else raw
-        asks = isinstance(raw, dict) and (raw.get("stability") or raw.get("bifurcation") or raw.get("two_tones"))
-        if isinstance(raw, dict) and asks and "sweep" not in raw:
-            raw = raw | {"sweep": NO_SWEEP}
-        return raw
+        if not isinstance(raw, dict) or "sweep" in raw:
+            return raw
+        band = unasked_sweep(raw)
+        asks = [raw.get(key) for key in ("stability", "bifurcation", "two_tones")]
+        in_time = isinstance(raw.get("orbit"), dict) and band != NO_SWEEP
+        return raw | {"sweep": band} if in_time or any(asks) else raw
 
     @property
     def is_only_followed(self) -> bool:
         """Whether it asks for stability, bifurcations or two tones and for no sweep."""
         asked = bool(self.stability or self.bifurcation or self.two_tones) and self.orbit is None
-        return asked and self.sweep == Sweep.model_validate(NO_SWEEP)
+        return asked and self._stands_for(NO_SWEEP)
 
     @property
     def is_only_in_time(self) -> bool:
         """Whether it asks for motions in time and for no sweep."""
-        return self.orbit is not None and self.sweep == Sweep.model_validate(band_of(self.orbit.model_dump()))
+        return self.orbit is not None and self._stands_for(band_of(self.orbit.model_dump()))
+
+    @property
+    def is_only_built(self) -> bool:
+        """Whether it asks for nothing: what is analysed is said in Python."""
+        asked = self.stability or self.bifurcation or self.two_tones or self.orbit
+        return not asked and self.sweep.normal_forces == UNPRESSED and self._stands_for(NO_SWEEP)
+
+    def _stands_for(self, band: Mapping[str, float]) -> bool:
+        """Whether the sweep is the one of a case that has none."""
+        forces = self.sweep.normal_forces
+        own = self.sweep.model_copy(update={"normal_forces": None if forces == UNPRESSED else forces})
+        return own == Sweep.model_validate(band)
 
     @model_validator(mode="after")
     def _fits_together(self) -> CaseSettings:
-        free = self.bifurcation or self.stability or any(s.motion for s in self.springs)
+        free = self.bifurcation or self.stability or self.is_only_built or any(s.motion for s in self.springs)
+        free = free or any(c.ground is not None for c in self.contacts)
+        free = free or self.orbit is not None and self.orbit.release is not None
         moved = free and not self.excitation and not self.excitations
         for short, many in (("body", "bodies"), ("excitation", "excitations"), ("monitor", "monitors")):
             if bool(getattr(self, short)) == bool(getattr(self, many)) and not (moved and short == "excitation"):
@@ -445,7 +459,7 @@ class CaseSettings(Model):
 
     def _pressed(self) -> CaseSettings:
         moves = [c.interface for c in self.contacts if c.ground is not None]
-        if moves and not self.is_only_in_time and not self.is_only_followed:
+        if moves and not (self.is_only_in_time or self.is_only_followed or self.is_only_built):
             raise ValueError(
                 f"contacts.{moves[0]}.ground: only a motion in time knows ground that moves; give [orbit], "
                 "[stability], [[bifurcation]] or [two_tones], and no sweep"
@@ -554,7 +568,16 @@ class CaseSettings(Model):
 
 
 NO_SWEEP = {"start": 1.0, "stop": 2.0}
-"""Stands for the sweep of a case that asks for stability, bifurcations or two tones alone."""
+"""Stands for the sweep of a case that asks for stability, bifurcations or two tones alone, or for nothing."""
+
+UNPRESSED = (0.0,)
+"""Normal forces of the sweep of a case whose contacts are pressed in Python."""
+
+
+def unasked_sweep(raw: Mapping[str, Any]) -> dict[str, float]:
+    """Start and stop (Hz) of the sweep of a case that has none, by its keys."""
+    asked = raw.get("orbit")
+    return (band_of(asked) if isinstance(asked, Mapping) else {}) or NO_SWEEP
 
 
 def band_of(orbit: Mapping[str, Any]) -> dict[str, float]:

@@ -20,17 +20,20 @@ from .point import OnNormal, OwnNormal
 if TYPE_CHECKING:
     from .composed import ContactModel
 
-SLIDES = 0.9
-"""Share of its largest value at which the smoothing counts as sliding, and not as the creep of a contact that sticks:
-from 6.3 / k_S on."""
+SLIDES, STICKS = 0.99, 0.9
+"""Shares of its largest value at which the smoothing begins to count as sliding, at 64 / k_S, and from which on it is
+the creep of a contact that sticks again, 6.3 / k_S. Near its limit a sticking contact creeps as fast as the second."""
 
 
 class RateState(NamedTuple):
-    """State of n points: u_t (2, n) m, path slid (2, n) m, time (n,) s."""
+    """State of n points: u_t (2, n) m and its rate (2, n) m/s, path slid (2, n) m, time (n,) s, and 1.0 where they
+    slide (n,)."""
 
     tangential: Array
+    rate: Array
     slipped: Array
     time: Array
+    slides: Array
 
 
 @settings
@@ -62,15 +65,19 @@ class RateContact(OnNormal):
         return jnp.concatenate([pressed[None], self._drag(norm(v.T[1:]), pressed, now) * v.T[1:]]).T, x
 
     def init(self, n: int) -> RateState:
-        return RateState(jnp.zeros((2, n)), jnp.zeros((2, n)), jnp.zeros(n))
+        still = jnp.zeros((2, n))
+        return RateState(still, still, still, jnp.zeros(n), jnp.zeros(n))
 
     def step(self, u: Array, v: Array, dt: Array | float, state: RateState) -> tuple[Array, RateState]:
         time, tangential, speed = state.time + dt, u.T[1:], norm(v.T[1:])
         pressed = self._pressed(u[:, 0], v[:, 0])
         force = self._drag(speed, pressed, time) * v.T[1:]
-        slides = (pressed > 0) & (self.slope * speed > jnp.tan(0.5 * jnp.pi * SLIDES))
+        share = jnp.where(state.slides > 0.5, STICKS, SLIDES)
+        passes = 0.5 * norm(state.rate + v.T[1:])  # a stiff creep may swing about it from step to step
+        slides = (pressed > 0) & (self.slope * passes > jnp.tan(0.5 * jnp.pi * share))
         slipped = state.slipped + jnp.where(slides, tangential - state.tangential, 0.0)
-        return jnp.concatenate([pressed[None], force]).T, RateState(tangential, slipped, time)
+        after = RateState(tangential, v.T[1:], slipped, time, slides.astype(float))
+        return jnp.concatenate([pressed[None], force]).T, after
 
     def slowed(self, u: Array, v: Array, dt: Array | float, state: RateState, yielding: Array) -> Array:
         pressed, trial, time = self._pressed(u[:, 0], v[:, 0]), v.T[1:], state.time + dt

@@ -84,15 +84,13 @@ class Diagram:
         last: list[int] = []
         for j, s in enumerate(self.s):
             going = [i for i, at in enumerate(last) if at == j - 1]
-            before = np.array([rows[i][j - 1] for i in going])
-            for k, i in _partners(before, s):
+            pairs = _partners(np.array([rows[i][j - 1] for i in going]), s)
+            for k, i in pairs:
                 rows[going[k]][j], last[going[k]] = s[i], j
-            taken = {complex(rows[i][j]) for i in going if last[i] == j}
-            for root in s:
-                if complex(root) not in taken:
-                    rows.append(np.full(len(self.values), complex(np.nan, np.nan)))
-                    rows[-1][j] = root
-                    last.append(j)
+            for i in sorted(set(range(len(s))) - {i for _, i in pairs}):  # of equal ones each by itself
+                rows.append(np.full(len(self.values), complex(np.nan, np.nan)))
+                rows[-1][j] = s[i]
+                last.append(j)
         return np.array(rows).reshape(len(rows), len(self.values))
 
     def to_dataframe(self) -> Any:

@@ -7,13 +7,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.interpolate import CubicHermiteSpline
 
 from ..case import CaseSettings
 from ..case.assemble import Built
 from ..case.contacts import swept
 from ..case.problem import problem_of
 from ..case.questions import OrbitOfCase, RunUpOfCase
-from ..errors import UserError
+from ..errors import UserError, told_of
 from ..files import store
 from ..files.tables import columns_csv
 from ..report.orbit import orbit_html
@@ -70,7 +71,7 @@ def _asked(settings: CaseSettings, built: Built, case_path: Path) -> list[record
         raise UserError(f"{case_path}: contacts.{waiting[0]}: nothing presses it; give orbit.normal_force, N")
     assembly = built.pressed(asked.normal_force)
     if asked.run_up is not None:
-        motions.append(_run_up(assembly, asked, asked.run_up))
+        motions.append(_run_up(assembly, asked, asked.run_up, case_path))
     for f in asked.hertz:
         name = f"{2 * np.pi * f:.6g} rad/s" if asked.Omega else f"{f:.6g} Hz"
         driven = equations.of(assembly, 2 * np.pi * f)
@@ -78,17 +79,26 @@ def _asked(settings: CaseSettings, built: Built, case_path: Path) -> list[record
         if asked.start == "balance":
             start = starts.of_balance(driven, problem_of(built, asked.normal_force))
         else:
-            start = asked.start
+            start = _rest(driven, asked, case_path)
         motions.append(recorded.Asked(name, driven, asked.settle, asked.keep, asked.samples, asked.steps, start))
     return motions
 
 
-def _run_up(assembly: Assembly, asked: OrbitOfCase, how: RunUpOfCase) -> recorded.Asked:
+def _rest(e: equations.Equations, asked: OrbitOfCase, path: Path) -> orbit.Start:
+    """Where bodies stand, or are let go."""
+    if asked.release is not None:
+        with told_of(f"{path}: orbit"):
+            return starts.released(e, asked.release.model_dump(), "release")
+    assert asked.start != "balance"
+    return asked.start
+
+
+def _run_up(assembly: Assembly, asked: OrbitOfCase, how: RunUpOfCase, path: Path) -> recorded.Asked:
     ramp = Ramp(2 * np.pi * how.start, 2 * np.pi * how.stop, how.time, how.engine_order, how.euler)
     name = f"{how.start:.6g} to {how.stop:.6g} Hz in {how.time:.6g} s"
-    assert asked.start != "balance"
     driven = equations.of_ramp(assembly, ramp)
-    return recorded.Asked(name, driven, 0, ramp.periods, asked.samples, asked.steps, asked.start)
+    start = _rest(driven, asked, path)
+    return recorded.Asked(name, driven, 0, ramp.periods, asked.samples, asked.steps, start)
 
 
 def _notes(found: Sequence[tuple[str, Orbit]]) -> list[str]:
@@ -111,7 +121,8 @@ def _messages(found: Sequence[tuple[str, Orbit]], built: Built) -> list[str]:
 def _sentence(name: str, one: Orbit) -> str:
     if not len(one.time):
         return f"{name}: {one.said}."
-    size = one.of().sized(0.5 * float(np.ptp(one.y[0])), 5)
+    largest, smallest = _ends(one)
+    size = one.of().sized(0.5 * (largest - smallest), 5)
     error = f", its last period uncertain by {percent(one.error)}" if np.isfinite(one.error) else ""
     return f"{name}: {one.said}; {one.labels[0]} swings by {size} on either side{error}."
 
@@ -157,16 +168,35 @@ def _table(found: Sequence[tuple[str, Orbit]]) -> dict[str, Any]:
     return {key: np.array([row[key] for row in rows]) for key in rows[0]}
 
 
+def _ends(one: Orbit) -> tuple[float, float]:
+    """Largest and smallest value of the first read-out, between the samples too."""
+    return _top(one, 1.0), -_top(one, -1.0)
+
+
+def _top(one: Orbit, sign: float) -> float:
+    """Of the cubics through the outermost sample and its neighbours with their velocities: at an impact they stay below
+    what it meets, where a parabola through the places alone passes beyond it."""
+    y = sign * one.y[0]
+    if len(y) < 2:
+        return float(y.max(initial=-np.inf))
+    i = int(np.argmax(y))
+    near = slice(max(i - 1, 0), i + 2)
+    way = CubicHermiteSpline(one.time[near], y[near], sign * one.v[0, near])
+    turns = way.derivative().roots(extrapolate=False)
+    return float(np.max([y[i], *way(turns[np.isfinite(turns)])]))
+
+
 def _row(one: Orbit) -> dict[str, float]:
     grows, of = one.exponent or Exponent(np.nan, np.nan, 0), one.of()
+    largest, smallest = _ends(one)
     return {
         "frequency_Hz": one.Omega / (2 * np.pi),
         "angular_frequency_rad_s": one.Omega,
         "repeats_after_periods": one.repeats,
         "impacts_per_period": one.impacts,
         "slips_per_period": one.slips,
-        of.column("smallest"): one.y[0].min(initial=np.inf),
-        of.column("largest"): one.y[0].max(initial=-np.inf),
+        of.column("smallest"): smallest,
+        of.column("largest"): largest,
         f"{of.column('largest_velocity')}_s": np.abs(one.v[0]).max(initial=0.0),
         "largest_contact_force_N": classification.largest_force(one),
         "lost_in_contacts_J_per_period": classification.lost(one),

@@ -16,7 +16,7 @@ import numpy as np
 import scipy.linalg
 
 from ..contact.elements import Polynomial, Stop
-from ..contact.friction import Coulomb
+from ..contact.friction import Coulomb, Friction, StaticSliding
 from ..contact.jenkins import Jenkins
 from ..contact.law import Law
 from ..contact.normal import Preload
@@ -27,6 +27,7 @@ from ..errors import UserError
 from ..settings.mistakes import bounded
 from .assembly import Assembly, Contact, ContactFace, Load, Output
 from .component import Component
+from .ground import Ground
 
 ALONG = {"n": 0, "t1": 1, "t2": 2}
 
@@ -39,7 +40,8 @@ class Element:
         law: of one point; its force acts against the displacement. at: number of a coordinate from 0, or (n,) weights
             of all. to: the same of what its other end is fixed to; None: the ground. along: which of the law's
             directions is used. name: of the element; None: of its kind and number. length: m, about what it has to move
-            by for its nonlinearity to show; None: not known.
+            by for its nonlinearity to show; None: not known. velocity: m/s, by which the ground moves along the
+            coordinate: a belt.
     """
 
     law: Law
@@ -48,8 +50,12 @@ class Element:
     along: str = "t1"
     name: str | None = None
     length: float | None = None
+    velocity: float = 0.0
 
     def __post_init__(self) -> None:
+        bounded("element: velocity", self.velocity)
+        if self.velocity and (self.to is not None or self.along == "n"):
+            raise UserError("element: velocity: is that of the ground along t1 or t2; leave out to, or velocity")
         if not isinstance(self.law, Law):
             raise UserError(f"element: law: {self.law!r} is no law; make the element by polynomial, jenkins, stop, ...")
 
@@ -116,18 +122,36 @@ def jenkins(stiffness: float, limit: float, at: Any = 0, to: Any = None, name: s
     return Element(law, at, to, name=name, length=limit / stiffness)
 
 
-def friction(limit: float, at: Any = 0, to: Any = None, name: str | None = None) -> Element:
+def friction(
+    limit: float, at: Any = 0, to: Any = None, name: str | None = None, *, static: float | None = None,
+    velocity: float = 0.0,
+) -> Element:  # fmt: skip
     """Dry friction that holds a force limit and does not yield before it slides: only motions in time can take it.
 
     Args:
-        limit: N. at, to, name: see `Element`.
+        limit: N. at, to, name: see `Element`. static: N that it holds before it slides, the limit if not given.
+            velocity: m/s of the ground, see `Element`.
 
     Raises:
-        UserError: a negative limit.
+        UserError: a negative limit, or a static one below it.
+
+    Examples:
+        A block on a belt sticks until its spring pulls by 0.3 N, and slips from there to 0.1 N:
+
+        >>> import microslip as ms
+        >>> belt = ms.structure(1.0, 1.0, output=0, elements=[ms.friction(0.2, static=0.3, velocity=0.01)])
+        >>> found = ms.integrate(belt, 0.2, unit="rad/s", settle=2, keep=2)
+        >>> print(f"{found.y.min():.2f} to {found.y.max():.2f} m")
+        0.10 to 0.30 m
     """
     bounded("friction: limit", limit, ge=0)
     one, zero, force = _numbers(1.0, 0.0, limit)
-    return Element(SetValued(Coulomb(one), zero, zero, Preload(force)), at, to, name=name)
+    law: Friction = Coulomb(one)
+    if static is not None and static != limit:
+        bounded("friction: static", static, ge=limit)
+        bounded("friction: limit", limit, gt=0)
+        law = StaticSliding(_numbers(static / limit)[0], one)
+    return Element(SetValued(law, zero, zero, Preload(force)), at, to, name=name, velocity=velocity)
 
 
 def stop(
@@ -289,7 +313,9 @@ def _contacts(elements: Sequence[Element], component: str, K: Array, force: Arra
         patch = patches.setdefault(key, Patch("element", np.zeros((1, 2)), np.ones(1), e.law, shape))
         own = e.name or f"{_kind(e)} {i}"
         face, zero = ContactFace(component, own, rows={0: row[None]}), np.zeros(1)
-        found.append(Contact(own, patch, face, None, zero, zero, length=e.length or _length(e.law, row, K, force)))
+        length = e.length or _length(e.law, row, K, force)
+        ground = Ground(e.velocity, 0.5 * math.pi * (e.along == "t2")) if e.velocity else None
+        found.append(Contact(own, patch, face, None, zero, zero, length=length, ground=ground))
     return tuple(found)
 
 

@@ -8,6 +8,7 @@ A. Giorgilli, J.-M. Strelcyn, Lyapunov characteristic exponents for smooth dynam
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -18,10 +19,11 @@ import scipy.optimize
 import scipy.special
 
 from ..data import Array
-from ..units import counted
+from ..units import counted, percent
 from .stepper import Now, Stepper
 
 if TYPE_CHECKING:
+    from .equations import Equations
     from .orbit import Orbit
 
 APART = 1e-7
@@ -44,6 +46,9 @@ REBOUNDS = 4
 
 LINES = 5
 """Combinations k of the second frequency up to which lines are looked for."""
+
+SETTLED = 1e-3
+"""Share of its size by which a motion may drift in half of the periods that are kept and have come to rest."""
 
 LATTICE = 0.02
 """Share of the points after every period that may lie off the closed curve of a quasi-periodic motion."""
@@ -93,10 +98,8 @@ def exponent(stepper: Stepper, now: Now, samples: int, each: int, periods: int, 
     if told := whole(now.held.states):
         return Exponent(math.nan, math.nan, 0, told)
     e = stepper.equations
-    rows = np.full(samples, each * samples)
-    weights = np.where(np.abs(e.omega2) > FREE * e.Omega**2, np.abs(e.omega2), e.Omega**2)
-    weights = np.sqrt(weights).reshape(len(now.y), -1)
-    scale = np.concatenate([weights, np.ones_like(weights)], axis=1)
+    rows, scale = np.full(samples, each * samples), sizes(e, len(now.y))
+    weights = scale[:, : scale.shape[1] // 2]
     seen = stepper.run(now, np.full(samples, each))[1]
     swing = np.concatenate([weights.ravel() * np.asarray(seen.q), np.asarray(seen.q_dot)], axis=1)
     apart = APART * (float(np.linalg.norm(swing, axis=1).max()) or 1.0)
@@ -110,7 +113,20 @@ def exponent(stepper: Stepper, now: Now, samples: int, each: int, periods: int, 
             return Exponent(math.nan, math.nan, i, "No Lyapunov exponent: the separation of two motions was lost.")
         growth[i] = math.log(size / apart)
         other = between(now, other, apart / size)
-    return _mean(growth[ALIGNED:], 2 * np.pi / e.Omega)
+    return mean(growth[ALIGNED:], 2 * np.pi / e.Omega)
+
+
+def sizes(e: Equations, blocks: int) -> Array:
+    """(b, 2 p) by which displacements and velocities of the modes are weighed in a separation, 1/s and 1."""
+    weights = np.where(np.abs(e.omega2) > FREE * e.Omega**2, np.abs(e.omega2), e.Omega**2)
+    weights = np.sqrt(weights).reshape(blocks, -1)
+    return np.concatenate([weights, np.ones_like(weights)], axis=1)
+
+
+def periods_of(done: int) -> int:
+    """Over how many periods the growth is averaged after so many were done; 0: these are too few."""
+    periods = min(MOST, done - ALIGNED) // BATCHES * BATCHES
+    return periods if periods >= FEWEST else 0
 
 
 def whole(states: Any) -> str:
@@ -121,12 +137,12 @@ def whole(states: Any) -> str:
     return "No Lyapunov exponent: a law of these contacts remembers whole numbers, which cannot be varied a little."
 
 
-def between(now: Now, other: Now, share: float) -> Now:
-    """A motion apart by a share of what the other is, memory of contacts included."""
+def between(now: Now, other: Now, share: Any, array: Callable[[Any], Any] = np.asarray) -> Now:
+    """A motion apart by a share of what the other is, memory of contacts included. array: of numpy or of jax."""
 
     def one(a: Any, b: Any) -> Any:
-        a, b = np.asarray(a), np.asarray(b)
-        return a + share * (b - a) if np.issubdtype(a.dtype, np.floating) else a
+        a, b = array(a), array(b)
+        return a + share * (b - a) if jnp.issubdtype(a.dtype, jnp.floating) else a
 
     return now._replace(
         **{
@@ -136,7 +152,7 @@ def between(now: Now, other: Now, share: float) -> Now:
     )
 
 
-def _mean(growth: Array, period: float) -> Exponent:
+def mean(growth: Array, period: float) -> Exponent:
     """Of growths a period, with the 95 % interval of Student's t over the means of batches; the first are left out
     where the batches do not take all."""
     n = len(growth) // BATCHES * BATCHES
@@ -194,8 +210,8 @@ def second_frequency(orbit: Orbit) -> float:
 
 
 def kind(orbit: Orbit) -> str:
-    """``periodic``, ``quasi-periodic``, ``chaotic``; ``settling``: the separation of neighbours shrinks, so it goes to
-    a motion that comes back; ``run-up``; ``open``: it is not known; ``diverged``; ``short``: less than two periods
+    """``periodic``, ``quasi-periodic``, ``chaotic``; ``settling``: it comes back, but drifts, or the separation of
+    neighbours shrinks, so that it goes to a motion that comes back; ``run-up``; ``open``: it is not known; ``diverged``; ``short``: less than two periods
     are kept."""
     if math.isfinite(orbit.diverged):
         return "diverged"
@@ -204,7 +220,7 @@ def kind(orbit: Orbit) -> str:
     if len(orbit.time) // orbit.samples < 2:
         return "short"
     if orbit.repeats:
-        return "periodic"
+        return "settling" if orbit.drifts > SETTLED else "periodic"
     if orbit.exponent is None or not math.isfinite(orbit.exponent.value):
         return "open"
     if math.isfinite(second_frequency(orbit)):
@@ -222,7 +238,11 @@ def said(orbit: Orbit) -> str:
     if what == "short":
         return "too short to say whether it repeats"
     kept, inside = len(orbit.time) // orbit.samples, "them" if p > 1 else "it"
+    if what == "settling" and p:
+        what = "drifting"
     words = {
+        "drifting": f"still settles, by {percent(orbit.drifts)} of its size in {counted(kept - kept // 2, 'period')}; "
+        f"comes back after {counted(p, 'period')} within 0.1 %",
         "periodic": f"comes back after {counted(p, 'period')}",
         "chaotic": f"chaotic, largest Lyapunov exponent {orbit.exponent}",
         "quasi-periodic": f"quasi-periodic, second frequency {second_frequency(orbit):.5g} of the excitation's",

@@ -12,7 +12,8 @@ import numpy as np
 from ..contact.law import Law, Step, norm, seldom
 from ..contact.patch import Patch
 from ..contact.set_valued import SetValued
-from .inclusion import Meets, solve
+from .ground import Moving
+from .inclusion import Meets, over_waves, solve
 
 CHORDS = 12
 """Iterations for contacts beside which the modes leave compliance out, with the slope of sticking contacts; modes leave
@@ -35,17 +36,22 @@ FEW = 4096
 
 
 class Group(NamedTuple):
-    """Equal contacts, whose coordinates stand one after the other. law: of all of their points. G: (c, n, 3, k) of
-    each. offset: (c, k) where they stand at d = 0."""
+    """Equal contacts, whose coordinates stand one after the other. law: of all of their points, on its ground. G: (c,
+    n, 3, k) of each. offset: (c, k) where they stand at d = 0."""
 
     law: Any
     G: Any
     offset: Any
 
     @property
+    def over(self) -> Any:
+        """Its law, without the ground."""
+        return self.law.law if isinstance(self.law, Moving) else self.law
+
+    @property
     def rigid(self) -> bool:
         """Whether its law is set-valued."""
-        return isinstance(self.law, SetValued)
+        return isinstance(self.over, SetValued)
 
 
 class Yielding(NamedTuple):
@@ -229,8 +235,9 @@ def told(
         slips.append(jnp.any(slid.reshape(len(g.G), -1), axis=1))
         if accounts:
             step = Step(u, way, dt, held.forces[i], points[i], held.states[i], states[i])
-            lost += jnp.sum(g.law.lost(step)) if by_law or not g.rigid else 0.0
-            given += jnp.sum(g.law.given(step))
+            moves = jnp.sum(g.law.given(step))
+            lost += jnp.sum(g.law.lost(step)) if by_law or not g.rigid else moves
+            given += moves
             stored += jnp.sum(g.law.stored(u, states[i]))
     zero, events = jnp.zeros(()), (jnp.concatenate(approach), jnp.concatenate(slips))
     return Held(held.d, held.force, states, points, places, *events, lost, given, stored, zero, zero)
@@ -250,23 +257,24 @@ def rigid_answer(
     """
     states, points = map(list, others)
     spots = [i for i, g in enumerate(groups) if g.rigid]
-    asked = [_asked(groups, i, bodies is None, free, ahead, held) for i in spots]
-    ways, pressed = (jnp.concatenate(x) for x in zip(*asked, strict=True))
-    ends = np.cumsum([len(w) for w, _ in asked])[:-1]
+    asked = [_asked(groups, i, bodies is None, free, ahead, dt, held) for i in spots]
+    ways, pressed, first, *slopes = (jnp.concatenate(x) for x in zip(*asked, strict=True))
+    if any(isinstance(groups[i].law, Moving) and groups[i].law.wavy for i in spots):
+        meets = over_waves(meets, *slopes)
+    ends = np.cumsum([len(w) for w, *_ in asked])[:-1]
 
     def coefficients(speed: Any) -> Any:
         each = zip(spots, jnp.split(speed, ends), jnp.split(pressed, ends), strict=True)
-        return jnp.concatenate([groups[i].law.friction.coefficient(x, jnp.nan_to_num(n)) for i, x, n in each])
+        return jnp.concatenate([groups[i].over.friction.coefficient(x, jnp.nan_to_num(n)) for i, x, n in each])
 
     highest = coefficients(jnp.zeros(len(ways)))
-    first = jnp.concatenate([held.forces[i] for i in spots])
     f, w, missed = solve(meets, ways, lambda _: highest, pressed, first)
-    if not all(groups[i].law.friction.constant for i in spots):
+    if not all(groups[i].over.friction.constant for i in spots):
         slides = slid(w, ways)
         f, w, missed = solve(meets, ways, lambda x: jnp.where(slides, coefficients(x / dt), highest), pressed, f)
     slipped = jnp.where(slid(w, ways)[:, None], w[:, 1:], 0.0)
     for i, force, way in zip(spots, jnp.split(f, ends), jnp.split(slipped, ends), strict=True):
-        points[i], states[i] = force, held.states[i] + way.T
+        points[i], states[i] = _held(groups[i], force, way, _point(groups, i, free), dt, held.states[i])
     force = joined(groups, points)
     d = free if bodies is None else free - times(bodies.R, force)
     by_law = bodies is not None
@@ -279,15 +287,29 @@ def slid(w: Any, free: Any) -> Any:
     return norm(w[:, 1:].T) > SLIDES * jnp.maximum(jnp.abs(w), jnp.abs(free))[:, 1:].max()
 
 
-def _asked(groups: tuple[Group, ...], i: int, masses: bool, free: Any, ahead: Any, held: Held) -> tuple[Any, Any]:
-    """w_0 and `pressed` of `inclusion.solve` for the points of a group."""
-    g, law = groups[i], groups[i].law
-    u, then = (moved(g, parts(groups, d)[i] + g.offset) for d in (free, ahead))
-    pressed = jnp.full(len(u), jnp.nan) if law.normal is None else law.normal.force(u[:, 0])
+def _asked(groups: tuple[Group, ...], i: int, masses: bool, free: Any, ahead: Any, dt: Any, held: Held) -> tuple:
+    """Of the points of a group: w_0, `pressed` and `first` of `inclusion.solve`, and (n, 2) the slopes of the ground
+    under them that turn their way, and their force."""
+    g, law, before, first = groups[i], groups[i].over, held.places[i], held.forces[i]
+    u, then = (_point(groups, i, d) for d in (free, ahead))
+    come, goes, deep, slopes = u - before, then - u, u[:, 0], (jnp.zeros((len(u), 2)),) * 2
+    if isinstance(g.law, Moving):
+        come, goes, deep, first, slopes = g.law.passed(before, u, then, first, dt, held.states[i])
+    pressed = jnp.full(len(u), jnp.nan) if law.normal is None else law.normal.force(deep)
     gap = jnp.broadcast_to(law.gap, len(u))
     if not masses:
-        return u - held.places[i].at[:, 0].set(gap), pressed
-    along = (then - u)[:, 0] + law.restitution * (u - held.places[i])[:, 0]
+        return come.at[:, 0].set(deep - gap), pressed, first, *slopes
+    along = goes[:, 0] + law.restitution * come[:, 0]
     if law.normal is None:
-        along = jnp.where(u[:, 0] >= gap, along, -jnp.inf)
-    return (then - u).at[:, 0].set(along), pressed
+        along = jnp.where(deep >= gap, along, -jnp.inf)
+    return goes.at[:, 0].set(along), pressed, first, *slopes
+
+
+def _point(groups: tuple[Group, ...], i: int, d: Any) -> Any:
+    """(n, 3) m of the points of a group."""
+    return moved(groups[i], parts(groups, d)[i] + groups[i].offset)
+
+
+def _held(g: Group, force: Any, way: Any, u: Any, dt: Any, state: Any) -> tuple[Any, Any]:
+    """(n, 3) force and state of set-valued points after a step to u (n, 3) in which they slid by a way (n, 2)."""
+    return g.law.slid(force, way, u, dt, state) if isinstance(g.law, Moving) else (force, state + way.T)

@@ -76,6 +76,24 @@ class Moving(Law):
         found = self.law.slowed(met, trial, dt, state.own, yielding)
         return v.at[:, 1:].set(found[:, 1:] + (self.velocity * self.along).T)
 
+    def passed(
+        self, before: Array, u: Array, then: Array, force: Array, dt: Array | float, state: OnGround
+    ) -> tuple[Array, Array, Array, Array, tuple[Array, Array]]:
+        """What set-valued points (n, 3) meet that come from `before` to u in a step and go to `then` in the next: both
+        ways over the ground, how deep they are (n,), the force (n, 3) before as the law has it, and (n, 2) the slopes
+        under them that turn their way, and their force."""
+        time = self._after(state, dt)
+        last = jnp.where(state.time < 0, time, state.time)
+        ways = self._over(before, u, last, time), self._over(u, then, time, time + dt)
+        slope = (self._slope(u, time) * self.along).T
+        slopes = slope, slope if self.pushes else 0 * slope
+        return *ways, u[:, 0] + self._height(u, time), self._unfelt(force, before, last), slopes
+
+    def slid(self, force: Array, way: Array, u: Array, dt: Array | float, state: OnGround) -> tuple[Array, OnGround]:
+        """(n, 3) N on the body by that of a set-valued law, and the state after a way (n, 2) that was slid."""
+        time = self._after(state, dt)
+        return self._felt(force, u, time), OnGround(state.own + way.T, time)
+
     def limit(self, force: Array, state: OnGround) -> Array:
         return self.law.limit(force, state.own)
 
@@ -119,6 +137,12 @@ class Moving(Law):
 
     def _met(self, u: Array, time: Array) -> Array:
         return jnp.concatenate([(u.T[0] + self._height(u, time))[None], u.T[1:] - self.velocity * time * self.along]).T
+
+    def _over(self, start: Array, end: Array, begin: Array, until: Array) -> Array:
+        """(n, 3) way over the ground from start to end; of differences, lest a long way of the ground costs digits."""
+        rise = self._height(end, until) - self._height(start, begin)
+        along = (self.velocity * (until - begin) * self.along).T
+        return end - start + jnp.concatenate([rise[:, None], -along], axis=1)
 
     def _meeting(self, u: Array, v: Array, time: Array) -> Array:
         passing = jnp.sum(self.along * v.T[1:], axis=0) - self.velocity

@@ -11,6 +11,8 @@ A. Curnier, Comput. Methods Appl. Mech. Eng. 92, 1991). Two kinds of bodies give
   w_N is where the point is, w_T how far it came, A = R. An impact needs no law, and energy is kept.
 - Masses (R = 0): the forces of this step move the next one. w is that next motion of a point whose gap is closed, and
   w_N more by e times the last one: restitution (after L. Paoli, M. Schatzman, SIAM J. Numer. Anal. 40, 2002).
+
+On ground that moves, w is the motion over it.
 """
 
 from __future__ import annotations
@@ -56,6 +58,19 @@ def meets(A: Any) -> Meets:
     root = jnp.sqrt(r.reshape(-1))
     largest = jnp.linalg.eigvalsh(root[:, None] * A * root).max(initial=1.0)
     return Meets(A, r, 1 / largest)
+
+
+def over_waves(M: Meets, slope: Any, lean: Any) -> Meets:
+    """Of points over waves, whose way along the normal is w_N + slope . w_T, and whose force pushes by f_N lean; slope
+    and lean (p, 2) are the same where what the ground takes it gives."""
+    own = jnp.broadcast_to(jnp.eye(3), (len(slope), 3, 3))
+    way, force = own.at[:, 0, 1:].set(slope), own.at[:, 0, 1:].set(lean)
+    A = M.A.reshape(len(slope), 3, len(slope), 3)
+
+    def turned(left: Any, right: Any) -> Any:
+        return jnp.einsum("pij,pjqk,qlk->piql", left, A, right).reshape(M.A.shape)
+
+    return meets(turned(way, way))._replace(A=turned(way, force))
 
 
 def within(x: Any, pressed: Any, mu: Any) -> Any:

@@ -6,7 +6,7 @@ not hang on the others. Nothing is kept of a motion but its points after every p
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from typing import Any
 
@@ -17,8 +17,9 @@ import numpy as np
 from ..contact.law import program
 from ..data import Array
 from ..errors import UserError
-from . import loop
+from . import classification, loop
 from .bodies import Bodies, Now, Options
+from .classification import Exponent
 from .contacts import Group
 from .equations import Equations
 from .orbit import REPEATS, comes_back, steps_of_a_sample
@@ -34,7 +35,8 @@ class Reached:
 
     Attributes:
         equations. steps: of a period. q, v: (n, keep, m) modal coordinates and velocities after every period that was
-            kept. closes: (n,) impacts of all contacts in them.
+            kept. closes: (n,) impacts of all contacts in them. exponents: the largest Lyapunov exponent of each, if
+            they were asked for; nan where a motion ceases to be finite.
     """
 
     equations: Equations
@@ -42,6 +44,7 @@ class Reached:
     q: Array
     v: Array
     closes: Array
+    exponents: tuple[Exponent, ...] = ()
 
     def __repr__(self) -> str:
         found = [f"{int((self.attractor == i).sum())} {self._told(i)}" for i in np.unique(self.attractor)]
@@ -57,6 +60,12 @@ class Reached:
         """(n, keep, w) read-outs after every period, in their units; without what bodies yield beside their modes."""
         o = self.equations.oscillators(0.0)
         return self.q @ self.equations.output.T + self.equations.output_given @ o
+
+    @property
+    def y_dot(self) -> Array:
+        """(n, keep, w) velocities of the read-outs then, in their units a second; likewise."""
+        e = self.equations
+        return self.v @ e.output.T + e.output_given @ (e.turning @ e.oscillators(0.0))
 
     @property
     def impacts(self) -> Array:
@@ -95,8 +104,13 @@ class Reached:
         return found
 
 
-def run(e: Equations, x: Array, x_dot: Array, settle: int, keep: int, steps: int | None = None) -> Reached:
+def run(
+    e: Equations, x: Array, x_dot: Array, settle: int, keep: int, steps: int | None = None, exponents: bool = False
+) -> Reached:
     """What starts (n, m0) of the assembly's coordinates lead to; contacts come there on a straight way from u = 0.
+
+    Args:
+        exponents: follow a neighbour of each motion too, see `classification.exponent`.
 
     Raises:
         UserError: starts of other lengths than the assembly has coordinates; see `orbit.run`.
@@ -107,36 +121,85 @@ def run(e: Equations, x: Array, x_dot: Array, settle: int, keep: int, steps: int
             f"starts: displacements {x.shape} and velocities {x_dot.shape} must both be (n, {len(e.shapes)}), a column "
             "for each coordinate of the system"
         )
+    periods = classification.periods_of(settle + keep) if exponents else 0
+    if exponents and not periods:
+        least = classification.ALIGNED + classification.FEWEST
+        raise UserError(f"exponents: take {least} periods at least; settle and keep are {settle + keep} together")
     each = steps_of_a_sample(e, 1, steps)
     stepper = Stepper(e, 2 * np.pi / e.Omega / each, accounts=False)
     to_modes = e.shapes.T @ e.assembly.joined(1).M.real
     shape = (len(x), stepper.bodies.omega2.shape[0], -1)
     y = np.concatenate([(x @ to_modes.T).reshape(shape), (x_dot @ to_modes.T).reshape(shape)], axis=2)
     counts = np.array([settle * each, each]) * 2**stepper.options.halvings
-    ends, closes = _all(stepper.options, keep, stepper.groups, stepper.bodies, y, e.oscillators(0.0), counts)
+    ends, closes, last = _all(stepper.options, keep, stepper.groups, stepper.bodies, y, e.oscillators(0.0), counts)
     q, v = (np.asarray(part).reshape(len(x), keep, -1) for part in np.split(np.asarray(ends), 2, axis=3))
-    return Reached(e, each, q, v, np.asarray(closes))
+    reached = Reached(e, each, q, v, np.asarray(closes))
+    return replace(reached, exponents=_exponents(stepper, last, reached.size, each, periods)) if periods else reached
+
+
+def _exponents(stepper: Stepper, last: Now, size: float, each: int, periods: int) -> tuple[Exponent, ...]:
+    """Of the motions that go on from where they are, `last`, all stacked."""
+    if told := classification.whole(last.held.states):
+        raise UserError(f"exponents: {told}")
+    e, stepper = stepper.equations, replace(stepper, order=2)
+    scale = classification.sizes(e, last.y.shape[1])
+    way = np.random.default_rng(0).standard_normal(scale.shape) / scale
+    apart = classification.APART * size
+    found = _grown(
+        stepper.options, classification.ALIGNED + periods, stepper.groups, stepper.bodies, last, each, scale,
+        apart * way / np.linalg.norm(scale * way),
+    )  # fmt: skip
+    growth = np.asarray(found)[:, classification.ALIGNED :]
+    none = Exponent(float("nan"), float("nan"), 0)
+    return tuple(classification.mean(one, 2 * np.pi / e.Omega) if np.isfinite(one).all() else none for one in growth)
 
 
 @partial(program, static_argnums=(0, 1))
 def _all(
     options: Options, keep: int, groups: tuple[Group, ...], B: Bodies, y: Any, o: Any, counts: Any
-) -> tuple[Any, Any]:
-    """(n, keep, b, 2 p) after every period that is kept, and (n,) impacts in them."""
+) -> tuple[Any, Any, Now]:
+    """(n, keep, b, 2 p) after every period that is kept, (n,) impacts in them, and where the motions are then."""
+    on = partial(_further, options, groups, B)
+
+    def one(start: Any) -> tuple[Any, Any, Now]:
+        now, _ = on(loop.begun(options, groups, B, start, o, None), counts[0])
+
+        def period(now: Now, _: None) -> tuple[Now, tuple[Any, Any]]:
+            now, closes = on(now, counts[1])
+            return now, (now.y, closes)
+
+        now, (ends, closes) = jax.lax.scan(period, now, length=keep)
+        return ends, jnp.sum(closes), now
+
+    return jax.lax.map(one, y)
+
+
+def _further(options: Options, groups: tuple[Group, ...], B: Bodies, now: Now, count: Any) -> tuple[Now, Any]:
+    """So many steps, and the impacts in them; o is there again what it was, so that rounding does not add up."""
 
     def step(carried: tuple) -> tuple:
         left, now, closes = carried
         left, now = loop.one_step(options, groups, B, left, now)
         return left, now, closes + jnp.sum(now.met[0])
 
-    def on(now: Now, count: Any) -> tuple[Now, tuple[Any, Any]]:
-        """Further; o is there again what it was, so that rounding does not add up."""
-        _, after, closes = jax.lax.while_loop(lambda c: c[0] > 0, step, (count, now, jnp.zeros((), int)))
-        return after._replace(o=now.o), (after.y, closes)
+    _, after, closes = jax.lax.while_loop(lambda c: c[0] > 0, step, (count, now, jnp.zeros((), int)))
+    return after._replace(o=now.o), closes
 
-    def one(start: Any) -> tuple[Any, Any]:
-        now, _ = on(loop.begun(options, groups, B, start, o, None), counts[0])
-        _, (ends, closes) = jax.lax.scan(lambda n, _: on(n, counts[1]), now, length=keep)
-        return ends, jnp.sum(closes)
 
-    return jax.lax.map(one, y)
+@partial(program, static_argnums=(0, 1))
+def _grown(
+    options: Options, periods: int, groups: tuple[Group, ...], B: Bodies, last: Now, count: Any, scale: Any, way: Any
+) -> Any:
+    """(n, periods) logarithms by which a separation grows in each, brought back to its size after every one."""
+    apart = jnp.linalg.norm(scale * way)
+
+    def period(carried: tuple[Now, Now], _: None) -> tuple[tuple[Now, Now], Any]:
+        now, other = (_further(options, groups, B, one, count)[0] for one in carried)
+        size = jnp.linalg.norm(scale * (other.y - now.y))
+        other = loop.typed(classification.between(now, other, apart / size, jnp.asarray))
+        return (now, other), jnp.log(size / apart)
+
+    def one(now: Now) -> Any:
+        return jax.lax.scan(period, (now, now._replace(y=now.y + way)), length=periods)[1]
+
+    return jax.lax.map(one, last)

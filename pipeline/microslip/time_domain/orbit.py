@@ -28,7 +28,7 @@ from .classification import Exponent
 from .equations import Equations
 from .ground import steps_of_waves
 from .samples import ROWS, InMemory, Kept
-from .starts import Periodic
+from .starts import Periodic, Released
 from .starts import begun as on_its_way
 from .stepper import KINDS, Stepper, static_force
 
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 Report = Callable[[str], None]
-Start = Literal["static", "rest"]
+Start = Literal["static", "rest"] | Released
 
 OF_CONTACT = 150
 """Steps in a period of the fastest motion with closed contacts, if nothing is asked for."""
@@ -171,6 +171,17 @@ class Orbit:
         """After how many periods of the excitation the motion comes back within `REPEATS`, in the last half of the
         periods that are kept; 0: it does not within half of them."""
         return comes_back(*self.stroboscopic)
+
+    @cached_property
+    def drifts(self) -> float:
+        """Share of its size by which a motion that comes back is elsewhere at the end of the last half of the periods
+        that are kept than at its beginning: it has not come to rest where that is more than `classification.SETTLED`."""
+        after, size = self.stroboscopic
+        last = after[:, after.shape[1] // 2 :]
+        if not self.repeats or not size:
+            return 0.0
+        begin = (last.shape[1] - 1) % self.repeats
+        return float(np.abs(last[:, -1] - last[:, begin]).max(initial=0.0) / size)
 
     @cached_property
     def stroboscopic(self) -> tuple[Array, float]:
@@ -475,10 +486,9 @@ def march(
 def _exponent(stepper: Stepper, now: Now, kept: Kept, samples: int, each: int, done: int) -> Exponent | None:
     """The largest Lyapunov exponent of a motion that has not come back in what was kept; of so many periods at most as
     were done."""
-    periods = min(classification.MOST, done - classification.ALIGNED) // classification.BATCHES
-    periods *= classification.BATCHES
+    periods = classification.periods_of(done)
     after, size = stroboscopic(kept.strips("modal_displacement", "modal_velocity"), stepper.equations.omega2, samples)
-    few = periods < classification.FEWEST or after.shape[1] < classification.FEWEST
+    few = not periods or after.shape[1] < classification.FEWEST
     if few or stepper.equations.ramp or comes_back(after, size):
         return None
     return classification.exponent(stepper, now, samples, each, periods)
@@ -630,6 +640,8 @@ def begun(e: Equations, start: Start) -> tuple[Array, Array]:
     Raises:
         NotConverged: Newton's method finds no rest under the steady loads. UserError: no such start.
     """
+    if isinstance(start, Released):
+        return start.q, start.v
     zero, tight = np.zeros(len(e.omega2)), [c.offset[0] > 0 and not c.preload.any() for c in e.contacts]
     if start == "rest":
         if any(tight) and not e.R.any():

@@ -1,7 +1,9 @@
-"""Where a motion begins: at rest, or on the periodic motion of a harmonic balance with what its contacts remember."""
+"""Where a motion begins: at rest, let go from somewhere, or on the periodic motion of a harmonic balance with what its
+contacts remember."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -9,11 +11,12 @@ import jax
 import numpy as np
 
 from ..data import Array
-from ..errors import NotConverged
+from ..errors import NotConverged, UserError
 from ..harmonic_balance import accuracy
 from ..harmonic_balance.problem import Problem
 from ..harmonic_balance.response import operating
 from ..harmonic_balance.solver import sweep
+from ..settings.mistakes import bounded
 from ..units import counted, percent
 from .contacts import Group, Held, answer, untouched
 from .equations import Equations
@@ -56,6 +59,73 @@ class Periodic:
             f"start: harmonic balance with {few} leaves out about {percent(self.beside)} of the motion, which begins "
             "beside the periodic one by as much; raise harmonics and samples, or settle.",
         )
+
+
+@dataclass(frozen=True, eq=False)
+class Released:
+    """Bodies that are let go at t = 0. q, v: (m,) modal displacements and velocities."""
+
+    q: Array
+    v: Array
+
+
+RELEASED = ("displacement", "velocity", "mode", "amplitude")
+"""Keys of a start from which bodies are let go."""
+
+
+def released(e: Equations, start: Mapping[str, Any], key: str = "start") -> Released:
+    """A start by its keys.
+
+    Args:
+        start: displacement, m, and velocity, m/s, of the assembly's coordinates, each (k,) or coordinate -> value, zero
+            where it is not given; of bodies from modal files the coordinates are those of their modes, one body after
+            the other. Or mode: number from 1 of a mode of the bodies without their contacts, and amplitude of the first
+            read-out in it. key: that the caller gives it by.
+
+    Raises:
+        UserError: other keys, numbers that are not as many as coordinates, a mode that there is not or that moves no
+            read-out.
+    """
+    if unknown := [name for name in start if name not in RELEASED]:
+        raise UserError(f"{key}: '{unknown[0]}' is none of {', '.join(RELEASED)}")
+    by_mode = start.get("mode") is not None
+    if by_mode != (start.get("amplitude") is not None):
+        raise UserError(f"{key}: mode and amplitude come together; give both, or a displacement or a velocity")
+    if by_mode and (start.get("displacement") is not None or start.get("velocity") is not None):
+        raise UserError(f"{key}: give a mode, or a displacement and a velocity, and not both")
+    if by_mode:
+        return _in_mode(e, start["mode"], start["amplitude"], key)
+    to_modes = e.shapes.T @ e.assembly.joined(1).M.real
+    x, v = (_coordinates(start.get(name), len(e.shapes), f"{key}: {name}") for name in RELEASED[:2])
+    return Released(to_modes @ x, to_modes @ v)
+
+
+def _in_mode(e: Equations, mode: Any, amplitude: Any, key: str) -> Released:
+    bounded(f"{key}: mode", mode, ge=1, le=len(e.omega2))
+    bounded(f"{key}: amplitude", amplitude)
+    if mode != int(mode) or not len(e.output):
+        raise UserError(f"{key}: mode: is a whole number, and its amplitude that of a read-out; name one")
+    q = np.eye(len(e.omega2))[int(mode) - 1]
+    seen = float(e.output[0] @ q)
+    if abs(seen) <= 1e-9 * np.abs(e.output[0]).max():
+        raise UserError(f"{key}: mode: the first read-out does not move in mode {mode}; read another place first")
+    return Released(amplitude / seen * q, 0 * q)
+
+
+def _coordinates(given: Any, count: int, key: str) -> Array:
+    """(k,) of values, or by coordinate; zeros where nothing is given."""
+    values = np.zeros(count)
+    if isinstance(given, Mapping):
+        for i in given:
+            bounded(f"{key}: a coordinate", i, ge=-count, le=count - 1)
+        bounded(key, list(given.values()))
+        values[[int(i) for i in given]] = list(given.values())
+    elif given is not None:
+        bounded(key, given)
+        values = np.atleast_1d(np.asarray(given, dtype=float))
+    if values.shape != (count,):
+        raise UserError(f"{key}: has shape {values.shape}; the assembly has {count} coordinates")
+    return values
 
 
 def of_balance(e: Equations, problem: Problem) -> Periodic:

@@ -19,7 +19,6 @@ import numpy as np
 import scipy.linalg
 
 from ..contact.law import program
-from ..contact.set_valued import SetValued
 from ..data import Array
 from ..errors import UserError
 from ..harmonic_balance.forces import repeated
@@ -64,8 +63,6 @@ class Stepper:
             offset = np.array([contacts[i].offset for i in same])
             law = repeated(patch.law, len(patch.points), len(same))
             if (ground := contacts[same[0]].ground) is not None:
-                if isinstance(law, SetValued):
-                    raise UserError(f"{contacts[same[0]].name}: ground: set-valued contacts stand on ground at rest")
                 law = moving(law, ground, np.tile(patch.points, (len(same), 1)))
             G = np.broadcast_to(patch.kinematics, (len(same), *patch.kinematics.shape))
             found.append(Group(law, G, offset))
@@ -185,12 +182,12 @@ class Stepper:
             D = self._points[0][rigid].reshape(-1, len(e.omega2))
             return meets(D @ speeds @ D.T * self.tau)
         names = ", ".join(c.name for c in e.contacts)
-        if not rigid.all() or any(g.law.normal is not None for g in self.groups):
+        if not rigid.all() or any(g.over.normal is not None for g in self.groups):
             raise UserError(
                 f"contacts {names}: on bodies that yield beside their modes, set-valued laws stand alone and press of "
                 'themselves; give all of them law = "set-valued" and no normal stiffness'
             )
-        if any(float(np.max(g.law.restitution)) > 0 for g in self.groups):
+        if any(float(np.max(g.over.restitution)) > 0 for g in self.groups):
             raise UserError(
                 f"contacts {names}: restitution: is for bodies of modes alone; these yield beside them, and what "
                 "comes back is theirs: leave it out"
