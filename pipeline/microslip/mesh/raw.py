@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -92,6 +93,17 @@ class RawMesh:
         before = self.point_sets.get(name, np.zeros(0, dtype=np.int64))
         self.point_sets[name] = np.union1d(before, positions).astype(np.int64)
 
+    def add_set(self, name: str, numbers: Iterable[int] | Indices, numbering: Numbering) -> None:
+        """Add to a point set the nodes of these numbers that are there; a remark names those that are not."""
+        ids = np.unique(np.fromiter(numbers, dtype=np.int64))
+        there = np.isin(ids, numbering.sorted)
+        if not there.all():
+            missing = ids[~there]
+            which = f"node {missing[0]}" if len(missing) == 1 else f"{len(missing)} nodes ({missing[0]}, ...)"
+            self.remarks.append(f"the set '{name}' names {which} that the file does not define: left out of it")
+        if there.any():
+            self.add_points(name, numbering.positions(ids[there], ""))
+
     def add_solids(
         self, solids: Mapping[str, list[tuple[int, int, list[int]]]], numbering: Numbering, what: str
     ) -> None:
@@ -116,6 +128,23 @@ def in_file(path: Path, text: str) -> str:
 def lost(where: str, what: str) -> str:
     """What is said of something that is not read although it counts; `where`: file and line."""
     return f"{where}: {what} is not read: the mass, stiffness or constraint is missing, so frequencies will differ"
+
+
+PRESTRESSED = (
+    "the frequencies of the deck are those under the load of its static step; that load is not taken, and stress can "
+    "change a frequency by a factor"
+)
+"""What is said of a deck whose modes are those of a loaded body."""
+
+
+def ignored(words: Iterable[str], loads: str) -> list[str]:
+    """What is said of keywords that are not used; loads: a pattern of those that load the body."""
+    every = list(dict.fromkeys(words))
+    pressing = [word for word in every if re.fullmatch(loads, word)]
+    others = [word for word in every if word not in pressing]
+    said = [(pressing, "loads, which change no frequency of an unstressed body")]
+    said += [(others, "what they do to the frequencies is not known here")]
+    return [f"read and not used: {', '.join(named)}: {effect}" for named, effect in said if named]
 
 
 def joined(parts: Iterable[Indices]) -> Indices:
@@ -156,6 +185,10 @@ class Numbering:
         twice = np.flatnonzero(np.diff(self.sorted) == 0)
         if len(twice):
             raise Damaged(f"node {self.sorted[twice[0]]} is defined twice")
+
+    def between(self, first: int, last: int) -> Indices:
+        """The numbers from first to last that nodes have, ascending."""
+        return self.sorted[np.searchsorted(self.sorted, first) : np.searchsorted(self.sorted, last, "right")]
 
     def positions(self, ids: Indices, what: str) -> Indices:
         """Positions of node numbers, any shape.
