@@ -723,7 +723,7 @@ def _say_seal(file: Path, quiet: bool) -> None:
 
 
 @app.command(name="import")
-def import_(file: Path, /, *more: Path, unit: str = "mm", apart: Apart = False) -> None:
+def import_(file: Path, /, *more: Path, unit: str | None = None, apart: Apart = False) -> None:
     """Make a body.toml around a CAD file, a mesh or matrices, or a modal file from measured modes.
 
     Several CAD files, or several meshes, of parts that touch become an assembly: a body.toml each, with the faces where
@@ -734,7 +734,7 @@ def import_(file: Path, /, *more: Path, unit: str = "mm", apart: Apart = False) 
             (.mtx, .mat, .h5, .op4, .pch, .sti), or modes of a test (.uff, .unv with data set 55).
         more: the other parts of an assembly, and the folder of the new files, last; one of their names if not given.
             A part may be a folder with a body.toml that is there already.
-        unit: of lengths, where the file does not tell.
+        unit: of lengths; if not given what the file tells (/UNITS of Ansys, data set 164), else mm.
     """
     from .stages.decks import import_deck
     from .stages.parts import import_apart, import_parts

@@ -17,7 +17,7 @@ from .importing import Imported, body_name, import_file, refuse_taken
 from .parts import Part, Patch, Shape, add_lines, case_lines, drive
 
 
-def import_deck(file: Path, folder: Path | None, unit: str) -> Imported:
+def import_deck(file: Path, folder: Path | None, unit: str | None) -> Imported:
     """Import a file; a deck whose instances make several bodies in contact becomes an assembly.
 
     Raises:

@@ -18,7 +18,7 @@ from ..basis import write_basis
 from ..data import Mesh
 from ..errors import UserError
 from ..files.store import ordinary, write_text
-from ..mesh import UNITS, mesh_problems, read_mesh
+from ..mesh import UNITS, mesh_problems, read_mesh, suffix_of, unit_of
 from ..mesh.chosen import of_instances
 from ..mesh.raw import Unread, in_file
 from ..units import SYSTEMS, usual_system
@@ -44,27 +44,29 @@ class Imported:
     told: tuple[str, ...]
 
 
-def import_file(file: Path, folder: Path | None, unit: str, instances: Sequence[str] = ()) -> Imported:
+def import_file(
+    file: Path, folder: Path | None, unit: str | None = None, instances: Sequence[str] = ()
+) -> Imported:
     """Write a body.toml around a CAD file, a mesh or matrices; nothing is copied, the file is named where it lies.
 
     Args:
         file: a CAD file, a mesh with or without materials, or the stiffness matrix of a pair. folder: of the new
-            body.toml, and the body's name; by default one of the file's name here. unit: of its lengths.
+            body.toml, and the body's name; by default one of the file's name here. unit: of its lengths; None: that
+        which the file tells, else mm.
         instances: those of a deck that are the body, all if none.
 
     Raises:
         UserError: unreadable, or there is a body.toml already.
     """
-    if unit not in UNITS:
-        raise UserError(f"--unit {unit}: unknown unit of length; choose one of {', '.join(UNITS)}")
     if not ordinary(file).is_file():
         raise UserError(f"{file}: there is no such file; correct the path")
+    unit = length_unit(unit, file)
     name = body_name((folder.resolve().name if folder else "") or file.stem)
     if file.suffix.lower() in _UNIVERSAL and _holds_modes(file):
         return _measured(file, (folder or Path(name)) / "basis.h5", unit, name)
     target = (folder or Path(name)) / "body.toml"
     refuse_taken(target)
-    kind = file.suffix.lower()
+    kind = suffix_of(file)
     made = _matrices if kind in MATRICES else _cad if kind in CAD else partial(_mesh, instances=instances)
     if made is _matrices and _in_metres(file):
         unit = "m"
@@ -74,6 +76,17 @@ def import_file(file: Path, folder: Path | None, unit: str, instances: Sequence[
     missing = "interfaces" if "[[supports]]" in lines else "supports, interfaces"
     last = f"{target}: ready. Add {missing} and loads, then: microslip run {shlex.quote(str(target.parent))}"
     return Imported(target, (*told, last))
+
+
+def length_unit(unit: str | None, file: Path) -> str:
+    """The unit of lengths that was asked for, else that which the file tells, else mm.
+
+    Raises:
+        UserError: an unknown one.
+    """
+    if unit is not None and unit not in UNITS:
+        raise UserError(f"--unit {unit}: unknown unit of length; choose one of {', '.join(UNITS)}")
+    return unit or unit_of(file) or "mm"
 
 
 def refuse_taken(*new: Path) -> None:
