@@ -69,6 +69,8 @@ def _read_initial(deck: Deck, parameters: dict[str, str], lines: list[str]) -> N
         _read_temperature(deck, parameters, lines, column=0)
     elif parameters.get("TYPE", "").upper() in ("STRESS", "PLASTIC STRAIN"):
         deck.lost.append(lost(deck.where, f"*INITIAL CONDITIONS, TYPE={parameters['TYPE'].upper()}"))
+    else:
+        deck.ignored.append(f"INITIAL CONDITIONS, TYPE={parameters.get('TYPE', '').upper()}")
 
 
 def assign_temperatures(deck: Deck, raw: RawMesh, numbering: Numbering) -> None:
@@ -91,7 +93,7 @@ def constraints(deck: Deck) -> Constraints:
         key, found = deck.key(deck.node_sets, word), deck.nodes(word)
         if found is None:
             raise Damaged(f"{where}: *BOUNDARY names the node set '{word}', which is not defined")
-        if not known.issuperset(found.tolist()):
+        if key is None and not known.issuperset(found.tolist()):
             raise Damaged(f"{where}: *BOUNDARY names the node {word}, which is not defined")
         if key is not None:
             held.hold(deck.written[key], directions)

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..data import Array, Indices, Joint, Link
+from ..data import Array, Indices, Joint, Link, Sector
 
 NODES = {
     "vertex": 1, "line": 2, "line3": 3, "triangle": 3, "triangle6": 6, "quad": 4, "quad8": 8, "quad9": 9, "tetra": 4,
@@ -66,7 +66,7 @@ class RawMesh:
         unended: what the file lacks at its end, in words: it may be cut there. Nothing if it tells that it is whole.
         lost: what carries mass, stiffness or a constraint and is not read, in words.
         remarks: what was read as something else or not used, in words. instances: name -> positions. joints: pairs of
-            faces in contact. preloads: of bolts: where it stands, force in the file's unit.
+            faces in contact. sector: of a cyclic ring. preloads: of bolts: where it stands, force in the file's unit.
     """
 
     points: Array
@@ -86,6 +86,7 @@ class RawMesh:
     remarks: list[str] = field(default_factory=list)
     instances: dict[str, Indices] = field(default_factory=dict)
     joints: list[Joint] = field(default_factory=list)
+    sector: Sector | None = None
     preloads: list[tuple[str, float]] = field(default_factory=list)
 
     def add_points(self, name: str, positions: Indices) -> None:

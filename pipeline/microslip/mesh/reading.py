@@ -312,7 +312,7 @@ def _assemble_mesh(raw: RawMesh, points: Array, cells: dict[str, Indices], metre
     return replace(
         mesh, faces=faces, inner=inner, supports=supports, not_held=tuple(raw.not_held), unended=raw.unended,
         links=links, lost=tuple(raw.lost), remarks=tuple(raw.remarks), joints=tuple(raw.joints),
-        preloads=tuple(raw.preloads),
+        sector=raw.sector, preloads=tuple(raw.preloads),
         instances={n: kept for n, s in raw.instances.items() if len(kept := _kept(renumber[s]))},
     )  # fmt: skip
 

@@ -195,6 +195,11 @@ def load_mesh(job: Job, path: Path | None = None) -> tuple[Mesh, list[str]]:
         errors.append("the mesh of a cyclic sector falls into parts that share no points; join them")
     if errors:
         raise UserError("\n".join(f"{path}: {e}" for e in errors))
+    if mesh.sector is not None and job.settings.cyclic is None:
+        warnings.append(
+            f"{mesh.sector.where}: the body is one of {mesh.sector.sectors} cyclic sectors; without [cyclic] its cut "
+            "faces are free and every frequency is another one"
+        )
     size = float(np.ptp(mesh.points, axis=0).max())
     warnings = [in_file(path, w) for w in (*warnings, *told)]
     warnings += [f"{job.path}: {w}" for w in implausible(job.settings, size)]
