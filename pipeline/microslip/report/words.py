@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from ..data import Array, ContactState, Interface, ModalGroup, SpeedRange
+from ..reduced.coordinates import certified_modes
 from ..reduced.truncation import percent
 from ..settings.body import GROUND
 from ..units import to_rpm
@@ -39,12 +40,41 @@ def certificate(group: ModalGroup) -> str:
     """What the inertia count proves, in one sentence."""
     if not group.checks.get("certified"):
         return "Nothing proves that no mode is missing: the spectrum was not certified (modes.certify)."
+    own = certified_modes(group)
+    if own == 0 and "upper_shift_hz" in group.checks:
+        count, limit = int(group.checks["count_below_upper_shift"]), group.checks["upper_shift_hz"]
+        return (
+            f"The inertia count proves that the body has {count} modes below {limit:.6g} Hz; these frequencies are "
+            "those of the reduced body, at or above them."
+        )
+    if own < len(group.omega) and "upper_shift_hz" in group.checks:
+        count, limit = int(group.checks["count_below_upper_shift"]), group.checks["upper_shift_hz"]
+        more = f", of which {own} are kept" if count > own else ""
+        return (
+            f"The inertia count proves that the body has {count} modes below {limit:.6g} Hz{more}; the "
+            f"{len(group.omega) - own} shapes behind them are static answers and no modes of the body."
+        )
     if "upper_shift_hz" not in group.checks:
         return f"These are all {group.n_modes} modes of the system."
     count = int(group.checks.get("count_below_upper_shift", group.n_modes))
     kept = f"; the first {group.n_modes} are kept" if count > group.n_modes else ""
     limit = group.checks["upper_shift_hz"]
     return f"The inertia count proves that these are all {count} modes below {limit:.6g} Hz{kept}."
+
+
+def proof(group: ModalGroup) -> str:
+    """How many modes a group has and how far they are certified, for the terminal."""
+    count, own = len(group.omega), certified_modes(group)
+    if not group.checks.get("certified"):
+        return f"{count} modes, NOT certified"
+    if own == count or "upper_shift_hz" not in group.checks:
+        return f"{count} modes, certified complete"
+    if own:
+        return f"{own} modes, certified complete, and {count - own} static shapes"
+    below, limit = group.checks["count_below_upper_shift"], group.checks["upper_shift_hz"]
+    return (
+        f"{count} modes of the reduced body; of the body itself {below:.0f} are certified below {limit:.6g} Hz"
+    )
 
 
 def range_sentence(harmonic: int, r: SpeedRange) -> str:
