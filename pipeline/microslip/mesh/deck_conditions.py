@@ -36,11 +36,11 @@ def _zeros(words: list[str]) -> str:
     """Directions of a data line: set, first, last direction, value.
 
     Raises:
-        ValueError: not such a line, or a displacement that is prescribed.
+        ValueError: not such a line, a last direction below the first, or a displacement that is prescribed.
     """
     first = int(words[1])
     last = int(words[2]) if words[2] else first
-    if first < 1 or (first <= 3 and words[3] and float(words[3]) != 0):
+    if first < 1 or last < first or (first <= 3 and words[3] and float(words[3]) != 0):
         raise ValueError
     return "xyzabc"[first - 1 : last]
 

@@ -22,7 +22,7 @@ from .deck_conditions import assign_temperatures, constraints
 from .deck_cyclic import KEYWORDS as CYCLIC
 from .deck_cyclic import sector_of
 from .deck_joints import KEYWORDS as JOINTS
-from .deck_joints import joints_of, preloads_of, unpressed, unused_loads
+from .deck_joints import joints_of, preloads_of, unpressed, unread, unused_loads
 from .deck_links import KEYWORDS as LINKS
 from .deck_links import links_of
 from .deck_materials import assign_materials
@@ -212,6 +212,7 @@ def _assembled(deck: Deck) -> RawMesh:
     raw.links, left_out = links_of(deck, numbering, points)
     raw.sector, uncut = sector_of(deck)
     raw.lost = [*deck.lost, *left_out, *uncut, *unpressed(deck)]
+    raw.remarks += unread(deck)
     raw.joints, raw.preloads = joints_of(deck), preloads_of(deck)
     raw.instances = {name: numbering.positions(np.unique(ids), "") for name, ids in deck.instances.items()}
     add_supports(raw, constraints(deck), numbering)
