@@ -139,7 +139,8 @@ def test_a_cyclic_deck_brings_its_sector(tmp_path, monkeypatch, capsys, pair, ax
     found = keys(tmp_path)
     assert found["cyclic"]["sectors"] == 12 and found["cyclic"]["nodal_diameters"] == [0, 1, 2, 3]
     # right is ahead of left about the axis, and y1 behind y0 about +x
-    assert found["cyclic"]["right"] == ("SLO" if axis > 0 else "SHI") and found["rotation"]["axis"] == [np.sign(axis), 0, 0]
+    assert found["cyclic"]["right"] == ("SLO" if axis > 0 else "SHI")
+    assert found["rotation"]["axis"] == [np.sign(axis), 0, 0]
     np.testing.assert_allclose(hertz(tmp_path, sector=2)[:3], [140782, 401182, 888852], rtol=3e-6)
     if axis > 0:
         path = tmp_path / "body" / "body.toml"
@@ -210,8 +211,9 @@ def test_touching_parts_of_a_deck_become_bodies_in_contact(tmp_path, monkeypatch
     assert "is one part: there is nothing to set apart" in capsys.readouterr().err
 
 
-SURFACES = ["*SURFACE, NAME=SMALL, TYPE=NODE", "a_z1", "*SURFACE, NAME=LARGE, TYPE=NODE", "b_z0",
-            "*SURFACE, NAME=SIDE, TYPE=NODE", "b_z1", "*SURFACE INTERACTION, NAME=DRY", "*FRICTION", "0.15"]  # fmt: skip
+FACES = {"SMALL": "a_z1", "LARGE": "b_z0", "SIDE": "b_z1"}
+SURFACES = [line for n, s in FACES.items() for line in (f"*SURFACE, NAME={n}, TYPE=NODE", s)]
+SURFACES += ["*SURFACE INTERACTION, NAME=DRY", "*FRICTION", "0.15"]
 
 
 def plate_and_block(cells=(1, 1)) -> Mesh:

@@ -62,19 +62,27 @@ def certificate(group: ModalGroup) -> str:
     return f"The inertia count proves that these are all {count} modes below {limit:.6g} Hz{kept}."
 
 
+def counted_modes(group: ModalGroup) -> str:
+    """How many modes a group has, and what else its frequencies belong to: static shapes, the reduced body."""
+    count, own = len(group.omega), certified_modes(group)
+    if own == count:
+        return f"{count} modes"
+    return f"{own} modes and {count - own} static shapes" if own else f"{count} modes of the reduced body"
+
+
 def proof(group: ModalGroup) -> str:
     """How many modes a group has and how far they are certified, for the terminal."""
-    count, own = len(group.omega), certified_modes(group)
+    modes = counted_modes(group)
     if not group.checks.get("certified"):
-        return f"{count} modes, NOT certified"
-    if own == count or "upper_shift_hz" not in group.checks:
-        return f"{count} modes, certified complete"
-    if own:
-        return f"{own} modes, certified complete, and {count - own} static shapes"
+        return f"{modes}, NOT certified"
+    if certified_modes(group) == len(group.omega):
+        return f"{modes}, certified complete"
+    if certified_modes(group):
+        return f"{modes}, the modes certified complete"
+    if "upper_shift_hz" not in group.checks:
+        return modes
     below, limit = group.checks["count_below_upper_shift"], group.checks["upper_shift_hz"]
-    return (
-        f"{count} modes of the reduced body; of the body itself {below:.0f} are certified below {limit:.6g} Hz"
-    )
+    return f"{modes}; of the body itself {below:.0f} are certified below {limit:.6g} Hz"
 
 
 def range_sentence(harmonic: int, r: SpeedRange) -> str:

@@ -7,9 +7,9 @@ import numpy as np
 from ..data import Array, GyroscopicModes, ModalBasis, ModalGroup, SpeedRange
 from ..linalg.gyroscopic import stability_sentence
 from ..reduced.compliance import sentence
-from ..reduced.coordinates import own_kind
+from ..reduced.coordinates import certified_modes, own_kind
 from ..reduced.quality import sentences
-from ..report.words import contact_sentence, proof
+from ..report.words import contact_sentence, counted_modes, proof
 from ..ring.expansion import certificate_words, certify_ring
 from ..ring.resonances import (
     eigenmodes,
@@ -45,7 +45,7 @@ def basis_summary(basis: ModalBasis) -> list[str]:
         return lines + _ring_summary(basis) + ranges
     for (_, harmonic), g in sorted(basis.groups.items()):
         state = f"{to_rpm(g.speed):g} rpm" + (f", {g.prestress} prestress" if g.prestress != "none" else "")
-        modes = f"{len(g.omega)} modes"
+        modes = counted_modes(g)
         known = f"{modes}, {between}" if (between := between_stations([g])) else proof(g)
         if basis.source == "measured":
             known = f"{modes}, measured: others may have been missed"
@@ -155,6 +155,8 @@ def _ring_summary(basis: ModalBasis) -> list[str]:
         state = f"{to_rpm(first.speed):g} rpm" + (f", {first.prestress} prestress" * (first.prestress != "none"))
         known = between_stations([basis.groups[speed, k] for k in harmonics_of(basis)])
         lines.append(f"{state}: {known or certificate_words(certify_ring(basis, speed))}")
+        if not certified_modes(first):
+            lines.append("  the frequencies below are those of the reduced sector, at or above the certified ones")
         lines += contact_lines(first)
         lines += [f"  {text}" for text in sentences(first, basis.reduction)]
         for g in groups:
