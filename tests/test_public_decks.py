@@ -72,16 +72,33 @@ MODES = ["*STEP{}", "*FREQUENCY", "6", "*END STEP"]
 def test_frequencies_of_a_loaded_body_are_warned_of(tmp_path, monkeypatch, capsys, steps, loaded):
     text = deck(block(), *HELD, *steps, sets=("x0", "x1"))
     said = imported(tmp_path, monkeypatch, capsys, "a.inp", text)
-    warned = "*FREQUENCY: the frequencies of the deck are those under the load of its static step" in said
-    assert warned == loaded and "*CLOAD: loads, which change no frequency of an unstressed body" in said
-    assert not loaded or any("*FREQUENCY" in text for text in read_mesh(tmp_path / "a.inp", "mm").lost)
+    warned = (
+        "*FREQUENCY: the frequencies of the deck are those under the load of its static step"
+        in said
+    )
+    assert (
+        warned == loaded
+        and "*CLOAD: loads, which change no frequency of an unstressed body" in said
+    )
+    assert not loaded or any(
+        "*FREQUENCY" in text for text in read_mesh(tmp_path / "a.inp", "mm").lost
+    )
 
 
 HOT = [*STEEL[:2], "205000., 0.29, 20.", "150000., 0.29, 420.", *STEEL[3:], "*EXPANSION", "{}"]
-WARM = ["*INITIAL CONDITIONS, TYPE=TEMPERATURE", "NALL, {}", "*STEP", "*TEMPERATURE", "NALL, {}", "*END STEP"]
+WARM = [
+    "*INITIAL CONDITIONS, TYPE=TEMPERATURE",
+    "NALL, {}",
+    "*STEP",
+    "*TEMPERATURE",
+    "NALL, {}",
+    "*END STEP",
+]
 
 
-def test_a_modulus_over_temperature_is_used_at_the_temperatures_of_the_deck(tmp_path, monkeypatch, capsys):
+def test_a_modulus_over_temperature_is_used_at_the_temperatures_of_the_deck(
+    tmp_path, monkeypatch, capsys
+):
     """1603.21 and 2438.96 Hz by CalculiX; the factor is sqrt(177.5/205)."""
     hot = [line.format("0.") for line in HOT]
     text = deck(block(), *HELD, *WARM[:1], "NALL, 220.", material=hot)
@@ -94,11 +111,16 @@ def test_a_modulus_over_temperature_is_used_at_the_temperatures_of_the_deck(tmp_
     ("keywords", "words"),
     [
         ([line.format(220) for line in WARM], "temperatures of the file are in force"),
-        ([line.format(20 + 200 * (i > 2)) for i, line in enumerate(WARM)], "they strain the body as well"),
+        (
+            [line.format(20 + 200 * (i > 2)) for i, line in enumerate(WARM)],
+            "they strain the body as well",
+        ),
         ([], "the file says none: that of its first row is taken"),
     ],
 )
-def test_temperatures_that_strain_the_body_are_left_to_its_owner(tmp_path, monkeypatch, capsys, keywords, words):
+def test_temperatures_that_strain_the_body_are_left_to_its_owner(
+    tmp_path, monkeypatch, capsys, keywords, words
+):
     text = deck(block(), *HELD, *keywords, material=[line.format("1.2e-5") for line in HOT])
     said = imported(tmp_path, monkeypatch, capsys, "a.inp", text)
     assert words in said and "the modulus of ST depends on temperature" in said
@@ -147,7 +169,9 @@ def test_a_cyclic_deck_brings_its_sector(tmp_path, monkeypatch, capsys, pair, ax
         path.write_text(path.read_text().split("[rotation]")[0] + "[modes]\ncount = 8\n")
         capsys.readouterr()
         assert main(["modes", "body"]) == 0
-        assert "one of 12 cyclic sectors; without [cyclic] its cut faces are free" in "".join(capsys.readouterr())
+        assert "one of 12 cyclic sectors; without [cyclic] its cut faces are free" in "".join(
+            capsys.readouterr()
+        )
 
 
 def test_columns_of_nodal_diameters_stay_apart(tmp_path, monkeypatch, capsys):
@@ -165,7 +189,9 @@ def test_no_more_modes_are_asked_for_than_a_small_body_has(tmp_path, monkeypatch
         held = ["SPC1,7,123,1,3,5,7"] if count == 10 else []
         mesh = meshes.brick("hexahedron", (1, 1, 1), (20, 12, 9))
         more = "\n".join(["MAT1,1,205000.,,.29,7.83-9", "PSOLID,1,1", *held, "ENDDATA"])
-        text = bulk(mesh).replace("CEND", "CEND\nSPC = 7" if held else "CEND").replace("ENDDATA", more)
+        text = (
+            bulk(mesh).replace("CEND", "CEND\nSPC = 7" if held else "CEND").replace("ENDDATA", more)
+        )
         monkeypatch.chdir(tmp_path)
         (tmp_path / f"a{number}.bdf").write_text(text)
         assert main(["import", f"a{number}.bdf"]) == 0
@@ -186,12 +212,16 @@ def test_bodies_that_touch_stay_apart(tmp_path, monkeypatch, capsys):
     text = deck(two(), "*BOUNDARY", "a_x0, 1, 3", "b_x1, 1, 3", sets=("a_x0", "b_x1"))
     said = imported(tmp_path, monkeypatch, capsys, "a.inp", text)
     assert "8 pairs of points" in said and "neither welded nor in contact" in said
-    np.testing.assert_allclose(hertz(tmp_path)[:6], np.repeat([4294.67, 5245.33, 19523.2], 2), rtol=3e-6)
+    np.testing.assert_allclose(
+        hertz(tmp_path)[:6], np.repeat([4294.67, 5245.33, 19523.2], 2), rtol=3e-6
+    )
     mesh = block("hexahedron", (1, 1, 2))
     torn = mesh.cells["hexahedron"].copy()
     torn[1, 0] = mesh.n_points
     points = np.vstack([mesh.points, mesh.points[mesh.cells["hexahedron"][1, 0]]])
-    errors, _ = mesh_problems(Mesh(points, {"hexahedron": torn}, node_id=np.arange(1, len(points) + 1)))
+    errors, _ = mesh_problems(
+        Mesh(points, {"hexahedron": torn}, node_id=np.arange(1, len(points) + 1))
+    )
     assert "merge duplicate nodes" in errors[0]
 
 
@@ -241,7 +271,20 @@ def test_a_contact_pair_is_the_same_in_either_order(tmp_path, monkeypatch, capsy
         (tmp_path / f"{name}.inp").write_text(paired(plate_and_block(cells), pair))
         assert main(["import", f"{name}.inp"]) == 0
         said.append(capsys.readouterr().out)
-        assert main(["modes", f"{name}/part-2", "-q", "--set", "modes.solver=superlu", "--set", "modes.count=4"]) == 0
+        assert (
+            main(
+                [
+                    "modes",
+                    f"{name}/part-2",
+                    "-q",
+                    "--set",
+                    "modes.solver=superlu",
+                    "--set",
+                    "modes.count=4",
+                ]
+            )
+            == 0
+        )
         faces = read_basis(tmp_path / "build" / "part-2" / "basis.h5").groups[0, 0].interfaces
         areas += [(key, face.areas.sum()) for key, face in faces.items()]
         case = tomllib.loads((tmp_path / name / "case.toml").read_text())
@@ -263,8 +306,16 @@ def test_no_contact_pair_vanishes(tmp_path, monkeypatch, capsys):
     assert "'SIDE' on 'LARGE': both lie on one body" in capsys.readouterr().out
 
 
-BOLT = ["*NODE, NSET=P", "9000, 0., 0., 0.", "*PRE-TENSION SECTION, SURFACE=SIDE, NODE=P",
-        "*STEP", "*STATIC", "*CLOAD", "P, 1, -800.", "*END STEP"]  # fmt: skip
+BOLT = [
+    "*NODE, NSET=P",
+    "9000, 0., 0., 0.",
+    "*PRE-TENSION SECTION, SURFACE=SIDE, NODE=P",
+    "*STEP",
+    "*STATIC",
+    "*CLOAD",
+    "P, 1, -800.",
+    "*END STEP",
+]
 
 
 def test_numbers_of_a_deck_that_hold_or_press_nothing_are_told(tmp_path, monkeypatch, capsys):
@@ -273,29 +324,48 @@ def test_numbers_of_a_deck_that_hold_or_press_nothing_are_told(tmp_path, monkeyp
     text = pair.replace("b_x0, 1, 3", "b_x0, 3, 1") + "\n".join(BOLT) + "\n"
     said = imported(tmp_path, monkeypatch, capsys, "a.inp", text)
     assert "not taken as a support: the line 'b_x0, 3, 1' of *BOUNDARY" in said
-    assert "the preload -800 N presses nothing together: not used" in said and "preload -800 N\n" not in said
-    assert tomllib.loads((tmp_path / "body" / "case.toml").read_text())["sweep"]["normal_forces"] == [1000.0]
+    assert (
+        "the preload -800 N presses nothing together: not used" in said
+        and "preload -800 N\n" not in said
+    )
+    assert tomllib.loads((tmp_path / "body" / "case.toml").read_text())["sweep"][
+        "normal_forces"
+    ] == [1000.0]
     (tmp_path / "b.inp").write_text(pair.replace("\n0.15\n", "\n-0.15\n"))
     assert main(["import", "b.inp"]) == 2
-    assert "*FRICTION has the coefficient -0.15" in capsys.readouterr().err and not (tmp_path / "b").exists()
+    assert (
+        "*FRICTION has the coefficient -0.15" in capsys.readouterr().err
+        and not (tmp_path / "b").exists()
+    )
     more = "*FRICTION, EXPONENTIAL DECAY\n0.15\n*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=LINEAR\n1e6"
     (tmp_path / "c.inp").write_text(pair.replace("*FRICTION\n0.15", more))
     assert main(["import", "c.inp"]) == 0
     said = capsys.readouterr().out
-    assert "of *FRICTION only the first coefficient" in said and "*SURFACE BEHAVIOR is not read" in said
+    assert (
+        "of *FRICTION only the first coefficient" in said
+        and "*SURFACE BEHAVIOR is not read" in said
+    )
 
 
 def test_left_handed_tetrahedra_and_wedges_are_turned(tmp_path):
     """Mirrored numbering, mid-side nodes with it: the same body, and a remark."""
-    flips = {"tetra": [0, 2, 1, 3], "tetra10": [0, 2, 1, 3, 6, 5, 4, 7, 9, 8],
-             "wedge": [3, 4, 5, 0, 1, 2], "wedge15": [3, 4, 5, 0, 1, 2, 9, 10, 11, 6, 7, 8, 12, 13, 14]}  # fmt: skip
+    flips = {
+        "tetra": [0, 2, 1, 3],
+        "tetra10": [0, 2, 1, 3, 6, 5, 4, 7, 9, 8],
+        "wedge": [3, 4, 5, 0, 1, 2],
+        "wedge15": [3, 4, 5, 0, 1, 2, 9, 10, 11, 6, 7, 8, 12, 13, 14],
+    }
     for kind, order in flips.items():
         mesh = meshes.brick(kind, (1, 1, 2), (0.02, 0.01, 0.03), to=meshes.shaken(0.0007))
         cells = mesh.cells[kind].copy()
         cells[::2] = cells[::2][:, order]
         for name, text in (("a.bdf", bulk), ("a.cdb", lambda m: archive(m, scale=1.0))):
-            (tmp_path / name).write_text(text(Mesh(mesh.points, {kind: cells}, node_id=mesh.node_id)))
+            (tmp_path / name).write_text(
+                text(Mesh(mesh.points, {kind: cells}, node_id=mesh.node_id))
+            )
             read = read_mesh(tmp_path / name, "m")
             assert not mesh_problems(read)[0], (kind, name)
-            assert any(f"{len(cells[::2])} left-handed cells {kind}" in text for text in read.remarks)
+            assert any(
+                f"{len(cells[::2])} left-handed cells {kind}" in text for text in read.remarks
+            )
             assert sorted(read.cells[kind][0]) == sorted(mesh.cells[kind][0])

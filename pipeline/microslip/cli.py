@@ -916,6 +916,8 @@ def _tell_mesh(file: Path, unit: str) -> None:
     print(f"faces: {_words(grid.faces)}\npoint sets: {_words(grid.point_sets)}")
     if grid.supports:
         print(f"supports: {_words(f'{name} in {directions}' for name, directions in grid.supports.items())}")
+    for text in grid.remarks:
+        print(f"note: {text}")
     errors, warnings = mesh_problems(grid)
     _warn(warnings)
     if errors:

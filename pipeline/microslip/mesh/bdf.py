@@ -35,12 +35,12 @@ _READ = {
     "GRID", "PSOLID", "MAT1", "PARAM", "SET1", "SPC", "SPC1", "SPCADD", "RBE2", "RBE3", "MPC", "MPCADD", *_SOLIDS,
     *_SHELLS, *_MATERIALS, *_PROPERTIES,
 }  # fmt: skip
-_SILENT = re.compile(r"EIG\w*|CORD\w+|ENDDATA|LOAD|DLOAD|TABL\w*|FREQ\d?|TSTEP|NLPARM|DTI|SET3|MDLPRM")
+_SILENT = re.compile(r"EIG\w*|CORD\w+|MATT\d+|ENDDATA|LOAD|DLOAD|TABL\w*|FREQ\d?|TSTEP|NLPARM|DTI|SET3|MDLPRM")
 """Cards that say nothing of the body, or only together with others that are named."""
 _LOADS = r"FORCE\d?|MOMENT\d?|PLOAD\w*|GRAV|RFORCE\d?|ACCEL\d?|TEMP\w*|SLOAD|DAREA|DEFORM"
 _COUNTS = re.compile(
     r"C(?!ORD|END)[A-Z]+\d?|R(?!FORCE|LOAD|AND|ING)[A-Z]+\d?|SUPORT1?|GENEL|DMIG|NSM[A-Z]*\d?|GRDSET|"
-    r"MATT\d+|MFLUID|BCTSET|BGSET|BCTABL[E1]|BCBODY1?|PSHELL|PCOMPG?|BCONTACT|BOLT|SPCOFF1?|SPCR|SPLINE\d|ASET1?|AEQUAD4"
+    r"MFLUID|BCTSET|BGSET|BCTABL[E1]|BCBODY1?|PSHELL|PCOMPG?|BCONTACT|BOLT|SPCOFF1?|SPCR|SPLINE\d|ASET1?|AEQUAD4"
 )
 """Cards that add mass, stiffness or constraints; those beside `_READ` are not read."""
 
@@ -86,6 +86,13 @@ def read_bdf(path: Path) -> RawMesh:
         lost(f"{path.name}, line {c[0].line}", f"{name} ({len(c)} card{'s' * (len(c) > 1)})")
         for name, c in others.items()
         if _COUNTS.fullmatch(name)
+    ]
+    raw.lost += [
+        f"{path.name}, {c.where}: a material over temperature, of which MAT1 alone is read: "
+        "frequencies will differ by a factor"
+        for name in others
+        if name.startswith("MATT")
+        for c in others[name]
     ]
     raw.lost += _prestressed(path.name, text)
     unused = (n for n in others if not (_COUNTS.fullmatch(n) or _SILENT.fullmatch(n)))

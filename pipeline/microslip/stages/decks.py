@@ -77,7 +77,9 @@ def import_apart(file: Path, folder: Path | None, unit: str | None) -> Imported:
     _, found = meeting(meshes, UNITS[unit])
     patches = [replace(with_names(parts, patch, found), alone=False) for patch in found]
     if not patches:
-        raise UserError(f"{file}: its {len(groups)} parts touch nowhere, so there is no contact; leave --apart out")
+        raise UserError(
+            f"{file}: its {len(groups)} parts touch nowhere, so there is no contact; leave --apart out"
+        )
     said = [sentence(parts, patch, unit) for patch in patches]
     return _assembly(file, folder, unit, groups, meshes, patches, said)
 
@@ -89,9 +91,15 @@ def _parts(file: Path, folder: Path | None, groups: list[list[str]]) -> list[Par
 
 
 def _assembly(
-    file: Path, folder: Path | None, unit: str, groups: list[list[str]], meshes: list[Mesh], patches: list[Patch],
-    said: Sequence[str], force: str = "1000.0]       # N",
-) -> Imported:  # fmt: skip
+    file: Path,
+    folder: Path | None,
+    unit: str,
+    groups: list[list[str]],
+    meshes: list[Mesh],
+    patches: list[Patch],
+    said: Sequence[str],
+    force: str = "1000.0]       # N",
+) -> Imported:
     """Write the bodies and the case of a file's parts. force: end of the line of normal forces of the case."""
     home, parts = folder or Path(body_name(file.stem)), _parts(file, folder, groups)
     refuse_taken(home / "case.toml", *(part.body for part in parts))
@@ -101,7 +109,9 @@ def _assembly(
         add_lines(part, joint_lines(parts, number, patches, unit))
     flat = [patch for patch in patches if patch.normal is not None]
     if not flat:
-        return Imported(home, (*told, *said, "warning: none of the contacts is flat, so no case is written"))
+        return Imported(
+            home, (*told, *said, "warning: none of the contacts is flat, so no case is written")
+        )
     shapes = [shape_of(mesh, UNITS[unit]) for mesh in meshes]
     driven = flat[0].parts[0]
     rows = drive(parts[driven], _free(meshes[driven], UNITS[unit]), flat[0])
@@ -127,7 +137,9 @@ def _touches(file: Path) -> bool:
 Ends = tuple[int, int]
 
 
-def _between_bodies(mesh: Mesh, groups: list[list[str]]) -> tuple[list[tuple[Joint, Ends]], list[str]]:
+def _between_bodies(
+    mesh: Mesh, groups: list[list[str]]
+) -> tuple[list[tuple[Joint, Ends]], list[str]]:
     """Pairs whose faces are of two bodies, each once, with these; and what is said of the others."""
     joints, told, seen = [], [], dict[frozenset[str], str]()
     instances = with_parts(mesh).instances
@@ -137,7 +149,9 @@ def _between_bodies(mesh: Mesh, groups: list[list[str]]) -> tuple[list[tuple[Joi
         key = frozenset((joint.slave, joint.master))
         if None in ends:
             at = (joint.slave, joint.master)[ends.index(None)]
-            told.append(f"{pair}: '{at}' is no face of the surface of one body; no contact is written")
+            told.append(
+                f"{pair}: '{at}' is no face of the surface of one body; no contact is written"
+            )
         elif ends[0] == ends[1]:
             told.append(f"{pair}: both lie on one body, where no contact is read: they move freely")
         elif key in seen:
@@ -148,16 +162,22 @@ def _between_bodies(mesh: Mesh, groups: list[list[str]]) -> tuple[list[tuple[Joi
     return joints, told
 
 
-def _body(mesh: Mesh, instances: Mapping[str, Indices], groups: list[list[str]], face: str) -> int | None:
+def _body(
+    mesh: Mesh, instances: Mapping[str, Indices], groups: list[list[str]], face: str
+) -> int | None:
     """The number of the body that has a face; None where it is none of the surface, or of several bodies."""
     if face not in mesh.faces:
         return None
     points = mesh.face_points(face)
-    inside = (np.isin(points, np.concatenate([instances[n] for n in group])).all() for group in groups)
+    inside = (
+        np.isin(points, np.concatenate([instances[n] for n in group])).all() for group in groups
+    )
     return next((number for number, whole in enumerate(inside) if whole), None)
 
 
-def _patches(joints: list[tuple[Joint, Ends]], meshes: list[Mesh], metres: float) -> Iterator[Patch]:
+def _patches(
+    joints: list[tuple[Joint, Ends]], meshes: list[Mesh], metres: float
+) -> Iterator[Patch]:
     """The contacts, both faces cut to what touches (whole where they lie apart): the same in either order."""
     taken: set[str] = set()
     for joint, ends in joints:
@@ -165,7 +185,10 @@ def _patches(joints: list[tuple[Joint, Ends]], meshes: list[Mesh], metres: float
         whole = [body.faces[name] for body, name in zip(bodies_, names, strict=True)]
         cut = [touching_facets(bodies_[i], bodies_[1 - i], whole[i], whole[1 - i]) for i in (0, 1)]
         apart = not all(cut)
-        found = [touch_of(body, w if apart else c) for body, w, c in zip(bodies_, whole, cut, strict=True)]
+        found = [
+            touch_of(body, w if apart else c)
+            for body, w, c in zip(bodies_, whole, cut, strict=True)
+        ]
         faces, sets = [], []
         for i in (0, 1):
             all_of_it = apart or sum(map(len, cut[i].values())) == sum(map(len, whole[i].values()))
@@ -180,7 +203,9 @@ def _patches(joints: list[tuple[Joint, Ends]], meshes: list[Mesh], metres: float
         area = min(t.area for t in found) / metres**2
         normal = None if any(t.normal is None for t in found) else found[0].normal
         friction = 0.2 if joint.friction is None else joint.friction
-        yield Patch(ends, area, normal, boxes, (faces[0], faces[1]), False, friction, (sets[0], sets[1]))
+        yield Patch(
+            ends, area, normal, boxes, (faces[0], faces[1]), False, friction, (sets[0], sets[1])
+        )
 
 
 def _sentence(groups: list[list[str]], patch: Patch, joint: Joint, unit: str) -> str:
@@ -188,7 +213,11 @@ def _sentence(groups: list[list[str]], patch: Patch, joint: Joint, unit: str) ->
     one, other = (f"{body}:{face}" for body, face in zip(bodies_, patch.faces, strict=True))
     mu = "friction 0.2 is a guess" if joint.friction is None else f"friction {joint.friction:g}"
     kind = "" if patch.normal is not None else "; curved, written as comments"
-    cut = [name for name, whole in zip((joint.slave, joint.master), patch.sets, strict=True) if not whole]
+    cut = [
+        name
+        for name, whole in zip((joint.slave, joint.master), patch.sets, strict=True)
+        if not whole
+    ]
     less = f"; of {' and '.join(map(repr, cut))} what touches" if cut else ""
     return f"{joint.where}: {one} against {other}, {patch.area:.4g} {unit}2, {mu}{less}{kind}"
 
@@ -205,4 +234,7 @@ def _pressed(mesh: Mesh) -> tuple[str, list[str]]:
     if not pressing:
         return "1000.0]       # N", said
     total = sum(force for _, force in pressing)
-    return f"{total:.6g}]       # N in each contact, of all bolts: write normal_force into one that has fewer", said
+    return (
+        f"{total:.6g}]       # N in each contact, of all bolts: write normal_force into one that has fewer",
+        said,
+    )
