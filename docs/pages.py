@@ -178,7 +178,8 @@ MEANING: dict[str, tuple[str, str]] = {
     "geometry.faces.cut": ("", "CAD: whether the box cuts: its part of the surface becomes a face of its own"),
     "geometry.faces.touching": (
         "",
-        "another file of the same kind in the same coordinates; where the two surfaces meet; with box: inside it",
+        "another file of the same kind in the same coordinates, or the body's own deck (what of it is not this body); "
+        "where the two surfaces meet; with box: inside it",
     ),
     "geometry.faces.surfaces": ("", "numbers from the table of `microslip info FILE`"),
     "mesh.size": ("*", "size of the elements; chosen from the body where it is not given"),

@@ -164,12 +164,12 @@ def test_materials_of_tables_and_minor_ratios(tmp_path):
         (("ET,1,185", "ET,3,185"), "element 1 is of type 1, which no ET command defines"),
         (("N,R5.3,LOC,       -1,\n", ""), "NBLOCK"),
         ((f"{-1:10d}\nCMBLOCK", "CMBLOCK"), "EBLOCK"),
+        (("EBLOCK,19,SOLID", "EBLOCK,19,COMPACT"), "COMPACT form"),
         ((f"{-1:10d}\nCMBLOCK", "      \nCMBLOCK"), "EBLOCK"),
         (("         2,         2\n(19i10)", "         3,         3\n(19i10)"), "announces 3 elements and holds 2"),
         ((" 210000.0", ""), "no elastic constants"),
         (("DENS", "KXX"), "no density"),
         (("CMBLOCK,Z0", "CMBLOCK,OTHER"), "Z0"),
-        (("         4         4\n", "         4       999\n"), "which the file does not define"),
     ],
 )
 def test_damaged_archives_are_refused_in_a_sentence(tmp_path, capsys, change, text):
@@ -243,8 +243,9 @@ def test_one_command_holds_several_directions_and_nodes(tmp_path):
 
 @pytest.mark.parametrize("more", ["E,9\nE,10", "EN,98,9\nEN,99,10", "EBLOCK,10,,,2\n(15i9)\n{0}\n{0}\n       -1"])
 def test_elements_outside_the_block_of_solids_are_told(tmp_path, more):
-    """Point masses by commands or in a short block, of the type before them; surface loads there say nothing."""
-    line = "".join(f"{w:9d}" for w in (98, 1, 1, 1, 0, 9))
+    """Point masses by commands of the type before them, or in a short block, of the second number of a line; surface
+    loads there say nothing."""
+    line = "".join(f"{w:9d}" for w in (98, 3, 1, 1, 0, 9))
     more = f"TYPE,3\n{more.format(line)}\nTYPE,2\nE,1,2,3,4\nEMODIF,2,MAT,3\n"
     text = archive(BAR).replace("ET,2,154", "ET,2,154\nET,3,MASS21").replace("FINISH", f"{more}FINISH")
     read = read_mesh(written(tmp_path, text), "mm")
@@ -287,3 +288,63 @@ def test_elements_with_mass_that_are_not_read_are_told(tmp_path):
     assert [text.split(" is not read")[0].partition(", ")[2] for text in read.lost] == [
         f"line {len(lines)}: CEINTF", "element 98: the Ansys type 21 (1 element)",
     ]  # fmt: skip
+
+
+def test_the_block_of_types_stands_for_et(tmp_path):
+    """ETBLOCK: number, element and 18 KEYOPTs; the integration that is not Ansys's is told."""
+    block = f"ETBLOCK,1,1\n(2i9,19a9)\n{1:9d}{186:9d}" + f"{0:9d}" * 18 + f"\n{-1:9d}"
+    whole = archive(meshes.brick("hexahedron20", (1, 1, 1)), ("z0",))
+    text = whole.replace("ET,1,186", block)
+    read = read_mesh(written(tmp_path, text), "mm")
+    assert read.n_cells == 1 and "1 elements SOLID186" in read.remarks[0]
+    options = f"{1:9d}{186:9d}{0:9d}{1:9d}"
+    full = text.replace(f"{1:9d}{186:9d}{0:9d}{0:9d}", options)
+    assert full != text and not read_mesh(written(tmp_path, full), "mm").remarks
+
+
+WORKBENCH = """/units,MKS
+et,2,154
+CMBLOCK,ROOT_2,NODE,1
+(8i10)
+         5
+cmsel,s,Z0
+d,all,all
+nsel,all
+d,all,ux,0
+d,12,ux,%_loadx%
+D,5,UZ,0,,900,2
+acel,0,0,9.81
+pstres,on
+FINISH"""
+
+
+def test_what_workbench_writes_is_read_or_named(tmp_path, monkeypatch, capsys):
+    """Lengths in m by /UNITS, a selected component that is held, a displacement from a table, a range over gaps."""
+    monkeypatch.chdir(tmp_path)
+    text = archive(BAR, ("z0",), scale=1.0).replace("\nFINISH", f"\n{WORKBENCH}").replace("2.1e5", "2.1e11")
+    (tmp_path / "ds.dat").write_text(text.replace("210000.0", "2.1e11").replace("7.85e-9", "7850"))
+    assert main(["import", "ds.dat", "part"]) == 0
+    said = capsys.readouterr().out
+    assert 'length_unit = "m"' in (tmp_path / "part" / "body.toml").read_text()
+    for words in ("supports of the file: Z0 in xyz, held z in z", "material 1: 7850 kg/m3 in the units m-kg-s",
+                  "D,12,ux takes its displacement from the table %_loadx%", "D,all,ux names no node",
+                  "ACEL: loads", "PSTRES: the frequencies of the deck are those under the load"):  # fmt: skip
+        assert words in said, words
+    assert main(["import", "ds.dat", "other", "--unit", "mm"]) == 0
+    assert "tells its lengths in m, here they are taken in mm" in capsys.readouterr().out
+
+
+def test_an_archive_without_materials_is_steel_with_a_warning(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    written(tmp_path, archive(BAR, material=()))
+    assert main(["import", "part.cdb", "there"]) == 0
+    assert "warning: no material was taken from the file" in capsys.readouterr().out
+    assert "young = 2.1e11" in (tmp_path / "there" / "body.toml").read_text()
+
+
+def test_a_component_with_nodes_that_are_not_there_is_a_remark(tmp_path):
+    """A range over a gap and a leftover number: the rest of the component stays."""
+    text = archive(BAR).replace("FINISH", "CMBLOCK,LEFT,NODE,3\n(8i10)\n         2       -40       999\nFINISH")
+    read = read_mesh(written(tmp_path, text), "mm")
+    assert read.node_id[read.point_sets["LEFT"]].tolist() == list(range(2, BAR.n_points + 1))
+    assert "the set 'LEFT' names" in read.remarks[0]

@@ -163,6 +163,45 @@ def test_universal_files_that_are_wrong(tmp_path: Path, old: str, new: str, word
         read_mesh(tmp_path / "a.unv", "m")
 
 
+SOLVED = """    -1
+   164
+         5   mm (milli-newton)         2
+  1.0D+03  1.0D+03  1.0D+00
+  2.73D+02
+    -1
+{mesh}    -1
+    55
+temperature
+NONE
+NONE
+NONE
+NONE
+         1         0         1         5         2         1
+         1         1         0
+  0.0
+         1
+  2.0E+01
+    -1
+    -1
+  2414
+         1
+    -1
+"""
+
+
+def test_results_beside_a_mesh_are_left_aside(tmp_path, monkeypatch, capsys):
+    """Fields of a solver (data sets 55 without modes and 2414) and the file's own unit of length."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "a.unv").write_text(SOLVED.format(mesh=unv(tetrahedra())))
+    assert main(["import", "a.unv", "part"]) == 0
+    said = capsys.readouterr().out
+    assert "data sets left aside: 55 (results at nodes), 2414 (results at nodes)" in said
+    assert 'length_unit = "mm"' in (tmp_path / "part" / "body.toml").read_text()
+    (tmp_path / "a.unv").write_text(SOLVED.format(mesh=unv(tetrahedra())).replace("1.0D+03", "1.0D+00", 1))
+    assert main(["import", "a.unv", "other"]) == 0
+    assert 'length_unit = "m"' in (tmp_path / "other" / "body.toml").read_text()
+
+
 def test_local_systems_of_a_universal_file_are_refused(tmp_path: Path) -> None:
     (tmp_path / "a.unv").write_text(SYSTEM.format("         0") + unv(tetrahedra()))
     assert read_mesh(tmp_path / "a.unv", "m").n_cells == 12

@@ -723,7 +723,7 @@ def _say_seal(file: Path, quiet: bool) -> None:
 
 
 @app.command(name="import")
-def import_(file: Path, /, *more: Path, unit: str = "mm", apart: Apart = False) -> None:
+def import_(file: Path, /, *more: Path, unit: str | None = None, apart: Apart = False) -> None:
     """Make a body.toml around a CAD file, a mesh or matrices, or a modal file from measured modes.
 
     Several CAD files, or several meshes, of parts that touch become an assembly: a body.toml each, with the faces where
@@ -734,17 +734,17 @@ def import_(file: Path, /, *more: Path, unit: str = "mm", apart: Apart = False) 
             (.mtx, .mat, .h5, .op4, .pch, .sti), or modes of a test (.uff, .unv with data set 55).
         more: the other parts of an assembly, and the folder of the new files, last; one of their names if not given.
             A part may be a folder with a body.toml that is there already.
-        unit: of lengths, where the file does not tell.
+        unit: of lengths; if not given what the file tells (/UNITS of Ansys, data set 164), else mm.
     """
-    from .stages.decks import import_deck
-    from .stages.parts import import_apart, import_parts
+    from .stages.decks import import_apart, import_deck
+    from .stages.parts import import_parts
 
     parts = [file, *(p for p in more if p.is_file() or (p / "body.toml").is_file() or p is not more[-1])]
     folder = more[-1] if len(parts) <= len(more) else None
     if apart and len(parts) > 1:
         raise UserError(f"import --apart: sets the solids of one file apart, and {len(parts)} parts are given")
     made = (
-        import_apart(file, folder)
+        import_apart(file, folder, unit)
         if apart
         else (import_deck(file, folder, unit) if len(parts) == 1 else import_parts(parts, folder, unit))
     )
@@ -916,6 +916,8 @@ def _tell_mesh(file: Path, unit: str) -> None:
     print(f"faces: {_words(grid.faces)}\npoint sets: {_words(grid.point_sets)}")
     if grid.supports:
         print(f"supports: {_words(f'{name} in {directions}' for name, directions in grid.supports.items())}")
+    for text in grid.remarks:
+        print(f"note: {text}")
     errors, warnings = mesh_problems(grid)
     _warn(warnings)
     if errors:

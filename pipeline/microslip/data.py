@@ -192,6 +192,23 @@ class Joint:
     friction: float | None = None
 
 
+@dataclass(frozen=True)
+class Sector:
+    """Cyclic symmetry as a file has it. `where`: its place there.
+
+    Attributes:
+        sectors: of the ring. faces: the two cut ones. axis: (3,) of the ring, of any length; point: (3,) on it, in the
+            file's unit. diameters: nodal diameters that are asked for, or nothing.
+    """
+
+    where: str
+    sectors: int
+    faces: tuple[str, str]
+    axis: tuple[float, ...]
+    point: tuple[float, ...]
+    diameters: tuple[int, ...] = ()
+
+
 @dataclass(frozen=True, eq=False)
 class Mesh:
     """A volume mesh with named faces.
@@ -212,7 +229,8 @@ class Mesh:
             that are not among them, in words. unended: what the file lacks at its end, in words, or nothing.
         lost: what carries mass, stiffness or a constraint in the file and is not read, in words.
         remarks: what of the file is read as something else or not used, in words. instances: name -> points.
-        joints: faces that the file lets touch. preloads: of its bolts: where it stands, force in the file's unit.
+        joints: faces that the file lets touch. sector: of a cyclic ring, if the file is one. preloads: of its bolts:
+            where it stands, force in the file's unit.
         links: constraints of the file, and ties: the equations that `fem.links.linked` makes of them, or None.
     """
 
@@ -233,6 +251,7 @@ class Mesh:
     remarks: tuple[str, ...] = ()
     instances: Mapping[str, Indices] = field(default_factory=dict)
     joints: tuple[Joint, ...] = ()
+    sector: Sector | None = None
     preloads: tuple[tuple[str, float], ...] = ()
     links: Links | None = None
     ties: Ties | None = None

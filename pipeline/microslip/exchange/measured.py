@@ -21,6 +21,7 @@ from ..errors import UserError
 from ..files.store import ordinary
 from ..linalg.canonical import signs
 from ..mesh import UNITS
+from ..mesh.unv import has_solids
 from ..reduced.correlation import DIRECTIONS, POINT
 from .functions import fit_messages, fits
 
@@ -45,17 +46,24 @@ class _Mode:
 
 
 def holds_modes(path: Path | str) -> bool:
-    """Whether a text file has modes or measured functions in the way of Universal Files."""
-    before = b""
+    """Whether a text file has modes or measured functions in the way of Universal Files.
+
+    Beside the solid cells of a mesh only modes count: what else stands there are a solver's results.
+    """
+    before, modes, others, since = b"", False, False, 0
     try:
         with open(path, "rb") as file:
             for line in file:
-                if before.strip() == b"-1" and line[:80].split()[:1] in ([b"55"], [b"58"], [b"58b"], [b"2414"]):
-                    return True
+                words = line[:80].split()
+                since += 1
+                if before.strip() == b"-1" and words[:1] in ([b"55"], [b"58"], [b"58b"], [b"2414"]):
+                    others, since = True, 0 if words[0] == b"55" else 9
+                elif since == 6 and others:  # record 6 of a data set 55: model, analysis, ...
+                    modes = modes or words[1:2] in [[str(kind).encode()] for kind in _KINDS]
                 before = line[:80]
     except OSError:
         return False
-    return False
+    return modes or (others and not has_solids(Path(path)))
 
 
 def read_measured(path: Path | str, unit: str = "m", name: str = "") -> tuple[ModalBasis, tuple[str, ...]]:

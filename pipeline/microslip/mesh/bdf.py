@@ -16,7 +16,7 @@ import numpy as np
 from ..data import AverageLink, Equation, Indices, Link, RigidLink
 from ..elasticity import turned_strain
 from .materials import isotropic_rows
-from .raw import Damaged, DeckMaterial, Numbering, RawMesh, lost
+from .raw import PRESTRESSED, Damaged, DeckMaterial, Numbering, RawMesh, ignored, lost
 from .supports import Constraints, add_supports
 
 _BRICK20, _WEDGE15 = (*range(12), *range(16, 20), *range(12, 16)), (*range(9), *range(12, 15), *range(9, 12))
@@ -29,14 +29,18 @@ _SOLIDS: dict[str, dict[int, tuple[str, Sequence[int]]]] = {
 }
 _SOLIDS["CPYRA"] = _SOLIDS["CPYRAM"]
 _SHELLS = {"CTRIA3": 3, "CTRIAR": 3, "CTRIA6": 3, "CQUAD4": 4, "CQUADR": 4, "CQUAD8": 4}
-_MATERIALS = {"MAT2", "MAT3", "MAT8", "MAT9", "MAT10", "MAT11"}
+_MATERIALS = ("MAT2", "MAT3", "MAT8", "MAT9", "MAT10", "MAT11")
+_PROPERTIES = ("PCOMPS", "PLSOLID", "PCOMPLS", "PSOLID")
 _READ = {
     "GRID", "PSOLID", "MAT1", "PARAM", "SET1", "SPC", "SPC1", "SPCADD", "RBE2", "RBE3", "MPC", "MPCADD", *_SOLIDS,
-    *_SHELLS, *_MATERIALS,
+    *_SHELLS, *_MATERIALS, *_PROPERTIES,
 }  # fmt: skip
+_SILENT = re.compile(r"EIG\w*|CORD\w+|MATT\d+|ENDDATA|LOAD|DLOAD|TABL\w*|FREQ\d?|TSTEP|NLPARM|DTI|SET3|MDLPRM")
+"""Cards that say nothing of the body, or only together with others that are named."""
+_LOADS = r"FORCE\d?|MOMENT\d?|PLOAD\w*|GRAV|RFORCE\d?|ACCEL\d?|TEMP\w*|SLOAD|DAREA|DEFORM"
 _COUNTS = re.compile(
     r"C(?!ORD|END)[A-Z]+\d?|R(?!FORCE|LOAD|AND|ING)[A-Z]+\d?|SUPORT1?|GENEL|DMIG|NSM[A-Z]*\d?|GRDSET|"
-    r"MATT\d+|MFLUID|BCTSET|BGSET|BCTABL[E1]|BCBODY1?|PSHELL|PCOMPG?|BCONTACT|BOLT|SPCOFF1?|SPCR|SPLINE\d|ASET1?|AEQUAD4"
+    r"MFLUID|BCTSET|BGSET|BCTABL[E1]|BCBODY1?|PSHELL|PCOMPG?|BCONTACT|BOLT|SPCOFF1?|SPCR|SPLINE\d|ASET1?|AEQUAD4"
 )
 """Cards that add mass, stiffness or constraints; those beside `_READ` are not read."""
 
@@ -68,26 +72,47 @@ def read_bdf(path: Path) -> RawMesh:
     raw = _grid(cards)
     numbering = Numbering(raw.node_id)
     properties = _elements(cards, raw, numbering)
-    raw.materials = [_material(cards, p) for p in properties] if cards.get("PSOLID") else []
+    named = any(cards.get(name) for name in (*_PROPERTIES, "MAT1", *_MATERIALS))
+    raw.materials = [_material(cards, p) for p in properties] if named else []
     if not raw.materials:
         raw.regions = []
     _shells(cards, raw, numbering)
     for name, label, first in (("SET1", "SET", 2), ("SPC1", "SPC", 3)):
         for card in cards.get(name, []):
-            members = np.array(_listed(card, first), dtype=np.int64)
-            raw.add_points(f"{label} {card[1]}", numbering.positions(members, f"{name} {card[1]} names"))
-    held = _constraints(cards, text)
+            raw.add_set(f"{label} {card[1]}", _listed(card, first, numbering), numbering)
+    held = _constraints(cards, text, numbering)
+    others = {name: c for name, c in cards.items() if name not in _READ}
     raw.lost = [
         lost(f"{path.name}, line {c[0].line}", f"{name} ({len(c)} card{'s' * (len(c) > 1)})")
-        for name, c in cards.items()
-        if name not in _READ and _COUNTS.fullmatch(name)
+        for name, c in others.items()
+        if _COUNTS.fullmatch(name)
     ]
+    raw.lost += [
+        f"{path.name}, {c.where}: a material over temperature, of which MAT1 alone is read: "
+        "frequencies will differ by a factor"
+        for name in others
+        if name.startswith("MATT")
+        for c in others[name]
+    ]
+    raw.lost += _prestressed(path.name, text)
+    unused = (n for n in others if not (_COUNTS.fullmatch(n) or _SILENT.fullmatch(n)))
+    raw.remarks += ignored(unused, _LOADS)
     raw.links = [*_rigid(cards, path.name, numbering, held), *_averages(cards, path.name, numbering, held)]
     raw.links += _equations(cards, path.name, text, numbering, held, raw.lost)
     add_supports(raw, held, numbering)
     if not re.search(r"^\s*ENDDATA\b", text, re.IGNORECASE | re.MULTILINE):
         raw.unended = "no ENDDATA"  # a warning: decks are also kept as parts that others include
     return raw
+
+
+def _prestressed(name: str, text: str) -> list[str]:
+    """What is said of a case control whose modes are those under the load of another subcase."""
+    for number, line in enumerate(text.upper().splitlines(), 1):
+        if re.match(r"\s*BEGIN\s+BULK", line):
+            break
+        if re.match(r"\s*STATSUB\b", line):
+            return [f"{name}, line {number}: STATSUB: {PRESTRESSED}"]
+    return []
 
 
 # cards ---------------------------------------------------------------------------------------------------------------
@@ -106,7 +131,7 @@ def _cards(text: str) -> Iterator[_Card]:
             break
         if re.match(r"\s*INCLUDE\b", line):
             raise Damaged("it includes another file; write the bulk data in one")
-        words = _fields(line)
+        words = _fields(line, number)
         if words[0] == "" or words[0][0] in "+*":
             if card:
                 card += words[1:]
@@ -119,12 +144,26 @@ def _cards(text: str) -> Iterator[_Card]:
         yield card
 
 
-def _fields(line: str) -> list[str]:
-    """Name and eight (or four wide) fields of a line."""
+def _fields(line: str, number: int) -> list[str]:
+    """Name and eight (or four wide) fields of a line; all that stand in a free one.
+
+    Raises:
+        Damaged: a free line whose tenth field may be data or the mark of a continuation.
+    """
     if "," in line:
-        words = [word.strip() for word in line.split(",")]
+        words = [word.strip() for word in line.rstrip(", \t").split(",")]
         count = 4 if words[0].endswith("*") or words[0].startswith("*") else 8
-        return (words + [""] * count)[: count + 1]
+        data, more = words[: count + 1], words[count + 1 :]
+        if more and more[0][:1] in ("+", "*"):  # the mark of a continuation
+            more = more[1:]
+        elif len(more) == 1 and not more[0][:1].isdecimal():  # such a mark in letters
+            more = []
+        elif more and (len(more) == 1 or not more[0]):
+            raise Damaged(
+                f"line {number} has '{more[0]}' in its field {count + 2}, which is that of the continuation; write "
+                f"what follows field {count + 1} in a line of its own"
+            )
+        return [*data, *[""] * (count + 1 - len(data)), *more]
     width, count = (16, 4) if "*" in line[:8] else (8, 8)
     return [line[:8].strip(), *(line[8 + i * width : 8 + (i + 1) * width].strip() for i in range(count))]
 
@@ -153,15 +192,24 @@ def _real(card: list[str], place: int) -> float | None:
         raise Damaged(f"{card[0]} {_at(card, 1)} holds '{text[:20]}' where a number belongs") from None
 
 
-def _listed(card: list[str], first: int) -> list[int]:
-    """Numbers from a place on; A THRU B is a range."""
+def _listed(card: list[str], first: int, numbering: Numbering | None = None) -> list[int]:
+    """Numbers from a place on; A THRU B (BY C) is a range, of the grid points that are there."""
     words = [w for w in card[first:] if w]
     members: list[int] = []
-    for i, word in enumerate(words):
-        if word == "THRU":
-            if not members or i + 1 >= len(words) or not words[i + 1].isdecimal() or len(words[i + 1]) > 9:
-                raise Damaged(f"{card[0]} {_at(card, 1)} holds THRU without its ends")
-            members += range(members[-1] + 1, min(int(words[i + 1]), members[-1] + 10**8))
+    while words:
+        word, *words = words
+        if word == "THRU" and members and words and words[0].isdecimal() and len(words[0]) < 10:
+            start, end, step = members[-1], int(words[0]), 1
+            words = words[1:]
+            if words[:1] == ["BY"] and words[1:2] and words[1].isdecimal():
+                step, words = max(int(words[1]), 1), words[2:]
+            if numbering is None:
+                members += range(start + step, min(end, start + 10**8) + 1, step)
+                continue
+            there = numbering.between(start, end)
+            members = [*members[:-1], *there[(there - start) % step == 0].tolist()]
+        elif word == "THRU":
+            raise Damaged(f"{card[0]} {_at(card, 1)} holds THRU without its ends")
         elif word.isdecimal() and len(word) < 13:
             members.append(int(word))
         else:
@@ -211,7 +259,11 @@ def _cell(name: str, number: int, card: list[str]) -> tuple[str, list[int]]:
 
 def _material(cards: Cards, property_: int) -> DeckMaterial:
     """What a property's cells are made of."""
-    solid = next((c for c in cards["PSOLID"] if _whole(c, 1) == property_), None)
+    layered = [c[0] for name in _PROPERTIES[:-1] for c in cards.get(name, []) if _whole(c, 1) == property_]
+    if layered:
+        refused = "a property that is not read; write it as PSOLID with a MAT1, or give [material] in a body.toml"
+        return DeckMaterial(f"{layered[0]} {property_}", None, None, np.zeros(6), None, "", refused)
+    solid = next((c for c in cards.get("PSOLID", []) if _whole(c, 1) == property_), None)
     if solid is None:
         return DeckMaterial("", None, None, np.zeros(6), None, f"of property {property_}, which no PSOLID defines")
     number, where = _whole(solid, 2), f"PSOLID {property_}"
@@ -243,7 +295,7 @@ def _density(cards: Cards, card: list[str]) -> float | None:
     return density if density is None or factor is None else density * factor
 
 
-def _constraints(cards: Cards, text: str) -> Constraints:
+def _constraints(cards: Cards, text: str, numbering: Numbering) -> Constraints:
     """Zero displacements: GRID's own, and those of the sets that the case control chooses, or the only one."""
     held = Constraints(turned={_whole(c, 1) for c in cards["GRID"] if _whole(c, 6, 0) != 0})
     for card in cards["GRID"]:
@@ -251,7 +303,7 @@ def _constraints(cards: Cards, text: str) -> Constraints:
     chosen = _chosen(cards, text, held)
     for card in cards.get("SPC1", []):
         if _whole(card, 1) in chosen:
-            for node in _listed(card, 3):
+            for node in _listed(card, 3, numbering):
                 held.hold(node, _directions(_at(card, 2)))
     for card in cards.get("SPC", []):
         for place in (2, 5) if _whole(card, 1) in chosen else ():
@@ -308,7 +360,8 @@ def _rigid(cards: Cards, name: str, numbering: Numbering, held: Constraints) -> 
     """RBE2: points that follow one as a rigid body does, in some of its directions."""
     for card in cards.get("RBE2", []):
         where = f"{name}, {card.where}"
-        members = [int(word) for word in card[4:] if word.isdecimal()] if "THRU" not in card else _listed(card, 4)
+        listed = [word for word in card[4:] if word.isdecimal()] if "THRU" not in card else card[4:]
+        members = _listed([*card[:4], *listed], 4, numbering)
         if not members:
             raise Damaged(f"{where} couples no nodes to its node {_at(card, 2)}; add them")
         reference = numbering.positions(np.array([_whole(card, 2)]), f"{where} names")

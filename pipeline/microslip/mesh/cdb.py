@@ -1,8 +1,9 @@
-"""Reader of Ansys archives (CDWRITE, blocked): nodes, solid elements, degenerate ones too, components, materials.
+"""Reader of Ansys archives (CDWRITE, blocked) and of Workbench's input files: nodes, solid elements, degenerate ones
+too, components, materials.
 
-Written against the description of the coded database file in the Ansys Programmer's Reference (NBLOCK, EBLOCK, CMBLOCK,
-MPDATA) and the node orders of SOLID185, 186, 187 and 285 in the Element Reference. A brick whose corners coincide is a
-wedge (K = L, O = P), a pyramid (M = N = O = P) or a tetrahedron (both).
+Written against the description of the coded database file in the Ansys Programmer's Reference (NBLOCK, EBLOCK, ETBLOCK,
+CMBLOCK, MPDATA) and the node orders of SOLID185, 186, 187 and 285 in the Element Reference. A brick whose corners
+coincide is a wedge (K = L, O = P), a pyramid (M = N = O = P) or a tetrahedron (both).
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ import numpy as np
 from ..data import Array, Equation, Link, RigidLink
 from ..elasticity import turned_strain
 from .materials import isotropic_rows, orthotropic_row
-from .raw import Damaged, DeckMaterial, Numbering, RawMesh, is_number, lost, real
+from .raw import PRESTRESSED, Damaged, DeckMaterial, Numbering, RawMesh, ignored, is_number, lost, real
 from .supports import Constraints, add_supports
 
 _SOLIDS = {185: 8, 45: 8, 186: 20, 95: 20, 187: 10, 92: 10, 285: 4}
@@ -42,6 +43,7 @@ _FORMS: dict[int, dict[str, Sequence[int]]] = {
 class _Archive:
     """What the commands have said. elements: (number, material, type, system, nodes). places: of equations, by name.
     kind: of the elements that follow (TYPE). outside: kind -> where, and how many elements, beside EBLOCK,,SOLID.
+    full: types with KEYOPT(2) = 1. selected: the component that CMSEL chose last. parameters: whole numbers of *SET.
     """
 
     node_id: list[int] = field(default_factory=list)
@@ -63,6 +65,10 @@ class _Archive:
     places: dict[str, str] = field(default_factory=dict)
     kind: int = 1
     outside: dict[int, tuple[str, int]] = field(default_factory=dict)
+    full: set[int] = field(default_factory=set)
+    selected: str = ""
+    parameters: dict[str, int] = field(default_factory=dict)
+    unused: list[str] = field(default_factory=list)
     lost: list[str] = field(default_factory=list)
 
 
@@ -78,7 +84,7 @@ def read_cdb(path: Path) -> RawMesh:
         words = [word.strip() for word in lines[at].split("!")[0].split(",")]
         command = words[0].upper()
         archive.where = f"{path.name}, line {at + 1}"
-        if command in ("NBLOCK", "EBLOCK", "CMBLOCK"):
+        if command in _BLOCKS:
             at = _BLOCKS[command](archive, words, lines, at + 1)
             continue
         try:
@@ -88,10 +94,13 @@ def read_cdb(path: Path) -> RawMesh:
             raise Damaged(f"{archive.where}: {error}") from None
         if command in _NOT_READ:
             archive.lost.append(lost(archive.where, command))
+        elif re.fullmatch(_LOADS, command):
+            archive.unused.append(command)
         at += 1
     raw = _assembled(archive)
     raw.lost = [*archive.lost, *_other_elements(archive, path.name)]
-    if not any(line.strip().upper() == "FINISH" for line in lines[-20:]):
+    raw.remarks += [*_integration(archive), *ignored(archive.unused, _LOADS)]
+    if not any(line.strip().upper().startswith("FINI") for line in lines[-20:]):
         raw.unended = "no FINISH"  # a warning: archives that were shortened by hand have none
     return raw
 
@@ -105,7 +114,7 @@ def _widths(lines: list[str], at: int, what: str) -> list[tuple[int, int, str]]:
     if not line.startswith("("):
         raise Damaged(f"{what} has no line with its format")
     fields, place = [], 0
-    for count, kind, width in re.findall(r"(\d*)([ie])(\d+)", re.sub(r"\.\d+(e\d+)?", "", line)):
+    for count, kind, width in re.findall(r"(\d*)([iea])(\d+)", re.sub(r"\.\d+(e\d+)?", "", line)):
         if not 0 < int(width) < 100 or int(count or 1) > 1000:
             raise Damaged(f"{what} has the format {line[:60]}, which cannot be")
         for _ in range(int(count or 1)):
@@ -145,6 +154,11 @@ def _read_nodes(archive: _Archive, words: list[str], lines: list[str], at: int) 
 
 
 def _read_elements(archive: _Archive, words: list[str], lines: list[str], at: int) -> int:
+    if "COMPACT" in (word.upper() for word in words):
+        raise Damaged(
+            f"{archive.where}: EBLOCK is in the COMPACT form, which is not read; write the archive again with "
+            "EBLOCK,19,SOLID (CDWRITE)"
+        )
     fields = _widths(lines, at, "EBLOCK")
     solid = len(words) > 2 and words[2].upper() == "SOLID"
     announced = _whole(words[4], "EBLOCK") if solid and len(words) > 4 and words[4] else 0
@@ -160,7 +174,8 @@ def _read_elements(archive: _Archive, words: list[str], lines: list[str], at: in
             raise Damaged("EBLOCK has an empty line instead of -1 at its end, the file is truncated")
         at += 1
         if not solid:
-            _leave_out(archive, words)
+            known = len(first) > 1 and first[1] in archive.kinds
+            _leave_out(archive, words, first[1] if known else archive.kind)
             continue
         if len(first) < 12:
             raise Damaged(f"EBLOCK holds the line '{lines[at - 1].strip()[:60]}', which is too short")
@@ -205,16 +220,51 @@ def _ranges(listed: list[int], name: str) -> list[int]:
     return members
 
 
-_BLOCKS = {"NBLOCK": _read_nodes, "EBLOCK": _read_elements, "CMBLOCK": _read_component}
+def _read_types(archive: _Archive, words: list[str], lines: list[str], at: int) -> int:
+    """Number, element and 18 KEYOPTs of each type; -1 ends them."""
+    fields = _widths(lines, at, "ETBLOCK")
+    if len(fields) < 4:
+        raise Damaged("ETBLOCK has a format without a number, an element and its options")
+    for number, line in enumerate(lines[at + 1 :], at + 1):
+        row = [line[a:b].strip() for a, b, _ in fields]
+        if row[0] == "-1":
+            return number + 1
+        kind = _whole(row[0], "ETBLOCK")
+        archive.kinds[kind] = _whole(row[1], "ETBLOCK")
+        if row[3] == "1":
+            archive.full.add(kind)
+    raise Damaged("ETBLOCK has no end, the file is truncated")
+
+
+_BLOCKS = {"NBLOCK": _read_nodes, "EBLOCK": _read_elements, "CMBLOCK": _read_component, "ETBLOCK": _read_types}
 
 
 # commands ------------------------------------------------------------------------------------------------------------
 
 
 def _read_type(archive: _Archive, words: list[str]) -> None:
-    if len(words) > 2 and words[1].isdecimal():
+    kind = archive.parameters.get(words[1].upper(), words[1]) if len(words) > 2 else ""
+    if str(kind).isdecimal():
         number = re.search(r"\d+$", words[2])
-        archive.kinds[_whole(words[1], "ET")] = int(number[0]) if number else 0
+        archive.kinds[_whole(str(kind), "ET")] = int(number[0]) if number else 0
+
+
+def _read_option(archive: _Archive, words: list[str]) -> None:
+    """KEYOPT, type, number, value."""
+    if len(words) > 3 and words[2] == "2" and words[3] == "1" and words[1].isdecimal():
+        archive.full.add(_whole(words[1], "KEYOPT"))
+
+
+def _read_parameter(archive: _Archive, words: list[str]) -> None:
+    """*SET, name, value."""
+    if len(words) > 2 and is_number(words[2]):
+        archive.parameters[words[1].upper()] = int(words[2])
+
+
+def _read_selection(archive: _Archive, words: list[str]) -> None:
+    """CMSEL,S,component; every other selection, or all, is none that is known."""
+    chosen = words[0].upper() == "CMSEL" and len(words) > 2 and words[1].upper() in ("S", "")
+    archive.selected = words[2].upper() if chosen else ""
 
 
 def _read_current(archive: _Archive, words: list[str]) -> None:
@@ -222,10 +272,19 @@ def _read_current(archive: _Archive, words: list[str]) -> None:
         archive.kind = _whole(words[1], "TYPE")
 
 
-def _leave_out(archive: _Archive, words: list[str]) -> None:
-    """An element of the current type that no EBLOCK,,SOLID holds: E, EN, or a line of a short block."""
-    where, count = archive.outside.get(archive.kind, (archive.where, 0))
-    archive.outside[archive.kind] = where, count + 1
+def _leave_out(archive: _Archive, words: list[str], kind: int | None = None) -> None:
+    """An element of a type, if not given the current one, that no EBLOCK,,SOLID holds: E, EN, or a line of a short
+    block."""
+    kind = archive.kind if kind is None else kind
+    where, count = archive.outside.get(kind, (archive.where, 0))
+    archive.outside[kind] = where, count + 1
+
+
+def _stressed(archive: _Archive, words: list[str]) -> None:
+    """PSTRES,ON, and a restart of a loaded state (ANTYPE,,RESTART,,,PERTURB)."""
+    on = words[0].upper() == "PSTRES" and len(words) > 1 and words[1].upper() in ("ON", "1")
+    if on or "PERTURB" in (word.upper() for word in words):
+        archive.lost.append(f"{archive.where}: {words[0].upper()}: {PRESTRESSED}")
 
 
 def _behind_release(words: list[str]) -> list[str]:
@@ -295,12 +354,21 @@ def _read_displacement(archive: _Archive, words: list[str]) -> None:
     directions = "".join("xyzabc" if w.upper() == "ALL" else _LABELS.get(w.upper(), "") for w in (label, *more))
     if not directions:
         return
-    if value and real(value, "D") != 0:
+    named = {name.upper(): name for name in archive.components}
+    component = named.get(archive.selected if where.upper() == "ALL" else where.upper())
+    if value.startswith("%"):
+        archive.held.left_out.append(f"D,{where},{label} takes its displacement from the table {value}")
+    elif value and real(value, "D") != 0:
         archive.held.left_out.append(f"D,{where},{label} prescribes a displacement")
+    elif component is not None:
+        archive.held.hold(component, directions)
     elif is_number(where):
         first, end = int(where), _whole(last, "D") if last else int(where)
-        for node in range(first, min(end, first + 10**8) + 1, max(_whole(step or "1", "D"), 1)):
-            archive.held.hold(node, directions)
+        every = range(first, min(end, first + 10**8) + 1, max(_whole(step or "1", "D"), 1))
+        known = {first, *archive.node_id} if len(every) > 1 else every  # a range may go over gaps
+        for node in every:
+            if node in known:
+                archive.held.hold(node, directions)
     else:
         archive.held.left_out.append(f"D,{where},{label} names no node by its number")
 
@@ -360,14 +428,18 @@ _COMMANDS = {
     "D": _read_displacement, "E": _leave_out, "EN": _leave_out, "TYPE": _read_current,
     "ET": _read_type, "MPTEMP": _read_temperatures, "MPDATA": _read_data, "MP": _read_constant, "TREF": _read_reference,
     "TUNIF": _read_uniform, "BFUNIF": _read_uniform, "BF": _read_body_force, "BFBLOCK": _refuse_temperatures,
+    "KEYOPT": _read_option, "KEYO": _read_option, "*SET": _read_parameter, "CMSEL": _read_selection,
+    "NSEL": _read_selection, "ALLSEL": _read_selection, "ALLS": _read_selection, "ESEL": _read_selection,
+    "PSTRES": _stressed, "ANTYPE": _stressed, "ANTY": _stressed,
 }  # fmt: skip
 
 
 _NOT_READ = {
     "RBE3", "CEINTF", "CPINTF", "CPNGEN", "CPLGEN", "CPCYC", "CECYC", "CESGEN", "CPSGEN", "MATWRITE", "EGEN", "ENGEN",
-    "EMODIF", "MPCHG", "INISTATE",
+    "EMODIF", "MPCHG", "INISTATE", "CYCLIC",
 }  # fmt: skip
 """Commands that constrain, or add or change elements, and are not read."""
+_LOADS = "F|FBLOCK|SF|SFE|SFEBLOCK|ACEL|OMEGA|DOMEGA|CMOMEGA|CMACEL|CGOMGA|BFE|SLOAD|PSLOAD"
 
 
 # assembly ------------------------------------------------------------------------------------------------------------
@@ -389,11 +461,12 @@ def _assembled(archive: _Archive) -> RawMesh:
     raw.add_solids(blocks, numbering, "EBLOCK names")
     for name, members in archive.components.items():
         if members:
-            chosen = np.array(members, dtype=np.int64)
-            raw.add_points(name, numbering.positions(chosen, f"the component '{name}' names"))
+            raw.add_set(name, members, numbering)
     raw.links = _links(archive, numbering)
     add_supports(raw, archive.held, numbering)
-    raw.materials = [_material(archive, *key) for key in regions]
+    raw.materials = [_material(archive, *key) for key in regions] if archive.constants else []
+    if not raw.materials:
+        raw.regions = []
     _assign_temperatures(archive, raw, numbering)
     return raw
 
@@ -440,6 +513,16 @@ def _other_elements(archive: _Archive, name: str) -> list[str]:
     beside = [(archive.kinds.get(kind, 0), where, count) for kind, (where, count) in archive.outside.items()]
     found += [one for one in beside if one[0] not in _HARMLESS]
     return [lost(where, f"the Ansys type {kind} ({count} element{'s' * (count > 1)})") for kind, where, count in found]
+
+
+def _integration(archive: _Archive) -> list[str]:
+    """What is said of bricks of 20 nodes that Ansys integrates at fewer points than are taken here."""
+    count = sum(
+        archive.kinds.get(kind) == 186 and kind not in archive.full and len(set(nodes)) == 20
+        for _, _, kind, _, nodes in archive.elements
+    )
+    text = "elements SOLID186 are taken with full integration, which their KEYOPT(2) = 1 asks for; without it they are"
+    return [f"{count} {text} a little softer on coarse meshes"] if count else []
 
 
 def _form(archive: _Archive, number: int, kind: int, nodes: list[int]) -> tuple[str, list[int]] | None:
@@ -517,7 +600,7 @@ def _orthotropic(name: str, c: dict[str, dict[int, float]]) -> Array:
 
 
 def _assign_temperatures(archive: _Archive, raw: RawMesh, numbering: Numbering) -> None:
-    if not archive.nodal and archive.uniform is None:
+    if not archive.nodal and archive.uniform is None and archive.reference is None:
         return
     raw.temperature = np.full((len(raw.points), 2), np.nan)
     raw.temperature[:, 0] = archive.reference or 0.0

@@ -11,14 +11,31 @@ from scipy.sparse.csgraph import connected_components
 
 from ..data import Equation, FaceTie, Indices, Link, Mesh
 from ..errors import UserError
+from .gates import part_numbers
+
+
+def with_parts(mesh: Mesh) -> Mesh:
+    """The mesh with its instances; of a file without any, parts that share no points are called so.
+
+    A part has the name of the point set that is just it, else ``part-1``, ``part-2`` in the order of the file.
+    """
+    if mesh.instances:
+        return mesh
+    numbers, named = part_numbers(mesh), {}
+    for part in range(numbers.max() + 1):
+        points = np.flatnonzero(numbers == part)
+        alike = (name for name, s in mesh.point_sets.items() if np.array_equal(np.unique(s), points))
+        named[next(alike, f"part-{part + 1}")] = points
+    return replace(mesh, instances=named)
 
 
 def of_instances(mesh: Mesh, names: Sequence[str]) -> Mesh:
-    """The mesh of these instances alone, with their sets, constraints and contacts.
+    """The mesh of these instances (see `with_parts`) alone, with their sets, constraints and contacts.
 
     Raises:
         UserError: an instance that the file does not have, a constraint that ties them to others.
     """
+    mesh = with_parts(mesh)
     unknown = [name for name in names if name not in mesh.instances]
     if unknown:
         raise UserError(f"has no instance '{unknown[0]}'; its instances are {', '.join(mesh.instances) or 'none'}")
@@ -113,7 +130,8 @@ def nodes_of(mesh: Mesh) -> list[Indices]:
 
 
 def bodies(mesh: Mesh) -> list[list[str]]:
-    """Instances that constraints or common points hold together, in the order of the file."""
+    """Instances (see `with_parts`) that constraints hold together, in the order of the file."""
+    mesh = with_parts(mesh)
     names = list(mesh.instances)
     of = np.full(mesh.n_points, -1)
     for number, name in enumerate(names):

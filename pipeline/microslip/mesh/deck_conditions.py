@@ -36,11 +36,11 @@ def _zeros(words: list[str]) -> str:
     """Directions of a data line: set, first, last direction, value.
 
     Raises:
-        ValueError: not such a line, or a displacement that is prescribed.
+        ValueError: not such a line, a last direction below the first, or a displacement that is prescribed.
     """
     first = int(words[1])
     last = int(words[2]) if words[2] else first
-    if first < 1 or (first <= 3 and words[3] and float(words[3]) != 0):
+    if first < 1 or last < first or (first <= 3 and words[3] and float(words[3]) != 0):
         raise ValueError
     return "xyzabc"[first - 1 : last]
 
@@ -69,6 +69,8 @@ def _read_initial(deck: Deck, parameters: dict[str, str], lines: list[str]) -> N
         _read_temperature(deck, parameters, lines, column=0)
     elif parameters.get("TYPE", "").upper() in ("STRESS", "PLASTIC STRAIN"):
         deck.lost.append(lost(deck.where, f"*INITIAL CONDITIONS, TYPE={parameters['TYPE'].upper()}"))
+    else:
+        deck.ignored.append(f"INITIAL CONDITIONS, TYPE={parameters.get('TYPE', '').upper()}")
 
 
 def assign_temperatures(deck: Deck, raw: RawMesh, numbering: Numbering) -> None:
@@ -91,7 +93,7 @@ def constraints(deck: Deck) -> Constraints:
         key, found = deck.key(deck.node_sets, word), deck.nodes(word)
         if found is None:
             raise Damaged(f"{where}: *BOUNDARY names the node set '{word}', which is not defined")
-        if not known.issuperset(found.tolist()):
+        if key is None and not known.issuperset(found.tolist()):
             raise Damaged(f"{where}: *BOUNDARY names the node {word}, which is not defined")
         if key is not None:
             held.hold(deck.written[key], directions)

@@ -89,8 +89,7 @@ def _where(card: Card) -> str:
 
 def _tie(reading: _Reading, card: Card, space: str, following: Card | None) -> Iterator[Link]:
     if "CYCLIC SYMMETRY" in card.parameters:
-        reading.left_out.append(lost(card.where, "*TIE of CYCLIC SYMMETRY (write [cyclic] in body.toml)"))
-        return
+        return  # see deck_cyclic
     text = card.parameters.get("POSITION TOLERANCE", "")
     tolerance = real(text, "POSITION TOLERANCE") if text else None
     for line in card.lines:

@@ -36,7 +36,7 @@ def _node_surface(
         if found is None:
             raise Damaged(f"{where}: the surface '{name}' names the node set '{row[0]}', which is not defined")
         if len(found):
-            raw.add_points(name, numbering.positions(found, f"the surface '{name}' names"))
+            raw.add_set(name, found, numbering)
 
 
 def _combined(raw: RawMesh, deck: Deck, name: str, way: str, words: list[str], where: str) -> None:

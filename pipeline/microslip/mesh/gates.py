@@ -51,19 +51,29 @@ def mesh_problems(mesh: Mesh) -> tuple[list[str], list[str]]:
     parts = part_numbers(mesh, tied=True)
     if not errors and (overlapping := _overlapping(mesh)):
         errors.append(f"{overlapping} facets belong to more than two cells, so cells overlap; remesh")
-    if len(pairs):
-        a, b = mesh.node_id[pairs[0]]
+    torn = pairs[parts[pairs[:, 0]] == parts[pairs[:, 1]]]
+    if len(torn):
+        a, b = mesh.node_id[torn[0]]
         errors.append(
-            f"{len(pairs)} pairs of points coincide (first: nodes {a} and {b}), so neighbouring cells are not "
+            f"{len(torn)} pairs of points coincide (first: nodes {a} and {b}), so neighbouring cells are not "
             "joined; merge duplicate nodes"
         )
     elif parts.max() > 0:
-        sizes = np.bincount(parts)
-        warnings.append(
-            f"the mesh falls into {len(sizes)} parts that share no points ({', '.join(map(str, sizes[:6]))} points); "
-            "support each, press it by a closure, or join them"
-        )
+        warnings.append(_apart(mesh, parts, pairs))
     return errors, warnings
+
+
+def _apart(mesh: Mesh, parts: Indices, pairs: Indices) -> str:
+    """What is said of parts that share no points, and of points (p, 2) of theirs at the same places."""
+    sizes = np.bincount(parts)
+    text = f"the mesh falls into {len(sizes)} parts that share no points ({', '.join(map(str, sizes[:6]))} points)"
+    if not len(pairs):
+        return f"{text}; support each, press it by a closure, or join them"
+    a, b = mesh.node_id[pairs[0]]
+    return (
+        f"{text}; where they touch ({len(pairs)} pairs of points, first: nodes {a} and {b}) they are neither welded "
+        "nor in contact: merge these nodes where they should be one body, or import --apart for bodies in contact"
+    )
 
 
 def _cell_problem(mesh: Mesh, cell_type: str) -> str:

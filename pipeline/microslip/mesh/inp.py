@@ -19,15 +19,17 @@ from . import deck_conditions, deck_materials, deck_mesh
 from .cards import Card, data_of, numbers, read_cards
 from .deck import Deck
 from .deck_conditions import assign_temperatures, constraints
+from .deck_cyclic import KEYWORDS as CYCLIC
+from .deck_cyclic import sector_of
 from .deck_joints import KEYWORDS as JOINTS
-from .deck_joints import joints_of, preloads_of, unpressed, unused_loads
+from .deck_joints import joints_of, preloads_of, unpressed, unread, unused_loads
 from .deck_links import KEYWORDS as LINKS
 from .deck_links import links_of
 from .deck_materials import assign_materials
 from .deck_mesh import CORNERS, cell_type
 from .deck_surfaces import add_surfaces
 from .instances import numbered, outline, place, placement, places
-from .raw import Damaged, Numbering, RawMesh, joined, lost
+from .raw import PRESTRESSED, Damaged, Numbering, RawMesh, ignored, joined, lost
 from .supports import add_supports
 
 _REFUSED = {
@@ -54,13 +56,31 @@ def read_inp(path: Path) -> RawMesh:
     whole.spaces[""] = spaces[-1]
     _read(path, whole, found.rest)
     raw = _assembled(whole)
-    raw.remarks = [*numbered([card.parameters["NAME"] for card, _ in parts], spaces), *_replaced(raw, whole)]
+    raw.remarks += [*numbered([card.parameters["NAME"] for card, _ in parts], spaces), *_replaced(raw, whole)]
     whole.ignored += unused_loads(whole)
-    if whole.ignored:
-        raw.remarks.append(f"read and not used: {', '.join('*' + word for word in dict.fromkeys(whole.ignored))}")
+    raw.lost += _prestressed(found.rest)
+    raw.remarks += ignored([f"*{word}" for word in whole.ignored], _LOADS)
     if not path.read_bytes().endswith(b"\n"):
         raw.unended = "a last line without an end"
     return raw
+
+
+_LOADS = r"\*(C|D|DS)(LOAD|FLUX)|\*(D|S)?FILM|\*D?RADIATE|\*INERTIA RELIEF|\*MASS FLOW RATE"
+
+
+def _prestressed(cards: list[Card]) -> list[str]:
+    """What is said of modes of a loaded body: those after a static step with NLGEOM, or in a step of PERTURBATION."""
+    step, stressed, large = Card(""), False, False
+    for card in cards:
+        if card.keyword == "STEP":
+            step = card
+            large = large or "NLGEOM" in step.parameters and step.parameters["NLGEOM"].upper() != "NO"
+        elif card.keyword == "STATIC":
+            stressed = True
+        elif card.keyword in ("FREQUENCY", "COMPLEX FREQUENCY") and stressed:
+            if large or "PERTURBATION" in step.parameters:
+                return [f"{card.where}: *{card.keyword}: {PRESTRESSED}"]
+    return []
 
 
 _AS = {
@@ -122,14 +142,14 @@ def _read(path: Path, deck: Deck, cards: list[Card]) -> None:
     for card in cards:
         if card.keyword in _REFUSED:
             raise Damaged(f"{card.where}: the file {_REFUSED[card.keyword]}; write out every node and cell")
-        if "INPUT" in card.parameters and card.keyword in (*LINKS, *JOINTS, *READERS):
+        if "INPUT" in card.parameters and card.keyword in (*LINKS, *JOINTS, *CYCLIC, *READERS):
             card.lines = [*card.lines, *_told(card, lambda c: data_of(path, c.parameters.pop("INPUT")))]
-        if card.keyword in (*LINKS, *JOINTS):
+        if card.keyword in (*LINKS, *JOINTS, *CYCLIC):
             deck.links.append((card, ""))
         if card.keyword not in READERS:
             if _COUNTS.fullmatch(card.keyword):
                 deck.lost.append(lost(card.where, f"*{card.keyword}"))
-            elif card.keyword not in (*_SILENT, *LINKS, *JOINTS):
+            elif card.keyword not in (*_SILENT, *LINKS, *JOINTS, *CYCLIC):
                 deck.ignored.append(card.keyword)
             continue
         deck.where = card.where
@@ -157,7 +177,7 @@ _SILENT = {
 _COUNTS = re.compile(
     "MASS|ROTARY INERTIA|NONSTRUCTURAL MASS|SPRING|DASHPOT|GAP|JOINT|CONNECTOR [A-Z]+|EMBEDDED ELEMENT|"
     "SHELL TO SOLID COUPLING|FASTENER|MATRIX (INPUT|ASSEMBLE)|SUBSTRUCTURE [A-Z]+|USER ELEMENT|UEL PROPERTY|"
-    "CONTACT|COHESIVE BEHAVIOR|CYCLIC SYMMETRY MODEL|HYPERELASTIC|HYPERFOAM|MODEL CHANGE|FOUNDATION|"
+    "CONTACT|COHESIVE BEHAVIOR|HYPERELASTIC|HYPERFOAM|MODEL CHANGE|FOUNDATION|"
     "(BEAM|BEAM GENERAL|SHELL|SHELL GENERAL|MEMBRANE|FRAME|COHESIVE|GASKET|CONNECTOR) SECTION"
 )
 """Keywords that add mass, stiffness or constraints and are not read."""
@@ -188,10 +208,11 @@ def _assembled(deck: Deck) -> RawMesh:
     for key, parts in deck.node_sets.items():
         members = np.unique(joined(parts))
         if len(members):
-            name = deck.written[key]
-            raw.add_points(name, numbering.positions(members, f"the node set '{name}' names"))
+            raw.add_set(deck.written[key], members, numbering)
     raw.links, left_out = links_of(deck, numbering, points)
-    raw.lost = [*deck.lost, *left_out, *unpressed(deck)]
+    raw.sector, uncut = sector_of(deck)
+    raw.lost = [*deck.lost, *left_out, *uncut, *unpressed(deck)]
+    raw.remarks += unread(deck)
     raw.joints, raw.preloads = joints_of(deck), preloads_of(deck)
     raw.instances = {name: numbering.positions(np.unique(ids), "") for name, ids in deck.instances.items()}
     add_supports(raw, constraints(deck), numbering)

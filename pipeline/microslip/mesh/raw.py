@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 
-from ..data import Array, Indices, Joint, Link
+from ..data import Array, Indices, Joint, Link, Sector
 
 NODES = {
     "vertex": 1, "line": 2, "line3": 3, "triangle": 3, "triangle6": 6, "quad": 4, "quad8": 8, "quad9": 9, "tetra": 4,
@@ -65,7 +66,7 @@ class RawMesh:
         unended: what the file lacks at its end, in words: it may be cut there. Nothing if it tells that it is whole.
         lost: what carries mass, stiffness or a constraint and is not read, in words.
         remarks: what was read as something else or not used, in words. instances: name -> positions. joints: pairs of
-            faces in contact. preloads: of bolts: where it stands, force in the file's unit.
+            faces in contact. sector: of a cyclic ring. preloads: of bolts: where it stands, force in the file's unit.
     """
 
     points: Array
@@ -85,12 +86,24 @@ class RawMesh:
     remarks: list[str] = field(default_factory=list)
     instances: dict[str, Indices] = field(default_factory=dict)
     joints: list[Joint] = field(default_factory=list)
+    sector: Sector | None = None
     preloads: list[tuple[str, float]] = field(default_factory=list)
 
     def add_points(self, name: str, positions: Indices) -> None:
         """Add to a point set."""
         before = self.point_sets.get(name, np.zeros(0, dtype=np.int64))
         self.point_sets[name] = np.union1d(before, positions).astype(np.int64)
+
+    def add_set(self, name: str, numbers: Iterable[int] | Indices, numbering: Numbering) -> None:
+        """Add to a point set the nodes of these numbers that are there; a remark names those that are not."""
+        ids = np.unique(np.fromiter(numbers, dtype=np.int64))
+        there = np.isin(ids, numbering.sorted)
+        if not there.all():
+            missing = ids[~there]
+            which = f"node {missing[0]}" if len(missing) == 1 else f"{len(missing)} nodes ({missing[0]}, ...)"
+            self.remarks.append(f"the set '{name}' names {which} that the file does not define: left out of it")
+        if there.any():
+            self.add_points(name, numbering.positions(ids[there], ""))
 
     def add_solids(
         self, solids: Mapping[str, list[tuple[int, int, list[int]]]], numbering: Numbering, what: str
@@ -116,6 +129,23 @@ def in_file(path: Path, text: str) -> str:
 def lost(where: str, what: str) -> str:
     """What is said of something that is not read although it counts; `where`: file and line."""
     return f"{where}: {what} is not read: the mass, stiffness or constraint is missing, so frequencies will differ"
+
+
+PRESTRESSED = (
+    "the frequencies of the deck are those under the load of its static step; that load is not taken, and stress can "
+    "change a frequency by a factor"
+)
+"""What is said of a deck whose modes are those of a loaded body."""
+
+
+def ignored(words: Iterable[str], loads: str) -> list[str]:
+    """What is said of keywords that are not used; loads: a pattern of those that load the body."""
+    every = list(dict.fromkeys(words))
+    pressing = [word for word in every if re.fullmatch(loads, word)]
+    others = [word for word in every if word not in pressing]
+    said = [(pressing, "loads, which change no frequency of an unstressed body")]
+    said += [(others, "what they do to the frequencies is not known here")]
+    return [f"read and not used: {', '.join(named)}: {effect}" for named, effect in said if named]
 
 
 def joined(parts: Iterable[Indices]) -> Indices:
@@ -156,6 +186,10 @@ class Numbering:
         twice = np.flatnonzero(np.diff(self.sorted) == 0)
         if len(twice):
             raise Damaged(f"node {self.sorted[twice[0]]} is defined twice")
+
+    def between(self, first: int, last: int) -> Indices:
+        """The numbers from first to last that nodes have, ascending."""
+        return self.sorted[np.searchsorted(self.sorted, first) : np.searchsorted(self.sorted, last, "right")]
 
     def positions(self, ids: Indices, what: str) -> Indices:
         """Positions of node numbers, any shape.

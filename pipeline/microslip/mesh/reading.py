@@ -31,7 +31,7 @@ from .med import read_med
 from .msh import is_msh41, read_msh41
 from .raw import NODES, Damaged, RawMesh, in_file
 from .surface import boundary_facets, faces_from_points, match_facets
-from .unv import read_unv
+from .unv import length_unit, read_unv
 
 UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 0.0254, "ft": 0.3048}
 """Unit of length -> metres."""
@@ -64,6 +64,8 @@ def read_mesh(path: Path | str, unit: str, system: str | None = None, zero: floa
         raise UserError(f"{path}: no such mesh file; make it first or correct the path")
     try:
         raw = _read_raw(path)
+        if (said := unit_of(path)) not in ("", unit):
+            raw.lost.append(f"the file tells its lengths in {said}, here they are taken in {unit}: which is right?")
         materials = tuple(in_si(m, system, zero) for m in raw.materials) if system else ()
         mesh = _mesh_of(raw, UNITS[unit], path)
         return replace(mesh, materials=materials, regions=mesh.regions if materials else {})
@@ -86,8 +88,51 @@ _READERS: dict[str, Callable[[Path], RawMesh]] = {
 _BY_MESHIO = (".msh", ".vtu", ".vtk")
 
 
-def _read_raw(path: Path) -> RawMesh:
+_LANGUAGES = (
+    (".cdb", r"^\s*(/BATCH|/PREP7|/UNITS|/COM|NBLOCK|EBLOCK|ETBLOCK|ET),?"),
+    (".inp", r"^\s*\*(HEADING|NODE|PART|INCLUDE|ELEMENT|MATERIAL)\b"),
+    (".bdf", r"^\s*(SOL\s|CEND|BEGIN\s|GRID)"),
+)
+"""Reader, and the first words by which it is known, of files whose suffix several programs use."""
+
+
+def suffix_of(path: Path) -> str:
+    """The suffix of a file in small letters; of ``.dat`` and ``.inp`` that of the program whose words it begins with.
+
+    Workbench writes Ansys's commands into ``ds.dat``, Ansys's own input is called ``.inp``, and ``.dat`` is Nastran's.
+    """
     suffix = path.suffix.lower()
+    if suffix not in (".dat", ".inp") or not path.is_file():
+        return suffix
+    with ordinary(path).open(encoding="latin-1") as file:
+        lines = [line for _, line in zip(range(2000), file, strict=False)]
+    for line in lines:
+        for language, words in _LANGUAGES:
+            if re.match(words, line, re.IGNORECASE):
+                return language
+    return suffix
+
+
+_TELLS = {"SI": "m", "MKS": "m", "UMKS": "um", "CGS": "cm", "MPA": "mm", "BFT": "ft", "BIN": "in"}
+"""Ansys's /UNITS -> unit of length."""
+
+
+def unit_of(path: Path) -> str:
+    """The unit of length, a key of `UNITS`, that a file tells (/UNITS of Ansys, data set 164); empty if it does not."""
+    if not path.is_file():
+        return ""
+    kind = suffix_of(path)
+    if kind in (".cdb", ".anf"):
+        text = ordinary(path).read_text(encoding="latin-1")
+        said = re.search(r"^\s*/UNITS\s*,\s*(\w+)", text, re.IGNORECASE | re.MULTILINE)
+        return _TELLS.get(said[1].upper(), "") if said else ""
+    if _READERS.get(kind) is read_unv:
+        return length_unit(ordinary(path).read_text(encoding="latin-1"), UNITS)
+    return ""
+
+
+def _read_raw(path: Path) -> RawMesh:
+    suffix = suffix_of(path)
     if suffix == ".msh" and is_msh41(path):
         return read_msh41(path)
     if suffix in _READERS:
@@ -106,6 +151,7 @@ def _mesh_of(raw: RawMesh, metres: float, path: Path) -> Mesh:
             way += " (in gmsh: Mesh.SecondOrderIncomplete = 1)"
         raise UserError(f"{path}: cells of type {', '.join(foreign)} cannot be assembled; {way}")
     _sort_by_region(raw)
+    _turn_left_handed(raw)
     cells: dict[str, list[Indices]] = {}
     for kind, connectivity in raw.blocks:
         if len(connectivity):
@@ -118,6 +164,27 @@ def _mesh_of(raw: RawMesh, metres: float, path: Path) -> Mesh:
     if np.abs(points).max() > _FARTHEST:
         raise UserError(f"{path}: a point lies {np.abs(points).max():.3g} m from the origin; the file is damaged")
     return _assemble_mesh(raw, points, {t: np.concatenate(c) for t, c in cells.items()}, metres)
+
+
+_MIRRORED = {
+    "tetra": (0, 2, 1, 3), "tetra10": (0, 2, 1, 3, 6, 5, 4, 7, 9, 8), "wedge": (3, 4, 5, 0, 1, 2),
+    "wedge15": (3, 4, 5, 0, 1, 2, 9, 10, 11, 6, 7, 8, 12, 13, 14),
+}  # fmt: skip
+"""Nodes of a left-handed cell in a right-handed order; of bricks and pyramids such an order is no mere habit."""
+
+
+def _turn_left_handed(raw: RawMesh) -> None:
+    """Count the nodes of left-handed tetrahedra and wedges the other way, as the solvers that allow them do."""
+    for number, (kind, cells) in enumerate(raw.blocks):
+        if kind not in _MIRRORED or not len(cells):
+            continue
+        corner = raw.points[cells[:, :4]]
+        left = np.linalg.det(corner[:, 1:] - corner[:, :1]) < 0
+        if left.any():
+            cells = cells.copy()
+            cells[left] = cells[left][:, _MIRRORED[kind]]
+            raw.blocks[number] = kind, cells
+            raw.remarks.append(f"{left.sum()} left-handed cells {kind} are counted the other way round")
 
 
 # other formats, by meshio ----------------------------------------------------------------------------------------
@@ -267,7 +334,7 @@ def _assemble_mesh(raw: RawMesh, points: Array, cells: dict[str, Indices], metre
     return replace(
         mesh, faces=faces, inner=inner, supports=supports, not_held=tuple(raw.not_held), unended=raw.unended,
         links=links, lost=tuple(raw.lost), remarks=tuple(raw.remarks), joints=tuple(raw.joints),
-        preloads=tuple(raw.preloads),
+        sector=raw.sector, preloads=tuple(raw.preloads),
         instances={n: kept for n, s in raw.instances.items() if len(kept := _kept(renumber[s]))},
     )  # fmt: skip
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -49,21 +50,39 @@ def touches(mesh: Mesh, other: Mesh) -> list[Touch]:
         parts.append((kind, facets, numbers[start : start + len(facets)]))
         start += len(facets)
     made = [
-        _touch(mesh, {kind: facets[own == i] for kind, facets, own in parts if (own == i).any()})
+        touch_of(mesh, {kind: facets[own == i] for kind, facets, own in parts if (own == i).any()})
         for i in range(numbers.max() + 1)
     ]
     return sorted(made, key=lambda touch: -touch.area)
 
 
-def touching_facets(mesh: Mesh, other: Mesh) -> dict[str, Indices]:
-    """Type -> (f, k) facets of the mesh's surface whose middle lies on the other's surface, facing it."""
-    theirs = _triangles(other)
+Facets = Mapping[str, Indices]
+
+
+def touching_facets(
+    mesh: Mesh, other: Mesh, within: Facets | None = None, onto: Facets | None = None
+) -> dict[str, Indices]:
+    """Type -> (f, k) facets of the mesh whose middle lies on the other's surface, facing it.
+
+    Where the other's facets are so much smaller that none does, those on which the middle of one of the other's lies.
+
+    Args:
+        within: facets of the mesh to choose from, onto: of the other to lie on; None: the whole surface.
+    """
+    own, theirs = within or boundary_facets(mesh), onto or boundary_facets(other)
     result = {}
-    for kind, facets in boundary_facets(mesh).items():
-        middle, vector = _middle(mesh, facets)
-        chosen = _lies_on(middle, vector, theirs)
+    for kind, facets in own.items():
+        chosen, _ = _lies_on(*_middle(mesh, facets), _triangles(other, theirs))
         if chosen.any():
             result[kind] = facets[chosen]
+    if result:
+        return result
+    points, vectors = (np.concatenate(part) for part in zip(*(_middle(other, f) for f in theirs.values()), strict=True))
+    for kind, facets in own.items():
+        _, hit = _lies_on(points, vectors, _triangles(mesh, {kind: facets}))
+        met = hit.reshape(FACET_CORNERS[kind] - 2, len(facets)).sum(axis=0) > 0
+        if met.any():
+            result[kind] = facets[met]
     return result
 
 
@@ -74,28 +93,32 @@ def _middle(mesh: Mesh, facets: Indices) -> tuple[Array, Array]:
     return corner.mean(axis=1), np.cross(corner[:, 2] - corner[:, 0], last - corner[:, 1]) / 2
 
 
-def _triangles(mesh: Mesh) -> Array:
-    """(t, 3, 3) corners of the triangles that the surface is made of."""
+def _triangles(mesh: Mesh, facets: Facets) -> Array:
+    """(t, 3, 3) corners of the triangles that facets are made of: the first ones of all, then the second ones."""
     made = []
-    for kind, facets in boundary_facets(mesh).items():
+    for kind, nodes in facets.items():
         corners = FACET_CORNERS[kind]
-        made += [mesh.points[facets[:, list(three)]] for three in ((0, 1, 2), (0, 2, 3))[: corners - 2]]
+        made += [mesh.points[nodes[:, list(three)]] for three in ((0, 1, 2), (0, 2, 3))[: corners - 2]]
     return np.concatenate(made)
 
 
-def _lies_on(points: Array, vectors: Array, triangles: Array) -> np.ndarray:
-    """(f,) whether a facet lies on one of some triangles that face it."""
+def _lies_on(points: Array, vectors: Array, triangles: Array) -> tuple[np.ndarray, np.ndarray]:
+    """(f,) whether a facet, by its middle, lies on one of some triangles that face it, and (t,) on which ones any does.
+    """
     centres = triangles.mean(axis=1)
     reach = float(np.linalg.norm(triangles - centres[:, None], axis=2).max())
     near = NEAR * np.sqrt(np.linalg.norm(vectors, axis=1))
     inside = ((points > triangles.min(axis=(0, 1)) - near[:, None]).all(axis=1)) & (
         points < triangles.max(axis=(0, 1)) + near[:, None]
     ).all(axis=1)
-    found, tree = np.zeros(len(points), dtype=bool), cKDTree(centres)
+    found, hit, tree = np.zeros(len(points), dtype=bool), np.zeros(len(triangles), dtype=bool), cKDTree(centres)
     for i in np.flatnonzero(inside):
-        close = triangles[tree.query_ball_point(points[i], reach + near[i])]
-        found[i] = len(close) > 0 and bool(_on(points[i], vectors[i], close, near[i]).any())
-    return found
+        close = np.array(tree.query_ball_point(points[i], reach + near[i]), dtype=np.int64)
+        if len(close):
+            on = _on(points[i], vectors[i], triangles[close], near[i])
+            found[i] = on.any()
+            hit[close[on]] = True
+    return found, hit
 
 
 def _on(point: Array, vector: Array, triangles: Array, near: float) -> np.ndarray:
@@ -126,9 +149,10 @@ def _patches(mesh: Mesh, found: dict[str, Indices]) -> Indices:
     return np.asarray(sp.csgraph.connected_components(joined, directed=False)[1])
 
 
-def _touch(mesh: Mesh, facets: dict[str, Indices]) -> Touch:
+def touch_of(mesh: Mesh, facets: Facets) -> Touch:
+    """The patch that facets of a mesh make."""
     vectors = np.concatenate([_middle(mesh, f)[1] for f in facets.values()])
     points = mesh.points[np.unique(np.concatenate([f.ravel() for f in facets.values()]))]
     whole, area = vectors.sum(axis=0), float(np.linalg.norm(vectors, axis=1).sum())
     flat = np.linalg.norm(whole) > FLAT * area
-    return Touch(facets, area, whole / area if flat else None, points.min(axis=0), points.max(axis=0))
+    return Touch(dict(facets), area, whole / area if flat else None, points.min(axis=0), points.max(axis=0))

@@ -8,7 +8,8 @@ name corners and mid-side nodes in turn, layer after layer.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -38,6 +39,12 @@ _OTHERS = {121, 122, 136, 137, 138, 139, 141, 142, 151, 152, 161}  # rigid bars,
 _GROUPS = {2417: 2, 2429: 2, 2430: 2, 2432: 2, 2435: 4, 2452: 4, 2467: 4, 2477: 4}
 """Data set of groups -> numbers of each member."""
 _NODE, _ELEMENT = 7, 8
+_KNOWN = {0, 151, 164, 781, 2411, 2412, 2420}
+_RESULTS = {
+    **dict.fromkeys((55, 2414), "results at nodes"), **dict.fromkeys((56, 57), "results in cells"), 58: "functions",
+    82: "trace lines", 790: "restraints and loads", 791: "restraints", 792: "loads", 1703: "materials",
+    1710: "materials", 1716: "materials",
+}  # fmt: skip
 
 
 def read_unv(path: Path) -> RawMesh:
@@ -52,10 +59,31 @@ def read_unv(path: Path) -> RawMesh:
     numbering = Numbering(raw.node_id)
     shells = _elements(sets, raw, numbering)
     _groups(sets, raw, numbering, shells)
+    others = dict.fromkeys(kind for kind, _ in sets if kind not in _KNOWN | {*_GROUPS})
+    named = [f"{kind} ({what})" if (what := _RESULTS.get(kind)) else str(kind) for kind in others]
+    if named:
+        raw.remarks.append(f"data sets left aside: {', '.join(named)}; only nodes, cells and groups are taken")
     marks = sum(line.strip() == "-1" for line in text.splitlines())
     if marks % 2 or not re.search(r"^ *-1[ \t\r]*\n*\Z", text, re.MULTILINE):
         raw.unended = "no data set that ends with its last line"
     return raw
+
+
+def has_solids(path: Path) -> bool:
+    """Whether a file has solid cells (data set 2412)."""
+    with suppress(Damaged):
+        sets = _data_sets(path.read_text(encoding="latin-1").splitlines())
+        return any(e[1] in _SOLIDS for kind, lines in sets if kind == 2412 for e in _records(lines))
+    return False
+
+
+def length_unit(text: str, units: Mapping[str, float]) -> str:
+    """The name of the unit of length by data set 164, whose factor turns metres into it; empty without one."""
+    said = re.search(r"^ *-1\s*\n *164\s*\n.*\n\s*(\S+)", text, re.MULTILINE)
+    with suppress(ValueError, ZeroDivisionError):
+        metres = 1 / float(said[1].upper().replace("D", "E")) if said else 0.0
+        return next((name for name, size in units.items() if abs(size / metres - 1) < 1e-3), "") if said else ""
+    return ""
 
 
 def _data_sets(lines: list[str]) -> Iterator[tuple[int, list[str]]]:
@@ -201,4 +229,4 @@ def _group(raw: RawMesh, numbering: Numbering, shells: _Shells, name: str, table
         if facets := [nodes_of for _, nodes_of in found if len(nodes_of) == count]:
             raw.facets.setdefault(name, []).append(np.array(facets))
     if len(nodes):
-        raw.add_points(name, numbering.positions(nodes, f"the group '{name}' names"))
+        raw.add_set(name, nodes, numbering)

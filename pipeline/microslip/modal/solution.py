@@ -101,7 +101,7 @@ def search(
     if wanted > pencil.n - 2:
         raise UserError(
             f"modes.count: {wanted} modes asked for, but the body has only {pencil.n} degrees of freedom; "
-            "ask for fewer or refine"
+            f"ask for {pencil.n - 2} at most, or refine"
         )
     if isinstance(unknowns, FreeUpper | Tied):
         refuse_unconstrained_parts(model, pencil, R.shape[1])

@@ -130,6 +130,11 @@ def own_kind(g: ModalGroup) -> tuple[str, ...]:
     return tuple(elastic if w > 0 else "rigid" for w in g.omega)
 
 
+def certified_modes(g: ModalGroup) -> int:
+    """How many of the frequencies are those of the body itself, which its inertia count certifies, the first ones."""
+    return sum(kind in ("rigid", "normal") for kind in own_kind(g)) if "reduced" not in own_kind(g) else 0
+
+
 def _modal(g: ModalGroup) -> Array:
     """Compliance in the modes alone: what the massless coordinates or the forces add to it is taken out again."""
     rows = compliance_rows(g)

@@ -22,7 +22,8 @@ from .problem import Reduced, Substructure, diagonalised, hermitian, own_modes, 
 
 
 def reduce(problem: Substructure) -> Reduced:
-    """Interface coordinates first (6 a patch, in the order of the rows), then fixed-interface modes.
+    """Interface coordinates first (6 a patch, in the order of the rows), then as many fixed-interface modes as modes
+    are asked for.
 
     A body with rigid motions gets as many inertia-relief shapes between the two: how it yields, held at its
     interfaces, to its own inertia in those motions. With them a force that accelerates the body is answered exactly.
@@ -34,8 +35,9 @@ def reduce(problem: Substructure) -> Reduced:
     B = problem.rows[chosen]
     R = problem.vectors[:, : problem.rigid]
     constraint_modes, stiffness, relief = static_shapes(R, B, problem.static[:, chosen], '"craig-bampton"')
-    count = len(problem.values) - problem.rigid
-    fixed = fixed_interface_modes(problem.pencil, B, count, problem.certify, problem.shift)
+    fixed = fixed_interface_modes(
+        problem.pencil, B, len(problem.values), problem.certify, problem.shift
+    )
     values, relief = own_modes(problem.pencil, without_modes(problem.pencil, fixed.vectors, relief))
     vectors = np.hstack([constraint_modes, relief, fixed.vectors])
     r, inner = len(chosen), np.concatenate([values, fixed.values])

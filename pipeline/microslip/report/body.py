@@ -23,7 +23,16 @@ from ..units import rpm_text, to_rpm
 from . import ring
 from .page import Album, Piece, fold, number, page, say, table
 from .response import answer, response_pieces, warnings
-from .words import certificate, contact_sentence, fit_sentence, fit_summary, hertz, number_list, range_sentence
+from .words import (
+    certificate,
+    contact_sentence,
+    counted_modes,
+    fit_sentence,
+    fit_summary,
+    hertz,
+    number_list,
+    range_sentence,
+)
 
 
 def report_html(
@@ -92,7 +101,7 @@ def _lead(basis: ModalBasis) -> str:
     band = f" from {elastic[0]:.5g} Hz to {elastic[-1]:.5g} Hz" if len(elastic) else ""
     rigid = int((group.omega == 0).sum())
     free = f", {rigid} of them rigid" if rigid else ""
-    return f"{group.n_modes} modes{free}{band}{speeds}; mass {number(basis.mass)} kg. {certificate(group)}"
+    return f"{counted_modes(group)}{free}{band}{speeds}; mass {number(basis.mass)} kg. {certificate(group)}"
 
 
 def _facts(basis: ModalBasis) -> list[tuple[str, str]]:

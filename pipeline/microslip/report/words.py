@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from ..data import Array, ContactState, Interface, ModalGroup, SpeedRange
+from ..reduced.coordinates import certified_modes
 from ..reduced.truncation import percent
 from ..settings.body import GROUND
 from ..units import to_rpm
@@ -39,12 +40,49 @@ def certificate(group: ModalGroup) -> str:
     """What the inertia count proves, in one sentence."""
     if not group.checks.get("certified"):
         return "Nothing proves that no mode is missing: the spectrum was not certified (modes.certify)."
+    own = certified_modes(group)
+    if own == 0 and "upper_shift_hz" in group.checks:
+        count, limit = int(group.checks["count_below_upper_shift"]), group.checks["upper_shift_hz"]
+        return (
+            f"The inertia count proves that the body has {count} modes below {limit:.6g} Hz; these frequencies are "
+            "those of the reduced body, at or above them."
+        )
+    if own < len(group.omega) and "upper_shift_hz" in group.checks:
+        count, limit = int(group.checks["count_below_upper_shift"]), group.checks["upper_shift_hz"]
+        more = f", of which {own} are kept" if count > own else ""
+        return (
+            f"The inertia count proves that the body has {count} modes below {limit:.6g} Hz{more}; the "
+            f"{len(group.omega) - own} shapes behind them are static answers and no modes of the body."
+        )
     if "upper_shift_hz" not in group.checks:
         return f"These are all {group.n_modes} modes of the system."
     count = int(group.checks.get("count_below_upper_shift", group.n_modes))
     kept = f"; the first {group.n_modes} are kept" if count > group.n_modes else ""
     limit = group.checks["upper_shift_hz"]
     return f"The inertia count proves that these are all {count} modes below {limit:.6g} Hz{kept}."
+
+
+def counted_modes(group: ModalGroup) -> str:
+    """How many modes a group has, and what else its frequencies belong to: static shapes, the reduced body."""
+    count, own = len(group.omega), certified_modes(group)
+    if own == count:
+        return f"{count} modes"
+    return f"{own} modes and {count - own} static shapes" if own else f"{count} modes of the reduced body"
+
+
+def proof(group: ModalGroup) -> str:
+    """How many modes a group has and how far they are certified, for the terminal."""
+    modes = counted_modes(group)
+    if not group.checks.get("certified"):
+        return f"{modes}, NOT certified"
+    if certified_modes(group) == len(group.omega):
+        return f"{modes}, certified complete"
+    if certified_modes(group):
+        return f"{modes}, the modes certified complete"
+    if "upper_shift_hz" not in group.checks:
+        return modes
+    below, limit = group.checks["count_below_upper_shift"], group.checks["upper_shift_hz"]
+    return f"{modes}; of the body itself {below:.0f} are certified below {limit:.6g} Hz"
 
 
 def range_sentence(harmonic: int, r: SpeedRange) -> str:

@@ -18,7 +18,7 @@ from ..basis.integrals import modal_mass
 from ..data import Array, Indices, Mesh, ModalBasis, ModalGroup
 from ..errors import UserError
 from ..frames import rotation
-from ..reduced.coordinates import in_modes
+from ..reduced.coordinates import in_modes, own_kind
 
 BACKWARD, FORWARD, STANDING = "backward", "forward", "standing"
 
@@ -239,8 +239,8 @@ def _proved(g: ModalGroup) -> float:
     if not g.checks.get("certified") or not len(g.omega):
         return 0.0
     limit = float(g.checks.get("upper_shift_hz", 0.0))
-    held = int((g.frequency <= limit).sum())
-    if held >= g.checks.get("count_below_upper_shift", np.inf):
+    modes = np.array([kind != "attachment" for kind in own_kind(g)])
+    if int((g.frequency[modes] <= limit).sum()) >= g.checks.get("count_below_upper_shift", np.inf):
         return limit
     return float(g.frequency[-1]) if g.to_diagonal is None else 0.0  # eigenmodes cut at a frequency
 

@@ -1,55 +1,132 @@
-"""A deck whose parts touch: a body.toml for each body that it makes, and a case with its contacts and preload."""
+"""A file whose parts touch: a body.toml for each body that it makes, and a case with its contacts and preload."""
 
 from __future__ import annotations
 
 import re
 import shlex
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from ..data import Array, Joint, Mesh
-from ..files.store import write_text
-from ..mesh import UNITS, boundary_facets, read_mesh
+from ..data import Array, Indices, Joint, Mesh
+from ..errors import UserError
+from ..files.store import ordinary, write_text
+from ..mesh import UNITS, boundary_facets, read_mesh, suffix_of
 from ..mesh.cards import files_of
-from ..mesh.chosen import bodies, of_instances
-from .importing import Imported, body_name, import_file, refuse_taken
-from .parts import Part, Patch, Shape, add_lines, case_lines, drive
+from ..mesh.chosen import bodies, of_instances, with_parts
+from ..mesh.raw import joined
+from ..mesh.touching import touch_of, touching_facets
+from .importing import CAD, Imported, body_name, import_file, length_unit, refuse_taken
+from .parts import (
+    Part,
+    Patch,
+    add_lines,
+    apart_cad,
+    case_lines,
+    drive,
+    joint_lines,
+    meeting,
+    sentence,
+    shape_of,
+    with_names,
+)
 
 
-def import_deck(file: Path, folder: Path | None, unit: str) -> Imported:
-    """Import a file; a deck whose instances make several bodies in contact becomes an assembly.
+def import_deck(file: Path, folder: Path | None, unit: str | None) -> Imported:
+    """Import a file; a deck whose *CONTACT PAIRs separate bodies becomes an assembly.
 
     Raises:
         UserError: unreadable files, files that are there already.
     """
-    if file.suffix.lower() != ".inp" or unit not in UNITS or not _touches(file):
+    if suffix_of(file) != ".inp" or not _touches(file):
         return import_file(file, folder, unit)
+    unit = length_unit(unit, file)
     mesh = read_mesh(file, unit)
-    groups = bodies(mesh) if mesh.instances else []
-    joints = [(joint, ends) for joint in mesh.joints if (ends := _between(mesh, groups, joint))]
+    groups = bodies(mesh)
+    joints, told = _between_bodies(mesh, groups)
     if not joints:
-        return import_file(file, folder, unit)
+        made = import_file(file, folder, unit)
+        return Imported(made.path, (*made.told[:-1], *told, made.told[-1]))
+    meshes = [of_instances(mesh, group) for group in groups]
+    patches = list(_patches(joints, meshes, UNITS[unit]))
+    pairs = zip(patches, joints, strict=True)
+    said = [*told, *(_sentence(groups, patch, joint, unit) for patch, (joint, _) in pairs)]
+    force, texts = _pressed(mesh)
+    return _assembly(file, folder, unit, groups, meshes, patches, [*said, *texts], force)
+
+
+def import_apart(file: Path, folder: Path | None, unit: str | None) -> Imported:
+    """The solids of a CAD file, or the parts of a mesh that share no points, as bodies of an assembly.
+
+    Raises:
+        UserError: see `import_parts`; a file of one part, parts that touch nowhere.
+    """
+    if not ordinary(file).is_file():
+        raise UserError(f"{file}: there is no such file; correct the path")
+    if file.suffix.lower() in CAD:
+        return apart_cad(file, folder)
+    unit = length_unit(unit, file)
+    mesh = read_mesh(file, unit)
+    groups = bodies(mesh)
+    if len(groups) < 2:
+        raise UserError(f"{file}: is one part: there is nothing to set apart; leave --apart out")
+    meshes = [of_instances(mesh, group) for group in groups]
+    parts = _parts(file, folder, groups)
+    _, found = meeting(meshes, UNITS[unit])
+    patches = [replace(with_names(parts, patch, found), alone=False) for patch in found]
+    if not patches:
+        raise UserError(
+            f"{file}: its {len(groups)} parts touch nowhere, so there is no contact; leave --apart out"
+        )
+    said = [sentence(parts, patch, unit) for patch in patches]
+    return _assembly(file, folder, unit, groups, meshes, patches, said)
+
+
+def _parts(file: Path, folder: Path | None, groups: list[list[str]]) -> list[Part]:
     home = folder or Path(body_name(file.stem))
     names = [body_name("-".join(group)) for group in groups]
-    parts = [Part(file, name, home / name / "body.toml") for name in names]
+    return [Part(file, name, home / name / "body.toml") for name in names]
+
+
+def _assembly(
+    file: Path,
+    folder: Path | None,
+    unit: str,
+    groups: list[list[str]],
+    meshes: list[Mesh],
+    patches: list[Patch],
+    said: Sequence[str],
+    force: str = "1000.0]       # N",
+) -> Imported:
+    """Write the bodies and the case of a file's parts. force: end of the line of normal forces of the case."""
+    home, parts = folder or Path(body_name(file.stem)), _parts(file, folder, groups)
     refuse_taken(home / "case.toml", *(part.body for part in parts))
-    shapes = [_shape(of_instances(mesh, group), UNITS[unit]) for group in groups]
-    patches = [_patch(mesh, joint, ends, UNITS[unit]) for joint, ends in joints]
-    flat = [patch for patch in patches if patch.normal is not None]
     told: list[str] = []
     for number, (part, group) in enumerate(zip(parts, groups, strict=True)):
         told += import_file(file, part.body.parent, unit, group).told[:-1]
-        add_lines(part, _interfaces(number, patches, joints))
-    told += [_sentence(parts, patch, joint, unit) for patch, (joint, _) in zip(patches, joints, strict=True)]
-    force, texts = _pressed(mesh)
+        add_lines(part, joint_lines(parts, number, patches, unit))
+    flat = [patch for patch in patches if patch.normal is not None]
     if not flat:
-        return Imported(home, (*told, *texts, "warning: none of the contact pairs is flat, so no case is written"))
-    rows = drive(parts[flat[0].parts[0]], shapes[flat[0].parts[0]].points, flat[0])
+        return Imported(
+            home, (*told, *said, "warning: none of the contacts is flat, so no case is written")
+        )
+    shapes = [shape_of(mesh, UNITS[unit]) for mesh in meshes]
+    driven = flat[0].parts[0]
+    rows = drive(parts[driven], _free(meshes[driven], UNITS[unit]), flat[0])
     lines = case_lines(home, parts, flat, shapes, unit, rows, force)
     write_text(home / "case.toml", "\n".join(lines) + "\n")
     last = f"{home / 'case.toml'}: ready. Correct its numbers, then: microslip run {shlex.quote(str(home))}"
-    return Imported(home / "case.toml", (*told, *texts, last))
+    return Imported(home / "case.toml", (*told, *said, last))
+
+
+def _free(mesh: Mesh, metres: float) -> Array:
+    """(p, 3) points of the surface that the file does not hold, in units of `metres`; all if it holds every one."""
+    surface = np.unique(joined(f.ravel() for f in boundary_facets(mesh).values()))
+    held = joined(mesh.point_sets[name] for name in mesh.supports if name in mesh.point_sets)
+    free = np.setdiff1d(surface, held)
+    return mesh.points[free if len(free) else surface] / metres
 
 
 def _touches(file: Path) -> bool:
@@ -57,71 +134,107 @@ def _touches(file: Path) -> bool:
     return any(found.search(f.read_bytes()) for f in files_of(file) if f.is_file())
 
 
-def _between(mesh: Mesh, groups: list[list[str]], joint: Joint) -> tuple[int, int] | None:
-    """The two bodies whose faces touch; None where they are one, or where a face is none of the surface."""
-    ends = []
-    for face in (joint.slave, joint.master):
-        if face not in mesh.faces:
-            return None
-        points = mesh.face_points(face)
-        ends += [
-            number
-            for number, group in enumerate(groups)
-            if np.isin(points, np.concatenate([mesh.instances[n] for n in group])).all()
+Ends = tuple[int, int]
+
+
+def _between_bodies(
+    mesh: Mesh, groups: list[list[str]]
+) -> tuple[list[tuple[Joint, Ends]], list[str]]:
+    """Pairs whose faces are of two bodies, each once, with these; and what is said of the others."""
+    joints, told, seen = [], [], dict[frozenset[str], str]()
+    instances = with_parts(mesh).instances
+    for joint in mesh.joints:
+        pair = f"warning: {joint.where}: '{joint.slave}' on '{joint.master}'"
+        ends = [_body(mesh, instances, groups, face) for face in (joint.slave, joint.master)]
+        key = frozenset((joint.slave, joint.master))
+        if None in ends:
+            at = (joint.slave, joint.master)[ends.index(None)]
+            told.append(
+                f"{pair}: '{at}' is no face of the surface of one body; no contact is written"
+            )
+        elif ends[0] == ends[1]:
+            told.append(f"{pair}: both lie on one body, where no contact is read: they move freely")
+        elif key in seen:
+            told.append(f"{pair}: the pair is there already ({seen[key]}); it is taken once")
+        else:
+            seen[key] = joint.where
+            joints.append((joint, (int(ends[0] or 0), int(ends[1] or 0))))
+    return joints, told
+
+
+def _body(
+    mesh: Mesh, instances: Mapping[str, Indices], groups: list[list[str]], face: str
+) -> int | None:
+    """The number of the body that has a face; None where it is none of the surface, or of several bodies."""
+    if face not in mesh.faces:
+        return None
+    points = mesh.face_points(face)
+    inside = (
+        np.isin(points, np.concatenate([instances[n] for n in group])).all() for group in groups
+    )
+    return next((number for number, whole in enumerate(inside) if whole), None)
+
+
+def _patches(
+    joints: list[tuple[Joint, Ends]], meshes: list[Mesh], metres: float
+) -> Iterator[Patch]:
+    """The contacts, both faces cut to what touches (whole where they lie apart): the same in either order."""
+    taken: set[str] = set()
+    for joint, ends in joints:
+        names, bodies_ = (joint.slave, joint.master), [meshes[end] for end in ends]
+        whole = [body.faces[name] for body, name in zip(bodies_, names, strict=True)]
+        cut = [touching_facets(bodies_[i], bodies_[1 - i], whole[i], whole[1 - i]) for i in (0, 1)]
+        apart = not all(cut)
+        found = [
+            touch_of(body, w if apart else c)
+            for body, w, c in zip(bodies_, whole, cut, strict=True)
         ]
-    return (ends[0], ends[1]) if len(ends) == 2 and ends[0] != ends[1] else None
+        faces, sets = [], []
+        for i in (0, 1):
+            all_of_it = apart or sum(map(len, cut[i].values())) == sum(map(len, whole[i].values()))
+            plain = body_name(names[i], "contact")
+            name = plain if all_of_it else body_name(f"{names[i]}-on-{names[1 - i]}", "contact")
+            if name in taken and not all_of_it:
+                name = f"{name[:60]}-{len(taken)}"
+            taken.add(name)
+            faces.append(name)
+            sets.append(names[i] if all_of_it else "")
+        boxes = np.array([[*t.low, *t.high] for t in found]) / metres
+        area = min(t.area for t in found) / metres**2
+        normal = None if any(t.normal is None for t in found) else found[0].normal
+        friction = 0.2 if joint.friction is None else joint.friction
+        yield Patch(
+            ends, area, normal, boxes, (faces[0], faces[1]), False, friction, (sets[0], sets[1])
+        )
 
 
-def _shape(mesh: Mesh, metres: float) -> Shape:
-    surface = np.unique(np.concatenate([f.ravel() for f in boundary_facets(mesh).values()]))
-    points = mesh.points[surface] / metres
-    return Shape(points, np.array([points.min(axis=0), points.max(axis=0)]))
-
-
-def _patch(mesh: Mesh, joint: Joint, ends: tuple[int, int], metres: float) -> Patch:
-    """The contact by its slave face."""
-    area, normal = _area(mesh, joint.slave)
-    boxes = []
-    for face in (joint.slave, joint.master):
-        points = mesh.points[mesh.face_points(face)] / metres
-        boxes.append([*points.min(axis=0), *points.max(axis=0)])
-    faces = (body_name(joint.slave, "contact"), body_name(joint.master, "contact"))
-    friction = 0.2 if joint.friction is None else joint.friction
-    return Patch(ends, area / metres**2, normal, np.array(boxes), faces, True, friction)
-
-
-def _area(mesh: Mesh, face: str) -> tuple[float, Array | None]:
-    """m2, and the outward normal, None where the face is curved."""
-    from ..fem.discretise import face_blocks
-
-    vectors = np.concatenate([b.area.reshape(-1, 3) for b in face_blocks(mesh, face)])
-    area, mean = float(np.linalg.norm(vectors, axis=1).sum()), vectors.sum(axis=0)
-    return area, mean / np.linalg.norm(mean) if np.linalg.norm(mean) > 0.999 * area else None
-
-
-def _interfaces(number: int, patches: list[Patch], joints: list[tuple[Joint, tuple[int, int]]]) -> list[str]:
-    """Lines of a body.toml: the interfaces of its contacts, each once; curved ones as comments."""
-    lines: dict[str, list[str]] = {}
-    for patch, (joint, ends) in zip(patches, joints, strict=True):
-        for end, name, face in zip(ends, patch.faces, (joint.slave, joint.master), strict=True):
-            if end == number:
-                mark = "" if patch.normal is not None else "#"
-                quoted = face.replace("\\", "\\\\").replace('"', '\\"')
-                lines[name] = ["", f"{mark}[[interfaces]]", f'{mark}name = "{name}"', f'{mark}face = "{quoted}"']
-    return [line for own in lines.values() for line in own]
-
-
-def _sentence(parts: list[Part], patch: Patch, joint: Joint, unit: str) -> str:
-    one, other = (f"{parts[i].name}:{face}" for i, face in zip(patch.parts, patch.faces, strict=True))
+def _sentence(groups: list[list[str]], patch: Patch, joint: Joint, unit: str) -> str:
+    bodies_ = [body_name("-".join(groups[i])) for i in patch.parts]
+    one, other = (f"{body}:{face}" for body, face in zip(bodies_, patch.faces, strict=True))
     mu = "friction 0.2 is a guess" if joint.friction is None else f"friction {joint.friction:g}"
     kind = "" if patch.normal is not None else "; curved, written as comments"
-    return f"{joint.where}: {one} against {other}, {patch.area:.4g} {unit}2, {mu}{kind}"
+    cut = [
+        name
+        for name, whole in zip((joint.slave, joint.master), patch.sets, strict=True)
+        if not whole
+    ]
+    less = f"; of {' and '.join(map(repr, cut))} what touches" if cut else ""
+    return f"{joint.where}: {one} against {other}, {patch.area:.4g} {unit}2, {mu}{less}{kind}"
 
 
 def _pressed(mesh: Mesh) -> tuple[str, list[str]]:
     """End of the line of normal forces, and what to say of it: every contact is pressed by all bolts together."""
-    if not mesh.preloads:
-        return "1000.0]       # N", []
-    total = sum(abs(force) for _, force in mesh.preloads)
-    said = [f"{where}: preload {force:g} N" for where, force in mesh.preloads]
-    return f"{total:.6g}]       # N in each contact, of all bolts: write normal_force into one that has fewer", said
+    pressing = [(where, force) for where, force in mesh.preloads if force > 0]
+    said = [f"{where}: preload {force:g} N" for where, force in pressing]
+    said += [
+        f"warning: {where}: the preload {force:g} N presses nothing together: not used; correct its sign"
+        for where, force in mesh.preloads
+        if force <= 0
+    ]
+    if not pressing:
+        return "1000.0]       # N", said
+    total = sum(force for _, force in pressing)
+    return (
+        f"{total:.6g}]       # N in each contact, of all bolts: write normal_force into one that has fewer",
+        said,
+    )

@@ -15,12 +15,12 @@ from pathlib import Path
 import numpy as np
 
 from ..basis import write_basis
-from ..data import Mesh
+from ..data import Array, Indices, Material, Mesh
 from ..errors import UserError
 from ..files.store import ordinary, write_text
-from ..mesh import UNITS, mesh_problems, read_mesh
+from ..mesh import UNITS, mesh_problems, read_mesh, suffix_of, unit_of
 from ..mesh.chosen import of_instances
-from ..mesh.raw import Unread, in_file
+from ..mesh.raw import Unread, in_file, joined
 from ..units import SYSTEMS, usual_system
 from .meshing import run_apart
 
@@ -44,27 +44,29 @@ class Imported:
     told: tuple[str, ...]
 
 
-def import_file(file: Path, folder: Path | None, unit: str, instances: Sequence[str] = ()) -> Imported:
+def import_file(
+    file: Path, folder: Path | None, unit: str | None = None, instances: Sequence[str] = ()
+) -> Imported:
     """Write a body.toml around a CAD file, a mesh or matrices; nothing is copied, the file is named where it lies.
 
     Args:
         file: a CAD file, a mesh with or without materials, or the stiffness matrix of a pair. folder: of the new
-            body.toml, and the body's name; by default one of the file's name here. unit: of its lengths.
+            body.toml, and the body's name; by default one of the file's name here. unit: of its lengths; None: that
+        which the file tells, else mm.
         instances: those of a deck that are the body, all if none.
 
     Raises:
         UserError: unreadable, or there is a body.toml already.
     """
-    if unit not in UNITS:
-        raise UserError(f"--unit {unit}: unknown unit of length; choose one of {', '.join(UNITS)}")
     if not ordinary(file).is_file():
         raise UserError(f"{file}: there is no such file; correct the path")
+    unit = length_unit(unit, file)
     name = body_name((folder.resolve().name if folder else "") or file.stem)
     if file.suffix.lower() in _UNIVERSAL and _holds_modes(file):
         return _measured(file, (folder or Path(name)) / "basis.h5", unit, name)
     target = (folder or Path(name)) / "body.toml"
     refuse_taken(target)
-    kind = file.suffix.lower()
+    kind = suffix_of(file)
     made = _matrices if kind in MATRICES else _cad if kind in CAD else partial(_mesh, instances=instances)
     if made is _matrices and _in_metres(file):
         unit = "m"
@@ -74,6 +76,17 @@ def import_file(file: Path, folder: Path | None, unit: str, instances: Sequence[
     missing = "interfaces" if "[[supports]]" in lines else "supports, interfaces"
     last = f"{target}: ready. Add {missing} and loads, then: microslip run {shlex.quote(str(target.parent))}"
     return Imported(target, (*told, last))
+
+
+def length_unit(unit: str | None, file: Path) -> str:
+    """The unit of lengths that was asked for, else that which the file tells, else mm.
+
+    Raises:
+        UserError: an unknown one.
+    """
+    if unit is not None and unit not in UNITS:
+        raise UserError(f"--unit {unit}: unknown unit of length; choose one of {', '.join(UNITS)}")
+    return unit or unit_of(file) or "mm"
 
 
 def refuse_taken(*new: Path) -> None:
@@ -148,15 +161,32 @@ def _supports(mesh: Mesh) -> tuple[list[str], list[str]]:
     return lines, [*told, f"supports of the file: {named}"]
 
 
+def _fixed(mesh: Mesh) -> Indices:
+    """Degrees of freedom that the file's supports hold."""
+    none = np.zeros(0, dtype=np.int64)
+    held = [(mesh.point_sets.get(n, none), ways) for n, ways in mesh.supports.items()]
+    return joined(3 * s + "xyz".index(c) for s, ways in held for c in ways if c in "xyz")
+
+
+def _count(mesh: Mesh, held: bool) -> int:
+    """How many modes are asked for: those of the sector at a nodal diameter have one cut face."""
+    cut = 0 if mesh.sector is None else 3 * len(_points_of(mesh, mesh.sector.faces[0]))
+    ties = 0 if mesh.ties is None else mesh.ties.rows.shape[0]
+    fixed = len(np.unique(_fixed(mesh))) if held else 0
+    return max(min(USUAL, 3 * mesh.n_points - fixed - cut - ties - 2), 1)
+
+
+def _points_of(mesh: Mesh, name: str) -> Indices:
+    return mesh.set_points(name) if name in {*mesh.faces, *mesh.point_sets} else joined(())
+
+
 def _hold(mesh: Mesh) -> bool:
     """Whether the file's supports leave no rigid motion."""
     from ..fem.discretise import discretise
     from ..fem.tied import tied_upper
     from ..modal.rigid import free_motions, left_by
 
-    none = np.zeros(0, dtype=np.int64)
-    held = [(mesh.point_sets.get(n, none), ways) for n, ways in mesh.supports.items()]
-    fixed = np.concatenate([3 * s + "xyz".index(c) for s, ways in held for c in ways if c in "xyz"])
+    none, fixed = np.zeros(0, dtype=np.int64), _fixed(mesh)
     if mesh.ties is None:
         return free_motions(mesh.points, mesh.points.mean(axis=0), fixed).shape[1] == 0
     first, sets = 3 * mesh.n_points, mesh.ties.sets
@@ -255,10 +285,15 @@ def _cad(file: Path, folder: Path, unit: str) -> tuple[list[str], list[str]]:
     lines += ["#[[interfaces]]           # where it touches its neighbour", '#name = "contact"', '#face = "contact"']
     lines += ["#[[excitations]]          # a force of 1 N", '#name = "shaker"', "#point = [0.0, 0.0, 0.0]"]
     lines += ["#direction = [1.0, 0.0, 0.0]", "#[[monitors]]", '#name = "tip"', "#point = [0.0, 0.0, 0.0]"]
-    return [*lines, *_END], told
+    return [*lines, *_end()], told
 
 
-_END = ["", "[modes]", "count = 20", "", "[damping]", "ratio = 0.001"]
+USUAL = 20
+"""Modes that are asked for where the body has as many."""
+
+
+def _end(count: int = USUAL) -> list[str]:
+    return ["", "[modes]", f"count = {count}", "", "[damping]", "ratio = 0.001"]
 
 
 def _mesh(file: Path, folder: Path, unit: str, instances: Sequence[str] = ()) -> tuple[list[str], list[str]]:
@@ -293,10 +328,73 @@ def _mesh(file: Path, folder: Path, unit: str, instances: Sequence[str] = ()) ->
         lines += ["density = 7850.0          # the file brings no material that can be used: this is steel"]
         lines += ["young = 2.1e11", "poisson = 0.3"]
         told.append("warning: no material was taken from the file; body.toml says steel")
-    if mesh.temperature is not None:
-        lines += ["", "#[temperature]", '#from = "mesh"', '#scale = "C"']
-        told.append("temperatures: used only once [temperature] of body.toml is uncommented")
-    return [*lines, *held, *_sets(mesh, bool(held)), *_END], told
+    hot, said = _temperatures(mesh)
+    ring, words = _cyclic(mesh, UNITS[unit])
+    told += [*said, *words]
+    count = _count(mesh, "[[supports]]" in held)
+    if count < USUAL:
+        told.append(f"modes: {count} asked for, the body has few degrees of freedom")
+    return [*lines, *hot, *ring, *held, *_sets(mesh, bool(held)), *_end(count)], told
+
+
+def _temperatures(mesh: Mesh) -> tuple[list[str], list[str]]:
+    """Lines of [temperature] and what to say of it: in force where moduli hang on it and nothing is strained by it."""
+    hanging = [m for m in mesh.materials if m.temperature_table is not None]
+    said = [_softened(m, mesh) for m in hanging]
+    if mesh.temperature is None:
+        return [], [f"warning: {text}" for text in said]
+    free, actual = mesh.temperature[:, 0], _actual(mesh.temperature)
+    whole = not np.isnan(free).any() and np.ptp(free) <= 1e-9 * max(np.abs(free).max(), 1.0)
+    strained = bool((np.abs(actual - free) > 0).any()) and any(m.expansion.any() for m in mesh.materials)
+    lines = ["[temperature]", 'from = "mesh"', 'scale = "C"             # or "K"']
+    if hanging and whole and not strained:
+        return ["", *lines], [f"temperatures of the file are in force: {text}" for text in said]
+    told = "temperatures: used only once [temperature] of body.toml is uncommented"
+    if hanging:
+        why = "they strain the body as well" if strained else "not all of them are there"
+        return ["", *(f"#{line}" for line in lines)], [*(f"warning: {text}" for text in said), f"{told}; {why}"]
+    return ["", *(f"#{line}" for line in lines)], [told]
+
+
+def _actual(temperature: Array) -> Array:
+    """(n,) actual temperatures: the stress-free ones where the file gives no others."""
+    free, actual = temperature.T
+    return np.where(np.isnan(actual), free, actual)
+
+
+def _softened(material: Material, mesh: Mesh) -> str:
+    """How far a modulus falls at the temperatures of the file, and the frequencies with it."""
+    assert material.temperature_table is not None
+    T, factor = material.temperature_table.T
+    text = f"the modulus of {material.name} depends on temperature"
+    hot = np.zeros(0) if mesh.temperature is None else _actual(mesh.temperature)
+    if not np.isfinite(hot).any():
+        return f"{text}, but the file says none: that of its first row is taken"
+    least, most = np.interp([np.nanmin(hot), np.nanmax(hot)], T, factor)
+    low, high = sorted((least, most))
+    at = f"{low:.4g}" if high - low < 1e-6 else f"{low:.4g} to {high:.4g}"
+    return f"{text}: {at} of its first row at those of the file, so frequencies by a factor of {low**0.5:.4g}"
+
+
+def _cyclic(mesh: Mesh, metres: float) -> tuple[list[str], list[str]]:
+    """Lines of [rotation] and [cyclic] of a file that is a sector, and what to say of them.
+
+    The right face is the left one turned by 2 pi / sectors about the axis, so of the two it is the one ahead.
+    """
+    if (sector := mesh.sector) is None:
+        return [], []
+    axis = np.array(sector.axis) / np.linalg.norm(sector.axis)
+    if len([name for name in sector.faces if name in mesh.faces]) < 2:
+        told = f"warning: {sector.where}: '{sector.faces[0]}' and '{sector.faces[1]}' are no faces of the surface"
+        return [], [f"{told}; name two in [cyclic], without it the cut is free"]
+    point = metres * np.array(sector.point)
+    one, other = (mesh.points[mesh.face_points(n)].mean(axis=0) - point for n in sector.faces)
+    left, right = sector.faces if axis @ np.cross(one, other) > 0 else sector.faces[::-1]
+    numbers = [", ".join(f"{v:.9g}" for v in row) for row in (axis + 0.0, np.array(sector.point) + 0.0)]
+    lines = ["", "[rotation]", f"axis = [{numbers[0]}]", f"point = [{numbers[1]}]", "", "[cyclic]"]
+    lines += [f"sectors = {sector.sectors}", f"left = {json.dumps(left)}", f"right = {json.dumps(right)}"]
+    lines += [f"nodal_diameters = {list(sector.diameters)}"] if sector.diameters else []
+    return lines, [f"{sector.where}: one of {sector.sectors} cyclic sectors, '{right}' ahead of '{left}'"]
 
 
 def _pressed(mesh: Mesh) -> list[str]:
@@ -346,8 +444,8 @@ def _matrices(file: Path, folder: Path, unit: str) -> tuple[list[str], list[str]
     if usual_system(unit) is None:
         lines.append(f'units = "m-kg-s"          # of the matrices: {", ".join(SYSTEMS)}')
     if nodes is not None and nodes.suffix in _MESHES:
-        return [*lines, *_sets(read_mesh(nodes, unit)), *_END], told
-    return [*lines, "", "#[geometry.matrices.sets]", "#tip = [1, 2, 3]", *_END], told
+        return [*lines, *_sets(read_mesh(nodes, unit)), *_end()], told
+    return [*lines, "", "#[geometry.matrices.sets]", "#tip = [1, 2, 3]", *_end()], told
 
 
 def _mass_of(file: Path, names: list[str]) -> Path:

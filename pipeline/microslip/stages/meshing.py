@@ -16,7 +16,7 @@ from ..data import Indices, Material, Mesh
 from ..errors import UserError
 from ..files import store
 from ..mesh import mesh_problems, part_numbers, read_mesh
-from ..mesh.chosen import of_instances
+from ..mesh.chosen import of_instances, with_parts
 from ..mesh.raw import in_file
 from ..settings.body import FaceRule, MaterialSettings, implausible
 from ..units import SYSTEMS, usual_system
@@ -195,6 +195,11 @@ def load_mesh(job: Job, path: Path | None = None) -> tuple[Mesh, list[str]]:
         errors.append("the mesh of a cyclic sector falls into parts that share no points; join them")
     if errors:
         raise UserError("\n".join(f"{path}: {e}" for e in errors))
+    if mesh.sector is not None and job.settings.cyclic is None:
+        warnings.append(
+            f"{mesh.sector.where}: the body is one of {mesh.sector.sectors} cyclic sectors; without [cyclic] its cut "
+            "faces are free and every frequency is another one"
+        )
     size = float(np.ptp(mesh.points, axis=0).max())
     warnings = [in_file(path, w) for w in (*warnings, *told)]
     warnings += [f"{job.path}: {w}" for w in implausible(job.settings, size)]
@@ -294,13 +299,13 @@ def _answering(job: Job, mesh: Mesh, rule: FaceRule, place: str) -> dict[str, In
     if rule.cut or rule.box is None and rule.touching is None:
         raise UserError(f"{place}: a mesh file has no labels or colours and is not cut; use box or touching alone")
     found = boundary_facets(mesh)
-    if rule.touching is not None:
-        found = touching_facets(mesh, _other_mesh(job, rule.touching, place))
     if rule.box is not None:
         low, high = np.array(rule.box[:3]), np.array(rule.box[3:])
         slack = 1e-6 * np.ptp(mesh.points, axis=0).max()
         inside = ((mesh.points >= low - slack) & (mesh.points <= high + slack)).all(axis=1)
         found = faces_from_points(found, np.flatnonzero(inside), mesh.n_points)
+    if found and rule.touching is not None:
+        found = touching_facets(mesh, _other_mesh(job, rule.touching, place), found)
     if not found:
         where = f"lies on {rule.touching}" if rule.touching is not None else "is in the box; widen it"
         raise UserError(f"{place}: no facet of the surface {where}")
@@ -308,7 +313,14 @@ def _answering(job: Job, mesh: Mesh, rule: FaceRule, place: str) -> dict[str, In
 
 
 def _other_mesh(job: Job, name: str, place: str) -> Mesh:
-    file = job.folder / name
+    """The mesh that a face lies on: of another file, or what of the body's own deck is not this body."""
+    file, instances = job.folder / name, job.settings.geometry.instances
     if not store.ordinary(file).is_file():
         raise UserError(f"{place}: touching: there is no file {file}")
-    return read_mesh(file, job.settings.length_unit)
+    mesh = read_mesh(file, job.settings.length_unit)
+    if file.resolve() != job.mesh_file.resolve():
+        return mesh
+    others = [part for part in with_parts(mesh).instances if part not in instances]
+    if not instances or not others:
+        raise UserError(f"{place}: touching: names the body's own mesh, of which geometry.instances leaves nothing out")
+    return of_instances(mesh, others)

@@ -15,13 +15,22 @@ from typing import Any
 
 import numpy as np
 
-from ..data import Array
+from ..data import Array, Mesh
 from ..errors import UserError
 from ..files.store import ordinary, write_text
 from ..mesh import UNITS, boundary_facets, read_mesh
 from ..mesh.touching import touches
 from ..settings.toml import load_toml
-from .importing import CAD, MATRICES, Imported, body_name, cad_result, import_file, refuse_taken
+from .importing import (
+    CAD,
+    MATRICES,
+    Imported,
+    body_name,
+    cad_result,
+    import_file,
+    length_unit,
+    refuse_taken,
+)
 
 NORMAL_STIFFNESS, TANGENTIAL_STIFFNESS = 4e11, 2e11
 """N/m3, per area of a joint of machined steel: where an own case begins, not a property of it."""
@@ -60,7 +69,7 @@ class Patch:
     Attributes:
         parts: their numbers. area, normal: (3,) None where it is curved. boxes: (2, 6) low and high corner in either
             part. faces: its name in either part. alone: whether these two parts touch nowhere else. friction: its
-            coefficient.
+            coefficient. sets: of either part's file, those which the faces are wholly.
     """
 
     parts: tuple[int, int]
@@ -70,9 +79,10 @@ class Patch:
     faces: tuple[str, str] = ("", "")
     alone: bool = True
     friction: float = 0.2
+    sets: tuple[str, str] = ("", "")
 
 
-def import_parts(files: Sequence[Path], folder: Path | None, unit: str) -> Imported:
+def import_parts(files: Sequence[Path], folder: Path | None, unit: str | None) -> Imported:
     """Write a body.toml around each of several files, with its faces where it touches the others, and a case.toml.
 
     Args:
@@ -97,8 +107,8 @@ def import_parts(files: Sequence[Path], folder: Path | None, unit: str) -> Impor
         if not part.there:
             written = import_file(part.file, part.body.parent, unit).told[:-1]
             told += [text.splitlines()[0] for text in written]  # a table of surfaces stands in the body.toml as well
-        add_lines(part, _joints(parts, number, patches, unit))
-    told += [_sentence(parts, patch, unit) for patch in patches]
+        add_lines(part, joint_lines(parts, number, patches, unit))
+    told += [sentence(parts, patch, unit) for patch in patches]
     flat = [patch for patch in patches if patch.normal is not None]
     if not flat:
         return Imported(home, (*told, "warning: none of the patches is flat, so no case is written"))
@@ -154,7 +164,7 @@ def _refuse_named(parts: Sequence[Part], patches: Sequence[Patch]) -> None:
                 raise UserError(f"{parts[i].body}: has a face or an interface '{face}' already; rename or remove it")
 
 
-def import_apart(file: Path, folder: Path | None) -> Imported:
+def apart_cad(file: Path, folder: Path | None) -> Imported:
     """The solids of one CAD file as parts of an assembly, each in a file of its own beside its body.toml.
 
     Raises:
@@ -172,10 +182,9 @@ def import_apart(file: Path, folder: Path | None) -> Imported:
     return import_parts(made, home, "mm")
 
 
-def _unit_of(files: Sequence[Path], unit: str) -> str:
+def _unit_of(files: Sequence[Path], asked: str | None) -> str:
     """The unit of lengths: that of the bodies that are there, which must be one, else the one asked for."""
-    if unit not in UNITS:
-        raise UserError(f"--unit {unit}: unknown unit of length; choose one of {', '.join(UNITS)}")
+    unit = length_unit(asked, next((f for f in files if f.is_file()), files[0]))
     own = {f: tomllib.loads((f / "body.toml").read_text())["length_unit"] for f in files if f.is_dir()}
     if len({*own.values()}) > 1 or len(own) not in (0, len(files)) and unit not in own.values():
         said = ", ".join(f"{f} in {u}" for f, u in own.items())
@@ -209,10 +218,10 @@ def _found(parts: Sequence[Part], unit: str) -> tuple[list[Shape], list[Patch]]:
             "all of one kind; import the others one by one"
         )
     shapes, patches = (_of_cad if kinds == {True} else _of_meshes)([part.file for part in parts], unit)
-    return shapes, [_named(parts, patch, patches) for patch in patches]
+    return shapes, [with_names(parts, patch, patches) for patch in patches]
 
 
-def _named(parts: Sequence[Part], patch: Patch, patches: Sequence[Patch]) -> Patch:
+def with_names(parts: Sequence[Part], patch: Patch, patches: Sequence[Patch]) -> Patch:
     """The patch with its faces named after the other part, numbered where the two have several."""
     same = [p for p in patches if p.parts == patch.parts]
     end = "" if len(same) == 1 else f"-{1 + [p is patch for p in same].index(True)}"
@@ -231,7 +240,11 @@ def _of_cad(files: Sequence[Path], unit: str) -> tuple[list[Shape], list[Patch]]
 
 
 def _of_meshes(files: Sequence[Path], unit: str) -> tuple[list[Shape], list[Patch]]:
-    meshes, scale = [read_mesh(file, unit) for file in files], UNITS[unit]
+    return meeting([read_mesh(file, unit) for file in files], UNITS[unit])
+
+
+def meeting(meshes: Sequence[Mesh], scale: float) -> tuple[list[Shape], list[Patch]]:
+    """The shapes of meshes (m), and where they touch each other, in units of `scale` metres."""
     made = []
     for i, j in combinations(range(len(meshes)), 2):
         theirs = touches(meshes[j], meshes[i])
@@ -239,25 +252,40 @@ def _of_meshes(files: Sequence[Path], unit: str) -> tuple[list[Shape], list[Patc
             met = min(theirs, key=lambda t: float(np.linalg.norm(t.low + t.high - own.low - own.high)))
             boxes = np.array([[*t.low, *t.high] for t in (own, met)]) / scale
             made.append(Patch((i, j), own.area / scale**2, own.normal, boxes))
-    surfaces = [np.unique(np.concatenate([f.ravel() for f in boundary_facets(m).values()])) for m in meshes]
-    points = [m.points[s] / scale for m, s in zip(meshes, surfaces, strict=True)]
-    return [Shape(p, np.array([p.min(axis=0), p.max(axis=0)])) for p in points], made
+    return [shape_of(mesh, scale) for mesh in meshes], made
 
 
-def _joints(parts: Sequence[Part], number: int, patches: Sequence[Patch], unit: str) -> list[str]:
-    """Lines of a body.toml: the faces and interfaces where a part touches others, curved ones as comments."""
+def shape_of(mesh: Mesh, scale: float) -> Shape:
+    """The shape of a mesh (m), in units of `scale` metres."""
+    surface = np.unique(np.concatenate([f.ravel() for f in boundary_facets(mesh).values()]))
+    points = mesh.points[surface] / scale
+    return Shape(points, np.array([points.min(axis=0), points.max(axis=0)]))
+
+
+def joint_lines(parts: Sequence[Part], number: int, patches: Sequence[Patch], unit: str) -> list[str]:
+    """Lines of a body.toml: the faces and interfaces where a part touches others, each once, curved ones as comments.
+
+    A face that is wholly a set of the file needs no rule.
+    """
     lines: list[str] = []
+    written: set[str] = set()
     for patch in patches:
-        if number not in patch.parts:
+        if number not in patch.parts or patch.faces[patch.parts.index(number)] in written:
             continue
         mine = patch.parts.index(number)
+        name = patch.faces[mine]
+        written.add(name)
         other, mark = parts[patch.parts[1 - mine]], "" if patch.normal is not None else "#"
         beside = Path(os.path.relpath(other.file.resolve(), parts[number].body.parent.resolve())).as_posix()
+        if patch.sets[mine]:
+            face = json.dumps(patch.sets[mine], ensure_ascii=False)
+            lines += ["", f"{mark}[[interfaces]]", f'{mark}name = "{name}"', f"{mark}face = {face}"]
+            continue
         lines += ["", f"{mark}[[geometry.faces]]       # where it touches {other.name}, {patch.area:.4g} {unit}2"]
-        lines += [f'{mark}name = "{patch.faces[mine]}"', f"{mark}touching = {json.dumps(beside)}"]
+        lines += [f'{mark}name = "{name}"', f"{mark}touching = {json.dumps(beside)}"]
         if not patch.alone:
             lines += [f"{mark}box = [{', '.join(f'{v:.6g}' for v in _widened(patch.boxes[mine]))}]"]
-        lines += [f"{mark}[[interfaces]]", f'{mark}name = "{patch.faces[mine]}"', f'{mark}face = "{patch.faces[mine]}"']
+        lines += [f"{mark}[[interfaces]]", f'{mark}name = "{name}"', f'{mark}face = "{name}"']
     return lines
 
 
@@ -273,7 +301,7 @@ def add_lines(part: Part, lines: Sequence[str]) -> None:
         write_text(part.body, part.body.read_text(encoding="utf-8").rstrip("\n") + "\n" + "\n".join(lines) + "\n")
 
 
-def _sentence(parts: Sequence[Part], patch: Patch, unit: str) -> str:
+def sentence(parts: Sequence[Part], patch: Patch, unit: str) -> str:
     one, other = (parts[i].name for i in patch.parts)
     where = f"{one} touches {other} over {patch.area:.4g} {unit}2"
     return f"{where}: " + (

@@ -7,9 +7,9 @@ import numpy as np
 from ..data import Array, GyroscopicModes, ModalBasis, ModalGroup, SpeedRange
 from ..linalg.gyroscopic import stability_sentence
 from ..reduced.compliance import sentence
-from ..reduced.coordinates import own_kind
+from ..reduced.coordinates import certified_modes, own_kind
 from ..reduced.quality import sentences
-from ..report.words import contact_sentence
+from ..report.words import contact_sentence, counted_modes, proof
 from ..ring.expansion import certificate_words, certify_ring
 from ..ring.resonances import (
     eigenmodes,
@@ -45,10 +45,11 @@ def basis_summary(basis: ModalBasis) -> list[str]:
         return lines + _ring_summary(basis) + ranges
     for (_, harmonic), g in sorted(basis.groups.items()):
         state = f"{to_rpm(g.speed):g} rpm" + (f", {g.prestress} prestress" if g.prestress != "none" else "")
-        proof = between_stations([g]) or ("certified complete" if g.checks.get("certified") else "NOT certified")
+        modes = counted_modes(g)
+        known = f"{modes}, {between}" if (between := between_stations([g])) else proof(g)
         if basis.source == "measured":
-            proof = "measured: others may have been missed"
-        lines.append(f"{state}, nodal diameter {harmonic}: {len(g.omega)} modes, {proof}")
+            known = f"{modes}, measured: others may have been missed"
+        lines.append(f"{state}, nodal diameter {harmonic}: {known}")
         if g.N_r is not None:
             lines.append("  circulatory forces stand beside as N_r: microslip stability tells what they do")
         lines += contact_lines(g)
@@ -110,7 +111,9 @@ MOST_COLUMNS = 10
 
 
 def _hertz_line(frequency: Array, most: int = MOST_COLUMNS) -> str:
-    return "".join(f"{f:10.5g}" for f in frequency[:most])
+    """Columns of ten, of which the first stays empty: from 1e5 Hz on in whole Hz, from 1e9 on with two digits."""
+    shown = frequency[:most]
+    return "".join(f"{f:10.5g}" if f < 99999.5 else f"{f:10.0f}" if f < 1e9 else f"{f:10.2g}" for f in shown)
 
 
 def _first(g: ModalGroup, columns: int) -> str:
@@ -150,8 +153,10 @@ def _ring_summary(basis: ModalBasis) -> list[str]:
         groups = [eigenmodes(basis.groups[speed, k]) for k in harmonics_of(basis)]
         first = basis.groups[speed, harmonics_of(basis)[0]]
         state = f"{to_rpm(first.speed):g} rpm" + (f", {first.prestress} prestress" * (first.prestress != "none"))
-        proof = between_stations([basis.groups[speed, k] for k in harmonics_of(basis)])
-        lines.append(f"{state}: {proof or certificate_words(certify_ring(basis, speed))}")
+        known = between_stations([basis.groups[speed, k] for k in harmonics_of(basis)])
+        lines.append(f"{state}: {known or certificate_words(certify_ring(basis, speed))}")
+        if not certified_modes(first):
+            lines.append("  the frequencies below are those of the reduced sector, at or above the certified ones")
         lines += contact_lines(first)
         lines += [f"  {text}" for text in sentences(first, basis.reduction)]
         for g in groups:
