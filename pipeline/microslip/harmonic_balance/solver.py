@@ -12,7 +12,7 @@ import numpy as np
 
 from .. import continuation
 from ..data import Array
-from ..errors import UserError
+from ..errors import NotConverged, UserError
 from ..settings.mistakes import bounded
 from . import pseudo_transient
 from .forces import AFT
@@ -198,6 +198,18 @@ def solve(
     if not point.converged:
         point = replace(point, status=f"{_cause(at, point)}: {point.status}")
     return replace(point, iterations=spent, history=history)
+
+
+def resting(problem: Problem, Omega: float) -> Point:
+    """The state of rest under the steady loads, whatever the frequency (rad/s).
+
+    Raises:
+        NotConverged: none is found.
+    """
+    point = solve(still := problem.loaded(0.0), Omega, [np.zeros(still.size)], along_load=False)
+    if not point.converged:
+        raise NotConverged(f"no state of rest under the steady loads is found: {point.status}")
+    return point
 
 
 def _cause(at: AtFrequency, point: Point) -> str:
