@@ -30,7 +30,8 @@ def pressed(force: float, **contact: Any) -> Any:
         "monitor": "held:a", "direction": "x", "bodies": [{"name": "held"}, {"name": "loose"}],
         "excitations": [{"row": "held:push", "amplitude": 1.0},
                         {"row": "loose:press", "amplitude": force, "harmonic": 0}],
-        "contacts": [{"interface": "held:face", "against": "loose:face", "interference": 0.0, **law, **patch, **contact}],
+        "contacts": [{"interface": "held:face", "against": "loose:face", "interference": 0.0,
+                      **law, **patch, **contact}],
     }  # fmt: skip
     return ms.assemble(case, held=held.basis(), loose=loose.basis())
 

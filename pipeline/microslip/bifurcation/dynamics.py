@@ -18,8 +18,6 @@ from ..settings.arguments import check_fields, numbers
 from ..settings.numbers import Positive
 from ..units import Quantity
 
-jax.config.update("jax_enable_x64", True)
-
 Rate = Callable[[Any, Any, Any], Any]
 """f of x (n,), the parameter p and the angle (rad) of what drives it, in jax: (n,)."""
 

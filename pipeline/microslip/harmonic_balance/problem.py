@@ -19,6 +19,7 @@ import scipy.linalg
 
 from ..data import Array, ComplexArray, Indices
 from ..errors import UserError
+from ..process import prepare
 from ..settings.mistakes import bounded
 from ..system.assembly import Assembly, Linear, stuck_modes
 from . import blocks, by_hand, reduced
@@ -662,6 +663,7 @@ def of(
     Raises:
         UserError: no harmonic or cycle, a length or a share that is none, a name that no component has.
     """
+    prepare()
     assembly.check_names()
     if moves := [c.name for c in assembly.contacts if c.ground is not None]:
         raise UserError(f"contacts.{moves[0]}.ground: moves, which harmonic balance cannot take; use microslip orbit")

@@ -10,12 +10,11 @@ from __future__ import annotations
 from functools import partial
 from typing import Literal
 
-import jax
 import jax.numpy as jnp
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..contact.law import Array
+from ..contact.law import Array, program
 
 Coefficients = Literal["table", "book"]
 
@@ -56,7 +55,7 @@ LEAST = 0.1
 """g below which Kalker's asymptotes are used."""
 
 
-@partial(jax.jit, static_argnames="source")
+@partial(program, static_argnames="source")
 def creep_coefficients(ratio: ArrayLike, poisson: ArrayLike, source: Coefficients = "table") -> Array:
     """(4, ...) C11, C22, C23, C33.
 
