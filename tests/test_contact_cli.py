@@ -41,6 +41,8 @@ def python(program: str, **environment: str) -> str:
 
 COMPILED = """
 import jax, jax.numpy as jnp
+from microslip.process import prepare
+prepare()
 from microslip.contact.examples import EXAMPLES
 from microslip.contact.law import history
 seen = []
@@ -63,13 +65,13 @@ def test_compiled_programs_are_kept_between_runs(tmp_path: Path) -> None:
 
 @pytest.mark.skipif(os.name != "posix", reason="a folder that cannot be made")
 def test_without_a_place_for_the_cache_nothing_is_said() -> None:
-    program = "from microslip.contact import law; print(law.keep_compiled())"
+    program = "from microslip import process; print(process.keep_compiled())"
     assert python(program, XDG_CACHE_HOME="/proc/none").strip() == "None"
 
 
 def test_programs_that_were_not_used_for_longest_are_forgotten(tmp_path: Path) -> None:
     """Of ten kilobytes, all but what half of five allow; nothing before an hour has passed, or while there is room."""
-    from microslip.contact.law import forget
+    from microslip.process import forget
 
     for age in range(10):
         (tmp_path / f"{age}-cache").write_bytes(bytes(1000))

@@ -643,7 +643,7 @@ def test_first_order_spreads_as_samples_do(together: float, neighbours: float) -
         ({"of": "frequency", "deviation": 0.1, "component": "rotor"}, "rotor"),
         ({"of": "friction", "deviation": 0.1, "contact": "root"}, "root"),
         ({"of": "added_mass", "values": (0.001,), "at": "nose"}, "monitor"),
-        ({"of": "frequency", "deviation": 0.1, "together": 2.0}, "correlation"),
+        ({"of": "frequency", "deviation": 0.1, "together": 2.0}, "together"),
         ({"of": "friction", "deviation": 0.1, "component": "vane"}, "body: nothing depends"),
         ({"of": "frequency", "deviation": 0.1, "at": "probe"}, "at: nothing depends"),
         ({"of": "frequency", "values": (0.1, 0.0), "neighbours": 0.5}, "neighbours: nothing depends"),

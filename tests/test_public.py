@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import subprocess
 import sys
@@ -295,16 +296,75 @@ def test_importing_the_package_imports_nothing_else():
     )
 
 
-def test_contact_laws_run_on_one_thread_unless_more_are_asked_for():
-    """Their steps are too short to be shared: on two threads a motion in time takes three times the CPU time."""
-    code = """import importlib, os, microslip as ms
-ms.jenkins(1.0, 1.0)
-print(os.environ["NPROC"])
-os.environ["NPROC"] = "3"
-print(os.environ["NPROC"] if importlib.reload(importlib.import_module("microslip.contact.law")) else "")"""
-    known = {k: v for k, v in os.environ.items() if k != "NPROC"}
-    found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, env=known)
-    assert found.stdout.split() == ["1", "3"]
+PROCESS = """import json, os, sys, warnings
+def process():
+    import jax, scipy.signal, scipy.sparse.linalg, scipy.special  # which have filters of their own
+    return [dict(os.environ), {k: str(v) for k, v in jax.config.values.items()}, [str(f) for f in warnings.filters],
+            os.listdir(os.environ["XDG_CACHE_HOME"])]
+before = process()
+"""
+
+
+def processes(tmp_path, code, **environment):
+    """What a program prints, in JSON, whose cache folder is empty."""
+    known = {k: v for k, v in os.environ.items() if k not in ("NPROC", "XLA_FLAGS") and not k.startswith("JAX_")}
+    (tmp_path / "cache").mkdir(exist_ok=True)
+    known |= {"XDG_CACHE_HOME": str(tmp_path / "cache"), **environment}
+    command = [sys.executable, "-c", PROCESS + code]
+    return json.loads(subprocess.run(command, capture_output=True, text=True, check=True, env=known).stdout)
+
+
+def test_importing_changes_nothing_of_the_process(tmp_path):
+    """Every public name is loaded, and a structure made; what jax is loads its own things."""
+    code = """import microslip as ms
+for name in ms.__all__:
+    getattr(ms, name)
+ms.structure(1.0, 1.0, force={0: 1.0}, elements=[ms.jenkins(1.0, 1.0), ms.stop(1.0, 1.0), ms.polynomial({3: 1.0})])
+after = process()
+print(json.dumps([a == b for a, b in zip(before, after)]))"""
+    assert processes(tmp_path, code) == [True, True, True, True]
+
+
+@pytest.mark.slow
+def test_the_first_solve_makes_jax_ready_and_tells(tmp_path):
+    code = """import logging, microslip as ms
+said = []
+class Kept(logging.Handler):
+    def emit(self, record):
+        said.append(record.getMessage())
+logging.getLogger("microslip").addHandler(Kept())
+logging.getLogger("microslip").setLevel("INFO")
+system = ms.structure(1.0, 1.0, 0.1, force={0: 0.3}, elements=[ms.jenkins(1.0, 0.5)])
+ms.integrate(system, 0.1, settle=0, keep=1)
+import jax
+print(json.dumps([os.environ["NPROC"], "small_while_loop" in os.environ["XLA_FLAGS"], jax.config.jax_enable_x64,
+                  len(os.listdir(os.environ["XDG_CACHE_HOME"] + "/microslip/jax")) > 1, said == list(ms.prepare()),
+                  len(said)]))"""
+    assert processes(tmp_path, code) == ["1", True, True, True, True, 4]
+
+
+def test_a_host_can_keep_its_process(tmp_path):
+    """All but 64 bit, without which nothing is solved; its own threads, folder and limits are left."""
+    code = """import microslip as ms
+said, after = ms.prepare(compiler=False, cache=False), process()
+changed = [k for k in after[1] if after[1][k] != before[1][k]]
+print(json.dumps([len(said), changed, before[0] == after[0], before[2:] == after[2:]]))"""
+    assert processes(tmp_path, code) == [1, ["jax_enable_x64"], True, True]
+    code = """import microslip as ms
+try:
+    ms.prepare(double=False)
+except ms.UserError as error:
+    print(json.dumps(str(error)))"""
+    assert "double" in processes(tmp_path, code)
+    code = """import jax, microslip as ms
+said = ms.prepare()
+print(json.dumps([os.environ["NPROC"], jax.config.jax_compilation_cache_dir, os.listdir(os.environ["XDG_CACHE_HOME"]),
+                  jax.config.jax_persistent_cache_min_compile_time_secs]))"""
+    own = str(tmp_path / "own")
+    found = processes(tmp_path, code, NPROC="3", JAX_COMPILATION_CACHE_DIR=own)
+    assert found == ["3", own, [], 0.01]
+    more = {"JAX_COMPILATION_CACHE_DIR": own, "JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS": "2.5"}
+    assert processes(tmp_path, code, **more)[-1] == 2.5
 
 
 def test_gyroscopic_forces_in_the_damping_matrix_are_solved_exactly():
@@ -343,33 +403,33 @@ SLIDER = ms.structure(1.0, 1.0, 0.02, force={0: 0.3}, elements=[ms.jenkins(1.0, 
         (lambda: ms.structure(1.0, 1.0, damping_ratio=-0.1), "damping_ratio"),
         (lambda: ms.structure(1.0, 1.0, force={3: 1.0}), "there is no coordinate 3; the structure has 1"),
         (lambda: ms.structure(1.0, 1.0, output=2), "there is no coordinate 2"),
-        (lambda: ms.structure(1.0, 1.0, elements=ms.jenkins(1.0, 1.0)), "elements: give a list"),
+        (lambda: ms.structure(1.0, 1.0, elements=ms.jenkins(1.0, 1.0)), "structure: elements: must be a list"),
         (lambda: ms.structure(1.0, 1.0, damping_ratio=5.0), "5 % is 0.05"),
         (lambda: ms.polynomial([1.0, 2.0]), "give it by power"),
-        (lambda: ms.structure(1.0, 1.0, force={0: "1 N"}), "force of coordinate 0: '1 N' is no number"),
-        (lambda: ms.structure([[1, 2], [3]], 1.0), "M: is no matrix of numbers"),
+        (lambda: ms.structure(1.0, 1.0, force={0: "1 N"}), "structure: force: "),
+        (lambda: ms.structure([[1, 2], [3]], 1.0), "structure: M"),
         (lambda: ms.structure(1.0, 1.0, elements=[ms.jenkins(1.0, 1.0, at=0, to=0)]), "nothing moves it"),
         (lambda: ms.follow(ms.structure(1.0, 1.0, force={0: 1.0}), 0.5, 2.0), "no contact or element"),
         (lambda: ms.backbone(ms.structure(1.0, 1.0, force={0: 1.0}), 0.1, 1.0), "no contact or element"),
-        (lambda: ms.harmonic_response(SLIDER, ["300"]), "frequency: ['300'] is no number"),
+        (lambda: ms.harmonic_response(SLIDER, ["300"]), "harmonic_response: frequency"),
         (lambda: ms.follow(SLIDER, 0.5, 2.0, settings={"pionts": 10}), "there is no pionts"),
         (lambda: ms.follow(SLIDER, 1.0, 1.0), "stop: 1 is the start too"),
-        (lambda: ms.Element(5.0, 0), "5.0 is no law"),
+        (lambda: ms.Element(5.0, 0), "Element: law"),
         (lambda: ms.structure(1.0, 1.0, elements=[ms.jenkins(1.0, 1.0, at=5)]), "there is no coordinate 5"),
         (lambda: ms.structure(np.eye(2), np.eye(2), elements=[ms.stop(1.0, 0.1, at=[1.0])]), "weights of shape (1,)"),
         (lambda: ms.polynomial({}), "give one or more whole numbers"),
         (lambda: ms.polynomial({0: 1.0}), "powers [0]"),
         (lambda: ms.jenkins(0.0, 1.0), "jenkins: stiffness"),
         (lambda: ms.stop(1.0, np.inf), "stop: gap"),
-        (lambda: ms.follow(duffing(), 0.3, 2.5, unit="rpm"), "unit: 'rpm' is none of Hz, rad/s"),
+        (lambda: ms.follow(duffing(), 0.3, 2.5, unit="rpm"), "follow: unit"),
         (lambda: ms.follow(duffing(), 0.0, 2.5), "start"),
         (lambda: ms.follow(duffing(), 0.1, 1.0, over="load"), "frequency: is missing"),
-        (lambda: ms.follow(duffing(), 0.1, 1.0, over="time"), "over: 'time'"),
+        (lambda: ms.follow(duffing(), 0.1, 1.0, over="time"), "follow: over"),
         (lambda: ms.harmonic_response(duffing(), []), "frequency"),
         (lambda: ms.harmonic_response("blade", [1.0]), "str is no assembly"),
-        (lambda: ms.harmonic_response(duffing(), ["a"]), "frequency: ['a'] is no number"),
-        (lambda: ms.harmonic_response(duffing(), [1.0], harmonics=2.5), "harmonics: 2.5 is no whole number"),
-        (lambda: ms.two_tones(duffing(), 1.0, 1.3, harmonics=2.5), "harmonics: 2.5 is no whole number"),
+        (lambda: ms.harmonic_response(duffing(), ["a"]), "harmonic_response: frequency"),
+        (lambda: ms.harmonic_response(duffing(), [1.0], harmonics=2.5), "harmonic_response: harmonics"),
+        (lambda: ms.two_tones(duffing(), 1.0, 1.3, harmonics=2.5), "two_tones: harmonics"),
         (lambda: ms.harmonic_response(duffing(), [1.0]).harmonics("tip"), "read-out 'tip': the response has q"),
         (lambda: rubbing(interface="rigth", normal_force=1.0),
          "no interface 'rigth'"),
@@ -405,7 +465,7 @@ def test_names_that_are_not_there():
         (lambda: ms.backbone(duffing(), 1e-3, 1.0, mode=9), "there is no mode 9; there are 1, counted from 0"),
         (lambda: ms.harmonic_response(ms.structure(1.0, 1.0, output=0), [1.0]), "nothing drives it"),
         (lambda: ms.harmonic_response(duffing(), [1.0], harmonics=3, samples=8), "8 are too few for 3 harmonics"),
-        (lambda: ms.jenkins("stiff", 1.0), "jenkins: stiffness: 'stiff' is no number"),
+        (lambda: ms.jenkins("stiff", 1.0), "jenkins: stiffness"),
         (lambda: ms.structure(1.0, 1.0, force={5: 1.0}), "structure: force: there is no coordinate 5"),
     ],
 )

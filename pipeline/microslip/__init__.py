@@ -16,6 +16,7 @@ __version__ = "0.1.0"
 
 PUBLIC = {
     "errors": "UserError",
+    "process": "prepare",
     "basis": "read_basis write_basis",
     "results.files": "read_response",
     "time_domain.recorded": "load read_orbits",

@@ -6,9 +6,10 @@ import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
+from pydantic import BeforeValidator
 
 from .case.assemble import Built
 from .case.contacts import swept
@@ -21,13 +22,13 @@ from .harmonic_balance.nonlinear_modes import Backbone
 from .harmonic_balance.problem import Problem
 from .harmonic_balance.solved import Motions
 from .harmonic_balance.solver import sweep
-from .settings.mistakes import bounded, whole
+from .settings.arguments import Count, Frequencies, Index, Rows, Text, Vector, checked
+from .settings.mistakes import bounded
+from .settings.numbers import Number, Positive
 from .system.assembly import Assembly
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
-
-    from numpy.typing import ArrayLike
 
     from .bifurcation.diagram import Diagram
     from .bifurcation.dynamics import Dynamics
@@ -38,8 +39,17 @@ if TYPE_CHECKING:
     from .time_domain.orbit import Orbit
 
 Report = Callable[[str], None]
-System = Assembly | Built | Problem
+
+
+def _to_be_analysed(system: Any) -> Any:
+    if not isinstance(system, Assembly | Built | Problem):
+        raise ValueError(f"{type(system).__name__} is no assembly; make one by structure or assemble")
+    return system
+
+
+System = Annotated[Assembly | Built | Problem, BeforeValidator(_to_be_analysed)]
 """What is analysed: bodies with contacts, loads and read-outs; such as a case describes; or their balance."""
+Unit = Literal["Hz", "rad/s"]
 
 IN_TIME = 25
 """Harmonics of the vibration that a motion in time starts on."""
@@ -57,9 +67,6 @@ def balanced(system: System, harmonics: int | None = None, samples: int | None =
     Raises:
         UserError: a case whose contacts wait for a normal force.
     """
-    for name, value in (("harmonics", harmonics), ("samples", samples)):
-        if value is not None:
-            whole(name, value, ge=1)
     if isinstance(system, Problem):
         if harmonics is not None or samples is not None:
             raise UserError(
@@ -70,8 +77,6 @@ def balanced(system: System, harmonics: int | None = None, samples: int | None =
         _pressed(system)
         asked = {"harmonics": harmonics, "samples": samples}
         return problem_of(system, None, **{key: n for key, n in asked.items() if n is not None})
-    if not isinstance(system, Assembly):
-        raise UserError(f"system: {type(system).__name__} is no assembly; make one by structure or assemble")
     H = 3 if harmonics is None else harmonics
     if samples is not None and samples < 4 * H:
         raise UserError(f"samples: {samples} are too few for {H} harmonics; take {4 * H} at least, better {16 * H}")
@@ -109,9 +114,10 @@ def _driven(problem: Problem) -> Problem:
     return problem
 
 
+@checked
 def harmonic_response(
-    system: System, frequency: Any, *, harmonics: int | None = None, samples: int | None = None,
-    unit: Literal["Hz", "rad/s"] = "Hz", report: Report = lambda _: None,
+    system: System, frequency: Frequencies, *, harmonics: Count | None = None, samples: Count | None = None,
+    unit: Unit = "Hz", report: Report = lambda _: None,
 ) -> Motions:  # fmt: skip
     """Steady forced vibration at given frequencies, by harmonic balance.
 
@@ -137,17 +143,17 @@ def harmonic_response(
         [0.221, 0.3, 0.669]
     """
     problem = _driven(balanced(system, harmonics, samples))
-    bounded("frequency", frequency)
-    asked = np.atleast_1d(np.asarray(frequency, dtype=float)) * _hertz(unit)
-    points, hertz = sweep(problem, asked, report), _hertz(unit)
+    asked = np.atleast_1d(np.asarray(frequency, dtype=float)) * HERTZ[unit]
+    points, hertz = sweep(problem, asked, report), HERTZ[unit]
     known = {} if hertz == 1 else {"parameter": asked / hertz}
     return Motions("response", points, lambda _: problem, over=_over("frequency", unit), known=known)
 
 
+@checked
 def two_tones(
-    system: Assembly | Built, first: Any, second: Any, *, free: bool = False, harmonics: int = 5,
-    samples: int | None = None, turns: int | None = None, start: Orbit | None = None,
-    unit: Literal["Hz", "rad/s"] = "Hz", kept: Kept | None = None, report: Report = lambda _: None,
+    system: System, first: Frequencies, second: Frequencies, *, free: bool = False, harmonics: Count = 5,
+    samples: Count | None = None, turns: Count | None = None, start: Orbit | None = None,
+    unit: Unit = "Hz", kept: Kept | None = None, report: Report = lambda _: None,
 ) -> Solved:  # fmt: skip
     """Quasi-periodic vibration of two frequencies without a common period, by harmonic balance over both.
 
@@ -181,16 +187,11 @@ def two_tones(
     """
     from .harmonic_balance import tones, two_tone
 
-    assembly = _pressed(system) if isinstance(system, Built) else system
-    if not isinstance(assembly, Assembly):
-        raise UserError(f"system: {type(system).__name__} is no assembly; make one by structure or assemble")
-    turn = 2 * np.pi * _hertz(unit)
-    for key, f in (("first", first), ("second", second)):
-        bounded(key, f, gt=0)
+    for key, given, has in (("start", start, "time"), ("kept", kept, "of")):
+        if given is not None and not hasattr(given, has):
+            raise UserError(f"two_tones: {key}: {given!r} is none; leave it out, or see its description")
+    assembly, turn = whole_of(system), 2 * np.pi * HERTZ[unit]
     one, two = (np.atleast_1d(np.asarray(f, dtype=float)) * turn for f in (first, second))
-    for key, count in (("harmonics", harmonics), ("samples", samples), ("turns", turns)):
-        if count is not None:
-            whole(key, count, ge=1)
     try:
         one, two = np.broadcast_arrays(one, two)
     except ValueError:
@@ -222,10 +223,11 @@ def _check_tones(assembly: Assembly, first: np.ndarray, second: np.ndarray, free
         raise UserError("first: no load has this frequency; give force to structure, or a load of tone 1 in a case")
 
 
+@checked
 def follow(
-    system: System, start: float, stop: float, *,
-    over: Literal["frequency", "load", "normal_force"] = "frequency", frequency: float | None = None,
-    harmonics: int | None = None, samples: int | None = None, unit: Literal["Hz", "rad/s"] = "Hz",
+    system: System, start: Number, stop: Number, *,
+    over: Literal["frequency", "load", "normal_force"] = "frequency", frequency: Positive | None = None,
+    harmonics: Count | None = None, samples: Count | None = None, unit: Unit = "Hz",
     settings: Settings | Mapping[str, Any] | None = None, report: Report = lambda _: None,
 ) -> Motions:  # fmt: skip
     """Steady forced vibration along the whole curve of its motions, through folds, stable or not.
@@ -257,7 +259,7 @@ def follow(
         >>> curve.folds.round(3).tolist()
         [1.463, 1.156]
     """
-    problem, hertz = _driven(balanced(system, harmonics, samples)), _hertz(unit)
+    problem, hertz = _driven(balanced(system, harmonics, samples)), HERTZ[unit]
     _bends(problem, "harmonic_response")
     if start == stop:
         raise UserError(f"stop: {stop:g} is the start too; give two ends between which the curve is followed")
@@ -265,13 +267,11 @@ def follow(
         bounded("start", start, gt=0)
         bounded("stop", stop, gt=0)
         family = families.of_frequency(problem, start * hertz, stop * hertz)
-    elif over in ("load", "normal_force"):
+    else:
         if frequency is None:
             raise UserError(f"frequency: is missing: at which frequency does the {over.replace('_', ' ')} vary?")
         make = families.of_load if over == "load" else families.of_normal_force
         family = make(problem, frequency * hertz, start, stop)
-    else:
-        raise UserError(f"over: '{over}' is none of frequency, load, normal_force")
     found = families.from_both_ends(family, report, settings)
     family = replace(family, unit=family.unit * hertz, words=unit) if over == "frequency" else family
     points = [p for one in found for p in one.points]
@@ -290,9 +290,10 @@ def follow(
     )  # fmt: skip
 
 
+@checked
 def backbone(
-    system: System, low: float, high: float, *, mode: int = 0, output: int = 0,
-    harmonics: int | None = None, samples: int | None = None, report: Report = lambda _: None,
+    system: System, low: Positive, high: Positive, *, mode: Index = 0, output: Index = 0,
+    harmonics: Count | None = None, samples: Count | None = None, report: Report = lambda _: None,
 ) -> Backbone:  # fmt: skip
     """A nonlinear mode: frequency and damping ratio over the amplitude, from sticking contacts to sliding ones.
 
@@ -316,13 +317,12 @@ def backbone(
     """
     problem = balanced(system, harmonics, samples)
     count = len(problem.assembly.outputs)
-    if not 0 <= output < count:
+    if output >= count:
         has = f"there are {count}, counted from 0" if count else "nothing is read; give output to structure"
         raise UserError(f"output: there is no read-out {output}; {has}")
-    if not 0 <= mode < (modes := len(problem.parts[1][0].M)):
+    if mode >= (modes := len(problem.parts[1][0].M)):
         raise UserError(f"mode: there is no mode {mode}; there are {modes}, counted from 0")
     _bends(problem, "the eigenvalues of its matrices")
-    bounded("low", low, gt=0)
     if not high > low:
         raise UserError(f"high: {high:g} is not above low, {low:g}; give the smaller amplitude first")
     return nonlinear_modes.backbone(problem, low, high, mode, output, report=report)
@@ -338,18 +338,13 @@ def _over(over: str, unit: str) -> str:
     return "Omega" if over == "frequency" and unit == "rad/s" else over
 
 
-def _hertz(unit: str) -> float:
-    if unit not in HERTZ:
-        raise UserError(f"unit: '{unit}' is none of {', '.join(HERTZ)}")
-    return HERTZ[unit]
-
-
+@checked
 def integrate(
-    system: System, frequency: float, *, second: float | None = None, unit: Literal["Hz", "rad/s"] = "Hz",
-    settle: int = 100, keep: int = 20,
-    samples: int = 256, steps: int | None = None,
+    system: System, frequency: Positive, *, second: Positive | None = None, unit: Unit = "Hz",
+    settle: Index = 100, keep: Count = 20,
+    samples: Count = 256, steps: Count | None = None,
     start: Literal["static", "rest", "balance"] | Mapping[str, Any] = "static",
-    method: Literal["stepper", "reference"] = "stepper", tolerance: float = 1e-9, file: Path | str | None = None,
+    method: Literal["stepper", "reference"] = "stepper", tolerance: Positive = 1e-9, file: Path | Text | None = None,
     report: Report = lambda _: None,
 ) -> Orbit:  # fmt: skip
     """Motion in time under harmonic loads, from rest (Sextro, section 4.1).
@@ -395,9 +390,7 @@ def integrate(
     from .time_domain import equations, orbit, recorded, reference, starts
 
     assembly = whole_of(system)
-    if method not in ("stepper", "reference"):
-        raise UserError(f"method: '{method}' is none of stepper, reference")
-    turn = 2 * np.pi * _hertz(unit)
+    turn = 2 * np.pi * HERTZ[unit]
     found = equations.of(assembly, turn * frequency, None if second is None else turn * second)
     if second is not None and start == "balance":
         raise UserError('second: "balance" begins on a periodic vibration; take "static" or "rest"')
@@ -418,9 +411,10 @@ def integrate(
     return recorded.run(file, [asked], report=report)[0]
 
 
+@checked
 def integrate_many(
-    system: System, frequency: float, displacements: ArrayLike, velocities: ArrayLike, *,
-    unit: Literal["Hz", "rad/s"] = "Hz", settle: int = 100, keep: int = 20, steps: int | None = None,
+    system: System, frequency: Positive, displacements: Rows, velocities: Rows, *,
+    unit: Unit = "Hz", settle: Index = 100, keep: Count = 20, steps: Count | None = None,
     exponents: bool = False,
 ) -> Reached:  # fmt: skip
     """Which motions many starts lead to: all of them integrated by one compiled program, for basins of attraction.
@@ -447,15 +441,15 @@ def integrate_many(
     """
     from .time_domain import equations, many
 
-    assembly = whole_of(system)
-    found = equations.of(assembly, 2 * np.pi * frequency * _hertz(unit))
+    found = equations.of(whole_of(system), 2 * np.pi * frequency * HERTZ[unit])
     return many.run(found, np.asarray(displacements), np.asarray(velocities), settle, keep, steps, exponents)
 
 
+@checked
 def run_up(
-    system: System, start: float, stop: float, time: float, *, unit: Literal["Hz", "rad/s"] = "Hz",
-    order: int = 1, euler: tuple[str, ...] = (), samples: int = 256, steps: int | None = None,
-    begin: Literal["static", "rest"] = "static", file: Path | str | None = None, report: Report = lambda _: None,
+    system: System, start: Positive, stop: Positive, time: Positive, *, unit: Unit = "Hz",
+    order: Count = 1, euler: tuple[str, ...] = (), samples: Count = 256, steps: Count | None = None,
+    begin: Literal["static", "rest"] = "static", file: Path | Text | None = None, report: Report = lambda _: None,
 ) -> Orbit:  # fmt: skip
     """Motion in time from rest while the frequency of the loads goes linearly from one to another, up or down.
 
@@ -487,21 +481,21 @@ def run_up(
     from .time_domain import equations, orbit, recorded
     from .time_domain.ramp import Ramp
 
-    assembly = whole_of(system)
-    turn = 2 * np.pi * _hertz(unit)
+    turn = 2 * np.pi * HERTZ[unit]
     ramp = Ramp(turn * start, turn * stop, time, order, euler)
-    found = equations.of_ramp(assembly, ramp)
+    found = equations.of_ramp(whole_of(system), ramp)
     if file is None:
         return orbit.run(found, 0, ramp.periods, samples, steps, begin, report)
     asked = recorded.Asked(f"{start:.6g} to {stop:.6g} {unit}", found, 0, ramp.periods, samples, steps, begin)
     return recorded.run(file, [asked], report=report)[0]
 
 
+@checked
 def bifurcate(
-    system: Dynamics | Callable[[float], Assembly | Built], start: float, stop: float, *, x: Any = None,
-    frequency: float | None = None, unit: Literal["Hz", "rad/s"] = "Hz", orbits: bool = True, doublings: int = 1,
-    attractors: Sequence[float] = (), starts: int = 64, deflate: Sequence[float] = (), nodes: int = 32,
-    step: float = 0.08, points: int = 400, report: Report = lambda _: None,
+    system: Dynamics | Callable[[float], Assembly | Built], start: Number, stop: Number, *, x: Vector | None = None,
+    frequency: Positive | None = None, unit: Unit = "Hz", orbits: bool = True, doublings: Index = 1,
+    attractors: Sequence[Number] = (), starts: Count = 64, deflate: Sequence[Number] = (), nodes: Count = 32,
+    step: Positive = 0.08, points: Count = 400, report: Report = lambda _: None,
 ) -> Diagram:  # fmt: skip
     """Equilibria over a parameter, their Hopf points, and the periodic orbits that are born there, stable or not.
 
@@ -536,26 +530,30 @@ def bifurcate(
     from .bifurcation import diagram, mechanics
     from .sliding import equilibrium, of
 
-    bounded("start, stop", [start, stop])
     if start == stop:
         raise UserError("stop: is the start; give two different values of the parameter")
     if isinstance(system, diagram.Dynamics):
         made = replace(system, parameter_scale=abs(stop - start))
         begin = np.zeros(made.count) if x is None else np.asarray(x, dtype=float)
+    elif not callable(system):
+        raise UserError(f"bifurcate: system: {system!r} is none; give Dynamics, or the assembly as a function of p")
     else:
-        Omega = None if frequency is None else 2 * np.pi * frequency * _hertz(unit)
+        Omega = None if frequency is None else 2 * np.pi * frequency * HERTZ[unit]
         made = mechanics.dynamics(lambda p: whole_of(system(p)), min(start, stop), max(start, stop), Omega)
         begin = equilibrium(of(whole_of(system(start)))) if x is None else np.asarray(x, dtype=float)
+    if len(begin) != made.count:
+        raise UserError(f"bifurcate: x: has {len(begin)} numbers; the system has {made.count}")
     asked = diagram.Asked(
         start, stop, orbits, doublings, nodes, step, points, tuple(attractors), starts, deflate=tuple(deflate)
     )
     return diagram.diagram(made, begin, asked, report=report)
 
 
+@checked
 def mistune(
-    system: Assembly, scatter: Scatter | Sequence[Scatter], frequency: ArrayLike, *, samples: int = 100,
-    until: float | None = None, rare: int = 0, seed: int = 0, stuck: bool = False, harmonics: int = 3,
-    points: int | None = None, workers: int = 1, executor: Executor | None = None, report: Report = lambda _: None,
+    system: Assembly, scatter: Scatter | Sequence[Scatter], frequency: Frequencies, *, samples: Count = 100,
+    until: Positive | None = None, rare: Index = 0, seed: Index = 0, stuck: bool = False, harmonics: Count = 3,
+    points: Count | None = None, workers: Count = 1, executor: Executor | None = None, report: Report = lambda _: None,
 ) -> Ensemble:  # fmt: skip
     """Whole rings whose sectors differ, sample by sample: how much higher the highest blade gets (Sextro section 5.6).
 

@@ -5,9 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
+from pydantic import BeforeValidator
 
 from . import sliding
 from .analyses import whole_of
@@ -17,7 +18,9 @@ from .case.contacts import swept
 from .case.settings import UNPRESSED, CaseSettings, unasked_sweep
 from .data import ModalBasis
 from .errors import UserError
-from .settings.mistakes import bounded, validate
+from .settings.arguments import Index, Text, Vector, checked
+from .settings.mistakes import unfit, validate
+from .settings.numbers import NotNegative, Number, Positive
 from .settings.toml import load_toml
 from .stages.job import job_of, open_job
 from .stages.places import modal_files
@@ -30,6 +33,19 @@ if TYPE_CHECKING:
 Report = Callable[[str], None]
 
 
+def _from_to(value: Any) -> Any:
+    if not isinstance(value, list | tuple | np.ndarray) or len(value) != 2:
+        raise ValueError("must be two numbers, from and to")
+    if said := unfit([v for v in value if not isinstance(v, float) or not math.isinf(v)]):
+        raise ValueError(said)
+    if not value[0] < value[1]:
+        raise ValueError(f"{value[0]:g} to {value[1]:g} has no area; give the smaller number first")
+    return value
+
+
+Window = Annotated[Any, BeforeValidator(_from_to)]
+
+
 def sample() -> Path:
     """The modal file that travels with the package: a twisted steel vane, 8 x 40 x 160 mm.
 
@@ -38,6 +54,7 @@ def sample() -> Path:
     return Path(__file__).parent / "samples" / "basis.h5"
 
 
+@checked
 def modes(
     body: Path | str | Mapping[str, Any], folder: Path | str = ".", report: Report = lambda _: None
 ) -> ModalBasis:
@@ -71,10 +88,12 @@ def modes(
     return read_basis(modal.modes_stage(open_job(body, root=folder), report=report)[0])
 
 
+@checked
 def stability(
-    body: Any, *, frequency: tuple[float, float] | None = None, growth: tuple[float, float] = (-math.inf, math.inf),
-    over: str | None = None, values: Any = None, at: Mapping[str, float] | None = None, accuracy: float = 1e-8,
-    neutral: float = 0.0, certify: bool = True, speed: int | None = None, report: Report = lambda _: None,
+    body: Any, *, frequency: Window | None = None, growth: Window = (-math.inf, math.inf),
+    over: Text | None = None, values: Vector | None = None, at: Mapping[str, Number] | None = None,
+    accuracy: Positive = 1e-8, neutral: NotNegative = 0.0, certify: bool = True, speed: Index | None = None,
+    report: Report = lambda _: None,
 ) -> Spectrum | Diagram:  # fmt: skip
     """Roots s of (s^2 M + s C + K) x = 0 in a window, none missed: what grows by itself, and how fast.
 
@@ -121,8 +140,9 @@ def stability(
     return roots_of(body, frequency, growth, over, values, at, accuracy, neutral, certify, speed, report)
 
 
+@checked
 def assemble(
-    case: Path | str | Mapping[str, Any], folder: Path | str = ".", *, normal_force: float | None = None,
+    case: Path | str | Mapping[str, Any], folder: Path | str = ".", *, normal_force: NotNegative | None = None,
     report: Report = lambda _: None, **bases: ModalBasis | Path | str,
 ) -> Built:  # fmt: skip
     """An assembly of bodies with contacts, loads and read-outs.
@@ -161,7 +181,6 @@ def assemble(
         files = modal_files(settings, path, Path(folder), report, {name: Path() for name in found})
         found |= {b.name: read_basis(files[b.name]) for b in missing}
     if normal_force is not None:
-        bounded("normal_force", normal_force, ge=0)
         bare = [swept(c) and not settings.is_thrown(c) for c in settings.contacts]
         pressed = {"normal_force": normal_force}
         own = [c.model_copy(update=pressed) if b else c for c, b in zip(settings.contacts, bare, strict=True)]

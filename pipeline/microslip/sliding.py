@@ -22,6 +22,7 @@ import scipy.linalg
 
 from .data import Array
 from .errors import NotConverged, UserError
+from .process import prepare
 from .system.assembly import Assembly, Contact
 
 
@@ -75,6 +76,7 @@ def of(assembly: Assembly, like: Array | None = None) -> Sliding:
         UserError: a contact that is not smooth, wavy ground, modes that are not real, compliance beside the modes;
             bodies that move by other shapes than the other assembly's, or have loss factors.
     """
+    prepare()
     assembly = assembly.unrolled()
     assembly.check_names()
     harmonics = sorted({x.harmonic for x in assembly.loads if x.harmonic})

@@ -56,6 +56,7 @@ from ..files.declared import (
 from ..files.hdf5 import put, put_scale, sealed
 from ..files.hostile import DAMAGE, inspect, refuse_damaged, short
 from ..files.store import ordinary
+from ..settings.arguments import checked
 from ..topology import CELL_TYPES, FACET_CORNERS
 from .checks import TOLERANCES, Check, check_basis
 
@@ -87,6 +88,7 @@ _FACET_NODES = {"triangle": 3, "triangle6": 6, "quad": 4, "quad8": 8, "quad9": 9
 # writing ---------------------------------------------------------------------------------------------------------
 
 
+@checked
 def write_basis(path: Path | str, basis: ModalBasis) -> None:
     """Write a modal file, complete or absent.
 
@@ -364,6 +366,7 @@ def _accept(file: h5py.File, path: Path) -> None:
         raise UserError(f"{path}: is damaged or no modal file ({short(error)}); {AGAIN}") from error
 
 
+@checked
 def read_basis(path: Path | str) -> ModalBasis:
     """Read a modal file.
 

@@ -13,6 +13,7 @@ from ..continuation import Lost, Scaled, Settings, newton, start
 from ..continuation.curve import State
 from ..data import Array
 from ..errors import UserError
+from ..process import prepare
 from . import deflation, equilibria, floquet, flow, orbits, switching
 from .basin import Attractor, attractors
 from .branches import EQUILIBRIA, Branch, Collected, joined, of_orbits
@@ -120,6 +121,7 @@ def diagram(
     Raises:
         UserError: there is no equilibrium, or no orbit of a driven system, near x.
     """
+    prepare()
     work = _Work(system, asked, kept, keep, report)
     if system.frequency is not None:
         _doublings(work, work.add(DRIVEN, lambda: _driven(work, x)), asked.doublings)

@@ -5,16 +5,18 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Annotated, Any
 
 import jax
 import jax.numpy as jnp
 import numpy as np
+from pydantic import Field
 
 from ..data import Array
+from ..errors import UserError
+from ..settings.arguments import check_fields, numbers
+from ..settings.numbers import Positive
 from ..units import Quantity
-
-jax.config.update("jax_enable_x64", True)
 
 Rate = Callable[[Any, Any, Any], Any]
 """f of x (n,), the parameter p and the angle (rad) of what drives it, in jax: (n,)."""
@@ -34,14 +36,21 @@ class Dynamics:
     """
 
     rate: Rate
-    labels: tuple[str, ...]
-    scale: Array
-    parameter_scale: float = 1.0
+    labels: Annotated[tuple[str, ...], Field(min_length=1)]
+    scale: Annotated[Any, numbers(1, gt=0)]
+    parameter_scale: Positive = 1.0
     frequency: Callable[[Any], Any] | None = None
     outputs: tuple[str, ...] = ()
     read: Callable[[Array, float], Array] | None = None
     units: tuple[str, ...] = ()
-    bends: Array | None = None
+    bends: Annotated[Any, numbers(2)] | None = None
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+        if len(self.scale) != self.count:
+            raise UserError(f"Dynamics: scale: has {len(self.scale)} numbers; there are {self.count} labels")
+        if self.bends is not None and len(self.bends) != self.count:
+            raise UserError(f"Dynamics: bends: has {len(self.bends)} rows; there are {self.count} labels")
 
     @property
     def count(self) -> int:

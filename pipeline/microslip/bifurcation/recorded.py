@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from ..errors import UserError
 from ..files import hdf5, store
 from ..files.hostile import reading, refuse_damaged
+from ..settings.arguments import checked
 from . import branches
 from .branches import Branch, Collected
 from .drawn import draw
@@ -55,6 +56,7 @@ def write_bifurcation(path: Path, diagrams: Sequence[Branches]) -> Path:
     return path
 
 
+@checked
 def read_bifurcation(path: Path | str) -> Mapping[str, Branches]:
     """Read ``bifurcation.h5``: name of a diagram -> its branches, with every orbit and its multipliers.
 

@@ -12,6 +12,7 @@ import numpy as np
 
 from ..data import CENTRIFUGAL, Array, ModalBasis, ModalGroup
 from ..errors import UserError, told_of
+from ..process import prepare
 from ..reduced.compliance import SURFACE
 from ..system.assembly import Assembly, Contact, Load, Output
 from ..system.component import Component, Ring
@@ -91,6 +92,7 @@ def build(settings: CaseSettings, bases: Mapping[str, ModalBasis], path: Path | 
         UserError: names that no modal file holds, faces that do not face each other, stiffnesses that count the bulk
             twice.
     """
+    prepare()
     settings = settings.model_copy(update={"contacts": tuple(described(c, path) for c in settings.contacts)})
     bodies = load_bodies(settings, bases, path)
     settings = thrown(settings, {name: b.basis for name, b in bodies.items()}, path)

@@ -12,7 +12,7 @@ from ..errors import UserError
 from ..harmonic_balance import problem as balance
 from ..harmonic_balance.book import BookPatch, book_patch
 from ..harmonic_balance.problem import Forces, Problem
-from ..harmonic_balance.solver import newton
+from ..harmonic_balance.solver import resting
 from ..system.assembly import Assembly
 from .assemble import Built
 from .contacts import swept
@@ -41,14 +41,16 @@ def book_models(assembly: Assembly, strips: int) -> dict[int, BookPatch]:
 
 
 def pressed_by(built: Built, problem: Problem) -> float:
-    """Normal force (N) in the first contact of the resting assembly, which names a response that no sweep presses."""
+    """Normal force (N) in the first contact of the resting assembly, which names a response that no sweep presses.
+
+    Raises:
+        NotConverged: no state of rest is found.
+    """
     given = [c.normal_force for c in built.contacts if c.normal_force is not None]
     if given or not built.contacts:
         return float(given[0]) if given else 0.0
-    still = problem.loaded(0.0)
-    point = newton(still.at(2 * np.pi * built.settings.sweep.start), np.zeros(still.size))
-    group = still.groups[0]
-    return float(group.force(group.relative(still.displacement(point.x)), 1.0)[0, 0, 0])
+    point, group = resting(problem, 2 * np.pi * built.settings.sweep.start), problem.groups[0]
+    return float(group.force(group.relative(problem.displacement(point.x)), 1.0)[0, 0, 0])
 
 
 def normal_forces(built: Built, path: Path | str, asked: Any = None) -> tuple[float, ...]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import jax.numpy as jnp
 import numpy as np
 
+from ..process import prepare
 from .curves import curve
 from .friction import Coulomb, Falling, Friction, Heated, Scattered, StaticSliding, characteristic, scattered
 from .friction import Exponential as Rising
@@ -23,6 +24,8 @@ from .regularised import MassContact
 from .sliders import Iwan, mindlin, rough_strips, segalman
 from .solids import Solid
 from .wear import course
+
+prepare()  # who asks for the examples computes them
 
 
 def _value(number: float) -> jnp.ndarray:

@@ -2,14 +2,9 @@
 
 from __future__ import annotations
 
-import os
-import tempfile
-import time
-import warnings
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, fields, is_dataclass
-from functools import partial
-from pathlib import Path
+from functools import partial, wraps
 from typing import Any, ClassVar, NamedTuple, TypeVar, dataclass_transform
 
 import jax
@@ -17,79 +12,31 @@ import jax.numpy as jnp
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..process import prepare
 from ..settings.mistakes import bounded
-
-os.environ.setdefault("NPROC", "1")  # threads of jax: the steps of contact laws are too short to be shared
-if "xla_backend_extra_options" not in os.environ.get("XLA_FLAGS", ""):  # loops as one program, no step by step calls
-    small = "--xla_backend_extra_options=xla_cpu_small_while_loop_byte_threshold=4000000"
-    os.environ["XLA_FLAGS"] = f"{os.environ.get('XLA_FLAGS', '')} {small}".strip()
-jax.config.update("jax_enable_x64", True)  # contact forces are differences of large numbers
-
-
-def keep_compiled() -> Path | None:
-    """Keep compiled programs in the user's cache folder, so that the next run need not compile them again.
-
-    `$XDG_CACHE_HOME/microslip/jax`, or `~/.cache/microslip/jax`. A folder that jax was told already
-    (JAX_COMPILATION_CACHE_DIR) is left; without a place to write to, nothing is kept and nothing is said, and a
-    damaged entry (a process killed while it wrote) is compiled again. It stays below half a gigabyte (`forget`).
-    """
-    told = getattr(jax.config, "jax_compilation_cache_dir", None)
-    if told is not None:
-        return Path(told)
-    try:
-        base = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
-        folder = Path(base, "microslip", "jax")
-        folder.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryFile(dir=folder):
-            pass
-    except (OSError, RuntimeError):
-        return None
-    jax.config.update("jax_compilation_cache_dir", str(folder))
-    jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.01)  # a study has a hundred small programs
-    jax.config.update("jax_persistent_cache_min_entry_size_bytes", -1)
-    jax.config.update("jax_raise_persistent_cache_errors", False)
-    warnings.filterwarnings("ignore", "Error (reading|writing) persistent compilation cache")
-    forget(folder)
-    return folder
-
-
-def forget(folder: Path, most: float = 2**29, every: float = 3600.0) -> None:
-    """Programs that were not used for longest go where all take more than `most` bytes, until they take half of that.
-
-    Looked at when it is some time (``every``, s) since the last look, which a file says: it takes 0.1 s.
-    """
-    looked, now = folder / "looked-through", time.time()
-    try:
-        if looked.exists() and 0 <= now - looked.stat().st_mtime < every:
-            return
-        looked.touch()
-        entries = [(one.stat(), one.path) for one in os.scandir(folder) if one.path != str(looked)]
-        left = sum(kept.st_size for kept, _ in entries)
-        if left <= most:
-            return
-        for kept, path in sorted(entries, key=lambda one: max(one[0].st_atime, one[0].st_mtime)):
-            if left <= most / 2:
-                return
-            Path(path).unlink(missing_ok=True)
-            left -= kept.st_size
-    except OSError:  # another process looks through it
-        return
-
-
-keep_compiled()
 
 KNOWN = (0, 6) <= jax.__version_info__ < (0, 11)  # other versions may not know the options
 
-program = partial(jax.jit, compiler_options={"xla_cpu_use_fusion_emitters": False} if KNOWN else {})
+
+def _compiled(function: Callable[..., Any], options: dict[str, Any], **given: Any) -> Callable[..., Any]:
+    """`jax.jit` with options of the compiler, in a process that is ready for it."""
+    compiled = jax.jit(function, compiler_options=options if KNOWN else {}, **given)
+
+    @wraps(function)
+    def call(*args: Any, **kwargs: Any) -> Any:
+        prepare()
+        return compiled(*args, **kwargs)
+
+    return call
+
+
+program = partial(_compiled, options={"xla_cpu_use_fusion_emitters": False})
 """`jax.jit` of what python calls: compiled in half the time, and slower only where there are hundreds of points."""
 
-often = partial(jax.jit, compiler_options={"xla_cpu_prefer_vector_width": 512} if KNOWN else {})
+often = partial(_compiled, options={"xla_cpu_prefer_vector_width": 512})
 """The same of hundreds of points: compiled half a second longer, and a third faster."""
 
-seldom = partial(
-    jax.jit,
-    compiler_options={"xla_cpu_use_fusion_emitters": False, "xla_backend_optimization_level": 0} if KNOWN else {},
-)
+seldom = partial(_compiled, options={"xla_cpu_use_fusion_emitters": False, "xla_backend_optimization_level": 0})
 """The same of what is called some dozens of times: compiled in a quarter of the time, half as fast."""
 
 
@@ -126,6 +73,7 @@ def static(**options: Any) -> Any:
 
 def value(x: float) -> Array:
     """A number of a law."""
+    prepare()
     return jnp.asarray(x, dtype=float)
 
 

@@ -22,6 +22,8 @@ import numpy as np
 import scipy.optimize
 
 from ..data import Array
+from ..settings.arguments import Count, check_fields
+from ..settings.numbers import NotNegative, Positive
 from .newton import Corrected, Equations, NewtonSettings, Scaled, correct, norm, tangent, unit
 
 TURN = 0.5
@@ -51,19 +53,22 @@ class Settings:
     direction: int = 1
     low: float = -np.inf
     high: float = np.inf
-    points: int = 1000
-    step: float = 0.02
-    step_min: float = 1e-9
-    step_max: float = 0.1
-    angle: float = 0.35
-    kink_step: float = 1e-2
-    contraction: float = 0.05
+    points: Count = 1000
+    step: Positive = 0.02
+    step_min: Positive = 1e-9
+    step_max: Positive = 0.1
+    angle: Positive = 0.35
+    kink_step: NotNegative = 1e-2
+    contraction: Positive = 0.05
     predictor: Literal["tangent", "cubic"] = "cubic"
     targets: tuple[float, ...] = ()
     folds: bool = True
     branch_points: bool = True
-    resolution: float = 1e-6
+    resolution: Positive = 1e-6
     newton: NewtonSettings = NewtonSettings(iterations=10, halvings=3, forced=2, last_resort=False)
+
+    def __post_init__(self) -> None:
+        check_fields(self)
 
 
 @dataclass(frozen=True)

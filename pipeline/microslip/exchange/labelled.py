@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from ..data import INTERFACE_ROWS, VOIGT, ModalBasis, ModalGroup, Rows
+from ..settings.arguments import checked
 from .choice import STATEMENT, node_numbers
 
 _UNITS = {
@@ -22,6 +23,7 @@ _UNITS = {
 }  # fmt: skip
 
 
+@checked
 def to_xarray(basis: ModalBasis) -> Any:
     """A modal basis as an `xarray.DataTree`; needs the package xarray (``microslip[exchange]``).
 

@@ -37,7 +37,7 @@ from .problem import AtFrequency, Problem
 from .readout import amplitude, measured
 from .reduced import untouched
 from .response import operating
-from .solver import CONVERGED, Report
+from .solver import CONVERGED, Report, resting
 from .solver import Point as Solved
 
 if TYPE_CHECKING:
@@ -47,6 +47,12 @@ OVER_AMPLITUDE = "amplitude"
 """What the series of a nonlinear mode runs over in its file."""
 REACHED = "all amplitudes were reached"
 """Why a nonlinear mode ends that is complete."""
+
+BEYOND = 100.0
+"""Logarithm of an amplitude in m, either way, that a step of the corrector may lead to and no motion has."""
+
+RIGID = 3e-5
+"""Frequency over the highest one below which a mode is the motion of a body that nothing holds: rounding."""
 
 HELD = 2.0
 """Stiffness that is taken into the bodies, over that of the sticking contact: with more than any motion has the body
@@ -186,8 +192,10 @@ def backbone(
             0 the lowest. output: read-out. asked: amplitudes (m) that are hit exactly.
 
     Raises:
-        UserError: a mode that does not move the read-out, or that there is not.
+        UserError: a mode that does not move the read-out or the contacts, or that there is not.
+        NotConverged: no state of rest under the steady loads is found.
     """
+    problem, rest = about_rest(problem)
     curve = _Curve(replace(problem, stiffness=tuple(HELD * k for k in problem.stiffness), share=0.0), output)
     z, omega = curve.linear(problem, mode)
     curve.x_scale[:-2] *= _growth(problem, mode)
@@ -195,7 +203,7 @@ def backbone(
     bounds = np.log([low, high])
     settings = replace(settings, low=float(bounds[0]) - 1e-9, high=float(bounds[1]), targets=tuple(np.log(asked)))
     points, quantity = list[Point](), measured(problem.assembly, output)
-    for state in follow(curve, curve.begun(z, float(bounds[0]), settings), settings):
+    for state in follow(curve, curve.begun(z, rest, float(bounds[0]), settings), settings):
         points += state.found
         if points:
             share = int(100 * min((points[-1].lam - bounds[0]) / (bounds[1] - bounds[0]), 1.0))
@@ -206,6 +214,23 @@ def backbone(
     found = tuple(curve.checks(*one) for one in zip(x, Omega, xi, strict=True))
     status = next((one.failure for one in found if one.failure), _in_words(state.status, points, low, high, quantity))
     return Backbone(A, Omega, xi / (2 * Omega) if len(A) else xi, x, omega, status, found, quantity)
+
+
+def about_rest(problem: Problem) -> tuple[Problem, Array]:
+    """The balance whose contacts stick as they do where the steady loads press them, and x (size,) there.
+
+    Raises:
+        NotConverged: no state of rest is found.
+    """
+    Omega = problem.lam_scale  # any: nothing vibrates
+    x = resting(problem, Omega).x
+    if not x.any() or len(problem.slices) > 1:
+        return problem, x
+    k = np.zeros((problem.count, problem.count))
+    for g, S in zip(problem.groups, problem.loaded(0.0).at(Omega).slopes(x, True), strict=True):
+        for own, slope in zip(g.first, S, strict=True):
+            k[np.ix_(own, own)] = slope[:, 1, :, 1]
+    return replace(problem, stiffness=(0.5 * (k + k.T),)), x
 
 
 def strongest(problem: Problem, low: float, high: float) -> int:
@@ -257,9 +282,15 @@ class _Curve:
             raise UserError(f"mode: number {mode + 1}; there are {len(omega)}, counted from 1")
         part, k, q = _only(stuck), stuck.stiffness[0], shapes[:, mode].astype(complex)
         d = np.linalg.solve(np.eye(part.count) + part.residual @ k, part.rows @ q)
+        at = f"{mode + 1} at {omega[mode] / 2 / np.pi:.6g} Hz"
+        if omega[mode] <= RIGID * omega[-1]:
+            lowest = int((omega <= RIGID * omega[-1]).sum()) + 1
+            raise UserError(f"mode: number {at} is a motion that nothing holds; take {lowest} or a higher one")
+        moved, reach = np.abs(d), np.abs(part.rows) @ np.abs(q)
+        if not (moved > 1e-9 * reach).any():
+            raise UserError(f"mode: number {at} does not move the contacts, so it is linear; take another")
         seen = complex(part.output[self.output] @ q - part.output_residual[self.output] @ (k @ d))
         if abs(seen) < 1e-9 * np.abs(part.output[self.output]).max(initial=0.0) * np.abs(q).max():
-            at = f"{mode + 1} at {omega[mode] / 2 / np.pi:.6g} Hz"
             raise UserError(f"mode: number {at} does not move the read-out; take another")
         C = part.viscous(float(omega[mode]))
         xi = float((q.conj() @ C @ q).real / (q.conj() @ part.M @ q).real)
@@ -270,16 +301,13 @@ class _Curve:
         self.x_scale[-2:] = omega[mode], 0.1 * omega[mode]
         return np.append(z.ravel(), [omega[mode], xi]), float(omega[mode])
 
-    def begun(self, z: Array, lam: float, settings: Settings) -> State:
-        """The first point. A mean that stands there however small the amplitude is (`held`) is not counted in this."""
-        first = start(self, z, lam, settings)
-        if not first.found:
-            return first
-        before, after = self.units(np.exp(lam))[0], first.found[0].x.copy()
-        mean = float(np.abs(after[: self.problem.count] * before[: self.problem.count]).max(initial=0.0))
-        self.held = mean * self.problem.length / self.x_scale[0]
-        after[:-2] *= before / self.units(np.exp(lam))[0]
-        return start(self, after, lam, settings)
+    def begun(self, z: Array, rest: Array, lam: float, settings: Settings) -> State:
+        """The first point, from the linear mode about x (size,) at rest, whose mean is there however small the
+        amplitude is: `held` is not counted in this."""
+        self.held = float(np.abs(rest).max(initial=0.0)) * self.problem.length / self.x_scale[0]
+        first, mean = z.copy(), slice(self.problem.count)
+        first[mean] = rest[mean] / self.units(np.exp(lam))[0][mean]
+        return start(self, first, lam, settings)
 
     def units(self, A: float) -> tuple[Array, Array]:
         """(n,) of x at an amplitude, and their derivatives by its logarithm: A / length, of the mean not less than of
@@ -291,7 +319,11 @@ class _Curve:
         return unit, rate
 
     def evaluate(self, z: Array, lam: float) -> tuple[Array, Array, Array]:
-        """R over its units and y / A - 1 (real and imaginary part), and their derivatives."""
+        """R over its units and y / A - 1 (real and imaginary part), and their derivatives; NaN at amplitudes that no
+        body has."""
+        if not abs(lam) < BEYOND:
+            n = len(z)
+            return np.full(n, np.nan), np.full((n, n), np.nan), np.full(n, np.nan)
         A, Omega, xi = float(np.exp(lam)), float(z[-2]), float(z[-1])
         unit, rate = self.units(A)
         x, at = z[:-2] * unit, self._at(Omega, xi)

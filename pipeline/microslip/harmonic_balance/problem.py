@@ -19,8 +19,9 @@ import scipy.linalg
 
 from ..data import Array, ComplexArray, Indices
 from ..errors import UserError
+from ..process import prepare
 from ..settings.mistakes import bounded
-from ..system.assembly import Assembly, Linear
+from ..system.assembly import Assembly, Linear, stuck_modes
 from . import blocks, by_hand, reduced
 from .blocks import Matrix
 from .forces import AFT, Forces
@@ -30,6 +31,9 @@ from .reduced import Coefficients, Driven, Eliminated, Poles, ReadOuts, Seen, Vi
 
 SOFTER = 0.7
 """Share of the reference stiffness that serves where the assembly with all of it is at resonance without damping."""
+
+AWAY = "slides away"
+"""What is said of a body that nothing holds."""
 
 NO_NUMBER = "is not a finite number"
 """What is said of a law without a value."""
@@ -348,8 +352,10 @@ class Problem:
 
     @cached_property
     def _softer(self) -> Problem:
-        """The same about other stiffnesses, for resonances that these make and no damping limits."""
-        return replace(self, stiffness=tuple(SOFTER * k for k in self.stiffness))
+        """The same about other stiffnesses, for resonances that these make and no damping limits, and for bodies that
+        nothing holds before the steady loads press them."""
+        both = zip(self.parts[0], self.stiffness, strict=True)
+        return replace(self, stiffness=tuple(_holding(part, SOFTER * k) for part, k in both))
 
     def evaluate(self, x: Array, Omega: float) -> tuple[Array, Array, Array]:
         """R, dR/dx and dR/dOmega (Omega in rad/s); (k,), (k, k), (k,)."""
@@ -397,6 +403,24 @@ class AtFrequency:
         """(size,) the response with contacts that stay as stiff as the reference stiffness: a first guess."""
         p = self.problem
         return -(self._applied(np.zeros((p.coefficients, p.count)), slice(1)) / p.scale).ravel()
+
+    @cached_property
+    def lost(self) -> str:
+        """Why no motion repeats, whatever the contacts do, the cause before a colon; nothing where one may."""
+        p = self.problem
+        bad = [np.flatnonzero(~np.isfinite(both[:, 0]).all(axis=(0, 2, 3))) for both in self.both]
+        if not all(part.count for part in p.parts[0]):
+            q = self.coordinates(np.zeros((p.coefficients, p.count)), p.share)
+            bad.append(np.flatnonzero([not all(np.isfinite(one).all() for one in each) for each in q]))
+        harmonics = np.concatenate(bad)
+        if not harmonics.size:
+            return ""
+        h, f = int(harmonics.min()), self.Omega / (2 * np.pi)
+        if h == 0:
+            return (
+                f"no balance: a body {AWAY}: nothing balances the steady forces on it; give it weak_springs or a spring"
+            )
+        return f"resonance: nothing limits a motion at {h * f:.6g} Hz; give its mode some damping"
 
     @cached_property
     def rounding(self) -> float:
@@ -639,6 +663,7 @@ def of(
     Raises:
         UserError: no harmonic or cycle, a length or a share that is none, a name that no component has.
     """
+    prepare()
     assembly.check_names()
     if moves := [c.name for c in assembly.contacts if c.ground is not None]:
         raise UserError(f"contacts.{moves[0]}.ground: moves, which harmonic balance cannot take; use microslip orbit")
@@ -665,13 +690,52 @@ def of(
         groups.append(Group(model, first, second, offset, preload, phase, tuple(same)))
     parts = _eliminated(assembly, harmonics, together)
     k = [c.stiffness for c in contacts]
-    if together:
-        stiffness: tuple[Array, ...] = (scipy.linalg.block_diag(*k) if k else np.zeros((0, 0)),)
-    else:
-        stiffness = tuple(
-            scipy.linalg.block_diag(*[k[i] for i, _, _ in assembly.sides(m.name)]) for m in assembly.components
-        )
+    sides = [range(len(k))] if together else [[i for i, _, _ in assembly.sides(m.name)] for m in assembly.components]
+    each = [scipy.linalg.block_diag(*[k[i] for i in own]) if own else np.zeros((0, 0)) for own in sides]
+    stiffness = tuple(_no_stiffer(part, one) for part, one in zip(parts[1], each, strict=True))
     return Problem(assembly, parts, begins, stiffness, tuple(groups), harmonics, length or moves_by(assembly))
+
+
+STIFFER = 1e6
+"""How many times stiffer than the bodies along a coordinate what is taken into them may be: where a contact is open, R
+is what two displacements that are equal to so many digits leave."""
+
+
+def _no_stiffer(part: Linear, stiffness: Array) -> Array:
+    """A stiffness (c, c) of the contacts, reduced along coordinates where it is more than `STIFFER` times the body's:
+    of modes phi that swing with omega, 1 / sum (T phi)^2 / omega^2."""
+    if not stiffness.any() or not len(part.M):
+        return stiffness
+    values, shapes = stuck_modes(part, np.zeros_like(stiffness))
+    squares = np.abs(values)
+    elastic = squares[squares > RIGID * squares.max(initial=0.0)]
+    if not elastic.size:
+        return stiffness
+    yields = (np.abs(part.rows @ shapes) ** 2 / np.maximum(squares, elastic.min())).sum(axis=1)
+    over = np.diag(stiffness) * (yields + np.diag(part.residual)) / STIFFER
+    if not (over > 1).any():
+        return stiffness
+    less = 1 / np.sqrt(np.maximum(over, 1.0))
+    return stiffness * less * less[:, None]
+
+
+def _holding(part: Linear, stiffness: Array) -> Array:
+    """A stiffness (c, c), and more where contacts feel a motion that neither it nor the body holds: as much as makes
+    that motion as stiff as the softest other one."""
+    if not part.count or not len(part.M):
+        return stiffness
+    squares, shapes = stuck_modes(part, stiffness)
+    free = squares <= RIGID * np.abs(squares).max()
+    felt = (np.abs(part.rows @ shapes[:, free]) ** 2).sum(axis=1)
+    far = felt > RIGID * (np.abs(part.rows @ shapes) ** 2).sum(axis=1)
+    softest = squares[~free].min(initial=np.inf)
+    return stiffness + np.diag(
+        np.divide(softest if softest < np.inf else 1.0, felt, out=np.zeros_like(felt), where=far)
+    )
+
+
+RIGID = 1e-9
+"""omega^2 over the largest one, up to which a motion is one of rounding: of a body that nothing holds."""
 
 
 def _eliminated(assembly: Assembly, harmonics: int, together: bool) -> tuple[tuple[Linear, ...], ...]:

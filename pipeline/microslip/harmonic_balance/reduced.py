@@ -24,6 +24,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -58,12 +59,40 @@ def seen(part: Linear, stiffness: Array, Omega: float, harmonic: int) -> Seen:
     held = stiffness @ P
     A = part.stiff - w**2 * part.M + 1j * w * part.C + T.conj().T @ held @ T
     driven = part.load - T.conj().T @ (held @ part.given)
-    X = np.linalg.solve(A, np.column_stack([driven, T.conj().T @ W]))
+    size = _size(part.stiff + T.conj().T @ held @ T, part.M, part.C, w)
+    X = solved(A, np.column_stack([driven, T.conj().T @ W]), size)
     slope = -2 * harmonic * w * part.M + 1j * harmonic * part.C
-    Y = -np.linalg.solve(A, slope @ X).astype(complex)
+    Y = -solved(A, slope @ X, size).astype(complex)
     reference, D = P @ (T @ X[:, 0] + part.given), P @ (T @ X[:, 1:] + B)
     rates = P @ (T @ Y)
     return Seen(reference, D, X[:, 0], X[:, 1:], rates[:, 0], rates[:, 1:], Y[:, 0], Y[:, 1:])
+
+
+LOST = 1e-3
+"""Share of the forces that the rounding of the matrices may make: a motion that takes more is one of rounding."""
+
+
+def solved(A: Any, right: Array | ComplexArray, size: Array) -> ComplexArray:
+    """(..., m, n) X of A X = right. A column is NaN where the sizes (..., m, m) of what the entries of A are sums of
+    leave nothing of it: there is no balance, or one without bounds. Where motions that A does not resist are not driven
+    either, they are left out.
+    """
+    try:
+        X = np.linalg.solve(A, right)
+    except np.linalg.LinAlgError:
+        finite = np.isfinite(A).all() and np.isfinite(right).all()
+        X = np.linalg.pinv(A, rcond=1e-13) @ right if finite else np.full(right.shape, np.nan, complex)
+    with np.errstate(all="ignore"):
+        forces = np.abs(right).max(axis=-2, initial=0.0)
+        rounding = np.finfo(float).eps * (size @ np.abs(X)).max(axis=-2, initial=0.0)
+        off = np.abs(A @ X - right).max(axis=-2, initial=0.0)
+        lost = ~((rounding <= LOST * forces) & (off <= LOST * forces))
+    return np.where(lost[..., None, :], np.nan, X) if lost.any() else np.asarray(X)
+
+
+def _size(stiff: ComplexArray, M: Array, C: Array, w: Any) -> Array:
+    """(..., m, m) size of the terms that stiff - w^2 M + i w C adds up. w: rad/s, a number or (..., 1, 1)."""
+    return np.abs(stiff) + w**2 * np.abs(M) + np.abs(w * C)
 
 
 @dataclass(frozen=True, eq=False)
@@ -226,10 +255,7 @@ class Eliminated:
 
     def _far(self, Omega: float) -> View | None:
         """`directly`, or None as `at` says: by how fast the coordinates change with the frequency."""
-        try:
-            found = [seen(part, self.stiffness, Omega, h) for h, part in enumerate(self.parts)]
-        except np.linalg.LinAlgError:
-            return None
+        found = [seen(part, self.stiffness, Omega, h) for h, part in enumerate(self.parts)]
         for s in found:
             moved = np.column_stack([s.modal, s.modal_compliance])
             rates = np.column_stack([s.modal_rate, s.modal_compliance_rate])
@@ -336,8 +362,8 @@ class Driven:
         h = self.harmonics
         w = h[:, None, None] * Omega
         right = self.loads * np.where(h, share, 1.0)[:, None] - g[..., h, :] @ self.given
-        A = self.stiff[..., None, :, :] - w**2 * self.M[..., None, :, :] + 1j * w * self.C[..., None, :, :]
-        return np.asarray(np.linalg.solve(A, right[..., None])[..., 0])
+        stiff, M, C = (one[..., None, :, :] for one in (self.stiff, self.M, self.C))
+        return solved(stiff - w**2 * M + 1j * w * C, right[..., None], _size(stiff, M, C, w))[..., 0]
 
 
 MET = 1e-6

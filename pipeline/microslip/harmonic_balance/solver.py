@@ -12,15 +12,14 @@ import numpy as np
 
 from .. import continuation
 from ..data import Array
-from ..errors import UserError
+from ..errors import NotConverged, UserError
 from ..settings.mistakes import bounded
 from . import pseudo_transient
 from .forces import AFT
-from .problem import NO_NUMBER, AtFrequency, Problem, Tried
+from .problem import AWAY, NO_NUMBER, AtFrequency, Problem, Tried
 
 Report = Callable[[str], None]
 CONVERGED = "converged"
-AWAY = "slides away"
 TURNS = "turns back"
 
 
@@ -96,6 +95,8 @@ def newton(
         slope: derivative of the forces somewhere near, to begin with. rises: how often |R| may rise. patience: steps
             that may go by before R is half of what it was; None: all.
     """
+    if at.lost:
+        return Point(at.Omega, np.full_like(x, np.nan), at.lost, np.nan, 0)
     start, fresh, history, left_over = x, False, list[float](), rises
     halved, last, whole = np.inf, 0, False
     R, seen = at.tried(x)
@@ -181,6 +182,8 @@ def solve(
     """
     bounded("frequency", Omega / (2 * np.pi), gt=0)
     at, spent, status = problem.at(Omega), 0, ""
+    if at.lost:
+        return newton(at, at.reference)
     history: tuple[float, ...] = ()
     for way, said in _ways(problem, at, [*starts, at.reference], slope, along_load, tolerance):
         if said:
@@ -195,6 +198,18 @@ def solve(
     if not point.converged:
         point = replace(point, status=f"{_cause(at, point)}: {point.status}")
     return replace(point, iterations=spent, history=history)
+
+
+def resting(problem: Problem, Omega: float) -> Point:
+    """The state of rest under the steady loads, whatever the frequency (rad/s).
+
+    Raises:
+        NotConverged: none is found.
+    """
+    point = solve(still := problem.loaded(0.0), Omega, [np.zeros(still.size)], along_load=False)
+    if not point.converged:
+        raise NotConverged(f"no state of rest under the steady loads is found: {point.status}")
+    return point
 
 
 def _cause(at: AtFrequency, point: Point) -> str:

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import Annotated, Any, Literal
 
 import numpy as np
+from pydantic import Field
 from scipy.special import ndtr
 
 from ..data import Array
 from ..errors import UserError
-
-if TYPE_CHECKING:
-    from ..system.assembly import Assembly
+from ..settings.arguments import Text, check_fields
+from ..settings.numbers import NotNegative, Number
 
 OF_BLADES = {
     "frequency": "eigenfrequencies of a body's modes",
@@ -57,24 +57,23 @@ class Scatter:
             sector and the next one, its powers those farther away.
     """
 
-    of: str
-    deviation: float = 0.0
-    distribution: str = "normal"
-    values: tuple[float, ...] = ()
-    others: Mapping[int, Assembly] = field(default_factory=dict)
-    arrangement: str = "given"
-    component: str | None = None
-    contact: str | None = None
-    at: str | None = None
-    together: float = 1.0
-    neighbours: float = 0.0
+    of: Text
+    deviation: NotNegative = 0.0
+    distribution: Literal["normal", "lognormal", "uniform"] = "normal"
+    values: Sequence[Number] = ()
+    others: Mapping[int, Any] = field(default_factory=dict)
+    arrangement: Literal["given", "shuffled", "drawn"] = "given"
+    component: Text | None = None
+    contact: Text | None = None
+    at: Text | None = None
+    together: Annotated[float, Field(ge=0, le=1)] = 1.0
+    neighbours: Annotated[float, Field(ge=-1, le=1)] = 0.0
 
     def __post_init__(self) -> None:
+        check_fields(self)
         known = {**OF_BLADES, **OF_CONTACTS}
         if self.of not in known:
             raise UserError(f"of: '{self.of}' is none of {', '.join(known)}")
-        if not np.isfinite([self.deviation, *self.values]).all() or self.deviation < 0:
-            raise UserError(f"deviation of {self.of}: must be a number that is not negative")
         if (self.of == "modal_file") != bool(self.others):
             raise UserError(f"{self.of}: others belong to modal_file, which needs them")
         given = (self.deviation > 0) + bool(self.values) + bool(self.others)
@@ -82,12 +81,6 @@ class Scatter:
             raise UserError(f"{self.of}: nothing scatters; give a deviation above zero, or values that are known")
         if given > 1:
             raise UserError(f"{self.of}: give one of deviation, values that are known, and others")
-        for key, choices in (("distribution", DISTRIBUTIONS), ("arrangement", ARRANGEMENTS)):
-            if getattr(self, key) not in choices:
-                raise UserError(f"{key}: '{getattr(self, key)}' is none of {', '.join(choices)}")
-        for key, least in (("together", 0.0), ("neighbours", -1.0)):
-            if not least <= getattr(self, key) <= 1.0:
-                raise UserError(f"{key}: {getattr(self, key):g} is no correlation between {least:g} and 1")
         self._heard()
 
     def _heard(self) -> None:

@@ -20,6 +20,7 @@ from ..files.hostile import DAMAGE, reading, refuse_damaged, short
 from ..files.store import json_text, ordinary
 from ..operating.motion import Motion, motion_of
 from ..reduced.coordinates import first_modes, in_modes
+from ..settings.arguments import checked
 from .journal import is_journal, read_journal
 from .series import Series
 
@@ -229,6 +230,7 @@ def _put_text(file: h5py.File, name: str, text: str) -> None:
     put(file, name, np.frombuffer(text.encode(), dtype=np.uint8))
 
 
+@checked
 def read_response(path: Path | str) -> Response:
     """Read ``response.h5``, or the journal of a response that is still computed or was killed.
 

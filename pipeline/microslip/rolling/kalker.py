@@ -10,12 +10,11 @@ from __future__ import annotations
 from functools import partial
 from typing import Literal
 
-import jax
 import jax.numpy as jnp
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..contact.law import Array
+from ..contact.law import Array, program
 from .arguments import number, words
 
 Coefficients = Literal["table", "book"]
@@ -74,7 +73,7 @@ def creep_coefficients(ratio: ArrayLike, poisson: ArrayLike, source: Coefficient
     return coefficients_at(number("ratio", ratio), number("poisson", poisson), source)
 
 
-@partial(jax.jit, static_argnames="source")
+@partial(program, static_argnames="source")
 def coefficients_at(ratio: ArrayLike, poisson: ArrayLike, source: Coefficients = "table") -> Array:
     """`creep_coefficients` as a pure function of jax."""
     s, nu = jnp.broadcast_arrays(jnp.asarray(ratio, dtype=float), jnp.asarray(poisson, dtype=float))

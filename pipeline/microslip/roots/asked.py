@@ -16,6 +16,7 @@ from ..linalg import quadratic
 from ..linalg.parametric import Family, family_of_group
 from ..linalg.quadratic import Quadratic, Window
 from ..ring.resonances import speeds_of
+from ..settings.mistakes import unfit
 from .diagram import Diagram, diagram
 from .spectrum import Spectrum, spectrum
 
@@ -30,7 +31,11 @@ def roots_of(
     """See `bodies.stability`; body: a basis, matrices or a family."""
     family = _family(body, speed)
     window = _window(family, growth, frequency)
+    if odd := sorted(set(at or {}) - {t.parameter for t in family.terms}):
+        raise UserError(f"stability: at: no matrix scales with the parameter '{odd[0]}'; leave it out")
     if over is None:
+        if values is not None:
+            raise UserError("stability: values: of which parameter? Give over, too")
         Q = family.at(at or {})
         return spectrum(Q, window, accuracy=accuracy, neutral=neutral, certify=certify, report=report)
     points = np.asarray([] if values is None else values, dtype=float)
@@ -51,7 +56,7 @@ def _family(body: Any, speed: int | None) -> Family:
     if isinstance(body, Quadratic):
         body = (body.M, body.C, body.K)
     if not isinstance(body, tuple | list) or len(body) != 3:
-        raise UserError("stability: give a path, a modal basis or three matrices (M, C, K)")
+        raise UserError("stability: body: give a path, a modal basis or three matrices (M, C, K)")
     found = [_matrix(A, key) for A, key in zip(body, "MCK", strict=True)]
     sizes = {key: A.shape[0] for A, key in zip(found, "MCK", strict=True)}
     if len(set(sizes.values())) > 1:
@@ -63,11 +68,13 @@ def _family(body: Any, speed: int | None) -> Family:
 
 
 def _matrix(A: Any, key: str) -> Any:
+    if not sp.issparse(A) and (said := unfit(A)):
+        raise UserError(f"stability: body: {key}: {said}; correct it")
     A = A.tocsr().astype(float) if sp.issparse(A) else np.atleast_2d(np.asarray(A, dtype=float))
     if A.ndim != 2 or A.shape[0] != A.shape[1]:
-        raise UserError(f"stability: {key}: has shape {A.shape}; give a square matrix")
+        raise UserError(f"stability: body: {key}: has shape {A.shape}; give a square matrix")
     if not np.isfinite(A.data if sp.issparse(A) else A).all():
-        raise UserError(f"stability: {key}: holds a number that is not finite; correct it")
+        raise UserError(f"stability: body: {key}: holds a number that is not finite; correct it")
     return A
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from pydantic import BaseModel, ValidationError
 
 from ..errors import UserError
+from .numbers import BEYOND
 
 _WORDS = {
     "float_type": "must be a number",
@@ -28,6 +29,9 @@ _WORDS = {
     "less_than": "must be less than {lt:g}",
     "less_than_equal": "must not be greater than {le:g}",
     "literal_error": "must be {expected}",
+    "callable_type": "must be a function",
+    "is_instance_of": "must be of class {class}",
+    "mapping_type": "must be a dict",
     "tuple_type": "must be a list in [brackets]",
     "list_type": "must be a list in [brackets]",
     "too_short": "must hold {min_length} values or more",
@@ -37,7 +41,7 @@ _SCALAR = {"float_type", "int_type", "bool_type", "string_type"}
 _NO_TABLE = {"model_type", "model_attributes_type", "dict_type"}
 
 
-def validate(model: type[Any], raw: dict[str, Any], path: Path) -> Any:
+def validate(model: type[Any], raw: dict[str, Any], path: Path | str) -> Any:
     """Check a table against a settings model.
 
     Raises:
@@ -59,22 +63,30 @@ def bounded(what: str, value: Any, gt: float | None = None, ge: float | None = N
     Raises:
         UserError: one that is not finite or out of its bounds.
     """
+    if said := unfit(value, gt, ge, le):
+        raise UserError(f"{what}: {said}; correct it")
+
+
+def unfit(value: Any, gt: float | None = None, ge: float | None = None, le: float | None = None) -> str:
+    """What is wrong with a number, or an array of them; nothing if it is finite and in its bounds."""
     try:
-        if np.asarray(value).dtype.kind in "SU":  # which numpy reads numbers from
+        if np.asarray(value).dtype.kind not in "iufO":  # of texts and truths numpy makes numbers too
             raise TypeError
         at = np.asarray(value, dtype=float)
-    except (TypeError, ValueError):
-        raise UserError(f"{what}: {value!r} is no number; correct it") from None
+    except (TypeError, ValueError, OverflowError):
+        return f"{_shown(value)} is no number"
     for kind, bound, good in (
         ("finite_number", None, np.isfinite(at)),
         ("greater_than", gt, gt is None or at > gt),
         ("greater_than_equal", ge, ge is None or at >= ge),
         ("less_than_equal", le, le is None or at <= le),
+        ("less_than_equal", BEYOND, at <= BEYOND),
+        ("greater_than_equal", -BEYOND, at >= -BEYOND),
     ):
         if not np.all(good):
             wrong = at[~np.broadcast_to(good, at.shape)].ravel()[0]
-            words = _WORDS[kind].format(gt=bound, ge=bound, le=bound)
-            raise UserError(f"{what}: {words} (it is {wrong:g}); correct it")
+            return f"{_WORDS[kind].format(gt=bound, ge=bound, le=bound)} (it is {wrong:g})"
+    return ""
 
 
 def whole(what: str, value: Any, ge: int = 0) -> None:

@@ -120,7 +120,7 @@ def backbones(
             band of the sweep if not given.
         low, high: amplitudes, m; from a thirtieth to thirty times where the contacts begin to slide if not given.
     """
-    from ..harmonic_balance.nonlinear_modes import backbone, sliding_amplitude, strongest
+    from ..harmonic_balance.nonlinear_modes import about_rest, backbone, sliding_amplitude, strongest
 
     found: dict[float, Backbone] = {}
     built, of = case.plain, case.quantity
@@ -129,7 +129,7 @@ def backbones(
     if 0.0 in normal_forces(built):
         report("left out: a normal force of 0 N, under which nothing sticks")
     for count, asked in enumerate(forces, 1):
-        problem = problem_of(built, asked, form="relative")
+        problem = about_rest(problem_of(built, asked, form="relative"))[0]
         normal = pressed_by(built, problem) if asked is None else asked
         report(f"backbone at F_N = {normal:g} N, {count} of {len(forces)}")
         number = mode - 1 if mode is not None else strongest(problem, band[0], band[1])

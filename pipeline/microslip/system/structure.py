@@ -10,10 +10,11 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
 import scipy.linalg
+from pydantic import BeforeValidator, Field
 
 from ..contact.elements import Polynomial, Stop
 from ..contact.friction import Coulomb, Friction, StaticSliding
@@ -24,12 +25,70 @@ from ..contact.patch import Patch
 from ..contact.set_valued import SetValued
 from ..data import Array, Compliance, ModalGroup, Rows
 from ..errors import UserError
-from ..settings.mistakes import bounded
+from ..settings.arguments import Text, check_fields, checked, numbers
+from ..settings.mistakes import bounded, unfit
+from ..settings.numbers import NotNegative, Number, Positive
 from .assembly import Assembly, Contact, ContactFace, Load, Output
 from .component import Component
 from .ground import Ground
 
 ALONG = {"n": 0, "t1": 1, "t2": 2}
+At = Annotated[Any, numbers(0, 1)]
+"""Number of a coordinate from 0, or (n,) weights of all."""
+Matrix = Annotated[Any, numbers(0, 2)]
+Share = Annotated[NotNegative, Field(le=1)]
+
+
+def _or_rigid(stiffness: Any) -> Any:
+    """Infinity passes as any number would."""
+    return 1.0 if isinstance(stiffness, float) and stiffness == math.inf else stiffness
+
+
+def _law(law: Any) -> Any:
+    if not isinstance(law, Law):
+        raise ValueError("is no law; make the element by polynomial, jenkins, stop, ...")
+    return law
+
+
+def _powers(stiffness: Any) -> Any:
+    if not isinstance(stiffness, Mapping):
+        raise ValueError("is no table; give it by power, as {3: 0.05} of k u^3")
+    whole = all(isinstance(p, int | np.integer) and 1 <= p <= HIGHEST for p in stiffness)
+    if not stiffness or not whole:
+        raise ValueError(f"has the powers {list(stiffness)}; give one or more whole numbers from 1 to {HIGHEST}")
+    if said := next((said for k in stiffness.values() if (said := unfit(k) or np.ndim(k) and "is no number")), ""):
+        raise ValueError(f"{said}; give one number for each power")
+    return stiffness
+
+
+HIGHEST = 100
+"""Power of a spring: of higher ones 1.1 u and u / 1.1 differ by eight orders of magnitude."""
+
+
+def _forces(force: Any) -> Any:
+    """Amplitudes by coordinate, or of all."""
+    values = list(force.values()) if isinstance(force, Mapping) else force
+    if isinstance(force, Mapping) and (said := unfit(list(force))):
+        raise ValueError(f"its coordinates: {said}")
+    try:
+        at = np.asarray(values)
+        at = at.astype(float) if at.dtype.kind == "O" else at
+    except (TypeError, ValueError):
+        raise ValueError("is no table of numbers; give coordinate: N, as {0: 1.0}") from None
+    if said := unfit(at.real) or unfit(at.imag):
+        raise ValueError(said)
+    if at.ndim != 1:
+        raise ValueError("must be one number for each coordinate")
+    return force
+
+
+Force = Annotated[Any, BeforeValidator(_forces)]
+
+
+def _elements(elements: Any) -> Any:
+    if not isinstance(elements, Sequence) or not all(isinstance(e, Element) for e in elements):
+        raise ValueError("must be a list of elements, as [ms.jenkins(1.0, 0.5)]")
+    return elements
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,20 +103,18 @@ class Element:
             coordinate: a belt.
     """
 
-    law: Law
-    at: Any
-    to: Any = None
-    along: str = "t1"
-    name: str | None = None
-    length: float | None = None
-    velocity: float = 0.0
+    law: Annotated[Law, BeforeValidator(_law)]
+    at: At
+    to: At | None = None
+    along: Literal["n", "t1", "t2"] = "t1"
+    name: Text | None = None
+    length: Positive | None = None
+    velocity: Number = 0.0
 
     def __post_init__(self) -> None:
-        bounded("element: velocity", self.velocity)
+        check_fields(self)
         if self.velocity and (self.to is not None or self.along == "n"):
             raise UserError("element: velocity: is that of the ground along t1 or t2; leave out to, or velocity")
-        if not isinstance(self.law, Law):
-            raise UserError(f"element: law: {self.law!r} is no law; make the element by polynomial, jenkins, stop, ...")
 
     def row(self, count: int) -> Array:
         """(n,) its displacement per unit of n coordinates.
@@ -77,8 +134,7 @@ def _row(at: Any, count: int, key: str) -> Array:
         if np.shape(at) != (count,):
             raise UserError(f"{key}: weights of shape {np.shape(at)}; the structure has {count} coordinates")
         return np.asarray(at, dtype=float)
-    bounded(key, at)
-    if at != int(at) or not -count <= at < count:
+    if not float(at).is_integer() or not -count <= at < count:
         raise UserError(f"{key}: there is no coordinate {at}; the structure has {count}, counted from 0")
     return np.eye(count)[int(at)]
 
@@ -88,7 +144,13 @@ def _numbers(*values: float) -> Any:
     return np.array(values, dtype=float)
 
 
-def polynomial(stiffness: Mapping[int, float], at: Any = 0, to: Any = None, name: str | None = None) -> Element:
+@checked
+def polynomial(
+    stiffness: Annotated[Mapping[int, float], BeforeValidator(_powers)],
+    at: At = 0,
+    to: At | None = None,
+    name: Text | None = None,
+) -> Element:
     """A spring with the force sum of k_p u^p.
 
     Args:
@@ -98,16 +160,14 @@ def polynomial(stiffness: Mapping[int, float], at: Any = 0, to: Any = None, name
     Raises:
         UserError: no powers, or one that is no whole number from 1 on.
     """
-    if not isinstance(stiffness, Mapping):
-        raise UserError(f"polynomial: stiffness: {stiffness!r}: give it by power, as {{3: 0.05}} of k u^3")
-    if not stiffness or any(p != int(p) or p < 1 for p in stiffness):
-        raise UserError(f"polynomial: powers {list(stiffness)}: give one or more whole numbers, 1 or larger")
-    bounded("polynomial: stiffness", list(stiffness.values()))
     numbers = _numbers(*(stiffness.get(p, 0.0) for p in range(1, max(stiffness) + 1)))
     return Element(Polynomial(numbers), at, to, name=name)
 
 
-def jenkins(stiffness: float, limit: float, at: Any = 0, to: Any = None, name: str | None = None) -> Element:
+@checked
+def jenkins(
+    stiffness: Positive, limit: NotNegative, at: At = 0, to: At | None = None, name: Text | None = None
+) -> Element:
     """A Jenkins element: a spring in series with a slider that holds a force limit.
 
     Args:
@@ -116,15 +176,14 @@ def jenkins(stiffness: float, limit: float, at: Any = 0, to: Any = None, name: s
     Raises:
         UserError: a stiffness that is not positive, or a negative limit.
     """
-    bounded("jenkins: stiffness", stiffness, gt=0)
-    bounded("jenkins: limit", limit, ge=0)
     law = Jenkins(*_numbers(0.0, stiffness, 0.0, limit))
     return Element(law, at, to, name=name, length=limit / stiffness)
 
 
+@checked
 def friction(
-    limit: float, at: Any = 0, to: Any = None, name: str | None = None, *, static: float | None = None,
-    velocity: float = 0.0,
+    limit: NotNegative, at: At = 0, to: At | None = None, name: Text | None = None, *,
+    static: Positive | None = None, velocity: Number = 0.0,
 ) -> Element:  # fmt: skip
     """Dry friction that holds a force limit and does not yield before it slides: only motions in time can take it.
 
@@ -144,7 +203,6 @@ def friction(
         >>> print(f"{found.y.min():.2f} to {found.y.max():.2f} m")
         0.10 to 0.30 m
     """
-    bounded("friction: limit", limit, ge=0)
     one, zero, force = _numbers(1.0, 0.0, limit)
     law: Friction = Coulomb(one)
     if static is not None and static != limit:
@@ -154,9 +212,10 @@ def friction(
     return Element(SetValued(law, zero, zero, Preload(force)), at, to, name=name, velocity=velocity)
 
 
+@checked
 def stop(
-    stiffness: float, gap: float, at: Any = 0, to: Any = None, both: bool = False, name: str | None = None,
-    restitution: float = 0.0,
+    stiffness: Annotated[Positive, BeforeValidator(_or_rigid)], gap: Number, at: At = 0, to: At | None = None,
+    both: bool = False, name: Text | None = None, restitution: Share = 0.0,
 ) -> Element:  # fmt: skip
     """A spring that is met beyond a gap and cannot pull.
 
@@ -168,25 +227,23 @@ def stop(
         UserError: a stiffness that is not positive; restitution of a stop that is not rigid; a rigid one on both sides.
     """
     if stiffness == math.inf:
-        bounded("stop: gap", gap)
-        bounded("stop: restitution", restitution, ge=0, le=1)
         if both:
             raise UserError("stop: both: a rigid stop has one side; give another at the negative weights for the other")
         law = SetValued(Coulomb(_numbers(0.0)[0]), *_numbers(restitution, gap))
         return Element(law, at, to, "n", name=name)
-    bounded("stop: stiffness", stiffness, gt=0)
-    bounded("stop: gap", gap, **({"ge": 0} if both else {}))
+    if both and gap < 0:
+        raise UserError(f"stop: gap: must not be less than 0 of a stop on both sides (it is {gap:g}); correct it")
     if restitution:
         raise UserError("stop: restitution: only a rigid stop has one; give stiffness = math.inf, or a damper")
     return Element(Stop(_numbers(stiffness)[0], _numbers(gap)[0], both), at, to, name=name, length=abs(gap) or None)
 
 
+@checked
 def structure(
-    M: Any, K: Any, C: Any = None, *, force: Mapping[int, complex] | Array | None = None,
-    second_force: Mapping[int, complex] | Array | None = None,
-    steady: Mapping[int, float] | Array | None = None,
-    elements: Sequence[Element] = (), output: int | Sequence[int] | None = None,
-    damping_ratio: float | Sequence[float] = 0.0, name: str = "structure",
+    M: Matrix, K: Matrix, C: Matrix | None = None, *, force: Force | None = None, second_force: Force | None = None,
+    steady: Force | None = None, elements: Annotated[Sequence[Element], BeforeValidator(_elements)] = (),
+    output: Annotated[Any, numbers(0, 1)] | None = None, damping_ratio: Annotated[Any, numbers(0, 1, ge=0)] = 0.0,
+    name: Text = "structure",
 ) -> Assembly:  # fmt: skip
     """A structure of matrices with nonlinear elements.
 
@@ -224,8 +281,9 @@ def structure(
     C = C + _modal_damping(M, K, damping_ratio)
     f, f_2, f_0 = _force(force, n), _force(second_force, n, "second_force"), _force(steady, n, "steady").real
     driven = np.abs(f) + np.abs(f_2) + np.abs(f_0)
-    watched = [int(i) for i in (np.flatnonzero(driven) if output is None else np.atleast_1d(output))]
-    rows = np.array([_row(i, n, "structure: output") for i in watched]).reshape(-1, n)
+    read = np.flatnonzero(driven) if output is None else np.atleast_1d(output)
+    rows = np.array([_row(i, n, "structure: output") for i in read]).reshape(-1, n)
+    watched = [int(i) for i in read]
     nowhere = np.zeros(3)
     group = ModalGroup(
         speed=0.0, omega=np.zeros(n), kind=("normal",) * n, damping_ratio=np.zeros(n), M_r=M, K_r=K, C_r=C,
@@ -244,13 +302,9 @@ def structure(
 
 
 def _matrix(A: Any, key: str) -> Array:
-    try:
-        A = np.atleast_2d(np.asarray(A, dtype=float))
-    except (TypeError, ValueError):
-        raise UserError(f"structure: {key}: is no matrix of numbers; give rows of the same length") from None
-    if A.ndim != 2 or len(A) != A.shape[1]:
+    A = np.atleast_2d(np.asarray(A, dtype=float))
+    if len(A) != A.shape[1]:
         raise UserError(f"structure: {key}: has shape {A.shape}; give a square matrix")
-    bounded(f"structure: {key}", A)
     return A
 
 
@@ -268,7 +322,8 @@ def _check_mass(M: Array) -> None:
 def _modal_damping(M: Array, K: Array, ratio: float | Sequence[float]) -> Array:
     """C of ratios D: M X diag(2 D omega) X^T M."""
     given = np.atleast_1d(np.asarray(ratio, dtype=float))
-    bounded("structure: damping_ratio", given, ge=0)
+    if len(given) > len(M):
+        raise UserError(f"structure: damping_ratio: has {len(given)} values; the structure has {len(M)} modes")
     if given.max(initial=0.0) >= 1:
         raise UserError(
             f"structure: damping_ratio: {given.max():g} lets nothing vibrate; a share of critical damping is meant, "
@@ -285,8 +340,6 @@ def _force(force: Any, n: int, key: str = "force") -> Array:
     if force is None:
         return np.zeros(n, dtype=complex)
     if isinstance(force, Mapping):
-        for i, v in force.items():
-            bounded(f"structure: {key} of coordinate {i}", v if isinstance(v, str) else [np.real(v), np.imag(v)])
         f = sum(
             (v * _row(i, n, f"structure: {key}").astype(complex) for i, v in force.items()), np.zeros(n, dtype=complex)
         )
@@ -294,19 +347,14 @@ def _force(force: Any, n: int, key: str = "force") -> Array:
         f = np.atleast_1d(np.asarray(force, dtype=complex))
     if f.shape != (n,):
         raise UserError(f"structure: {key}: has shape {f.shape}; the structure has {n} coordinates")
-    bounded(f"structure: {key}", [*f.real, *f.imag])
     return f
 
 
 def _contacts(elements: Sequence[Element], component: str, K: Array, force: Array) -> tuple[Contact, ...]:
-    if not isinstance(elements, Sequence) or not all(isinstance(e, Element) for e in elements):
-        raise UserError("structure: elements: give a list of them, as [ms.jenkins(1.0, 0.5)]")
     patches: dict[str, Patch] = {}  # equal elements are evaluated together
     found = []
     for i, e in enumerate(elements, 1):
         row = e.row(len(K))
-        if e.along not in ALONG:
-            raise UserError(f"element: along: '{e.along}' is no direction; choose from n, t1, t2")
         shape = np.zeros((1, 3, 1))
         shape[0, ALONG[e.along], 0] = 1.0
         key = f"{e.law!r} {e.along}"

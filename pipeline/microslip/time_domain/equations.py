@@ -23,6 +23,7 @@ from ..contact.patch import stuck_stiffness
 from ..contact.set_valued import SetValued
 from ..data import Array
 from ..errors import UserError
+from ..process import prepare
 from ..settings.mistakes import bounded
 from ..system.assembly import Assembly, Contact, Linear, diagonal
 from .ramp import Ramp, turning_loads
@@ -189,6 +190,7 @@ def of(assembly: Assembly, Omega: float, second: float | None = None) -> Equatio
         UserError: a frequency that is not positive; modes that are not real; a law that does not say what it remembers;
             circulatory forces.
     """
+    prepare()
     bounded("frequency", Omega / (2 * np.pi), gt=0)
     assembly = (assembly if second is None else _of_two(assembly, second / Omega)).unrolled()
     assembly.check_names()

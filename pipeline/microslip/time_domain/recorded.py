@@ -18,6 +18,7 @@ from ..harmonic_balance import solved
 from ..harmonic_balance.nonlinear_modes import Backbone
 from ..results.series import Series
 from ..results.tones import TwoTones, is_of_tones, read_tones
+from ..settings.arguments import checked
 from . import orbit, samples
 from .equations import Equations
 from .orbit import Orbit, Start
@@ -157,6 +158,7 @@ def run(
         return [Recorded(path, i, whole[f"motion_{i}"], a.equations) for i, a in enumerate(asked, 1)]
 
 
+@checked
 def read_orbits(path: Path | str) -> tuple[Recorded, ...]:
     """Read ``orbit.h5``, or what `Orbit.save` wrote: its motions, whose arrays are read when they are asked for.
 
@@ -169,6 +171,7 @@ def read_orbits(path: Path | str) -> tuple[Recorded, ...]:
         return tuple(Recorded(path, i, file[f"motion_{i}"]) for i in range(1, count + 1))
 
 
+@checked
 def load(path: Path | str) -> Series | Backbone | Recorded | TwoTones:
     """What a result's `save` wrote: the only series of a response file, a nonlinear mode, the only motion in time, or
     motions of two frequencies.

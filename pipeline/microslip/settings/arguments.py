@@ -1,0 +1,107 @@
+"""Arguments of public functions, checked by their annotations as the keys of a file are by theirs."""
+
+from __future__ import annotations
+
+import inspect
+import sys
+from collections.abc import Callable, Sequence
+from dataclasses import is_dataclass
+from functools import cache, reduce, wraps
+from operator import or_
+from types import UnionType
+from typing import Annotated, Any, ParamSpec, TypeVar, Union, get_args, get_origin
+
+import numpy as np
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, InstanceOf, create_model
+
+from .mistakes import unfit, validate
+
+P = ParamSpec("P")
+R = TypeVar("R")
+
+Count = Annotated[int, Field(ge=1)]
+Index = Annotated[int, Field(ge=0)]
+Text = Annotated[str, Field(min_length=1)]
+
+
+def numbers(*dimensions: int, gt: float | None = None, ge: float | None = None) -> BeforeValidator:
+    """What an array may be: how many dimensions it has, and bounds of its entries, of which there is one at least."""
+
+    def check(value: Any) -> Any:
+        if said := unfit(value, gt=gt, ge=ge):
+            raise ValueError(said)
+        if (found := np.ndim(value)) not in dimensions:
+            wanted = " or ".join({0: "one number", 1: "a list", 2: "rows of numbers"}[d] for d in dimensions)
+            raise ValueError(f"must be {wanted}, and has {found} dimensions")
+        if not np.size(value):
+            raise ValueError("must not be empty")
+        return value
+
+    return BeforeValidator(check)
+
+
+Frequencies = Annotated[Any, numbers(0, 1, gt=0)]
+"""One or (f,), positive."""
+Vector = Annotated[Any, numbers(1)]
+Rows = Annotated[Any, numbers(2)]
+
+
+def checked(function: Callable[P, R]) -> Callable[P, R]:
+    """The function, whose arguments are looked at before it is called.
+
+    A call raises `UserError`: an argument that is none of what its annotation says; the sentence begins with the
+    names of the function and the argument.
+    """
+    signature = inspect.signature(function)
+
+    @wraps(function)
+    def call(*args: P.args, **kwargs: P.kwargs) -> R:
+        check(function, signature.bind(*args, **kwargs).arguments)
+        return function(*args, **kwargs)
+
+    return call
+
+
+def check_fields(made: Any) -> None:
+    """The same of what a dataclass is made from."""
+    check(type(made), vars(made))
+
+
+def check(of: Callable[..., Any], given: dict[str, Any]) -> None:
+    """Raise `UserError` for what does not fit the annotations of a function or a class. given: name -> value."""
+    model = _model(of)
+    validate(model, {k: _plain(v) for k, v in given.items() if k in model.model_fields}, of.__name__)
+
+
+def _plain(value: Any) -> Any:
+    """A number of numpy as one of Python."""
+    return value.item() if isinstance(value, np.generic) else value
+
+
+def _made(annotation: Any) -> Any:
+    """The annotation, whose dataclasses stand for what was made by them, not for tables to make them from."""
+    kind, of = get_origin(annotation), get_args(annotation)
+    if isinstance(annotation, type) and is_dataclass(annotation):
+        return Annotated[annotation, InstanceOf()]
+    if kind is Annotated:
+        return Annotated[_made(of[0]), *of[1:]]
+    if kind in (Union, UnionType):
+        return reduce(or_, map(_made, of))
+    return kind[tuple(map(_made, of))] if kind in (Sequence, tuple) else annotation
+
+
+@cache
+def _model(of: Callable[..., Any]) -> type[BaseModel]:
+    """Keys and what they may be; names that only a type checker knows may be anything."""
+    names, scope = dict(inspect.get_annotations(of)), vars(sys.modules[of.__module__])
+    keys: dict[str, Any] = {}
+    for name, annotation in names.items():
+        try:
+            keys[name] = (_made(eval(annotation, scope) if isinstance(annotation, str) else annotation), None)
+        except NameError:
+            continue
+    keys.pop("return", None)
+    if not isinstance(of, type):
+        more = {p.name for p in inspect.signature(of).parameters.values() if p.kind is p.VAR_KEYWORD}
+        keys = {name: key for name, key in keys.items() if name not in more}
+    return create_model(of.__name__, __config__=ConfigDict(strict=True, arbitrary_types_allowed=True), **keys)

@@ -1,0 +1,172 @@
+"""Nonsense as arguments of the public functions: each is refused by a `UserError` that begins with the function's name
+and names the argument."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+import microslip as ms
+from microslip.errors import UserError
+
+NAN, INF = math.nan, math.inf
+RAGGED = [[1.0], [1.0, 2.0]]
+NUMBER = ["x", "1", NAN, INF, [], {}, None, RAGGED, object(), 1e200, 1j, True]
+NOT_NEGATIVE = [*NUMBER, -1.0]
+POSITIVE = [*NOT_NEGATIVE, 0.0]
+WHOLE = ["x", NAN, INF, 1.5, -1, [], {}, None, True]
+COUNT = [*WHOLE, 0]
+WORD = ["nonsense", 3, [], None, NAN]
+TEXT = [3, [], NAN, ""]
+TRUTH = ["x", 3, None, NAN]
+SYSTEM = ["x", 3.0, None, [], NAN]
+FUNCTION = ["x", 3.0, None]
+MATRIX = ["x", NAN, INF, [], {}, None, RAGGED, [["a"]], np.zeros((2, 3)), np.zeros((1, 1, 1)), 1e200]
+FREQUENCIES = ["x", NAN, INF, [], None, {}, -1.0, 0.0, [[0.1, 0.2]], ["a"], [0.1, NAN], object(), 1e200, 1j]
+PLACE = ["x", NAN, INF, {}]
+FILE = [3.0, None, [], NAN]
+FORCE = ["x", NAN, {0: NAN}, {0: "a"}, {"a": 1.0}, {0: None}, {0: INF}, [], [1.0, 2.0], {1.5: 1.0}, {0: [1.0]},
+         {NAN: 1.0}, {0: 1e200}]  # fmt: skip
+
+
+def without_none(kind):
+    """Of an argument that may be left out."""
+    return [v for v in kind if v is not None]
+
+
+def optional(**kinds):
+    return {key: without_none(kind) for key, kind in kinds.items()}
+
+
+SLIDER = ms.structure(1.0, 1.0, 0.1, force={0: 0.3}, elements=[ms.jenkins(1.0, 0.5)])
+TWO = ms.structure(1.0, 1.0, 0.1, force={0: 0.2}, second_force={0: 0.1}, elements=[ms.polynomial({3: 0.05})])
+FLUTTER = [[3, 1], [1, 1]], [[0, 0], [0, 0]], [[-1, 2], [-1, 1]]
+BALANCE = optional(harmonics=COUNT, samples=COUNT) | {"report": FUNCTION}
+
+
+def rate(x, p, angle):
+    return -x
+
+
+def dynamics(**more):
+    return ms.Dynamics(**({"rate": rate, "labels": ("x", "y"), "scale": np.ones(2)} | more))
+
+
+BRUSSELATOR = dynamics()
+CALLS = [
+    (ms.structure, {"M": 1.0, "K": 1.0, "C": 0.1, "force": {0: 0.3}}, {
+        "M": MATRIX, "K": MATRIX, "force": FORCE, "steady": FORCE, "second_force": FORCE, "name": TEXT,
+        "elements": ["x", 3.0, [1.0], {}, ["x"], NAN],
+        "output": ["x", NAN, 1.5, [NAN], ["x"], [None], [[0]], 5, {}, -7, INF],
+        "damping_ratio": ["x", NAN, INF, -0.1, 1.0, {}, [[0.1]], [], None, ["a"], [0.1, 0.2]],
+    } | optional(C=MATRIX)),
+    (ms.polynomial, {"stiffness": {3: 1.0}}, {
+        "stiffness": ["x", NAN, None, [], {}, {3: NAN}, {3: "a"}, {"3": 1.0}, {NAN: 1.0}, {INF: 1.0}, {None: 1.0},
+                      {-1: 1.0}, {10**9: 1.0}, {3: [1.0]}, {3: 1e200}, {3: 1j}, {1.5: 1.0}],
+        "at": PLACE, "to": PLACE, "name": TEXT,
+    }),
+    (ms.jenkins, {"stiffness": 1.0, "limit": 1.0},
+     {"stiffness": [*POSITIVE, [1.0, 2.0]], "limit": [*NOT_NEGATIVE, [1.0]], "at": PLACE, "to": PLACE, "name": TEXT}),
+    (ms.stop, {"stiffness": 1.0, "gap": 1.0}, {
+        "stiffness": [v for v in POSITIVE if v is not INF], "gap": NUMBER, "at": PLACE, "to": PLACE, "both": TRUTH,
+        "restitution": ["x", NAN, -1.0, 2.0, None, []], "name": TEXT,
+    }),
+    (ms.friction, {"limit": 1.0}, {"limit": NOT_NEGATIVE, "at": PLACE, "to": PLACE, "name": TEXT}),
+    (ms.Element, {"law": ms.jenkins(1.0, 1.0).law, "at": 0},
+     {"law": SYSTEM, "at": PLACE, "to": PLACE, "along": WORD, "name": TEXT, "length": without_none(POSITIVE)}),
+    (ms.Dynamics, {"rate": rate, "labels": ("x", "y"), "scale": np.ones(2)}, {
+        "rate": FUNCTION, "labels": [3, None, (), "x", (1, 2), NAN], "parameter_scale": POSITIVE,
+        "scale": [1.0, "x", NAN, None, [1.0], [1.0, NAN], [1.0, -1.0], [1.0, 0.0], [], {}],
+        "outputs": [3, NAN, (1,)], "units": [3, NAN, (1,)], "bends": ["x", 3.0, NAN, np.eye(3)],
+    } | optional(frequency=FUNCTION, read=FUNCTION)),
+    (ms.harmonic_response, {"system": SLIDER, "frequency": [0.1]},
+     {"system": SYSTEM, "frequency": FREQUENCIES, "unit": WORD, **BALANCE}),
+    (ms.two_tones, {"system": TWO, "first": 0.2, "second": 0.13}, {
+        "system": SYSTEM, "first": FREQUENCIES, "second": FREQUENCIES, "free": TRUTH, "unit": WORD, **BALANCE,
+        "turns": without_none(COUNT), "start": ["x", 3.0], "kept": ["x", 3.0],
+    }),
+    (ms.follow, {"system": SLIDER, "start": 0.1, "stop": 0.2}, {
+        "system": SYSTEM, "start": POSITIVE, "stop": POSITIVE, "over": WORD, "unit": WORD, **BALANCE,
+        "frequency": without_none(POSITIVE), "settings": ["x", 3.0, [0], {3: 1}],
+    }),
+    (ms.backbone, {"system": SLIDER, "low": 1e-3, "high": 1.0}, {
+        "system": SYSTEM, "low": POSITIVE, "high": [*POSITIVE, 1e-4], "mode": [*WHOLE, 5], "output": [*WHOLE, 5],
+        **BALANCE,
+    }),
+    (ms.integrate, {"system": SLIDER, "frequency": 0.24}, {
+        "system": SYSTEM, "frequency": POSITIVE, "second": without_none(POSITIVE), "unit": WORD, "settle": WHOLE,
+        "keep": COUNT, "samples": COUNT, "steps": without_none(COUNT), "method": WORD, "tolerance": POSITIVE,
+        "file": [*without_none(FILE), ""], "report": FUNCTION,
+    }),
+    (ms.integrate_many, {"system": SLIDER, "frequency": 0.24, "displacements": [[0.1]], "velocities": [[0.0]]}, {
+        "system": SYSTEM, "frequency": POSITIVE, "unit": WORD, "settle": WHOLE, "keep": COUNT,
+        "displacements": ["x", NAN, [], [[NAN]], [["a"]], [0.1], None, [[0.1, 0.2]], {}],
+        "velocities": ["x", NAN, [], [[NAN]], [0.1], None, [[0.0], [0.0]], {}], "steps": without_none(COUNT),
+    }),
+    (ms.run_up, {"system": SLIDER, "start": 0.1, "stop": 0.2, "time": 20.0}, {
+        "system": SYSTEM, "start": POSITIVE, "stop": POSITIVE, "time": POSITIVE, "unit": WORD, "order": COUNT,
+        "euler": ["x", 3.0, None, (1,), NAN], "samples": COUNT, "steps": without_none(COUNT), "begin": WORD,
+        "file": [*without_none(FILE), ""], "report": FUNCTION,
+    }),
+    (ms.bifurcate, {"system": BRUSSELATOR, "start": 1.5, "stop": 1.6, "orbits": False}, {
+        "system": SYSTEM, "start": NUMBER, "stop": [*NUMBER, 1.5], "x": ["x", NAN, [1.0], [NAN, 1.0], [[1.0, 1.0]], {}],
+        "frequency": without_none(POSITIVE), "unit": WORD, "orbits": TRUTH, "doublings": WHOLE, "starts": COUNT,
+        "attractors": ["x", NAN, None, [NAN], ["a"]], "deflate": ["x", NAN, None, [NAN], ["a"]], "nodes": COUNT,
+        "step": POSITIVE, "points": COUNT, "report": FUNCTION,
+    }),
+    (ms.stability, {"body": FLUTTER}, {
+        "body": [3.0, None, NAN, [], (1.0,), ([[1]], [[1]], [["a"]]), ([[NAN]], [[0.0]], [[1.0]]),
+                 ([[1.0]], [[0.0]], [[1.0, 2.0]])],
+        "frequency": ["x", 3.0, (1.0,), (NAN, 1.0), ("a", 1.0), (2.0, 1.0), (1.0, 1.0), [], (-1.0, NAN)],
+        "growth": ["x", 3.0, (1.0,), (NAN, 1.0), None, (1.0, -1.0)], "over": [3.0, NAN, ""],
+        "values": ["x", 3.0, [NAN], [], [1.0, 2.0]], "at": ["x", 3.0, {"a": 1.0}, {"a": "x"}, NAN],
+        "accuracy": POSITIVE, "neutral": NOT_NEGATIVE, "certify": TRUTH, "speed": without_none(WHOLE),
+        "report": FUNCTION,
+    }),
+    (ms.Scatter, {"of": "frequency", "deviation": 0.01}, {
+        "of": WORD, "deviation": NOT_NEGATIVE, "distribution": WORD, "values": ["x", NAN, [NAN], ["a"], 3.0, None],
+        "others": ["x", 3.0, NAN, []], "arrangement": WORD, "component": TEXT, "contact": TEXT, "at": TEXT,
+        "together": ["x", NAN, 2.0, None, []], "neighbours": ["x", NAN, 2.0, None, []],
+    }),
+    (ms.mistune, {"system": SLIDER, "scatter": ms.Scatter("frequency", 0.01), "frequency": [1.0, 2.0, 3.0]}, {
+        "system": [*SYSTEM, SLIDER], "frequency": FREQUENCIES, "samples": COUNT, "until": without_none(POSITIVE),
+        "rare": WHOLE, "seed": WHOLE, "stuck": TRUTH, "harmonics": COUNT, "points": without_none(COUNT),
+        "workers": COUNT, "report": FUNCTION,
+    }),
+    (ms.assemble, {"case": {"body": "vane"}}, {
+        "case": FILE, "folder": FILE, "normal_force": without_none(NOT_NEGATIVE), "report": FUNCTION,
+    }),
+    (ms.modes, {"body": {"name": "a"}}, {"body": FILE, "folder": FILE, "report": FUNCTION}),
+    *((read, {"path": "x"}, {"path": FILE}) for read in (ms.load, ms.read_basis, ms.read_response, ms.read_orbits)),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("function", "good", "key"),
+    [pytest.param(f, good, key, id=f"{f.__name__}-{key}") for f, good, kinds in CALLS for key in kinds],
+)
+def test_nonsense_is_refused_by_its_name(function, good, key):
+    nonsense = next(kinds[key] for f, _, kinds in CALLS if f is function)
+    for value in nonsense:
+        with pytest.raises(UserError) as caught:
+            function(**{**good, key: value})
+        assert key in str(caught.value), (value, str(caught.value))
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [{"points": "a"}, {"points": NAN}, {"points": -1}, {"step_max": -1.0}, {"step": NAN}, {"step_max": "a"}],
+)
+def test_steps_along_a_curve_that_are_none(settings):
+    with pytest.raises(UserError, match=str(next(iter(settings)))):
+        ms.follow(SLIDER, 0.1, 0.2, settings=settings)
+
+
+def test_numbers_of_numpy_are_numbers():
+    force = {np.int64(0): np.float64(1.0)}
+    one = ms.structure(np.float64(1.0), np.int64(1), force=force, damping_ratio=np.float32(0.125))
+    found = ms.harmonic_response(one, np.float64(0.05), harmonics=np.int64(1))
+    exact = 1 / abs(1 - (0.1 * np.pi) ** 2 + 0.25j * 0.1 * np.pi)
+    np.testing.assert_allclose(found.amplitude, exact, rtol=1e-6)
