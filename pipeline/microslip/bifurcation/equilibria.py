@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
+import scipy.linalg
 
 from ..continuation import Lost, Scaled, Segment, Settings, advance, root, start
 from ..continuation.curve import State
@@ -110,8 +111,10 @@ def _sought(system: Dynamics, x: Array, p: float, omega: float) -> Hopf:
     try:
         return hopf(system, x, p, omega)
     except (Lost, np.linalg.LinAlgError) as error:
-        values = eigenvalues(system, x, p)
-        if (np.abs(values - 1j * omega) < NEAR * omega).sum() > 1:
+        size = np.asarray(system.scale)
+        J = np.asarray(system.still(x, p)[1]) * size / size[:, None]
+        small = scipy.linalg.svdvals(J - 1j * omega * np.eye(system.count)) < NEAR * omega
+        if small.sum() > 1:  # each pair has a shape; two that meet have one
             raise UserError(
                 f"near {p:.4g} of the parameter several pairs of roots cross the imaginary axis at {omega:.4g} rad/s: "
                 "parts that are alike and not coupled; follow one of them, or couple them"

@@ -179,7 +179,8 @@ class OrbitOfCase(Model):
     that are left to themselves. keep: periods that are kept. samples: of each. steps: of each, if not given as many as
     the fastest motion with closed contacts needs. start: at rest, ``static`` under the steady
     loads, ``rest`` as preloaded; or ``balance``, on the vibration that harmonic balance finds with the case's
-    harmonics. release: where the bodies are let go, instead of start. normal_force: N, of the contacts that the sweep presses.
+    harmonics. release: where the bodies are let go, instead of start. normal_force: N, of the
+    contacts that the sweep presses.
     """
 
     frequency: Several | None = None

@@ -210,9 +210,9 @@ def second_frequency(orbit: Orbit) -> float:
 
 
 def kind(orbit: Orbit) -> str:
-    """``periodic``, ``quasi-periodic``, ``chaotic``; ``settling``: it comes back, but drifts, or the separation of
-    neighbours shrinks, so that it goes to a motion that comes back; ``run-up``; ``open``: it is not known; ``diverged``; ``short``: less than two periods
-    are kept."""
+    """``periodic``, ``quasi-periodic``, ``chaotic``; ``settling``: it comes back, but drifts, or
+    the separation of neighbours shrinks, so that it goes to a motion that comes back; ``run-up``;
+    ``open``: it is not known; ``diverged``; ``short``: less than two periods are kept."""
     if math.isfinite(orbit.diverged):
         return "diverged"
     if orbit.run_up:

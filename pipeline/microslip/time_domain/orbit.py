@@ -174,8 +174,8 @@ class Orbit:
 
     @cached_property
     def drifts(self) -> float:
-        """Share of its size by which a motion that comes back is elsewhere at the end of the last half of the periods
-        that are kept than at its beginning: it has not come to rest where that is more than `classification.SETTLED`."""
+        """Share of its size by which a motion that comes back is elsewhere at the end of the last
+        half of the periods that are kept than at its beginning; see `classification.SETTLED`."""
         after, size = self.stroboscopic
         last = after[:, after.shape[1] // 2 :]
         if not self.repeats or not size:
