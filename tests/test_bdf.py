@@ -186,7 +186,7 @@ def test_what_bulk_data_holds_besides_is_named(tmp_path, capsys):
         tmp_path, "FORCE,1,10,0,1.0,1.0,0.0,0.0", "XYZZY,1", "EIGRL,1,,,8", control=["STATSUB = 1"]
     )
     assert (
-        "FORCE: loads, which" in read.remarks[0]
+        "FORCE: loads, under which" in read.remarks[0]
         and "XYZZY: what they do to the freq" in read.remarks[1]
     )
     assert "STATSUB: the frequencies of the deck are those under the load" in read.lost[0]

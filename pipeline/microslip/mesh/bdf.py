@@ -96,9 +96,10 @@ def read_bdf(path: Path) -> RawMesh:
         if name.startswith("MATT")
         for c in others[name]
     ]
-    raw.lost += _prestressed(path.name, text)
+    stress = _prestressed(path.name, text)
+    raw.lost += stress
     unused = (n for n in others if not (_COUNTS.fullmatch(n) or _SILENT.fullmatch(n)))
-    raw.remarks += ignored(unused, _LOADS)
+    raw.remarks += ignored(unused, _LOADS, bool(stress))
     raw.links = [*_rigid(cards, path.name, numbering, held), *_averages(cards, path.name, numbering, held)]
     raw.links += _equations(cards, path.name, text, numbering, held, raw.lost)
     add_supports(raw, held, numbering)

@@ -80,6 +80,7 @@ class _Archive:
     full: set[int] = field(default_factory=set)
     selected: str = ""
     parameters: dict[str, int] = field(default_factory=dict)
+    stressed: bool = False
     unused: list[str] = field(default_factory=list)
     lost: list[str] = field(default_factory=list)
 
@@ -111,7 +112,7 @@ def read_cdb(path: Path) -> RawMesh:
         at += 1
     raw = _assembled(archive)
     raw.lost = [*archive.lost, *_other_elements(archive, path.name)]
-    raw.remarks += [*_integration(archive), *ignored(archive.unused, _LOADS)]
+    raw.remarks += [*_integration(archive), *ignored(archive.unused, _LOADS, archive.stressed)]
     if not any(line.strip().upper().startswith("FINI") for line in lines[-20:]):
         raw.unended = "no FINISH"  # a warning: archives that were shortened by hand have none
     return raw
@@ -301,6 +302,7 @@ def _stressed(archive: _Archive, words: list[str]) -> None:
     """PSTRES,ON, and a restart of a loaded state (ANTYPE,,RESTART,,,PERTURB)."""
     on = words[0].upper() == "PSTRES" and len(words) > 1 and words[1].upper() in ("ON", "1")
     if on or "PERTURB" in (word.upper() for word in words):
+        archive.stressed = True
         archive.lost.append(f"{archive.where}: {words[0].upper()}: {PRESTRESSED}")
 
 

@@ -61,8 +61,9 @@ def read_inp(path: Path) -> RawMesh:
         *_replaced(raw, whole),
     ]
     whole.ignored += unused_loads(whole)
-    raw.lost += _prestressed(found.rest)
-    raw.remarks += ignored([f"*{word}" for word in whole.ignored], _LOADS)
+    stress = _prestressed(found.rest)
+    raw.lost += stress
+    raw.remarks += ignored([f"*{word}" for word in whole.ignored], _LOADS, bool(stress))
     if not path.read_bytes().endswith(b"\n"):
         raw.unended = "a last line without an end"
     return raw

@@ -147,12 +147,17 @@ PRESTRESSED = (
 """What is said of a deck whose modes are those of a loaded body."""
 
 
-def ignored(words: Iterable[str], loads: str) -> list[str]:
-    """What is said of keywords that are not used; loads: a pattern of those that load the body."""
+def ignored(words: Iterable[str], loads: str, stressed: bool = False) -> list[str]:
+    """What is said of keywords that are not used.
+
+    Args:
+        loads: a pattern of those that load the body. stressed: the deck's modes are those under them.
+    """
     every = list(dict.fromkeys(words))
     pressing = [word for word in every if re.fullmatch(loads, word)]
     others = [word for word in every if word not in pressing]
-    said = [(pressing, "loads, which change no frequency of an unstressed body")]
+    idle = "loads, which change no frequency of an unstressed body"
+    said = [(pressing, "loads, under which the deck's frequencies are" if stressed else idle)]
     said += [(others, "what they do to the frequencies is not known here")]
     return [f"read and not used: {', '.join(named)}: {effect}" for named, effect in said if named]
 
