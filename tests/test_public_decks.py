@@ -58,6 +58,13 @@ def test_a_set_that_nothing_uses_may_name_nodes_that_are_not_there(tmp_path, mon
     np.testing.assert_allclose(hertz(tmp_path)[:5], CLAMPED, rtol=5e-6)  # six digits
 
 
+def test_a_support_without_a_node_that_is_there_is_told(tmp_path, monkeypatch, capsys):
+    text = deck(block(), "*NSET, NSET=GONE", "88888, 99999", "*BOUNDARY", "GONE, 1, 3")
+    said = imported(tmp_path, monkeypatch, capsys, "a.inp", text)
+    assert "not taken as a support: 'GONE' in xyz: none of its nodes is there" in said
+    assert keys(tmp_path)["free"] is True
+
+
 STATIC = ["*STEP, NLGEOM", "*STATIC", "*CLOAD", "x1, 1, 1125", "*END STEP"]
 MODES = ["*STEP{}", "*FREQUENCY", "6", "*END STEP"]
 

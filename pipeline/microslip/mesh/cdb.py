@@ -55,7 +55,7 @@ class _Archive:
     """What the commands have said. elements: (number, material, type, system, nodes). places: of equations, by name.
     kind: of the elements that follow (TYPE). outside: kind -> where, and how many elements, beside EBLOCK,,SOLID.
     full: types with KEYOPT(2) = 1. selected: the component that CMSEL chose last. parameters: whole
-    numbers of *SET. unused: loads that are not taken.
+    numbers of *SET. unused: loads that are not taken. ranged: numbers that ranges of D go over.
     """
 
     node_id: list[int] = field(default_factory=list)
@@ -81,6 +81,7 @@ class _Archive:
     selected: str = ""
     parameters: dict[str, int] = field(default_factory=dict)
     stressed: bool = False
+    ranged: set[int] = field(default_factory=set)
     unused: list[str] = field(default_factory=list)
     lost: list[str] = field(default_factory=list)
 
@@ -386,10 +387,9 @@ def _read_displacement(archive: _Archive, words: list[str]) -> None:
     elif is_number(where):
         first, end = int(where), _whole(last, "D") if last else int(where)
         every = range(first, min(end, first + 10**8) + 1, max(_whole(step or "1", "D"), 1))
-        known = {first, *archive.node_id} if len(every) > 1 else every  # a range may go over gaps
+        archive.ranged.update(every[1:])
         for node in every:
-            if node in known:
-                archive.held.hold(node, directions)
+            archive.held.hold(node, directions)
     else:
         archive.held.left_out.append(f"D,{where},{label} names no node by its number")
 
@@ -484,6 +484,8 @@ def _assembled(archive: _Archive) -> RawMesh:
         if members:
             raw.add_set(name, members, numbering)
     raw.links = _links(archive, numbering)
+    for gap in archive.ranged.difference(archive.node_id):
+        archive.held.nodes.pop(gap, None)
     add_supports(raw, archive.held, numbering)
     raw.materials = [_material(archive, *key) for key in regions] if archive.constants else []
     if not raw.materials:
