@@ -139,16 +139,22 @@ def test_a_material_that_is_not_read_refuses_the_import(tmp_path, capsys):
 
 
 def block(tmp_path, *cards: str, control=()) -> Mesh:
-    """One brick whose grid points have the numbers 10, 20, ... 80, the lower ones 10 to 40, and further cards."""
+    """One brick whose grid points have the numbers 10, 20, ... 80, the lower ones 10 to 40, and
+    further cards."""
     mesh = meshes.brick("hexahedron", (1, 1, 1))
     mesh = Mesh(mesh.points, mesh.cells, node_id=10 * np.arange(1, 9))
-    text = bulk(mesh).replace("ENDDATA", "\n".join([*cards, "ENDDATA"])).replace("CEND", "\n".join(["CEND", *control]))
+    text = (
+        bulk(mesh)
+        .replace("ENDDATA", "\n".join([*cards, "ENDDATA"]))
+        .replace("CEND", "\n".join(["CEND", *control]))
+    )
     (tmp_path / "a.bdf").write_text(text)
     return read_mesh(tmp_path / "a.bdf", "m")
 
 
 def test_free_lines_longer_than_ten_fields_go_on(tmp_path):
-    """All eight points are held; a mark in the tenth field is none of them; what may be either is refused."""
+    """All eight points are held; a mark in the tenth field is none of them; what may be either is
+    refused."""
     for card in ("SPC1,7,123,10,20,30,40,50,60,70,80", "SPC1,7,123,10,20,30,40,50,60,+,70,80"):
         read = block(tmp_path, card)
         assert read.node_id[read.point_sets["SPC 7"]].tolist() == list(range(10, 90, 10))
@@ -162,16 +168,27 @@ def test_a_range_goes_over_numbers_that_are_no_grid_points(tmp_path):
     """SPC1 A THRU B and SET1 A THRU B BY C; a number of its own that is not there is a remark."""
     cards = ["SPC1,7,123,1,THRU,45", "SET1,9,10,THRU,90,BY,20", "SET1,8,10,11,80"]
     read = block(tmp_path, *cards, control=["SPC = 7"])
-    assert read.node_id[read.point_sets["SPC 7"]].tolist() == [10, 20, 30, 40] and read.supports["SPC 7"] == "xyz"
+    assert (
+        read.node_id[read.point_sets["SPC 7"]].tolist() == [10, 20, 30, 40]
+        and read.supports["SPC 7"] == "xyz"
+    )
     assert read.node_id[read.point_sets["SET 9"]].tolist() == [10, 30, 50, 70] and not read.not_held
     assert read.node_id[read.point_sets["SET 8"]].tolist() == [10, 80]
-    assert read.remarks == ("the set 'SET 8' names node 11 that the file does not define: left out of it",)
+    assert read.remarks == (
+        "the set 'SET 8' names node 11 that the file does not define: left out of it",
+    )
 
 
 def test_what_bulk_data_holds_besides_is_named(tmp_path, capsys):
-    """Loads, unknown cards, a prestress subcase; a layered solid refuses the import, where steel took its place."""
-    read = block(tmp_path, "FORCE,1,10,0,1.0,1.0,0.0,0.0", "XYZZY,1", "EIGRL,1,,,8", control=["STATSUB = 1"])
-    assert "FORCE: loads, which" in read.remarks[0] and "XYZZY: what they do to the freq" in read.remarks[1]
+    """Loads, unknown cards, a prestress subcase; a layered solid refuses the import, where steel
+    took its place."""
+    read = block(
+        tmp_path, "FORCE,1,10,0,1.0,1.0,0.0,0.0", "XYZZY,1", "EIGRL,1,,,8", control=["STATSUB = 1"]
+    )
+    assert (
+        "FORCE: loads, under which" in read.remarks[0]
+        and "XYZZY: what they do to the freq" in read.remarks[1]
+    )
     assert "STATSUB: the frequencies of the deck are those under the load" in read.lost[0]
     (told,) = block(tmp_path, "MATT1,1,5").lost
     assert "MATT1 1: a material over temperature" in told and "by a factor" in told

@@ -243,8 +243,8 @@ def test_one_command_holds_several_directions_and_nodes(tmp_path):
 
 @pytest.mark.parametrize("more", ["E,9\nE,10", "EN,98,9\nEN,99,10", "EBLOCK,10,,,2\n(15i9)\n{0}\n{0}\n       -1"])
 def test_elements_outside_the_block_of_solids_are_told(tmp_path, more):
-    """Point masses by commands of the type before them, or in a short block, of the second number of a line; surface
-    loads there say nothing."""
+    """Point masses by commands of the type before them, or in a short block, of the second number of a
+    line; surface loads there say nothing."""
     line = "".join(f"{w:9d}" for w in (98, 3, 1, 1, 0, 9))
     more = f"TYPE,3\n{more.format(line)}\nTYPE,2\nE,1,2,3,4\nEMODIF,2,MAT,3\n"
     text = archive(BAR).replace("ET,2,154", "ET,2,154\nET,3,MASS21").replace("FINISH", f"{more}FINISH")
@@ -319,16 +319,26 @@ FINISH"""
 
 
 def test_what_workbench_writes_is_read_or_named(tmp_path, monkeypatch, capsys):
-    """Lengths in m by /UNITS, a selected component that is held, a displacement from a table, a range over gaps."""
+    """Lengths in m by /UNITS, a selected component that is held, a displacement from a table, a
+    range over gaps."""
     monkeypatch.chdir(tmp_path)
-    text = archive(BAR, ("z0",), scale=1.0).replace("\nFINISH", f"\n{WORKBENCH}").replace("2.1e5", "2.1e11")
+    text = (
+        archive(BAR, ("z0",), scale=1.0)
+        .replace("\nFINISH", f"\n{WORKBENCH}")
+        .replace("2.1e5", "2.1e11")
+    )
     (tmp_path / "ds.dat").write_text(text.replace("210000.0", "2.1e11").replace("7.85e-9", "7850"))
     assert main(["import", "ds.dat", "part"]) == 0
     said = capsys.readouterr().out
     assert 'length_unit = "m"' in (tmp_path / "part" / "body.toml").read_text()
-    for words in ("supports of the file: Z0 in xyz, held z in z", "material 1: 7850 kg/m3 in the units m-kg-s",
-                  "D,12,ux takes its displacement from the table %_loadx%", "D,all,ux names no node",
-                  "ACEL: loads", "PSTRES: the frequencies of the deck are those under the load"):  # fmt: skip
+    for words in (
+        "supports of the file: Z0 in xyz, held z in z",
+        "material 1: 7850 kg/m3 in the units m-kg-s",
+        "D,12,ux takes its displacement from the table %_loadx%",
+        "D,all,ux names no node",
+        "ACEL: loads",
+        "PSTRES: the frequencies of the deck are those under the load",
+    ):
         assert words in said, words
     assert main(["import", "ds.dat", "other", "--unit", "mm"]) == 0
     assert "tells its lengths in m, here they are taken in mm" in capsys.readouterr().out
@@ -344,7 +354,9 @@ def test_an_archive_without_materials_is_steel_with_a_warning(tmp_path, monkeypa
 
 def test_a_component_with_nodes_that_are_not_there_is_a_remark(tmp_path):
     """A range over a gap and a leftover number: the rest of the component stays."""
-    text = archive(BAR).replace("FINISH", "CMBLOCK,LEFT,NODE,3\n(8i10)\n         2       -40       999\nFINISH")
+    text = archive(BAR).replace(
+        "FINISH", "CMBLOCK,LEFT,NODE,3\n(8i10)\n         2       -40       999\nFINISH"
+    )
     read = read_mesh(written(tmp_path, text), "mm")
     assert read.node_id[read.point_sets["LEFT"]].tolist() == list(range(2, BAR.n_points + 1))
     assert "the set 'LEFT' names" in read.remarks[0]

@@ -267,7 +267,13 @@ def test_a_floating_superelement_of_two_nodes_comes_back(
     writer("dmig")(basis, "b.pch")
     shared = {"stiffness": "b.pch", "mass": "b.pch", "nodes": "b.pch", "superelement": True}
     given = BodySettings.model_validate(
-        {"name": "b", "length_unit": unit, "free": True, "geometry": {"matrices": shared}, "modes": {"count": 30}}
+        {
+            "name": "b",
+            "length_unit": unit,
+            "free": True,
+            "geometry": {"matrices": shared},
+            "modes": {"count": 30},
+        }
     )
     body = read_matrices(MatrixFiles(**shared), tmp_path, unit)
     found, _ = foreign_basis(body, given)

@@ -190,14 +190,17 @@ NONE
 
 
 def test_results_beside_a_mesh_are_left_aside(tmp_path, monkeypatch, capsys):
-    """Fields of a solver (data sets 55 without modes and 2414) and the file's own unit of length."""
+    """Fields of a solver (data sets 55 without modes and 2414) and the file's own unit of length.
+    """
     monkeypatch.chdir(tmp_path)
     (tmp_path / "a.unv").write_text(SOLVED.format(mesh=unv(tetrahedra())))
     assert main(["import", "a.unv", "part"]) == 0
     said = capsys.readouterr().out
     assert "data sets left aside: 55 (results at nodes), 2414 (results at nodes)" in said
     assert 'length_unit = "mm"' in (tmp_path / "part" / "body.toml").read_text()
-    (tmp_path / "a.unv").write_text(SOLVED.format(mesh=unv(tetrahedra())).replace("1.0D+03", "1.0D+00", 1))
+    (tmp_path / "a.unv").write_text(
+        SOLVED.format(mesh=unv(tetrahedra())).replace("1.0D+03", "1.0D+00", 1)
+    )
     assert main(["import", "a.unv", "other"]) == 0
     assert 'length_unit = "m"' in (tmp_path / "other" / "body.toml").read_text()
 

@@ -238,7 +238,9 @@ def test_free_bodies_keep_rigid_motions_and_answer_with_inertia_relief(method):
     np.testing.assert_allclose((c.modal / scale)[:12, :12], (c.static / scale)[:12, :12], atol=1e-8)
     assert [x.name for x in check_basis(basis) if not x.passed] == []
     certified = modal_basis(mesh, body(reduction="eigenmodes", **FREE)).groups[0, 0].omega
-    limit = 0.01 if method == "craig-bampton" else 1e-9  # ten fixed-interface modes: 0.5 % above, measured
+    limit = (
+        0.01 if method == "craig-bampton" else 1e-9
+    )  # ten fixed-interface modes: 0.5 % above, measured
     error = g.omega[6:9] / certified[6:9] - 1
     assert (error > -1e-9).all() and (error < limit).all()
 
@@ -403,15 +405,18 @@ def test_the_error_with_sticking_contacts_is_told_within_a_few_per_cent():
 
 
 def test_frequencies_of_a_reduced_body_are_not_called_certified():
-    """Craig-Bampton's are those of the reduced body, Rubin's attachment shapes no modes; the others are certified."""
+    """Craig-Bampton's are those of the reduced body, Rubin's attachment shapes no modes; the others
+    are certified."""
     said = {m: "\n".join(basis_summary(block(m)[2])) for m in METHODS}
     for method in ("eigenmodes", "macneal", "massless-boundary", "dual-craig-bampton"):
         assert "6 modes, certified complete" in said[method], method
     g = block("craig-bampton")[2].groups[0, 0]
     count, limit = g.checks["count_below_upper_shift"], g.checks["upper_shift_hz"]
-    assert f"18 modes of the reduced body; of the body itself {count:.0f} are certified below {limit:.6g} Hz" in said[
-        "craig-bampton"
-    ]
+    assert (
+        f"18 modes of the reduced body; of the body itself {count:.0f} are certified below "
+        f"{limit:.6g} Hz"
+        in said["craig-bampton"]
+    )
     assert "certified complete" not in said["craig-bampton"]
     assert "6 modes and 13 static shapes, the modes certified complete" in said["rubin"]
     assert "no modes of the body" in certificate(block("rubin")[2].groups[0, 0])

@@ -197,8 +197,9 @@ class Sector:
     """Cyclic symmetry as a file has it. `where`: its place there.
 
     Attributes:
-        sectors: of the ring. faces: the two cut ones. axis: (3,) of the ring, of any length; point: (3,) on it, in the
-            file's unit. diameters: nodal diameters that are asked for, or nothing.
+        sectors: of the ring. faces: the two cut ones. axis: (3,) of the ring, of any length; point:
+            (3,) on it, in the file's unit. diameters: nodal diameters that are asked for, or
+            nothing.
     """
 
     where: str
@@ -229,8 +230,8 @@ class Mesh:
             that are not among them, in words. unended: what the file lacks at its end, in words, or nothing.
         lost: what carries mass, stiffness or a constraint in the file and is not read, in words.
         remarks: what of the file is read as something else or not used, in words. instances: name -> points.
-        joints: faces that the file lets touch. sector: of a cyclic ring, if the file is one. preloads: of its bolts:
-            where it stands, force in the file's unit.
+        joints: faces that the file lets touch. sector: of a cyclic ring, if the file is one.
+            preloads: of its bolts: where it stands, force in the file's unit.
         links: constraints of the file, and ties: the equations that `fem.links.linked` makes of them, or None.
     """
 

@@ -48,7 +48,8 @@ class _Mode:
 def holds_modes(path: Path | str) -> bool:
     """Whether a text file has modes or measured functions in the way of Universal Files.
 
-    Beside the solid cells of a mesh only modes count: what else stands there are a solver's results.
+    Beside the solid cells of a mesh only modes count: what else stands there are a solver's
+    results.
     """
     before, modes, others, since = b"", False, False, 0
     try:

@@ -35,7 +35,9 @@ _READ = {
     "GRID", "PSOLID", "MAT1", "PARAM", "SET1", "SPC", "SPC1", "SPCADD", "RBE2", "RBE3", "MPC", "MPCADD", *_SOLIDS,
     *_SHELLS, *_MATERIALS, *_PROPERTIES,
 }  # fmt: skip
-_SILENT = re.compile(r"EIG\w*|CORD\w+|MATT\d+|ENDDATA|LOAD|DLOAD|TABL\w*|FREQ\d?|TSTEP|NLPARM|DTI|SET3|MDLPRM")
+_SILENT = re.compile(
+    r"EIG\w*|CORD\w+|MATT\d+|ENDDATA|LOAD|DLOAD|TABL\w*|FREQ\d?|TSTEP|NLPARM|DTI|SET3|MDLPRM"
+)
 """Cards that say nothing of the body, or only together with others that are named."""
 _LOADS = r"FORCE\d?|MOMENT\d?|PLOAD\w*|GRAV|RFORCE\d?|ACCEL\d?|TEMP\w*|SLOAD|DAREA|DEFORM"
 _COUNTS = re.compile(
@@ -94,9 +96,10 @@ def read_bdf(path: Path) -> RawMesh:
         if name.startswith("MATT")
         for c in others[name]
     ]
-    raw.lost += _prestressed(path.name, text)
+    stress = _prestressed(path.name, text)
+    raw.lost += stress
     unused = (n for n in others if not (_COUNTS.fullmatch(n) or _SILENT.fullmatch(n)))
-    raw.remarks += ignored(unused, _LOADS)
+    raw.remarks += ignored(unused, _LOADS, bool(stress))
     raw.links = [*_rigid(cards, path.name, numbering, held), *_averages(cards, path.name, numbering, held)]
     raw.links += _equations(cards, path.name, text, numbering, held, raw.lost)
     add_supports(raw, held, numbering)
@@ -160,7 +163,8 @@ def _fields(line: str, number: int) -> list[str]:
             more = []
         elif more and (len(more) == 1 or not more[0]):
             raise Damaged(
-                f"line {number} has '{more[0]}' in its field {count + 2}, which is that of the continuation; write "
+                f"line {number} has '{more[0]}' in its field {count + 2}, which is that of the "
+                "continuation; write "
                 f"what follows field {count + 1} in a line of its own"
             )
         return [*data, *[""] * (count + 1 - len(data)), *more]
@@ -259,9 +263,11 @@ def _cell(name: str, number: int, card: list[str]) -> tuple[str, list[int]]:
 
 def _material(cards: Cards, property_: int) -> DeckMaterial:
     """What a property's cells are made of."""
-    layered = [c[0] for name in _PROPERTIES[:-1] for c in cards.get(name, []) if _whole(c, 1) == property_]
+    layered = [
+        c[0] for name in _PROPERTIES[:-1] for c in cards.get(name, []) if _whole(c, 1) == property_
+    ]
     if layered:
-        refused = "a property that is not read; write it as PSOLID with a MAT1, or give [material] in a body.toml"
+        refused = "a property that is not read; write PSOLID with a MAT1, or [material] in a body.toml"
         return DeckMaterial(f"{layered[0]} {property_}", None, None, np.zeros(6), None, "", refused)
     solid = next((c for c in cards.get("PSOLID", []) if _whole(c, 1) == property_), None)
     if solid is None:

@@ -1,9 +1,10 @@
-"""Reader of Ansys archives (CDWRITE, blocked) and of Workbench's input files: nodes, solid elements, degenerate ones
-too, components, materials.
+"""Reader of Ansys archives (CDWRITE, blocked) and of Workbench's input files: nodes, solid cells,
+degenerate ones too, components, materials.
 
-Written against the description of the coded database file in the Ansys Programmer's Reference (NBLOCK, EBLOCK, ETBLOCK,
-CMBLOCK, MPDATA) and the node orders of SOLID185, 186, 187 and 285 in the Element Reference. A brick whose corners
-coincide is a wedge (K = L, O = P), a pyramid (M = N = O = P) or a tetrahedron (both).
+Written against the description of the coded database file in the Ansys Programmer's Reference
+(NBLOCK, EBLOCK, ETBLOCK, CMBLOCK, MPDATA) and the node orders of SOLID185, 186, 187 and 285 in the
+Element Reference. A brick whose corners coincide is a wedge (K = L, O = P), a pyramid (M = N = O = P) or
+a tetrahedron (both).
 """
 
 from __future__ import annotations
@@ -18,7 +19,17 @@ import numpy as np
 from ..data import Array, Equation, Link, RigidLink
 from ..elasticity import turned_strain
 from .materials import isotropic_rows, orthotropic_row
-from .raw import PRESTRESSED, Damaged, DeckMaterial, Numbering, RawMesh, ignored, is_number, lost, real
+from .raw import (
+    PRESTRESSED,
+    Damaged,
+    DeckMaterial,
+    Numbering,
+    RawMesh,
+    ignored,
+    is_number,
+    lost,
+    real,
+)
 from .supports import Constraints, add_supports
 
 _SOLIDS = {185: 8, 45: 8, 186: 20, 95: 20, 187: 10, 92: 10, 285: 4}
@@ -43,7 +54,8 @@ _FORMS: dict[int, dict[str, Sequence[int]]] = {
 class _Archive:
     """What the commands have said. elements: (number, material, type, system, nodes). places: of equations, by name.
     kind: of the elements that follow (TYPE). outside: kind -> where, and how many elements, beside EBLOCK,,SOLID.
-    full: types with KEYOPT(2) = 1. selected: the component that CMSEL chose last. parameters: whole numbers of *SET.
+    full: types with KEYOPT(2) = 1. selected: the component that CMSEL chose last. parameters: whole
+    numbers of *SET. unused: loads that are not taken. ranged: numbers that ranges of D go over.
     """
 
     node_id: list[int] = field(default_factory=list)
@@ -68,6 +80,8 @@ class _Archive:
     full: set[int] = field(default_factory=set)
     selected: str = ""
     parameters: dict[str, int] = field(default_factory=dict)
+    stressed: bool = False
+    ranged: set[int] = field(default_factory=set)
     unused: list[str] = field(default_factory=list)
     lost: list[str] = field(default_factory=list)
 
@@ -99,7 +113,7 @@ def read_cdb(path: Path) -> RawMesh:
         at += 1
     raw = _assembled(archive)
     raw.lost = [*archive.lost, *_other_elements(archive, path.name)]
-    raw.remarks += [*_integration(archive), *ignored(archive.unused, _LOADS)]
+    raw.remarks += [*_integration(archive), *ignored(archive.unused, _LOADS, archive.stressed)]
     if not any(line.strip().upper().startswith("FINI") for line in lines[-20:]):
         raw.unended = "no FINISH"  # a warning: archives that were shortened by hand have none
     return raw
@@ -156,7 +170,8 @@ def _read_nodes(archive: _Archive, words: list[str], lines: list[str], at: int) 
 def _read_elements(archive: _Archive, words: list[str], lines: list[str], at: int) -> int:
     if "COMPACT" in (word.upper() for word in words):
         raise Damaged(
-            f"{archive.where}: EBLOCK is in the COMPACT form, which is not read; write the archive again with "
+            f"{archive.where}: EBLOCK is in the COMPACT form, which is not read; write the archive "
+            "again with "
             "EBLOCK,19,SOLID (CDWRITE)"
         )
     fields = _widths(lines, at, "EBLOCK")
@@ -236,7 +251,12 @@ def _read_types(archive: _Archive, words: list[str], lines: list[str], at: int) 
     raise Damaged("ETBLOCK has no end, the file is truncated")
 
 
-_BLOCKS = {"NBLOCK": _read_nodes, "EBLOCK": _read_elements, "CMBLOCK": _read_component, "ETBLOCK": _read_types}
+_BLOCKS = {
+    "NBLOCK": _read_nodes,
+    "EBLOCK": _read_elements,
+    "CMBLOCK": _read_component,
+    "ETBLOCK": _read_types,
+}
 
 
 # commands ------------------------------------------------------------------------------------------------------------
@@ -273,8 +293,7 @@ def _read_current(archive: _Archive, words: list[str]) -> None:
 
 
 def _leave_out(archive: _Archive, words: list[str], kind: int | None = None) -> None:
-    """An element of a type, if not given the current one, that no EBLOCK,,SOLID holds: E, EN, or a line of a short
-    block."""
+    """An element, of the current type if none is given, outside EBLOCK,,SOLID: E, EN, short blocks."""
     kind = archive.kind if kind is None else kind
     where, count = archive.outside.get(kind, (archive.where, 0))
     archive.outside[kind] = where, count + 1
@@ -284,6 +303,7 @@ def _stressed(archive: _Archive, words: list[str]) -> None:
     """PSTRES,ON, and a restart of a loaded state (ANTYPE,,RESTART,,,PERTURB)."""
     on = words[0].upper() == "PSTRES" and len(words) > 1 and words[1].upper() in ("ON", "1")
     if on or "PERTURB" in (word.upper() for word in words):
+        archive.stressed = True
         archive.lost.append(f"{archive.where}: {words[0].upper()}: {PRESTRESSED}")
 
 
@@ -357,7 +377,9 @@ def _read_displacement(archive: _Archive, words: list[str]) -> None:
     named = {name.upper(): name for name in archive.components}
     component = named.get(archive.selected if where.upper() == "ALL" else where.upper())
     if value.startswith("%"):
-        archive.held.left_out.append(f"D,{where},{label} takes its displacement from the table {value}")
+        archive.held.left_out.append(
+            f"D,{where},{label} takes its displacement from the table {value}"
+        )
     elif value and real(value, "D") != 0:
         archive.held.left_out.append(f"D,{where},{label} prescribes a displacement")
     elif component is not None:
@@ -365,10 +387,9 @@ def _read_displacement(archive: _Archive, words: list[str]) -> None:
     elif is_number(where):
         first, end = int(where), _whole(last, "D") if last else int(where)
         every = range(first, min(end, first + 10**8) + 1, max(_whole(step or "1", "D"), 1))
-        known = {first, *archive.node_id} if len(every) > 1 else every  # a range may go over gaps
+        archive.ranged.update(every[1:])
         for node in every:
-            if node in known:
-                archive.held.hold(node, directions)
+            archive.held.hold(node, directions)
     else:
         archive.held.left_out.append(f"D,{where},{label} names no node by its number")
 
@@ -429,8 +450,8 @@ _COMMANDS = {
     "ET": _read_type, "MPTEMP": _read_temperatures, "MPDATA": _read_data, "MP": _read_constant, "TREF": _read_reference,
     "TUNIF": _read_uniform, "BFUNIF": _read_uniform, "BF": _read_body_force, "BFBLOCK": _refuse_temperatures,
     "KEYOPT": _read_option, "KEYO": _read_option, "*SET": _read_parameter, "CMSEL": _read_selection,
-    "NSEL": _read_selection, "ALLSEL": _read_selection, "ALLS": _read_selection, "ESEL": _read_selection,
-    "PSTRES": _stressed, "ANTYPE": _stressed, "ANTY": _stressed,
+    "NSEL": _read_selection, "ALLSEL": _read_selection, "ALLS": _read_selection,
+    "ESEL": _read_selection, "PSTRES": _stressed, "ANTYPE": _stressed, "ANTY": _stressed,
 }  # fmt: skip
 
 
@@ -463,6 +484,8 @@ def _assembled(archive: _Archive) -> RawMesh:
         if members:
             raw.add_set(name, members, numbering)
     raw.links = _links(archive, numbering)
+    for gap in archive.ranged.difference(archive.node_id):
+        archive.held.nodes.pop(gap, None)
     add_supports(raw, archive.held, numbering)
     raw.materials = [_material(archive, *key) for key in regions] if archive.constants else []
     if not raw.materials:
@@ -516,13 +539,16 @@ def _other_elements(archive: _Archive, name: str) -> list[str]:
 
 
 def _integration(archive: _Archive) -> list[str]:
-    """What is said of bricks of 20 nodes that Ansys integrates at fewer points than are taken here."""
+    """What is said of bricks of 20 nodes that Ansys integrates at fewer points than are taken."""
     count = sum(
         archive.kinds.get(kind) == 186 and kind not in archive.full and len(set(nodes)) == 20
         for _, _, kind, _, nodes in archive.elements
     )
-    text = "elements SOLID186 are taken with full integration, which their KEYOPT(2) = 1 asks for; without it they are"
-    return [f"{count} {text} a little softer on coarse meshes"] if count else []
+    text = (
+        "elements SOLID186 are taken with full integration, which their KEYOPT(2) = 1 asks for; "
+        "without it they are a little softer on coarse meshes"
+    )
+    return [f"{count} {text}"] if count else []
 
 
 def _form(archive: _Archive, number: int, kind: int, nodes: list[int]) -> tuple[str, list[int]] | None:

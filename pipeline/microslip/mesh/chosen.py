@@ -17,20 +17,23 @@ from .gates import part_numbers
 def with_parts(mesh: Mesh) -> Mesh:
     """The mesh with its instances; of a file without any, parts that share no points are called so.
 
-    A part has the name of the point set that is just it, else ``part-1``, ``part-2`` in the order of the file.
+    A part has the name of the point set that is just it, else ``part-1``, ``part-2`` in the order
+    of the file.
     """
     if mesh.instances:
         return mesh
     numbers, named = part_numbers(mesh), {}
     for part in range(numbers.max() + 1):
         points = np.flatnonzero(numbers == part)
-        alike = (name for name, s in mesh.point_sets.items() if np.array_equal(np.unique(s), points))
+        alike = (
+            name for name, s in mesh.point_sets.items() if np.array_equal(np.unique(s), points)
+        )
         named[next(alike, f"part-{part + 1}")] = points
     return replace(mesh, instances=named)
 
 
 def of_instances(mesh: Mesh, names: Sequence[str]) -> Mesh:
-    """The mesh of these instances (see `with_parts`) alone, with their sets, constraints and contacts.
+    """The mesh of these instances (see `with_parts`) alone, with their sets and constraints.
 
     Raises:
         UserError: an instance that the file does not have, a constraint that ties them to others.

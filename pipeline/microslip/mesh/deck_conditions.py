@@ -36,7 +36,8 @@ def _zeros(words: list[str]) -> str:
     """Directions of a data line: set, first, last direction, value.
 
     Raises:
-        ValueError: not such a line, a last direction below the first, or a displacement that is prescribed.
+        ValueError: not such a line, a last direction below the first, or a displacement that is
+            prescribed.
     """
     first = int(words[1])
     last = int(words[2]) if words[2] else first

@@ -29,7 +29,8 @@ def sector_of(deck: Deck) -> tuple[Sector | None, list[str]]:
     sectors, ends = model.parameters.get("N", ""), [v for row in _points(model) for v in row]
     if not is_number(sectors) or len(ends) != 6 or len(chosen) != 1:
         raise Damaged(
-            f"{model.where}: *{MODEL} needs N, two points of its axis (six numbers) and the TIE of its faces"
+            f"{model.where}: *{MODEL} needs N, two points of its axis (six numbers) and the TIE of "
+            "its faces"
         )
     tie, space = chosen[0]
     known = {name.upper(): name for name, *_ in deck.surfaces}

@@ -23,7 +23,9 @@ def joints_of(deck: Deck) -> list[Joint]:
         elif card.keyword == "FRICTION" and card.lines:
             value = real(card.lines[0].split(",")[0], f"{card.where}: *{card.keyword}")
             if not 0 <= value < float("inf"):
-                raise Damaged(f"{card.where}: *FRICTION has the coefficient {value:g}; write one of 0 or more")
+                raise Damaged(
+                    f"{card.where}: *FRICTION has the coefficient {value:g}; write one of 0 or more"
+                )
             friction[current] = value
     known = {name.upper(): name for name, *_ in deck.surfaces}
     laws = {card.parameters.get("NAME", "").upper() for card, _ in deck.links if card.keyword == "SURFACE INTERACTION"}
@@ -45,15 +47,22 @@ def joints_of(deck: Deck) -> list[Joint]:
 
 
 def unread(deck: Deck) -> list[str]:
-    """What is said of contacts whose law is more than a coefficient of friction, or that are tied."""
+    """What is said of contacts whose law is more than a coefficient of friction, or that are tied.
+    """
     said = []
     for card, _ in deck.links:
         if card.keyword == "FRICTION" and (card.parameters or len(card.lines) > 1):
             said.append(f"{card.where}: of *FRICTION only the first coefficient is read")
         if card.keyword == "SURFACE BEHAVIOR":
-            said.append(f"{card.where}: *SURFACE BEHAVIOR is not read: a case guesses the stiffness by the area")
+            said.append(
+                f"{card.where}: *SURFACE BEHAVIOR is not read: a case guesses the stiffness by the "
+                "area"
+            )
         if card.keyword == "CONTACT PAIR" and "TIED" in card.parameters:
-            said.append(f"{card.where}: *CONTACT PAIR, TIED is taken as a contact with friction; write *TIE for a tie")
+            said.append(
+                f"{card.where}: *CONTACT PAIR, TIED is taken as a contact with friction; write "
+                "*TIE for a tie"
+            )
     return said
 
 

@@ -55,7 +55,8 @@ def mesh_problems(mesh: Mesh) -> tuple[list[str], list[str]]:
     if len(torn):
         a, b = mesh.node_id[torn[0]]
         errors.append(
-            f"{len(torn)} pairs of points coincide (first: nodes {a} and {b}), so neighbouring cells are not "
+            f"{len(torn)} pairs of points coincide (first: nodes {a} and {b}), so neighbouring "
+            "cells are not "
             "joined; merge duplicate nodes"
         )
     elif parts.max() > 0:
@@ -64,15 +65,19 @@ def mesh_problems(mesh: Mesh) -> tuple[list[str], list[str]]:
 
 
 def _apart(mesh: Mesh, parts: Indices, pairs: Indices) -> str:
-    """What is said of parts that share no points, and of points (p, 2) of theirs at the same places."""
+    """What is said of parts that share no points, and of points (p, 2) of theirs at the same
+    places."""
     sizes = np.bincount(parts)
-    text = f"the mesh falls into {len(sizes)} parts that share no points ({', '.join(map(str, sizes[:6]))} points)"
+    counts = ", ".join(map(str, sizes[:6]))
+    text = f"the mesh falls into {len(sizes)} parts that share no points ({counts} points)"
     if not len(pairs):
         return f"{text}; support each, press it by a closure, or join them"
     a, b = mesh.node_id[pairs[0]]
     return (
-        f"{text}; where they touch ({len(pairs)} pairs of points, first: nodes {a} and {b}) they are neither welded "
-        "nor in contact: merge these nodes where they should be one body, or import --apart for bodies in contact"
+        f"{text}; where they touch ({len(pairs)} pairs of points, first: nodes {a} and {b}) they "
+        "are neither welded "
+        "nor in contact: merge these nodes where they should be one body, or import --apart for "
+        "bodies in contact"
     )
 
 

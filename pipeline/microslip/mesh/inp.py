@@ -56,10 +56,14 @@ def read_inp(path: Path) -> RawMesh:
     whole.spaces[""] = spaces[-1]
     _read(path, whole, found.rest)
     raw = _assembled(whole)
-    raw.remarks += [*numbered([card.parameters["NAME"] for card, _ in parts], spaces), *_replaced(raw, whole)]
+    raw.remarks += [
+        *numbered([card.parameters["NAME"] for card, _ in parts], spaces),
+        *_replaced(raw, whole),
+    ]
     whole.ignored += unused_loads(whole)
-    raw.lost += _prestressed(found.rest)
-    raw.remarks += ignored([f"*{word}" for word in whole.ignored], _LOADS)
+    stress = _prestressed(found.rest)
+    raw.lost += stress
+    raw.remarks += ignored([f"*{word}" for word in whole.ignored], _LOADS, bool(stress))
     if not path.read_bytes().endswith(b"\n"):
         raw.unended = "a last line without an end"
     return raw
@@ -69,12 +73,15 @@ _LOADS = r"\*(C|D|DS)(LOAD|FLUX)|\*(D|S)?FILM|\*D?RADIATE|\*INERTIA RELIEF|\*MAS
 
 
 def _prestressed(cards: list[Card]) -> list[str]:
-    """What is said of modes of a loaded body: those after a static step with NLGEOM, or in a step of PERTURBATION."""
+    """What is said of modes of a loaded body: those after a static step with NLGEOM, or in a step
+    of PERTURBATION."""
     step, stressed, large = Card(""), False, False
     for card in cards:
         if card.keyword == "STEP":
             step = card
-            large = large or "NLGEOM" in step.parameters and step.parameters["NLGEOM"].upper() != "NO"
+            large = (
+                large or "NLGEOM" in step.parameters and step.parameters["NLGEOM"].upper() != "NO"
+            )
         elif card.keyword == "STATIC":
             stressed = True
         elif card.keyword in ("FREQUENCY", "COMPLEX FREQUENCY") and stressed:

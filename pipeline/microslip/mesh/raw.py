@@ -66,7 +66,8 @@ class RawMesh:
         unended: what the file lacks at its end, in words: it may be cut there. Nothing if it tells that it is whole.
         lost: what carries mass, stiffness or a constraint and is not read, in words.
         remarks: what was read as something else or not used, in words. instances: name -> positions. joints: pairs of
-            faces in contact. sector: of a cyclic ring. preloads: of bolts: where it stands, force in the file's unit.
+            faces in contact. sector: of a cyclic ring. preloads: of bolts: where it stands, force
+            in the file's unit.
     """
 
     points: Array
@@ -95,13 +96,20 @@ class RawMesh:
         self.point_sets[name] = np.union1d(before, positions).astype(np.int64)
 
     def add_set(self, name: str, numbers: Iterable[int] | Indices, numbering: Numbering) -> None:
-        """Add to a point set the nodes of these numbers that are there; a remark names those that are not."""
+        """Add to a point set the nodes of these numbers that are there; a remark names those that
+        are not."""
         ids = np.unique(np.fromiter(numbers, dtype=np.int64))
         there = np.isin(ids, numbering.sorted)
         if not there.all():
             missing = ids[~there]
-            which = f"node {missing[0]}" if len(missing) == 1 else f"{len(missing)} nodes ({missing[0]}, ...)"
-            self.remarks.append(f"the set '{name}' names {which} that the file does not define: left out of it")
+            which = (
+                f"node {missing[0]}"
+                if len(missing) == 1
+                else f"{len(missing)} nodes ({missing[0]}, ...)"
+            )
+            self.remarks.append(
+                f"the set '{name}' names {which} that the file does not define: left out of it"
+            )
         if there.any():
             self.add_points(name, numbering.positions(ids[there], ""))
 
@@ -132,18 +140,24 @@ def lost(where: str, what: str) -> str:
 
 
 PRESTRESSED = (
-    "the frequencies of the deck are those under the load of its static step; that load is not taken, and stress can "
+    "the frequencies of the deck are those under the load of its static step; that load is not "
+    "taken, and stress can "
     "change a frequency by a factor"
 )
 """What is said of a deck whose modes are those of a loaded body."""
 
 
-def ignored(words: Iterable[str], loads: str) -> list[str]:
-    """What is said of keywords that are not used; loads: a pattern of those that load the body."""
+def ignored(words: Iterable[str], loads: str, stressed: bool = False) -> list[str]:
+    """What is said of keywords that are not used.
+
+    Args:
+        loads: a pattern of those that load the body. stressed: the deck's modes are those under them.
+    """
     every = list(dict.fromkeys(words))
     pressing = [word for word in every if re.fullmatch(loads, word)]
     others = [word for word in every if word not in pressing]
-    said = [(pressing, "loads, which change no frequency of an unstressed body")]
+    idle = "loads, which change no frequency of an unstressed body"
+    said = [(pressing, "loads, under which the deck's frequencies are" if stressed else idle)]
     said += [(others, "what they do to the frequencies is not known here")]
     return [f"read and not used: {', '.join(named)}: {effect}" for named, effect in said if named]
 
@@ -189,7 +203,9 @@ class Numbering:
 
     def between(self, first: int, last: int) -> Indices:
         """The numbers from first to last that nodes have, ascending."""
-        return self.sorted[np.searchsorted(self.sorted, first) : np.searchsorted(self.sorted, last, "right")]
+        return self.sorted[
+            np.searchsorted(self.sorted, first) : np.searchsorted(self.sorted, last, "right")
+        ]
 
     def positions(self, ids: Indices, what: str) -> Indices:
         """Positions of node numbers, any shape.

@@ -65,7 +65,10 @@ def read_mesh(path: Path | str, unit: str, system: str | None = None, zero: floa
     try:
         raw = _read_raw(path)
         if (said := unit_of(path)) not in ("", unit):
-            raw.lost.append(f"the file tells its lengths in {said}, here they are taken in {unit}: which is right?")
+            raw.lost.append(
+                f"the file tells its lengths in {said}, here they are taken in {unit}: which is "
+                "right?"
+            )
         materials = tuple(in_si(m, system, zero) for m in raw.materials) if system else ()
         mesh = _mesh_of(raw, UNITS[unit], path)
         return replace(mesh, materials=materials, regions=mesh.regions if materials else {})
@@ -97,9 +100,10 @@ _LANGUAGES = (
 
 
 def suffix_of(path: Path) -> str:
-    """The suffix of a file in small letters; of ``.dat`` and ``.inp`` that of the program whose words it begins with.
+    """The suffix of a file; of ``.dat`` and ``.inp`` that of the program whose words stand there.
 
-    Workbench writes Ansys's commands into ``ds.dat``, Ansys's own input is called ``.inp``, and ``.dat`` is Nastran's.
+    Workbench writes Ansys's commands into ``ds.dat``, Ansys's own input is called ``.inp``, and
+    ``.dat`` is Nastran's.
     """
     suffix = path.suffix.lower()
     if suffix not in (".dat", ".inp") or not path.is_file():
@@ -118,7 +122,8 @@ _TELLS = {"SI": "m", "MKS": "m", "UMKS": "um", "CGS": "cm", "MPA": "mm", "BFT": 
 
 
 def unit_of(path: Path) -> str:
-    """The unit of length, a key of `UNITS`, that a file tells (/UNITS of Ansys, data set 164); empty if it does not."""
+    """The unit of length, a key of `UNITS`, that a file tells (/UNITS of Ansys, data set 164);
+    empty if it does not."""
     if not path.is_file():
         return ""
     kind = suffix_of(path)
@@ -167,14 +172,18 @@ def _mesh_of(raw: RawMesh, metres: float, path: Path) -> Mesh:
 
 
 _MIRRORED = {
-    "tetra": (0, 2, 1, 3), "tetra10": (0, 2, 1, 3, 6, 5, 4, 7, 9, 8), "wedge": (3, 4, 5, 0, 1, 2),
+    "tetra": (0, 2, 1, 3),
+    "tetra10": (0, 2, 1, 3, 6, 5, 4, 7, 9, 8),
+    "wedge": (3, 4, 5, 0, 1, 2),
     "wedge15": (3, 4, 5, 0, 1, 2, 9, 10, 11, 6, 7, 8, 12, 13, 14),
-}  # fmt: skip
-"""Nodes of a left-handed cell in a right-handed order; of bricks and pyramids such an order is no mere habit."""
+}
+"""Nodes of a left-handed cell in a right-handed order; of bricks and pyramids such an order is no
+mere habit."""
 
 
 def _turn_left_handed(raw: RawMesh) -> None:
-    """Count the nodes of left-handed tetrahedra and wedges the other way, as the solvers that allow them do."""
+    """Count the nodes of left-handed tetrahedra and wedges the other way, as the solvers that allow
+    them do."""
     for number, (kind, cells) in enumerate(raw.blocks):
         if kind not in _MIRRORED or not len(cells):
             continue
@@ -184,7 +193,9 @@ def _turn_left_handed(raw: RawMesh) -> None:
             cells = cells.copy()
             cells[left] = cells[left][:, _MIRRORED[kind]]
             raw.blocks[number] = kind, cells
-            raw.remarks.append(f"{left.sum()} left-handed cells {kind} are counted the other way round")
+            raw.remarks.append(
+                f"{left.sum()} left-handed cells {kind} are counted the other way round"
+            )
 
 
 # other formats, by meshio ----------------------------------------------------------------------------------------

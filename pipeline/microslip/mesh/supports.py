@@ -60,6 +60,8 @@ def add_supports(raw: RawMesh, held: Constraints, numbering: Numbering) -> None:
             left_out[f"'{name}' is held in {directions} of what may be a local system"] = None
         elif name in raw.point_sets:
             raw.supports[name] = directions
+        else:
+            left_out[f"'{name}' in {directions}: none of its nodes is there"] = None
     alike: dict[str, list[int]] = {}
     for node, found in held.nodes.items():
         if not found:

@@ -64,10 +64,12 @@ def touching_facets(
 ) -> dict[str, Indices]:
     """Type -> (f, k) facets of the mesh whose middle lies on the other's surface, facing it.
 
-    Where the other's facets are so much smaller that none does, those on which the middle of one of the other's lies.
+    Where the other's facets are so much smaller that none does, those on which the middle of one of
+    the other's lies.
 
     Args:
-        within: facets of the mesh to choose from, onto: of the other to lie on; None: the whole surface.
+        within: facets of the mesh to choose from, onto: of the other to lie on; None: the whole
+            surface.
     """
     own, theirs = within or boundary_facets(mesh), onto or boundary_facets(other)
     result = {}
@@ -77,7 +79,10 @@ def touching_facets(
             result[kind] = facets[chosen]
     if result:
         return result
-    points, vectors = (np.concatenate(part) for part in zip(*(_middle(other, f) for f in theirs.values()), strict=True))
+    points, vectors = (
+        np.concatenate(part)
+        for part in zip(*(_middle(other, f) for f in theirs.values()), strict=True)
+    )
     for kind, facets in own.items():
         _, hit = _lies_on(points, vectors, _triangles(mesh, {kind: facets}))
         met = hit.reshape(FACET_CORNERS[kind] - 2, len(facets)).sum(axis=0) > 0
@@ -94,24 +99,31 @@ def _middle(mesh: Mesh, facets: Indices) -> tuple[Array, Array]:
 
 
 def _triangles(mesh: Mesh, facets: Facets) -> Array:
-    """(t, 3, 3) corners of the triangles that facets are made of: the first ones of all, then the second ones."""
+    """(t, 3, 3) corners of the triangles that facets are made of: the first ones of all, then the
+    second ones."""
     made = []
     for kind, nodes in facets.items():
         corners = FACET_CORNERS[kind]
-        made += [mesh.points[nodes[:, list(three)]] for three in ((0, 1, 2), (0, 2, 3))[: corners - 2]]
+        made += [
+            mesh.points[nodes[:, list(three)]] for three in ((0, 1, 2), (0, 2, 3))[: corners - 2]
+        ]
     return np.concatenate(made)
 
 
 def _lies_on(points: Array, vectors: Array, triangles: Array) -> tuple[np.ndarray, np.ndarray]:
-    """(f,) whether a facet, by its middle, lies on one of some triangles that face it, and (t,) on which ones any does.
-    """
+    """(f,) whether a facet, by its middle, lies on one of some triangles that face it, and (t,) on
+    which ones any does."""
     centres = triangles.mean(axis=1)
     reach = float(np.linalg.norm(triangles - centres[:, None], axis=2).max())
     near = NEAR * np.sqrt(np.linalg.norm(vectors, axis=1))
     inside = ((points > triangles.min(axis=(0, 1)) - near[:, None]).all(axis=1)) & (
         points < triangles.max(axis=(0, 1)) + near[:, None]
     ).all(axis=1)
-    found, hit, tree = np.zeros(len(points), dtype=bool), np.zeros(len(triangles), dtype=bool), cKDTree(centres)
+    found, hit, tree = (
+        np.zeros(len(points), dtype=bool),
+        np.zeros(len(triangles), dtype=bool),
+        cKDTree(centres),
+    )
     for i in np.flatnonzero(inside):
         close = np.array(tree.query_ball_point(points[i], reach + near[i]), dtype=np.int64)
         if len(close):
@@ -155,4 +167,6 @@ def touch_of(mesh: Mesh, facets: Facets) -> Touch:
     points = mesh.points[np.unique(np.concatenate([f.ravel() for f in facets.values()]))]
     whole, area = vectors.sum(axis=0), float(np.linalg.norm(vectors, axis=1).sum())
     flat = np.linalg.norm(whole) > FLAT * area
-    return Touch(dict(facets), area, whole / area if flat else None, points.min(axis=0), points.max(axis=0))
+    return Touch(
+        dict(facets), area, whole / area if flat else None, points.min(axis=0), points.max(axis=0)
+    )

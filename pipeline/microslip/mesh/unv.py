@@ -41,10 +41,15 @@ _GROUPS = {2417: 2, 2429: 2, 2430: 2, 2432: 2, 2435: 4, 2452: 4, 2467: 4, 2477: 
 _NODE, _ELEMENT = 7, 8
 _KNOWN = {0, 151, 164, 781, 2411, 2412, 2420}
 _RESULTS = {
-    **dict.fromkeys((55, 2414), "results at nodes"), **dict.fromkeys((56, 57), "results in cells"), 58: "functions",
-    82: "trace lines", 790: "restraints and loads", 791: "restraints", 792: "loads", 1703: "materials",
-    1710: "materials", 1716: "materials",
-}  # fmt: skip
+    **dict.fromkeys((55, 2414), "results at nodes"),
+    **dict.fromkeys((56, 57), "results in cells"),
+    **dict.fromkeys((1703, 1710, 1716), "materials"),
+    58: "functions",
+    82: "trace lines",
+    790: "restraints and loads",
+    791: "restraints",
+    792: "loads",
+}
 
 
 def read_unv(path: Path) -> RawMesh:
@@ -62,7 +67,9 @@ def read_unv(path: Path) -> RawMesh:
     others = dict.fromkeys(kind for kind, _ in sets if kind not in _KNOWN | {*_GROUPS})
     named = [f"{kind} ({what})" if (what := _RESULTS.get(kind)) else str(kind) for kind in others]
     if named:
-        raw.remarks.append(f"data sets left aside: {', '.join(named)}; only nodes, cells and groups are taken")
+        raw.remarks.append(
+            f"data sets left aside: {', '.join(named)}; only nodes, cells and groups are taken"
+        )
     marks = sum(line.strip() == "-1" for line in text.splitlines())
     if marks % 2 or not re.search(r"^ *-1[ \t\r]*\n*\Z", text, re.MULTILINE):
         raw.unended = "no data set that ends with its last line"
@@ -78,11 +85,16 @@ def has_solids(path: Path) -> bool:
 
 
 def length_unit(text: str, units: Mapping[str, float]) -> str:
-    """The name of the unit of length by data set 164, whose factor turns metres into it; empty without one."""
+    """The name of the unit of length by data set 164, whose factor turns metres into it; empty
+    without one."""
     said = re.search(r"^ *-1\s*\n *164\s*\n.*\n\s*(\S+)", text, re.MULTILINE)
     with suppress(ValueError, ZeroDivisionError):
         metres = 1 / float(said[1].upper().replace("D", "E")) if said else 0.0
-        return next((name for name, size in units.items() if abs(size / metres - 1) < 1e-3), "") if said else ""
+        return (
+            next((name for name, size in units.items() if abs(size / metres - 1) < 1e-3), "")
+            if said
+            else ""
+        )
     return ""
 
 

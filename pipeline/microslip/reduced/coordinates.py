@@ -131,8 +131,13 @@ def own_kind(g: ModalGroup) -> tuple[str, ...]:
 
 
 def certified_modes(g: ModalGroup) -> int:
-    """How many of the frequencies are those of the body itself, which its inertia count certifies, the first ones."""
-    return sum(kind in ("rigid", "normal") for kind in own_kind(g)) if "reduced" not in own_kind(g) else 0
+    """How many of the frequencies are those of the body itself, which its inertia count certifies,
+    the first ones."""
+    return (
+        sum(kind in ("rigid", "normal") for kind in own_kind(g))
+        if "reduced" not in own_kind(g)
+        else 0
+    )
 
 
 def _modal(g: ModalGroup) -> Array:

@@ -22,8 +22,8 @@ from .problem import Reduced, Substructure, diagonalised, hermitian, own_modes, 
 
 
 def reduce(problem: Substructure) -> Reduced:
-    """Interface coordinates first (6 a patch, in the order of the rows), then as many fixed-interface modes as modes
-    are asked for.
+    """Interface coordinates first (6 a patch, in the order of the rows), then fixed-interface modes, as many
+    as modes are asked for.
 
     A body with rigid motions gets as many inertia-relief shapes between the two: how it yields, held at its
     interfaces, to its own inertia in those motions. With them a force that accelerates the body is answered exactly.

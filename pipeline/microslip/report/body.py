@@ -101,7 +101,8 @@ def _lead(basis: ModalBasis) -> str:
     band = f" from {elastic[0]:.5g} Hz to {elastic[-1]:.5g} Hz" if len(elastic) else ""
     rigid = int((group.omega == 0).sum())
     free = f", {rigid} of them rigid" if rigid else ""
-    return f"{counted_modes(group)}{free}{band}{speeds}; mass {number(basis.mass)} kg. {certificate(group)}"
+    which = f"{counted_modes(group)}{free}{band}{speeds}"
+    return f"{which}; mass {number(basis.mass)} kg. {certificate(group)}"
 
 
 def _facts(basis: ModalBasis) -> list[tuple[str, str]]:

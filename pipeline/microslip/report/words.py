@@ -44,15 +44,18 @@ def certificate(group: ModalGroup) -> str:
     if own == 0 and "upper_shift_hz" in group.checks:
         count, limit = int(group.checks["count_below_upper_shift"]), group.checks["upper_shift_hz"]
         return (
-            f"The inertia count proves that the body has {count} modes below {limit:.6g} Hz; these frequencies are "
+            f"The inertia count proves that the body has {count} modes below {limit:.6g} Hz; these "
+            "frequencies are "
             "those of the reduced body, at or above them."
         )
     if own < len(group.omega) and "upper_shift_hz" in group.checks:
         count, limit = int(group.checks["count_below_upper_shift"]), group.checks["upper_shift_hz"]
         more = f", of which {own} are kept" if count > own else ""
         return (
-            f"The inertia count proves that the body has {count} modes below {limit:.6g} Hz{more}; the "
-            f"{len(group.omega) - own} shapes behind them are static answers and no modes of the body."
+            f"The inertia count proves that the body has {count} modes below {limit:.6g} Hz{more}; "
+            "the "
+            f"{len(group.omega) - own} shapes behind them are static answers and no modes of the "
+            "body."
         )
     if "upper_shift_hz" not in group.checks:
         return f"These are all {group.n_modes} modes of the system."
@@ -63,11 +66,16 @@ def certificate(group: ModalGroup) -> str:
 
 
 def counted_modes(group: ModalGroup) -> str:
-    """How many modes a group has, and what else its frequencies belong to: static shapes, the reduced body."""
+    """How many modes a group has, and what else its frequencies belong to: static shapes, the
+    reduced body."""
     count, own = len(group.omega), certified_modes(group)
     if own == count:
         return f"{count} modes"
-    return f"{own} modes and {count - own} static shapes" if own else f"{count} modes of the reduced body"
+    return (
+        f"{own} modes and {count - own} static shapes"
+        if own
+        else f"{count} modes of the reduced body"
+    )
 
 
 def proof(group: ModalGroup) -> str:

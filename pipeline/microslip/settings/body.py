@@ -63,9 +63,9 @@ class FaceRule(Model):
     """How a face of a CAD file or of a mesh is picked: exactly one of the ways.
 
     cut: of a CAD file, the part of the surface inside the box, cut out of the faces that it has. touching: another file
-    of the same kind in the same coordinates, or the body's own deck, for what of it is not this body; the part of the
-    surface that lies on its surface, cut out of a CAD file, the facets of a mesh whose middle lies there; of several
-    such patches, those wholly in the box.
+    of the same kind in the same coordinates, or the body's own deck, for what of it is not this
+    body; the part of the surface that lies on its surface, cut out of a CAD file, the facets of a
+    mesh whose middle lies there; of several such patches, those wholly in the box.
     """
 
     name: Name

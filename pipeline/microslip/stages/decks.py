@@ -1,4 +1,5 @@
-"""A file whose parts touch: a body.toml for each body that it makes, and a case with its contacts and preload."""
+"""A file whose parts touch: a body.toml for each body that it makes, and a case with its contacts
+and preload."""
 
 from __future__ import annotations
 
@@ -58,7 +59,7 @@ def import_deck(file: Path, folder: Path | None, unit: str | None) -> Imported:
 
 
 def import_apart(file: Path, folder: Path | None, unit: str | None) -> Imported:
-    """The solids of a CAD file, or the parts of a mesh that share no points, as bodies of an assembly.
+    """The solids of a CAD file, or the parts of a mesh that share no points, as bodies in contact.
 
     Raises:
         UserError: see `import_parts`; a file of one part, parts that touch nowhere.
@@ -78,7 +79,8 @@ def import_apart(file: Path, folder: Path | None, unit: str | None) -> Imported:
     patches = [replace(with_names(parts, patch, found), alone=False) for patch in found]
     if not patches:
         raise UserError(
-            f"{file}: its {len(groups)} parts touch nowhere, so there is no contact; leave --apart out"
+            f"{file}: its {len(groups)} parts touch nowhere, so there is no contact; leave --apart "
+            "out"
         )
     said = [sentence(parts, patch, unit) for patch in patches]
     return _assembly(file, folder, unit, groups, meshes, patches, said)
@@ -100,7 +102,8 @@ def _assembly(
     said: Sequence[str],
     force: str = "1000.0]       # N",
 ) -> Imported:
-    """Write the bodies and the case of a file's parts. force: end of the line of normal forces of the case."""
+    """Write the bodies and the case of a file's parts. force: end of the line of normal forces of
+    the case."""
     home, parts = folder or Path(body_name(file.stem)), _parts(file, folder, groups)
     refuse_taken(home / "case.toml", *(part.body for part in parts))
     told: list[str] = []
@@ -122,7 +125,8 @@ def _assembly(
 
 
 def _free(mesh: Mesh, metres: float) -> Array:
-    """(p, 3) points of the surface that the file does not hold, in units of `metres`; all if it holds every one."""
+    """(p, 3) points of the surface that the file does not hold, in units of `metres`; all if it
+    holds every one."""
     surface = np.unique(joined(f.ravel() for f in boundary_facets(mesh).values()))
     held = joined(mesh.point_sets[name] for name in mesh.supports if name in mesh.point_sets)
     free = np.setdiff1d(surface, held)
@@ -140,7 +144,8 @@ Ends = tuple[int, int]
 def _between_bodies(
     mesh: Mesh, groups: list[list[str]]
 ) -> tuple[list[tuple[Joint, Ends]], list[str]]:
-    """Pairs whose faces are of two bodies, each once, with these; and what is said of the others."""
+    """Pairs whose faces are of two bodies, each once, with these; and what is said of the others.
+    """
     joints, told, seen = [], [], dict[frozenset[str], str]()
     instances = with_parts(mesh).instances
     for joint in mesh.joints:
@@ -165,7 +170,8 @@ def _between_bodies(
 def _body(
     mesh: Mesh, instances: Mapping[str, Indices], groups: list[list[str]], face: str
 ) -> int | None:
-    """The number of the body that has a face; None where it is none of the surface, or of several bodies."""
+    """The number of the body that has a face; None where it is none of the surface, or of several
+    bodies."""
     if face not in mesh.faces:
         return None
     points = mesh.face_points(face)
@@ -178,7 +184,8 @@ def _body(
 def _patches(
     joints: list[tuple[Joint, Ends]], meshes: list[Mesh], metres: float
 ) -> Iterator[Patch]:
-    """The contacts, both faces cut to what touches (whole where they lie apart): the same in either order."""
+    """The contacts, both faces cut to what touches (whole where they lie apart): the same in either
+    order."""
     taken: set[str] = set()
     for joint, ends in joints:
         names, bodies_ = (joint.slave, joint.master), [meshes[end] for end in ends]
@@ -227,7 +234,8 @@ def _pressed(mesh: Mesh) -> tuple[str, list[str]]:
     pressing = [(where, force) for where, force in mesh.preloads if force > 0]
     said = [f"{where}: preload {force:g} N" for where, force in pressing]
     said += [
-        f"warning: {where}: the preload {force:g} N presses nothing together: not used; correct its sign"
+        f"warning: {where}: the preload {force:g} N presses nothing together: not used; correct "
+        "its sign"
         for where, force in mesh.preloads
         if force <= 0
     ]
@@ -235,6 +243,7 @@ def _pressed(mesh: Mesh) -> tuple[str, list[str]]:
         return "1000.0]       # N", said
     total = sum(force for _, force in pressing)
     return (
-        f"{total:.6g}]       # N in each contact, of all bolts: write normal_force into one that has fewer",
+        f"{total:.6g}]       # N in each contact, of all bolts: write normal_force into one that "
+        "has fewer",
         said,
     )

@@ -51,8 +51,8 @@ def import_file(
 
     Args:
         file: a CAD file, a mesh with or without materials, or the stiffness matrix of a pair. folder: of the new
-            body.toml, and the body's name; by default one of the file's name here. unit: of its lengths; None: that
-        which the file tells, else mm.
+            body.toml, and the body's name; by default one of the file's name here. unit: of its
+            lengths; None: that which the file tells, else mm.
         instances: those of a deck that are the body, all if none.
 
     Raises:
@@ -338,21 +338,27 @@ def _mesh(file: Path, folder: Path, unit: str, instances: Sequence[str] = ()) ->
 
 
 def _temperatures(mesh: Mesh) -> tuple[list[str], list[str]]:
-    """Lines of [temperature] and what to say of it: in force where moduli hang on it and nothing is strained by it."""
+    """Lines of [temperature] and what to say of it: in force where moduli hang on it and nothing is
+    strained by it."""
     hanging = [m for m in mesh.materials if m.temperature_table is not None]
     said = [_softened(m, mesh) for m in hanging]
     if mesh.temperature is None:
         return [], [f"warning: {text}" for text in said]
     free, actual = mesh.temperature[:, 0], _actual(mesh.temperature)
     whole = not np.isnan(free).any() and np.ptp(free) <= 1e-9 * max(np.abs(free).max(), 1.0)
-    strained = bool((np.abs(actual - free) > 0).any()) and any(m.expansion.any() for m in mesh.materials)
+    strained = bool((np.abs(actual - free) > 0).any()) and any(
+        m.expansion.any() for m in mesh.materials
+    )
     lines = ["[temperature]", 'from = "mesh"', 'scale = "C"             # or "K"']
     if hanging and whole and not strained:
         return ["", *lines], [f"temperatures of the file are in force: {text}" for text in said]
     told = "temperatures: used only once [temperature] of body.toml is uncommented"
     if hanging:
         why = "they strain the body as well" if strained else "not all of them are there"
-        return ["", *(f"#{line}" for line in lines)], [*(f"warning: {text}" for text in said), f"{told}; {why}"]
+        return ["", *(f"#{line}" for line in lines)], [
+            *(f"warning: {text}" for text in said),
+            f"{told}; {why}",
+        ]
     return ["", *(f"#{line}" for line in lines)], [told]
 
 
@@ -373,28 +379,39 @@ def _softened(material: Material, mesh: Mesh) -> str:
     least, most = np.interp([np.nanmin(hot), np.nanmax(hot)], T, factor)
     low, high = sorted((least, most))
     at = f"{low:.4g}" if high - low < 1e-6 else f"{low:.4g} to {high:.4g}"
-    return f"{text}: {at} of its first row at those of the file, so frequencies by a factor of {low**0.5:.4g}"
+    factor = f"so frequencies by a factor of {low**0.5:.4g}"
+    return f"{text}: {at} of its first row at those of the file, {factor}"
 
 
 def _cyclic(mesh: Mesh, metres: float) -> tuple[list[str], list[str]]:
     """Lines of [rotation] and [cyclic] of a file that is a sector, and what to say of them.
 
-    The right face is the left one turned by 2 pi / sectors about the axis, so of the two it is the one ahead.
+    The right face is the left one turned by 2 pi / sectors about the axis, so of the two it is the
+    one ahead.
     """
     if (sector := mesh.sector) is None:
         return [], []
     axis = np.array(sector.axis) / np.linalg.norm(sector.axis)
     if len([name for name in sector.faces if name in mesh.faces]) < 2:
-        told = f"warning: {sector.where}: '{sector.faces[0]}' and '{sector.faces[1]}' are no faces of the surface"
+        faces = " and ".join(map(repr, sector.faces))
+        told = f"warning: {sector.where}: {faces} are no faces of the surface"
         return [], [f"{told}; name two in [cyclic], without it the cut is free"]
     point = metres * np.array(sector.point)
     one, other = (mesh.points[mesh.face_points(n)].mean(axis=0) - point for n in sector.faces)
     left, right = sector.faces if axis @ np.cross(one, other) > 0 else sector.faces[::-1]
-    numbers = [", ".join(f"{v:.9g}" for v in row) for row in (axis + 0.0, np.array(sector.point) + 0.0)]
+    numbers = [
+        ", ".join(f"{v:.9g}" for v in row) for row in (axis + 0.0, np.array(sector.point) + 0.0)
+    ]
     lines = ["", "[rotation]", f"axis = [{numbers[0]}]", f"point = [{numbers[1]}]", "", "[cyclic]"]
-    lines += [f"sectors = {sector.sectors}", f"left = {json.dumps(left)}", f"right = {json.dumps(right)}"]
+    lines += [
+        f"sectors = {sector.sectors}",
+        f"left = {json.dumps(left)}",
+        f"right = {json.dumps(right)}",
+    ]
     lines += [f"nodal_diameters = {list(sector.diameters)}"] if sector.diameters else []
-    return lines, [f"{sector.where}: one of {sector.sectors} cyclic sectors, '{right}' ahead of '{left}'"]
+    return lines, [
+        f"{sector.where}: one of {sector.sectors} cyclic sectors, '{right}' ahead of '{left}'"
+    ]
 
 
 def _pressed(mesh: Mesh) -> list[str]:

@@ -197,7 +197,8 @@ def load_mesh(job: Job, path: Path | None = None) -> tuple[Mesh, list[str]]:
         raise UserError("\n".join(f"{path}: {e}" for e in errors))
     if mesh.sector is not None and job.settings.cyclic is None:
         warnings.append(
-            f"{mesh.sector.where}: the body is one of {mesh.sector.sectors} cyclic sectors; without [cyclic] its cut "
+            f"{mesh.sector.where}: the body is one of {mesh.sector.sectors} cyclic sectors; "
+            "without [cyclic] its cut "
             "faces are free and every frequency is another one"
         )
     size = float(np.ptp(mesh.points, axis=0).max())
@@ -313,7 +314,8 @@ def _answering(job: Job, mesh: Mesh, rule: FaceRule, place: str) -> dict[str, In
 
 
 def _other_mesh(job: Job, name: str, place: str) -> Mesh:
-    """The mesh that a face lies on: of another file, or what of the body's own deck is not this body."""
+    """The mesh that a face lies on: of another file, or what of the body's own deck is not this
+    body."""
     file, instances = job.folder / name, job.settings.geometry.instances
     if not store.ordinary(file).is_file():
         raise UserError(f"{place}: touching: there is no file {file}")
@@ -322,5 +324,8 @@ def _other_mesh(job: Job, name: str, place: str) -> Mesh:
         return mesh
     others = [part for part in with_parts(mesh).instances if part not in instances]
     if not instances or not others:
-        raise UserError(f"{place}: touching: names the body's own mesh, of which geometry.instances leaves nothing out")
+        raise UserError(
+            f"{place}: touching: names the body's own mesh, of which geometry.instances leaves "
+            "nothing out"
+        )
     return of_instances(mesh, others)

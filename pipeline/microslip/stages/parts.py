@@ -262,10 +262,12 @@ def shape_of(mesh: Mesh, scale: float) -> Shape:
     return Shape(points, np.array([points.min(axis=0), points.max(axis=0)]))
 
 
-def joint_lines(parts: Sequence[Part], number: int, patches: Sequence[Patch], unit: str) -> list[str]:
-    """Lines of a body.toml: the faces and interfaces where a part touches others, each once, curved ones as comments.
+def joint_lines(
+    parts: Sequence[Part], number: int, patches: Sequence[Patch], unit: str
+) -> list[str]:
+    """Lines of a body.toml: the faces and interfaces where a part touches others, each once.
 
-    A face that is wholly a set of the file needs no rule.
+    Curved ones are comments. A face that is wholly a set of the file needs no rule.
     """
     lines: list[str] = []
     written: set[str] = set()

@@ -111,9 +111,12 @@ MOST_COLUMNS = 10
 
 
 def _hertz_line(frequency: Array, most: int = MOST_COLUMNS) -> str:
-    """Columns of ten, of which the first stays empty: from 1e5 Hz on in whole Hz, from 1e9 on with two digits."""
+    """Columns of ten, of which the first stays empty: from 1e5 Hz on in whole Hz, from 1e9 on with
+    two digits."""
     shown = frequency[:most]
-    return "".join(f"{f:10.5g}" if f < 99999.5 else f"{f:10.0f}" if f < 1e9 else f"{f:10.2g}" for f in shown)
+    return "".join(
+        f"{f:10.5g}" if f < 99999.5 else f"{f:10.0f}" if f < 1e9 else f"{f:10.2g}" for f in shown
+    )
 
 
 def _first(g: ModalGroup, columns: int) -> str:
@@ -156,7 +159,10 @@ def _ring_summary(basis: ModalBasis) -> list[str]:
         known = between_stations([basis.groups[speed, k] for k in harmonics_of(basis)])
         lines.append(f"{state}: {known or certificate_words(certify_ring(basis, speed))}")
         if not certified_modes(first):
-            lines.append("  the frequencies below are those of the reduced sector, at or above the certified ones")
+            lines.append(
+                "  the frequencies below are those of the reduced sector, at or above the "
+                "certified ones"
+            )
         lines += contact_lines(first)
         lines += [f"  {text}" for text in sentences(first, basis.reduction)]
         for g in groups:
