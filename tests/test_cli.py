@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import shutil
 import signal
 import subprocess
@@ -175,6 +176,38 @@ def test_init_copies_a_runnable_body_and_overwrites_nothing(folder: Path, capsys
     assert main(["init", "own", "my part"]) == 2 and "my part/body.toml: is there already" in said(capsys)[1]
     assert main(["init", "blade"]) == 2
     assert "is there already" in said(capsys)[1] and (folder / "blade" / "body.toml").read_bytes() == before
+
+
+def test_bodies_of_a_folder_have_names_of_their_own(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Copied under another name too, and what a copied file names is copied. Two of one name would write one product:
+    refused by their files. A case beside them finds each by its name."""
+    from microslip.stages.job import open_job
+    from microslip.stages.places import find_body
+
+    assert main(["init", "pendulum", "pp"]) == 0 and main(["init", "blade", "bb"]) == 0
+    assert [open_job(folder / "pp" / f"{file}.toml").settings.name for file in ("body", "sliding")] == [
+        "pp",
+        "pp-sliding",
+    ]
+    assert [open_job(folder / "bb" / f"{file}.toml").settings.name for file in ("body", "damped")] == [
+        "bb",
+        "bb-damped",
+    ]
+    case = folder / "pp" / "case.toml"
+    assert find_body(case, "pp-sliding", folder) == folder / "pp" / "sliding.toml"
+    assert find_body(case, "pp", folder) == folder / "pp" / "body.toml"
+    for copied in (*folder.glob("pp/*.toml"), *folder.glob("bb/*.toml")):
+        for name in re.findall(r"[\w./-]+\.(?:toml|py)\b", copied.read_text()):
+            assert (copied.parent / name).is_file(), (copied, name)
+    sliding = folder / "pp" / "sliding.toml"
+    sliding.write_text(sliding.read_text().replace('"pp-sliding"', '"pp"'))
+    said(capsys)
+    for file, other in (("body", "sliding"), ("sliding", "body")):
+        assert main(["modes", f"pp/{file}.toml"]) == 2
+        told = said(capsys)[1]
+        assert f"pp/{file}.toml: name: {other}.toml" in told
+    assert not (folder / "build" / "pp").exists()
+    assert open_job(sliding, ["name=another"]).settings.name == "another"
 
 
 def test_every_question_takes_the_modal_file_beside_a_case(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:

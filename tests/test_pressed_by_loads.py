@@ -1,4 +1,4 @@
-"""Bodies that nothing but their contacts hold, pressed by steady loads: what presses them, and their nonlinear modes."""
+"""Bodies that nothing but their contacts hold, pressed by steady loads: what presses them, and their modes."""
 
 from __future__ import annotations
 

@@ -120,7 +120,7 @@ def init(name: str, folder: Path | None = None, /) -> None:
             shutil.copyfile(source, target / copy)
             if copy.endswith(".toml") and name != "contact":  # whose files have names of their own
                 keys = ("name",) if name == "sample" else ("name", "body")  # whose body is a modal file's
-                _rename(target / copy, target.resolve().name, keys)
+                _rename(target / copy, name if name in known else "", target.resolve().name, keys)
     except OSError as error:
         raise UserError(f"{target}: cannot be written ({error.strerror}); choose another folder") from error
     file, verb = _MADE.get(name, ("body.toml", "run"))
@@ -150,12 +150,14 @@ def _to_copy(name: str) -> list[tuple[Path, str]]:
     return files + ([(case, "case.toml")] if case.is_file() else [])
 
 
-def _rename(path: Path, name: str, keys: tuple[str, ...]) -> None:
-    """Give the body (and its case) the name of its folder, so that its products stand in build/<folder>/."""
+def _rename(path: Path, old: str, name: str, keys: tuple[str, ...]) -> None:
+    """Give the body (and its case) the name of its folder, so that its products stand in build/<folder>/; further
+    bodies of the folder, called OLD-more, that and more."""
+    was = rf"{re.escape(old)}(|-[^\"]*)" if old else '[^"]*()'
     if re.fullmatch(r"[A-Za-z0-9_.-]{1,64}", name):
         text = path.read_text(encoding="utf-8")
         for key in keys:
-            text = re.sub(rf'^{key} = "[^"]*"', f'{key} = "{name}"', text, count=1, flags=re.M)
+            text = re.sub(rf'^{key} = "{was}"', rf'{key} = "{name}\1"', text, count=1, flags=re.M)
         path.write_text(text, encoding="utf-8")
 
 

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import shlex
+from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -56,7 +58,7 @@ def open_job(path: Path | str, assignments: list[str] | None = None, root: Path 
     """Read a body file (or the body.toml in a folder).
 
     Raises:
-        UserError: see `load_body`.
+        UserError: see `load_body`; another body file of the folder has the same name.
     """
     path = Path(path)
     if holds_a_case_alone(path):
@@ -66,6 +68,7 @@ def open_job(path: Path | str, assignments: list[str] | None = None, root: Path 
     if path.suffix.lower() in _NO_SETTINGS and path.is_file():
         raise UserError(f"{path}: is no body.toml; make one around it with: microslip import {shlex.quote(str(path))}")
     settings, raw = load_body(path, assignments)
+    _only_one(path, settings.name)
     return Job(path, settings, raw, Path(root))
 
 
@@ -77,6 +80,30 @@ def job_of(raw: dict[str, Any], folder: Path) -> Job:
     """
     path = folder / "body"
     return Job(path, body_settings(raw, path), raw, folder)
+
+
+def is_of_a_body(keys: Mapping[str, Any]) -> bool:
+    """Whether a file with these keys describes a body."""
+    return "geometry" in keys and not ASKED & set(keys)
+
+
+def _only_one(path: Path, name: str) -> None:
+    """Refuse a body whose products would take the place of those of another one of the folder.
+
+    Raises:
+        UserError: with both files.
+    """
+    for other in sorted(path.parent.glob("*.toml")):
+        with suppress(UserError):  # its own mistakes are told when it is run
+            keys = load_toml(other)
+            if not other.samefile(path) and keys.get("name") == name and is_of_a_body(keys):
+                break
+    else:
+        return
+    raise UserError(
+        f"{path}: name: {other.name} beside it is a body of the name '{name}' too, and their products would stand in "
+        "one folder; give one of them another name"
+    )
 
 
 def holds_a_case_alone(path: Path) -> bool:

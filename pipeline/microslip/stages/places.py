@@ -14,7 +14,7 @@ from ..case.settings import BodyOfCase
 from ..errors import UserError
 from ..files import store
 from ..settings.toml import load_toml
-from .job import ASKED, open_job, system_file
+from .job import ASKED, is_of_a_body, open_job, system_file
 from .modal import modes_stage, system_stage
 from .stage import Report
 
@@ -198,18 +198,19 @@ def _elsewhere(path: Path, name: str, root: Path) -> str:
 def find_body(case_path: Path, name: str, root: Path) -> Path:
     """The body file of a name that a case gives.
 
-    It stands beside the case, or in NAME/ or geometry/ of the case's folder, of one above it, or of `root`, the nearest
-    first, so that a case means the same body wherever it is run. In geometry/ it is geometry/NAME/body.toml, or any
-    file of geometry/*/ that says that name (a body's second arrangement, the other side of a rig).
+    It stands beside the case, in any file, or in NAME/ or geometry/ of the case's folder, of one above it, or of
+    `root`, the nearest first, so that a case means the same body wherever it is run. In geometry/ it is
+    geometry/NAME/body.toml, or any file of geometry/*/ that says that name (a body's second arrangement, the other side
+    of a rig).
 
     Raises:
         UserError: if there is none.
     """
     for number, folder in enumerate((*_above(case_path.parent, root), root)):
-        beside = [folder / "body.toml"] if number == 0 else []
+        beside = [folder / "body.toml", *sorted(folder.glob("*.toml"))] if number == 0 else []
         usual = [*beside, folder / "geometry" / name / "body.toml", folder / name / "body.toml"]
         for file in (*filter(Path.is_file, usual), *sorted((folder / "geometry").glob("*/*.toml"))):
-            if load_toml(file).get("name") == name:
+            if (keys := load_toml(file)).get("name") == name and is_of_a_body(keys):
                 return file
     raise UserError(
         f"{case_path}: body: no body.toml of a body '{name}' is beside it, nor in {name}/ or geometry/ of its folder, "
