@@ -9,6 +9,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from ..data import Array, Indices
+from ..results.series import of_solutions
 from ..units import METRES, Quantity
 
 
@@ -48,14 +49,14 @@ class FrequencyResponse:
         return ~self.added if len(self.added) else np.ones(len(self.frequency), dtype=bool)
 
     def columns(self) -> dict[str, Array]:
-        """What stands in a table beside the frequency, by name and unit."""
-        return {
+        """What stands in a table beside the frequency, by name and unit; nan where a point is no solution."""
+        found = {
             self.quantity.column("amplitude"): np.abs(self.monitor),
             "phase_rad": np.angle(self.monitor),
             "dissipated_J": self.dissipated,
             **({"supplied_J": self.supplied, "damped_J": self.damped} if len(self.supplied) else {}),
-            "converged": self.converged.astype(float),
         }
+        return of_solutions(found, self.converged) | {"converged": self.converged.astype(float)}
 
 
 def peaks(response: FrequencyResponse) -> list[tuple[float, float]]:
