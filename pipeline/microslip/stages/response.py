@@ -6,7 +6,7 @@ import contextlib
 import importlib.util
 import json
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -17,11 +17,12 @@ from ..basis import read_basis
 from ..case import CaseResult, CaseSettings, checkpoint, load_case, run_case
 from ..case.assemble import build
 from ..case.messages import at_places, lifted
+from ..case.run import with_motions
 from ..case.settings import FIRST_HARMONICS
 from ..data import Array, ModalBasis
 from ..errors import UserError
 from ..files import store
-from ..files.tables import rows_csv
+from ..files.tables import rows_csv, write_tables
 from ..harmonic_balance.response import HarmonicResponse
 from ..harmonic_balance.sweeps import overhanging
 from ..report.response import JUMPS, highest, lifted_forces, response_html
@@ -105,6 +106,7 @@ def _work(
     try:
         begin = _harmonics(points, settings, bases, case_path) if settings.looks_for_harmonics else FIRST_HARMONICS
         result = run_case(settings, bases, case_path, stage.report, points.journal, begin)
+        result = with_motions(result, stage.report)
     except KeyboardInterrupt:
         _unfinished(points)
         raise
@@ -156,6 +158,7 @@ def _finished(points: Checkpoint, result: CaseResult, wanted: Wanted, report: Re
     response = replace(response, resonances=tuple(summary["resonances"]))
     write_response(folder / "response.h5", response)
     files = [folder / "response.h5", folder / "response.csv"]
+    files += write_tables(folder, {"motions.csv": _columns(summary["motions_in_time"])}, 8)
     drawn |= _ring(result, response, folder, report) if wanted.pictures else {}
     more = _assessed(result, response, folder, wanted, report)
     if more is not None:
@@ -175,6 +178,11 @@ def _finished(points: Checkpoint, result: CaseResult, wanted: Wanted, report: Re
     summary["files"] = [path.name for path in [*files, folder / "response.html"]]
     store.write_text(folder / "response.html", response_html(summary, drawn))
     return summary
+
+
+def _columns(rows: Sequence[Mapping[str, Any]]) -> dict[str, list[Any]]:
+    """Name -> column of rows that have the same names; none where there are no rows."""
+    return {name: [row[name] for row in rows] for name in (rows[0] if rows else ())}
 
 
 def _judged(response: Response, result: CaseResult, rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
@@ -211,7 +219,10 @@ def _doubt(result: CaseResult, normal: float, frequency: float, status: str, err
     if _jumps(found, frequency) or any(
         np.isclose(f, frequency) for f, _ in overhanging(found, result.resonances[normal])
     ):
-        return f"beside it is {JUMPS}, higher perhaps: respond --over frequency"
+        known = any(b.down and b.normal == normal for b in result.beyond)
+        return f"beside it is {JUMPS}, " + (
+            "see the motions in time" if known else "higher perhaps: respond --over frequency"
+        )
     if not np.isfinite(error):
         return "uncertain: no solution with more harmonics"
     return f"uncertain by about {percent(error)}: raise harmonics and samples" if error > UNCERTAIN else ""
@@ -406,6 +417,11 @@ def summarise(result: CaseResult) -> dict[str, Any]:
             {"normal_force_N": r.normal_force, "frequency_Hz": r.frequency, name: r.amplitude, "add": r.add}
             for r in result.rising
         ],
+        "folds": [
+            {"normal_force_N": n, "frequency_Hz": f, name: a} for n, folds in result.folds.items() for f, a in folds
+        ],
+        "motions_in_time": [row for one in result.beyond for row in one.rows()],
+        "beyond": [words for one in result.beyond for words in one.sentences()],
         "failed_points": failed,
         "messages": list(result.messages),
     }
