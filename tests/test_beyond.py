@@ -66,7 +66,8 @@ def test_what_is_said_of_two_motions() -> None:
     down = [motion(430, 70, True), motion(420, 75, True), motion(410, 80, True), motion(400, 90, True, 0.5),
             motion(390, 120, True), motion(380, 30)]  # fmt: skip
     up = [motion(380, 30), motion(390, 38), motion(400, 42), motion(410, 49), motion(420, 74, True), motion(430, 70)]
-    said = Beyond(100.0, (410.0, 420.0), up, down, [motion(390, 38), motion(400, 88, True), motion(410, 81, True)]).sentences()
+    rest = [motion(390, 38), motion(400, 88, True), motion(410, 81, True)]
+    said = Beyond(100.0, (410.0, 420.0), up, down, rest).sentences()
     assert "from 390 to 410 Hz" in said[0] and "120 µm at 390 Hz" in said[0] and "F_N = 100 N" in said[0]
     assert "lower one at 390 Hz" in said[1] and "higher one from 400 to 410 Hz" in said[1] and "88 µm" in said[1]
     assert "upwards" in said[2] and "lower one up to 410 Hz (49 µm)" in said[2] and "74 µm at 420 Hz" in said[2]

@@ -7,6 +7,7 @@ is left at all. Motions in time do.
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -45,6 +46,9 @@ LOWEST = 0.5
 
 WITHIN, STEPS = 30, 80
 """Frequencies of a sweep in time within a gap, and of all of it, at most."""
+
+LONG = 120.0
+"""s that a motion at a frequency may take in a sweep that nobody asked for."""
 
 LOST, HALVINGS = 0.3, 3
 """Share by which an amplitude changes in a step in which a motion is lost, and how often such a step is halved."""
@@ -113,7 +117,7 @@ class Beyond:
     def sentences(self) -> list[str]:
         """Which motion is reached from rest, which other ones there are, how high, and how they are reached; what the
         curve of periodic motions is and whether it is stable."""
-        return [*self._in_time(), *(words for one in self.curves for words in one.sentences()), *self._stable()]
+        return [*self._in_time(), *map(_of_curve, self.curves), *self._stable()]
 
     def _stable(self) -> list[str]:
         """How many of the motions on the curves are stable, and where some are not."""
@@ -201,6 +205,13 @@ class Beyond:
         return [f"Motions are irregular, without a period, {span}, with swings of up to {self._size(top.swing)}."]
 
 
+def _of_curve(one: Followed) -> str:
+    """A curve in a sentence."""
+    said = f"Curve of periodic motions, {one.sentences()[0]}"
+    more = f"; it goes on from {one.parameter[-1]:.5g} Hz (respond --over frequency)."
+    return said if not one.status.startswith("points") else said.removesuffix(".") + more
+
+
 def _jumps(before: Settled, after: Settled) -> bool:
     """Whether a motion is lost in a step."""
     return not after.like(before.amplitude, LOST)
@@ -262,7 +273,7 @@ def _both_ways(
         some, whole = curves(settings.model_copy(update={"curve": way}), bases, path, "frequency", keep, report)
         if not whole:
             raise KeyboardInterrupt
-        found += [f for f in some[:1] if f.rows]
+        found += [replace(f, legs=0) for f in some[:1] if f.rows]  # each is told by where it begins
     return found
 
 
@@ -367,7 +378,11 @@ class _Swept:
 
     def _at(self, way: str, f: float, begin: Settled | None = None) -> Settled:
         self.report(f"motion in time, {way}, F_N = {self.normal:g} N: {f:.6g} Hz")
-        return settled(self.problem.assembly, f, self.periods, begin)
+        began = time.monotonic()
+        found = settled(self.problem.assembly, f, self.periods, begin)
+        if begin is not None and (took := time.monotonic() - began) > LONG:  # the first one compiles
+            raise UserError(f"a frequency takes {took:.0f} s, too long for a sweep ([orbit] asks for single ones)")
+        return found
 
     def _balanced(self, f: float) -> float:
         """Amplitude of the harmonic balance at a frequency (Hz); nan where it has no solution."""
