@@ -369,7 +369,7 @@ def test_what_stands_in_the_folder(folder: Path) -> None:
     assert found.series[0].frequency[top] == row["frequency_Hz"]
 
 
-SLIDES = ("amplitude=20.0", "sweep.points=5")
+SLIDES = ("amplitude=20.0", "sweep.points=5", "sweep.normal_forces=[500.0]")
 
 
 @pytest.mark.parametrize(
