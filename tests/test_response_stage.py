@@ -369,7 +369,7 @@ def test_what_stands_in_the_folder(folder: Path) -> None:
     assert found.series[0].frequency[top] == row["frequency_Hz"]
 
 
-SLIDES = ("amplitude=20.0", "sweep.points=5")
+SLIDES = ("amplitude=20.0", "sweep.points=5", "sweep.normal_forces=[500.0]")
 
 
 @pytest.mark.parametrize(
@@ -434,6 +434,9 @@ def test_a_point_that_fails_is_kept_with_its_status(folder: Path, monkeypatch: p
     assert summary["unsolved"] == f"1 of {len(series)} points did not converge, {where}"
     table = np.genfromtxt(folder / "build/vane/response.csv", delimiter=",", names=True)
     assert table["frequency_Hz"][table["converged_FN_50_N"] == 0] == [360.0]
+    amplitude, rows = table["amplitude_m_FN_50_N"], summary["resonances"]
+    assert np.isnan(amplitude[table["frequency_Hz"] == 360.0]).all()
+    assert max(r["amplitude_m"] for r in rows) == pytest.approx(np.nanmax(amplitude), rel=1e-8)
     assert (folder / "build/vane/response.html").read_text().count("did not converge, at 360 Hz under F") == 1
     monkeypatch.setattr(solver, "newton", newton)
     told, converged = respond(folder, "sweep.points=5", force=True)

@@ -89,11 +89,24 @@ def test_the_table_has_every_point_of_every_series() -> None:
     table = response_table({5.0: sweep([10.0, 20.0 * (1 + 1e-15), 40.0], [], [(12.5, 10.0)]), 7.0: two})
     rows = list(csv.DictReader(table.splitlines()))
     assert [float(r["frequency_Hz"]) for r in rows] == [10.0, 12.5, 20.0, 20.00000001, 30.0, 40.0]
-    assert [r["amplitude_m_FN_5_N"] for r in rows] == ["30", "37.5", "60", "", "", "120"]
-    assert [r["amplitude_m_FN_7_N"] for r in rows] == ["30", "", "60", "60", "90", "120"]
+    assert [r["amplitude_m_FN_5_N"] for r in rows] == ["30", "37.5", "60", "", "", ""]
+    assert [r["amplitude_m_FN_7_N"] for r in rows] == ["30", "", "60", "60", "90", ""]
     assert [r["converged_FN_5_N"] for r in rows] == ["1", "1", "1", "", "", "0"]
     assert [r["asked"] for r in rows] == ["1", "0", "1", "0", "0", "1"]
     assert not any(r[name] for r in rows[3:5] for name in r if name.endswith("_FN_5_N"))
+
+
+def test_what_is_no_solution_has_no_numbers_of_a_motion() -> None:
+    """The point at 40 Hz did not converge: its cells are empty in the table but for how it was looked for, nan in the
+    data frame and in xarray, so that the largest of a column is one of a solution; the file keeps what there was."""
+    series = sweep([10.0, 20.0, 40.0])
+    last = list(csv.DictReader(response_table({5.0: series}).splitlines()))[-1]
+    known = {"frequency_Hz": "40", "asked": "1", "converged_FN_5_N": "0", "iterations_FN_5_N": "4"}
+    assert {name: v for name, v in last.items() if v} == {**known, "harmonics_FN_5_N": "1"}
+    assert series.columns()["amplitude_m"][:2].tolist() == [30.0, 60.0]
+    assert series.to_dataframe()["amplitude_m"].max() == 60.0 and series.amplitude[2] == 120.0
+    known = series.to_xarray()
+    assert abs(known["monitors.tip"]).max() == 60.0 and known["iterations"].values.tolist() == [4, 4, 4]
 
 
 def same(a: dict, b: dict) -> None:

@@ -22,7 +22,7 @@ from ..harmonic_balance.problem import Problem
 from ..harmonic_balance.readout import measured
 from ..results import Journal
 from ..results.names import exact
-from ..results.series import READ
+from ..results.series import CONVERGED, READ, of_solutions
 from ..units import METRES, Quantity
 from .assemble import Built, build
 from .contacts import swept
@@ -86,6 +86,11 @@ class Followed:
         return np.abs(self.monitor[:, 1])
 
     @property
+    def converged(self) -> Array:
+        """(p,) bool, whether each point passes its checks."""
+        return np.array([row.get("status", CONVERGED) == CONVERGED for row in self.rows], dtype=bool)
+
+    @property
     def complete(self) -> bool:
         """Whether the other end was reached."""
         begin, end = self.ends
@@ -125,17 +130,20 @@ class Followed:
         return ", ".join(said + ([] if self.frequency is None else [f"{number(self.frequency)} Hz"])) or "as pressed"
 
     def columns(self) -> dict[str, Array]:
-        """Name -> column, for a table."""
+        """Name -> column, for a table; what is told of a motion is nan where a point fails its checks."""
         first = {} if self.normal is None else {"normal_force_N": self.normal}
         first |= {} if self.frequency is None else {"at_frequency_Hz": self.frequency}
-        return {
-            **{name: np.full(len(self.rows), value) for name, value in first.items()},
-            COLUMNS[self.over]: self.parameter,
+        told = {
             self.quantity.column("amplitude"): self.amplitude,
             "phase_deg": np.degrees(np.angle(self.monitor[:, 1])),
             self.quantity.column("mean"): self.monitor[:, 0].real,
             "slipping": self._share("slipping"),
             "open": self._share("open"),
+        }
+        return {
+            **{name: np.full(len(self.rows), value) for name, value in first.items()},
+            COLUMNS[self.over]: self.parameter,
+            **of_solutions(told, self.converged),
             "fold": self.fold.astype(float),
             "leg": 1.0 + (self.legs or 0) + np.cumsum(self.fold) - self.fold,
         }
@@ -152,7 +160,7 @@ class Followed:
         if not self.rows:
             key = "band" if self.over == "frequency" else self.over
             return [f"{self.label}: {self.status}; begin elsewhere than at {begin:.6g} {unit} (curve.{key})."]
-        top, folds = int(np.argmax(self.amplitude)), self.parameter[self.fold]
+        top, folds = int(np.argmax(np.where(self.converged, self.amplitude, 0.0))), self.parameter[self.fold]
         factor, name = by or self.quantity.shared(self.amplitude)
         said = f"{self.label}: {len(self.rows)} points, at most {factor * self.amplitude[top]:.4g} {name} at "
         said += f"{self.parameter[top]:.6g} {unit}; "

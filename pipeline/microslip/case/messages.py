@@ -16,7 +16,7 @@ from ..harmonic_balance.response import HarmonicResponse
 from ..harmonic_balance.sweeps import overhanging
 from ..results.checks import cause
 from ..results.names import apart
-from ..units import counted, percent
+from ..units import Quantity, counted, percent
 from .assemble import Built
 from .problem import book_models
 from .settings import CaseSettings
@@ -194,6 +194,16 @@ def across(problem: Problem, found: HarmonicResponse, normal: float) -> list[str
                 f'write law = {{ kind = "jenkins", slides_along = "t{3 - law.slider}" }}, or law = "smooth".'
             ]
     return said
+
+
+def folded(folds: Mapping[float, Sequence[tuple[float, float]]], of: Quantity) -> list[str]:
+    """A message on places where a response is highest because its curve ends there."""
+    return [
+        f"At F_N = {normal:g} N the curve that the sweep follows turns back, at a fold, or ends at {at:.6g} Hz and "
+        f"{of.sized(height)}: that is no resonance, beyond it there is another motion."
+        for normal, peaks in folds.items()
+        for at, height in peaks
+    ]
 
 
 def overhangs(

@@ -23,12 +23,14 @@ from ..harmonic_balance.reduced import stuck, stuck_damping
 from ..harmonic_balance.refinement import filled_response
 from ..harmonic_balance.response import HarmonicResponse, Resonance, refined_peaks
 from ..harmonic_balance.solver import Point
+from ..harmonic_balance.sweeps import ends, gaps
 from ..results import Journal
 from ..system.assembly import Assembly, Linear
 from ..units import Quantity, counted, percent
 from . import edges
 from . import messages as say
 from .assemble import Built, build
+from .beyond import Beyond, beyond
 from .checkpoint import series_name
 from .contacts import memory_of, swept
 from .edges import Rising
@@ -38,7 +40,8 @@ from .settings import FIRST_HARMONICS, CaseSettings
 from .weak_springs import raising
 
 Keep = Callable[[Built], AbstractContextManager[Journal]]
-Answer = tuple[dict[float, "HarmonicResponse"], dict[float, list[tuple[float, float]]], tuple[Array, Array], list[str]]
+Peaks = dict[float, list[tuple[float, float]]]
+Answer = tuple[dict[float, "HarmonicResponse"], Peaks, Peaks, tuple[Array, Array], list[str]]
 
 
 @dataclass(frozen=True)
@@ -51,7 +54,8 @@ class CaseResult:
     sweep. speed: rad/s. messages: sentences a reader must know. built: the assembly. rising: ends of the band at which
     responses still rise. truncation: largest estimated error of an amplitude for want of harmonics and samples, over
     it; None where it is not estimated. errors: normal force (N) -> frequency in Hz -> the same, of resonances among
-    others.
+    others. folds: normal force -> (Hz, m) where the response is highest and its curve ends, which is no resonance.
+    beyond: motions in time about jumps and gaps, where they were asked for.
     """
 
     settings: CaseSettings
@@ -66,6 +70,8 @@ class CaseResult:
     truncation: float | None = None
     stuck_damping: Array = field(default_factory=lambda: np.zeros(0))
     errors: Mapping[float, Mapping[float, float]] = field(default_factory=dict)
+    folds: Mapping[float, list[tuple[float, float]]] = field(default_factory=dict)
+    beyond: tuple[Beyond, ...] = ()
 
     @property
     def quantity(self) -> Quantity:
@@ -129,7 +135,7 @@ def _run(
     _book_can(built, path)
     _can_be_pressed(built, forces, path)
     with keep(built) if keep else nullcontext() as journal:
-        responses, resonances, stuck, messages = _answered(built, forces, frequency, report, journal, left)
+        responses, resonances, folds, stuck, messages = _answered(built, forces, frequency, report, journal, left)
     free = free_response(built, frequency)
     idle = [normal for normal, r in responses.items() if say.still(r)]
     resonances |= {normal: [] for normal in idle}
@@ -145,22 +151,35 @@ def _run(
         *say.too_coarse(settings, *stuck),
         *say.not_converged(responses),
         *say.idle(idle),
+        *say.folded(folds, measured(built.assembly)),
         *say.overhangs(responses, resonances),
         *edges.messages(at_the_ends),
     ]
     return CaseResult(
         settings, responses, free, stuck[0], resonances, built.speed, tuple(messages), built,
-        tuple(at_the_ends), left.most, stuck[1], left.errors,
+        tuple(at_the_ends), left.most, stuck[1], left.errors, folds,
     )  # fmt: skip
+
+
+def with_motions(result: CaseResult, report: Callable[[str], None] = lambda _: None) -> CaseResult:
+    """The same with motions in time where a response jumps or leaves a gap; the book's mode has none."""
+    if result.settings.mode == "book":
+        return result
+    forces, found = dict.fromkeys(normal_forces(result.built, "") or (None,)), list[Beyond]()
+    for asked, (normal, r) in zip(forces, result.responses.items(), strict=True):
+        for gap in gaps(r, result.resonances[normal]):
+            problem = problem_of(result.built, asked)
+            found.append(beyond(problem, r, gap, normal, result.quantity, report))
+    return replace(result, beyond=tuple(found))
 
 
 def _answered(
     built: Built, forces: tuple[float, ...], frequency: Array, report: Callable[[str], None], journal: Journal | None,
     left: _Left,
 ) -> Answer:  # fmt: skip
-    """Responses and resonances by normal force, sticking frequencies and their damping, messages."""
+    """Responses, resonances and folds by normal force, sticking frequencies and their damping, messages."""
     responses: dict[float, HarmonicResponse] = {}
-    resonances, stiff, messages = {}, (np.zeros(0), np.zeros(0)), []
+    resonances, folds, stiff, messages = {}, {}, (np.zeros(0), np.zeros(0)), []
     _report_memory(built, report)
     for normal in forces or (None,):
         problem = problem_of(built, normal)
@@ -168,6 +187,9 @@ def _answered(
         report(f"friction response at a normal force of {key:g} N")
         limits = np.array([c.coefficient * (key if swept(c) else c.normal_force or 0.0) for c in built.contacts])
         found, peaks = _swept(problem, frequency, limits, report, journal, key)
+        turns = ends(found, [(one.frequency, one.amplitude) for one in peaks])
+        folds[key] = [(one.frequency, one.amplitude) for one, turn in zip(peaks, turns, strict=True) if turn]
+        peaks = [one for one, turn in zip(peaks, turns, strict=True) if not turn]
         responses[key], resonances[key] = found, [(one.frequency, one.amplitude) for one in peaks]
         messages += say.not_periodic(key, found.unsteady, built.settings)
         messages += say.lifting(built, problem, found, key) + say.pulling(built, found, key)
@@ -175,7 +197,7 @@ def _answered(
         messages += [] if say.still(found) else left.out(problem, found, peaks, key)
         if key == max(responses):
             stiff = _stuck(problem.assembly)
-    return responses, resonances, stiff, messages
+    return responses, resonances, folds, stiff, messages
 
 
 def _report_memory(built: Built, report: Callable[[str], None]) -> None:

@@ -28,7 +28,7 @@ from ..errors import UserError
 from ..files.hdf5 import refuse_foreign
 from ..results.checks import Checks
 from ..results.files import FORMAT, Response, write_response
-from ..results.series import Series
+from ..results.series import Series, of_solutions
 from ..system import assembly
 from ..system.assembly import Linear
 from ..units import METRES, Quantity
@@ -86,9 +86,10 @@ class Backbone:
         return self.Omega / (2 * np.pi)
 
     def columns(self) -> dict[str, Array]:
-        """Heading -> (k,) numbers."""
-        column = self.quantity.column("amplitude")
-        return {column: self.amplitude, "frequency_Hz": self.frequency, "damping_ratio": self.damping}
+        """Heading -> (k,) numbers; nan where a motion fails its checks."""
+        column, found = self.quantity.column("amplitude"), {"frequency_Hz": self.frequency}
+        passed = np.array([not c.failure for c in self.checks], dtype=bool)
+        return {column: self.amplitude, **of_solutions({**found, "damping_ratio": self.damping}, passed)}
 
     def to_dataframe(self) -> Any:
         """The table of `columns` as a `pandas.DataFrame`."""

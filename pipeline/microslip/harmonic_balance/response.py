@@ -14,7 +14,7 @@ from ..continuation import SEARCH
 from ..continuation import peak as climbed
 from ..data import Array, ComplexArray, Compliance, ModalGroup, Rows
 from ..results.checks import UNCHECKED, Checks, exchanged
-from ..results.series import without_rounding
+from ..results.series import of_solutions, without_rounding
 from ..system.assembly import Assembly, ContactFace, Load, Output, preloaded_contact
 from ..system.component import Component
 from . import problem as balance
@@ -139,13 +139,16 @@ class HarmonicResponse(FrequencyResponse):
     def columns(self) -> dict[str, Array]:
         name, a = self.quantity.column, without_rounding(self.harmonics)
         more = {name(f"amplitude_{h}"): np.abs(a[:, h]) for h in range(2, a.shape[1])}
-        return {
-            **super().columns(),
+        found = {
             name("mean"): a[:, 0].real,
             **more,
             "slip_dissipated_J": self.by_slip,
             "slipping": self.slipping.sum(axis=1) / max(self.slipping.shape[1], 1),
             "open": self.open.sum(axis=1) / max(self.open.shape[1], 1),
+        }
+        return {
+            **super().columns(),
+            **of_solutions(found, self.converged),
             "harmonics": np.full(len(self.frequency), self.harmonics.shape[1] - 1.0),
             "iterations": self.iterations.astype(float),
         }

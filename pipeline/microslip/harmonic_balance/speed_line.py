@@ -14,6 +14,7 @@ import numpy as np
 
 from ..data import Array
 from ..errors import UserError
+from ..results.series import of_solutions
 from ..system.assembly import Assembly
 from . import problem as balance
 from . import response
@@ -39,7 +40,7 @@ class SpeedResponse(HarmonicResponse):
 
     def columns(self) -> dict[str, Array]:
         forces = {f"normal_force_{i + 1}_N": force for i, force in enumerate(self.normal.T)}
-        return {"speed_rpm": self.rpm, **super().columns(), **forces}
+        return {"speed_rpm": self.rpm, **super().columns(), **of_solutions(forces, self.converged)}
 
 
 def frequency(order: int, rpm: Array) -> Array:

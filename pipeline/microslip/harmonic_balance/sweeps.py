@@ -9,6 +9,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from ..data import Array, Indices
+from ..results.series import of_solutions
 from ..units import METRES, Quantity
 
 
@@ -48,14 +49,14 @@ class FrequencyResponse:
         return ~self.added if len(self.added) else np.ones(len(self.frequency), dtype=bool)
 
     def columns(self) -> dict[str, Array]:
-        """What stands in a table beside the frequency, by name and unit."""
-        return {
+        """What stands in a table beside the frequency, by name and unit; nan where a point is no solution."""
+        found = {
             self.quantity.column("amplitude"): np.abs(self.monitor),
             "phase_rad": np.angle(self.monitor),
             "dissipated_J": self.dissipated,
             **({"supplied_J": self.supplied, "damped_J": self.damped} if len(self.supplied) else {}),
-            "converged": self.converged.astype(float),
         }
+        return of_solutions(found, self.converged) | {"converged": self.converged.astype(float)}
 
 
 def peaks(response: FrequencyResponse) -> list[tuple[float, float]]:
@@ -132,6 +133,52 @@ def overhanging(response: FrequencyResponse, peaks: Sequence[tuple[float, float]
             found.append((at, height))
     return found
 
+
+def ends(response: FrequencyResponse, peaks: Sequence[tuple[float, float]]) -> list[bool]:
+    """Of peaks (Hz, m) whether each is no maximum but where the curve of solutions ends, at a fold: the last solution
+    is beside it and no lower, or there is none."""
+    f, a, ok, near = response.frequency, np.abs(response.monitor), response.converged, NEAR * _step(response)
+    last = np.zeros(len(f), dtype=bool)
+    for low, high in _breaks(response):
+        last[[low, high]] = True
+    return [
+        bool((last & (np.abs(f - at) < near) & (~ok | (a >= (1 - 1e-6) * height))).any()) for at, height in peaks
+    ]
+
+
+def gaps(response: FrequencyResponse, peaks: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
+    """Hz, Hz: where a sweep jumps or leaves points without a solution, and between an overhanging peak and the place
+    where the sweep passes it; those within three steps of each other are one."""
+    f, step = response.frequency, _step(response)
+    found = [(float(f[low]), float(f[high])) for low, high in _breaks(response)]
+    jumps = [0.5 * (low + high) for low, high in found]
+    over = [(at, min(jumps, key=lambda jump: abs(jump - at), default=at)) for at, _ in overhanging(response, peaks)]
+    joined = list[tuple[float, float]]()
+    for low, high in sorted([*found, *(tuple(sorted(one)) for one in over)]):
+        if joined and low - joined[-1][1] < 3 * step:
+            joined[-1] = joined[-1][0], max(high, joined[-1][1])
+        else:
+            joined.append((low, high))
+    return joined
+
+
+def _breaks(response: FrequencyResponse) -> list[tuple[int, int]]:
+    """Neighbouring points between which a sweep jumps, or of which one is no solution."""
+    f, a, ok = response.frequency, np.abs(response.monitor), response.converged
+    close = np.diff(f) < NEAR * _step(response)
+    apart = np.abs(np.diff(a)) > JUMP * np.maximum(a[:-1], a[1:])
+    return [(int(i), int(i) + 1) for i in np.flatnonzero(~ok[:-1] | ~ok[1:] | close & apart)]
+
+
+def _step(response: FrequencyResponse) -> float:
+    """Hz between the points asked for."""
+    asked = response.frequency[response.asked]
+    return float(np.median(np.diff(asked))) if len(asked) > 1 else 0.0
+
+
+NEAR, JUMP = 0.02, 0.05
+"""Share of a step within which two points are one place, and of the larger amplitude by which they differ where a sweep
+jumps there."""
 
 DIP = 0.01
 """Share of the lower one of two tops by which the response has to fall between them for them to be two resonances: the

@@ -70,6 +70,7 @@ def response_picture(
     if len(result.responses) > 1:
         told += f" at $F_N$ = {max(result.responses):g} N"
     told += "; dotted: contacts would lift off, not valid" if any(lifts) else ""
+    told += "; in time: triangles swept up and down, crosses from rest" if any(b.down for b in result.beyond) else ""
     columns = LEGEND if len(shown) == 1 else 3
     handles, labels = by_rows(*axes.get_legend_handles_labels(), columns)
     figure.legend(handles, labels, loc="outside lower center", ncols=columns, fontsize=9, title=told, title_fontsize=8)
@@ -130,6 +131,10 @@ def _curves(
     for row, (colour, normal) in enumerate(zip(colours, forces * (w.number == 0), strict=False)):
         r = result.responses[normal]
         mark_missing(axes, r.frequency[~r.converged], colour, row)
+        for one in (b for b in result.beyond if b.normal == normal):
+            for motions, mark in ((one.up, "^"), (one.down, "v"), (one.rest, "x")):
+                at = [(m.frequency, by * m.amplitude) for m in motions]
+                axes.plot(*np.reshape(at, (-1, 2)).T, mark, color=colour, ms=4, mfc="none")
     return lifts
 
 

@@ -40,6 +40,7 @@ def answer(response: Mapping[str, Any], album: Album) -> list[Piece]:
     failed = response.get("unsolved")
     return [
         say(*_sentences(response), tone="lead"),
+        say(*response.get("beyond", ()), tone="lead"),
         say(f"{failed}." if failed else "", tone="bad"),
         _resonances(rows, _factors(response)) if rows else say(""),
         say(_of_others(response) if rows else ""),
@@ -60,7 +61,8 @@ def _sentences(response: Mapping[str, Any]) -> list[str]:
     """The highest and the lowest resonance, the largest stress, what the numbers are worth."""
     rows = response.get("resonances", [])
     if not rows:
-        return ["No resonance was found in the band." if "resonances" in response else ""]
+        said = "No resonance was found in the band." if "resonances" in response else ""
+        return [said, *(f"{_fold(row, _factors(response))}." for row in response.get("folds", ()))]
     doubtful = sum(bool(row.get("doubt")) for row in rows)
     lifted, valid = lifted_forces(rows), _valid(rows)
     first, *others = response.get("read_outs", [""])
@@ -144,6 +146,10 @@ def _peak(row: Mapping[str, Any], factors: Factors) -> str:
     return f"{number(factor * size)} {unit} at {number(row['frequency_Hz'], 5)} Hz under F_N = {force} N"
 
 
+def _fold(row: Mapping[str, Any], factors: Factors) -> str:
+    return f"The curve turns back, at a fold, or ends at {_peak(row, factors)}"
+
+
 def _resonances(rows: Sequence[Mapping[str, Any]], factors: Factors) -> Piece:
     """The table of resonances: what speaks against one stands beside its amplitude, and marks its row."""
     doubts = any(row.get("doubt") for row in rows)
@@ -201,6 +207,7 @@ def response_pieces(response: Mapping[str, Any], album: Album) -> list[Piece]:
     told = {k: v for k, v in response.items() if not k.endswith("sha256") and v not in ("", None, [])}
     told = {k: v for k, v in told.items() if not response.get(_TOLD.get(k, ""))}
     words = told.pop("description", "")
+    told.pop("beyond", None)
     tables = {k: v for k, v in told.items() if isinstance(v, list) and v and isinstance(v[0], Mapping)}
     factors = _factors(response)
     single = {k: _cell(v).removeprefix(f"{k}: ") for k, v in told.items() if k not in tables}
@@ -226,6 +233,8 @@ _TOLD = {"stuck_frequencies_Hz": "stuck_modes", "estimated_error_of_harmonics": 
 _HEADINGS = {
     "stuck_modes": "Modes with sticking contacts, as far as the harmonics reach",
     "stuck_under_N": "normal force of the modes with sticking contacts in N",
+    "folds": "Where the response is highest and its curve ends, which is no resonance",
+    "motions_in_time": "Motions in time about jumps and gaps, swept in steps or each from rest",
     "rising_at_the_edge": "Where the response still rises at an end of the band",
 }
 """Titles of tables and names of facts that their keys do not tell."""

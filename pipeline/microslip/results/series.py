@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -20,6 +20,9 @@ CONVERGED = "converged"
 
 READ = ("monitors/", "angles/", "gauges/")
 """How the names of read-outs begin."""
+
+OF_A_MOTION = ("x", "supplied", "damped", "exchanged", "kinetic")
+"""Arrays, beside those of read-outs, bodies and contacts, that tell nothing where a point is no solution."""
 
 UNITS = {
     "frequency": "Hz", "Omega": "rad/s", "supplied": "J", "damped": "J", "dissipated": "J", "kinetic": "J",
@@ -56,6 +59,11 @@ def without_rounding(harmonics: ComplexArray) -> ComplexArray:
     """(f, H + 1) amplitudes of a read-out, those that are rounding beside the largest of their point zero."""
     size = np.abs(harmonics)
     return np.where(size <= ROUNDING * size.max(axis=1, keepdims=True, initial=0.0), 0.0, harmonics)
+
+
+def of_solutions(columns: Mapping[str, Array], converged: Array, known: Sequence[str] = ()) -> dict[str, Array]:
+    """Columns (f,) with nan where a point is no solution, but for those that are known there too."""
+    return {name: v if name in known else np.where(converged, v, np.nan) for name, v in columns.items()}
 
 
 @dataclass(frozen=True)
@@ -195,7 +203,7 @@ class Series:
     # tables ----------------------------------------------------------------------------------------------------------
 
     def columns(self) -> dict[str, Array]:
-        """Heading, with its unit -> (f,) numbers."""
+        """Heading, with its unit -> (f,) numbers; what is told of a motion is nan where a point is no solution."""
         column = self.quantity.column
         found = {} if self.over == "frequency" else {self.over: self.parameter}
         found["frequency_Hz"] = self.frequency
@@ -213,7 +221,7 @@ class Series:
             found["damping_ratio"] = self.damping_ratio
         contacts = max(len([n for n in self.arrays if n.startswith("contacts/") and n.endswith("/slipping")]), 1)
         found |= {name: self._summed(name) / contacts for name in ("slipping", "open")}
-        return found | {"converged": self.converged}
+        return of_solutions(found, self.converged, (self.over, "frequency_Hz")) | {"converged": self.converged}
 
     def to_dataframe(self) -> Any:
         """The table of `columns` as a `pandas.DataFrame`, a row a point; ``status`` says what went wrong."""
@@ -223,7 +231,7 @@ class Series:
 
     def to_xarray(self) -> Any:
         """Everything as an `xarray.Dataset` over the axis ``point``: a slash in a name becomes a dot, units are
-        attributes."""
+        attributes. What is told of a motion is nan where a point is no solution."""
         import xarray
 
         variables = {name.replace("/", "."): self._variable(name) for name in self.arrays if name != "history"}
@@ -245,6 +253,9 @@ class Series:
 
     def _variable(self, name: str) -> tuple[tuple[str, ...], Array, dict[str, str]]:
         values, (*above, last) = self.arrays[name], name.split("/")
+        if name in OF_A_MOTION or name.startswith((*READ, "bodies/", "contacts/")):
+            solved = self.converged.reshape(-1, *np.ones(values.ndim - 1, dtype=int))
+            values = np.where(solved, values, np.nan)
         owner = "/".join(above[1:]) or last
         axes = ("point", *(f"{name.replace('/', '.')}_{i}" for i in range(1, values.ndim)))
         if name.startswith(READ):

@@ -13,7 +13,8 @@ from .series import Series
 
 
 def response_table(series: Mapping[float, Series]) -> str:
-    """CSV text: in order of the frequency every point that a series has, with empty cells for series without it.
+    """CSV text: in order of the frequency every point that a series has, with empty cells for series without it, and
+    for what is told of a motion where the point is no solution.
 
     Args:
         series: normal force (N) -> its sweep, with the points that were added and the peaks that were searched for.
@@ -28,7 +29,8 @@ def response_table(series: Mapping[float, Series]) -> str:
     columns: dict[str, list[str | float]] = {"frequency_Hz": [*every]}
     for force, (normal, s) in zip(apart(list(series)), series.items(), strict=True):
         for name, values in _columns(s).items():
-            held = dict(zip(places[normal], values.astype(float).tolist(), strict=True))
+            cells = ["" if np.isnan(v) else float(v) for v in values.astype(float)]
+            held = dict(zip(places[normal], cells, strict=True))
             columns[f"{name}_FN_{force}_N"] = [held.get(f, "") for f in every]
     return columns_csv(columns | {"asked": [float(f in asked) for f in every]}, 9)
 
@@ -43,6 +45,6 @@ def _columns(s: Series) -> dict[str, Array]:
     """Heading -> (f,) numbers: those of a series, and how they were found."""
     found = {name: values for name, values in s.columns().items() if name != "frequency_Hz"}
     return found | {
-        "slip_dissipated_J": s.by_slip,
+        "slip_dissipated_J": np.where(s.converged, s.by_slip, np.nan),
         **{name: np.asarray(s.arrays[name]) for name in ("harmonics", "iterations")},
     }

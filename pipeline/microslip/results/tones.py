@@ -16,7 +16,7 @@ from ..files.hdf5 import IMAGINARY, put, refuse_foreign, sealed
 from ..files.hostile import DAMAGE, reading, refuse_damaged
 from ..files.store import ordinary
 from ..units import Quantity
-from .series import CONVERGED
+from .series import CONVERGED, of_solutions
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -136,7 +136,8 @@ class TwoTones:
         each = {f"{name}_{a}_{b}": size[:, j] for j, (a, b) in enumerate(self.pairs)}
         own = {"supplied_1_W": self.supplied[:, 0], "supplied_2_W": self.supplied[:, 1], "damped_W": self.damped}
         tones = {"frequency_1_Hz": self.first, "frequency_2_Hz": self.second}
-        return {**tones, **each, **own, "lost_W": self.lost, "status": list(self.status)}
+        told = of_solutions({**each, **own, "lost_W": self.lost}, self.converged)
+        return {**tones, **told, "status": list(self.status)}
 
     def to_xarray(self) -> Any:
         """Everything as an `xarray.Dataset` over ``point``, ``readout`` and ``pair``; units are attributes."""

@@ -219,9 +219,10 @@ def _searched(series: Series) -> Indices:
 
 
 def tops(series: Series, size: Array) -> Indices:
-    """Points of a series that are resonances: those that were searched for between the others, and of those of one
-    plateau the highest, see `sweeps.prominent`. size: (f,) m, of the read-out."""
-    points = np.flatnonzero(series.converged)
+    """Points of a series that are resonances: those that were searched for between the others and are no folds, and of
+    those of one plateau the highest, see `sweeps.prominent`. size: (f,) m, of the read-out."""
+    folds = np.asarray(series.arrays.get("fold", np.zeros(len(series))), dtype=bool)
+    points = np.flatnonzero(series.converged & ~folds)
     at = np.flatnonzero(np.isin(points, _searched(series)))
     return points[prominent(np.asarray(size)[points], at)]
 

@@ -6,7 +6,7 @@ import contextlib
 import importlib.util
 import json
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -16,12 +16,14 @@ import numpy as np
 from ..basis import read_basis
 from ..case import CaseResult, CaseSettings, checkpoint, load_case, run_case
 from ..case.assemble import build
+from ..case.beyond import with_curve
 from ..case.messages import at_places, lifted
+from ..case.run import with_motions
 from ..case.settings import FIRST_HARMONICS
 from ..data import Array, ModalBasis
 from ..errors import UserError
 from ..files import store
-from ..files.tables import rows_csv
+from ..files.tables import rows_csv, write_tables
 from ..harmonic_balance.response import HarmonicResponse
 from ..harmonic_balance.sweeps import overhanging
 from ..report.response import JUMPS, highest, lifted_forces, response_html
@@ -105,6 +107,10 @@ def _work(
     try:
         begin = _harmonics(points, settings, bases, case_path) if settings.looks_for_harmonics else FIRST_HARMONICS
         result = run_case(settings, bases, case_path, stage.report, points.journal, begin)
+        result = with_motions(result, stage.report)
+        curve = Checkpoint(folder / "curve.points", raw, files, stage.force, stage.begin)
+        own = bases, case_path, curve.journal, stage.report
+        result = replace(result, beyond=tuple(with_curve(b, result.settings, *own) for b in result.beyond))
     except KeyboardInterrupt:
         _unfinished(points)
         raise
@@ -156,6 +162,9 @@ def _finished(points: Checkpoint, result: CaseResult, wanted: Wanted, report: Re
     response = replace(response, resonances=tuple(summary["resonances"]))
     write_response(folder / "response.h5", response)
     files = [folder / "response.h5", folder / "response.csv"]
+    curve = [columns for one in result.beyond for columns in one.columns()]
+    joined = {name: np.concatenate([c[name] for c in curve]) for name in (curve[0] if curve else ())}
+    files += write_tables(folder, {"motions.csv": _columns(summary["motions_in_time"]), "curve.csv": joined}, 8)
     drawn |= _ring(result, response, folder, report) if wanted.pictures else {}
     more = _assessed(result, response, folder, wanted, report)
     if more is not None:
@@ -175,6 +184,11 @@ def _finished(points: Checkpoint, result: CaseResult, wanted: Wanted, report: Re
     summary["files"] = [path.name for path in [*files, folder / "response.html"]]
     store.write_text(folder / "response.html", response_html(summary, drawn))
     return summary
+
+
+def _columns(rows: Sequence[Mapping[str, Any]]) -> dict[str, list[Any]]:
+    """Name -> column of rows that have the same names; none where there are no rows."""
+    return {name: [row[name] for row in rows] for name in (rows[0] if rows else ())}
 
 
 def _judged(response: Response, result: CaseResult, rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
@@ -211,7 +225,10 @@ def _doubt(result: CaseResult, normal: float, frequency: float, status: str, err
     if _jumps(found, frequency) or any(
         np.isclose(f, frequency) for f, _ in overhanging(found, result.resonances[normal])
     ):
-        return f"beside it is {JUMPS}, higher perhaps: respond --over frequency"
+        known = any(b.down and b.normal == normal for b in result.beyond)
+        return f"beside it is {JUMPS}, " + (
+            "see the motions in time" if known else "higher perhaps: respond --over frequency"
+        )
     if not np.isfinite(error):
         return "uncertain: no solution with more harmonics"
     return f"uncertain by about {percent(error)}: raise harmonics and samples" if error > UNCERTAIN else ""
@@ -232,6 +249,7 @@ UNCERTAIN = 0.1
 
 def _drawn(result: CaseResult, rows: list[dict[str, Any]], folder: Path) -> dict[str, Path]:
     """Title -> picture of the first read-out, with others of its unit where they are few, and of each other one."""
+    from ..pictures.following import curve_plot
     from ..pictures.response import response_picture, together
 
     asked = result.readouts
@@ -243,6 +261,9 @@ def _drawn(result: CaseResult, rows: list[dict[str, Any]], folder: Path) -> dict
         drawn[title] = folder / "pictures" / f"{name}.png"
         with store.complete_or_absent(drawn[title]) as temporary:
             response_picture(result, temporary, group, rows)
+    if lines := [one for b in result.beyond for one in b.curves if len(one.rows) > 1]:
+        title = "curve of periodic motions about jumps and gaps"
+        drawn[title] = curve_plot(lines, folder / "pictures" / "curve.png", f"{result.settings.name}: {title}")
     return drawn
 
 
@@ -262,11 +283,22 @@ def _response(points: Checkpoint, result: CaseResult, summary: Mapping[str, Any]
     names = {checkpoint.series_name(n): n for n in result.responses}
     head, held = read_journal(points.file)
     low, high = result.settings.sweep.start, result.settings.sweep.stop
-    found = {name: {k: p for k, p in held.get(name, {}).items() if low <= k <= high} for name in names}
+    found = {
+        name: _with_folds({k: p for k, p in held.get(name, {}).items() if low <= k <= high}, result.folds[normal])
+        for name, normal in names.items()
+    }
     told = {"parameters": {name: {"normal_force": n} for name, n in names.items()}, "finished": True}
     told["estimated"] = result.truncation
     told |= {key: summary[key] for key in ("resonances", "stuck_modes", "messages")}
     return response_of({**head, **told}, found)
+
+
+def _with_folds(
+    rows: Mapping[float, Mapping[str, Any]], folds: Sequence[tuple[float, float]]
+) -> Mapping[float, Mapping[str, Any]]:  # fmt: skip
+    """Points by frequency (Hz), with ``fold`` 1 at the folds (Hz, m) of a response that has some."""
+    at = np.array([f for f, _ in folds])
+    return {f: {**row, "fold": int(np.isclose(f, at, rtol=1e-12).any())} for f, row in rows.items()} if folds else rows
 
 
 @dataclass(frozen=True)
@@ -406,6 +438,11 @@ def summarise(result: CaseResult) -> dict[str, Any]:
             {"normal_force_N": r.normal_force, "frequency_Hz": r.frequency, name: r.amplitude, "add": r.add}
             for r in result.rising
         ],
+        "folds": [
+            {"normal_force_N": n, "frequency_Hz": f, name: a} for n, folds in result.folds.items() for f, a in folds
+        ],
+        "motions_in_time": [row for one in result.beyond for row in one.rows()],
+        "beyond": [words for one in result.beyond for words in one.sentences()],
         "failed_points": failed,
         "messages": list(result.messages),
     }

@@ -165,6 +165,8 @@ def _tell(summary: Mapping[str, Any], report: Report) -> None:
     for row, normal in zip(rows, apart([row["normal_force_N"] for row in rows]), strict=True):
         note = f" ({row['doubt']})" if row.get("doubt") else f"; add {row['add']}" if "add" in row else ""
         report(f"F_N = {normal} N: {'still rising at ' if 'add' in row else ''}{_at(row)}{note}")
+    for words in summary.get("beyond", ()):
+        report(words)
 
 
 def _at(row: Mapping[str, Any]) -> str:
