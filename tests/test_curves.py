@@ -247,4 +247,4 @@ def test_nothing_to_press_and_laws_of_one_force(case: Path, capsys: pytest.Captu
     assert "contacts.sole.law" in "".join(capsys.readouterr())
     case.write_text(CASE.replace("start = 100.0", "start = 131.0"))
     assert main(["respond", "case.toml", "--over", "load"]) == 2
-    assert "holds no resonance; give a frequency" in "".join(capsys.readouterr())
+    assert "no resonance in the band; widen the sweep, or give a frequency" in "".join(capsys.readouterr())

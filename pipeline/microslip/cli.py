@@ -616,8 +616,8 @@ def optimum(
     _say(following.told(found, over, opened), quiet)
     for file in files:
         _say(file, quiet)
-    if not following.is_optimum(found):
-        raise NotConverged(following.missed(found, over))
+    if why := following.missed(found, over):
+        raise NotConverged(why)
 
 
 def _case_file(case: Path) -> Path:

@@ -262,10 +262,10 @@ def _resonance(
     key = f"{normal}, {s.start} to {s.stop} Hz by {s.points}"
     if key not in known:
         report(f"resonance between {s.start:g} and {s.stop:g} Hz")
-        f = largest(problem, np.linspace(s.start, s.stop, s.points)).frequency
-        if not np.isfinite(f):
-            raise UserError(f"{path}: curve.frequency: the band of the sweep holds no resonance; give a frequency (Hz)")
-        known[key] = float(f)
+        top = largest(problem, np.linspace(s.start, s.stop, s.points))
+        if top.missing:
+            raise UserError(f"{path}: curve.frequency: {top.missing}; widen the sweep, or give a frequency (Hz)")
+        known[key] = top.frequency
         journal.say({**journal.head, "at": known})
     return float(known[key])
 

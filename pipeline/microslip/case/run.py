@@ -23,6 +23,7 @@ from ..harmonic_balance.reduced import stuck, stuck_damping
 from ..harmonic_balance.refinement import filled_response
 from ..harmonic_balance.response import HarmonicResponse, Resonance, refined_peaks
 from ..harmonic_balance.solver import Point
+from ..harmonic_balance.sweeps import still
 from ..results import Journal
 from ..system.assembly import Assembly, Linear
 from ..units import Quantity, counted, percent
@@ -131,7 +132,7 @@ def _run(
     with keep(built) if keep else nullcontext() as journal:
         responses, resonances, stuck, messages = _answered(built, forces, frequency, report, journal, left)
     free = free_response(built, frequency)
-    idle = [normal for normal, r in responses.items() if say.still(r)]
+    idle = [normal for normal, r in responses.items() if still(r)]
     resonances |= {normal: [] for normal in idle}
     at_the_ends = edges.rising({n: r for n, r in responses.items() if n not in idle}, resonances)
     messages = [
@@ -172,7 +173,7 @@ def _answered(
         messages += say.not_periodic(key, found.unsteady, built.settings)
         messages += say.lifting(built, problem, found, key) + say.pulling(built, found, key)
         messages += say.across(problem, found, key)
-        messages += [] if say.still(found) else left.out(problem, found, peaks, key)
+        messages += [] if still(found) else left.out(problem, found, peaks, key)
         if key == max(responses):
             stiff = _stuck(problem.assembly)
     return responses, resonances, stiff, messages

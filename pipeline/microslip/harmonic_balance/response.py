@@ -17,6 +17,7 @@ from ..results.checks import UNCHECKED, Checks, exchanged
 from ..results.series import without_rounding
 from ..system.assembly import Assembly, ContactFace, Load, Output, preloaded_contact
 from ..system.component import Component
+from ..units import counted
 from . import problem as balance
 from . import reduced
 from .checks import checks, judged
@@ -27,7 +28,7 @@ from .solver import CONVERGED as CONVERGED
 from .solver import Point as Point
 from .solver import Report, solve, sweep
 from .solver import newton as newton
-from .sweeps import FrequencyResponse, brackets, inside, resonances
+from .sweeps import FrequencyResponse, brackets, inside, resonances, still
 
 
 @dataclass(frozen=True)
@@ -249,8 +250,37 @@ class Resonance(NamedTuple):
     x: Array
 
 
+NONE = "no resonance in the band"
+"""What is said of a band whose points all have a solution and show no peak."""
+
+
+NOT_FOUND = "not found"
+"""How the reason begins where points have no solution, so that there may be one."""
+
+
+def no_resonance(response: HarmonicResponse) -> str:
+    """Why a response has no resonance: there is `NONE`, what is read does not move, or points have no solution, so that
+    none was found."""
+    if still(response):
+        return "the read-out does not move"
+    failed = np.flatnonzero(~response.converged)
+    return f"{NOT_FOUND}: {unsolved(response)}: {response.status[failed[0]]}" if len(failed) else NONE
+
+
+def unsolved(response: HarmonicResponse) -> str:
+    """How many points have no solution, and where the first one is; nothing where all have one."""
+    failed = np.flatnonzero(~response.converged)
+    if not len(failed):
+        return ""
+    points = counted(len(response.frequency), "point")
+    return f"{len(failed)} of {points} did not converge, first at {response.frequency[failed[0]]:.6g} Hz"
+
+
 def refined_peaks(problem: Problem, response: HarmonicResponse) -> list[Resonance]:
-    """The peaks beside the tops of a sweep; of those of one plateau the highest, see `sweeps.prominent`."""
+    """The peaks beside the tops of a sweep; of those of one plateau the highest, see `sweeps.prominent`; none of a
+    read-out that does not move."""
+    if still(response):
+        return []
     found = [highest(problem, response, bracket) for bracket in brackets(response)]
     return resonances(response, [Resonance(p.Omega / (2 * np.pi), a, p.x) for p, a in filter(None, found)])
 

@@ -145,8 +145,8 @@ def _orders(write: Write, settings: CaseSettings, bases: Bases, path: Path, repo
         first, columns = max(found.values(), key=lambda r: len(r.order)), dict[str, Array]()
         for label, r in found.items():
             plain = label.replace("$F_N$", "FN").replace(" = ", "_").replace(" ", "_")
-            missing = np.full(len(first.order) - len(r.order), np.nan)
-            own = {f"{n}_{plain}": np.append(v, missing) for n, v in r.columns().items() if n not in of_all}
+            left = len(first.order) - len(r.order)
+            own = {f"{n}_{plain}": _padded(v, left) for n, v in r.columns().items() if n not in of_all}
             columns |= {n: v for n, v in first.columns().items() if n in of_all} | own
         return {"orders_worst.csv": _worst_table(list(found.values())), "orders.csv": columns}
 
@@ -161,6 +161,11 @@ def _orders(write: Write, settings: CaseSettings, bases: Bases, path: Path, repo
     return Survey(tables(found), draw, _worst_sentences(list(found.values())), failed)
 
 
+def _padded(column: Array, left: int) -> Array:
+    """With so many values more that are not known."""
+    return np.append(column, [""] * left if column.dtype.kind == "U" else [np.nan] * left)
+
+
 def _worst_table(found: Sequence[OverOrders]) -> dict[str, Array]:
     """Column -> under every normal force: the largest amplitude and stress over the engine orders, and where."""
     columns = {"normal_force_N": np.array([r.normal_force for r in found])}
@@ -170,7 +175,8 @@ def _worst_table(found: Sequence[OverOrders]) -> dict[str, Array]:
         names = name, f"engine_order_of_{of}", f"frequency_of_{of}_Hz"
         columns |= dict(zip(names, np.array(values, dtype=float).T, strict=True))
     for name, each in (
-        ("orders_without_resonance", [np.isnan(r.amplitude).sum() for r in found]),
+        ("orders_without_resonance", [(np.isnan(r.amplitude) & ~r.lost).sum() for r in found]),
+        ("orders_not_found", [r.lost.sum() for r in found]),
         ("failed_points", [r.failed.sum() for r in found]),
     ):
         columns[name] = np.array(each, dtype=float)
@@ -195,7 +201,17 @@ def _worst_sentences(found: Sequence[OverOrders]) -> list[str]:
             said.append(_worst_sentence(rows, of, found))
     if not any(np.isfinite(r.stress).any() for r in found):
         said.append("Stresses are not known: the modal file holds none (output.nodal_stress = true in body.toml).")
-    return said or ["No resonance in the band."]
+    known = any(np.isfinite(r.amplitude).any() for r in found)
+    none = [] if known or any(r.lost.any() for r in found) else ["No resonance in the band."]
+    return said + none + [s for r in found for s in _lost_orders(r)]
+
+
+def _lost_orders(one: OverOrders) -> list[str]:
+    """Of which engine orders no resonance was found under a normal force, and why not of the first of them."""
+    if not (lost := np.flatnonzero(one.lost).tolist()):
+        return []
+    under = "" if np.isnan(one.normal_force) else f"F_N = {one.normal_force:.6g} N, "
+    return [f"{under}engine order {number_list([int(e) for e in one.order[lost]])}: {one.missing[lost[0]]}."]
 
 
 def _worst_sentence(rows: Sequence[Worst], of: str, found: Sequence[OverOrders]) -> str:
@@ -212,8 +228,10 @@ def _worst_sentence(rows: Sequence[Worst], of: str, found: Sequence[OverOrders])
 
 
 def _known(row: Worst) -> str:
-    missing = row.count - row.known
-    return f" ({counted(missing, 'engine order')} without a resonance in the band)" if missing else ""
+    none = row.count - row.known - row.lost
+    said = [f"{counted(none, 'engine order')} without a resonance in the band"] if none else []
+    said += [f"of {counted(row.lost, 'engine order')} none was found"] if row.lost else []
+    return f" ({', '.join(said)})" if said else ""
 
 
 def _speeds(write: Write, settings: CaseSettings, bases: Bases, path: Path, report: Report) -> Survey:
@@ -225,10 +243,11 @@ def _speeds(write: Write, settings: CaseSettings, bases: Bases, path: Path, repo
     r = surveys.over_speeds(settings, bases, path, report, lambda some: write(tables(some)))
     amplitude = np.where(r.converged, np.abs(r.monitor), np.nan)
     title = f"{settings.name}: along engine order {r.order}"
-    top = int(np.nanargmax(amplitude)) if r.converged.any() else 0
+    top = int(np.argmax(np.nan_to_num(amplitude)))
     drawn = r.rpm, r.frequency, amplitude, r.normal
     size = r.quantity.sized(float(amplitude[top]))
     said = [f"Largest amplitude {size} at {r.rpm[top]:.6g} rpm, {r.frequency[top]:.6g} Hz."]
+    said = said if r.converged.any() else ["No amplitude is known: no speed has a solution."]
     if still := [b.name for b in settings.components if not bases[b.name].ranges]:
         said.append(f"The same at all speeds: {', '.join(still)} (no rotation.range_rpm in a body.toml).")
     return Survey(
