@@ -87,9 +87,9 @@ class Followed:
 
     @property
     def complete(self) -> bool:
-        """Whether the other end was reached."""
+        """Whether it left the range at the other end, the nearer one of its last point."""
         begin, end = self.ends
-        return not self.early and abs(self.parameter[-1] - end) < 1e-9 * abs(end - begin)
+        return not self.early and abs(self.parameter[-1] - end) < abs(self.parameter[-1] - begin)
 
     @property
     def early(self) -> bool:

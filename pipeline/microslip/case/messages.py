@@ -12,7 +12,7 @@ from ..data import Array
 from ..harmonic_balance import FrequencyResponse
 from ..harmonic_balance.problem import Problem
 from ..harmonic_balance.reduced import stuck, stuck_damping, untouched
-from ..harmonic_balance.response import HarmonicResponse
+from ..harmonic_balance.response import HarmonicResponse, unsolved
 from ..harmonic_balance.sweeps import overhanging
 from ..results.checks import cause
 from ..results.names import apart
@@ -211,6 +211,17 @@ def not_converged(responses: Mapping[float, HarmonicResponse]) -> list[str]:
             said = f"{many}, first at {at[0]:.6g} Hz: {failed[at[0]]}"
             found.append(said + (f"; {remedy}." if remedy else "."))
     return found
+
+
+def not_found(
+    responses: Mapping[float, HarmonicResponse], resonances: Mapping[float, Sequence[tuple[float, float]]]
+) -> list[str]:  # fmt: skip
+    """A message for each normal force without a resonance under which points have no solution."""
+    return [
+        f"At F_N = {normal:g} N no resonance was found, though there may be one: {unsolved(r)}."
+        for normal, r in responses.items()
+        if not resonances[normal] and unsolved(r)
+    ]
 
 
 def at_places(places: Mapping[float, Sequence[float]]) -> str:

@@ -145,6 +145,7 @@ def _run(
         *left.unknown(),
         *say.too_coarse(settings, *stuck),
         *say.not_converged(responses),
+        *say.not_found(responses, resonances),
         *say.idle(idle),
         *say.overhangs(responses, resonances),
         *edges.messages(at_the_ends),

@@ -59,8 +59,10 @@ def _of_others(response: Mapping[str, Any]) -> str:
 def _sentences(response: Mapping[str, Any]) -> list[str]:
     """The highest and the lowest resonance, the largest stress, what the numbers are worth."""
     rows = response.get("resonances", [])
+    if not rows and (lost := response.get("unsolved")):
+        return [f"No resonance was found, though there may be one: {lost}."]
     if not rows:
-        return ["No resonance was found in the band." if "resonances" in response else ""]
+        return ["There is no resonance in the band." if "resonances" in response else ""]
     doubtful = sum(bool(row.get("doubt")) for row in rows)
     lifted, valid = lifted_forces(rows), _valid(rows)
     first, *others = response.get("read_outs", [""])

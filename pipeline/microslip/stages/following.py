@@ -26,6 +26,7 @@ from ..errors import UserError
 from ..files import store
 from ..files.store import ordinary
 from ..files.tables import rows_csv
+from ..harmonic_balance.nonlinear_modes import REACHED
 from ..harmonic_balance.readout import measured
 from ..harmonic_balance.solver import CONVERGED
 from ..results import read_response
@@ -146,8 +147,16 @@ def backbones(
                 f"{100 * one.damping[i]:.3g} % at {of.sized(one.amplitude[i], 3)}"
             )
             said += f"; {checked(largest(one.checks))}"
-        report(f"F_N = {normal:g} N: {said}" + ("" if one.complete else f" ({one.status})"))
+        report(f"F_N = {normal:g} N: {said}" + ("" if one.complete else f" ({one.failing or one.status})"))
     return found
+
+
+def unreached(found: Mapping[float, Backbone]) -> str:
+    """Which nonlinear modes do not reach all amplitudes, or hold motions that fail their checks; nothing where none."""
+    early = [f"{normal:g} N" for normal, one in found.items() if one.status != REACHED]
+    said = [f"the backbone at {', '.join(early)} ends early"] if early else []
+    said += [f"at {normal:g} N {one.failing}" for normal, one in found.items() if one.failing]
+    return "; ".join(said)
 
 
 def write_backbones(found: Mapping[float, Backbone], case: Case) -> list[Path]:
@@ -169,7 +178,8 @@ def _backbone_message(normal: float, one: Backbone, of: Quantity) -> str:
         f"F_N = {normal:g} N: from {f[0]:.5g} Hz (sticking: {one.stuck / 2 / np.pi:.5g} Hz) to {f[-1]:.5g} Hz; most "
         f"damped, {100 * one.damping[i]:.3g} %, at an amplitude of {of.sized(one.amplitude[i], 3)} and {f[i]:.5g} Hz"
     )
-    return said + ("." if one.complete else f"; it ends early: {one.status}.")
+    said += f"; {one.failing}" if one.failing else ""
+    return said + ("." if one.status == REACHED else f"; it ends early: {one.status}.")
 
 
 def _page(case: Case, name: str, title: str, sentences: Sequence[str], files: Sequence[Path]) -> Path:

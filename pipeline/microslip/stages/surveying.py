@@ -45,28 +45,28 @@ class Survey:
     """What a survey leaves.
 
     Attributes:
-        tables: file name -> (column -> values). draw: file name -> what draws it. sentences: for the reader. failed:
-            points that did not converge, or curves that end early. whole: nobody interrupted it.
+        tables: file name -> (column -> values). draw: file name -> what draws it. sentences: for the reader. missing:
+            what was asked for and is not known, in words; nothing where all is. whole: nobody interrupted it.
     """
 
     tables: Tables
     draw: Mapping[str, Callable[[Path], Path]]
     sentences: list[str] = field(default_factory=list)
-    failed: int = 0
+    missing: str = ""
     whole: bool = True
 
 
 def survey_stage(
     case_path: Path, basis_file: Path | None, kind: str, assignments: list[str] | None = None, force: bool = False,
     report: Report = lambda _: None,
-) -> tuple[list[Path], list[str], bool]:  # fmt: skip
+) -> tuple[list[Path], list[str], str]:  # fmt: skip
     """A survey of a case on modal files that are there already, in build/<case>/.
 
     Args:
         kind: a key of `KINDS`, or one of `curves.OVER`. basis_file: see `respond`.
 
     Returns:
-        The files, sentences for the reader, and whether every point converged.
+        The files, sentences for the reader, and what is missing, in words.
 
     Raises:
         UserError: the case does not ask for it, or asks for what cannot be.
@@ -109,16 +109,21 @@ def _work(
     names = [*found.tables, *found.draw, _shown(found, kind, settings.name, folder)]
     if not found.whole:
         raise KeyboardInterrupt
-    store.write_text(said, "\n".join([f"{', '.join(names)}: {found.failed}", *found.sentences]) + "\n")
+    store.write_text(said, "\n".join([f"{', '.join(names)}: {found.missing}", *found.sentences]) + "\n")
     beside = [points.file.with_suffix(".h5")] if kind not in KINDS else []
     return Made([*(folder / name for name in names), *beside])
 
 
-def _told(said: Path) -> tuple[list[Path], list[str], bool]:
+def _told(said: Path) -> tuple[list[Path], list[str], str]:
     """What `survey_stage` returned when it wrote a file of sentences."""
     first, *sentences = said.read_text().splitlines()
-    listed, failed = first.split(": ")
-    return [said.parent / name for name in listed.split(", ")], sentences, int(failed) == 0
+    listed, _, missing = first.partition(": ")
+    return [said.parent / name for name in listed.split(", ")], sentences, missing
+
+
+def _unsolved(points: int) -> str:
+    """Of points that did not converge, in words."""
+    return f"{counted(points, 'point')} did not converge" if points else ""
 
 
 def _shown(found: Survey, kind: str, case: str, folder: Path) -> str:
@@ -153,7 +158,7 @@ def _orders(write: Write, settings: CaseSettings, bases: Bases, path: Path, repo
     of_all = {"engine_order", "wave"}
     found = surveys.over_orders(settings, bases, path, report, lambda some: write(tables(some)))
     title = f"{settings.name}: resonances over the engine order"
-    failed = sum(int(r.failed.sum()) for r in found.values())
+    failed = _unsolved(sum(int(r.failed.sum()) for r in found.values()))
     draw: dict[str, Callable[[Path], Path]] = {"pictures/orders.png": lambda p: over_orders_picture(found, p, title)}
     if len(found) > 1:
         words = f"{settings.name}: the worst of all engine orders over the normal force"
@@ -254,7 +259,7 @@ def _speeds(write: Write, settings: CaseSettings, bases: Bases, path: Path, repo
         tables(r),
         {"pictures/speeds.png": lambda p: speed_line_picture(*drawn, p, title, r.quantity)},
         said,
-        int((~r.converged).sum()),
+        _unsolved(int((~r.converged).sum())),
     )
 
 
@@ -268,7 +273,7 @@ def _ranges(write: Write, settings: CaseSettings, bases: Bases, path: Path, repo
     title = f"{settings.name}: over {', '.join(e.names).replace('_', ' ')}"
     return Survey(
         tables(e), {"pictures/ranges.png": lambda p: envelope_picture(e, p, title)}, _ranges_sentences(e),
-        int((~e.converged).sum()),
+        _unsolved(int((~e.converged).sum())),
     )  # fmt: skip
 
 
@@ -319,14 +324,17 @@ def _curve(over: str, points: Checkpoint, settings: CaseSettings, bases: Bases, 
     columns = {name: np.concatenate([one.columns()[name] for one in found]) for name in found[0].columns()}
     title, name = f"{settings.name}: over the {over.replace('_', ' ')}", f"over_{over}"
     response = _written(points, found, whole)
-    failed = sum(int((~s.converged).sum()) for s in response.series)
+    failed = _unsolved(sum(int((~s.converged).sum()) for s in response.series))
     by = found[0].quantity.shared(a for one in found for a in one.amplitude)
-    drawn, arrived = [one for one in found if len(one.rows) > 1], sum(one.complete for one in found)
+    drawn, early = [one for one in found if len(one.rows) > 1], sum(one.early for one in found)
+    arrived, asked = sum(one.complete for one in found), sum(one.legs is None for one in found)
+    missing = [f"{early} of {counted(len(found), 'curve')} end{'s' * (early == 1)} early"] if early else []
+    missing += ["not every curve reaches the other end"] if arrived < asked and not early else []
     return Survey(
         {f"{name}.csv": columns},
         {f"pictures/{name}.png": lambda p: curve_plot(drawn, p, title)} if drawn else {},
         [*(words for one in found for words in one.sentences(by)), sentence(response, None)],
-        sum(one.early for one in found) + (arrived < sum(one.legs is None for one in found)) + failed,
+        "; ".join([*missing, *filter(None, [failed])]),
         whole,
     )
 
