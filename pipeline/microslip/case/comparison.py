@@ -68,7 +68,8 @@ def comparison_table(pairs: Sequence[Pair], of: Quantity = METRES) -> str:
 
 def sentence(p: Pair) -> str:
     """A line for a terminal."""
-    one, two = (f"{x[0]:.6g} Hz, {x[1]:.4g} {p.quantity.said}" if x else "no resonance found" for x in (p.marched, p.book))
+    none, unit = "no resonance found", p.quantity.said
+    one, two = (f"{x[0]:.6g} Hz, {x[1]:.4g} {unit}" if x else none for x in (p.marched, p.book))
     apart = p.differences()
     more = "" if apart is None else f" ({100 * apart[0]:+.2g} % in frequency, {100 * apart[1]:+.2g} % in amplitude)"
     return f"F_N = {p.normal_force:g} N: marched {one}; book {two}{more}"

@@ -153,18 +153,20 @@ def haigh_plot(cycle: CycleStress, limits: MaterialLimits, worst: Endurance, tit
         xlim=(left, 1.03e-6 * limits.tensile_strength),
     )
     axes.legend(fontsize=9, loc="upper right")
-    _close_up(axes, mean, amplitude)
+    _close_up(axes, cycle)
     return save_figure(figure, path)
 
 
-def _close_up(axes: Axes, mean: Array, amplitude: Array) -> None:
+def _close_up(axes: Axes, cycle: CycleStress) -> None:
     """Where the places fill a corner of the diagram alone: a window on them, or words where no mean stress shows."""
     (left, right), (_, top) = axes.get_xlim(), axes.get_ylim()
-    high = float(amplitude.max())
+    mean, amplitude, high = 1e-6 * cycle.mean, 1e-6 * cycle.amplitude, 1e-6 * cycle.highest
     if not 0 < high < 0.25 * top:
         return
     if np.ptp(mean) < 0.005 * (right - left):
-        said = f"all places: mean stress {mean.min():.2g} to {mean.max():.2g} MPa,\namplitude up to {high:.3g} MPa"
+        least, most = cycle.means
+        said = f"all places: mean stress {1e-6 * least:.2g} to {1e-6 * most:.2g} MPa,\n"
+        said += f"amplitude up to {high:.3g} MPa"
         line = {"arrowstyle": "-", "color": COLOURS[0]}
         said_beside(axes, said, (mean.mean(), high), (40, 40), fontsize=9, color=COLOURS[0], arrowprops=line)
         return
@@ -249,17 +251,18 @@ def _map_panel(
     axes.set_aspect("equal")
     axes.set_ylabel(("t2" if lies else "t1") + " in mm", fontsize=9)
     axes.tick_params(labelsize=8)
-    axes.set_title(f"{label}{between}{_span(values)} {unit}", fontsize=9.5)
+    axes.set_title(f"{label}{between}{_span(m.span(name), scale)} {unit}", fontsize=9.5)
     ticks: Any = MaxNLocator(4) if high > low else [0.0]
     bar = axes.figure.colorbar(shown, ax=axes, shrink=0.95, pad=0.02, aspect=10, ticks=ticks)
     bar.ax.tick_params(labelsize=7.5)
 
 
-def _span(values: Array) -> str:
+def _span(ends: tuple[float, float], scale: float) -> str:
     """Smallest and largest value; one where both read the same."""
-    low, high = float(values.min()), float(values.max())
-    told = f"{low:.3g} to {high:.3g}"
-    return f"{high:.3g} everywhere, in" if told == f"{high:.3g} to {high:.3g}" else told
+    low, high = ends
+    told = f"{scale * low:.3g} to {scale * high:.3g}"
+    same = told == f"{scale * high:.3g} to {scale * high:.3g}"
+    return f"{scale * high:.3g} everywhere, in" if same else told
 
 
 # the body ----------------------------------------------------------------------------------------------------------
@@ -285,24 +288,25 @@ def stress_picture(
     n = studio.basis.mesh.n_points
     if len(cycle.points) != n or any(len(p.group.phi) != n for p in motion.parts):
         return None
-    shape, size, degrees = farthest(motion, n)
-    grown = views.nice(views.AMPLITUDE * studio.extent / max(size, 1e-300))
+    shape, full_scale, degrees = farthest(motion, n)
+    grown = views.nice(views.AMPLITUDE * studio.extent / max(full_scale, 1e-300))
     moved = (studio.basis.mesh.points + grown * shape)[studio.outside.source]
     camera = fit(np.vstack([studio.points, moved]), studio.axes, views.AREA)
-    fields = [("stress amplitude (von Mises)", 1e-6 * cycle.amplitude, "MPa", views.STRESS_MAP)]
-    if np.abs(cycle.mean).max() > 0.05 * float(cycle.amplitude.max()):
-        fields.append(("largest stress of the cycle", 1e-6 * cycle.largest, "MPa", views.STRESS_MAP))
+    swing, most = 1e-6 * cycle.highest, 1e-6 * cycle.top
+    fields = [("stress amplitude (von Mises)", 1e-6 * cycle.amplitude, "MPa", swing)]
+    if np.abs(cycle.mean).max() > 0.05 * cycle.highest:
+        fields.append(("largest stress of the cycle", 1e-6 * cycle.largest, "MPa", most))
     if limits is not None:
         used = 100.0 / np.maximum(vibration_margin(limits, cycle.amplitude, cycle.mean), 1e-3)
-        fields.append(("share of the endured amplitude", used, "%", views.STRESS_MAP))
+        fields.append(("share of the endured amplitude", used, "%", np.nan))
     tiles = []
-    for label, values, unit, colours in fields:
-        image = views.stress_tile(studio, values, grown * shape, camera, 0.8, unit, colours, mark=mark)
+    for label, values, unit, largest in fields:
+        image = views.stress_tile(studio, values, grown * shape, camera, 0.8, unit, largest, mark=mark)
         tiles.append(captioned(image, label, size=16))
     ring = "" if mark is None else f" Ring: the worst place{'' if _seen(studio, mark) else ', on the far side'}."
     note = (
         f"Drawn at {degrees:.0f} degrees of the cycle, {grown:g} times as large; largest displacement "
-        f"{METRES.sized(size, 3)}; grey lines: at rest.{ring}"
+        f"{METRES.sized(full_scale, 3)}; grey lines: at rest.{ring}"
     )
     return captioned(side_by_side(tiles), title, note, 20)
 

@@ -314,7 +314,7 @@ def _campbell_frame(axes: Axes, basis: ModalBasis, rpm: Array, top: float, track
     if (tracks.mac[shown] < SURE).any():
         note += f"; dotted: MAC below {SURE:g}, add speeds"
     if (change := gyroscopic_change(basis)) and change <= VISIBLE:
-        note += f"; gyroscopic coupling changes them by {100 * change:.2g} % at most"
+        note += f"; gyroscopic coupling changes them by less than {100 * VISIBLE:g} %"
     elif change:
         note += "; engine orders meet the branches with gyroscopic coupling"
     if not shown.all():

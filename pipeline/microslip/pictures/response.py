@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -140,7 +139,7 @@ LEGEND = 6
 def _stuck_lines(axes: Axes, frequencies: Array, width: float) -> None:
     """A line at every frequency (Hz), its number on a side where there is so much room (Hz) for it."""
     taken, last = axes.get_xlim()
-    for f, end in pairwise([*frequencies, last]):
+    for f, end in zip(frequencies, [*frequencies[1:], last], strict=False):  # nothing of none
         axes.axvline(f, color="0.75", lw=0.8, ls="--", zorder=0)
         right = end - f > width
         if right or f - width > taken:
