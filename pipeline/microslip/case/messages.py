@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 
 import numpy as np
 
@@ -14,7 +15,7 @@ from ..harmonic_balance.problem import Problem
 from ..harmonic_balance.reduced import stuck, stuck_damping, untouched
 from ..harmonic_balance.response import HarmonicResponse, unsolved
 from ..harmonic_balance.sweeps import overhanging
-from ..results.checks import cause
+from ..results.checks import UNCERTAIN, cause
 from ..results.names import apart
 from ..units import counted, percent
 from .assemble import Built
@@ -41,6 +42,11 @@ SAID = 3
 """Frequencies, and normal forces, that a sentence names; the others are counted."""
 
 
+def off(likely: float) -> str:
+    """By how much an amplitude is likely to be off, and on which side: "12 % (too high)"."""
+    return f"{percent(abs(likely))} (too {'high' if likely > 0 else 'low'})"
+
+
 def by_the_book(built: Built) -> list[str]:
     """That it is the book's mode, and how far its tables are off."""
     if built.settings.mode != "book":
@@ -56,6 +62,32 @@ def by_the_book(built: Built) -> list[str]:
         f"orbits; its tables are off by at most {' and '.join(errors.values())}. microslip respond CASE --compare-book "
         "shows what the mode leaves out."
     ]
+
+
+def method(settings: CaseSettings, errors: Mapping[float, Mapping[float, float]] = MappingProxyType({})) -> str:
+    """That an answer is that of one harmonic, and what it is likely to be off by; nothing where more are balanced, or
+    where one is enough.
+
+    Args:
+        errors: normal force (N) -> Hz -> see `CaseResult.errors`.
+    """
+    if settings.balanced > 1 or not settings.contacts:
+        return ""
+    if settings.mode == "book":
+        return (
+            "One harmonic, the method of the book (Sextro 5.2); what it leaves out is not estimated: microslip respond "
+            "CASE --compare-book shows it."
+        )
+    each = [(abs(share), share, n) for n, own in errors.items() for share in own.values() if np.isfinite(share)]
+    if not each:
+        return "One harmonic, the method of the book (Sextro 5.2); what it leaves out is not estimated."
+    most, share, normal = max(each)
+    if most <= UNCERTAIN:
+        return ""
+    return (
+        f"One harmonic, the method of the book (Sextro 5.2): amplitudes are off by up to about "
+        f"{off(share)}, most under F_N = {normal:g} N; harmonics = 9 shows the motion as it is."
+    )
 
 
 def between_equilibria(built: Built) -> list[str]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,8 +16,11 @@ from ..operating.stress import CycleStress, StressPeaks
 from ..units import METRES, counted
 from .plots import (
     COLOURS,
+    LIGHT,
     by_rows,
     empty_figure,
+    lighter,
+    lighter_means,
     mark_missing,
     plain_numbers,
     said_beside,
@@ -38,6 +41,15 @@ Curves = Mapping[float, tuple[Array, Array]]
 """Normal force, N -> abscissa and ordinate of a curve."""
 
 
+Unsure = Callable[[float, Array], Array]
+"""Normal force (N) and frequencies (Hz) -> bool, where amplitudes are uncertain."""
+
+
+def all_sure(normal: float, frequency: Array) -> Array:
+    """Nowhere."""
+    return np.zeros(len(frequency), dtype=bool)
+
+
 def shades(count: int) -> list[tuple[float, ...]]:
     """Colours of a rising parameter, light to dark; a single one is dark."""
     from matplotlib import colormaps
@@ -49,15 +61,18 @@ def shades(count: int) -> list[tuple[float, ...]]:
 
 
 def over_frequency_plot(
-    curves: Curves, quantity: str, title: str, path: Path, lifted: Mapping[float, Array] | None = None
-) -> Path:
+    curves: Curves, quantity: str, title: str, path: Path, lifted: Mapping[float, Array] | None = None,
+    unsure: Unsure = all_sure,
+) -> Path:  # fmt: skip
     """A quantity over the frequency (Hz) for every normal force, on a logarithmic scale.
 
     Args:
         curves: NaN where a point did not converge, which is marked. quantity: label of the ordinate with its unit.
             lifted: normal force, N -> which points are not valid, because contacts would lift off; they are dotted.
+            unsure: see `Unsure`; curves are lighter there.
     """
     figure, axes = single_panel(9.0, 6.0)
+    axes.set_yscale("log")
     pairs = list(zip(shades(len(curves)), sorted(curves.items()), strict=True))
     told = ""
     for width, (colour, (normal, (x, y))) in zip(widths(len(pairs)), pairs, strict=True):
@@ -66,7 +81,8 @@ def over_frequency_plot(
             axes.semilogy(*through(x, np.where(off, y, np.nan)), color=colour, linewidth=width, linestyle=":")
             told = "dotted: contacts would lift off, not valid"
         line = {"linestyle": ":" if off.all() else "-", "label": f"$F_N$ = {normal:g} N"}
-        axes.semilogy(*through(x, np.where(off, np.nan, y)), color=colour, linewidth=width, **line)
+        fine, drawn = through(x, np.where(off, np.nan, y))
+        lighter(axes, fine, drawn, unsure(normal, fine), color=colour, linewidth=width, **line)
     for row, (colour, (_, (x, y))) in enumerate(pairs):
         mark_missing(axes, x[np.isnan(y)], colour, row)
     low, high = (f(float(f(x)) for x, _ in curves.values()) for f in (min, max))
@@ -80,13 +96,14 @@ def over_frequency_plot(
 
 def over_normal_force_plot(
     peaks: Mapping[str, Sequence[tuple[float, float]]], quantity: str, title: str, path: Path,
-    lifted: Collection[float] = (),
+    lifted: Collection[float] = (), unsure: Collection[tuple[float, float]] = (),
 ) -> Path:  # fmt: skip
     """The largest value of each resonance over the normal force (N), both logarithmic; the lowest is marked.
 
     Args:
         peaks: name of a resonance -> (normal force, value) pairs. A normal force of 0 has no place on the axis.
-            lifted: normal forces under which contacts would lift off, so that values are not valid: hollow.
+            lifted: normal forces under which contacts would lift off, so that values are not valid: hollow. unsure:
+            pairs that are uncertain: lighter.
     """
     figure, axes = single_panel(8.0, 5.2)
     for i, (name, pairs) in enumerate(peaks.items()):
@@ -96,7 +113,9 @@ def over_normal_force_plot(
         off = np.isin(x, list(lifted))
         colour, best = COLOURS[i % len(COLOURS)], int(np.argmin(np.where(off & ~off.all(), np.inf, y)))
         axes.loglog(x, y, "-", color=colour, linewidth=1.6, label=name)
-        axes.plot(x[~off], y[~off], "o", color=colour, markersize=4)
+        light = np.array([pair in unsure for pair in zip(x, y, strict=True)])
+        axes.plot(x[~off & ~light], y[~off & ~light], "o", color=colour, markersize=4)
+        axes.plot(x[~off & light], y[~off & light], "o", color=colour, markersize=4, alpha=LIGHT)
         axes.plot(x[off], y[off], "o", color=colour, markersize=4, mfc="white")
         if 0 < best < len(x) - 1:
             axes.plot(x[best], y[best], "o", markersize=9, mfc="none", mec=colour, mew=1.6)
@@ -109,7 +128,9 @@ def over_normal_force_plot(
     axes.margins(y=0.15)
     for axis in (axes.xaxis, axes.yaxis):
         numbers_within(axis)
-    if len(peaks) > 1 or hollow:
+    if len(unsure):
+        axes.plot([], [], "o", color="0.3", markersize=4, alpha=LIGHT, label=lighter_means())
+    if len(peaks) > 1 or hollow or len(unsure):
         axes.legend(fontsize=9)
     return save_figure(figure, path)
 

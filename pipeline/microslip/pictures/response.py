@@ -19,7 +19,7 @@ from ..harmonic_balance.sweeps import overhanging
 from ..results.names import apart
 from ..units import METRES, Quantity
 from .operating import shades
-from .plots import by_rows, mark_missing, plain_numbers, said_beside, through, widths, write_png
+from .plots import by_rows, lighter, mark_missing, plain_numbers, said_beside, through, widths, write_png
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -125,7 +125,8 @@ def _curves(
         line, label = style if np.isfinite(amplitude).any() else ":", f"$F_N$ = {said} N{of}"
         single = [(f, by * a) for f, a in peaks if f in apart_from_it]
         axes.plot(*np.reshape(single, (-1, 2)).T, "o", color=colour, ms=4)
-        axes.plot(*through(f[on], amplitude[on]), color=colour, lw=width, ls=line, label=label)
+        x, y = through(f[on], amplitude[on])
+        lighter(axes, x, y, result.unsure(normal, x), color=colour, lw=width, ls=line, label=label)
     for row, (colour, normal) in enumerate(zip(colours, forces * (w.number == 0), strict=False)):
         r = result.responses[normal]
         mark_missing(axes, r.frequency[~r.converged], colour, row)

@@ -57,8 +57,14 @@ def _of_others(response: Mapping[str, Any]) -> str:
 
 
 def _sentences(response: Mapping[str, Any]) -> list[str]:
-    """The highest and the lowest resonance, the largest stress, what the numbers are worth."""
-    rows = response.get("resonances", [])
+    """How it was solved where that matters, the highest and the lowest resonance, the largest stress, what the numbers
+    are worth."""
+    rows, method = response.get("resonances", []), response.get("method", "")
+    return [*([method] if method else []), *_of_resonances(response, rows)]
+
+
+def _of_resonances(response: Mapping[str, Any], rows: Sequence[Mapping[str, Any]]) -> list[str]:
+    """The same without how it was solved."""
     if not rows and (lost := response.get("unsolved")):
         return [f"No resonance was found, though there may be one: {lost}."]
     if not rows:

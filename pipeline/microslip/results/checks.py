@@ -27,6 +27,10 @@ COUNTED = 0.05
 the square of the samples: 64 leave 2e-4 of forty random systems in the median and 5e-3 at most
 (`tests/test_random_systems.py`); bodies that hit each other between few samples leave more than this."""
 
+UNCERTAIN = 0.05
+"""What an amplitude is likely to be off by for want of harmonics and samples, over it, from which on it
+is called uncertain in tables and pictures."""
+
 MOTION = 1e-4
 """Share of the contacts' motion by which the bodies' may differ from it."""
 
