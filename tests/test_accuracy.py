@@ -167,7 +167,8 @@ def test_too_few_harmonics_of_a_slider_are_told():
 
 
 def test_what_is_uncertain_is_drawn_lighter_and_told_first():
-    """Off by 20 % at one resonance and 1 % at the other: beyond 5 % between them; where nobody knows it is uncertain."""
+    """Off by 20 % at one resonance and 1 % at the other: beyond 5 % between them; what nobody knows is
+    uncertain too."""
     from matplotlib.figure import Figure
 
     errors = {10.0: {100.0: 0.2, 110.0: -0.01}, 20.0: {105.0: np.nan}}
@@ -181,7 +182,10 @@ def test_what_is_uncertain_is_drawn_lighter_and_told_first():
     assert light.get_alpha() < 0.5 and "uncertain by more than 5 %" in light.get_label()
     settings = SimpleNamespace(balanced=1, contacts=(0,), mode="aft")
     assert "off by up to about 20 % (too high), most under F_N = 10 N" in method(settings, errors)
-    assert method(settings, {10.0: {100.0: 0.04}}) == "" == method(SimpleNamespace(balanced=9), errors)
+    assert method(settings, {10.0: {100.0: 0.04}}) == ""
+    few = SimpleNamespace(balanced=3, contacts=(0,), mode="aft")
+    assert method(few, errors).startswith("3 harmonics: amplitudes are off by up to about 20 %")
+    assert method(few, {}) == "" and "not estimated" in method(settings, {})
     told = said(response_html({"method": method(settings, errors), "resonances": [], "mode": "aft"}, {}))
     assert told.index("One harmonic, the method of the book") < told.index("There is no resonance")
 

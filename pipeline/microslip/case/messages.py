@@ -65,29 +65,28 @@ def by_the_book(built: Built) -> list[str]:
 
 
 def method(settings: CaseSettings, errors: Mapping[float, Mapping[float, float]] = MappingProxyType({})) -> str:
-    """That an answer is that of one harmonic, and what it is likely to be off by; nothing where more are balanced, or
-    where one is enough.
+    """That an answer is that of one harmonic, or of too few, and what it is likely to be off by; nothing where they are
+    enough.
 
     Args:
         errors: normal force (N) -> Hz -> see `CaseResult.errors`.
     """
-    if settings.balanced > 1 or not settings.contacts:
+    if not settings.contacts:
         return ""
+    count = settings.balanced
+    told = "One harmonic, the method of the book (Sextro 5.2)" if count == 1 else f"{count} harmonics"
     if settings.mode == "book":
-        return (
-            "One harmonic, the method of the book (Sextro 5.2); what it leaves out is not estimated: microslip respond "
-            "CASE --compare-book shows it."
-        )
-    each = [(abs(share), share, n) for n, own in errors.items() for share in own.values() if np.isfinite(share)]
+        return f"{told}; what it leaves out is not estimated: microslip respond CASE --compare-book shows it."
+    each = [(abs(e), e, n) for n, own in errors.items() for e in own.values() if np.isfinite(e)]
     if not each:
-        return "One harmonic, the method of the book (Sextro 5.2); what it leaves out is not estimated."
+        return f"{told}; what it leaves out is not estimated." if count == 1 else ""
     most, share, normal = max(each)
     if most <= UNCERTAIN:
         return ""
-    return (
-        f"One harmonic, the method of the book (Sextro 5.2): amplitudes are off by up to about "
-        f"{off(share)}, most under F_N = {normal:g} N; harmonics = 9 shows the motion as it is."
-    )
+    nine = "harmonics = 9, about nine times the work, shows the motion as it is"
+    more = nine if count == 1 else f"take harmonics = {2 * count}"
+    off_by = f"amplitudes are off by up to about {off(share)}, most under F_N = {normal:g} N"
+    return f"{told}: {off_by}; {more}."
 
 
 def between_equilibria(built: Built) -> list[str]:

@@ -115,7 +115,7 @@ def sentence(response: Response, estimated: float | None) -> str:
     Args:
         estimated: largest estimated error of an amplitude for want of harmonics and samples, over it; None: not known.
     """
-    guess = "not estimated" if estimated is None else f"estimated as {percent(estimated)}"
+    guess = "not estimated" if estimated is None else f"estimated as {percent(estimated)} at most"
     guess = guess if estimated is None or np.isfinite(estimated) else "unknown, no finer solution was found"
     worst = Checks(*(_worst(response.series, name) for name in ("balance", "counted", "motion")))
     return f"{checked(worst)}, error of harmonics and samples: {guess}; {_of_points(response.series)}"

@@ -389,9 +389,7 @@ def _unknown(found: Optimum, unit: str) -> str:
     for value, one in found.found.items():
         if one.status != CONVERGED:
             why.setdefault(one.status, []).append(value)
-    return "".join(
-        f"; at {', '.join(f'{v:.4g}' for v in values)}{unit} {status}" for status, values in why.items()
-    )
+    return "".join(f"; at {', '.join(f'{v:.4g}' for v in values)}{unit} {status}" for status, values in why.items())
 
 
 _FOUND_AS = {"kink": " (where it changes abruptly)", "two peaks": " (where two are equally high)"}
