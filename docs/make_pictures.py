@@ -1464,6 +1464,8 @@ def book_figures() -> None:
 
     for name, drawing in (("book_figures", study), ("book_rolling", rolled)):
         save(drawn(drawing.picture(figure(10.5, 5.2), plain)), name, colours=LINES)
+    force, moment = 100 * study.discretisation()
+    print(f"Fig. 5.2-2: 8 elements miss {force:.1f} % of the force, {moment:.1f} % of the moment at most")
 
 
 def patches() -> None:

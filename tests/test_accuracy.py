@@ -9,8 +9,10 @@ import numpy as np
 import pytest
 from test_harmonic_balance_laws import oscillator, point, three_dof, value
 from test_harmonic_balance_time import group, held
+from test_report import said
 
-from microslip.case.run import _Left
+from microslip.case.messages import method
+from microslip.case.run import CaseResult, _Left
 from microslip.contact.friction import Coulomb
 from microslip.contact.normal import Penalty, Preload
 from microslip.contact.patch import Patch
@@ -20,6 +22,8 @@ from microslip.harmonic_balance import problem as balance
 from microslip.harmonic_balance.accuracy import enough, error, finer
 from microslip.harmonic_balance.response import harmonic_response, of_body, operating
 from microslip.harmonic_balance.solver import solve
+from microslip.pictures import plots
+from microslip.report.response import response_html
 
 MANY = 21
 
@@ -73,7 +77,8 @@ def random_system(rng):
 
 
 def judge(spring, limit, body, Omega, grids):
-    """(true error, estimate, of harmonics, of samples) of every (harmonics, samples), over the true amplitude."""
+    """(true error, bound, of harmonics, of samples) of every (harmonics, samples), over the true amplitude; the true
+    error and what is likely of it, with their signs."""
     one = held(body, jenkins(spring, 1.0, limit), [1], np.zeros(1), np.zeros(1), 1.0)
     fine = balance.of(one, 40, 2048, length=limit / spring)
     exact = solve(fine, Omega, [])
@@ -84,7 +89,7 @@ def judge(spring, limit, body, Omega, grids):
         assert exact.converged and point.converged
         e = error(p, point.x, Omega)
         parts = (e.amplitude - right, e.amplitude * e.readout, e.by_harmonics, e.by_samples)
-        found.append(np.abs(parts) / right)
+        found.append([*np.abs(parts) / right, parts[0] / right, e.likely() * e.amplitude / right])
     return np.array(found)
 
 
@@ -99,8 +104,11 @@ def test_the_estimate_covers_the_error_of_random_systems(systems):
     told = np.array(
         [judge(k, limit, body, w, GRIDS) for body, k, limit, w in (random_system(rng) for _ in range(systems))]
     )
-    true, estimate, by_harmonics, by_samples = np.moveaxis(told, -1, 0)
+    true, estimate, by_harmonics, by_samples, signed, likely = np.moveaxis(told, -1, 0)
     counts = true > 1e-4
+    ratio = likely[counts] / signed[counts]
+    assert (ratio > 0).mean() >= 0.99  # it says on which side the solution errs
+    assert ((ratio > 0.5) & (ratio < 2)).mean() >= 0.95 and np.median(ratio) == pytest.approx(1, abs=0.25)
     assert (estimate >= true)[counts].mean() >= 0.99 and counts.sum() >= systems
     assert np.median(estimate[counts] / true[counts]) < 4
     mean = np.sqrt(np.mean(by_harmonics**2, axis=0)), np.sqrt(np.mean(by_samples**2, axis=0))
@@ -155,7 +163,31 @@ def test_too_few_harmonics_of_a_slider_are_told():
     assert enough(problem, start, tolerance=1.01 * known.readout, first=known).reached
     assert not enough(problem, start, tolerance=0.99 * known.readout, most=4, first=known).reached
     (message,) = _Left(built, None).out(problem, harmonic_response(problem, np.array([17.0]), np.ones(1)), [], 8.0)
-    assert "At F_N = 8 N the amplitude at 17 Hz" in message
+    assert "At F_N = 8 N the amplitude at 17 Hz" in message and "(too " in message and "at most" in message
+
+
+def test_what_is_uncertain_is_drawn_lighter_and_told_first():
+    """Off by 20 % at one resonance and 1 % at the other: beyond 5 % between them; what nobody knows is
+    uncertain too."""
+    from matplotlib.figure import Figure
+
+    errors = {10.0: {100.0: 0.2, 110.0: -0.01}, 20.0: {105.0: np.nan}}
+    f = np.array([95.0, 100.0, 105.0, 110.0, 115.0])
+    unsure = {n: CaseResult.unsure(SimpleNamespace(errors=errors), n, f).tolist() for n in (10.0, 20.0, 30.0)}
+    assert unsure == {10.0: [True, True, True, False, False], 20.0: [True] * 5, 30.0: [False] * 5}
+    axes = Figure().subplots()
+    plots.lighter(axes, f, f, np.array(unsure[10.0]), color="black", label="10 N")
+    sure, light = axes.get_lines()
+    assert np.isnan(sure.get_ydata()).tolist() == [not known for known in np.isnan(light.get_ydata())]
+    assert light.get_alpha() < 0.5 and "uncertain by more than 5 %" in light.get_label()
+    settings = SimpleNamespace(balanced=1, contacts=(0,), mode="aft")
+    assert "off by up to about 20 % (too high), most under F_N = 10 N" in method(settings, errors)
+    assert method(settings, {10.0: {100.0: 0.04}}) == ""
+    few = SimpleNamespace(balanced=3, contacts=(0,), mode="aft")
+    assert method(few, errors).startswith("3 harmonics: amplitudes are off by up to about 20 %")
+    assert method(few, {}) == "" and "not estimated" in method(settings, {})
+    told = said(response_html({"method": method(settings, errors), "resonances": [], "mode": "aft"}, {}))
+    assert told.index("One harmonic, the method of the book") < told.index("There is no resonance")
 
 
 def test_places_without_a_finer_solution_are_told_once_with_what_to_do():

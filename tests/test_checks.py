@@ -20,13 +20,15 @@ from microslip.contact.friction import Coulomb
 from microslip.contact.normal import Penalty
 from microslip.contact.point import PointContact
 from microslip.continuation import Settings
-from microslip.harmonic_balance import peak, reduced, response, solver
+from microslip.harmonic_balance import envelope, peak, reduced, response, solver
 from microslip.harmonic_balance import problem as balance
-from microslip.harmonic_balance.nonlinear_modes import backbone
+from microslip.harmonic_balance.nonlinear_modes import REACHED, backbone
 from microslip.harmonic_balance.solver import solve
 from microslip.results import Response, read_response, write_response
 from microslip.results.checks import COUNTED, cause, check_response, largest, sentence
 from microslip.stages import response as making
+from microslip.stages.following import unreached
+from microslip.stages.surveying import _worst_sentences
 
 pytestmark = pytest.mark.usefixtures("undrawn")
 
@@ -135,14 +137,20 @@ def test_peaks_and_modes_are_checked_as_points_are(monkeypatch: pytest.MonkeyPat
     """What is climbed to or followed over the amplitude: eight samples of a cycle are too few, 64 are not."""
     for samples, few in ((8, True), (64, False)):
         mode = backbone(sliding(samples=samples), 5e-5, 6e-5, settings=Settings(step=0.2, folds=False))
-        assert mode.status.startswith("energy") == few != mode.complete
+        assert ("energy" in mode.failing) == few != mode.complete and mode.status == REACHED
+        assert ("ends early" in unreached({1.0: mode})) is False and bool(unreached({1.0: mode})) == few
         assert (abs(largest(mode.checks).counted) > COUNTED) == few
     problem, band = sliding(samples=64, force=2.0), np.linspace(90.0, 180.0, 9)
     assert peak.highest(problem, band)[0].converged
     work = reduced.work
     monkeypatch.setattr(reduced, "work", lambda *given: tuple(np.array(work(*given)) * [1.001, 1.0, 1.0, 1.0]))
-    found, _ = peak.highest(problem, band)
-    assert not found.converged and found.status.startswith("energy")
+    found, _, _ = peak.highest(problem, band)
+    said = "not found: 11 of 11 points did not converge, first at 14.3239 Hz: energy"  # two of them added
+    assert not found.converged and found.status.startswith(said)
+    orders = envelope.over_orders(lambda order: problem, [1], (90.0 / 2 / np.pi, 180.0 / 2 / np.pi), 9)
+    assert orders.missing[0] == found.status and orders.lost.all()
+    assert "No resonance" not in " ".join(said := _worst_sentences([orders]))
+    assert said[-1] == f"engine order 1: {found.status}."
 
 
 def test_why_a_point_fails(monkeypatch: pytest.MonkeyPatch) -> None:

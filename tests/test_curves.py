@@ -18,6 +18,7 @@ from microslip.case.problem import problem_of
 from microslip.cli import main
 from microslip.continuation import Settings
 from microslip.data import ModalBasis
+from microslip.harmonic_balance import reduced
 from microslip.harmonic_balance.families import followed, of_frequency, of_load
 from microslip.harmonic_balance.response import operating
 from microslip.harmonic_balance.solver import newton, solve
@@ -117,13 +118,26 @@ def test_interrupted_and_resumed(case: Path) -> None:
     assert len(half["leg"]) >= 20 and not read_response("build/lifting/over_frequency.h5").finished
     assert Path("build/lifting/pictures/over_frequency.png").is_file()
     told: list[str] = []
-    _, sentences, whole = surveying.survey_stage(case, None, "frequency", report=told.append)
+    _, sentences, missing = surveying.survey_stage(case, None, "frequency", report=told.append)
     resumed = rows("over_frequency.csv")
-    assert whole and sentences and int([t for t in told if "% of the way" in t][0].split()[7]) > 20
+    assert not missing and sentences and int([t for t in told if "% of the way" in t][0].split()[7]) > 20
     np.testing.assert_array_equal(resumed["frequency_Hz"][: len(half["leg"])], half["frequency_Hz"])
     surveying.survey_stage(case, None, "frequency", force=True)
     assert rows("over_frequency.csv")["frequency_Hz"] == pytest.approx(resumed["frequency_Hz"], rel=1e-6)
     assert read_response("build/lifting/over_frequency.h5").finished
+
+
+def test_a_curve_that_reaches_its_end_is_not_said_to_end_early(
+    case: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Points that fail their checks are another thing: a tenth of the work is missing at every point."""
+    work = reduced.work
+    monkeypatch.setattr(reduced, "work", lambda *given: tuple(np.array(work(*given)) * [1.1, 1.0, 1.0, 1.0]))
+    assert main(["respond", "case.toml", "--over", "frequency", "--set", "curve.band=[120.0, 118.0]"]) == 1
+    said = capsys.readouterr()
+    count = len(rows("over_frequency.csv")["leg"])
+    assert f"error: {count} points did not converge; " in said.err
+    assert "early" not in said.out + said.err and rows("over_frequency.csv")["frequency_Hz"][-1] == 118.0
 
 
 def test_ended_early_and_gone_on(case: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -131,7 +145,7 @@ def test_ended_early_and_gone_on(case: Path, capsys: pytest.CaptureFixture[str])
     few = ["respond", "case.toml", "--over", "frequency", "--set", "curve.points=8"]
     assert main(few) == 1
     said = capsys.readouterr()
-    assert "allow more to go on (curve.points)" in said.out and "some of the curves end early" in said.err
+    assert "allow more to go on (curve.points)" in said.out and "1 of 1 curve ends early" in said.err
     assert len(rows("over_frequency.csv")["leg"]) == 8
     told: list[str] = []
     surveying.survey_stage(case, None, "frequency", ["curve.points=16"], report=told.append)
@@ -247,4 +261,4 @@ def test_nothing_to_press_and_laws_of_one_force(case: Path, capsys: pytest.Captu
     assert "contacts.sole.law" in "".join(capsys.readouterr())
     case.write_text(CASE.replace("start = 100.0", "start = 131.0"))
     assert main(["respond", "case.toml", "--over", "load"]) == 2
-    assert "holds no resonance; give a frequency" in "".join(capsys.readouterr())
+    assert "no resonance in the band; widen the sweep, or give a frequency" in "".join(capsys.readouterr())

@@ -310,6 +310,15 @@ def test_half_space_page(capsys: pytest.CaptureFixture[str]) -> None:
     assert capsys.readouterr().out.strip() == printed
 
 
+def test_the_book_page_has_the_numbers_of_its_figure() -> None:
+    """Of eight elements in Fig. 5.2-2, as its command prints them."""
+    import figure_study
+
+    force, moment = 100 * figure_study.discretisation()
+    told = f"{force:.1f} % of the force, {moment:.1f} % of the moment at most, which the command prints"
+    assert told in (DOCS / "book.md").read_text(encoding="utf-8")
+
+
 @pytest.mark.slow
 def test_contact_page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     """Its tables made again, and what its examples print; the profile is the invented one of the table."""

@@ -16,7 +16,7 @@ from microslip.basis import write_basis
 from microslip.case import load_case, run_case
 from microslip.cli import main
 from microslip.errors import UserError
-from microslip.harmonic_balance import peak
+from microslip.harmonic_balance import peak, reduced
 from microslip.stages import following
 from microslip.units import METRES
 
@@ -206,7 +206,7 @@ def test_an_optimum_where_contacts_would_lift_off_is_marked(tmp_path: Path, monk
     np.testing.assert_array_equal(following.found_before(["pit"], "mass", case)["pit"][3], [1, 0, 0])
     dotted, solid = figures[0].axes[0].get_lines()[:2]
     assert np.isfinite(dotted.get_ydata()).all() and list(np.isfinite(solid.get_ydata())) == [True, False, False]
-    assert "not valid: contacts lift off" in [t.get_text() for t in figures[0].legends[0].get_texts()]
+    assert "doubtful or not valid, see the table" in [t.get_text() for t in figures[0].legends[0].get_texts()]
 
 
 def test_what_was_not_found_stands_in_the_table_with_its_commas(
@@ -220,9 +220,30 @@ def test_what_was_not_found_stands_in_the_table_with_its_commas(
     peaks = {m: peak.HighestPeak(600.0, 1e-6 / m, np.zeros(1), s) for m, s in ((1.0, "converged"), (2.0, said))}
     found = peak.Optimum(1.0, peaks[1.0], f"lost between 1 and 2: {said}", peaks, {})
     *_, page = following.write_optimum(found, "mass", case)
-    what = [row["what"] for row in csv.DictReader(Path("build/pit/optimum.csv").open())]
+    rows = list(csv.DictReader(Path("build/pit/optimum.csv").open()))
+    assert rows[1]["amplitude_m"] == rows[1]["frequency_Hz"] == ""
+    what = [row["what"] for row in rows]
     assert what == ["highest resonance", said, f"lowest: lost between 1 and 2: {said}"]
     assert "raise samples</td>" in page.read_text()
+
+
+def test_a_search_that_fails_does_not_say_that_there_is_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Energy out of balance at every point: the reason, empty cells and exit code 1; a curve has no frequency."""
+    one_point(tmp_path, monkeypatch, points=3)
+    work = reduced.work
+    monkeypatch.setattr(reduced, "work", lambda *given: tuple(np.array(work(*given)) * [1.1, 1.0, 1.0, 1.0]))
+    assert main(["optimum", "case.toml", "--low", "20", "--high", "30", "--points", "2"]) == 1
+    why = "not found: 3 of 3 points did not converge, first at 60 Hz: energy"
+    shown, error = capsys.readouterr()
+    assert f"no resonance is known at any value; at 20, 30 N {why}" in shown and why in error
+    rows = table("optimum.csv")
+    assert [row["what"].startswith(why) for row in rows] == [True, True]
+    assert [(row["frequency_Hz"], row["amplitude_m"]) for row in rows] == [("", "")] * 2
+    assert why in Path("build/sled/optimum.html").read_text()
+    assert main(["respond", "case.toml", "--over", "load"]) == 2
+    assert f"curve.frequency: {why}" in capsys.readouterr().err
 
 
 def test_no_optimum_says_where_to_look(

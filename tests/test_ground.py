@@ -194,6 +194,21 @@ def test_what_moving_ground_gives_is_its_force_times_its_way() -> None:
     np.testing.assert_allclose(given, pulled - pulled[0], atol=5e-3 * given.max())
 
 
+def test_the_picture_of_a_motion_has_the_loss_of_its_table(monkeypatch: pytest.MonkeyPatch) -> None:
+    """On moving ground a loop's area is no loss: what stands in the picture is the table's, whatever that says."""
+    from microslip.pictures import orbit as drawing
+
+    figures: list = []
+    monkeypatch.setattr(drawing, "save_figure", lambda figure, path: figures.append(figure) or path)
+    law = rate(Exponential(value(0.8), value(0.55), value(20.0)), 1e4, 1e-4)
+    found = orbit.run(equations.of(rubbing(law, Ground(V), force=3.0), 20.0), 0, 2, 64, 256, "rest")
+    drawing.orbit_picture(found, {"lost_in_contacts_J_per_period": 123.4}, Path("orbit.png"), "title")
+    (figure,) = figures
+    titles = [figure.get_suptitle(), *(axes.get_title() for axes in figure.axes)]
+    assert [t for t in titles if " J" in t] == ["title; contacts lose 123.4 J a period"]
+    assert any("force in N" in axes.get_ylabel() for axes in figure.axes)  # its loops are drawn
+
+
 def test_many_points_that_creep_together_carry_what_one_does() -> None:
     """Four points of a rigid patch, each with a quarter, on ground without waves: the turns of the braking agree."""
     friction = Exponential(value(0.8), value(0.55), value(100.0))

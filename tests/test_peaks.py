@@ -21,7 +21,8 @@ from microslip.continuation import NO_OPTIMUM, Settings, extremum, lowest, peak,
 from microslip.harmonic_balance import peak as peaks
 from microslip.harmonic_balance.peak import highest, optimum, resonance
 from microslip.harmonic_balance.readout import amplitude
-from microslip.harmonic_balance.response import of_body, operating
+from microslip.harmonic_balance.refinement import filled_response
+from microslip.harmonic_balance.response import of_body, operating, refined_peaks
 from microslip.harmonic_balance.solver import solve, sweep
 from microslip.stages.following import missed, optimum_message
 
@@ -163,11 +164,13 @@ def climbing(family, x, lam):
 
 def test_a_read_out_that_nothing_moves_has_no_peak():
     """Two masses of their own: where one resonates the other stands still, whatever rounding climbs to."""
-    two = ms.structure(np.eye(2), np.diag([1.0, 4.0]), 0.02 * np.eye(2), force={0: 1.0}, output=[0, 1])
-    problem = balanced(two, 1)
-    (point,) = sweep(problem, np.array([1.0 / (2 * np.pi)]))
-    top = peaks.Peak(point.x, point.Omega, 1e-36, False, "converged", np.zeros(0))
-    assert peaks.checked(problem, top, 0).converged and peaks.checked(problem, top, 1).status == peaks.STILL
+    for output in (0, 1):
+        parts = np.eye(2), np.diag([1.0, 4.0]), 0.02 * np.eye(2)
+        two = ms.structure(*parts, force={0: 1.0}, output=[output])
+        top = highest(balanced(two, 1), np.linspace(0.5, 3.0, 6)).peak
+        assert top.converged is (output == 0)
+        assert output == 0 or top.status == "the read-out does not move"
+    assert np.isnan(top.value) and np.isnan(top.lam)
 
 
 def test_optimal_damping_of_a_relaxing_spring():
@@ -325,7 +328,7 @@ def test_the_peak_of_a_contact_with_microslip_is_the_highest():
     """Against a golden-section search over single solutions. Points that change between stick and slip sample by
     sample ripple the top by 3e-5 of its height, which is flat to that within 0.5 %."""
     problem = pressed(4.0)
-    found, end = highest(problem, BAND)
+    found, end, _ = highest(problem, BAND)
     assert found.converged and end is None
 
     def height(f):
@@ -338,6 +341,25 @@ def test_the_peak_of_a_contact_with_microslip_is_the_highest():
     best = scipy.optimize.minimize_scalar(height, bounds=bounds, method="bounded", options={"xatol": 1e-5})
     assert resonance(found).amplitude == pytest.approx(-best.fun, rel=1e-4)
     assert f == pytest.approx(best.x, rel=5e-3)
+
+
+def test_a_resonance_narrower_than_a_step_is_found_as_a_response_finds_it():
+    """Of a stuck contact, whose half-power width is a sixteenth of the step: the peak of the linear system, and to the
+    last digit that of the response."""
+    problem, band = pressed(1e6), 2 * np.pi * np.linspace(28, 48, 6)
+    top = highest(problem, band)
+    response = filled_response(problem, band / (2 * np.pi), np.zeros(1))
+    best = max(refined_peaks(problem, response), key=lambda one: one.amplitude)
+    assert np.sqrt(top.peak.value) == pytest.approx(best.amplitude, rel=1e-12)
+    part, k = problem.parts[1][0], problem.stiffness[0]
+
+    def linear(w):
+        K = part.K + part.rows.conj().T @ k @ part.rows
+        return -abs(part.output[0] @ np.linalg.solve(K - w * w * part.M + 1j * w * part.C, part.load))
+
+    w = 2 * np.pi * best.frequency
+    exact = scipy.optimize.minimize_scalar(linear, bounds=(0.99 * w, 1.01 * w), method="bounded")
+    assert best.amplitude == pytest.approx(-exact.fun, rel=1e-6) and not top.unsolved
 
 
 @pytest.mark.slow
@@ -366,7 +388,8 @@ def test_a_setting_that_hardly_matters_is_said_to():
         found = peaks.Optimum(3.0, tops[3.0], NO_OPTIMUM, tops, {})
         assert found.spread == pytest.approx(most / 4.2109 - 1)
         assert ("hardly matters" in optimum_message(found, "normal_force")) is word
-        assert "an end; look beyond it with --high above 3" in missed(found, "normal_force")
+        beyond = "an end; look beyond it with --high above 3" in missed(found, "normal_force")
+        assert beyond is not word and ("is lowest" in optimum_message(found, "normal_force")) is not word
     one = peaks.Optimum(1.0, tops[1.0], NO_OPTIMUM, {1.0: tops[1.0]}, {})
     assert np.isinf(one.spread)
 
@@ -409,7 +432,7 @@ def test_the_optimum_of_a_slider_against_sweeps():
 def test_a_top_at_the_end_of_the_band_is_no_peak():
     """Of a stuck contact the resonance lies beyond the band: there is none in it, and the end is told."""
     problem, beyond = pressed(1e6), 2 * np.pi * np.linspace(20, 28, 9)
-    found, end = highest(problem, beyond)
+    found, end, _ = highest(problem, beyond)
     assert not found.converged and found.status == "no resonance in the band"
     assert end == pytest.approx(beyond[-1])
 

@@ -110,6 +110,10 @@ def test_the_picture_names_the_time_constants_of_the_table(monkeypatch: pytest.M
     for way, fit in (("up", lines[1]), ("down", lines[3])):
         assert fit.get_label() == f"exponential of {studied.constants[f'{way}_fitted_s'][0]:.3g} s"
         assert fit.get_xdata()[-1] == pytest.approx(4 * PASS, rel=0.06)
+    told = {**studied.constants, "up_fitted_s": np.array([0.123, 0.5])}  # what the table says is what stands there
+    vars(studied)["constants"] = told
+    tyre.tyre_picture(studied, tmp_path / "tyre.png", "t")
+    assert figures[1].axes[2].lines[1].get_label() == "exponential of 0.123 s"
 
 
 def test_numbers_that_are_none_of_a_brush() -> None:

@@ -372,16 +372,13 @@ def identify(
 
 
 def _survey(case: Path, basis: Path | None, kind: str, set_: Sequence[str], force: bool, quiet: bool) -> None:
-    from .case.curves import OVER
     from .stages.surveying import survey_stage
 
     with progress(f"{kind.replace('_', ' ')} of {case}", quiet) as report:
-        made, sentences, converged = survey_stage(case, basis, kind, list(set_), force, report)
+        made, sentences, missing = survey_stage(case, basis, kind, list(set_), force, report)
     _say("\n".join([*sentences, *map(str, made)]), quiet)
-    if not converged and kind in OVER:
-        raise NotConverged(f"some of the curves end early; {made[0]} holds what was found")
-    if not converged:
-        raise NotConverged(f"some points did not converge; they are marked in {made[0]}")
+    if missing:
+        raise NotConverged(f"{missing}; {made[0]} holds what was found")
 
 
 @app.command
@@ -583,8 +580,8 @@ def backbone(
             files = following.write_backbones(found, opened)
     for file in files:
         _say(file, quiet)
-    if not all(one.complete for one in found.values()):
-        raise NotConverged("some of the backbones end early; backbone.csv holds what was found")
+    if why := following.unreached(found):
+        raise NotConverged(f"{why}; backbone.csv holds what was found")
 
 
 @app.command
@@ -618,8 +615,8 @@ def optimum(
     _say(following.told(found, over, opened), quiet)
     for file in files:
         _say(file, quiet)
-    if not following.is_optimum(found):
-        raise NotConverged(following.missed(found, over))
+    if why := following.missed(found, over):
+        raise NotConverged(why)
 
 
 def _case_file(case: Path) -> Path:

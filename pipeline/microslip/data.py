@@ -376,6 +376,11 @@ class Interface:
         at=f"{_FRAME}/patch/pattern", when='`coordinates = "characteristic"`', order=1,
     )] = field(default_factory=lambda: np.zeros((0, 3, 0)))  # fmt: skip
 
+    @property
+    def area(self) -> float:
+        """m2, of the patch."""
+        return float(self.areas.sum())
+
     def row(self, name: str) -> Array:
         """(m,) one of the rows by its label: ``u_n``, ..., ``phi_t2``, ``c1``, ``c2``, ...
 

@@ -180,6 +180,9 @@ def _coexisting(work: _Work, still: Branch, p: float) -> None:
     centre = still.x[int(np.argmin(np.abs(still.parameter - p))), 0]
     found = attractors(system, centre, p, asked.starts, asked.seed, asked.nodes)
     work.seen += found
+    if (others := asked.starts - round(sum(a.share for a in found) * asked.starts)) > 0:
+        words = f"of {asked.starts} motions {others} came to rest, or to no periodic motion that was recognised"
+        work.messages.append(f"at {p:.6g}: {words}")
     _new_ones(work, "attractor", [a.orbit for a in found])
 
 

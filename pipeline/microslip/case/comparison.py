@@ -11,7 +11,7 @@ from ..units import METRES, Quantity, amplitude_of
 
 @dataclass(frozen=True)
 class Pair:
-    """A resonance under a normal force (N) in both modes: (Hz, amplitude), or None where one of them has none there.
+    """A resonance under a normal force (N) in both modes: (Hz, amplitude), or None where none was found in one of them.
     quantity: what the amplitude measures."""
 
     normal_force: float
@@ -53,7 +53,7 @@ def _peaks(rows: Sequence[Mapping[str, Any]], normal: float) -> list[tuple[float
 
 
 def comparison_table(pairs: Sequence[Pair], of: Quantity = METRES) -> str:
-    """CSV text; a resonance that one mode does not have leaves its cells empty. of: what the amplitudes measure."""
+    """CSV text; a resonance that was not found in one mode leaves its cells empty. of: what the amplitudes measure."""
     amplitudes_of = [of.column(name) for name in ("aft", "book", "difference")]
     head = ["normal_force_N", "aft_Hz", "book_Hz", "difference_Hz_percent", *amplitudes_of[:2]]
     rows = [",".join([*head, f"{amplitudes_of[2]}_percent"])]
@@ -68,7 +68,8 @@ def comparison_table(pairs: Sequence[Pair], of: Quantity = METRES) -> str:
 
 def sentence(p: Pair) -> str:
     """A line for a terminal."""
-    one, two = (f"{x[0]:.6g} Hz, {x[1]:.4g} {p.quantity.said}" if x else "no resonance" for x in (p.marched, p.book))
+    none, unit = "no resonance found", p.quantity.said
+    one, two = (f"{x[0]:.6g} Hz, {x[1]:.4g} {unit}" if x else none for x in (p.marched, p.book))
     apart = p.differences()
     more = "" if apart is None else f" ({100 * apart[0]:+.2g} % in frequency, {100 * apart[1]:+.2g} % in amplitude)"
     return f"F_N = {p.normal_force:g} N: marched {one}; book {two}{more}"

@@ -92,9 +92,9 @@ class Followed:
 
     @property
     def complete(self) -> bool:
-        """Whether the other end was reached."""
+        """Whether it left the range at the other end, the nearer one of its last point."""
         begin, end = self.ends
-        return not self.early and abs(self.parameter[-1] - end) < 1e-9 * abs(end - begin)
+        return not self.early and abs(self.parameter[-1] - end) < abs(self.parameter[-1] - begin)
 
     @property
     def early(self) -> bool:
@@ -270,10 +270,10 @@ def _resonance(
     key = f"{normal}, {s.start} to {s.stop} Hz by {s.points}"
     if key not in known:
         report(f"resonance between {s.start:g} and {s.stop:g} Hz")
-        f = largest(problem, np.linspace(s.start, s.stop, s.points)).frequency
-        if not np.isfinite(f):
-            raise UserError(f"{path}: curve.frequency: the band of the sweep holds no resonance; give a frequency (Hz)")
-        known[key] = float(f)
+        top = largest(problem, np.linspace(s.start, s.stop, s.points))
+        if top.missing:
+            raise UserError(f"{path}: curve.frequency: {top.missing}; widen the sweep, or give a frequency (Hz)")
+        known[key] = top.frequency
         journal.say({**journal.head, "at": known})
     return float(known[key])
 

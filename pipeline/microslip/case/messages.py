@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 
 import numpy as np
 
@@ -12,9 +13,9 @@ from ..data import Array
 from ..harmonic_balance import FrequencyResponse
 from ..harmonic_balance.problem import Problem
 from ..harmonic_balance.reduced import stuck, stuck_damping, untouched
-from ..harmonic_balance.response import HarmonicResponse
+from ..harmonic_balance.response import HarmonicResponse, unsolved
 from ..harmonic_balance.sweeps import overhanging
-from ..results.checks import cause
+from ..results.checks import UNCERTAIN, cause
 from ..results.names import apart
 from ..units import Quantity, counted, percent
 from .assemble import Built
@@ -23,10 +24,6 @@ from .settings import CaseSettings
 
 OPEN = 0.01
 """Share of points and time that may be open in the book's mode before a message is made."""
-
-
-STILL = 1e-10
-"""Share of the contacts' motion below which a read-out counts as one that does not move: rounding."""
 
 
 REMEDIES = {
@@ -45,6 +42,11 @@ SAID = 3
 """Frequencies, and normal forces, that a sentence names; the others are counted."""
 
 
+def off(likely: float) -> str:
+    """By how much an amplitude is likely to be off, and on which side: "12 % (too high)"."""
+    return f"{percent(abs(likely))} (too {'high' if likely > 0 else 'low'})"
+
+
 def by_the_book(built: Built) -> list[str]:
     """That it is the book's mode, and how far its tables are off."""
     if built.settings.mode != "book":
@@ -60,6 +62,31 @@ def by_the_book(built: Built) -> list[str]:
         f"orbits; its tables are off by at most {' and '.join(errors.values())}. microslip respond CASE --compare-book "
         "shows what the mode leaves out."
     ]
+
+
+def method(settings: CaseSettings, errors: Mapping[float, Mapping[float, float]] = MappingProxyType({})) -> str:
+    """That an answer is that of one harmonic, or of too few, and what it is likely to be off by; nothing where they are
+    enough.
+
+    Args:
+        errors: normal force (N) -> Hz -> see `CaseResult.errors`.
+    """
+    if not settings.contacts:
+        return ""
+    count = settings.balanced
+    told = "One harmonic, the method of the book (Sextro 5.2)" if count == 1 else f"{count} harmonics"
+    if settings.mode == "book":
+        return f"{told}; what it leaves out is not estimated: microslip respond CASE --compare-book shows it."
+    each = [(abs(e), e, n) for n, own in errors.items() for e in own.values() if np.isfinite(e)]
+    if not each:
+        return f"{told}; what it leaves out is not estimated." if count == 1 else ""
+    most, share, normal = max(each)
+    if most <= UNCERTAIN:
+        return ""
+    nine = "harmonics = 9, about nine times the work, shows the motion as it is"
+    more = nine if count == 1 else f"take harmonics = {2 * count}"
+    off_by = f"amplitudes are off by up to about {off(share)}, most under F_N = {normal:g} N"
+    return f"{told}: {off_by}; {more}."
 
 
 def between_equilibria(built: Built) -> list[str]:
@@ -108,20 +135,13 @@ def too_coarse(settings: CaseSettings, stuck: Array, damping: Array) -> list[str
     ]
 
 
-def still(response: FrequencyResponse) -> bool:
-    """Whether nothing moves the first read-out, so that its peaks are none."""
-    ok = response.converged
-    moved = float(np.abs(response.slip[ok]).max(initial=0.0))
-    return 0 < moved and float(np.abs(response.monitor[ok]).max(initial=0.0)) <= STILL * moved
-
-
 def idle(forces: Sequence[float]) -> list[str]:
     """A message where nothing moves the first read-out."""
     if not forces:
         return []
     pressed = ", ".join(f"{normal:g}" for normal in forces)
     return [
-        f"At F_N = {pressed} N the first read-out does not move while the contacts do: it has no resonances; read "
+        f"At F_N = {pressed} N the first read-out does not move: it has no resonances; read "
         "another direction or another monitor."
     ]
 
@@ -232,6 +252,17 @@ def not_converged(responses: Mapping[float, HarmonicResponse]) -> list[str]:
             said = f"{many}, first at {at[0]:.6g} Hz: {failed[at[0]]}"
             found.append(said + (f"; {remedy}." if remedy else "."))
     return found
+
+
+def not_found(
+    responses: Mapping[float, HarmonicResponse], resonances: Mapping[float, Sequence[tuple[float, float]]]
+) -> list[str]:  # fmt: skip
+    """A message for each normal force without a resonance under which points have no solution."""
+    return [
+        f"At F_N = {normal:g} N no resonance was found, though there may be one: {unsolved(r)}."
+        for normal, r in responses.items()
+        if not resonances[normal] and unsolved(r)
+    ]
 
 
 def at_places(places: Mapping[float, Sequence[float]]) -> str:

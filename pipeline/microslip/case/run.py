@@ -21,10 +21,11 @@ from ..harmonic_balance.problem import Problem
 from ..harmonic_balance.readout import measured
 from ..harmonic_balance.reduced import stuck, stuck_damping
 from ..harmonic_balance.refinement import filled_response
-from ..harmonic_balance.response import HarmonicResponse, Resonance, refined_peaks
+from ..harmonic_balance.response import HarmonicResponse, Resonance, parted, refined_peaks
 from ..harmonic_balance.solver import Point
-from ..harmonic_balance.sweeps import ends, gaps
+from ..harmonic_balance.sweeps import gaps, still
 from ..results import Journal
+from ..results.checks import UNCERTAIN
 from ..system.assembly import Assembly, Linear
 from ..units import Quantity, counted, percent
 from . import edges
@@ -53,9 +54,10 @@ class CaseResult:
     resonances: normal force -> (frequency in Hz, amplitude in m) of each peak, searched for between the points of the
     sweep. speed: rad/s. messages: sentences a reader must know. built: the assembly. rising: ends of the band at which
     responses still rise. truncation: largest estimated error of an amplitude for want of harmonics and samples, over
-    it; None where it is not estimated. errors: normal force (N) -> frequency in Hz -> the same, of resonances among
-    others. folds: normal force -> (Hz, m) where the response is highest and its curve ends, which is no resonance.
-    beyond: motions in time about jumps and gaps, where they were asked for.
+    it; None where it is not estimated. errors: normal force (N) -> frequency in Hz -> what the amplitude is likely to
+    be off by, over it, above 0 where it is too high, NaN where nobody knows: of resonances, the highest point and where
+    most is left out. folds: normal force -> (Hz, m) where the response is highest and its curve ends, which is no
+    resonance. beyond: motions in time about jumps and gaps, where they were asked for.
     """
 
     settings: CaseSettings
@@ -77,6 +79,15 @@ class CaseResult:
     def quantity(self) -> Quantity:
         """What the first read-out measures."""
         return measured(self.built.assembly)
+
+    def unsure(self, normal: float, frequency: Array) -> Array:
+        """(f,) bool, frequencies (Hz) at which the amplitude is likely to be off by more than `UNCERTAIN`, from what is
+        known of the points that are judged on either side."""
+        if not (known := self.errors.get(normal)):
+            return np.zeros(len(frequency), dtype=bool)
+        at = sorted(known)
+        share = np.nan_to_num(np.abs([known[f] for f in at]), nan=1.0)
+        return np.asarray(np.interp(frequency, at, share) > UNCERTAIN)
 
     @property
     def readouts(self) -> list[Readout]:
@@ -137,7 +148,7 @@ def _run(
     with keep(built) if keep else nullcontext() as journal:
         responses, resonances, folds, stuck, messages = _answered(built, forces, frequency, report, journal, left)
     free = free_response(built, frequency)
-    idle = [normal for normal, r in responses.items() if say.still(r)]
+    idle = [normal for normal, r in responses.items() if still(r)]
     resonances |= {normal: [] for normal in idle}
     at_the_ends = edges.rising({n: r for n, r in responses.items() if n not in idle}, resonances)
     messages = [
@@ -150,6 +161,7 @@ def _run(
         *left.unknown(),
         *say.too_coarse(settings, *stuck),
         *say.not_converged(responses),
+        *say.not_found(responses, resonances),
         *say.idle(idle),
         *say.folded(folds, measured(built.assembly)),
         *say.overhangs(responses, resonances),
@@ -187,14 +199,13 @@ def _answered(
         report(f"friction response at a normal force of {key:g} N")
         limits = np.array([c.coefficient * (key if swept(c) else c.normal_force or 0.0) for c in built.contacts])
         found, peaks = _swept(problem, frequency, limits, report, journal, key)
-        turns = ends(found, [(one.frequency, one.amplitude) for one in peaks])
-        folds[key] = [(one.frequency, one.amplitude) for one, turn in zip(peaks, turns, strict=True) if turn]
-        peaks = [one for one, turn in zip(peaks, turns, strict=True) if not turn]
+        peaks, turns = parted(found, peaks)
+        folds[key] = [(one.frequency, one.amplitude) for one in turns]
         responses[key], resonances[key] = found, [(one.frequency, one.amplitude) for one in peaks]
         messages += say.not_periodic(key, found.unsteady, built.settings)
         messages += say.lifting(built, problem, found, key) + say.pulling(built, found, key)
         messages += say.across(problem, found, key)
-        messages += [] if say.still(found) else left.out(problem, found, peaks, key)
+        messages += [] if still(found) else left.out(problem, found, peaks, key)
         if key == max(responses):
             stiff = _stuck(problem.assembly)
     return responses, resonances, folds, stiff, messages
@@ -331,19 +342,14 @@ class _Left:
         if not problem.groups or settings.mode == "book" or (whole and self.tolerance is None):
             return []
         looked_at = judged(problem, found, peaks)
-        for point, estimate, share in looked_at if self.tolerance is not None else ():
+        for point, estimate, share, _ in looked_at if self.tolerance is not None else ():
             self._enough(problem, found, point, estimate, share, normal)
-        self.errors[normal] = {
-            peak.frequency: share
-            for peak in peaks
-            for point, _, share in looked_at
-            if np.isclose(point.Omega / (2 * np.pi), peak.frequency, rtol=1e-9, atol=0)
-        }
         if not looked_at:
             return []
-        if lost := [point.Omega / (2 * np.pi) for point, _, share in looked_at if not np.isfinite(share)]:
+        self.errors[normal] = {one.point.Omega / (2 * np.pi): one.likely for one in looked_at}
+        if lost := [one.point.Omega / (2 * np.pi) for one in looked_at if not np.isfinite(one.bound)]:
             self.lost[normal] = lost
-        point, e, share = max(looked_at, key=lambda one: one[2])
+        point, e, share, likely = max(looked_at, key=lambda one: one.bound)
         self.most = max(self.most or 0.0, share)
         where = f"At F_N = {normal:g} N the amplitude at {point.Omega / (2 * np.pi):.6g} Hz is uncertain"
         balanced = counted(problem.harmonics, "harmonic")
@@ -355,7 +361,7 @@ class _Left:
         what = "harmonics" if e.by_harmonics > e.by_samples else "samples"
         said = f"mostly for want of {what}, with {balanced} and {e.samples} samples; raise {what}"
         said += f" (and samples to {16 * (problem.harmonics + 2)} or more)." if what == "harmonics" else "."
-        return [f"{where} by about {percent(share)}, {said}"]
+        return [f"{where} by about {say.off(likely)}, {percent(share)} at most, {said}"]
 
     def unknown(self) -> list[str]:
         """A message on all places whose error nobody knows, and what to do about them."""

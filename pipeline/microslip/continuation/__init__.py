@@ -22,6 +22,7 @@ from .extremum import Lowest as Lowest
 from .extremum import Peak as Peak
 from .extremum import lowest as lowest
 from .extremum import peak as peak
+from .extremum import placed as placed
 from .extremum import rated as rated
 from .newton import CONVERGED as CONVERGED
 from .newton import Equations as Equations

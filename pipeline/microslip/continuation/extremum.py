@@ -76,6 +76,14 @@ def peak(problem: Rated, x: Array, lam: float, settings: Settings | None = None)
     return _climbed(problem, State(y, t, found.sign, settings.step, None, sense, y, t, 1, 0.0, ()), settings)
 
 
+def placed(problem: Rated, x: Array, lam: float) -> Peak:
+    """The peak at a place of the curve, (n,) and lambda, that is known to be one."""
+    slope = _Slope(problem)
+    y = slope.scaled.pack(x, lam)
+    tangent = np.linalg.svd(slope.scaled(y)[1])[2][-1]  # of a singular derivative it is one of them
+    return replace(_peak(slope, slope.at(y, tangent)), kink=False)
+
+
 def _climbed(problem: Rated, state: State, settings: Settings) -> Peak:
     """Uphill, and the other way too where that peak is hardly higher than the beginning."""
     slope = _Slope(problem)

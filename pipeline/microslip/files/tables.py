@@ -12,12 +12,17 @@ from .store import write_text
 
 
 def rows_csv(head: Iterable[str], rows: Iterable[Iterable[str | float]], digits: int = 8) -> str:
-    """Numbers with so many significant digits; texts in quotes where they hold a comma (RFC 4180)."""
+    """Numbers with so many significant digits, an empty cell for one that is not known (NaN); texts in quotes where
+    they hold a comma (RFC 4180)."""
     text = io.StringIO()
     lines = csv.writer(text, lineterminator="\n")
     lines.writerow(head)
-    lines.writerows([v if isinstance(v, str) else f"{v:.{digits}g}" for v in row] for row in rows)
+    lines.writerows([_cell(v, digits) for v in row] for row in rows)
     return text.getvalue()
+
+
+def _cell(value: str | float, digits: int) -> str:
+    return value if isinstance(value, str) else "" if value != value else f"{value:.{digits}g}"
 
 
 def columns_csv(columns: Mapping[str, Iterable[Any]], digits: int) -> str:

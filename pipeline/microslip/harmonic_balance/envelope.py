@@ -21,9 +21,9 @@ from .checkpoint import beside, rectangle
 from .problem import Problem
 from .readout import measured
 from .reduced import stuck
+from .refinement import Solved, filled_response
 from .response import Operating
-from .solver import Report, sweep
-from .sweeps import brackets
+from .solver import CONVERGED, Point, Report
 
 # --- resonance over engine order -------------------------------------------------------------------------------------
 
@@ -34,10 +34,11 @@ class OverOrders:
 
     Attributes:
         order: (e,) engine orders. index: (e,) of their waves. frequency: (e,) Hz and amplitude: (e,) m of the first
-            read-out; NaN where the band holds no peak. stuck: (e,) Hz, the nearest mode with sticking
-            contacts, or NaN. failed: (e,) points that did not converge. stress: (e,) Pa, the largest stress amplitude
-            in the band of the body that is read, and stressed_at: (e,) Hz where; NaN where the band holds no peak or
-            the modal file no stress. quantity: what is read; m stands for its unit. normal_force: N, or NaN.
+            read-out; NaN where none is known. stuck: (e,) Hz, the nearest mode with sticking contacts, or NaN. failed:
+            (e,) points that did not converge. stress: (e,) Pa, the largest stress amplitude in the band of the body
+            that is read, and stressed_at: (e,) Hz where; NaN where no peak or the modal file no stress is known.
+            missing: (e,) texts, why no resonance is known (`response.no_resonance`), empty where one is. quantity:
+            what is read; m stands for its unit. normal_force: N, or NaN.
     """
 
     order: Indices
@@ -48,8 +49,14 @@ class OverOrders:
     failed: Indices
     stress: Array
     stressed_at: Array
+    missing: Sequence[str] = field(kw_only=True, default=())
     quantity: Quantity = field(kw_only=True, default=METRES)
     normal_force: float = field(kw_only=True, default=float("nan"))
+
+    @property
+    def lost(self) -> Array:
+        """(e,) bool, no resonance was found though the band may hold one."""
+        return np.array([why.startswith(response.NOT_FOUND) for why in self.missing], dtype=bool)
 
     def columns(self) -> dict[str, Array]:
         """Name -> column, for a table."""
@@ -61,6 +68,8 @@ class OverOrders:
             "stuck_Hz": self.stuck,
             "failed_points": self.failed.astype(float),
         }
+        if any(self.missing):
+            found["missing"] = np.array(self.missing)
         if np.isfinite(self.stress).any():
             found |= {"stress_amplitude_Pa": self.stress, "frequency_of_stress_Hz": self.stressed_at}
         return found
@@ -72,7 +81,7 @@ class Worst:
 
     Attributes:
         normal_force: N. value: m or Pa. order: the engine order that has it, at frequency: Hz. known: engine orders
-            whose resonance is known, of count.
+            whose resonance is known, of count; lost: those of which none was found.
     """
 
     normal_force: float
@@ -81,6 +90,7 @@ class Worst:
     frequency: float
     known: int
     count: int
+    lost: int
 
 
 def worst(one: OverOrders, of: Literal["amplitude", "stress"]) -> Worst | None:
@@ -90,7 +100,8 @@ def worst(one: OverOrders, of: Literal["amplitude", "stress"]) -> Worst | None:
     if not known.any():
         return None
     i = int(np.nanargmax(value))
-    return Worst(one.normal_force, float(value[i]), int(one.order[i]), float(at[i]), int(known.sum()), len(value))
+    counts = int(known.sum()), len(value), int(one.lost.sum())
+    return Worst(one.normal_force, float(value[i]), int(one.order[i]), float(at[i]), *counts)
 
 
 def lowest(rows: Sequence[Worst]) -> Worst:
@@ -111,6 +122,7 @@ def over_orders(
             such as the normal force. keep: is given what there is after every engine order.
     """
     rows, whole = list[tuple[Any, ...]](), OverOrders(*8 * (np.zeros(0, dtype=int),))
+    missing: list[str] = []
     for i, e in enumerate(orders):
         report(f"engine order {e}{under}, {i + 1} of {len(orders)}")
         problem = build(int(e))
@@ -122,40 +134,45 @@ def over_orders(
             (int(e), problem.assembly.index(1), f, top.amplitude, near, top.failed, top.stress, top.stressed_at)
         )
         columns = (np.array(column) for column in zip(*rows, strict=True))
-        whole = OverOrders(*columns, quantity=measured(problem.assembly))
+        missing.append(top.missing)
+        whole = OverOrders(*columns, missing=tuple(missing), quantity=measured(problem.assembly))
         what = f"{f:.6g} Hz, {whole.quantity.sized(top.amplitude)}"
         what += f", {1e-6 * top.stress:.4g} MPa" if np.isfinite(top.stress) else ""
-        report(f"engine order {e}{under}: {what if np.isfinite(f) else 'no resonance in the band'}")
+        report(f"engine order {e}{under}: {top.missing or what}")
         keep(whole)
     return whole
 
 
 @dataclass(frozen=True)
 class Largest:
-    """The largest resonance of a band: Hz and m, NaN where it has no peak; points that did not converge; the largest
-    stress amplitude (Pa) in the band and its frequency (Hz), NaN where it is not known."""
+    """The largest resonance of a band: Hz and m, NaN where none is known; points that did not converge; why none is
+    known (`response.no_resonance`), or nothing; the largest stress amplitude (Pa) in the band and its frequency (Hz),
+    NaN where it is not known."""
 
     frequency: float
     amplitude: float
     failed: int
+    missing: str = ""
     stress: float = float("nan")
     stressed_at: float = float("nan")
 
 
 def largest(problem: Problem, frequency: Array, report: Report = lambda _: None) -> Largest:
-    """The largest resonance of a band, looked for beside every top of a sweep, and the largest stress on the way."""
-    points = sweep(problem, frequency, report)
-    motions = [response.operating(problem, p) for p in points]
-    found = response.of_points(problem, points, np.zeros(len(problem.assembly.contacts)), motions)
+    """The largest resonance of a band, looked for as a response looks for its own, and the largest stress on the
+    way."""
+    solved: list[Solved] = []
+    limit = np.zeros(len(problem.assembly.contacts))
+    found = filled_response(problem, frequency, limit, report, keep=lambda f, one, _: solved.append(one))
     failed = int((~found.converged).sum())
     report("resonances between the points")
-    peaks = [peak for bracket in brackets(found) if (peak := response.highest(problem, found, bracket)) is not None]
+    peaks, folds = response.parted(found, response.refined_peaks(problem, found))
     if not peaks:
-        return Largest(float("nan"), float("nan"), failed)
-    known = [m for m, ok in zip(motions, found.converged, strict=True) if ok]
-    motion = motion_of_read(problem, [*known, *(response.operating(problem, p) for p, _ in peaks)])
-    top, amplitude = max(peaks, key=lambda peak: peak[1])
-    one = Largest(top.Omega / (2 * np.pi), amplitude, failed)
+        return Largest(np.nan, np.nan, failed, response.no_resonance(found, folds))
+    known = [motion for point, motion in solved if response.judged(point, motion.checks).converged]
+    tops = [response.operating(problem, Point(2 * np.pi * p.frequency, p.x, CONVERGED, 0.0, 0)) for p in peaks]
+    motion = motion_of_read(problem, [*known, *tops])
+    top = max(peaks, key=lambda peak: peak.amplitude)
+    one = Largest(top.frequency, top.amplitude, failed)
     if motion is None:
         return one
     stress = stress_peaks(motion, largest=False).amplitude

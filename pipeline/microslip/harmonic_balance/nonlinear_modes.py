@@ -31,7 +31,7 @@ from ..results.files import FORMAT, Response, write_response
 from ..results.series import Series, of_solutions
 from ..system import assembly
 from ..system.assembly import Linear
-from ..units import METRES, Quantity
+from ..units import METRES, Quantity, counted
 from .checks import checks
 from .problem import AtFrequency, Problem
 from .readout import amplitude, measured
@@ -122,7 +122,8 @@ class Backbone:
             return f"<Backbone: no points; {self.status}>"
         f, a, d = (f"{v[0]:.5g} to {v[-1]:.5g}" for v in (self.frequency, self.amplitude, self.damping))
         damped = f"damping ratio {d}, at most {self.damping.max():.3g}"
-        return f"<Backbone: {len(self.Omega)} points, {a} {self.quantity.said}, {f} Hz, {damped}; {self.status}>"
+        ended = "; ".join(filter(None, [self.failing, self.status]))
+        return f"<Backbone: {len(self.Omega)} points, {a} {self.quantity.said}, {f} Hz, {damped}; {ended}>"
 
     def save(self, path: Path | str) -> Path:
         """Write a response file (``docs/response_file.md``), complete or absent; `load` reads it.
@@ -154,7 +155,13 @@ class Backbone:
     @property
     def complete(self) -> bool:
         """All amplitudes asked for were reached, by motions that pass their checks."""
-        return self.status == REACHED
+        return self.status == REACHED and not self.failing
+
+    @property
+    def failing(self) -> str:
+        """How many motions fail their checks, and why the first of them does; nothing where all pass."""
+        why = [c.failure for c in self.checks if c.failure]
+        return f"{len(why)} of {counted(len(self.checks), 'point')} fail their checks ({why[0]})" if why else ""
 
 
 def _in_words(status: str, points: Sequence[Point], low: float, high: float, of: Quantity) -> str:
@@ -213,7 +220,7 @@ def backbone(
     Omega, xi = (np.array([p.x[i] for p in points]) for i in (-2, -1))
     x = np.array([p.x[:-2] * curve.units(a)[0] for p, a in zip(points, A, strict=True)]).reshape(len(A), len(z) - 2)
     found = tuple(curve.checks(*one) for one in zip(x, Omega, xi, strict=True))
-    status = next((one.failure for one in found if one.failure), _in_words(state.status, points, low, high, quantity))
+    status = _in_words(state.status, points, low, high, quantity)
     return Backbone(A, Omega, xi / (2 * Omega) if len(A) else xi, x, omega, status, found, quantity)
 
 

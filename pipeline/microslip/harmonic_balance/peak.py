@@ -1,28 +1,24 @@
 """The highest resonance of an assembly in a band, and the value of a setting at which it is lowest: normal force, mass,
 angle, whatever makes a problem.
 
-A sweep over the band sees the resonances, `continuation.extremum` climbs to their peaks and finds the lowest place.
+It is looked for as a response looks for its resonances; `continuation.extremum` finds the lowest place.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
-from ..continuation import SEARCH, Lowest, Peak, lowest, rated
-from ..continuation import peak as climbed
+from ..continuation import Lowest, Peak, lowest, placed, rated
 from ..data import Array
 from .problem import Problem
 from .readout import WithOutput, measured
-from .response import operating
-from .solver import CONVERGED, Point, Report, sweep
-from .sweeps import prominent
-
-SEEN = 0.5
-"""Share of the highest peak that a top of the sweep has to have to be climbed: half a step of the sweep beside a
-resonance, that much of it is left if the step is less than 1.7 half-power widths."""
+from .refinement import filled_response
+from .response import no_resonance, operating, parted, refined_peaks, unsolved
+from .solver import CONVERGED, Point, Report
 
 Make = Callable[[float], Problem]
 """The problem at a value of the parameter; its scales must not depend on the value (give `length` to `problem.of`)."""
@@ -30,14 +26,17 @@ Make = Callable[[float], Problem]
 
 @dataclass(frozen=True)
 class HighestPeak:
-    """A peak. Attributes: Omega: rad/s. amplitude: m. x: see `Problem`. status: "converged", or what went wrong.
-    open: (c,) share of its points and time at which each contact is open."""
+    """A peak. Attributes: Omega: rad/s. amplitude: m; both NaN where none is known. x: see `Problem`. status:
+    "converged", or why none is known, see `response.no_resonance`. open: (c,) share of its points and time at which
+    each contact is open. unsolved: folds, and points of the sweep without a solution, in words, beside which one may be
+    higher."""
 
     Omega: float
     amplitude: float
     x: Array
     status: str
     open: Array | None = None
+    unsolved: str = ""
 
 
 @dataclass(frozen=True)
@@ -63,43 +62,30 @@ class Optimum:
         return max(heights) / min(heights) - 1 if len(heights) > 1 else float("inf")
 
 
-def highest(
-    problem: Problem, Omega: Array, output: int = 0, report: Report = lambda _: None
-) -> tuple[Peak, float | None]:
-    """The highest peak of a read-out in a band, and the end (rad/s) at which the response is higher than that, if one.
+class Top(NamedTuple):
+    """The highest peak of a band; rad/s of the end at which the response is higher than that, if one; points of the
+    sweep without a solution and folds, in words."""
 
-    A sweep over Omega (f,) in rad/s, then uphill from its tops, along the curve, as far as the band goes. A band
-    without any peak gives one that says so.
-    """
-    points = [p for p in sweep(problem, Omega / (2 * np.pi), report) if p.converged]
-    seen = WithOutput(problem, output)
-    none = Peak(np.zeros(problem.size), float(Omega[0]), np.nan, False, "no solution in the band", np.zeros(0))
-    if not points:
-        return none, None
-    height = np.array([seen.output(p.x, p.Omega)[0] for p in points])
-    walled = np.concatenate([[0.0], height, [0.0]])
-    tops = np.flatnonzero((walled[1:-1] > walled[:-2]) & (walled[1:-1] >= walled[2:]))
-    tops = prominent(np.sqrt(height), tops)
-    best = replace(none, value=0.0, status="no resonance in the band")
-    within = replace(SEARCH, low=float(Omega.min()), high=float(Omega.max()))
-    for i in sorted(tops, key=lambda k: -height[k]):
-        if height[i] < SEEN**2 * best.value:
-            break
-        found = climbed(seen, points[i].x, points[i].Omega, within)
-        if found.converged and within.low < found.lam < within.high and found.value > best.value:
-            best = checked(problem, found, output)
-    end = max((0, -1), key=lambda k: height[k])
-    return best, points[end].Omega if height[end] > best.value else None
+    peak: Peak
+    end: float | None
+    unsolved: str
 
 
-def checked(problem: Problem, peak: Peak, output: int = 0) -> Peak:
-    """A peak that is not called converged if its solution fails its checks (`results.checks`), or does not move the
-    read-out but for rounding."""
-    if not peak.converged:
-        return peak
-    found = operating(problem, Point(peak.lam, peak.x, CONVERGED, 0.0, 0))
-    still = "" if found.outputs[output, 1] else STILL
-    return replace(peak, status=found.checks.failure or still or peak.status)
+def highest(problem: Problem, Omega: Array, report: Report = lambda _: None) -> Top:
+    """The highest peak of the first read-out in a band, Omega (f,) in rad/s, looked for as a response looks for its
+    resonances. A band in which none is known gives one that says why."""
+    response = filled_response(problem, Omega / (2 * np.pi), np.zeros(len(problem.assembly.contacts)), report)
+    resonances, folds = parted(response, refined_peaks(problem, response))
+    best = max(resonances, key=lambda one: one.amplitude, default=None)
+    why = no_resonance(response, folds)
+    peak = Peak(np.zeros(problem.size), np.nan, np.nan, False, why, np.zeros(0))
+    if best is not None:
+        peak = placed(WithOutput(problem), best.x, 2 * np.pi * best.frequency)
+    solved = np.flatnonzero(response.converged)
+    height = np.abs(response.monitor)
+    end = max(solved[[0, -1]], key=lambda k: height[k]) if len(solved) else 0
+    rises = len(solved) > 0 and height[end] > (0.0 if best is None else best.amplitude)
+    return Top(peak, 2 * np.pi * float(response.frequency[end]) if rises else None, unsolved(response, folds))
 
 
 def opened(problem: Problem, peak: Peak) -> Array | None:
@@ -110,17 +96,13 @@ def opened(problem: Problem, peak: Peak) -> Array | None:
     return np.array([float(cycle.open.mean()) for cycle in cycles])
 
 
-STILL = "the read-out does not move"
-"""Status of a peak of rounding."""
-
-
 def resonance(peak: Peak) -> HighestPeak:
     """A peak of a squared amplitude in the words of vibrations."""
     return HighestPeak(peak.lam, float(np.sqrt(peak.value)), peak.x, peak.status)
 
 
 def optimum(
-    make: Make, values: Sequence[float], Omega: Array, output: int = 0, report: Report = lambda _: None,
+    make: Make, values: Sequence[float], Omega: Array, report: Report = lambda _: None,
     keep: Callable[[dict[float, HighestPeak]], None] = lambda found: None,
 ) -> Optimum:  # fmt: skip
     """The value between the first and the last one at which the highest resonance in a band is lowest.
@@ -133,15 +115,16 @@ def optimum(
     found: dict[float, HighestPeak] = {}
 
     def family(value: float) -> WithOutput:
-        return WithOutput(make(value), output)
+        return WithOutput(make(value))
 
     def at(value: float) -> Peak:
         report(f"highest resonance at {value:.5g}")
-        top, end = highest(make(value), Omega, output, report)
+        problem = make(value)
+        top, end, lost = highest(problem, Omega, report)
         if end is not None:
             rising[value] = end
-        one = found[value] = replace(resonance(top), open=opened(make(value), top))
-        size = measured(make(value).assembly, output).sized(one.amplitude)
+        one = found[value] = replace(resonance(top), open=opened(problem, top), unsolved=lost)
+        size = measured(problem.assembly).sized(one.amplitude)
         said = f"{one.Omega / (2 * np.pi):.6g} Hz, {size}" if top.converged else top.status
         report(f"highest resonance at {value:.5g}: {said}")
         keep(dict(sorted(found.items())))

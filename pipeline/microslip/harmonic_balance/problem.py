@@ -290,7 +290,7 @@ class Problem:
             for coordinates, sign in ((g.first, 1.0), (g.second, -1.0)):
                 if coordinates is not None:
                     of += [(int(i), sign, own) for i, own in zip(ranks, coordinates, strict=True)]
-        at = np.full((len(of), max((len(own) for *_, own in of), default=0)), self.count)
+        at = np.full((len(of), max((len(own) for *_, own in of), default=1)), self.count)
         for row, (*_, own) in zip(at, of, strict=True):
             row[: len(own)] = own
         part = np.searchsorted(begins, at[:, 0], "right") - 1

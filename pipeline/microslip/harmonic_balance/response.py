@@ -17,6 +17,7 @@ from ..results.checks import UNCHECKED, Checks, exchanged
 from ..results.series import of_solutions, without_rounding
 from ..system.assembly import Assembly, ContactFace, Load, Output, preloaded_contact
 from ..system.component import Component
+from ..units import counted
 from . import problem as balance
 from . import reduced
 from .checks import checks, judged
@@ -27,7 +28,7 @@ from .solver import CONVERGED as CONVERGED
 from .solver import Point as Point
 from .solver import Report, solve, sweep
 from .solver import newton as newton
-from .sweeps import FrequencyResponse, brackets, inside, resonances
+from .sweeps import FrequencyResponse, brackets, ends, inside, resonances, still
 
 
 @dataclass(frozen=True)
@@ -252,8 +253,52 @@ class Resonance(NamedTuple):
     x: Array
 
 
+NONE = "no resonance in the band"
+"""What is said of a band whose points all have a solution and show no peak."""
+
+
+NOT_FOUND = "not found"
+"""How the reason begins where points have no solution, so that there may be one."""
+
+
+def no_resonance(response: HarmonicResponse, folds: Sequence[Resonance] = ()) -> str:
+    """Why a response has no resonance: there is `NONE`, what is read does not move, or points have no solution or the
+    curve turns back, so that none was found."""
+    if still(response):
+        return "the read-out does not move"
+    if not (lost := unsolved(response, folds)):
+        return NONE
+    failed = np.flatnonzero(~response.converged)
+    return f"{NOT_FOUND}: {lost}" + (f": {response.status[failed[0]]}" if len(failed) else "")
+
+
+def unsolved(response: HarmonicResponse, folds: Sequence[Resonance] = ()) -> str:
+    """Where the curve turns back, how many points have no solution, and where the first one is; nothing where there is
+    none of these."""
+    failed = np.flatnonzero(~response.converged)
+    said = [f"the curve turns back at {one.frequency:.6g} Hz, at a fold" for one in folds]
+    if len(failed):
+        points = counted(len(response.frequency), "point")
+        said.append(f"{len(failed)} of {points} did not converge, first at {response.frequency[failed[0]]:.6g} Hz")
+    return "; ".join(said)
+
+
+def parted(
+    response: FrequencyResponse, peaks: Sequence[Resonance]
+) -> tuple[list[Resonance], list[Resonance]]:
+    """Resonances, and the folds at which the curve that a sweep follows turns back or ends (`sweeps.ends`)."""
+    turns = ends(response, [(one.frequency, one.amplitude) for one in peaks])
+    tops, folds = list[Resonance](), list[Resonance]()
+    for peak, turn in zip(peaks, turns, strict=True):
+        (folds if turn else tops).append(peak)
+    return tops, folds
+
+
 def refined_peaks(problem: Problem, response: HarmonicResponse) -> list[Resonance]:
-    """The peaks beside the tops of a sweep; of those of one plateau the highest, see `sweeps.prominent`."""
+    """The peaks beside the tops of a sweep; of those of one plateau the highest, see `sweeps.prominent`; none of a
+    read-out that does not move."""
+    if still(response):
+        return []
     found = [highest(problem, response, bracket) for bracket in brackets(response)]
     return resonances(response, [Resonance(p.Omega / (2 * np.pi), a, p.x) for p, a in filter(None, found)])
 

@@ -85,6 +85,17 @@ def brackets(response: FrequencyResponse) -> list[tuple[int, int, int]]:
     return found + [end for end, rises in zip(ends, rise, strict=True) if rises]
 
 
+STILL = 1e-10
+"""Share of the contacts' motion below which a read-out counts as one that does not move: rounding."""
+
+
+def still(response: FrequencyResponse) -> bool:
+    """Whether nothing moves the first read-out, so that its peaks are none."""
+    ok = response.converged
+    moved = float(np.abs(response.slip[ok]).max(initial=0.0))
+    return bool(ok.any()) and float(np.abs(response.monitor[ok]).max()) <= STILL * moved
+
+
 def hidden(frequency: Array, modes: Array, damping: Array) -> list[float]:
     """Hz of resonances that a sweep may step over: of modes inside the band whose half-power width is less than a step.
 

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 import scipy.sparse as sp
 
-from ..data import Array, StressSet
+from ..data import Array, ModalGroup, StressSet
 from ..elasticity import VOIGT_AXES, pushed
 from ..fem.cyclic import CutFaces, CyclicUpper
 from ..fem.discretise import Block
@@ -153,3 +155,18 @@ def von_mises(stress: Array) -> Array:
     """(...,) equivalent stress of (..., 6), Pa."""
     xx, yy, zz, xy, yz, xz = np.moveaxis(stress, -1, 0)
     return np.sqrt(0.5 * ((xx - yy) ** 2 + (yy - zz) ** 2 + (zz - xx) ** 2) + 3 * (xy**2 + yz**2 + xz**2))
+
+
+class StaticExtremes(NamedTuple):
+    """Of a static state: the largest displacement, m, and the largest equivalent stress, Pa, NaN where the modal file
+    holds no stress at the nodes."""
+
+    displacement: float
+    stress: float
+
+
+def static_extremes(group: ModalGroup) -> StaticExtremes:
+    """The largest displacement and stress of the static state of a group."""
+    moved = float(np.linalg.norm(group.u_static, axis=-1).max(initial=0.0))
+    stress = group.stresses.get("nodes")
+    return StaticExtremes(moved, np.nan if stress is None else float(von_mises(stress.static_stress).max(initial=0.0)))

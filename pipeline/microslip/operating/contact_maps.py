@@ -50,6 +50,11 @@ class ContactMap:
     samples: int
     by_samples: float
 
+    def span(self, name: str) -> tuple[float, float]:
+        """The smallest and the largest value of one of its fields."""
+        values = getattr(self, name)
+        return float(values.min()), float(values.max())
+
     @property
     def points(self) -> Array:
         """(n, 3) m, body axes."""

@@ -50,6 +50,21 @@ class CycleStress:
     largest: Array
     harmonics: ComplexArray
 
+    @property
+    def highest(self) -> float:
+        """Pa, the largest amplitude of all places."""
+        return float(self.amplitude.max())
+
+    @property
+    def top(self) -> float:
+        """Pa, the largest stress of all places and times."""
+        return float(self.largest.max())
+
+    @property
+    def means(self) -> tuple[float, float]:
+        """Pa, the smallest and the largest mean of all places."""
+        return float(self.mean.min()), float(self.mean.max())
+
 
 def stress_set(group: ModalGroup, location: str = "nodes") -> StressSet:
     """The stress modes of a group.

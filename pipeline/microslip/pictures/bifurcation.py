@@ -50,7 +50,7 @@ def _portraits(found: Diagram, branch: Branch, axes: Axes, parameter_unit: str) 
         y = np.append(y, y[0])
         velocity = np.gradient(np.concatenate([y[-3:-1], y, y[1:3]]), orbit.period / (len(y) - 1))[2:-2]
         style = "-" if branch.stable[i] else (0, (4, 3))
-        label = f"{orbit.p:.4g} {parameter_unit}".strip()
+        label = f"{branch.parameter[i]:.4g} {parameter_unit}".strip()
         axes.plot(y, velocity, ls=style, lw=1.3, color=COLOURS[k], label=label)
     unit = Quantity(branch.units[0]).said if branch.units else ""
     axes.set(xlabel=f"{found.system.named[0]} in {unit}".removesuffix(" in "))

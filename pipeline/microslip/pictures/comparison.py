@@ -42,8 +42,8 @@ def mac_plot(found: Comparison, names: tuple[str, str], path: Path) -> Path:
     for p in found.pairs:
         colour = "white" if p.mac > 0.6 else "#111111"
         axes.text(p.second, p.first, f"{100 * p.mac:.0f}", ha="center", va="center", color=colour, fontsize=7)
-    named = zip((axes.yaxis, axes.xaxis), names, (found.first_frequency, found.second_frequency), strict=True)
-    for axis, name, frequency in named:
+    frequencies = found.first_frequency, found.second_frequency
+    for axis, name, frequency in zip((axes.yaxis, axes.xaxis), names, frequencies, strict=True):
         every = max(1, -(-len(frequency) // 30))
         axis.set_ticks(range(0, len(frequency), every))
         axis.set_ticklabels([f"{j + 1}: {hertz(frequency[j])}" for j in range(0, len(frequency), every)], fontsize=7)

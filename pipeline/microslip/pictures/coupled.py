@@ -103,8 +103,8 @@ def over_orders_picture(found: Mapping[str, OverOrders], path: Path, title: str)
 
 
 def worst_order_picture(found: Sequence[OverOrders], path: Path, title: str) -> Path:
-    """The worst of all engine orders over the normal force: stress where it is known, else amplitude; the lowest is
-    marked, and every point says its engine order."""
+    """The worst of all engine orders over the normal force, as their table has it: stress where it is known, else
+    amplitude; the lowest is marked, and every point says its engine order."""
     stressed = any(np.isfinite(r.stress).any() for r in found)
     of: Literal["stress", "amplitude"] = "stress" if stressed else "amplitude"
     rows = [w for r in found if (w := worst(r, of)) is not None]

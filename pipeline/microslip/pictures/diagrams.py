@@ -82,7 +82,8 @@ def nodal_diameter_plot(basis: ModalBasis, path: Path) -> Path:
     axes.set_title(f"{basis.name}: nodal diameters of {basis.sectors} sectors", fontweight="bold")
     note = "lines join modes of the same shape (MAC)"
     if len(shown) > 1:
-        note = f"filled: at {rpm_text(shown[0].speed)}; hollow: at {rpm_text(shown[1].speed)}; {note}"
+        first, last = ends
+        note = f"filled: at {rpm_text(first)}; hollow: at {rpm_text(last)}; {note}"
     _note(axes, note, -0.11)
     return save_figure(figure, path)
 
@@ -150,7 +151,7 @@ def stuck_plot(basis: ModalBasis, path: Path) -> Path | None:
     axes.set_ylabel("frequency in Hz")
     kept = any(c.modes == "closed" and c.sector_shift for c in basis.groups[speed, harmonics[0]].contacts.values())
     apart, state = ("sliding", "closed along their normal") if kept else ("apart", "open")
-    axes.set_title(f"{basis.name}: neighbours {apart} and stuck, {rpm_text(found.speed)}", fontweight="bold")
+    axes.set_title(f"{basis.name}: neighbours {apart} and stuck, {rpm_text(speed)}", fontweight="bold")
     note = f"lines: contacts {state}; black squares: the contact '{name}' and its neighbour do not move on each other"
     _note(axes, note, -0.11)
     return save_figure(figure, path)
@@ -200,7 +201,7 @@ def _safe_panel(axes: Axes, basis: ModalBasis, speed: int, orders: Sequence[int]
     _close_ones(axes, margins(basis, speed, orders, CLOSE), top)
     _nodal_axis(axes, basis)
     axes.set_ylabel("frequency in Hz")
-    axes.set_title(rpm_text(found.speed), fontsize=11)
+    axes.set_title(rpm_text(speed), fontsize=11)
 
 
 def _safe_ceiling(found: Families, orders: Sequence[int], turns: float) -> float:

@@ -102,7 +102,7 @@ def optimum_plot(
     beside: Mapping[str, Array] | None = None, valid: Mapping[float, bool] | None = None,
 ) -> Path:  # fmt: skip
     """Height and frequency of the highest resonance of what is read over a setting, the optimum marked; hollow and
-    dotted what is not valid.
+    dotted what is doubtful or not valid, crosses where none is known.
 
     Args:
         name: of what was found, where others stand beside it: name -> (4, k) values of the setting, Hz, amplitudes, and
@@ -121,9 +121,12 @@ def optimum_plot(
             axes.plot(x, np.where(ok > 0, y, np.nan), "o-", color=colour, markersize=4, linewidth=1.6, label=said)
     doubtful = not all(one[3].all() for one in curves.values())
     if doubtful:
-        left.plot(
-            [], [], "o:", color="0.3", markersize=4, markerfacecolor="white", label="not valid: contacts lift off"
-        )
+        hollow = {"color": "0.3", "markersize": 4, "markerfacecolor": "white"}
+        left.plot([], [], "o:", **hollow, label="doubtful or not valid, see the table")
+    lost = [value for value in found.found if value not in known]
+    for axes in (left, right) if lost else ():
+        at_the_foot, label = axes.get_xaxis_transform(), "no resonance known, see the table"
+        axes.plot(lost, np.full(len(lost), 0.03), "x", color="#c8382c", transform=at_the_foot, label=label)
     place = list(known).index(found.parameter)
     for axes, y in ((left, scale * own[2]), (right, own[1])):
         at = (found.parameter, y[place])
@@ -141,7 +144,7 @@ def optimum_plot(
     left.margins(y=0.15)
     right.set_ylabel("its frequency in Hz")
     figure.suptitle(title, fontsize=12)
-    if beside or doubtful:
+    if beside or doubtful or lost:
         figure.legend(*left.get_legend_handles_labels(), loc="outside lower center", ncols=4, fontsize=9)
     return save_figure(figure, path)
 

@@ -28,11 +28,11 @@ def moving_gif(basis: ModalBasis, moved: Array, path: Path, title: str) -> Path:
 
 def _frames(studio: views.Studio | ring_views.RingStudio, moved: Array, title: str) -> list[lettering.Picture]:
     sizes = np.linalg.norm(moved, axis=3)
-    largest, (frame, sector) = float(sizes.max()), np.unravel_index(sizes.max(axis=2).argmax(), sizes.shape[:2])
+    full_scale, (frame, sector) = float(sizes.max()), np.unravel_index(sizes.max(axis=2).argmax(), sizes.shape[:2])
     source, count = studio.outside.source, len(moved)
     swing = views.AMPLITUDE if isinstance(studio, views.Studio) else ring_views.SWING
     factor = views.mode_scale(studio, moved[frame, sector], swing)
-    note = f"amplified {factor:.3g} times; largest displacement {METRES.sized(largest)}"
+    note = f"amplified {factor:.3g} times; largest displacement {METRES.sized(full_scale)}"
     if isinstance(studio, views.Studio):
         still, triangles, note = studio.points, studio.outside.triangles, f"{note}; grey lines: at rest"
         studio.stage.lines(studio.basis.mesh.points, studio.outside.outline, (150, 154, 164), 1.5)
@@ -43,7 +43,7 @@ def _frames(studio: views.Studio | ring_views.RingStudio, moved: Array, title: s
     colours = {"cmap": views.DISPLACEMENT_MAP, "clim": (0.0, 1.0)}
     data = studio.stage.skin(still, triangles, np.zeros(len(still)), **colours)
     frames = []
-    for points, size in zip(shown, sizes[:, :, source].reshape(count, -1) / max(largest, 1e-300), strict=True):
+    for points, size in zip(shown, sizes[:, :, source].reshape(count, -1) / max(full_scale, 1e-300), strict=True):
         studio.stage.reshape(data, triangles, points, size)
         frames.append(lettering.captioned(studio.stage.shoot(camera), title, note, 16))
     return frames

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,8 +16,11 @@ from ..operating.stress import CycleStress, StressPeaks
 from ..units import METRES, counted
 from .plots import (
     COLOURS,
+    LIGHT,
     by_rows,
     empty_figure,
+    lighter,
+    lighter_means,
     mark_missing,
     plain_numbers,
     said_beside,
@@ -38,6 +41,15 @@ Curves = Mapping[float, tuple[Array, Array]]
 """Normal force, N -> abscissa and ordinate of a curve."""
 
 
+Unsure = Callable[[float, Array], Array]
+"""Normal force (N) and frequencies (Hz) -> bool, where amplitudes are uncertain."""
+
+
+def all_sure(normal: float, frequency: Array) -> Array:
+    """Nowhere."""
+    return np.zeros(len(frequency), dtype=bool)
+
+
 def shades(count: int) -> list[tuple[float, ...]]:
     """Colours of a rising parameter, light to dark; a single one is dark."""
     from matplotlib import colormaps
@@ -49,15 +61,18 @@ def shades(count: int) -> list[tuple[float, ...]]:
 
 
 def over_frequency_plot(
-    curves: Curves, quantity: str, title: str, path: Path, lifted: Mapping[float, Array] | None = None
-) -> Path:
+    curves: Curves, quantity: str, title: str, path: Path, lifted: Mapping[float, Array] | None = None,
+    unsure: Unsure = all_sure,
+) -> Path:  # fmt: skip
     """A quantity over the frequency (Hz) for every normal force, on a logarithmic scale.
 
     Args:
         curves: NaN where a point did not converge, which is marked. quantity: label of the ordinate with its unit.
             lifted: normal force, N -> which points are not valid, because contacts would lift off; they are dotted.
+            unsure: see `Unsure`; curves are lighter there.
     """
     figure, axes = single_panel(9.0, 6.0)
+    axes.set_yscale("log")
     pairs = list(zip(shades(len(curves)), sorted(curves.items()), strict=True))
     told = ""
     for width, (colour, (normal, (x, y))) in zip(widths(len(pairs)), pairs, strict=True):
@@ -66,7 +81,8 @@ def over_frequency_plot(
             axes.semilogy(*through(x, np.where(off, y, np.nan)), color=colour, linewidth=width, linestyle=":")
             told = "dotted: contacts would lift off, not valid"
         line = {"linestyle": ":" if off.all() else "-", "label": f"$F_N$ = {normal:g} N"}
-        axes.semilogy(*through(x, np.where(off, np.nan, y)), color=colour, linewidth=width, **line)
+        fine, drawn = through(x, np.where(off, np.nan, y))
+        lighter(axes, fine, drawn, unsure(normal, fine), color=colour, linewidth=width, **line)
     for row, (colour, (_, (x, y))) in enumerate(pairs):
         mark_missing(axes, x[np.isnan(y)], colour, row)
     low, high = (f(float(f(x)) for x, _ in curves.values()) for f in (min, max))
@@ -80,13 +96,14 @@ def over_frequency_plot(
 
 def over_normal_force_plot(
     peaks: Mapping[str, Sequence[tuple[float, float]]], quantity: str, title: str, path: Path,
-    lifted: Collection[float] = (),
+    lifted: Collection[float] = (), unsure: Collection[tuple[float, float]] = (),
 ) -> Path:  # fmt: skip
     """The largest value of each resonance over the normal force (N), both logarithmic; the lowest is marked.
 
     Args:
         peaks: name of a resonance -> (normal force, value) pairs. A normal force of 0 has no place on the axis.
-            lifted: normal forces under which contacts would lift off, so that values are not valid: hollow.
+            lifted: normal forces under which contacts would lift off, so that values are not valid: hollow. unsure:
+            pairs that are uncertain: lighter.
     """
     figure, axes = single_panel(8.0, 5.2)
     for i, (name, pairs) in enumerate(peaks.items()):
@@ -96,7 +113,9 @@ def over_normal_force_plot(
         off = np.isin(x, list(lifted))
         colour, best = COLOURS[i % len(COLOURS)], int(np.argmin(np.where(off & ~off.all(), np.inf, y)))
         axes.loglog(x, y, "-", color=colour, linewidth=1.6, label=name)
-        axes.plot(x[~off], y[~off], "o", color=colour, markersize=4)
+        light = np.array([pair in unsure for pair in zip(x, y, strict=True)])
+        axes.plot(x[~off & ~light], y[~off & ~light], "o", color=colour, markersize=4)
+        axes.plot(x[~off & light], y[~off & light], "o", color=colour, markersize=4, alpha=LIGHT)
         axes.plot(x[off], y[off], "o", color=colour, markersize=4, mfc="white")
         if 0 < best < len(x) - 1:
             axes.plot(x[best], y[best], "o", markersize=9, mfc="none", mec=colour, mew=1.6)
@@ -109,7 +128,9 @@ def over_normal_force_plot(
     axes.margins(y=0.15)
     for axis in (axes.xaxis, axes.yaxis):
         numbers_within(axis)
-    if len(peaks) > 1 or hollow:
+    if len(unsure):
+        axes.plot([], [], "o", color="0.3", markersize=4, alpha=LIGHT, label=lighter_means())
+    if len(peaks) > 1 or hollow or len(unsure):
         axes.legend(fontsize=9)
     return save_figure(figure, path)
 
@@ -153,18 +174,20 @@ def haigh_plot(cycle: CycleStress, limits: MaterialLimits, worst: Endurance, tit
         xlim=(left, 1.03e-6 * limits.tensile_strength),
     )
     axes.legend(fontsize=9, loc="upper right")
-    _close_up(axes, mean, amplitude)
+    _close_up(axes, cycle)
     return save_figure(figure, path)
 
 
-def _close_up(axes: Axes, mean: Array, amplitude: Array) -> None:
+def _close_up(axes: Axes, cycle: CycleStress) -> None:
     """Where the places fill a corner of the diagram alone: a window on them, or words where no mean stress shows."""
     (left, right), (_, top) = axes.get_xlim(), axes.get_ylim()
-    high = float(amplitude.max())
+    mean, amplitude, high = 1e-6 * cycle.mean, 1e-6 * cycle.amplitude, 1e-6 * cycle.highest
     if not 0 < high < 0.25 * top:
         return
     if np.ptp(mean) < 0.005 * (right - left):
-        said = f"all places: mean stress {mean.min():.2g} to {mean.max():.2g} MPa,\namplitude up to {high:.3g} MPa"
+        least, most = cycle.means
+        said = f"all places: mean stress {1e-6 * least:.2g} to {1e-6 * most:.2g} MPa,\n"
+        said += f"amplitude up to {high:.3g} MPa"
         line = {"arrowstyle": "-", "color": COLOURS[0]}
         said_beside(axes, said, (mean.mean(), high), (40, 40), fontsize=9, color=COLOURS[0], arrowprops=line)
         return
@@ -249,17 +272,18 @@ def _map_panel(
     axes.set_aspect("equal")
     axes.set_ylabel(("t2" if lies else "t1") + " in mm", fontsize=9)
     axes.tick_params(labelsize=8)
-    axes.set_title(f"{label}{between}{_span(values)} {unit}", fontsize=9.5)
+    axes.set_title(f"{label}{between}{_span(m.span(name), scale)} {unit}", fontsize=9.5)
     ticks: Any = MaxNLocator(4) if high > low else [0.0]
     bar = axes.figure.colorbar(shown, ax=axes, shrink=0.95, pad=0.02, aspect=10, ticks=ticks)
     bar.ax.tick_params(labelsize=7.5)
 
 
-def _span(values: Array) -> str:
+def _span(ends: tuple[float, float], scale: float) -> str:
     """Smallest and largest value; one where both read the same."""
-    low, high = float(values.min()), float(values.max())
-    told = f"{low:.3g} to {high:.3g}"
-    return f"{high:.3g} everywhere, in" if told == f"{high:.3g} to {high:.3g}" else told
+    low, high = ends
+    told = f"{scale * low:.3g} to {scale * high:.3g}"
+    same = told == f"{scale * high:.3g} to {scale * high:.3g}"
+    return f"{scale * high:.3g} everywhere, in" if same else told
 
 
 # the body ----------------------------------------------------------------------------------------------------------
@@ -285,24 +309,25 @@ def stress_picture(
     n = studio.basis.mesh.n_points
     if len(cycle.points) != n or any(len(p.group.phi) != n for p in motion.parts):
         return None
-    shape, size, degrees = farthest(motion, n)
-    grown = views.nice(views.AMPLITUDE * studio.extent / max(size, 1e-300))
+    shape, full_scale, degrees = farthest(motion, n)
+    grown = views.nice(views.AMPLITUDE * studio.extent / max(full_scale, 1e-300))
     moved = (studio.basis.mesh.points + grown * shape)[studio.outside.source]
     camera = fit(np.vstack([studio.points, moved]), studio.axes, views.AREA)
-    fields = [("stress amplitude (von Mises)", 1e-6 * cycle.amplitude, "MPa", views.STRESS_MAP)]
-    if np.abs(cycle.mean).max() > 0.05 * float(cycle.amplitude.max()):
-        fields.append(("largest stress of the cycle", 1e-6 * cycle.largest, "MPa", views.STRESS_MAP))
+    swing, most = 1e-6 * cycle.highest, 1e-6 * cycle.top
+    fields = [("stress amplitude (von Mises)", 1e-6 * cycle.amplitude, "MPa", swing)]
+    if np.abs(cycle.mean).max() > 0.05 * cycle.highest:
+        fields.append(("largest stress of the cycle", 1e-6 * cycle.largest, "MPa", most))
     if limits is not None:
         used = 100.0 / np.maximum(vibration_margin(limits, cycle.amplitude, cycle.mean), 1e-3)
-        fields.append(("share of the endured amplitude", used, "%", views.STRESS_MAP))
+        fields.append(("share of the endured amplitude", used, "%", np.nan))
     tiles = []
-    for label, values, unit, colours in fields:
-        image = views.stress_tile(studio, values, grown * shape, camera, 0.8, unit, colours, mark=mark)
+    for label, values, unit, largest in fields:
+        image = views.stress_tile(studio, values, grown * shape, camera, 0.8, unit, largest, mark=mark)
         tiles.append(captioned(image, label, size=16))
     ring = "" if mark is None else f" Ring: the worst place{'' if _seen(studio, mark) else ', on the far side'}."
     note = (
         f"Drawn at {degrees:.0f} degrees of the cycle, {grown:g} times as large; largest displacement "
-        f"{METRES.sized(size, 3)}; grey lines: at rest.{ring}"
+        f"{METRES.sized(full_scale, 3)}; grey lines: at rest.{ring}"
     )
     return captioned(side_by_side(tiles), title, note, 20)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -34,11 +34,14 @@ WINDOW = 8
 EVENT_MARKS = (("closes", "v", 4, "meets"), ("slips", "|", 9, "begins to slip"))
 
 
-def orbit_picture(orbit: Orbit, path: Path, title: str) -> Path:
+def orbit_picture(orbit: Orbit, row: Mapping[str, float], path: Path, title: str) -> Path:
     """What its read-out does, and where there is friction, the ways of contacts in their plane and their loops.
 
     Phase portrait, the last periods with events, the spectrum; where the motion does not repeat, its Poincare section
     and how the spectrum changes. Of a run-up, its size over the frequency, and the spectrum that changes with that.
+
+    Args:
+        row: of the table of motions, whose numbers stand above.
     """
     panels: list[Panel] = [orbit.plot, partial(_history, orbit), partial(_spectrum, orbit)]
     if orbit.run_up:
@@ -61,7 +64,9 @@ def orbit_picture(orbit: Orbit, path: Path, title: str) -> Path:
     for axes in places[len(panels) :]:
         axes.set_visible(False)
     places[0].legend(fontsize=8, loc="lower left", bbox_to_anchor=(0.0, 1.0), frameon=False)
-    figure.suptitle(title, fontweight="bold")
+    lost = row["lost_in_contacts_J_per_period"]
+    more = f"; contacts lose {lost:.4g} J a period" if len(orbit.touching) and np.isfinite(lost) else ""
+    figure.suptitle(title + more, fontweight="bold")
     return save_figure(figure, path)
 
 
@@ -199,7 +204,7 @@ def _of_contact(orbit: Orbit, contact: int, areas: Array) -> list[Panel]:
     own = areas[rows]
     for k, name in names.items():
         if abs(own[k]) >= 0.01 * np.abs(own).max():
-            found.append(partial(_loop, orbit, rows.start + k, f"{met.name}, {name}", float(own[k])))
+            found.append(partial(_loop, orbit, rows.start + k, f"{met.name}, {name}"))
     return found
 
 
@@ -212,13 +217,13 @@ def _way(orbit: Orbit, contact: int, axes: Axes) -> None:
     axes.set_aspect("equal", adjustable="datalim")
 
 
-def _loop(orbit: Orbit, row: int, name: str, area: float, axes: Axes) -> None:
-    """Force over displacement of the periods that `classification.loops` takes; that area stands above."""
+def _loop(orbit: Orbit, row: int, name: str, axes: Axes) -> None:
+    """Force over displacement of the periods that `classification.loops` takes. Its area is no loss where the ground
+    moves, so none is written."""
     count = (orbit.repeats or SHOWN) * orbit.samples + 1
     d, unit = _sized(orbit.d[row, -count:])
     axes.plot(d, orbit.force[row, -count:], color=COLOURS[4], linewidth=1.0)
     axes.set(xlabel=f"{name}: displacement in {unit}", ylabel="force in N")
-    axes.set_title(f"loses {area:.4g} J a period", fontsize=9)
 
 
 def chatter_picture(orbit: Orbit, contact: int, path: Path, title: str) -> Path:

@@ -15,6 +15,7 @@ from ..data import Array, ContactState, ModalBasis, ModalGroup
 from ..files.store import complete_or_absent
 from ..modal.campbell import SURE, VISIBLE, Crossing, Tracks, crossings, gyroscopic_change, parted
 from ..reduced.truncation import Coordinate, coordinates, percent
+from ..results.checks import UNCERTAIN
 from ..units import METRES, from_rpm, rpm_text, to_rpm
 
 if TYPE_CHECKING:
@@ -76,6 +77,25 @@ def through(x: Array, y: Array, each: int = 8) -> tuple[Array, Array]:
             scale = y[run].max()
             out[inside] = scale / np.sqrt(PchipInterpolator(x[run], (scale / y[run]) ** 2)(fine[inside]))
     return fine, out
+
+
+LIGHT = 0.35
+"""How much of its colour a curve keeps where it is uncertain."""
+
+
+def lighter_means() -> str:
+    """For a legend."""
+    return f"lighter: uncertain by more than {100 * UNCERTAIN:g} %"
+
+
+def lighter(axes: Axes, x: Array, y: Array, unsure: Array, **line: Any) -> None:
+    """A curve, lighter where its points (bool, like x) are uncertain; the first one of an axes is told in the
+    legend."""
+    axes.plot(x, np.where(unsure, np.nan, y), **line)
+    if unsure.any():
+        told = lighter_means()
+        label = "_" if told in axes.get_legend_handles_labels()[1] else told
+        axes.plot(x, np.where(unsure, y, np.nan), **(line | {"alpha": LIGHT, "label": label}))
 
 
 def widths(count: int) -> list[float]:
@@ -314,7 +334,7 @@ def _campbell_frame(axes: Axes, basis: ModalBasis, rpm: Array, top: float, track
     if (tracks.mac[shown] < SURE).any():
         note += f"; dotted: MAC below {SURE:g}, add speeds"
     if (change := gyroscopic_change(basis)) and change <= VISIBLE:
-        note += f"; gyroscopic coupling changes them by {100 * change:.2g} % at most"
+        note += f"; gyroscopic coupling changes them by less than {100 * VISIBLE:g} %"
     elif change:
         note += "; engine orders meet the branches with gyroscopic coupling"
     if not shown.all():

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -20,7 +19,7 @@ from ..harmonic_balance.sweeps import overhanging
 from ..results.names import apart
 from ..units import METRES, Quantity
 from .operating import shades
-from .plots import by_rows, mark_missing, plain_numbers, said_beside, through, widths, write_png
+from .plots import by_rows, lighter, mark_missing, plain_numbers, said_beside, through, widths, write_png
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -127,7 +126,8 @@ def _curves(
         line, label = style if np.isfinite(amplitude).any() else ":", f"$F_N$ = {said} N{of}"
         single = [(f, by * a) for f, a in peaks if f in apart_from_it]
         axes.plot(*np.reshape(single, (-1, 2)).T, "o", color=colour, ms=4)
-        axes.plot(*through(f[on], amplitude[on]), color=colour, lw=width, ls=line, label=label)
+        x, y = through(f[on], amplitude[on])
+        lighter(axes, x, y, result.unsure(normal, x), color=colour, lw=width, ls=line, label=label)
     for row, (colour, normal) in enumerate(zip(colours, forces * (w.number == 0), strict=False)):
         r = result.responses[normal]
         mark_missing(axes, r.frequency[~r.converged], colour, row)
@@ -145,7 +145,7 @@ LEGEND = 6
 def _stuck_lines(axes: Axes, frequencies: Array, width: float) -> None:
     """A line at every frequency (Hz), its number on a side where there is so much room (Hz) for it."""
     taken, last = axes.get_xlim()
-    for f, end in pairwise([*frequencies, last]):
+    for f, end in zip(frequencies, [*frequencies[1:], last], strict=False):  # nothing of none
         axes.axvline(f, color="0.75", lw=0.8, ls="--", zorder=0)
         right = end - f > width
         if right or f - width > taken:

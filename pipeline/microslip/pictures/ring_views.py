@@ -198,10 +198,10 @@ def operating_ring(bodies: Sequence[Round], axis: Array, point: Array, title: st
     triangles = np.concatenate([s[2] + start for s, start in zip(skins, begins, strict=False)])
     parts = np.einsum("vdi,vi->dv", _directions(still - point, axis), moved)
     strongest = int((parts**2).sum(axis=1).argmax())
-    size = np.linalg.norm(moved, axis=1).max()
-    grown = nice(SWING * _diameter(still - point, axis) / max(float(size), 1e-300))
-    most = float(np.abs(parts[strongest]).max())
-    value, (scale, unit) = parts[strongest] / max(most, 1e-300), METRES.scale(most)
+    full_scale = float(np.linalg.norm(moved, axis=1).max())
+    grown = nice(SWING * _diameter(still - point, axis) / max(full_scale, 1e-300))
+    top = float(np.abs(parts[strongest]).max())
+    value, (scale, unit) = parts[strongest] / max(top, 1e-300), METRES.scale(top)
     stage = Stage()
     try:
         drawn = still + grown * moved
@@ -210,10 +210,10 @@ def operating_ring(bodies: Sequence[Round], axis: Array, point: Array, title: st
     finally:
         stage.close()
     bar = colour_bar(
-        _map(COLOURS), f"{-scale * most:.3g}", f"{scale * most:.3g}", f"{DIRECTIONS[strongest]} displacement in {unit}",
+        _map(COLOURS), f"{-(scale * top):.3g}", f"{scale * top:.3g}", f"{DIRECTIONS[strongest]} displacement in {unit}",
         image.width,
     )  # fmt: skip
-    told = f"{note}, {grown:g} times as large; largest displacement {METRES.sized(size, 3)}."
+    told = f"{note}, {grown:g} times as large; largest displacement {METRES.sized(full_scale, 3)}."
     return captioned(stacked([image, bar], 4), title, told, 20)
 
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..data import Array, ModalBasis
 from ..mesh import boundary_facets
-from ..rolling.brush import fitted, jump
+from ..rolling.brush import jump
 from ..rolling.slip import Studied
 from .plots import COLOURS, empty_figure, plain_axes, save_figure
 from .scene import element_sides
@@ -45,17 +45,17 @@ def tyre_picture(found: Studied, path: Path, title: str, wheel: ModalBasis | Non
     slips, forces = found.steady
     steady.plot(100 * slips, forces, color=COLOURS[0])
     steady.set(xlabel="slip in %", ylabel="force over normal force", ylim=(0, None), title="steady rolling")
-    shown = found.case.jumps.shown
-    for i, (first, last) in enumerate(((0.0, shown), (shown, 0.0))):
+    shown, c = found.case.jumps.shown, found.constants
+    row, seen = int(np.flatnonzero(c["slip"] == shown)[0]), slice(int(np.ceil(4.0 * len(b.share))) + 1)
+    for i, (way, first, last) in enumerate((("up", 0.0, shown), ("down", shown, 0.0))):
         time, force = jump(b, first, last, r.force)
-        constant, seen = fitted(time, force), slice(int(np.ceil(4.0 * len(b.share))) + 1)
+        constant = c[f"{way}_fitted_s"][row]
         time, force, end = time[seen], force[seen], force[-1]
         one.plot(time, force / r.force, color=COLOURS[i], label=f"slip {100 * first:g} to {100 * last:g} %")
         fit = end + (force[0] - end) * np.exp(-time / constant)
         one.plot(time, fit / r.force, ":", color=COLOURS[i], label=f"exponential of {constant:.3g} s")
     one.set(xlabel="time in s", ylabel="force over normal force", title="a jump and back")
     one.legend(fontsize=8)
-    c = found.constants
     for i, (way, name) in enumerate((("up", "from 0"), ("down", "back to 0"))):
         constants.plot(100 * c["slip"], c[f"{way}_fitted_s"], "o-", markersize=3, color=COLOURS[i], label=name)
         constants.plot(

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..data import Array, Indices, Interface, ModalBasis, ModalGroup
-from ..modal.stress import von_mises
+from ..modal.stress import static_extremes, von_mises
 from ..units import rpm_text
 from .lettering import (
     INK,
@@ -143,8 +143,7 @@ def mesh_picture(studio: Studio) -> Picture:
         studio.stage.lines(nearer, outside.outline, (20, 22, 28), 2.0)
         views.append(_measured(studio.stage.shoot(camera), camera))
     both = side_by_side(views)
-    unit = max(areas.values(), default=0.0)
-    entries = [(colours[n], f"{n}  {_area_text(areas[n], unit)}") for n in names] + unnamed
+    entries = [(colours[n], n) for n in names] + unnamed
     cells = ", ".join(f"{len(c)} {kind}" for kind, c in basis.mesh.cells.items())
     title = f"{basis.name}: mesh and named faces"
     note = f"{basis.mesh.n_points} points, {cells}. Seen from two opposite sides."
@@ -171,9 +170,9 @@ def _area(studio: Studio, name: str) -> float:
     return 0.5 * float(np.linalg.norm(triangle_normals(studio.points, studio.outside.triangles[chosen]), axis=1).sum())
 
 
-def _area_text(area: float, largest: float) -> str:
-    """An area, m2, in the unit that suits the largest of its company."""
-    scale, name = (1e6, "mm²") if largest < 0.1 else (1e4, "cm²")
+def _area_text(area: float) -> str:
+    """An area, m2, in the unit that suits it."""
+    scale, name = (1e6, "mm²") if area < 0.1 else (1e4, "cm²")
     return f"{area * scale:.0f} {name}" if area * scale >= 100 else f"{area * scale:.3g} {name}"
 
 
@@ -289,9 +288,8 @@ def _patch_tile(studio: Studio, name: str, item: Interface, size: tuple[int, int
     for axis, text, colour in zip(item.rotation, ("n", "t1", "t2"), FRAME_COLOURS, strict=True):
         at = camera.project(item.origin + 1.12 * arm * axis)[0]
         draw.text(tuple(at), text, colour, face, anchor="mm", stroke_width=3, stroke_fill="white")
-    area = float(item.areas.sum())
     role = item.role + (f", faces {item.partner}" if item.partner else "")
-    note = f"{role}; {len(item.areas)} points, {_area_text(area, area)}"
+    note = f"{role}; {len(item.areas)} points, {_area_text(item.area)}"
     draw.rectangle((0, 0, image.width - 1, image.height - 1), outline=(190, 194, 202))
     return captioned(image, name, note, 18)
 
@@ -417,21 +415,26 @@ def stress_sheet(studio: Studio, group: ModalGroup, count: int, camera: Camera) 
     for j in chosen:
         factor = ONE_MILLIMETRE / np.linalg.norm(group.phi[:, :, j], axis=1).max()
         shape = mode_scale(studio, group.phi[:, :, j]) * group.phi[:, :, j]
-        image = stress_tile(studio, 1e-6 * factor * von_mises(stress.stress[:, :, j]), shape, camera, 0.75, "MPa")
+        values = 1e-6 * factor * von_mises(stress.stress[:, :, j])
+        image = stress_tile(studio, values, shape, camera, 0.75, "MPa", np.nan)
         tiles.append(captioned(image, mode_title(group, j), size=17))
     title = f"{studio.basis.name}: stress modes{at_speed(group)}"
     note = (
         "Equivalent stress (von Mises) in MPa when the largest displacement of the mode is 1 mm; shapes amplified. "
-        "The colours leave out the highest 0.2 % of the values; the largest is written below."
+        "The colours leave out the highest 0.2 % of the values."
     )
     return sheet(tiles, title, note)
 
 
 def stress_tile(
-    studio: Studio, values: Array, shape: Array, camera: Camera, factor: float, unit: str, colours: str = STRESS_MAP,
-    mark: int | None = None,
+    studio: Studio, values: Array, shape: Array, camera: Camera, factor: float, unit: str, largest: float,
+    colours: str = STRESS_MAP, mark: int | None = None,
 ) -> Picture:  # fmt: skip
-    """One deformed body coloured by nodal values (n,), with its colour bar; a ring is drawn round the node `mark`."""
+    """One deformed body coloured by nodal values (n,), with its colour bar; a ring is drawn round the node `mark`.
+
+    Args:
+        largest: value that is written below, of the table; NaN: none.
+    """
     outside = studio.outside
     seen = values[outside.source]
     top = float(np.quantile(seen, 0.998)) or 1.0
@@ -443,10 +446,8 @@ def stress_tile(
         for radius, colour, width in ((15, "white", 6), (14, INK, 3)):
             pen(image).ellipse((x - radius, y - radius, x + radius, y + radius), outline=colour, width=width)
     image = scaled(image, factor)
-    peak = float(seen.max())
-    return stacked(
-        [image, colour_bar(_map(colours), "0", number(top), f"{unit}; largest {number(peak)} {unit}", image.width)], 4
-    )
+    told = f"; largest {number(largest)} {unit}" if np.isfinite(largest) else ""
+    return stacked([image, colour_bar(_map(colours), "0", number(top), f"{unit}{told}", image.width)], 4)
 
 
 def static_picture(studio: Studio, group: ModalGroup) -> Picture | None:
@@ -455,6 +456,7 @@ def static_picture(studio: Studio, group: ModalGroup) -> Picture | None:
     size = np.linalg.norm(u, axis=1) if len(u) == studio.basis.mesh.n_points else np.zeros(1)
     if not size.any():
         return None
+    static = static_extremes(group)
     grown = nice(0.06 * studio.extent / size.max())
     shape = grown * u
     moved = (studio.basis.mesh.points + shape)[studio.outside.source]
@@ -462,9 +464,10 @@ def static_picture(studio: Studio, group: ModalGroup) -> Picture | None:
     tiles = []
     stress = group.stresses.get("nodes")
     if stress is not None and len(stress.points) == studio.basis.mesh.n_points:
-        image = stress_tile(studio, 1e-6 * von_mises(stress.static_stress), shape, camera, 1.0, "MPa")
+        values = 1e-6 * von_mises(stress.static_stress)
+        image = stress_tile(studio, values, shape, camera, 1.0, "MPa", 1e-6 * static.stress)
         tiles.append(captioned(image, "Equivalent stress", size=17))
-    image = stress_tile(studio, 1e3 * size, shape, camera, 1.0, "mm", DISPLACEMENT_MAP)
+    image = stress_tile(studio, 1e3 * size, shape, camera, 1.0, "mm", 1e3 * static.displacement, DISPLACEMENT_MAP)
     tiles.append(captioned(image, "Displacement", size=17))
     title = f"{studio.basis.name}: static state{at_speed(group)}"
     return captioned(

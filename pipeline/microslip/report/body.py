@@ -13,13 +13,14 @@ from ..basis import check_basis
 from ..data import ModalBasis, ModalGroup
 from ..linalg.gyroscopic import stability_sentence
 from ..modal.campbell import crossings, engine_orders, parted, track_basis
+from ..modal.stress import static_extremes
 from ..reduced.compliance import SUPPLIED, Share, has_residual, sentence, shares
 from ..reduced.coordinates import basis_in_modes
 from ..reduced.quality import sentences
 from ..reduced.truncation import percent, verdict
 from ..ring.expansion import certificate_words, certify_ring, ring_checks
 from ..ring.resonances import eigenmodes, harmonics_of, speeds_of
-from ..units import rpm_text, to_rpm
+from ..units import METRES, rpm_text, to_rpm
 from . import ring
 from .page import Album, Piece, fold, number, page, say, table
 from .response import answer, response_pieces, warnings
@@ -54,7 +55,7 @@ def report_html(
         "Frequencies": ring.frequencies(basis, album) if cyclic else _frequencies(basis, album),
         "Engine orders": ring.orders(basis, album) if cyclic else [],
         "Modes": _modes(basis, album),
-        "Stresses": [album.take("stress_modes", tone="wide"), album.take("static")],
+        "Stresses": [album.take("stress_modes", tone="wide"), _static(basis), album.take("static")],
         "Interfaces": _interfaces(basis, album),
         "Static contact": _contacts(basis, album),
         "How many modes are enough": _truncation(stored, basis, album),
@@ -71,6 +72,17 @@ def report_html(
 
 def _groups(basis: ModalBasis) -> list[ModalGroup]:
     return [basis.groups[k] for k in sorted(basis.groups)]
+
+
+def _static(basis: ModalBasis) -> Piece:
+    """The largest displacement and stress of every static state at speed."""
+    said = []
+    for group in {g.speed: g for g in reversed(_groups(basis))}.values():
+        moved, stress = static_extremes(group)
+        stressed = f", equivalent stress up to {number(1e-6 * stress)} MPa" if np.isfinite(stress) else ""
+        if moved > 0:
+            said.append(f"Static state at {rpm_text(group.speed)}: displacement up to {METRES.sized(moved)}{stressed}.")
+    return say(*said[::-1])
 
 
 def _clean(values: Any, scale: float) -> Any:
@@ -228,7 +240,7 @@ def _interfaces(basis: ModalBasis, album: Album) -> list[Piece]:
     for name, i in group.interfaces.items():
         role = i.role + (f", faces {i.partner}" if i.partner else "")
         normal = _list(_clean(i.rotation[0], 1.0), 3)
-        rows.append([name, role, number(1e6 * i.areas.sum()), len(i.areas), _place(i.origin, basis), normal])
+        rows.append([name, role, number(1e6 * i.area), len(i.areas), _place(i.origin, basis), normal])
     head = ["interface", "role", "area in mm²", "points", "origin in mm", "outward normal"]
     contacts = {name: i for name, i in group.interfaces.items() if i.role != "load"}
     fit = say(*(fit_sentence(name, i, group) for name, i in contacts.items()))

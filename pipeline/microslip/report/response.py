@@ -58,10 +58,18 @@ def _of_others(response: Mapping[str, Any]) -> str:
 
 
 def _sentences(response: Mapping[str, Any]) -> list[str]:
-    """The highest and the lowest resonance, the largest stress, what the numbers are worth."""
-    rows = response.get("resonances", [])
+    """How it was solved where that matters, the highest and the lowest resonance, the largest stress, what the numbers
+    are worth."""
+    rows, method = response.get("resonances", []), response.get("method", "")
+    return [*([method] if method else []), *_of_resonances(response, rows)]
+
+
+def _of_resonances(response: Mapping[str, Any], rows: Sequence[Mapping[str, Any]]) -> list[str]:
+    """The same without how it was solved."""
+    if not rows and (lost := response.get("unsolved")):
+        return [f"No resonance was found, though there may be one: {lost}."]
     if not rows:
-        said = "No resonance was found in the band." if "resonances" in response else ""
+        said = "There is no resonance in the band." if "resonances" in response else ""
         return [said, *(f"{_fold(row, _factors(response))}." for row in response.get("folds", ()))]
     doubtful = sum(bool(row.get("doubt")) for row in rows)
     lifted, valid = lifted_forces(rows), _valid(rows)

@@ -27,6 +27,10 @@ COUNTED = 0.05
 the square of the samples: 64 leave 2e-4 of forty random systems in the median and 5e-3 at most
 (`tests/test_random_systems.py`); bodies that hit each other between few samples leave more than this."""
 
+UNCERTAIN = 0.05
+"""What an amplitude is likely to be off by for want of harmonics and samples, over it, from which on it
+is called uncertain in tables and pictures."""
+
 MOTION = 1e-4
 """Share of the contacts' motion by which the bodies' may differ from it."""
 
@@ -111,7 +115,7 @@ def sentence(response: Response, estimated: float | None) -> str:
     Args:
         estimated: largest estimated error of an amplitude for want of harmonics and samples, over it; None: not known.
     """
-    guess = "not estimated" if estimated is None else f"estimated as {percent(estimated)}"
+    guess = "not estimated" if estimated is None else f"estimated as {percent(estimated)} at most"
     guess = guess if estimated is None or np.isfinite(estimated) else "unknown, no finer solution was found"
     worst = Checks(*(_worst(response.series, name) for name in ("balance", "counted", "motion")))
     return f"{checked(worst)}, error of harmonics and samples: {guess}; {_of_points(response.series)}"

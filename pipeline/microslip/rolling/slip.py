@@ -136,8 +136,9 @@ class Studied:
 
     @cached_property
     def constants(self) -> dict[str, Array]:
-        """Of the table of jumps: time constants, s, by the exponential that fits best, and by 1 - 1/e of the change."""
-        targets = np.array(self.case.jumps.targets)
+        """Of the table of jumps, the one that is drawn among them: time constants, s, by the exponential
+        that fits best, and by 1 - 1/e of the change."""
+        targets = np.unique([*self.case.jumps.targets, self.case.jumps.shown])
         columns = {"slip": targets}
         rigid = replace(self.brush, compliance=0.0)
         for name, brush in (("", self.brush), ("rigid_", rigid)):

@@ -76,7 +76,8 @@ class Spectrum:
         grow = np.flatnonzero(verdict == "unstable")
         each = ", ".join(f"{self._place(i)} by {self.growth[i]:.4g} 1/s" for i in grow[:6])
         more = f" and {len(grow) - 6} more" if len(grow) > 6 else ""
-        said = f"{len(grow) or 'none'} of {n} roots grow{'s' * (len(grow) < 2)}{': ' * bool(each)}{each}{more}"
+        roots = f"{n} roots" if self.complete else f"the {n} roots that were found"
+        said = f"{len(grow) or 'none'} of {roots} grow{'s' * (len(grow) < 2)}{': ' * bool(each)}{each}{more}"
         neutral = int((verdict == "neutral").sum())
         return f"{said}; {neutral} neutral; {self.proof}"
 

@@ -5,7 +5,7 @@ From a response file and the body's modal file alone, whoever computed them and 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -65,6 +65,7 @@ class Assessment:
             None. quantity: what the read-out measures. everywhere: whether
             the points are enough for a curve over the frequency. lifted: normal force (N) -> which of the points to
             draw are not valid, because contacts would lift off; not_valid: those under which a resonance is not.
+            unsure: normal force (N) and frequencies (Hz) -> where amplitudes are uncertain, or None.
             several: whether the response has other bodies too.
     """
 
@@ -76,6 +77,7 @@ class Assessment:
     everywhere: bool = True
     lifted: Mapping[float, Array] = field(default_factory=dict)
     not_valid: frozenset[float] = frozenset()
+    unsure: Callable[[float, Array], Array] | None = None
     several: bool = False
 
     @property
@@ -260,8 +262,9 @@ def draw(
     if curves and found.everywhere:
         label, title = f"largest stress amplitude of {found.whose} in MPa", f"{case}: largest stress of {found.whose}"
         drawn["stress over frequency"] = operating.over_frequency_plot(
-            curves, label, title, folder / "stress_over_frequency.png", found.lifted
-        )
+            curves, label, title, folder / "stress_over_frequency.png", found.lifted,
+            found.unsure or operating.all_sure,
+        )  # fmt: skip
     if lines := over_force(found):
         drawn["stress over normal force"] = operating.over_normal_force_plot(
             lines,
@@ -269,6 +272,7 @@ def draw(
             f"{case}: largest stress of {found.whose} at its resonances",
             folder / "stress_over_normal_force.png",
             found.not_valid,
+            doubtful(found),
         )
     top = found.highest
     if top is not None:
@@ -319,6 +323,15 @@ def over_force(found: Assessment) -> dict[str, list[tuple[float, float]]]:
     if len({r.normal_force for line in lines.values() for r in line}) < 3:
         return {}
     return {name: [(r.normal_force, 1e-6 * r.worst.amplitude) for r in line] for name, line in lines.items()}
+
+
+def doubtful(found: Assessment) -> set[tuple[float, float]]:
+    """Those of the pairs of `over_force` whose amplitude is uncertain."""
+    unsure = found.unsure
+    if unsure is None:
+        return set()
+    each = [(r, unsure(r.normal_force, np.array([r.frequency]))[0]) for r in found.resonances]
+    return {(r.normal_force, 1e-6 * r.worst.amplitude) for r, doubt in each if doubt}
 
 
 def _at_worst(

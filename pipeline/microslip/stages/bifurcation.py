@@ -138,8 +138,9 @@ def told(asked: BifurcationOfCase, found: Diagram) -> list[str]:
         said.append(f"{asked.name}: Hopf point at {point.p:.6g}{unit}, {point.omega:.6g} rad/s, {kind}.")
     for b in found.branches:
         passed = [WORDS[str(k)](f"{p:.6g}{unit}") for k, p in zip(b.kind, b.parameter, strict=True) if str(k) in WORDS]
+        nothing = "nothing on the way" + " as far as it was followed" * b.lost
         if not b.still or passed:
-            said.append(f"{asked.name}, {b.name}: born at the {b.born}; {', '.join(passed) or 'nothing on the way'}.")
+            said.append(f"{asked.name}, {b.name}: born at the {b.born}; {', '.join(passed) or nothing}.")
     said += [f"{asked.name}, deflation at {p:.6g}{unit}: {beside(found, p)}." for p in asked.deflate]
     return [*said, *(f"{asked.name}, {words}" for words in found.messages)]
 
@@ -149,4 +150,6 @@ def beside(found: Diagram, p: float) -> str:
     there = [one for one in found.deflated if one.orbit.p == p]
     words = [f"{'stable' if one.stable else 'unstable'}, period {one.orbit.period:.6g} s, multiplier of the size "
              f"{np.abs(one.multipliers).max(initial=0.0):.3g}" for one in there]  # fmt: skip
-    return f"{counted(len(there), 'orbit')} beside what was known" + (f": {'; '.join(words)}" if words else "")
+    if not there:
+        return "no orbit was found beside what was known, which does not mean that there is none"
+    return f"{counted(len(there), 'orbit')} beside what was known: {'; '.join(words)}"

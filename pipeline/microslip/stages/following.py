@@ -26,10 +26,12 @@ from ..errors import UserError
 from ..files import store
 from ..files.store import ordinary
 from ..files.tables import rows_csv
+from ..harmonic_balance.nonlinear_modes import REACHED
 from ..harmonic_balance.readout import measured
+from ..harmonic_balance.solver import CONVERGED
 from ..results import read_response
 from ..results.checks import checked, largest
-from ..units import METRES, Quantity
+from ..units import METRES, Quantity, percent
 from .stage import Report
 from .varied import Varied
 
@@ -145,8 +147,16 @@ def backbones(
                 f"{100 * one.damping[i]:.3g} % at {of.sized(one.amplitude[i], 3)}"
             )
             said += f"; {checked(largest(one.checks))}"
-        report(f"F_N = {normal:g} N: {said}" + ("" if one.complete else f" ({one.status})"))
+        report(f"F_N = {normal:g} N: {said}" + ("" if one.complete else f" ({one.failing or one.status})"))
     return found
+
+
+def unreached(found: Mapping[float, Backbone]) -> str:
+    """Which nonlinear modes do not reach all amplitudes, or hold motions that fail their checks; nothing where none."""
+    early = [f"{normal:g} N" for normal, one in found.items() if one.status != REACHED]
+    said = [f"the backbone at {', '.join(early)} ends early"] if early else []
+    said += [f"at {normal:g} N {one.failing}" for normal, one in found.items() if one.failing]
+    return "; ".join(said)
 
 
 def write_backbones(found: Mapping[float, Backbone], case: Case) -> list[Path]:
@@ -168,7 +178,8 @@ def _backbone_message(normal: float, one: Backbone, of: Quantity) -> str:
         f"F_N = {normal:g} N: from {f[0]:.5g} Hz (sticking: {one.stuck / 2 / np.pi:.5g} Hz) to {f[-1]:.5g} Hz; most "
         f"damped, {100 * one.damping[i]:.3g} %, at an amplitude of {of.sized(one.amplitude[i], 3)} and {f[i]:.5g} Hz"
     )
-    return said + ("." if one.complete else f"; it ends early: {one.status}.")
+    said += f"; {one.failing}" if one.failing else ""
+    return said + ("." if one.status == REACHED else f"; it ends early: {one.status}.")
 
 
 def _page(case: Case, name: str, title: str, sentences: Sequence[str], files: Sequence[Path]) -> Path:
@@ -252,14 +263,14 @@ def write_optimum(found: Optimum, over: str, case: Case, beside: Mapping[str, Ar
     from ..pictures.following import optimum_plot
 
     files, title = [_optimum_table(found.found, over, case, found)], _title(case, "highest resonance and optimum")
-    if any(one.status == "converged" for one in found.found.values()):
+    if any(one.status == CONVERGED for one in found.found.values()):
         label = over.replace("_", " ") + (unit_of(over) and f" in{unit_of(over)}")
         picture = case.folder / "pictures" / "optimum.png"
         good = {value: valid(one, case) for value, one in found.found.items()}
         files.append(optimum_plot(found, label, title, picture, case.quantity, case.name, beside, good))
     said = [
         f"{told(found, over, case)}.",
-        *([] if is_optimum(found) else [f"{missed(found, over)}."]),
+        *([f"{why}."] if (why := missed(found, over)) else []),
         *(_lowest_of(name, values, over, case.quantity) for name, values in beside.items()),
     ]
     return [*files, _page(case, "optimum", title, said, files)]
@@ -288,9 +299,10 @@ def found_before(names: Sequence[str], over: str, case: Case) -> dict[str, Array
         head, *rows = csv.reader(ordinary(file).read_text(encoding="utf-8").splitlines())
         if head != asked:
             raise UserError(f"{file}: holds {', '.join(head)}, not {', '.join(asked)}; name another case")
-        known = [[*map(float, row[:3]), NOT_VALID not in row[3]] for row in rows if row[3].startswith(RESONANCE)]
+        known = [[*map(float, row[:3]), row[3] == RESONANCE] for row in rows if row[3].startswith(RESONANCE)]
         if not known:
-            raise UserError(f"{file}: holds no resonance; name another case")
+            why = f" ({rows[0][3]})" if rows else ""
+            raise UserError(f"{file}: no resonance is known at any value{why}; name another case")
         found[folder.name] = np.array(known).T
     return found
 
@@ -298,33 +310,48 @@ def found_before(names: Sequence[str], over: str, case: Case) -> dict[str, Array
 def _lowest_of(name: str, values: Array, over: str, of: Quantity) -> str:
     """The lowest of the resonances of another case."""
     value, f, amplitude, valid = values[:, values[2].argmin()]
-    doubt = "" if valid else f"; {NOT_VALID}"
-    return f"{name}: lowest at {over} = {value:.4g}{unit_of(over)}, {of.sized(amplitude)} at {f:.5g} Hz{doubt}."
+    said = "" if valid else "; doubtful or not valid, see its optimum.csv"
+    return f"{name}: lowest at {over} = {value:.4g}{unit_of(over)}, {of.sized(amplitude)} at {f:.5g} Hz{said}."
 
 
 RESONANCE, NOT_VALID = "highest resonance", "not valid: contacts would lift off"
+DOUBTFUL = "doubtful"
 """What a row of ``optimum.csv`` is, and behind it what makes one doubtful."""
 
 
 def valid(one: HighestPeak, case: Case) -> bool:
-    """Whether no contact is open at a resonance though what stands for its law does not follow it."""
-    return one.open is None or not lifts(case.plain, one.open[None])[0]
+    """Whether no contact is open at a resonance though what stands for its law does not follow it, and all points of
+    the sweep that led to it have a solution."""
+    return not one.unsolved and (one.open is None or not lifts(case.plain, one.open[None])[0])
 
 
 def told(found: Optimum, over: str, case: Case) -> str:
     """`optimum_message`, and whether it is valid."""
-    doubt = "" if valid(found.resonance, case) else f"; {NOT_VALID}"
-    return f"{optimum_message(found, over, case.quantity)}{doubt}"
+    return optimum_message(found, over, case.quantity) + doubt(found.resonance, case)
+
+
+def doubt(one: HighestPeak, case: Case) -> str:
+    """What speaks against a resonance, behind a semicolon; nothing, where nothing does."""
+    if one.status != CONVERGED or valid(one, case):
+        return ""
+    return f"; {DOUBTFUL}: {one.unsolved}" if one.unsolved else f"; {NOT_VALID}"
 
 
 def _optimum_table(found: Mapping[float, HighestPeak], over: str, case: Case, best: Optimum | None = None) -> Path:
-    known = {True: RESONANCE, False: f"{RESONANCE}; {NOT_VALID}"}
-    shown = [(v, r, known[valid(r, case)] if r.status == "converged" else r.status) for v, r in found.items()]
-    if best is not None:
+    shown = [
+        (v, r, RESONANCE + doubt(r, case) if r.status == CONVERGED else r.status) for v, r in found.items()
+    ]  # fmt: skip
+    if best is not None and best.resonance.status == CONVERGED:
         what = f"optimum: {best.status}" if is_optimum(best) else f"lowest: {best.status}"
-        shown.append((best.parameter, best.resonance, what))
-    rows = [(f"{v:.10g}", f"{r.Omega / 2 / np.pi:.10g}", f"{r.amplitude:.8g}", what) for v, r, what in shown]
+        shown.append((best.parameter, best.resonance, "lowest: the setting hardly matters" if hardly(best) else what))
+    rows = [(f"{v:.10g}", *_place(r), what) for v, r, what in shown]
     return case.table("optimum.csv", _optimum_head(over, case), rows)
+
+
+def _place(one: HighestPeak) -> tuple[str, str]:
+    """Frequency (Hz) and amplitude of a resonance as cells, empty where none is known."""
+    known = one.status == CONVERGED
+    return (f"{one.Omega / 2 / np.pi:.10g}", f"{one.amplitude:.8g}") if known else ("", "")
 
 
 def _optimum_head(over: str, case: Case) -> list[str]:
@@ -342,13 +369,27 @@ def unit_of(over: str) -> str:
 def optimum_message(found: Optimum, over: str, of: Quantity = METRES) -> str:
     """The optimum of what is read in a sentence."""
     best, unit = found.resonance, unit_of(over)
-    if best.status != "converged":
-        return f"{over}: no resonance was found at any value"
-    name = "normal force" if over == NORMAL_FORCE else over
-    where = f"{name} = {found.parameter:.6g}{unit}: the highest resonance, {of.sized(best.amplitude)} at "
-    lines = f"{where}{best.Omega / 2 / np.pi:.6g} Hz, is lowest"
-    lines += _FOUND_AS.get(found.status, "") if is_optimum(found) else " of those that were found"
-    return lines + _hardly(found) + _rising(found, unit)
+    if best.status != CONVERGED:
+        return f"{over}: no resonance is known at any value{_unknown(found, unit)}"
+    name, height = "normal force" if over == NORMAL_FORCE else over, of.sized(best.amplitude)
+    if hardly(found):
+        changes = f"less than {percent(found.spread)}" if found.spread > 1e-6 else "nothing that could be told"
+        lines = f"the setting hardly matters: from {name} = {min(found.found):g} to {max(found.found):g}{unit} the "
+        lines += f"highest resonance, {height} at {best.Omega / 2 / np.pi:.6g} Hz, changes by {changes}"
+    else:
+        lines = f"{name} = {found.parameter:.6g}{unit}: the highest resonance, {height} at "
+        lines += f"{best.Omega / 2 / np.pi:.6g} Hz, is lowest"
+        lines += _FOUND_AS.get(found.status, "") if is_optimum(found) else " of those that were found"
+    return lines + _unknown(found, unit) + _rising(found, unit)
+
+
+def _unknown(found: Optimum, unit: str) -> str:
+    """At which values no resonance is known, and why."""
+    why: dict[str, list[float]] = {}
+    for value, one in found.found.items():
+        if one.status != CONVERGED:
+            why.setdefault(one.status, []).append(value)
+    return "".join(f"; at {', '.join(f'{v:.4g}' for v in values)}{unit} {status}" for status, values in why.items())
 
 
 _FOUND_AS = {"kink": " (where it changes abruptly)", "two peaks": " (where two are equally high)"}
@@ -372,14 +413,9 @@ HARDLY = 0.01
 what two tops have to be apart to be two, `harmonic_balance.sweeps.DIP`."""
 
 
-def _hardly(found: Optimum) -> str:
-    """That the setting hardly matters, if it does not."""
-    if found.spread >= HARDLY:
-        return ""
-    return (
-        f"; the setting hardly matters: from {min(found.found):g} to {max(found.found):g} the highest resonance "
-        f"changes by {100 * found.spread:.2g} %"
-    )
+def hardly(found: Optimum) -> bool:
+    """Whether the setting hardly matters: no resonance that is known is much higher than another."""
+    return found.spread < HARDLY and all(one.status == CONVERGED for one in found.found.values())
 
 
 def is_optimum(found: Optimum) -> bool:
@@ -388,8 +424,10 @@ def is_optimum(found: Optimum) -> bool:
 
 
 def missed(found: Optimum, over: str) -> str:
-    """Why there is no optimum, and where to look for it."""
+    """Why there is no optimum, and where to look for it; nothing where there is one or the setting hardly matters."""
     low, high, unit = min(found.found), max(found.found), unit_of(over)
+    if is_optimum(found) or hardly(found):
+        return ""
     if found.status != NO_OPTIMUM or found.parameter not in (low, high):
         return f"no optimum was found: {found.status}"
     end = f"--low below {low:g}" if found.parameter == low else f"--high above {high:g}"

@@ -154,7 +154,8 @@ def _pictures(found: Sequence[tuple[str, Orbit]], folder: Path, case: str) -> li
     if len(seen) > 1:  # one that diverges as it settles leaves nothing to draw
         drawn.append(portraits(seen, folder / "phase_portraits.png", f"{case}: phase portraits"))
     for i, (name, one) in enumerate(seen, 1):
-        drawn.append(orbit_picture(one, folder / f"orbit_{i}.png", f"{case}: {name}\n{one.said}"))
+        title = f"{case}: {name}\n{one.said}"
+        drawn.append(orbit_picture(one, _row(one), folder / f"orbit_{i}.png", title))
         for k, contact in enumerate(one.contacts):
             if classification.chatter(one, k):
                 title = f"{case}: {name}, chatter of {contact}"

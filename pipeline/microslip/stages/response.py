@@ -17,7 +17,7 @@ from ..basis import read_basis
 from ..case import CaseResult, CaseSettings, checkpoint, load_case, run_case
 from ..case.assemble import build
 from ..case.beyond import with_curve
-from ..case.messages import at_places, lifted
+from ..case.messages import at_places, lifted, method, off
 from ..case.run import with_motions
 from ..case.settings import FIRST_HARMONICS
 from ..data import Array, ModalBasis
@@ -28,10 +28,10 @@ from ..harmonic_balance.response import HarmonicResponse
 from ..harmonic_balance.sweeps import overhanging
 from ..report.response import JUMPS, highest, lifted_forces, response_html
 from ..results import Response, Series, read_journal, read_response, response_of, response_table, write_response
-from ..results.checks import sentence
+from ..results.checks import UNCERTAIN, sentence
 from ..results.names import apart
 from ..results.series import CONVERGED
-from ..units import counted, percent, to_rpm
+from ..units import counted, to_rpm
 from . import assessment
 from .checkpoint import Checkpoint, inputs_of
 from .ring import draw_ring
@@ -140,7 +140,9 @@ def _unfinished(points: Checkpoint) -> None:
 
 
 def _tell(summary: Mapping[str, Any], report: Report) -> None:
-    """The stuck modes and what a reader must know."""
+    """How it was solved, the stuck modes and what a reader must know."""
+    if summary["method"]:
+        report(summary["method"])
     for i, mode in enumerate(summary.get("stuck_modes", ()), 1):
         f, D, width = (mode[key] for key in ("frequency_Hz", "damping_ratio", "half_power_width_Hz"))
         report(f"stuck mode {i}: {f:.6g} Hz, damping ratio {100 * D:.3g} %, half-power width {width:.3g} Hz")
@@ -204,7 +206,7 @@ def _judged(response: Response, result: CaseResult, rows: list[dict[str, Any]]) 
         errors = result.errors.get(normal, {})
         share = next((e for at, e in errors.items() if np.isclose(at, f, rtol=1e-9, atol=0)), None)
         table |= {w.column: float(abs(w.harmonics(series)[i, 1])) for w in others}
-        table |= {} if share is None or not np.isfinite(share) else {"estimated_error": float(share)}
+        table |= {} if share is None or not np.isfinite(share) else {"estimated_error": abs(share)}
         out.append(_ordered(row | table | {"doubt": _doubt(result, normal, f, series.status[i], share or 0.0)}))
     return out
 
@@ -231,7 +233,7 @@ def _doubt(result: CaseResult, normal: float, frequency: float, status: str, err
         )
     if not np.isfinite(error):
         return "uncertain: no solution with more harmonics"
-    return f"uncertain by about {percent(error)}: raise harmonics and samples" if error > UNCERTAIN else ""
+    return f"uncertain by about {off(error)}: raise harmonics and samples" if abs(error) > UNCERTAIN else ""
 
 
 def _jumps(found: HarmonicResponse, frequency: float) -> bool:
@@ -241,10 +243,6 @@ def _jumps(found: HarmonicResponse, frequency: float) -> bool:
     step = float(np.median(np.diff(found.frequency[found.asked])))
     near = (np.diff(f) < 0.02 * step) & (np.abs(f[:-1] - frequency) < step)
     return bool((near & (np.abs(np.diff(a)) > 0.2 * a.max(initial=0.0))).any())
-
-
-UNCERTAIN = 0.1
-"""Estimated error of an amplitude by harmonics and samples that are left out, from which on it is called uncertain."""
 
 
 def _drawn(result: CaseResult, rows: list[dict[str, Any]], folder: Path) -> dict[str, Path]:
@@ -322,7 +320,10 @@ def _assessed(
     limits = result.settings.material_limits
     everywhere = wanted.stresses == "all"
     found = assessment.assess(response, basis, monitor, component, limits, report=report, everywhere=everywhere)
-    found = replace(found, lifted=_lifted_off(result, found), not_valid=lifted_forces(response.resonances))
+    found = replace(
+        found, lifted=_lifted_off(result, found), not_valid=lifted_forces(response.resonances),
+        unsure=result.unsure,
+    )  # fmt: skip
     maps, messages = ({}, []) if found.highest is None else _maps(result, found, report)
     drawn = {}
     if wanted.pictures:
@@ -425,6 +426,7 @@ def summarise(result: CaseResult) -> dict[str, Any]:
         "case": result.settings.name,
         "mode": result.settings.mode,
         "harmonics": result.settings.balanced,
+        "method": method(result.settings, result.errors),
         **truncation,
         "description": result.settings.description,
         "rotation_speed_rpm": to_rpm(result.speed),

@@ -45,28 +45,28 @@ class Survey:
     """What a survey leaves.
 
     Attributes:
-        tables: file name -> (column -> values). draw: file name -> what draws it. sentences: for the reader. failed:
-            points that did not converge, or curves that end early. whole: nobody interrupted it.
+        tables: file name -> (column -> values). draw: file name -> what draws it. sentences: for the reader. missing:
+            what was asked for and is not known, in words; nothing where all is. whole: nobody interrupted it.
     """
 
     tables: Tables
     draw: Mapping[str, Callable[[Path], Path]]
     sentences: list[str] = field(default_factory=list)
-    failed: int = 0
+    missing: str = ""
     whole: bool = True
 
 
 def survey_stage(
     case_path: Path, basis_file: Path | None, kind: str, assignments: list[str] | None = None, force: bool = False,
     report: Report = lambda _: None,
-) -> tuple[list[Path], list[str], bool]:  # fmt: skip
+) -> tuple[list[Path], list[str], str]:  # fmt: skip
     """A survey of a case on modal files that are there already, in build/<case>/.
 
     Args:
         kind: a key of `KINDS`, or one of `curves.OVER`. basis_file: see `respond`.
 
     Returns:
-        The files, sentences for the reader, and whether every point converged.
+        The files, sentences for the reader, and what is missing, in words.
 
     Raises:
         UserError: the case does not ask for it, or asks for what cannot be.
@@ -109,16 +109,21 @@ def _work(
     names = [*found.tables, *found.draw, _shown(found, kind, settings.name, folder)]
     if not found.whole:
         raise KeyboardInterrupt
-    store.write_text(said, "\n".join([f"{', '.join(names)}: {found.failed}", *found.sentences]) + "\n")
+    store.write_text(said, "\n".join([f"{', '.join(names)}: {found.missing}", *found.sentences]) + "\n")
     beside = [points.file.with_suffix(".h5")] if kind not in KINDS else []
     return Made([*(folder / name for name in names), *beside])
 
 
-def _told(said: Path) -> tuple[list[Path], list[str], bool]:
+def _told(said: Path) -> tuple[list[Path], list[str], str]:
     """What `survey_stage` returned when it wrote a file of sentences."""
     first, *sentences = said.read_text().splitlines()
-    listed, failed = first.split(": ")
-    return [said.parent / name for name in listed.split(", ")], sentences, int(failed) == 0
+    listed, _, missing = first.partition(": ")
+    return [said.parent / name for name in listed.split(", ")], sentences, missing
+
+
+def _unsolved(points: int) -> str:
+    """Of points that did not converge, in words."""
+    return f"{counted(points, 'point')} did not converge" if points else ""
 
 
 def _shown(found: Survey, kind: str, case: str, folder: Path) -> str:
@@ -145,20 +150,25 @@ def _orders(write: Write, settings: CaseSettings, bases: Bases, path: Path, repo
         first, columns = max(found.values(), key=lambda r: len(r.order)), dict[str, Array]()
         for label, r in found.items():
             plain = label.replace("$F_N$", "FN").replace(" = ", "_").replace(" ", "_")
-            missing = np.full(len(first.order) - len(r.order), np.nan)
-            own = {f"{n}_{plain}": np.append(v, missing) for n, v in r.columns().items() if n not in of_all}
+            left = len(first.order) - len(r.order)
+            own = {f"{n}_{plain}": _padded(v, left) for n, v in r.columns().items() if n not in of_all}
             columns |= {n: v for n, v in first.columns().items() if n in of_all} | own
         return {"orders_worst.csv": _worst_table(list(found.values())), "orders.csv": columns}
 
     of_all = {"engine_order", "wave"}
     found = surveys.over_orders(settings, bases, path, report, lambda some: write(tables(some)))
     title = f"{settings.name}: resonances over the engine order"
-    failed = sum(int(r.failed.sum()) for r in found.values())
+    failed = _unsolved(sum(int(r.failed.sum()) for r in found.values()))
     draw: dict[str, Callable[[Path], Path]] = {"pictures/orders.png": lambda p: over_orders_picture(found, p, title)}
     if len(found) > 1:
         words = f"{settings.name}: the worst of all engine orders over the normal force"
         draw = {"pictures/orders_worst.png": lambda p: worst_order_picture(list(found.values()), p, words)} | draw
     return Survey(tables(found), draw, _worst_sentences(list(found.values())), failed)
+
+
+def _padded(column: Array, left: int) -> Array:
+    """With so many values more that are not known."""
+    return np.append(column, [""] * left if column.dtype.kind == "U" else [np.nan] * left)
 
 
 def _worst_table(found: Sequence[OverOrders]) -> dict[str, Array]:
@@ -170,7 +180,8 @@ def _worst_table(found: Sequence[OverOrders]) -> dict[str, Array]:
         names = name, f"engine_order_of_{of}", f"frequency_of_{of}_Hz"
         columns |= dict(zip(names, np.array(values, dtype=float).T, strict=True))
     for name, each in (
-        ("orders_without_resonance", [np.isnan(r.amplitude).sum() for r in found]),
+        ("orders_without_resonance", [(np.isnan(r.amplitude) & ~r.lost).sum() for r in found]),
+        ("orders_not_found", [r.lost.sum() for r in found]),
         ("failed_points", [r.failed.sum() for r in found]),
     ):
         columns[name] = np.array(each, dtype=float)
@@ -195,7 +206,17 @@ def _worst_sentences(found: Sequence[OverOrders]) -> list[str]:
             said.append(_worst_sentence(rows, of, found))
     if not any(np.isfinite(r.stress).any() for r in found):
         said.append("Stresses are not known: the modal file holds none (output.nodal_stress = true in body.toml).")
-    return said or ["No resonance in the band."]
+    known = any(np.isfinite(r.amplitude).any() for r in found)
+    none = [] if known or any(r.lost.any() for r in found) else ["No resonance in the band."]
+    return said + none + [s for r in found for s in _lost_orders(r)]
+
+
+def _lost_orders(one: OverOrders) -> list[str]:
+    """Of which engine orders no resonance was found under a normal force, and why not of the first of them."""
+    if not (lost := np.flatnonzero(one.lost).tolist()):
+        return []
+    under = "" if np.isnan(one.normal_force) else f"F_N = {one.normal_force:.6g} N, "
+    return [f"{under}engine order {number_list([int(e) for e in one.order[lost]])}: {one.missing[lost[0]]}."]
 
 
 def _worst_sentence(rows: Sequence[Worst], of: str, found: Sequence[OverOrders]) -> str:
@@ -212,8 +233,10 @@ def _worst_sentence(rows: Sequence[Worst], of: str, found: Sequence[OverOrders])
 
 
 def _known(row: Worst) -> str:
-    missing = row.count - row.known
-    return f" ({counted(missing, 'engine order')} without a resonance in the band)" if missing else ""
+    none = row.count - row.known - row.lost
+    said = [f"{counted(none, 'engine order')} without a resonance in the band"] if none else []
+    said += [f"of {counted(row.lost, 'engine order')} none was found"] if row.lost else []
+    return f" ({', '.join(said)})" if said else ""
 
 
 def _speeds(write: Write, settings: CaseSettings, bases: Bases, path: Path, report: Report) -> Survey:
@@ -225,17 +248,18 @@ def _speeds(write: Write, settings: CaseSettings, bases: Bases, path: Path, repo
     r = surveys.over_speeds(settings, bases, path, report, lambda some: write(tables(some)))
     amplitude = np.where(r.converged, np.abs(r.monitor), np.nan)
     title = f"{settings.name}: along engine order {r.order}"
-    top = int(np.nanargmax(amplitude)) if r.converged.any() else 0
+    top = int(np.argmax(np.nan_to_num(amplitude)))
     drawn = r.rpm, r.frequency, amplitude, r.normal
     size = r.quantity.sized(float(amplitude[top]))
     said = [f"Largest amplitude {size} at {r.rpm[top]:.6g} rpm, {r.frequency[top]:.6g} Hz."]
+    said = said if r.converged.any() else ["No amplitude is known: no speed has a solution."]
     if still := [b.name for b in settings.components if not bases[b.name].ranges]:
         said.append(f"The same at all speeds: {', '.join(still)} (no rotation.range_rpm in a body.toml).")
     return Survey(
         tables(r),
         {"pictures/speeds.png": lambda p: speed_line_picture(*drawn, p, title, r.quantity)},
         said,
-        int((~r.converged).sum()),
+        _unsolved(int((~r.converged).sum())),
     )
 
 
@@ -249,7 +273,7 @@ def _ranges(write: Write, settings: CaseSettings, bases: Bases, path: Path, repo
     title = f"{settings.name}: over {', '.join(e.names).replace('_', ' ')}"
     return Survey(
         tables(e), {"pictures/ranges.png": lambda p: envelope_picture(e, p, title)}, _ranges_sentences(e),
-        int((~e.converged).sum()),
+        _unsolved(int((~e.converged).sum())),
     )  # fmt: skip
 
 
@@ -300,14 +324,17 @@ def _curve(over: str, points: Checkpoint, settings: CaseSettings, bases: Bases, 
     columns = {name: np.concatenate([one.columns()[name] for one in found]) for name in found[0].columns()}
     title, name = f"{settings.name}: over the {over.replace('_', ' ')}", f"over_{over}"
     response = _written(points, found, whole)
-    failed = sum(int((~s.converged).sum()) for s in response.series)
+    failed = _unsolved(sum(int((~s.converged).sum()) for s in response.series))
     by = found[0].quantity.shared(a for one in found for a in one.amplitude)
-    drawn, arrived = [one for one in found if len(one.rows) > 1], sum(one.complete for one in found)
+    drawn, early = [one for one in found if len(one.rows) > 1], sum(one.early for one in found)
+    arrived, asked = sum(one.complete for one in found), sum(one.legs is None for one in found)
+    missing = [f"{early} of {counted(len(found), 'curve')} end{'s' * (early == 1)} early"] if early else []
+    missing += ["not every curve reaches the other end"] if arrived < asked and not early else []
     return Survey(
         {f"{name}.csv": columns},
         {f"pictures/{name}.png": lambda p: curve_plot(drawn, p, title)} if drawn else {},
         [*(words for one in found for words in one.sentences(by)), sentence(response, None)],
-        sum(one.early for one in found) + (arrived < sum(one.legs is None for one in found)) + failed,
+        "; ".join([*missing, *filter(None, [failed])]),
         whole,
     )
 
