@@ -400,37 +400,6 @@ def test_an_interrupt_exits_130_or_143_and_leaves_no_half_product(
         assert (tmp_path / "meshes/box.msh").is_file(), "the finished mesh is kept"
 
 
-IN_A_CALLBACK = """
-import gc, os, sys, time
-from microslip import cli
-
-def ask(phase, info):
-    gc.callbacks.remove(ask)
-    os.kill(os.getpid(), int(sys.argv[1]))
-    for _ in range(1000):  # where the interpreter looks for signals
-        pass
-
-def work(*words, **more):
-    gc.callbacks.append(ask)
-    gc.collect()
-    time.sleep(600)
-
-cli.app = work
-cli.entry()
-"""
-
-
-@POSIX
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_a_request_to_end_is_heard_in_the_midst_of_a_callback_too(tmp_path: Path, number: signal.Signals) -> None:
-    """An exception that a callback of the garbage collector raises goes no further."""
-    (tmp_path / "callback.py").write_text(IN_A_CALLBACK)
-    words = [sys.executable, "callback.py", str(int(number))]
-    done = subprocess.run(words, cwd=tmp_path, env=environment(), capture_output=True, text=True, timeout=120)
-    assert done.returncode == 128 + number
-    assert [line[:37] for line in done.stderr.splitlines()] == ["error: interrupted; what is finished "]
-
-
 @POSIX
 def test_a_reader_that_leaves_is_no_error(finished: Path) -> None:
     command = f"{sys.executable} -m microslip check build/box/basis.h5 | head -n 1"

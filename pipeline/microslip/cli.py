@@ -4,7 +4,6 @@ interrupted, 143 ended by SIGTERM."""
 from __future__ import annotations
 
 import codecs
-import contextlib
 import io
 import logging
 import os
@@ -13,7 +12,6 @@ import shlex
 import shutil
 import signal
 import sys
-import threading
 from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from pathlib import Path
@@ -21,7 +19,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import App, CycloptsError, Parameter
 
-from . import __version__
+from . import __version__, interrupts
 from .errors import NotConverged, UserError
 from .progress import progress
 
@@ -1006,7 +1004,7 @@ def main(words: list[str] | None = None) -> int:
     except OSError as error:
         return _fail(f"{error.filename or 'a file'}: {error.strerror or error}; correct the path or its permissions", 2)
     except KeyboardInterrupt:
-        return _fail("interrupted; what is finished is kept, and products and points of it are not computed again", 130)
+        return _fail("interrupted; what is finished is kept, and the same command goes on from there", 130)
 
 
 def _plainly(error: UnicodeError) -> tuple[str, int]:
@@ -1045,42 +1043,11 @@ def _fail(text: str, code: int) -> int:
 
 def entry() -> None:
     """Console script. A request to end (SIGTERM) is Ctrl-C but for the exit code: what is finished is kept."""
-    asked: list[int] = [signal.SIGINT]
-
-    def end(number: int, _: object) -> None:
-        asked.append(number)
-        raise KeyboardInterrupt
-
-    def lost(what: sys.UnraisableHookArgs) -> None:
-        """A request that came while the interpreter ran what takes no exception, such as a callback of its garbage
-        collector, is made again a little later."""
-        if isinstance(what.exc_value, KeyboardInterrupt):
-            again = threading.Timer(0.05, _ask_again, asked[-1:])
-            again.daemon = True
-            again.start()
-        else:
-            sys.__unraisablehook__(what)
-
-    sys.unraisablehook = lost
-    signal.signal(signal.SIGTERM, end)
-    if (code := main()) == 130:
-        _leave(128 + asked[-1])
+    interrupts.listen()
+    code = main()
+    if code == 130 or not code and interrupts.requested():
+        interrupts.leave(interrupts.requested() or signal.SIGINT)
     sys.exit(code)
-
-
-def _ask_again(number: int) -> None:
-    if hasattr(signal, "pthread_kill"):  # which wakes a main thread that waits; Windows has none
-        signal.pthread_kill(threading.main_thread().ident or 0, number)
-    else:
-        signal.raise_signal(number)
-
-
-def _leave(code: int) -> None:
-    """End at once: threads of libraries that were interrupted may crash while the interpreter is taken down."""
-    for stream in (sys.stdout, sys.stderr):
-        with contextlib.suppress(OSError, ValueError):
-            stream.flush()
-    os._exit(code)
 
 
 if __name__ == "__main__":

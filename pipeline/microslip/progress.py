@@ -7,6 +7,8 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 
+from .interrupts import look
+
 Report = Callable[[str], None]
 
 
@@ -17,10 +19,10 @@ def progress(title: str, quiet: bool = False) -> Iterator[Report]:
     On a terminal a bar shows the present step and its time, and finished steps stay above it; when the output is a
     file or a pipe each step is one plain line. ``300 of 600 frequencies`` moves the bar of the present step (in a file
     it is a line if nothing was said for `SILENCE` seconds), and a text that begins with ``warning:`` stays on the
-    screen.
+    screen. A request to end is heeded there: what reports is a loop that can be left (`interrupts.look`).
     """
     if quiet:
-        yield lambda _: None
+        yield lambda _: look()
     elif sys.stderr.isatty():
         with _bar(title) as report:
             yield report
@@ -39,6 +41,7 @@ def _lines() -> Report:
 
     def report(text: str) -> None:
         nonlocal last, step
+        look()
         now, (total, done) = time.perf_counter(), _fraction(text)
         if total is None or done <= step[0] + 1:
             step = done, now
@@ -65,6 +68,7 @@ def _bar(title: str) -> Iterator[Report]:
 
     def report(text: str) -> None:
         nonlocal step
+        look()
         total, done = _fraction(text)
         if text.startswith("warning:"):
             bar.console.print(text, style="yellow", highlight=False, markup=False)

@@ -18,6 +18,7 @@ import h5py
 import numpy as np
 
 from ..errors import UserError
+from ..interrupts import deferred
 from .store import complete_or_absent
 
 _SEAL = b"\nmicroslip seal, sha256 of all bytes before this line: "
@@ -69,7 +70,7 @@ def create(path: Path, again: bool = False) -> Iterator[h5py.File]:
     Raises:
         OSError: the disk is full or the file too large, once and with its errno.
     """
-    with open(path, "r+b" if again else "w+b") as raw:
+    with deferred(), open(path, "r+b" if again else "w+b") as raw:
         sink = _Sink(raw)
         try:
             with h5py.File(sink, "r+" if again else "w", libver=("v108", "v110")) as file:

@@ -28,6 +28,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import UserError
+from ..interrupts import look, writing
 
 _ODD = {
     stat.S_IFDIR: "a folder",
@@ -70,22 +71,25 @@ def complete_or_absent(path: Path | str) -> Iterator[Path]:
     """
     path = Path(path)
     _refuse_odd(path)
-    temporary: Path | None = None
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        _remove_leftovers(path)
-        handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.stem}.{os.getpid()}.", suffix=path.suffix)
-        os.close(handle)
-        temporary = Path(name)
-        yield temporary
-        put_in_place(temporary, path)
-        temporary = None
-    except OSError as error:
-        raise UserError(refused(path, error)) from error
-    finally:
-        if temporary is not None:
-            with contextlib.suppress(OSError):
-                temporary.unlink(missing_ok=True)
+    look()
+    with writing():
+        temporary: Path | None = None
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            _remove_leftovers(path)
+            prefix = f".{path.stem}.{os.getpid()}."
+            handle, name = tempfile.mkstemp(dir=path.parent, prefix=prefix, suffix=path.suffix)
+            os.close(handle)
+            temporary = Path(name)
+            yield temporary
+            put_in_place(temporary, path)
+            temporary = None
+        except OSError as error:
+            raise UserError(refused(path, error)) from error
+        finally:
+            if temporary is not None:
+                with contextlib.suppress(OSError):
+                    temporary.unlink(missing_ok=True)
 
 
 def put_in_place(temporary: Path, path: Path) -> None:
@@ -263,6 +267,9 @@ def _add(sha: Any, value: Any) -> None:
         sha.update(f"{array.dtype.str} {array.shape};".encode() + np.ascontiguousarray(array).tobytes())
 
 
+POLLED = 0.1
+"""s between two looks whether another process has ended."""
+
 _MINE: set[Path] = set()
 """Products that this process is making."""
 
@@ -318,11 +325,18 @@ def _taken(lock: int, file: Path, why: str, report: Callable[[str], None]) -> bo
 
     taken = False
     try:
-        try:
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            report(f"waiting for {os.pread(lock, 100, 0).decode(errors='replace') or 'a process'}, which {why}")
-            fcntl.flock(lock, fcntl.LOCK_EX)
+        waits = False
+        while True:
+            try:
+                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                break
+            except BlockingIOError:
+                if not waits:
+                    owner = os.pread(lock, 100, 0).decode(errors="replace") or "a process"
+                    report(f"waiting for {owner}, which {why}")
+                waits = True
+                look()
+                time.sleep(POLLED)
         if taken := os.path.samestat(os.fstat(lock), os.stat(file)):
             with contextlib.suppress(OSError):  # a full disk: then nobody is named
                 os.ftruncate(lock, 0)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import subprocess
@@ -9,12 +10,14 @@ import sys
 import tempfile
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from ..data import Indices, Material, Mesh
 from ..errors import UserError
 from ..files import store
+from ..interrupts import look
 from ..mesh import mesh_problems, part_numbers, read_mesh
 from ..mesh.chosen import of_instances
 from ..mesh.raw import in_file
@@ -123,10 +126,26 @@ def run_apart(words: list[str], scratch: str) -> subprocess.CompletedProcess[str
     read, write = os.pipe()  # which nobody writes to: its end is the end of this process
     try:
         command = [sys.executable, "-c", _TO_THE_END, scratch, *words]
-        return subprocess.run(command, stdin=read, capture_output=True, text=True, env=environment)
+        pipes: dict[str, Any] = dict.fromkeys(("stdout", "stderr"), subprocess.PIPE)
+        process = subprocess.Popen(command, stdin=read, text=True, env=environment, **pipes)
+        try:
+            return _ended(process)
+        finally:
+            process.kill()
+            process.communicate()
     finally:
         os.close(read)
         os.close(write)
+
+
+def _ended(process: subprocess.Popen[str]) -> subprocess.CompletedProcess[str]:
+    """What a process leaves, which is waited for in Python, where a request to end is heard."""
+    while True:
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            out, err = process.communicate(timeout=store.POLLED)
+            look()  # a terminal asks both
+            return subprocess.CompletedProcess(process.args, process.returncode, out, err)
+        look()
 
 
 _TO_THE_END = """

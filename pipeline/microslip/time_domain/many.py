@@ -1,7 +1,7 @@
 """Many starts of one system, integrated by one compiled program: which motion does each of them reach?
 
-Starts are taken one after the other within the program, each with steps of its own, so that what one start becomes does
-not hang on the others. Nothing is kept of a motion but its points after every period and its impacts.
+Starts are taken one after the other by one program, each with steps of its own, so that what one start becomes does not
+hang on the others. Nothing is kept of a motion but its points after every period and its impacts.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ import numpy as np
 from ..contact.law import program
 from ..data import Array
 from ..errors import UserError
+from ..interrupts import look
 from . import loop
 from .bodies import Bodies, Now, Options
 from .contacts import Group
@@ -113,16 +114,20 @@ def run(e: Equations, x: Array, x_dot: Array, settle: int, keep: int, steps: int
     shape = (len(x), stepper.bodies.omega2.shape[0], -1)
     y = np.concatenate([(x @ to_modes.T).reshape(shape), (x_dot @ to_modes.T).reshape(shape)], axis=2)
     counts = np.array([settle * each, each]) * 2**stepper.options.halvings
-    ends, closes = _all(stepper.options, keep, stepper.groups, stepper.bodies, y, e.oscillators(0.0), counts)
-    q, v = (np.asarray(part).reshape(len(x), keep, -1) for part in np.split(np.asarray(ends), 2, axis=3))
-    return Reached(e, each, q, v, np.asarray(closes))
+    ends, closes = np.zeros((len(x), keep, *y.shape[1:])), np.zeros(len(x), int)
+    for i, start in enumerate(y):
+        look()
+        o = e.oscillators(0.0)
+        ends[i], closes[i] = _one(stepper.options, keep, stepper.groups, stepper.bodies, start, o, counts)
+    q, v = (part.reshape(len(x), keep, -1) for part in np.split(ends, 2, axis=3))
+    return Reached(e, each, q, v, closes)
 
 
 @partial(program, static_argnums=(0, 1))
-def _all(
+def _one(
     options: Options, keep: int, groups: tuple[Group, ...], B: Bodies, y: Any, o: Any, counts: Any
 ) -> tuple[Any, Any]:
-    """(n, keep, b, 2 p) after every period that is kept, and (n,) impacts in them."""
+    """(keep, b, 2 p) after every period that is kept, and how many impacts were in them."""
 
     def step(carried: tuple) -> tuple:
         left, now, closes = carried
@@ -134,9 +139,6 @@ def _all(
         _, after, closes = jax.lax.while_loop(lambda c: c[0] > 0, step, (count, now, jnp.zeros((), int)))
         return after._replace(o=now.o), (after.y, closes)
 
-    def one(start: Any) -> tuple[Any, Any]:
-        now, _ = on(loop.begun(options, groups, B, start, o, None), counts[0])
-        _, (ends, closes) = jax.lax.scan(lambda n, _: on(n, counts[1]), now, length=keep)
-        return ends, jnp.sum(closes)
-
-    return jax.lax.map(one, y)
+    now, _ = on(loop.begun(options, groups, B, y, o, None), counts[0])
+    _, (ends, closes) = jax.lax.scan(lambda n, _: on(n, counts[1]), now, length=keep)
+    return ends, jnp.sum(closes)

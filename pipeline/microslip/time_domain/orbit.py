@@ -18,6 +18,7 @@ from ..contact.set_valued import SetValued
 from ..data import Array
 from ..errors import NotConverged, UserError
 from ..files.hdf5 import put, refuse_foreign, sealed
+from ..interrupts import look
 from ..settings.mistakes import bounded
 from ..system.assembly import Contact
 from ..units import METRES, Quantity, counted
@@ -444,6 +445,7 @@ def march(
     (now, hardest), done = kept.begun((first, Hardest(-1.0, 0.0)))
     many, happened, reported = 1, 0, time.monotonic()
     while done < settle + keep:
+        look()
         before, dense = now, done >= settle
         ahead, began = 1 if dense else min(many, settle - done), time.monotonic()
         rows = np.full(samples, each if dense else each * samples)
