@@ -15,6 +15,7 @@ import json
 import math
 import os
 import platform
+import re
 import stat
 import subprocess
 import tempfile
@@ -67,7 +68,8 @@ def complete_or_absent(path: Path | str) -> Iterator[Path]:
     the next write of the same product removes. A link under the name gives way; what it leads to stays as it is.
 
     Raises:
-        UserError: if the folder is missing, not writable, the disk is full, or something else than a file stands there.
+        UserError: if the folder is missing, not writable, the disk is full, or something else than a file of this kind
+            stands there.
     """
     path = Path(path)
     _refuse_odd(path)
@@ -82,6 +84,7 @@ def complete_or_absent(path: Path | str) -> Iterator[Path]:
             os.close(handle)
             temporary = Path(name)
             yield temporary
+            refuse_other(path, kind_of(temporary))
             put_in_place(temporary, path)
             temporary = None
         except OSError as error:
@@ -98,6 +101,44 @@ def put_in_place(temporary: Path, path: Path) -> None:
     _sync(temporary)
     os.replace(temporary, path)
     _sync(path.parent)
+
+
+_BEGINS = {
+    rb"\x89HDF": "an HDF5 file", rb"\x89PNG": "a PNG picture", rb"GIF8": "a GIF picture",
+    rb"PK\x03\x04": "a zip archive", rb"MATLAB 5\.0": "a MATLAB file", rb"<\?xml": "an XML file",
+    rb"<!DOCTYPE html": "a page", rb"\$MeshFormat": "a mesh of gmsh", rb"\s*-1\s*\n": "a universal file",
+    rb"\*\*": "a file of MBDyn", rb"\$": "bulk data", rb"\d+ nodes, \d+ modes": "a SID",
+}  # fmt: skip
+"""How a file begins -> what it is; anything else is text, or bytes."""
+
+_UNMARKED = ("text", "bytes", "a page", "a PNG picture", "a GIF picture", "a mesh of gmsh")
+_MARK = re.compile(rb"microslip-[a-z-]*[a-z]|microslip table|by microslip|microslip \d|microslip: |modelDescr|\.npy")
+"""What tells one kind of the others from another, near their beginning."""
+
+
+def kind_of(path: Path) -> str:
+    """What a file is, by its first bytes: its format, and whether this program wrote it; "" if it is empty."""
+    with open(path, "rb") as file:
+        head = file.read(4096)
+    other = "" if not head else "bytes" if b"\0" in head else "text"
+    kind = next((kind for begin, kind in _BEGINS.items() if re.match(begin, head)), other)
+    mark = None if kind in ("", *_UNMARKED) else _MARK.search(head)
+    return f"{kind} ({mark[0].decode().strip(': ')})" if mark else kind
+
+
+def refuse_other(path: Path | str, kind: str) -> None:
+    """Refuse to replace a file that is none of a kind (`kind_of`), and no product with a sidecar; an empty one may go.
+
+    Raises:
+        UserError: there is one.
+    """
+    path = Path(path)
+    if not path.is_file() or sidecar_path(path).is_file() or not os.access(path, os.R_OK):
+        return
+    if (there := kind_of(path)) not in ("", kind):
+        is_, would = there.split(" (")[0], kind.split(" (")[0]
+        words = f"{is_}, not {would}" if is_ != would else f"{is_} of another kind"
+        raise UserError(f"{path}: is there already and is {words}; give another name or remove it")
 
 
 def open_to_append(path: Path | str) -> int:

@@ -17,7 +17,7 @@ import scipy.linalg
 from ..contact.set_valued import SetValued
 from ..data import Array
 from ..errors import NotConverged, UserError
-from ..files.hdf5 import put, refuse_foreign, sealed
+from ..files.hdf5 import put, sealed
 from ..interrupts import look
 from ..settings.mistakes import bounded
 from ..system.assembly import Contact
@@ -307,7 +307,6 @@ class Orbit:
         Raises:
             UserError: no permission, no space; a file that is none of motions stands there.
         """
-        refuse_foreign(path, kept_samples.FORMAT)
         with sealed(path) as file:
             kept_samples.head(file)
             group = file.create_group("motion_1")
