@@ -133,7 +133,8 @@ def refuse_other(path: Path | str, kind: str) -> None:
         UserError: there is one.
     """
     path = Path(path)
-    if not path.is_file() or sidecar_path(path).is_file() or not os.access(path, os.R_OK):
+    known = path.is_symlink() or sidecar_path(path).is_file()  # a link gives way
+    if known or not path.is_file() or not os.access(path, os.R_OK):
         return
     if (there := kind_of(path)) not in ("", kind):
         is_, would = there.split(" (")[0], kind.split(" (")[0]
