@@ -412,11 +412,12 @@ def nothing_to_do(
 
 
 def is_up_to_date(product: Path | str, inputs: Mapping[str, Any]) -> bool:
-    """True if `product` and the files beside it are what its sidecar describes, and were made from these `inputs`."""
+    """True if `product` and the files beside it are what its sidecar describes, and were made from these `inputs` and
+    from what was opened besides (`note_product`)."""
     product = Path(product)
     try:
         note = json.loads(ordinary(sidecar_path(product)).read_text())
-        made = {product.name: note["product"], **note["files"]}
+        made = {product.name: note["product"], **note["files"], **note.get("opened", {})}
         same = note["inputs"] == hash_settings(inputs)
         return same and all(hash_file(product.parent / name) == digest for name, digest in made.items())
     except (OSError, ValueError, KeyError, TypeError, AttributeError):
@@ -436,17 +437,20 @@ def unfinished(product: Path | str) -> None:
         raise UserError(refused(sidecar_path(product), error)) from error
 
 
-def note_product(product: Path | str, inputs: Mapping[str, Any], files: Iterable[Path] = (), **more: Any) -> None:
+def note_product(
+    product: Path | str, inputs: Mapping[str, Any], files: Iterable[Path] = (), opened: Iterable[Path] = (), **more: Any
+) -> None:  # fmt: skip
     """Write the sidecar of a finished product: hashes, and what is volatile (UTC time, git commit).
 
     Args:
-        files: written with the product, in its folder or below.
+        files: written with the product, in its folder or below. opened: read on the way, which `inputs` do not tell.
     """
     product = Path(product)
     note = {
         "inputs": hash_settings(inputs),
         "product": hash_file(product),
         "files": {str(file.relative_to(product.parent)): hash_file(file) for file in sorted(set(files))},
+        "opened": {os.path.relpath(file, product.parent): hash_file(file) for file in sorted(set(opened))},
         "written": datetime.now(UTC).isoformat(timespec="seconds"),
         **git_state(Path(__file__).parent),
         **more,
