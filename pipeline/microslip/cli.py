@@ -665,6 +665,7 @@ def _check(file: Path, short: bool, quiet: bool) -> None:
         if other.form != FORMAT:
             raise
         return _check_response(file, short, quiet)
+    _say_seal(file, quiet)
     _verdict(file, [*check_basis(basis), *ring_checks(basis)], short, quiet)
 
 
@@ -674,6 +675,7 @@ def _check_response(file: Path, short: bool, quiet: bool) -> None:
     from .results.checks import check_response, sentence
 
     found = read_response(file)
+    _say_seal(file, quiet)
     bases, missing = _modal_files(found)
     findings = check_response(found, bases)
     if missing and not short:
@@ -706,18 +708,18 @@ def _verdict(file: Path, findings: list[Check], short: bool, quiet: bool) -> Non
     for c in failed if quiet else worst_of_each(failed) if short else findings:
         mark = "ok  " if c.passed else "FAIL"
         print(f"{mark} {c.name}: {c.value:.3g} (limit {c.limit:.3g}){'  ' + c.message if c.message else ''}")
-    _say_seal(file, quiet)
     if failed:
         raise NotConverged(f"{file}: {len(failed)} of {len(findings)} checks failed")
     _say(f"{file}: all {len(findings)} checks passed", quiet)
 
 
 def _say_seal(file: Path, quiet: bool) -> None:
-    """A line if a file that could be read has no seal."""
+    """A line, the first, if a file that could be read has no seal."""
     from .files.hdf5 import seal_state
 
     if seal_state(file) == "absent":
-        _say(f"{file}: not sealed: written by another program, or changed since it was written", quiet)
+        _say(f"{file}: not sealed: written by another program, or changed since it was written; what follows is "
+             "recomputed from its numbers, and those that nothing else tells may be wrong", quiet)  # fmt: skip
 
 
 @app.command(name="import")
