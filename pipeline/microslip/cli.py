@@ -21,7 +21,7 @@ from cyclopts import App, CycloptsError, Parameter
 
 from . import __version__, interrupts
 from .errors import NotConverged, UserError
-from .progress import progress
+from .progress import announced, progress
 
 if TYPE_CHECKING:
     from .basis.checks import Check
@@ -987,7 +987,8 @@ def main(words: list[str] | None = None) -> int:
     _plain_where_needed()
     logging.getLogger("matplotlib").setLevel(logging.ERROR)  # it warns of a home without a place for its fonts
     try:
-        app(words, exit_on_error=False, print_error=False, result_action="return_value")
+        with announced(sys.argv[1:] if words is None else words):
+            app(words, exit_on_error=False, print_error=False, result_action="return_value")
         sys.stdout.flush()
         return 0
     except CycloptsError as error:

@@ -420,6 +420,7 @@ def _lanczos(pencil: Pencil, count: int, shift: float, tolerance: float, known: 
         theta, S = np.linalg.eigh(0.5 * (T[:done, :done] + T[:done, :done].conj().T))
         theta, S = theta[::-1][:wanted], S[:, ::-1][:, :wanted]
         if (np.linalg.norm(R @ S[last], axis=0) < tolerance * np.abs(theta)).all():
+            pencil.tell(f"{done} of {done} Lanczos vectors, the rest was not needed")
             values = shift + 1 / theta
             order = np.argsort(values, kind="stable")
             return values[order], (Q[:, :done] @ S)[:, order]

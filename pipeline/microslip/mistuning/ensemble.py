@@ -170,6 +170,8 @@ def run(
             _more(found, of, min(samples, _next(len(found), EACH * workers)), until, samples, report)
             if file is not None:
                 _keep(file, inputs, found)
+    if len(found) < samples:
+        report(f"{len(found)} of {len(found)} samples{_told(found)}, the rest was not needed")
     return found
 
 
