@@ -1,6 +1,6 @@
-# The file graph: geometry/% -> meshes/%.msh -> build/%/basis.h5 -> build/%/report.html (with pipeline/cases/%.toml).
+# geometry/% -> meshes/%.msh -> build/%/basis.h5 -> build/%/report.html (with pipeline/cases/%.toml),
 # and pipeline/cases/<case>.toml + the modal files it names -> build/<case>/response.csv.
-# Each stage decides by the hash of its inputs whether there is work to do; make only calls it.
+# Each stage decides by the hashes of its inputs and of all its products whether there is work to do; make only calls it.
 
 BODIES   := $(sort $(patsubst geometry/%/build.py,%,$(wildcard geometry/*/build.py)))
 CASES    := $(filter-out $(BODIES),$(sort $(basename $(notdir $(wildcard pipeline/cases/*.toml)))))
@@ -8,7 +8,6 @@ PYTHON   := .venv/bin/python
 RUN      := $(PYTHON) -m microslip
 PYTEST   := $(PYTHON) -m pytest -n 2 --dist loadfile
 READY    := .venv/.ready
-SOURCES  := $(shell find pipeline/microslip -type f -not -path '*/__pycache__/*')
 
 export OMP_NUM_THREADS ?= 1
 export MKL_NUM_THREADS ?= $(OMP_NUM_THREADS)
@@ -17,9 +16,6 @@ unexport DISPLAY PYTHONPATH PYTHONHOME PYTHONDONTWRITEBYTECODE # without byte co
 # The environment knows the folder it was made for: a checkout that was moved or copied is set up again.
 MOVED := $(shell [ "$$(cat $(READY) 2>/dev/null)" = "$$(pwd -P)" ] || echo moved)
 
-.DELETE_ON_ERROR:
-.SECONDARY:
-.SECONDEXPANSION:
 .PHONY: disc-brake spin-pit moved help setup all cases $(CASES) $(BODIES) $(BODIES:%=%-mesh) $(BODIES:%=%-modes) test test-slow test-all peers lint docs bench clean distclean
 
 help: ## list the verbs
@@ -52,19 +48,16 @@ disc-brake: $(READY) ## does the published disc brake squeal: roots, and how man
 
 tyre: $(READY) slip-jump
 
-$(filter-out tyre,$(BODIES)): %: build/%/report.html
-pendulum: pendulum-friction-two-modes pendulum-friction-three-modes pendulum-friction
-$(BODIES:%=%-mesh): %-mesh: meshes/%.msh
-$(BODIES:%=%-modes): %-modes: build/%/basis.h5
+$(filter-out tyre,$(BODIES)): %: $(READY)
+	@$(RUN) run geometry/$*
 
-meshes/%.msh: $$(wildcard geometry/$$*/*) $(SOURCES) | $(READY)
+pendulum: pendulum-friction-two-modes pendulum-friction-three-modes pendulum-friction
+
+$(BODIES:%=%-mesh): %-mesh: $(READY)
 	@$(RUN) mesh geometry/$*
 
-build/%/basis.h5: meshes/%.msh geometry/%/body.toml $(SOURCES) | $(READY)
+$(BODIES:%=%-modes): %-modes: $(READY)
 	@$(RUN) modes geometry/$*
-
-build/%/report.html: build/%/basis.h5 $$(wildcard pipeline/cases/$$*.toml) $(SOURCES) | $(READY)
-	@$(RUN) run geometry/$*
 
 test: $(READY) ## the quick tests, about eight minutes on two cores, to be five
 	@$(PYTEST)

@@ -23,6 +23,7 @@ import small
 from microslip.basis import check_basis, read_basis, write_basis
 from microslip.basis.files import open_file
 from microslip.basis.integrals import modal_mass
+from microslip.basis.strains import stiffness_error, stress_error
 from microslip.data import Mesh, ModalBasis
 from microslip.errors import UserError
 from microslip.files.hdf5 import seal, seal_state
@@ -295,6 +296,21 @@ TAMPERED = {
 }
 
 
+TAMPERED |= {
+    "one number of a shape": (AT + "modes/phi", scaled(1.001, (200, 1, 3))),
+    "one number of a shape at speed": ("speed_1/nd_0/modes/phi", scaled(1.001, (200, 1, 3))),
+    "one strain": (AT + "strain/gauss/T", scaled(1.001, (300, 2, 4))),
+    "one strain at speed": ("speed_1/nd_0/strain/gauss/T", scaled(1.001, (300, 2, 4))),
+    "one stress": (AT + "stress/gauss/T", scaled(1.001, (300, 2, 4))),
+    "one smoothed stress": (AT + "stress/nodes/T", scaled(1.001, (200, 2, 4))),
+    "static displacement of a node": ("speed_1/nd_0/rotation/u_static", scaled(1.001, (200, 2))),
+    "one number of a load": (AT + "excitation/shaker/T", scaled(1.001, (0, 1))),
+    "one number of a read-out": (AT + "monitor/tip-probe/T", scaled(1.001, (2, 5))),
+    "origin of a patch": ("interfaces/left/origin", scaled(1.001, 2)),
+}
+"""What nothing but the seal guarded."""
+
+
 @pytest.mark.parametrize("what", TAMPERED)
 def test_tampered_content_is_found(copy: Path, what: str) -> None:
     change(copy, *TAMPERED[what])
@@ -302,6 +318,34 @@ def test_tampered_content_is_found(copy: Path, what: str) -> None:
         assert failed(read_basis(copy)) != []
     except UserError as error:
         assert "damaged" in str(error)
+
+
+@pytest.mark.parametrize("of", ["another law", "another modulus"])
+def test_frequencies_that_are_not_those_of_the_shapes_are_found(of: str) -> None:
+    """Consistent in all that the file says of them: a shape that is stiffer than the others says it is. That all are by
+    one factor is another modulus, of which the file knows nothing."""
+    g = small.basis().groups[0, 0]
+    factor = np.full(g.n_modes, 1.001)
+    factor[1:] = 1.0 if of == "another law" else 1.001
+    one = dataclasses.replace(g, K_r=factor * g.K_r, omega=np.sqrt(factor) * g.omega, stresses={})
+    limit, found = 1e-9, stiffness_error(small.basis(), one)  # over the highest: the first is far below it
+    assert found is not None and (found > 1e3 * limit) == (of == "another law")
+
+
+def test_any_law_of_the_material_is_compared_and_a_changing_one_is_not() -> None:
+    """An orthotropic one is known by its stresses; without them only an isotropic one is."""
+    wood = {
+        "density": 600.0, "young": [11e9, 0.9e9, 0.5e9], "poisson": [0.3, 0.4, 0.3], "shear": [0.7e9, 0.6e9, 0.1e9],
+        "axes": [[1.0, 0.2, 0.0], [-0.2, 1.0, 0.0], [0.0, 0.0, 1.0]],
+    }  # fmt: skip
+    basis = modal_basis(small.beam(), BodySettings.model_validate(small.table(material=wood)), provenance={})
+    g = basis.groups[0, 0]
+    assert stiffness_error(basis, g) < 1e-10 and stress_error(basis, g) < 1e-10
+    assert stiffness_error(basis, dataclasses.replace(g, stresses={})) is None
+    warm = dataclasses.replace(basis, provenance={"settings": '{"temperature": {"file": "t.csv"}}'})
+    assert stiffness_error(warm, g) is None and stress_error(warm, g) is None
+    steel = small.basis()
+    assert stiffness_error(steel, dataclasses.replace(steel.groups[0, 0], stresses={})) < 1e-10
 
 
 @pytest.mark.parametrize(

@@ -52,6 +52,15 @@ def test_hopf_points_in_files_and_words(case: Path, capsys: pytest.CaptureFixtur
     assert "points: 5" in "".join(capsys.readouterr()) or "points: 5" in (folder / "bifurcation.html").read_text()
 
 
+def test_two_diagrams_of_one_name_are_refused(case: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Their files would be the same ones."""
+    text = case.read_text()
+    case.write_text(text + text[text.index("[[bifurcation]]") :])
+    assert main(["bifurcate", str(case)]) == 2
+    said = capsys.readouterr().err
+    assert "bifurcation" in said and "'load'" in said and not (case.parent / "build").exists()
+
+
 @pytest.mark.parametrize(
     "text, wrong, key",
     [

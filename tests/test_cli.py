@@ -433,37 +433,6 @@ def test_an_interrupt_exits_130_or_143_and_leaves_no_half_product(
         assert (tmp_path / "meshes/box.msh").is_file(), "the finished mesh is kept"
 
 
-IN_A_CALLBACK = """
-import gc, os, sys, time
-from microslip import cli
-
-def ask(phase, info):
-    gc.callbacks.remove(ask)
-    os.kill(os.getpid(), int(sys.argv[1]))
-    for _ in range(1000):  # where the interpreter looks for signals
-        pass
-
-def work(*words, **more):
-    gc.callbacks.append(ask)
-    gc.collect()
-    time.sleep(600)
-
-cli.app = work
-cli.entry()
-"""
-
-
-@POSIX
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_a_request_to_end_is_heard_in_the_midst_of_a_callback_too(tmp_path: Path, number: signal.Signals) -> None:
-    """An exception that a callback of the garbage collector raises goes no further."""
-    (tmp_path / "callback.py").write_text(IN_A_CALLBACK)
-    words = [sys.executable, "callback.py", str(int(number))]
-    done = subprocess.run(words, cwd=tmp_path, env=environment(), capture_output=True, text=True, timeout=120)
-    assert done.returncode == 128 + number
-    assert [line[:37] for line in done.stderr.splitlines()] == ["error: interrupted; what is finished "]
-
-
 @POSIX
 def test_a_reader_that_leaves_is_no_error(finished: Path) -> None:
     command = f"{sys.executable} -m microslip check build/box/basis.h5 | head -n 1"
@@ -539,6 +508,81 @@ def test_progress_in_a_log_shows_small_steps_only_after_silence(
         report("8 of 80 vectors")
     shown = capsys.readouterr().err
     assert "eigenmodes" in shown and "8 of 80" in shown and "4 of 80" not in shown
+
+
+@pytest.fixture
+def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    return tmp_path / "microslip" / "durations.json"
+
+
+def test_a_run_says_what_it_will_do_and_how_long_it_took_here(
+    cache: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The longest of the last ones in this folder, else of the same name in others; short ones say nothing of it."""
+    from microslip import progress
+
+    def first(title: str) -> str:
+        with progress.progress(title):
+            pass
+        return said(capsys)[1].splitlines()[0]
+
+    assert "modal file" in first("run box") and not cache.exists(), "it took no time"
+    assert "not timed on this machine yet" in first("run box")
+    for seconds in (150.0, 90.0):
+        progress.keep("run box", seconds)
+    assert first("run box").endswith("at most about 2 min, as before")
+    monkeypatch.chdir(cache.parent)
+    assert first("run box").endswith("at most about 2 min, as before")
+    progress.keep("run box", 30.0)
+    assert first("run box").endswith("at most about 30 s, as before")
+    progress.keep("run box", 0.1)
+    assert first("run box").endswith("at most about 30 s, as before"), "all was up to date"
+    progress.keep("mesh box", 3.0)
+    assert " s" not in first("mesh box").replace("mesh", "")
+    cache.write_text("damaged")
+    assert "not timed on this machine yet" in first("run box")
+
+
+def test_what_will_be_done_is_said_before_what_does_it_is_loaded(
+    cache: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    from microslip import progress
+
+    monkeypatch.setattr(progress, "LOADING", 0.01)
+    with progress.announced(["run", "box", "--force"]):
+        time.sleep(0.2)
+        before = said(capsys)[1]
+        with progress.progress("run ./box/body.toml"):
+            pass
+        assert before.startswith("run box: mesh, modal file") and not said(capsys)[1]
+    for words in (["run", "box", "-q"], ["run"], ["init", "box"]):
+        with progress.announced(words):
+            time.sleep(0.05)
+        assert not said(capsys)[1]
+
+
+def test_a_silent_step_is_told_again_and_counts_come_to_their_end(
+    cache: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    from microslip import progress
+
+    monkeypatch.setattr(progress, "BEAT", 0.05)
+    with progress.progress("run box") as report:
+        report("a long step")
+        time.sleep(0.3)
+    assert "still at it: a long step" in said(capsys)[1]
+    monkeypatch.setattr(progress, "BEAT", 1e3)
+    with progress.progress("run box") as report:
+        monkeypatch.setattr(progress, "SILENCE", 0.0)
+        for text in ("27 of 400 points", "3 of 8 steps"):
+            report(text)
+        monkeypatch.setattr(progress, "SILENCE", 1e3)
+        report("8 of 8 steps")
+        report("pictures")
+        report("5 of 9 pictures")
+    lines = [line.split("s  ", 1)[-1].split(", about")[0] for line in said(capsys)[1].splitlines()[1:]]
+    assert lines == ["27 of 400 points", "27 of 400 points; ended there", "3 of 8 steps", "8 of 8 steps", "pictures"]
 
 
 @pytest.mark.parametrize("encoding, shown", [("utf-8", "2 µm ✓"), ("ascii", "2 um ?"), ("latin-1", "2 µm ?")])

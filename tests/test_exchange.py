@@ -726,3 +726,18 @@ def test_an_exporter_of_another_package_is_one_file(
         assert code == 0 or "microslip.exporter: other:" in capsys.readouterr().err
     formats.cache_clear()
     assert (tmp_path / "names.txt").read_text() == read_basis(file).name
+
+
+@pytest.mark.parametrize("form", ALL)
+def test_an_export_replaces_its_like_and_neither_notes_nor_its_own_input(
+    form: str, file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    source, notes = tmp_path / "vane.h5", tmp_path / "notes.txt"
+    shutil.copy(file, source)
+    notes.write_text("microslip: buy milk")
+    for target in (source, notes):
+        before = target.read_bytes()
+        assert main(["export", str(source), "--to", form, "-o", str(target)]) == 2
+        assert str(target) in capsys.readouterr().err and target.read_bytes() == before
+    for _ in range(2):
+        assert main(["export", str(source), "--to", form, "-o", str(tmp_path / "new")]) == 0

@@ -314,6 +314,31 @@ def test_what_cannot_be_is_an_error_of_the_unit(run: Callable[[ModalBasis], Mast
         one.call("DoStep", ctypes.c_double(0.0), ctypes.c_double(h), 0, returns=3)
 
 
+@LINUX
+def test_no_number_that_is_not_finite_enters_the_unit_by_any_door(run: Callable[[ModalBasis], Master]) -> None:
+    """Nor does a force beyond all numbers leave one: the state stays what it was, and goes on."""
+    one = run(plain())
+    force, size = "interface.right.u_n.force", ctypes.c_size_t(1)
+    assert force in one.at
+    at, order = (ctypes.c_uint * 1)(one.at[force]), (ctypes.c_int * 1)(1)
+    one.step(0.0, 1e-4)
+    before = one.get("modal.q[1]", "modal.v[1]", force)
+    for bad in (np.nan, np.inf, -np.inf):
+        value, states = (ctypes.c_double * 1)(bad), (ctypes.c_double * (2 * one.modes))(bad)
+        one.call("SetReal", at, size, value, returns=3)
+        one.call("SetRealInputDerivatives", at, size, order, value, returns=3)
+        one.call("SetContinuousStates", states, ctypes.c_size_t(2 * one.modes), returns=3)
+        one.call("SetTime", ctypes.c_double(bad), returns=3)
+        one.call("SetupExperiment", 0, ctypes.c_double(0.0), ctypes.c_double(bad), 0, ctypes.c_double(1.0), returns=3)
+        one.call("DoStep", ctypes.c_double(bad), ctypes.c_double(1e-4), 0, returns=3)
+    assert np.array_equal(before, one.get("modal.q[1]", "modal.v[1]", force))
+    one.set({force: 1e308})
+    one.call("DoStep", ctypes.c_double(1e-4), ctypes.c_double(1e4), 0, returns=3)
+    one.set({force: 1.0})
+    one.step(1e-4, 1e-4)
+    assert np.isfinite(one.state()).all()
+
+
 def test_the_description_tells_units_names_and_what_depends_on_what(tmp_path: Path) -> None:
     basis = replace(plain(), name="Läufer & <Sohn>\n1")
     g = basis.groups[0, 0]

@@ -320,3 +320,38 @@ def test_a_fingerprint_is_of_every_bit_and_of_nothing_else() -> None:
     assert len({store.fingerprint(v) for v in others}) == len({id(v) for v in others})
     with pytest.raises(TypeError):
         store.fingerprint(lambda: 0)
+
+
+def test_a_file_of_another_kind_is_not_replaced(tmp_path: Path) -> None:
+    """Nor is one that another program wrote in a format of ours; a table gives way to a table, an empty file and a link
+    to anything, a product with a sidecar to a whole one."""
+    import h5py
+
+    from microslip.files.hdf5 import sealed
+
+    path = tmp_path / "it.h5"
+
+    def write(form: str) -> None:
+        with sealed(path) as file:
+            file.attrs["format"] = form
+
+    def others() -> None:
+        with h5py.File(path, "w") as file:
+            file["x"] = [1.0, 2.0]
+
+    path.touch()
+    for form in ("microslip-orbit", "microslip-orbit"):
+        write(form)
+    for other in (lambda: write("microslip-response"), others, lambda: path.write_text("notes")):
+        path.unlink()
+        other()
+        before = path.read_bytes()
+        with pytest.raises(UserError, match=r"it\.h5: is there already and is "):
+            write("microslip-orbit")
+        assert path.read_bytes() == before and [p.name for p in tmp_path.iterdir()] == ["it.h5"]
+    with pytest.raises(UserError):
+        store.write_text(path.with_name("it.h5"), "<!DOCTYPE html>")
+    store.write_text(path, "a,b")
+    path.write_bytes(b"torn")
+    store.sidecar_path(path).write_text("{}")
+    write("microslip-orbit")

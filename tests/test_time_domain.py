@@ -873,6 +873,20 @@ def test_a_motion_that_diverges_keeps_what_was_computed_and_says_why(tmp_path: P
     same(ms.integrate(growing, 1.0, unit="rad/s", settle=0, keep=200), found)
 
 
+@pytest.mark.parametrize("call", ["integrate", "run_up"])
+def test_a_motion_replaces_no_file_of_another_kind(call: str, tmp_path: Path) -> None:
+    """It is refused before there is work."""
+    notes, told = tmp_path / "notes.txt", list[str]()
+    notes.write_text("mine")
+    beam = ms.structure(1.0, 1.0, 0.1, force={0: 1.0}, output=0)
+    with pytest.raises(UserError, match=r"notes\.txt: is there already and is text"):
+        if call == "integrate":
+            ms.integrate(beam, 1.0, settle=0, keep=2, file=notes, report=told.append)
+        else:
+            ms.run_up(beam, 0.1, 0.2, 10.0, file=notes, report=told.append)
+    assert notes.read_text() == "mine" and not told and [p.name for p in tmp_path.iterdir()] == ["notes.txt"]
+
+
 def test_a_case_that_diverges_ends_with_exit_code_1(hammer: Path, capsys: pytest.CaptureFixture) -> None:
     """Its body takes energy from nowhere: a damper with the wrong sign."""
     basis = ms.read_basis("build/hammer/basis.h5")

@@ -413,3 +413,36 @@ def test_stresses_and_pictures_can_be_left_out(wanted, whole, tmp_path):
     assert part["amplitude_m"] == pytest.approx(whole["amplitude_m"], rel=1e-12)
     stress = None if wanted.stresses == "none" else pytest.approx(whole["stress_amplitude_Pa"], rel=1e-12)
     assert part.get("stress_amplitude_Pa") == stress
+
+
+def test_what_a_build_file_imports_or_reads_is_an_input_of_the_mesh(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A helper beside it, a table above it, a model that gmsh reads: a change of any makes the mesh out of date."""
+    monkeypatch.chdir(tmp_path)
+    body = write_box(tmp_path / "box", case=False)
+    (body / "sizes.py").write_text("LENGTH = 1.0\n")
+    (tmp_path / "table.csv").write_text("1.0")
+    (body / "point.geo").write_text("Point(9001) = {0, 0, 0, 1};")
+    build = (body / "build.py").read_text()
+    more = (
+        "from pathlib import Path\nfrom sizes import LENGTH\nHERE = Path(__file__).parent\n"
+        "assert (HERE.parent / 'table.csv').read_text() and LENGTH\n"
+    )
+    assert build.count("gmsh.model.occ.synchronize()") == 1
+    build = build.replace(
+        "gmsh.model.occ.synchronize()", "gmsh.model.occ.synchronize(); gmsh.merge(str(HERE / 'point.geo'))"
+    )
+    (body / "build.py").write_text(build.replace("import gmsh\n", f"import gmsh\n{more}", 1))
+
+    def made() -> bool:
+        told: list[str] = []
+        meshing.mesh_stage(open_job(body), report=told.append)
+        return "meshes/box.msh is up to date" not in told
+
+    assert made() and not made()
+    opened = json.loads((tmp_path / "meshes/box.msh.json").read_text())["opened"]
+    assert set(opened) == {"../box/build.py", "../box/sizes.py", "../table.csv", "../box/point.geo"}
+    for file in (body / "sizes.py", tmp_path / "table.csv", body / "point.geo"):
+        file.write_text(file.read_text() + "\n")
+        assert made() and not made(), file

@@ -4,7 +4,6 @@ interrupted, 143 ended by SIGTERM."""
 from __future__ import annotations
 
 import codecs
-import contextlib
 import io
 import logging
 import os
@@ -13,7 +12,6 @@ import shlex
 import shutil
 import signal
 import sys
-import threading
 from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from pathlib import Path
@@ -21,9 +19,9 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import App, CycloptsError, Parameter
 
-from . import __version__
+from . import __version__, interrupts
 from .errors import NotConverged, UserError
-from .progress import progress
+from .progress import announced, progress
 
 if TYPE_CHECKING:
     from .basis.checks import Check
@@ -666,6 +664,7 @@ def _check(file: Path, short: bool, quiet: bool) -> None:
         if other.form != FORMAT:
             raise
         return _check_response(file, short, quiet)
+    _say_seal(file, quiet)
     _verdict(file, [*check_basis(basis), *ring_checks(basis)], short, quiet)
 
 
@@ -675,6 +674,7 @@ def _check_response(file: Path, short: bool, quiet: bool) -> None:
     from .results.checks import check_response, sentence
 
     found = read_response(file)
+    _say_seal(file, quiet)
     bases, missing = _modal_files(found)
     findings = check_response(found, bases)
     if missing and not short:
@@ -707,18 +707,18 @@ def _verdict(file: Path, findings: list[Check], short: bool, quiet: bool) -> Non
     for c in failed if quiet else worst_of_each(failed) if short else findings:
         mark = "ok  " if c.passed else "FAIL"
         print(f"{mark} {c.name}: {c.value:.3g} (limit {c.limit:.3g}){'  ' + c.message if c.message else ''}")
-    _say_seal(file, quiet)
     if failed:
         raise NotConverged(f"{file}: {len(failed)} of {len(findings)} checks failed")
     _say(f"{file}: all {len(findings)} checks passed", quiet)
 
 
 def _say_seal(file: Path, quiet: bool) -> None:
-    """A line if a file that could be read has no seal."""
+    """A line, the first, if a file that could be read has no seal."""
     from .files.hdf5 import seal_state
 
     if seal_state(file) == "absent":
-        _say(f"{file}: not sealed: written by another program, or changed since it was written", quiet)
+        _say(f"{file}: not sealed: written by another program, or changed since it was written; what follows is "
+             "recomputed from its numbers, and those that nothing else tells may be wrong", quiet)  # fmt: skip
 
 
 @app.command(name="import")
@@ -988,7 +988,8 @@ def main(words: list[str] | None = None) -> int:
     _plain_where_needed()
     logging.getLogger("matplotlib").setLevel(logging.ERROR)  # it warns of a home without a place for its fonts
     try:
-        app(words, exit_on_error=False, print_error=False, result_action="return_value")
+        with announced(sys.argv[1:] if words is None else words):
+            app(words, exit_on_error=False, print_error=False, result_action="return_value")
         sys.stdout.flush()
         return 0
     except CycloptsError as error:
@@ -1007,7 +1008,7 @@ def main(words: list[str] | None = None) -> int:
     except OSError as error:
         return _fail(f"{error.filename or 'a file'}: {error.strerror or error}; correct the path or its permissions", 2)
     except KeyboardInterrupt:
-        return _fail("interrupted; what is finished is kept, and products and points of it are not computed again", 130)
+        return _fail("interrupted; what is finished is kept, and the same command goes on from there", 130)
 
 
 def _plainly(error: UnicodeError) -> tuple[str, int]:
@@ -1046,42 +1047,11 @@ def _fail(text: str, code: int) -> int:
 
 def entry() -> None:
     """Console script. A request to end (SIGTERM) is Ctrl-C but for the exit code: what is finished is kept."""
-    asked: list[int] = [signal.SIGINT]
-
-    def end(number: int, _: object) -> None:
-        asked.append(number)
-        raise KeyboardInterrupt
-
-    def lost(what: sys.UnraisableHookArgs) -> None:
-        """A request that came while the interpreter ran what takes no exception, such as a callback of its garbage
-        collector, is made again a little later."""
-        if isinstance(what.exc_value, KeyboardInterrupt):
-            again = threading.Timer(0.05, _ask_again, asked[-1:])
-            again.daemon = True
-            again.start()
-        else:
-            sys.__unraisablehook__(what)
-
-    sys.unraisablehook = lost
-    signal.signal(signal.SIGTERM, end)
-    if (code := main()) == 130:
-        _leave(128 + asked[-1])
+    interrupts.listen()
+    code = main()
+    if code == 130 or not code and interrupts.requested():
+        interrupts.leave(interrupts.requested() or signal.SIGINT)
     sys.exit(code)
-
-
-def _ask_again(number: int) -> None:
-    if hasattr(signal, "pthread_kill"):  # which wakes a main thread that waits; Windows has none
-        signal.pthread_kill(threading.main_thread().ident or 0, number)
-    else:
-        signal.raise_signal(number)
-
-
-def _leave(code: int) -> None:
-    """End at once: threads of libraries that were interrupted may crash while the interpreter is taken down."""
-    for stream in (sys.stdout, sys.stderr):
-        with contextlib.suppress(OSError, ValueError):
-            stream.flush()
-    os._exit(code)
 
 
 if __name__ == "__main__":

@@ -3,50 +3,126 @@
 from __future__ import annotations
 
 import contextlib
+import json
+import os
 import sys
+import tempfile
+import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+from .interrupts import look
 
 Report = Callable[[str], None]
 
 
 @contextlib.contextmanager
 def progress(title: str, quiet: bool = False) -> Iterator[Report]:
-    """Yield a function that is told, in words, what begins now.
+    """Say what will be done and about how long it takes, and yield a function that is told, in words, what begins now.
 
     On a terminal a bar shows the present step and its time, and finished steps stay above it; when the output is a
-    file or a pipe each step is one plain line. ``300 of 600 frequencies`` moves the bar of the present step (in a file
-    it is a line if nothing was said for `SILENCE` seconds), and a text that begins with ``warning:`` stays on the
-    screen.
+    file or a pipe each step is one plain line, and a step that says nothing for `BEAT` seconds is told again.
+    ``300 of 600 frequencies`` moves the bar of the present step (in a file it is a line if nothing was said for
+    `SILENCE` seconds, and once more at its end), and a text that begins with ``warning:`` stays on the screen. A
+    request to end is heeded there: what reports is a loop that can be left (`interrupts.look`).
     """
+    began, typed = time.perf_counter(), _typed or title
     if quiet:
-        yield lambda _: None
-    elif sys.stderr.isatty():
-        with _bar(title) as report:
-            yield report
+        yield lambda _: look()
     else:
-        print(title, file=sys.stderr, flush=True)
-        yield _lines()
+        _say_first(title, typed)
+        with (_bar if sys.stderr.isatty() else _lines)(title) as report:
+            yield report
+    keep(typed, time.perf_counter() - began)
 
 
-SILENCE = 5.0
-"""s after which even small steps are worth a line in a log."""
+LOADING = 1.0
+"""s after which what will be done is said, though what does it is still being loaded."""
+
+_typed, _first = "", threading.Lock()
+_told_first = False
 
 
-def _lines() -> Report:
+@contextlib.contextmanager
+def announced(words: Sequence[str]) -> Iterator[None]:
+    """While the command line does what these words say: `progress` says first what will be done, or, where that takes
+    longer than `LOADING`, it is said before."""
+    global _typed, _told_first
+    verb, *others = [word for word in words if not word.startswith("-")][:2] or [""]
+    _typed, _told_first = " ".join([verb, *others]), False
+    timer = threading.Timer(LOADING, _say_first, (_typed, _typed))
+    timer.daemon = True
+    if verb in PLANS and others and not {"-q", "--quiet", "-h", "--help"} & set(words):
+        timer.start()
+    try:
+        yield
+    finally:
+        timer.cancel()
+        _typed = ""
+
+
+def _say_first(title: str, typed: str) -> None:
+    """What will be done and about how long it takes, once."""
+    global _told_first
+    with _first:
+        if not (_typed and _told_first):
+            plan = planned(typed)
+            print(f"{title}{': ' * bool(plan)}{plan}", file=sys.stderr, flush=True)
+        _told_first = True
+
+
+SILENCE, BEAT = 5.0, 15.0
+"""s after which even small steps are worth a line in a log, and after which the present step is told again."""
+
+
+@contextlib.contextmanager
+def _lines(title: str) -> Iterator[Report]:
     began = last = time.perf_counter()
     step = (0.0, began)  # how many were done when it was first told, and when
+    present, counted, shown, seen = title, "", "", False
+    ended, lock = threading.Event(), threading.Lock()
+
+    def line(text: str) -> None:
+        nonlocal last
+        last = time.perf_counter()
+        print(f"  {last - began:6.1f} s  {text}", file=sys.stderr, flush=True)
+
+    def close() -> None:
+        """The last count of a step of which counts were shown."""
+        total, done = _fraction(counted)
+        if seen and total is not None and (shown != counted or done < total):
+            line(counted if done >= total else f"{counted}; ended there")
 
     def report(text: str) -> None:
-        nonlocal last, step
-        now, (total, done) = time.perf_counter(), _fraction(text)
-        if total is None or done <= step[0] + 1:
-            step = done, now
-        if total is None or now - last > SILENCE:
-            last = now
-            print(f"  {now - began:6.1f} s  {text}{_left(step, now, total, done)}", file=sys.stderr, flush=True)
+        nonlocal step, present, counted, shown, seen
+        look()
+        with lock:
+            total, done = _fraction(text)
+            if total is None or done < _fraction(counted)[1]:
+                close()
+                counted, seen = "", False
+            now = time.perf_counter()
+            if total is None or done <= step[0] + 1:
+                step = done, now
+            present, counted = text, text if total is not None else ""
+            if total is None or now - last > SILENCE:
+                shown, seen = text, total is not None
+                line(f"{text}{_left(step, now, total, done)}")
 
-    return report
+    def beat() -> None:
+        while not ended.wait(0.1 * BEAT):
+            with lock:
+                if time.perf_counter() - last > BEAT:
+                    line(f"still at it: {present}")
+
+    threading.Thread(target=beat, daemon=True).start()
+    try:
+        yield report
+        close()
+    finally:
+        ended.set()
 
 
 @contextlib.contextmanager
@@ -65,6 +141,7 @@ def _bar(title: str) -> Iterator[Report]:
 
     def report(text: str) -> None:
         nonlocal step
+        look()
         total, done = _fraction(text)
         if text.startswith("warning:"):
             bar.console.print(text, style="yellow", highlight=False, markup=False)
@@ -85,8 +162,7 @@ def _left(step: tuple[float, float], now: float, total: float | None, done: floa
     first, began = step
     if total is None or done <= first:
         return ""
-    left = (now - began) * (total - done) / (done - first)
-    return f", about {left:.0f} s left" if left < 120 else f", about {left / 60:.0f} min left"
+    return f", about {_duration((now - began) * (total - done) / (done - first))} left"
 
 
 def _fraction(text: str) -> tuple[float | None, float]:
@@ -95,3 +171,84 @@ def _fraction(text: str) -> tuple[float | None, float]:
     if len(words) >= 3 and words[1] == "of" and words[0].isdigit() and words[2].isdigit():
         return float(words[2]), float(words[0])
     return None, 0.0
+
+
+# how long it takes here ----------------------------------------------------------------------------------------------
+
+PLANS = {
+    "run": ("mesh, modal file, what the case asks for, pictures and page, each where it is not up to date", 30, 300),
+    "mesh": ("the mesh, if it is not up to date", 1, 30),
+    "modes": ("mesh, assembly, eigenmodes, rows and stresses, each if it is not up to date", 5, 120),
+    "respond": ("every point of the sweep, peaks between them, their error, stresses and pictures", 15, 180),
+    "orbit": ("motions period by period, their error, tables and pictures", 15, 180),
+    "bifurcate": ("equilibria, periodic orbits that begin at them, tables and pictures", 30, 300),
+    "two-tones": ("every pair of frequencies, tables and pictures", 30, 300),
+    "mistune": ("the tuned ring, then sample after sample", 60, 1200),
+    "roll": ("patches, creep curve, tables and pictures", 10, 300),
+    "stability": ("roots and their count, pictures", 5, 300),
+    "backbone": ("a nonlinear mode under each normal force", 20, 300),
+    "optimum": ("a sweep at each value, then the lowest resonance between them", 60, 600),
+    "closure": ("a static contact at each approach", 10, 300),
+    "report": ("pictures and page", 10, 60),
+}
+"""Verb -> what will be done, and between how many s it took for the cases that travel with the
+package, each on one quiet core of an AMD EPYC."""
+
+SHORT = 10.0
+"""s below which nobody is told how long it takes."""
+
+WORTH = 2.0
+"""s from which on a run is kept: one that finds all up to date says nothing of one that does not."""
+
+RUNS, TITLES = 5, 300
+"""That are kept, of each and in all."""
+
+
+def planned(title: str) -> str:
+    """What will be done, and about how long it takes: as runs of this title took on this machine, or as long as such
+    runs take; "" where that is soon."""
+    known, place = _durations(), _key(title)
+    words, low, high = PLANS.get(title.split()[0], ("", SHORT, 300))
+    took = known.get(place) or [s for key, more in known.items() if key.split("\n")[0] == title for s in more]
+    if took:
+        return f"{words}{'; ' * bool(words)}at most about {_duration(max(took))}, as before" * (max(took) > SHORT)
+    usual = f"not timed on this machine yet, such runs take {_duration(low)} to {_duration(high)}"
+    return f"{words}{'; ' * bool(words)}{usual}" * (high > SHORT)
+
+
+def keep(title: str, seconds: float) -> None:
+    """How long a run took, for the next one; where there is no place to write to, nothing is kept."""
+    if seconds < WORTH or (place := _place()) is None:
+        return
+    known, key = _durations(), _key(title)
+    took = [*known.pop(key, []), round(seconds, 1)][-RUNS:]
+    with contextlib.suppress(OSError):
+        place.parent.mkdir(parents=True, exist_ok=True)
+        handle, name = tempfile.mkstemp(dir=place.parent, prefix=".durations.")
+        with os.fdopen(handle, "w", encoding="utf-8") as file:
+            json.dump(dict([*known.items(), (key, took)][-TITLES:]), file, indent=1)
+        os.replace(name, place)
+
+
+def _key(title: str) -> str:
+    return f"{title}\n{Path.cwd()}"
+
+
+def _place() -> Path | None:
+    """Where durations are kept: `$XDG_CACHE_HOME/microslip/durations.json` or that in `~/.cache`; None: nowhere."""
+    with contextlib.suppress(RuntimeError):  # no home
+        return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache", "microslip", "durations.json")
+    return None
+
+
+def _durations() -> dict[str, list[float]]:
+    """Title and folder -> s that its last runs took; nothing of what is no such file."""
+    try:
+        found: Any = json.loads((_place() or Path(os.devnull)).read_text(encoding="utf-8"))
+        return {str(k): [float(s) for s in v] for k, v in found.items() if v}
+    except (OSError, ValueError, TypeError, AttributeError):
+        return {}
+
+
+def _duration(seconds: float) -> str:
+    return f"{seconds:.0f} s" if seconds < 120 else f"{seconds / 60:.0f} min"

@@ -27,6 +27,7 @@ from ..linalg.gyroscopic import stability_sentence
 from ..modal.range_basis import Interpolant, frequencies, largest_difference
 from ..reduced.coordinates import compliance_row, held, in_modes, own_stiffness
 from .integrals import cell_volumes, face_mean, modal_mass
+from .strains import stiffness_error, strain_error, stress_error
 
 TOLERANCES = {
     "orthogonality": 1e-9,
@@ -34,6 +35,10 @@ TOLERANCES = {
     "mass_error": 1e-8,
 }
 """Upper limits the solver's numbers are held to by `check_basis` (``certified`` must be 1, the rest is information)."""
+
+
+SMALL = 1e-6
+"""Of the largest compliance's root, below which that of a row is rounding."""
 
 
 @dataclass(frozen=True)
@@ -63,10 +68,11 @@ def check_basis(basis: ModalBasis) -> list[Check]:
     """Verify what a modal file claims from its own content, and the numbers stored by the solver.
 
     Without the full K this covers: shapes and sizes; finite numbers; the mesh's volume, mass-orthogonality of the
-    shapes recomputed from the mesh (a file whose shapes stand in another node order fails here); ascending
-    frequencies; M_r = 1 and K_r = diag(omega^2) for normal modes; C_r; skew G_r; orthonormal right-handed frames;
-    interface rows against the patch's shapes and against phi; modal compliance against the rows; static not below
-    modal compliance; the solver's certificate, orthogonality and backward error.
+    shapes recomputed from the mesh (a file whose shapes stand in another node order fails here), to the digits that its
+    solver claims; of a body at rest their stiffness-orthogonality, with strains and stresses; ascending frequencies;
+    M_r = 1 and K_r = diag(omega^2) for normal modes; C_r; skew G_r; orthonormal right-handed frames; interface rows
+    against the patch's shapes and against phi; modal compliance against the rows; static not below modal compliance;
+    the solver's certificate, orthogonality and backward error.
     """
     with np.errstate(all="ignore"):  # absurd numbers are findings, not warnings
         return _check_basis(basis)
@@ -322,13 +328,20 @@ def _shape_checks(basis: ModalBasis, g: ModalGroup) -> _Findings:
     if not weight > 0:
         return [("volume of the mesh is positive", np.inf, 0.0, "")]
     error = _largest(inner * basis.mass / weight - np.eye(g.n_modes))
-    found: _Findings = [("shapes are mass-orthonormal on the mesh", error, 1e-8, ""), *_place_checks(basis)]
+    limit = min(1e-8, max(1e-11, 100 * g.checks.get("orthogonality", 1.0)))  # what the solver claims, and rounding
+    found: _Findings = [("shapes are mass-orthonormal on the mesh", error, limit, ""), *_place_checks(basis)]
+    if (error := stiffness_error(basis, g)) is not None:
+        found.append(("shapes are stiffness-orthogonal on the mesh", error, 1e-9, ""))
     if g.residual is not None and g.residual.phi.size:
         found.append(("residual shapes are mass-orthogonal to the modes", _beside(basis, g, g.residual.phi), 1e-6, ""))
     if basis.mesh.materials:
         found.append(("mass of the mesh's materials", abs(weight / basis.mass - 1), 1e-8, ""))
     volume = cell_volumes(basis.mesh) if g.stresses else 0.0
+    if g.stresses and (error := stress_error(basis, g)) is not None:
+        found.append(("stresses follow from strains", error, 1e-9, ""))
     for name, s in g.stresses.items():
+        if (error := strain_error(basis, g, s)) is not None:
+            found.append((f"strains of {name} follow from the shapes", error, 1e-9, ""))
         found.append((f"volume of stress set {name}", abs(float(s.weights.sum()) / volume - 1), 1e-9, ""))
     return found
 
@@ -365,6 +378,10 @@ def _interface_checks(basis: ModalBasis, g: ModalGroup, name: str, item: Interfa
         message = f"nothing moves it along {', '.join(still)}"
         found.append((f"interface {name}: rows of zeros", float(len(still)), np.inf, message))
     top = max(_largest(item.rows[:3]), 1e-300)
+    if len(item.areas) and item.points.shape == (len(item.areas), 3):
+        centre = item.areas @ item.points / item.areas.sum()
+        error = _largest(centre - item.origin) / (_largest(np.ptp(item.points, axis=0)) + _extent(basis.mesh))
+        found.append((f"interface {name}: origin is the centre of the patch", error, 1e-9, ""))
     if item.shapes.shape[0]:
         mean = R @ np.einsum("p,pim->im", item.areas, item.shapes) / item.areas.sum()
         error = _largest(mean - item.rows[:3]) / top
@@ -406,12 +423,11 @@ def _compliance_checks(g: ModalGroup) -> _Findings:
     if not len(T):
         return found
     modal = held(T, g.compliance.labels, g.kind, g.K_r, g.omega, g.to_diagonal)
-    error = _largest(modal - g.compliance.modal) / max(_largest(modal), 1e-300)
-    found.append(("modal compliance follows from the rows", error, 1e-9, ""))
     static = g.compliance.static
-    error = _largest(static - static.conj().T) / max(_largest(static), 1e-300)
-    found.append(("static compliance is symmetric", error, 1e-9, ""))
     d = np.sqrt(np.maximum(np.diag(static).real, 1e-300))
+    size = np.outer(*[np.maximum(d, SMALL * _largest(d))] * 2)  # metres and radians stand side by side
+    found.append(("modal compliance follows from the rows", _largest((modal - g.compliance.modal) / size), 1e-9, ""))
+    found.append(("static compliance is symmetric", _largest((static - static.conj().T) / size), 1e-9, ""))
     for part, what in ((g.compliance.modal, "its modal part"), (g.compliance.plain, "that of the eigenmodes alone")):
         scaled = (static - part) / np.outer(d, d)
         worst = float(np.linalg.eigvalsh(scaled).min()) if np.isfinite(scaled).all() else -np.inf

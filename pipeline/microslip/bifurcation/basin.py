@@ -8,6 +8,7 @@ import numpy as np
 
 from ..continuation import newton
 from ..data import Array
+from ..interrupts import look
 from . import equilibria, floquet, flow
 from .dynamics import Dynamics
 from .orbits import extremes
@@ -52,6 +53,7 @@ def attractors(system: Dynamics, centre: Array, p: float, count: int, seed: int,
     x = np.asarray(run(starts(system, centre, count, seed), p, SETTLE * slow, 0.0))
     seen = [x]
     for _ in range(WATCH * EACH):
+        look()
         seen.append(np.asarray(run(seen[-1], p, slow / EACH, 0.0)))
     ways = np.swapaxes(np.array(seen), 0, 1)
     found: list[Orbit] = []

@@ -27,6 +27,7 @@ from ..settings.numbers import (
     _finite_vector,
     _float,
     _tuple,
+    named_once,
 )
 from ..settings.toml import read_settings
 from ..system.excitation import Turning
@@ -382,6 +383,7 @@ class CaseSettings(Model):
         names = [b.name for b in self.components]
         if twice := sorted({n for n in names if names.count(n) > 1}):
             raise ValueError(f"bodies: the name '{twice[0]}' is taken; give every body its own")
+        named_once(self, "bifurcation")
         if said := self._whose():
             raise ValueError(said)
         if self.loads and all(x.is_zero for x in self.loads):

@@ -15,6 +15,7 @@ import scipy.linalg.lapack
 import scipy.optimize
 
 from ..data import Array
+from ..interrupts import look
 
 CONVERGED = "converged"
 
@@ -198,6 +199,7 @@ def correct(
     sizes: list[float] = []
     forced = 0
     for iteration in range(1, settings.iterations + 1):
+        look()
         factors = _factor(here.B) if here.size < math.inf else None
         if factors is None:
             what = "singular derivative" if here.size < math.inf else "R or its derivative is not a number"

@@ -15,6 +15,7 @@ import scipy.sparse as sp
 from ..data import Array, Indices
 from ..elasticity import PAIR, to_tensor
 from ..elasticity import from_tensor as from_tensor
+from ..interrupts import look
 from .discretise import Block, Discretisation
 
 _BATCH = 300_000  # node pairs assembled at a time: temporaries stay below the 32 MB that malloc hands back at once
@@ -28,6 +29,7 @@ def to_symmetric(voigt: Array) -> Array:
 def _batches(block: Block) -> Iterator[slice]:
     size = _BATCH // block.cells.shape[1] ** 2
     for start in range(0, len(block.cells), size):
+        look()
         yield slice(start, start + size)
 
 

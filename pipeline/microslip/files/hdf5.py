@@ -17,8 +17,8 @@ from typing import Any, BinaryIO, Literal
 import h5py
 import numpy as np
 
-from ..errors import UserError
-from .store import complete_or_absent
+from ..interrupts import deferred
+from .store import complete_or_absent, refuse_other
 
 _SEAL = b"\nmicroslip seal, sha256 of all bytes before this line: "
 IMAGINARY = "_imag"
@@ -69,7 +69,7 @@ def create(path: Path, again: bool = False) -> Iterator[h5py.File]:
     Raises:
         OSError: the disk is full or the file too large, once and with its errno.
     """
-    with open(path, "r+b" if again else "w+b") as raw:
+    with deferred(), open(path, "r+b" if again else "w+b") as raw:
         sink = _Sink(raw)
         try:
             with h5py.File(sink, "r+" if again else "w", libver=("v108", "v110")) as file:
@@ -158,18 +158,9 @@ def seal_state(path: Path) -> Literal["intact", "broken", "absent"]:
 
 
 def refuse_foreign(path: Path | str, form: str) -> None:
-    """Refuse to write where a file stands that is none of a format (its attribute ``format``), sealed as it was
-    written; an empty one may go.
+    """Refuse to write, before there is work, where a file stands that is none of a format (its attribute ``format``).
 
     Raises:
         UserError: there is one.
     """
-    path = Path(path)
-    if not path.is_file() or not path.stat().st_size:
-        return
-    with contextlib.suppress(OSError):  # no right to read it, no HDF5
-        if seal_state(path) == "intact":
-            with h5py.File(path, "r") as file:
-                if file.attrs.get("format") == form:
-                    return
-    raise UserError(f"{path}: is there already and no {form} file as it was saved; give another name or remove it")
+    refuse_other(path, f"an HDF5 file ({form})")

@@ -15,6 +15,7 @@ import json
 import math
 import os
 import platform
+import re
 import stat
 import subprocess
 import tempfile
@@ -28,6 +29,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import UserError
+from ..interrupts import look, writing
 
 _ODD = {
     stat.S_IFDIR: "a folder",
@@ -66,26 +68,31 @@ def complete_or_absent(path: Path | str) -> Iterator[Path]:
     the next write of the same product removes. A link under the name gives way; what it leads to stays as it is.
 
     Raises:
-        UserError: if the folder is missing, not writable, the disk is full, or something else than a file stands there.
+        UserError: if the folder is missing, not writable, the disk is full, or something else than a file of this kind
+            stands there.
     """
     path = Path(path)
     _refuse_odd(path)
-    temporary: Path | None = None
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        _remove_leftovers(path)
-        handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.stem}.{os.getpid()}.", suffix=path.suffix)
-        os.close(handle)
-        temporary = Path(name)
-        yield temporary
-        put_in_place(temporary, path)
-        temporary = None
-    except OSError as error:
-        raise UserError(refused(path, error)) from error
-    finally:
-        if temporary is not None:
-            with contextlib.suppress(OSError):
-                temporary.unlink(missing_ok=True)
+    look()
+    with writing():
+        temporary: Path | None = None
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            _remove_leftovers(path)
+            prefix = f".{path.stem}.{os.getpid()}."
+            handle, name = tempfile.mkstemp(dir=path.parent, prefix=prefix, suffix=path.suffix)
+            os.close(handle)
+            temporary = Path(name)
+            yield temporary
+            refuse_other(path, kind_of(temporary))
+            put_in_place(temporary, path)
+            temporary = None
+        except OSError as error:
+            raise UserError(refused(path, error)) from error
+        finally:
+            if temporary is not None:
+                with contextlib.suppress(OSError):
+                    temporary.unlink(missing_ok=True)
 
 
 def put_in_place(temporary: Path, path: Path) -> None:
@@ -94,6 +101,45 @@ def put_in_place(temporary: Path, path: Path) -> None:
     _sync(temporary)
     os.replace(temporary, path)
     _sync(path.parent)
+
+
+_BEGINS = {
+    rb"\x89HDF": "an HDF5 file", rb"\x89PNG": "a PNG picture", rb"GIF8": "a GIF picture",
+    rb"PK\x03\x04": "a zip archive", rb"MATLAB 5\.0": "a MATLAB file", rb"<\?xml": "an XML file",
+    rb"<!DOCTYPE html": "a page", rb"\$MeshFormat": "a mesh of gmsh", rb"\s*-1\s*\n": "a universal file",
+    rb"\*\*": "a file of MBDyn", rb"\$": "bulk data", rb"\d+ nodes, \d+ modes": "a SID",
+}  # fmt: skip
+"""How a file begins -> what it is; anything else is text, or bytes."""
+
+_UNMARKED = ("text", "bytes", "a page", "a PNG picture", "a GIF picture", "a mesh of gmsh")
+_MARK = re.compile(rb"microslip-[a-z-]*[a-z]|microslip table|by microslip|microslip \d|microslip: |modelDescr|\.npy")
+"""What tells one kind of the others from another, near their beginning."""
+
+
+def kind_of(path: Path) -> str:
+    """What a file is, by its first bytes: its format, and whether this program wrote it; "" if it is empty."""
+    with open(path, "rb") as file:
+        head = file.read(4096)
+    other = "" if not head else "bytes" if b"\0" in head else "text"
+    kind = next((kind for begin, kind in _BEGINS.items() if re.match(begin, head)), other)
+    mark = None if kind in ("", *_UNMARKED) else _MARK.search(head)
+    return f"{kind} ({mark[0].decode().strip(': ')})" if mark else kind
+
+
+def refuse_other(path: Path | str, kind: str) -> None:
+    """Refuse to replace a file that is none of a kind (`kind_of`), and no product with a sidecar; an empty one may go.
+
+    Raises:
+        UserError: there is one.
+    """
+    path = Path(path)
+    known = path.is_symlink() or sidecar_path(path).is_file()  # a link gives way
+    if known or not path.is_file() or not os.access(path, os.R_OK):
+        return
+    if (there := kind_of(path)) not in ("", kind):
+        is_, would = there.split(" (")[0], kind.split(" (")[0]
+        words = f"{is_}, not {would}" if is_ != would else f"{is_} of another kind"
+        raise UserError(f"{path}: is there already and is {words}; give another name or remove it")
 
 
 def open_to_append(path: Path | str) -> int:
@@ -263,6 +309,9 @@ def _add(sha: Any, value: Any) -> None:
         sha.update(f"{array.dtype.str} {array.shape};".encode() + np.ascontiguousarray(array).tobytes())
 
 
+POLLED = 0.1
+"""s between two looks whether another process has ended."""
+
 _MINE: set[Path] = set()
 """Products that this process is making."""
 
@@ -318,11 +367,18 @@ def _taken(lock: int, file: Path, why: str, report: Callable[[str], None]) -> bo
 
     taken = False
     try:
-        try:
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            report(f"waiting for {os.pread(lock, 100, 0).decode(errors='replace') or 'a process'}, which {why}")
-            fcntl.flock(lock, fcntl.LOCK_EX)
+        waits = False
+        while True:
+            try:
+                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                break
+            except BlockingIOError:
+                if not waits:
+                    owner = os.pread(lock, 100, 0).decode(errors="replace") or "a process"
+                    report(f"waiting for {owner}, which {why}")
+                waits = True
+                look()
+                time.sleep(POLLED)
         if taken := os.path.samestat(os.fstat(lock), os.stat(file)):
             with contextlib.suppress(OSError):  # a full disk: then nobody is named
                 os.ftruncate(lock, 0)
@@ -356,11 +412,12 @@ def nothing_to_do(
 
 
 def is_up_to_date(product: Path | str, inputs: Mapping[str, Any]) -> bool:
-    """True if `product` and the files beside it are what its sidecar describes, and were made from these `inputs`."""
+    """True if `product` and the files beside it are what its sidecar describes, and were made from these `inputs` and
+    from what was opened besides (`note_product`)."""
     product = Path(product)
     try:
         note = json.loads(ordinary(sidecar_path(product)).read_text())
-        made = {product.name: note["product"], **note["files"]}
+        made = {product.name: note["product"], **note["files"], **note.get("opened", {})}
         same = note["inputs"] == hash_settings(inputs)
         return same and all(hash_file(product.parent / name) == digest for name, digest in made.items())
     except (OSError, ValueError, KeyError, TypeError, AttributeError):
@@ -380,17 +437,20 @@ def unfinished(product: Path | str) -> None:
         raise UserError(refused(sidecar_path(product), error)) from error
 
 
-def note_product(product: Path | str, inputs: Mapping[str, Any], files: Iterable[Path] = (), **more: Any) -> None:
+def note_product(
+    product: Path | str, inputs: Mapping[str, Any], files: Iterable[Path] = (), opened: Iterable[Path] = (), **more: Any
+) -> None:  # fmt: skip
     """Write the sidecar of a finished product: hashes, and what is volatile (UTC time, git commit).
 
     Args:
-        files: written with the product, in its folder or below.
+        files: written with the product, in its folder or below. opened: read on the way, which `inputs` do not tell.
     """
     product = Path(product)
     note = {
         "inputs": hash_settings(inputs),
         "product": hash_file(product),
         "files": {str(file.relative_to(product.parent)): hash_file(file) for file in sorted(set(files))},
+        "opened": {os.path.relpath(file, product.parent): hash_file(file) for file in sorted(set(opened))},
         "written": datetime.now(UTC).isoformat(timespec="seconds"),
         **git_state(Path(__file__).parent),
         **more,

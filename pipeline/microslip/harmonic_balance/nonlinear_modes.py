@@ -25,9 +25,8 @@ import numpy as np
 from ..continuation import Point, Settings, State, follow, start
 from ..data import Array
 from ..errors import UserError
-from ..files.hdf5 import refuse_foreign
 from ..results.checks import Checks
-from ..results.files import FORMAT, Response, write_response
+from ..results.files import Response, write_response
 from ..results.series import Series, of_solutions
 from ..system import assembly
 from ..system.assembly import Linear
@@ -131,7 +130,6 @@ class Backbone:
         Raises:
             UserError: a file that is no response stands there.
         """
-        refuse_foreign(path, FORMAT)
         known = {"frequency": self.frequency, "parameter": self.amplitude, "damping_ratio": self.damping, "x": self.x}
         known |= {f"checks/{n.name}": np.array([getattr(c, n.name) for c in self.checks]) for n in fields(Checks)}
         status = tuple(c.failure or CONVERGED for c in self.checks)

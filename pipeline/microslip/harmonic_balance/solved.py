@@ -11,8 +11,7 @@ import numpy as np
 
 from ..data import Array
 from ..errors import UserError
-from ..files.hdf5 import refuse_foreign
-from ..results.files import FORMAT, Response, read_response, stacked, write_response
+from ..results.files import Response, read_response, stacked, write_response
 from ..results.series import Series
 from ..units import Quantity
 from . import accuracy
@@ -118,7 +117,6 @@ class Motions(Series):
         Raises:
             UserError: no permission, no space; a file that is none of a response stands there.
         """
-        refuse_foreign(path, FORMAT)
         plain = Series(self.name, self.parameters, self.key, self.status, {**self.arrays}, dict(self.labels), self.over)
         write_response(path, Response(self.name, "aft", (plain,), labels=dict(self.labels)))
         return Path(path)

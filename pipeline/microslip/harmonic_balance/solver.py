@@ -13,6 +13,7 @@ import numpy as np
 from .. import continuation
 from ..data import Array
 from ..errors import NotConverged, UserError
+from ..interrupts import look
 from ..settings.mistakes import bounded
 from . import pseudo_transient
 from .forces import AFT
@@ -103,6 +104,7 @@ def newton(
     contraction = _contraction(at.problem)
     reference, error = float(np.abs(at.reference).max(initial=0.0)) or 1.0, np.inf  # where nothing drives, the length
     for count in range(most):
+        look()
         size = np.clip(np.abs(x).max(initial=0.0), 1e-3 * reference, 1e3 * reference)
         error = float(np.abs(R).max(initial=0.0) / size)
         history.append(error)

@@ -20,6 +20,7 @@ import scipy.linalg
 import scipy.sparse as sp
 import scipy.sparse.linalg as spla
 
+from .. import interrupts
 from ..data import Array, Indices
 from ..errors import NotConverged
 
@@ -403,6 +404,7 @@ def _lanczos(pencil: Pencil, count: int, shift: float, tolerance: float, known: 
     wanted = min(count, limit * block)
     look = wanted + block
     for step in range(limit):
+        interrupts.look()
         done = (step + 1) * block
         pencil.tell(f"{done} of {limit * block} Lanczos vectors at most, {wanted} modes wanted")
         last, new = slice(done - block, done), slice(done, done + block)
@@ -418,6 +420,7 @@ def _lanczos(pencil: Pencil, count: int, shift: float, tolerance: float, known: 
         theta, S = np.linalg.eigh(0.5 * (T[:done, :done] + T[:done, :done].conj().T))
         theta, S = theta[::-1][:wanted], S[:, ::-1][:, :wanted]
         if (np.linalg.norm(R @ S[last], axis=0) < tolerance * np.abs(theta)).all():
+            pencil.tell(f"{done} of {done} Lanczos vectors, the rest was not needed")
             values = shift + 1 / theta
             order = np.argsort(values, kind="stable")
             return values[order], (Q[:, :done] @ S)[:, order]

@@ -18,6 +18,7 @@ from scipy.linalg import lapack
 
 from ..data import Array, ComplexArray, Flags
 from ..errors import NotConverged
+from ..interrupts import look
 
 DENSE = 300
 """Rows up to which all roots are computed at once."""
@@ -283,6 +284,7 @@ def _disc(Q: Quadratic, part: Window, block: int) -> tuple[Array, Array, float, 
     V[:, :block] = np.linalg.qr(start)[0]
     m, radius, theta, Y = 0, 0.0, np.zeros(0, dtype=complex), np.zeros((0, 0), dtype=complex)
     while m + block <= space:
+        look()
         _extend(V, H, m, block, operator)
         m += block
         if m % (8 * block) and m + block <= space:

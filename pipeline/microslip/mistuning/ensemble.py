@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import os
+import signal
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import Executor, ProcessPoolExecutor
+from concurrent.futures import Executor, Future, ProcessPoolExecutor, wait
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from multiprocessing import get_context
@@ -16,6 +17,7 @@ import numpy as np
 from ..data import Array
 from ..errors import UserError
 from ..files import store
+from ..interrupts import look
 from ..settings.mistakes import whole
 from ..units import counted, percent
 from . import rare
@@ -168,6 +170,8 @@ def run(
             _more(found, of, min(samples, _next(len(found), EACH * workers)), until, samples, report)
             if file is not None:
                 _keep(file, inputs, found)
+    if len(found) < samples:
+        report(f"{len(found)} of {len(found)} samples{_told(found)}, the rest was not needed")
     return found
 
 
@@ -309,8 +313,29 @@ def _computed(
     if workers == 1:
         yield lambda numbers: (sample(asked, n) for n in numbers)
         return
-    with ProcessPoolExecutor(workers, get_context("spawn"), _begin, (asked,)) as pool:
-        yield lambda numbers: pool.map(_one, numbers)
+    pool = ProcessPoolExecutor(workers, get_context("spawn"), _begin, (asked,))
+    try:
+        yield lambda numbers: _in_order([pool.submit(_one, n) for n in numbers])
+    except KeyboardInterrupt:
+        pool.shutdown(wait=False, cancel_futures=True)  # the command line ends what they are at
+        raise
+    except BaseException:
+        pool.shutdown(cancel_futures=True)
+        raise
+    pool.shutdown()
+
+
+def _in_order(awaited: Sequence[Future[Sample]]) -> Iterator[Sample]:
+    """Samples as they are wanted; nothing is waited for in C, where a request to end would wait too."""
+    try:
+        for one in awaited:
+            while not one.done():
+                look()
+                wait([one], store.POLLED)
+            yield one.result()
+    finally:
+        for one in awaited:
+            one.cancel()
 
 
 _own: Any = None
@@ -319,6 +344,7 @@ _own: Any = None
 def _begin(asked: Asked) -> None:
     global _own
     _own = asked
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # a terminal asks all; who began them ends them
 
 
 def _one(number: int) -> Sample:

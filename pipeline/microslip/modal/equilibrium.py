@@ -33,6 +33,7 @@ from ..fem.operators import (
     tangent_tensor_slope,
 )
 from ..fem.tied import Tied
+from ..interrupts import look
 from ..linalg.eigen import DirectSolver, Unstable, symmetric_product
 from ..units import rpm_text
 from .closing import Closing
@@ -321,6 +322,7 @@ def _newton_at(
     u = np.zeros((n, 3)) if start is None else start.u
     closing = Closing(model.contacts, points + u, level, () if start is None else start.contacts)
     for _ in range(60 if model.contacts else 25):
+        look()
         H = [displacement_gradient(b, u) for b in model.d.blocks]
         stress = stress_of(model, [green_strain(h) for h in H])
         closing.move(points + u, steps[-1] if steps else np.inf)

@@ -22,6 +22,7 @@ import numpy as np
 from ..data import Array
 from ..errors import UserError
 from ..files.store import open_to_append, ordinary, refused
+from ..interrupts import writing
 
 FORMAT = "microslip-points"
 FORMAT_VERSION = "0.1"
@@ -73,7 +74,8 @@ class Journal:
     def _append(self, words: dict[str, Any], point: Point) -> None:
         whole = os.fstat(self._file).st_size
         try:
-            _write_all(self._file, _packed(words, point))
+            with writing():
+                _write_all(self._file, _packed(words, point))
             if time.monotonic() - self._synced > _SYNC:
                 os.fsync(self._file)
                 self._synced = time.monotonic()

@@ -12,7 +12,7 @@ import numpy as np
 
 from ..data import Array, ComplexArray, Indices
 from ..errors import UserError
-from ..files.hdf5 import IMAGINARY, put, refuse_foreign, sealed
+from ..files.hdf5 import IMAGINARY, put, sealed
 from ..files.hostile import DAMAGE, reading, refuse_damaged
 from ..files.store import ordinary
 from ..units import Quantity
@@ -160,7 +160,6 @@ class TwoTones:
         Raises:
             UserError: no permission, no space; a file that is none of two tones stands there.
         """
-        refuse_foreign(path, FORMAT)
         with sealed(path) as file:
             file.attrs["format"], file.attrs["format_version"] = FORMAT, FORMAT_VERSION
             for key in ("readouts", "units", "status", "messages"):

@@ -6,6 +6,7 @@ import numpy as np
 
 from ..data import Array
 from ..errors import UserError
+from ..interrupts import look
 from .half_space_influence import NORMAL, Influence
 
 TOLERANCE = 1e-10
@@ -70,6 +71,7 @@ def _gradients(
         pressure *= load / pressure.sum()
     direction, before, fresh = np.zeros_like(distance), 1.0, True
     for _ in range(ITERATIONS):
+        look()
         touching = pressure > 0
         gap = deformation(pressure) + distance
         level = float(gap[touching].mean()) if load is not None else float(approach)  # type: ignore[arg-type]

@@ -22,6 +22,7 @@ from scipy.sparse.linalg import LinearOperator, gmres
 
 from ..data import Array, Flags
 from ..errors import UserError
+from ..interrupts import look
 from .half_space_influence import TANGENTIAL, Grid, Influence
 
 TOLERANCE = 1e-7
@@ -156,6 +157,7 @@ def tractions(
     p, error = within(trial, bound), 1.0
     largest = max(float(bound.max()), np.finfo(float).tiny)
     for _ in range(ITERATIONS):
+        look()
         tangent = _linearised(problem, trial)
         p = tangent.free(p) + tangent.across * bound * tangent.slip
         slip = problem.rigid + np.tensordot(amounts, problem.wanted, 1) + B(p, TANGENTIAL, TANGENTIAL)

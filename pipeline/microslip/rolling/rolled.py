@@ -10,6 +10,7 @@ import numpy as np
 
 from ..contact.friction import Friction
 from ..data import Array
+from ..interrupts import look
 from .laws import Surface, rolled_by_characteristic
 from .strips import BLOCK, Forces, Tractions, creep_forces, tractions
 from .temperature import Conductor, conducted, falling, heat_share, settled
@@ -79,6 +80,7 @@ def rolled(
     blocks = [np.arange(i, min(i + BLOCK, len(speed))) for i in range(0, len(speed), BLOCK)]
     parts, hottest, some = [], [], []
     for block in blocks:
+        look()
         f, t = _rolled(given[:, block], friction, speed[block], heat, surface, how)
         parts.append(f)
         some.append([v[np.isin(block, kept)] for v in t])

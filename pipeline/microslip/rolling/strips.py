@@ -8,6 +8,7 @@ to 2, over the speed: s_M = (xi - phi y, eta + phi x) (6.3-8). The springs betwe
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache, partial
 from typing import Any, Literal, NamedTuple
@@ -19,6 +20,7 @@ from numpy.typing import ArrayLike
 
 from ..contact.law import program
 from ..contact.point import opposed
+from ..interrupts import look
 from .arguments import TINY, broadcast, grid_of, words
 from .kalker import Coefficients, coefficients_at
 
@@ -268,11 +270,16 @@ def _rolled(*given: Array, elements: tuple[int, int], distribution: Distribution
     return jax.lax.map(block, given)
 
 
-def runs(n: int, block: int) -> list[slice]:
+def runs(n: int, block: int) -> Iterator[slice]:
     """Of blocks: `RUN` at a time, then one by one, so that two shapes are compiled at the most."""
     blocks = -(-n // block)
     many = blocks - blocks % RUN
-    return [slice(i, i + RUN) for i in range(0, many, RUN)] + [slice(i, i + 1) for i in range(many, blocks)]
+    for i in range(0, many, RUN):
+        look()
+        yield slice(i, i + RUN)
+    for i in range(many, blocks):
+        look()
+        yield slice(i, i + 1)
 
 
 def creep_forces(

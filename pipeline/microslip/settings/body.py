@@ -615,7 +615,7 @@ class BodySettings(Model):
 
     @model_validator(mode="after")
     def _names_once(self) -> BodySettings:
-        named_once(self, "closures", "bolts", "interfaces", "excitations", "monitors gauges")
+        named_once(self, "closures", "bolts", "interfaces", "excitations", "monitors gauges", "parameters")
         if self.geometry.matrices is not None:
             self._only_what_matrices_can()
         elif self.parameters:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import subprocess
@@ -9,12 +10,14 @@ import sys
 import tempfile
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from ..data import Indices, Material, Mesh
 from ..errors import UserError
 from ..files import store
+from ..interrupts import look
 from ..mesh import mesh_problems, part_numbers, read_mesh
 from ..mesh.chosen import of_instances, with_parts
 from ..mesh.raw import in_file
@@ -62,9 +65,10 @@ def mesh_stage(job: Job, output: Path | None = None, force: bool = False, report
 
     def work() -> Made:
         report(f"meshing {source.name}")
-        for line in _run_mesher(job, source, product):
+        told, opened = _run_mesher(job, source, product)
+        for line in told:
             report(line)
-        return Made()
+        return Made(opened=opened)
 
     Stage(product, ("cad",), force, report).make(inputs, work)
     return product
@@ -92,8 +96,8 @@ def _refuse_unnamed_faces(job: Job) -> None:
         raise UserError("\n".join(wrong))
 
 
-def _run_mesher(job: Job, source: Path, product: Path) -> list[str]:
-    """Run gmsh in its own process; returns its warnings."""
+def _run_mesher(job: Job, source: Path, product: Path) -> tuple[list[str], list[Path]]:
+    """Run gmsh in its own process; returns its warnings, and the files that it has read."""
     settings = {**job.raw, "folder": str(job.folder.resolve())}
     words = [str(source.resolve())] if job.settings.geometry.build else ["-m", "microslip.cad"]
     with store.complete_or_absent(product) as temporary, tempfile.TemporaryDirectory() as scratch:
@@ -110,33 +114,73 @@ def _run_mesher(job: Job, source: Path, product: Path) -> list[str]:
         if done.returncode or not made.is_file():
             raise UserError(_mesher_failure(job, done))
         temporary.write_bytes(made.read_bytes())
-    return [line for line in done.stderr.splitlines() if line.startswith("warning:")]
+        told = Path(scratch) / OPENED
+        opened = [Path(name) for name in json.loads(told.read_text())] if told.is_file() else []
+    return [line for line in done.stderr.splitlines() if line.startswith("warning:")], opened
 
 
 def run_apart(words: list[str], scratch: str) -> subprocess.CompletedProcess[str]:
     """Run a Python file, or -m and a module, in a process of its own, as gmsh is.
 
-    It ends when this process does, however that ends, and then removes the folder `scratch`.
+    It ends when this process does, however that ends, and then removes the folder `scratch`. There it leaves a list of
+    the files that it read, but for those of Python, of this package and of `scratch`.
     """
     paths = [str(PACKAGE.parent), os.environ.get("PYTHONPATH", "")]
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(p for p in paths if p)}
     read, write = os.pipe()  # which nobody writes to: its end is the end of this process
     try:
-        command = [sys.executable, "-c", _TO_THE_END, scratch, *words]
-        return subprocess.run(command, stdin=read, capture_output=True, text=True, env=environment)
+        command = [sys.executable, "-c", _TO_THE_END.format(name=OPENED, own=str(PACKAGE)), scratch, *words]
+        pipes: dict[str, Any] = dict.fromkeys(("stdout", "stderr"), subprocess.PIPE)
+        process = subprocess.Popen(command, stdin=read, text=True, env=environment, **pipes)
+        try:
+            return _ended(process)
+        finally:
+            process.kill()
+            process.communicate()
     finally:
         os.close(read)
         os.close(write)
 
 
+def _ended(process: subprocess.Popen[str]) -> subprocess.CompletedProcess[str]:
+    """What a process leaves, which is waited for in Python, where a request to end is heard."""
+    while True:
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            out, err = process.communicate(timeout=store.POLLED)
+            look()  # a terminal asks both
+            return subprocess.CompletedProcess(process.args, process.returncode, out, err)
+        look()
+
+
+OPENED = "opened.json"
+"""Of `run_apart`: files that were read."""
+
 _TO_THE_END = """
-import os, runpy, shutil, sys, threading
+import atexit, json, os, runpy, shutil, sys, sysconfig, threading
 
 def end(scratch):
     os.read(0, 1)
     shutil.rmtree(scratch, ignore_errors=True)
     os._exit(1)
 
+opened = set()
+
+def hear(event, words):
+    if event == "open" and isinstance(words[0], (str, bytes)):
+        name, mode, flags = words
+        if not (set(mode) & set("wax+") if mode else flags & (os.O_WRONLY | os.O_RDWR)):
+            opened.add(os.path.abspath(os.fsdecode(name)))
+
+def tell(scratch):
+    known = [scratch, {own!r}, *sysconfig.get_paths().values(), sys.base_prefix, "/proc", "/sys", "/dev", "/etc"]
+    known = [os.path.join(os.path.realpath(folder), "") for folder in known]
+    read = opened | {{m.__file__ for m in list(sys.modules.values()) if getattr(m, "__file__", None)}}
+    read = {{f for f in map(os.path.realpath, read) if os.path.isfile(f) and not f.endswith(".pyc")}}
+    with open(os.path.join(scratch, {name!r}), "w") as file:
+        json.dump(sorted(f for f in read if not any(f.startswith(folder) for folder in known)), file)
+
+sys.addaudithook(hear)
+atexit.register(tell, sys.argv[1])
 threading.Thread(target=end, args=[sys.argv[1]], daemon=True).start()
 module = sys.argv[2] == "-m"
 sys.argv = sys.argv[2 + module :]

@@ -12,9 +12,11 @@ import numpy as np
 
 from .. import __version__
 from ..basis import write_basis
+from ..basis.files import FORMAT
 from ..data import Array, Mesh, ModalBasis
 from ..errors import UserError, told_of
 from ..files import store
+from ..files.hdf5 import refuse_foreign
 from ..mesh import UNITS
 from ..mesh.cards import files_of
 from ..settings.body import BodySettings, MatrixFiles
@@ -34,6 +36,8 @@ def modes_stage(
         UserError, NotConverged: see `modes.modal_basis`.
     """
     matrices = job.settings.geometry.matrices
+    if output is not None:
+        refuse_foreign(output, FORMAT)
     if matrices is None:
         mesh_file = mesh_stage(job, report=report)
         code: tuple[str, ...] = _CODE

@@ -24,11 +24,12 @@ class Made:
     """What the work of a stage leaves.
 
     Attributes:
-        files: written with the product, in its folder or below. note: volatile things for the sidecar. whole: whether
-            nothing was missing; else the next run tries again.
+        files: written with the product, in its folder or below. opened: read on the way, and not known before. note:
+            volatile things for the sidecar. whole: whether nothing was missing; else the next run tries again.
     """
 
     files: Iterable[Path] = ()
+    opened: Iterable[Path] = ()
     note: Mapping[str, Any] = field(default_factory=dict)
     whole: bool = True
 
@@ -61,7 +62,7 @@ class Stage:
                 return False
             made = work()
             if made.whole:
-                store.note_product(self.product, all_inputs, made.files, **made.note)
+                store.note_product(self.product, all_inputs, made.files, made.opened, **made.note)
             return True
 
     def is_made(self, inputs: Mapping[str, Any]) -> bool:

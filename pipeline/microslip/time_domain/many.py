@@ -1,11 +1,12 @@
 """Many starts of one system, integrated by one compiled program: which motion does each of them reach?
 
-Starts are taken one after the other within the program, each with steps of its own, so that what one start becomes does
-not hang on the others. Nothing is kept of a motion but its points after every period and its impacts.
+Starts are taken one after the other by one program, each with steps of its own, so that what one start becomes does not
+hang on the others. Nothing is kept of a motion but its points after every period and its impacts.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from typing import Any
@@ -17,6 +18,7 @@ import numpy as np
 from ..contact.law import program
 from ..data import Array
 from ..errors import UserError
+from ..interrupts import look
 from . import classification, loop
 from .bodies import Bodies, Now, Options
 from .classification import Exponent
@@ -131,47 +133,51 @@ def run(
     shape = (len(x), stepper.bodies.omega2.shape[0], -1)
     y = np.concatenate([(x @ to_modes.T).reshape(shape), (x_dot @ to_modes.T).reshape(shape)], axis=2)
     counts = np.array([settle * each, each]) * 2**stepper.options.halvings
-    ends, closes, last = _all(stepper.options, keep, stepper.groups, stepper.bodies, y, e.oscillators(0.0), counts)
-    q, v = (np.asarray(part).reshape(len(x), keep, -1) for part in np.split(np.asarray(ends), 2, axis=3))
-    reached = Reached(e, each, q, v, np.asarray(closes))
+    ends, closes, last = np.zeros((len(x), keep, *y.shape[1:])), np.zeros(len(x), int), list[Now]()
+    for i, start in enumerate(y):
+        look()
+        o = e.oscillators(0.0)
+        ends[i], closes[i], now = _one(stepper.options, keep, stepper.groups, stepper.bodies, start, o, counts)
+        last.append(now)
+    q, v = (part.reshape(len(x), keep, -1) for part in np.split(ends, 2, axis=3))
+    reached = Reached(e, each, q, v, closes)
     return replace(reached, exponents=_exponents(stepper, last, reached.size, each, periods)) if periods else reached
 
 
-def _exponents(stepper: Stepper, last: Now, size: float, each: int, periods: int) -> tuple[Exponent, ...]:
-    """Of the motions that go on from where they are, `last`, all stacked."""
-    if told := classification.whole(last.held.states):
+def _exponents(stepper: Stepper, last: Sequence[Now], size: float, each: int, periods: int) -> tuple[Exponent, ...]:
+    """Of the motions that go on from where they are, `last`."""
+    if told := classification.whole(last[0].held.states):
         raise UserError(f"exponents: {told}")
     e, stepper = stepper.equations, replace(stepper, order=2)
-    scale = classification.sizes(e, last.y.shape[1])
+    scale = classification.sizes(e, last[0].y.shape[0])
     way = np.random.default_rng(0).standard_normal(scale.shape) / scale
-    apart = classification.APART * size
-    found = _grown(
-        stepper.options, classification.ALIGNED + periods, stepper.groups, stepper.bodies, last, each, scale,
-        apart * way / np.linalg.norm(scale * way),
-    )  # fmt: skip
-    growth = np.asarray(found)[:, classification.ALIGNED :]
-    none = Exponent(float("nan"), float("nan"), 0)
-    return tuple(classification.mean(one, 2 * np.pi / e.Omega) if np.isfinite(one).all() else none for one in growth)
+    way *= classification.APART * size / np.linalg.norm(scale * way)
+    exponents = list[Exponent]()
+    for now in last:
+        look()
+        count = classification.ALIGNED + periods
+        found = _grown(stepper.options, count, stepper.groups, stepper.bodies, now, each, scale, way)
+        growth = np.asarray(found)[classification.ALIGNED :]
+        known = np.isfinite(growth).all()
+        none = Exponent(float("nan"), float("nan"), 0)
+        exponents.append(classification.mean(growth, 2 * np.pi / e.Omega) if known else none)
+    return tuple(exponents)
 
 
 @partial(program, static_argnums=(0, 1))
-def _all(
+def _one(
     options: Options, keep: int, groups: tuple[Group, ...], B: Bodies, y: Any, o: Any, counts: Any
 ) -> tuple[Any, Any, Now]:
-    """(n, keep, b, 2 p) after every period that is kept, (n,) impacts in them, and where the motions are then."""
+    """(keep, b, 2 p) after every period that is kept, how many impacts were in them, and where the motion is then."""
     on = partial(_further, options, groups, B)
+    now, _ = on(loop.begun(options, groups, B, y, o, None), counts[0])
 
-    def one(start: Any) -> tuple[Any, Any, Now]:
-        now, _ = on(loop.begun(options, groups, B, start, o, None), counts[0])
+    def period(now: Now, _: None) -> tuple[Now, tuple[Any, Any]]:
+        now, closes = on(now, counts[1])
+        return now, (now.y, closes)
 
-        def period(now: Now, _: None) -> tuple[Now, tuple[Any, Any]]:
-            now, closes = on(now, counts[1])
-            return now, (now.y, closes)
-
-        now, (ends, closes) = jax.lax.scan(period, now, length=keep)
-        return ends, jnp.sum(closes), now
-
-    return jax.lax.map(one, y)
+    now, (ends, closes) = jax.lax.scan(period, now, length=keep)
+    return ends, jnp.sum(closes), now
 
 
 def _further(options: Options, groups: tuple[Group, ...], B: Bodies, now: Now, count: Any) -> tuple[Now, Any]:
@@ -190,7 +196,7 @@ def _further(options: Options, groups: tuple[Group, ...], B: Bodies, now: Now, c
 def _grown(
     options: Options, periods: int, groups: tuple[Group, ...], B: Bodies, last: Now, count: Any, scale: Any, way: Any
 ) -> Any:
-    """(n, periods) logarithms by which a separation grows in each, brought back to its size after every one."""
+    """(periods,) logarithms by which a separation grows in each, brought back to its size after every one."""
     apart = jnp.linalg.norm(scale * way)
 
     def period(carried: tuple[Now, Now], _: None) -> tuple[tuple[Now, Now], Any]:
@@ -199,7 +205,4 @@ def _grown(
         other = loop.typed(classification.between(now, other, apart / size, jnp.asarray))
         return (now, other), jnp.log(size / apart)
 
-    def one(now: Now) -> Any:
-        return jax.lax.scan(period, (now, now._replace(y=now.y + way)), length=periods)[1]
-
-    return jax.lax.map(one, last)
+    return jax.lax.scan(period, (last, last._replace(y=last.y + way)), length=periods)[1]

@@ -17,7 +17,8 @@ import scipy.linalg
 from ..contact.set_valued import SetValued
 from ..data import Array
 from ..errors import NotConverged, UserError
-from ..files.hdf5 import put, refuse_foreign, sealed
+from ..files.hdf5 import put, sealed
+from ..interrupts import look
 from ..settings.mistakes import bounded
 from ..system.assembly import Contact
 from ..units import METRES, Quantity, counted
@@ -317,7 +318,6 @@ class Orbit:
         Raises:
             UserError: no permission, no space; a file that is none of motions stands there.
         """
-        refuse_foreign(path, kept_samples.FORMAT)
         with sealed(path) as file:
             kept_samples.head(file)
             group = file.create_group("motion_1")
@@ -455,6 +455,7 @@ def march(
     (now, hardest), done = kept.begun((first, Hardest(-1.0, 0.0)))
     many, happened, reported = 1, 0, time.monotonic()
     while done < settle + keep:
+        look()
         before, dense = now, done >= settle
         ahead, began = 1 if dense else min(many, settle - done), time.monotonic()
         rows = np.full(samples, each if dense else each * samples)

@@ -13,6 +13,7 @@ import numpy as np
 
 from ..data import Array
 from ..errors import UserError
+from ..files.hdf5 import refuse_foreign
 from ..files.store import fingerprint
 from ..harmonic_balance import solved
 from ..harmonic_balance.nonlinear_modes import Backbone
@@ -136,6 +137,7 @@ def run(
         UserError: see `orbit.run`; no permission, no space. NotConverged: no state of rest is found.
     """
     path = Path(path)
+    refuse_foreign(path, samples.FORMAT)
     plan = [samples.Planned(a.name, a.equations, a.samples, a.keep) for a in asked]
     depends = fingerprint([a.fingerprint for a in asked], inputs)
     with samples.recording(path, depends, plan, fresh, report) as file:

@@ -13,6 +13,7 @@ import numpy as np
 
 from ..data import Array
 from ..errors import UserError
+from ..interrupts import look
 from ..results import Journal
 from ..rolling.strips import creep_forces, tractions
 from ..rolling.wear import deposited, smoothed
@@ -321,6 +322,7 @@ def jumps(
         yield now, jump
     size = min(first, turns) if fixed or not jump.size else _next(jump, tolerance)
     while now.turns < turns * (1 - 1e-12):
+        look()
         size = min(size, turns - now.turns)
         then = r.at(now.depth + size * now.taken, now.turns + size, now)
         mean = 0.5 * (now.taken + then.taken)

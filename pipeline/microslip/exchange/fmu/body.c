@@ -63,6 +63,14 @@ static fmi2Status refuse(Body *b, const char *why)
     return fmi2Error;
 }
 
+static int finite(const fmi2Real *x, size_t n)
+{
+    while (n--)
+        if (!isfinite(x[n]))
+            return 0;
+    return 1;
+}
+
 static double damping(const State *s, int p)
 {
     int i = PAIR[p].i;
@@ -163,6 +171,7 @@ static void begin(State *s)
 #define CALL FMI2_Export fmi2Status
 #define READY { return fmi2OK; }
 #define NEVER { return refuse((Body *)c, "this function is not offered"); }
+#define FINITE(call, x, n) (finite(x, n) || (refuse((Body *)c, call ": takes finite numbers alone"), 0))
 #define REFERENCES const fmi2ValueReference r[], size_t n
 #define NONE { return n ? refuse((Body *)c, "every variable is a real one") : fmi2OK; }
 
@@ -187,8 +196,7 @@ CALL fmi2SetDebugLogging(fmi2Component c, fmi2Boolean on, size_t n, const fmi2St
 CALL fmi2SetupExperiment(fmi2Component c, fmi2Boolean known, fmi2Real tolerance, fmi2Real start, fmi2Boolean ends,
                          fmi2Real stop)
 {
-    STATE->time = start;
-    return fmi2OK;
+    return FINITE("fmi2SetupExperiment", &start, 1) ? (STATE->time = start, fmi2OK) : fmi2Error;
 }
 CALL fmi2EnterInitializationMode(fmi2Component c) READY
 CALL fmi2ExitInitializationMode(fmi2Component c) READY
@@ -213,6 +221,8 @@ CALL fmi2GetReal(fmi2Component c, REFERENCES, fmi2Real value[])
 CALL fmi2SetReal(fmi2Component c, REFERENCES, const fmi2Real value[])
 {
     size_t i;
+    if (!FINITE("fmi2SetReal", value, n))
+        return fmi2Error;
     for (i = 0; i < n; i++) {
         double *at = place(STATE, r[i]);
         if (!at)
@@ -236,7 +246,13 @@ CALL fmi2GetFMUstate(fmi2Component c, fmi2FMUstate *copy)
     memcpy(*copy, STATE, sizeof(State));
     return fmi2OK;
 }
-CALL fmi2SetFMUstate(fmi2Component c, fmi2FMUstate copy) { memcpy(STATE, copy, sizeof(State)); return fmi2OK; }
+CALL fmi2SetFMUstate(fmi2Component c, fmi2FMUstate copy)
+{
+    if (!FINITE("fmi2SetFMUstate", copy, sizeof(State) / sizeof(double)))
+        return fmi2Error;
+    memcpy(STATE, copy, sizeof(State));
+    return fmi2OK;
+}
 CALL fmi2FreeFMUstate(fmi2Component c, fmi2FMUstate *copy) { free(*copy); *copy = NULL; return fmi2OK; }
 CALL fmi2SerializedFMUstateSize(fmi2Component c, fmi2FMUstate copy, size_t *size)
 {
@@ -267,8 +283,16 @@ CALL fmi2CompletedIntegratorStep(fmi2Component c, fmi2Boolean kept, fmi2Boolean 
     *event = *end = 0;
     return fmi2OK;
 }
-CALL fmi2SetTime(fmi2Component c, fmi2Real time) { STATE->time = time; return fmi2OK; }
-CALL fmi2SetContinuousStates(fmi2Component c, const fmi2Real x[], size_t n) COPY(STATE->x, x)
+CALL fmi2SetTime(fmi2Component c, fmi2Real time)
+{
+    return FINITE("fmi2SetTime", &time, 1) ? (STATE->time = time, fmi2OK) : fmi2Error;
+}
+CALL fmi2SetContinuousStates(fmi2Component c, const fmi2Real x[], size_t n)
+{
+    if (!FINITE("fmi2SetContinuousStates", x, n))
+        return fmi2Error;
+    COPY(STATE->x, x)
+}
 CALL fmi2GetContinuousStates(fmi2Component c, fmi2Real x[], size_t n) COPY(x, STATE->x)
 CALL fmi2GetDerivatives(fmi2Component c, fmi2Real dx[], size_t n)
 {
@@ -285,6 +309,8 @@ CALL fmi2GetNominalsOfContinuousStates(fmi2Component c, fmi2Real x[], size_t n) 
 CALL fmi2SetRealInputDerivatives(fmi2Component c, REFERENCES, const fmi2Integer order[], const fmi2Real value[])
 {
     size_t i;
+    if (!FINITE("fmi2SetRealInputDerivatives", value, n))
+        return fmi2Error;
     for (i = 0; i < n; i++) {
         if (order[i] != 1 || r[i] < F || r[i] >= U)
             return refuse((Body *)c, "fmi2SetRealInputDerivatives: inputs have a first derivative and no other");
@@ -295,11 +321,15 @@ CALL fmi2SetRealInputDerivatives(fmi2Component c, REFERENCES, const fmi2Integer 
 CALL fmi2GetRealOutputDerivatives(fmi2Component c, REFERENCES, const fmi2Integer order[], fmi2Real value[]) NEVER
 CALL fmi2DoStep(fmi2Component c, fmi2Real time, fmi2Real h, fmi2Boolean final)
 {
-    if (!(h >= 0) || h > 1e300)
+    State before = *STATE;
+    if (!(h >= 0) || h > 1e300 || !isfinite(time))
         return refuse((Body *)c, "fmi2DoStep: the step must be a positive time");
     advance(STATE, h);
     STATE->time = time + h;
-    return fmi2OK;
+    if (finite(STATE->x, 2 * MODES))
+        return fmi2OK;
+    *STATE = before;
+    return refuse((Body *)c, "fmi2DoStep: the motion grows beyond all numbers");
 }
 CALL fmi2CancelStep(fmi2Component c) NEVER
 #define LATER { return fmi2Discard; } /* of steps that end later: there are none */
