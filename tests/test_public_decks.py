@@ -51,10 +51,15 @@ def keys(folder, body: str = "body") -> dict:
     return tomllib.loads((folder / body / "body.toml").read_text())
 
 
+GONE = ["*SURFACE, NAME=GONE", "8888, S1"]
+
+
 def test_a_set_that_nothing_uses_may_name_nodes_that_are_not_there(tmp_path, monkeypatch, capsys):
-    text = deck(block(), "*NSET, NSET=LEFTOVER", "3, 7, 99999", *HELD)
+    text = deck(block(), "*NSET, NSET=LEFTOVER", "3, 7, 99999", "*ELSET, ELSET=OLD", "1, 7777", *HELD, *GONE)
     said = imported(tmp_path, monkeypatch, capsys, "a.inp", text)
     assert "note: the set 'LEFTOVER' names node 99999 that the file does not define" in said
+    assert "note: the set 'OLD' names element 7777 that the file does not define" in said
+    assert "no cell that is read is '8888' of the surface 'GONE'" in said
     np.testing.assert_allclose(hertz(tmp_path)[:5], CLAMPED, rtol=5e-6)  # six digits
 
 

@@ -855,7 +855,7 @@ def report(file: Path, /, *, output: Output = None, quiet: Quiet = False) -> Non
 
 @app.command
 def info(
-    file: Path, /, *, output: Output = None, unit: str = "mm", speed: int | None = None,
+    file: Path, /, *, output: Output = None, unit: str | None = None, speed: int | None = None,
     nodal_diameter: int | None = None, rpm: float | None = None,
 ) -> None:  # fmt: skip
     """What a file holds: a modal file, a mesh, a CAD file (its faces, to choose from), matrices, or a body.toml.
@@ -863,27 +863,25 @@ def info(
     Args:
         file: basis.h5 or its folder, a mesh, a STEP or BREP file, matrices, or a body.toml.
         output: of a CAD file: a picture (.png) of its surfaces with their numbers.
-        unit: unit of length of a mesh or CAD file.
+        unit: unit of length of a mesh or CAD file; if not given what the file tells, else mm.
         speed: of a modal file: this one of its speeds only, counted from 0.
         nodal_diameter: of a cyclic body: this one only.
         rpm: of a modal file with a speed range: what it holds at this speed.
     """
-    from .mesh import UNITS
-    from .stages.importing import CAD, MATRICES, cad_table
+    from .stages.importing import CAD, MATRICES, cad_table, length_unit
 
     if not file.exists():
         raise UserError(f"{file}: there is no such file; correct the path")
     if file.is_dir() and not (file / "body.toml").is_file() and (file / "basis.h5").is_file():
         file = file / "basis.h5"
-    if unit not in UNITS:
-        raise UserError(f"--unit {unit}: unknown unit of length; choose one of {', '.join(UNITS)}")
+    metre = length_unit(unit, file)
     suffix = file.suffix.lower()
     if suffix in (".h5", ".hdf5"):
         from .stages.summary import basis_summary
 
         print("\n".join(basis_summary(_chosen(file, rpm, speed, nodal_diameter))))
     elif suffix in CAD:
-        text, reason = cad_table(file, unit, output)
+        text, reason = cad_table(file, metre, output)
         print(text)
         _warn([f"no picture of the surfaces: {reason}"] if reason else [])
         if output is not None and not reason:
@@ -900,7 +898,7 @@ def info(
 
         print(f"{file}: matrices {_words(matrix_names(file))}")
     else:
-        _tell_mesh(file, unit)
+        _tell_mesh(file, metre)
 
 
 def _tell_mesh(file: Path, unit: str) -> None:

@@ -64,6 +64,8 @@ def _element_surface(deck: Deck, raw: RawMesh, name: str, rows: list[list[str]],
         face = row[1].upper() if len(row) > 1 else ""
         if chosen is None:
             raise Damaged(f"{where}: the surface '{name}' names the element set '{row[0]}', which is not defined")
+        if not np.isin(chosen, everything).any():
+            raw.remarks.append(f"{where}: no cell that is read is '{row[0]}' of the surface '{name}'")
         for cells in deck.solids:
             nodes = cells.nodes[np.isin(cells.ids, chosen)]
             sides = sides_of(cells.kind)

@@ -29,7 +29,7 @@ from .deck_materials import assign_materials
 from .deck_mesh import CORNERS, cell_type
 from .deck_surfaces import add_surfaces
 from .instances import numbered, outline, place, placement, places
-from .raw import PRESTRESSED, Damaged, Numbering, RawMesh, ignored, joined, lost
+from .raw import PRESTRESSED, Damaged, Numbering, RawMesh, ignored, joined, lost, undefined
 from .supports import add_supports
 
 _REFUSED = {
@@ -206,6 +206,7 @@ def _assembled(deck: Deck) -> RawMesh:
         cells.nodes = numbering.positions(cells.nodes, "*ELEMENT names")
         raw.blocks.append((cells.kind, cells.nodes))
     raw.cell_id = [cells.ids for cells in deck.solids]
+    raw.remarks += _unknown_cells(deck)
     ids, count = np.unique(joined(raw.cell_id), return_counts=True)
     if (count > 1).any():
         twice = ids[count > 1][0]
@@ -232,6 +233,15 @@ def _assembled(deck: Deck) -> RawMesh:
                 raw.facets.setdefault(deck.written[key], []).append(cells.nodes[inside])
     add_surfaces(deck, raw, numbering)
     return raw
+
+
+def _unknown_cells(deck: Deck) -> list[str]:
+    """What is said of element sets that name cells which are not there; nothing beside kinds that are not read."""
+    if not all(map(cell_type, deck.kinds)):
+        return []
+    known = joined(cells.ids for cells in (*deck.solids, *deck.facets))
+    gone = {key: np.setdiff1d(joined(parts), known) for key, parts in deck.cell_sets.items()}
+    return [undefined(deck.written[key], "element", ids) for key, ids in gone.items() if len(ids)]
 
 
 def _unique_nodes(deck: Deck) -> tuple[Indices, Array]:

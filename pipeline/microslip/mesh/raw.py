@@ -101,15 +101,7 @@ class RawMesh:
         ids = np.unique(np.fromiter(numbers, dtype=np.int64))
         there = np.isin(ids, numbering.sorted)
         if not there.all():
-            missing = ids[~there]
-            which = (
-                f"node {missing[0]}"
-                if len(missing) == 1
-                else f"{len(missing)} nodes ({missing[0]}, ...)"
-            )
-            self.remarks.append(
-                f"the set '{name}' names {which} that the file does not define: left out of it"
-            )
+            self.remarks.append(undefined(name, "node", ids[~there]))
         if there.any():
             self.add_points(name, numbering.positions(ids[there], ""))
 
@@ -132,6 +124,13 @@ class RawMesh:
 def in_file(path: Path, text: str) -> str:
     """A sentence about a file, with its name once: ``deck/a.inp, line 3: ...`` of ``a.inp, line 3: ...``."""
     return f"{path}{text.removeprefix(path.name)}" if text.startswith(f"{path.name}, ") else f"{path}: {text}"
+
+
+def undefined(name: str, what: str, numbers: Indices) -> str:
+    """What is said of a set that names nodes or elements (`what`) which the file does not define."""
+    first, count = numbers[0], len(numbers)
+    which = f"{what} {first}" if count == 1 else f"{count} {what}s ({first}, ...)"
+    return f"the set '{name}' names {which} that the file does not define: left out of it"
 
 
 def lost(where: str, what: str) -> str:
