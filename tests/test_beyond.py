@@ -47,6 +47,7 @@ FOLDED = swept(
 )
 JUMPS = swept([110, 120, 122.091, 122.092, 130], [1, 4, 10, 11.8, 2])
 SMOOTH = swept([100, 110, 113, 120], [1, 4, 9, 3])
+NARROW = swept([100, 110, 110.1, 120], [1, 4, 9, 3])
 
 
 @pytest.mark.parametrize(
@@ -55,6 +56,7 @@ SMOOTH = swept([100, 110, 113, 120], [1, 4, 9, 3])
         (FOLDED, [(423.166, 69)], [True], [(423.166, 440)]),
         (JUMPS, [(114.1, 16.5), (122.091, 10.0)], [False, True], [(114.1, 122.092)]),
         (SMOOTH, [(113, 9)], [False], []),
+        (NARROW, [(110.1, 9)], [False], []),
     ],
 )
 def test_where_a_sweep_ends_is_no_resonance(
