@@ -16,7 +16,7 @@ from test_edges import modes
 
 import microslip as ms
 from microslip.basis import read_basis, write_basis
-from microslip.case import load_case, run
+from microslip.case import load_case
 from microslip.case.assemble import build
 from microslip.case.beyond import Beyond
 from microslip.cli import main
@@ -273,8 +273,7 @@ def test_a_lap_joint_from_rest_stays_closed_and_opens(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Two beams of 120 mm, their far ends clamped, pressed by 100 N where they overlap and shaken by 20 N: two other
-    integrations in time have 20.8 µm at 300 Hz, closed, and open from 400 Hz on, 83 µm there and 73 µm at 423 Hz, where
-    the sweep ends at a fold, which is no resonance."""
+    integrations in time have 20.8 µm at 300 Hz, closed, and open from 400 Hz on, 83 µm there and 73 µm at 423 Hz."""
     pytest.importorskip("gmsh")
     monkeypatch.chdir(tmp_path)
     subprocess.run([sys.executable, "-c", DRAW], check=True, capture_output=True)
@@ -286,13 +285,8 @@ def test_a_lap_joint_from_rest_stays_closed_and_opens(
     (tmp_path / "case.toml").write_text(JOINT)
     settings = load_case(tmp_path / "case.toml")[0]
     files = modal_files(settings, tmp_path / "case.toml", tmp_path, lambda _: None)
-    monkeypatch.setattr(run._Left, "out", lambda *_: [])
-    result = run.run_case(
-        settings, {n: read_basis(f) for n, f in files.items()}, tmp_path / "case.toml"
-    )
-    ((begins, _),) = gaps(result.responses[100.0], [])
-    assert result.resonances[100.0] == [] and begins == pytest.approx(423, abs=3)
-    pressed = result.built.pressed(100.0)
+    bases = {name: read_basis(file) for name, file in files.items()}
+    pressed = build(settings, bases, tmp_path / "case.toml").pressed(100.0)
     for f, amplitude, opens in (
         (300.0, 20.8e-6, False),
         (390.0, 37.6e-6, False),

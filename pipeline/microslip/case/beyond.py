@@ -51,7 +51,7 @@ LONG = 120.0
 """s that a motion at a frequency may take in a sweep that nobody asked for, and the stability of a
 curve, but for what compiles."""
 
-LOST, HALVINGS = 0.3, 3
+LOST, HALVINGS = 0.2, 3
 """Share by which an amplitude changes in a step in which a motion is lost, and how often such a step is halved."""
 
 ALIKE = 2
