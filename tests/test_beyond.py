@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import csv
 import json
+import subprocess
+import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,7 +15,7 @@ from test_curves import CASE, lifting, problem
 from test_edges import modes
 
 import microslip as ms
-from microslip.basis import write_basis
+from microslip.basis import read_basis, write_basis
 from microslip.case import load_case
 from microslip.case.assemble import build
 from microslip.case.beyond import Beyond
@@ -23,35 +25,49 @@ from microslip.harmonic_balance.response import operating
 from microslip.harmonic_balance.solver import solve
 from microslip.harmonic_balance.sweeps import ends, gaps
 from microslip.results import read_response
+from microslip.stages.places import modal_files
 from microslip.time_domain.stepped import Settled, settled
 
 pytestmark = pytest.mark.usefixtures("undrawn", "unjudged")
 
 
-def swept(frequency: list[float], amplitude: list[float], lost: tuple[float, ...] = ()) -> FrequencyResponse:
+def swept(
+    frequency: list[float], amplitude: list[float], lost: tuple[float, ...] = ()
+) -> FrequencyResponse:
     """A sweep by 10 Hz and what was added between; lost: where it has no solution."""
     f = np.array(frequency)
-    r = replace(modes(f, (1e3, 0.01, 1.0)), monitor=np.array(amplitude, dtype=complex), added=f % 10 != 0)
+    r = replace(
+        modes(f, (1e3, 0.01, 1.0)), monitor=np.array(amplitude, dtype=complex), added=f % 10 != 0
+    )
     return replace(r, converged=~np.isin(f, lost))
 
 
-FOLDED = swept([400, 410, 420, 423.166, 423.169, 430, 440], [42, 49, 60, 69, 80, 77, 73], (423.169, 430))
+FOLDED = swept(
+    [400, 410, 420, 423.166, 423.169, 430, 440], [42, 49, 60, 69, 80, 77, 73], (423.169, 430)
+)
 JUMPS = swept([110, 120, 122.091, 122.092, 130], [1, 4, 10, 11.8, 2])
 SMOOTH = swept([100, 110, 113, 120], [1, 4, 9, 3])
+NARROW = swept([100, 110, 110.1, 120], [1, 4, 9, 3])
 
 
-@pytest.mark.parametrize(("found", "peaks", "turns", "beside"), [
-    (FOLDED, [(423.166, 69)], [True], [(423.166, 440)]),
-    (JUMPS, [(114.1, 16.5), (122.091, 10.0)], [False, True], [(114.1, 122.092)]),
-    (SMOOTH, [(113, 9)], [False], []),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("found", "peaks", "turns", "beside"),
+    [
+        (FOLDED, [(423.166, 69)], [True], [(423.166, 440)]),
+        (JUMPS, [(114.1, 16.5), (122.091, 10.0)], [False, True], [(114.1, 122.092)]),
+        (SMOOTH, [(113, 9)], [False], []),
+        (NARROW, [(110.1, 9)], [False], []),
+    ],
+)
 def test_where_a_sweep_ends_is_no_resonance(
     found: FrequencyResponse, peaks: list, turns: list[bool], beside: list
 ) -> None:
     """The last solution before a gap or a jump is an end; a peak that overhangs, or lies between points, is none. What
     is looked at reaches from an overhanging peak to the jump, and over all points without a solution."""
     assert ends(found, peaks) == turns
-    np.testing.assert_allclose(gaps(found, [p for p, turn in zip(peaks, turns, strict=True) if not turn]), beside)
+    np.testing.assert_allclose(
+        gaps(found, [p for p, turn in zip(peaks, turns, strict=True) if not turn]), beside
+    )
 
 
 def motion(frequency: float, amplitude: float, opens: bool = False, least: float = 1.0) -> Settled:
@@ -63,18 +79,49 @@ def motion(frequency: float, amplitude: float, opens: bool = False, least: float
 def test_what_is_said_of_two_motions() -> None:
     """A joint that opens: which motion from rest, how high the other one is, where each sweep leaves its own, where it
     is irregular."""
-    down = [motion(430, 70, True), motion(420, 75, True), motion(410, 80, True), motion(400, 90, True, 0.5),
-            motion(390, 120, True), motion(380, 30)]  # fmt: skip
-    up = [motion(380, 30), motion(390, 38), motion(400, 42), motion(410, 49), motion(420, 74, True), motion(430, 70)]
+    down = [
+        motion(430, 70, True),
+        motion(420, 75, True),
+        motion(410, 80, True),
+        motion(400, 90, True, 0.5),
+        motion(390, 120, True),
+        motion(380, 30),
+    ]
+    up = [
+        motion(380, 30),
+        motion(390, 38),
+        motion(400, 42),
+        motion(410, 49),
+        motion(420, 74, True),
+        motion(430, 70),
+    ]
     rest = [motion(390, 38), motion(400, 88, True), motion(410, 81, True)]
     said = Beyond(100.0, (410.0, 420.0), up, down, rest).sentences()
-    assert "from 390 to 410 Hz" in said[0] and "120 µm at 390 Hz" in said[0] and "F_N = 100 N" in said[0]
-    assert "lower one at 390 Hz" in said[1] and "higher one from 400 to 410 Hz" in said[1] and "88 µm" in said[1]
-    assert "upwards" in said[2] and "lower one up to 410 Hz (49 µm)" in said[2] and "74 µm at 420 Hz" in said[2]
-    assert "downwards" in said[3] and "down to 390 Hz (120 µm)" in said[3] and "30 µm at 380 Hz" in said[3]
+    assert (
+        "from 390 to 410 Hz" in said[0]
+        and "120 µm at 390 Hz" in said[0]
+        and "F_N = 100 N" in said[0]
+    )
+    assert (
+        "lower one at 390 Hz" in said[1]
+        and "higher one from 400 to 410 Hz" in said[1]
+        and "88 µm" in said[1]
+    )
+    assert (
+        "upwards" in said[2]
+        and "lower one up to 410 Hz (49 µm)" in said[2]
+        and "74 µm at 420 Hz" in said[2]
+    )
+    assert (
+        "downwards" in said[3]
+        and "down to 390 Hz (120 µm)" in said[3]
+        and "30 µm at 380 Hz" in said[3]
+    )
     assert "irregular" in said[4] and "400 Hz" in said[4] and len(said) == 5
     (same,) = Beyond(100.0, (410.0, 420.0), up, up[::-1]).sentences()
-    assert "same motion" in same and Beyond(100.0, why="no form in time").sentences()[0].count("no form in time")
+    assert "same motion" in same and Beyond(100.0, why="no form in time").sentences()[0].count(
+        "no form in time"
+    )
 
 
 def test_a_motion_from_rest_is_that_of_the_balance(case: Path) -> None:
@@ -95,29 +142,50 @@ def case(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 @pytest.mark.slow
-def test_a_response_that_jumps_is_integrated_in_time(case: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_response_that_jumps_is_integrated_in_time(
+    case: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     """The sweep jumps at 122 Hz; the motion that lifts off is three to thirty times as high below, and a sweep in time
     downwards follows it, one upwards and starts from rest do not: on page, terminal, table. Its amplitudes are those
     of the balance with 7 harmonics on the curve that leans over, to 2 %."""
     assert main(["respond", "case.toml"]) == 0
     told = capsys.readouterr().err
     rows = list(csv.DictReader(Path("build/lifting/motions.csv").open()))
-    way = {w: {float(r["frequency_Hz"]): r for r in rows if r["way"] == w} for w in ("upwards", "downwards")}
+    way = {
+        w: {float(r["frequency_Hz"]): r for r in rows if r["way"] == w}
+        for w in ("upwards", "downwards")
+    }
     up, down = ({f: float(r["amplitude_m"]) for f, r in way[w].items()} for w in way)
     both = [f for f in up if f in down and 106 < f < 121]
-    assert len(both) == 5 and all(down[f] > 3 * up[f] for f in both) and down[both[0]] > 25 * up[both[0]]
+    assert (
+        len(both) == 5
+        and all(down[f] > 3 * up[f] for f in both)
+        and down[both[0]] > 25 * up[both[0]]
+    )
     at_rest = [r for r in rows if r["way"] == "from rest"]
-    assert at_rest and all(float(r["amplitude_m"]) == pytest.approx(up[float(r["frequency_Hz"])], rel=0.02)
-                           for r in at_rest)  # fmt: skip
+    assert at_rest and all(
+        float(r["amplitude_m"]) == pytest.approx(up[float(r["frequency_Hz"])], rel=0.02)
+        for r in at_rest
+    )
     series = read_response("build/lifting/response.h5").series[0]
-    np.testing.assert_allclose([up[f] for f in both], np.interp(both, series.key, series.amplitude), rtol=0.02)
-    summary, page = json.loads(Path("build/lifting/response.json").read_text()), Path("build/lifting/response.html")
+    np.testing.assert_allclose(
+        [up[f] for f in both], np.interp(both, series.key, series.amplitude), rtol=0.02
+    )
+    summary, page = (
+        json.loads(Path("build/lifting/response.json").read_text()),
+        Path("build/lifting/response.html"),
+    )
     for words in summary["beyond"]:
         assert words in told and words.split(" N ")[-1] in page.read_text()
     assert "Motions in time" in page.read_text() and "from rest" in page.read_text()
     assert all(row["frequency_Hz"] < 121 for row in summary["resonances"])
-    curve = ms.follow(build(load_case(case)[0], {"lifting": lifting()}, case).pressed(10.0), 140.0, 106.0,
-                      harmonics=7, samples=256)  # fmt: skip
+    curve = ms.follow(
+        build(load_case(case)[0], {"lifting": lifting()}, case).pressed(10.0),
+        140.0,
+        106.0,
+        harmonics=7,
+        samples=256,
+    )
     for f in both[1:]:
         assert down[f] == pytest.approx(highest(curve.parameter, curve.amplitude, f), rel=0.02)
 
@@ -127,3 +195,107 @@ def highest(parameter: np.ndarray, amplitude: np.ndarray, at: float) -> float:
     way = (parameter[:-1] - at) * (parameter[1:] - at) <= 0
     share = ((at - parameter[:-1]) / np.diff(parameter))[way]
     return float((amplitude[:-1][way] + share * np.diff(amplitude)[way]).max())
+
+
+DRAW = """
+import gmsh
+gmsh.initialize(readConfigFiles=False, interruptible=False)
+gmsh.option.setNumber("General.Terminal", 0)
+occ = gmsh.model.occ
+for name, x, z in (("lapA", 0, 0), ("lapB", 80, 4)):
+    occ.cut([(3, occ.addBox(x, 0, z, 120, 30, 4))], [(3, occ.addCylinder(100, 15, z - 1, 0, 0, 6, 4.5))])
+    occ.synchronize()
+    gmsh.write(name + ".step")
+    gmsh.clear()
+gmsh.finalize()
+"""
+
+LAP = """
+name = "{name}"
+length_unit = "mm"
+[geometry]
+cad = "../{name}.step"
+[mesh]
+size = 6.0
+[material]
+name = "steel"
+density = 7850.0
+young = 2.1e11
+poisson = 0.3
+[modes]
+count = 20
+[damping]
+ratio = 0.001
+[[geometry.faces]]
+name = "meets"
+touching = "../{other}.step"
+[[interfaces]]
+name = "meets"
+face = "meets"
+[[geometry.faces]]
+name = "clamp"
+box = [{x}, -1, -1, {x}.1, 31, 9]
+[[supports]]
+face = "clamp"
+[[excitations]]
+name = "shaker"
+point = [{at}, 15, 4]
+direction = [0, 0, 1]
+[[monitors]]
+name = "probe"
+point = [{at}, 15, 4]
+"""
+
+JOINT = """
+name = "joint"
+excitation = "lapA:shaker"
+amplitude = 20.0
+monitor = "lapA:probe"
+direction = "z"
+bodies = [{ name = "lapA" }, { name = "lapB" }]
+[[contacts]]
+interface = "lapA:meets"
+against = "lapB:meets"
+normal_stiffness = 4.5e+08
+tangential_stiffness = 2.3e+08
+friction = 0.2
+points = [5, 4]
+[sweep]
+start = 380
+stop = 440
+points = 7
+normal_forces = [100.0]
+"""
+
+
+@pytest.mark.slow
+def test_a_lap_joint_from_rest_stays_closed_and_opens(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Two beams of 120 mm, their far ends clamped, pressed by 100 N where they overlap and shaken by 20 N: two other
+    integrations in time have 20.8 µm at 300 Hz, closed, and open from 400 Hz on, 83 µm there and 73 µm at 423 Hz."""
+    pytest.importorskip("gmsh")
+    monkeypatch.chdir(tmp_path)
+    subprocess.run([sys.executable, "-c", DRAW], check=True, capture_output=True)
+    for name, other, x in (("lapA", "lapB", 0), ("lapB", "lapA", 200)):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "body.toml").write_text(
+            LAP.format(name=name, other=other, x=x, at=60 + 0.4 * x)
+        )
+    (tmp_path / "case.toml").write_text(JOINT)
+    settings = load_case(tmp_path / "case.toml")[0]
+    files = modal_files(settings, tmp_path / "case.toml", tmp_path, lambda _: None)
+    bases = {name: read_basis(file) for name, file in files.items()}
+    pressed = build(settings, bases, tmp_path / "case.toml").pressed(100.0)
+    for f, amplitude, opens in (
+        (300.0, 20.8e-6, False),
+        (390.0, 37.6e-6, False),
+        (400.0, 83e-6, True),
+        (423.0, 73e-6, True),
+    ):
+        one = settled(pressed, f, 640)
+        assert (
+            one.amplitude == pytest.approx(amplitude, rel=0.06)
+            and one.opens == opens
+            and not one.irregular
+        )

@@ -48,9 +48,10 @@ WITHIN, STEPS = 30, 80
 """Frequencies of a sweep in time within a gap, and of all of it, at most."""
 
 LONG = 120.0
-"""s that a motion at a frequency may take in a sweep that nobody asked for."""
+"""s that a motion at a frequency may take in a sweep that nobody asked for, and the stability of a
+curve, but for what compiles."""
 
-LOST, HALVINGS = 0.3, 3
+LOST, HALVINGS = 0.2, 3
 """Share by which an amplitude changes in a step in which a motion is lost, and how often such a step is halved."""
 
 ALIKE = 2
@@ -83,7 +84,11 @@ class Beyond:
         """The lower and the higher motion where sweeps upwards and downwards are on different ones, by frequency."""
         known = {one.frequency: one for one in self.up}
         pairs = [(known[d.frequency], d) for d in self.down if d.frequency in known]
-        apart = [sorted(pair, key=lambda m: m.amplitude) for pair in pairs if not pair[0].like(pair[1].amplitude)]
+        apart = [
+            sorted(pair, key=lambda m: m.amplitude)
+            for pair in pairs
+            if not pair[0].like(pair[1].amplitude)
+        ]
         return sorted(((low, high) for low, high in apart), key=lambda pair: pair[0].frequency)
 
     def rows(self) -> list[dict[str, float | str]]:
@@ -91,13 +96,21 @@ class Beyond:
         column = self.quantity.column
         return [
             {
-                "normal_force_N": self.normal, "way": way, "frequency_Hz": m.frequency,
-                column("amplitude"): m.amplitude, column("swing"): m.swing, "contacts": "open" if m.opens else "closed",
+                "normal_force_N": self.normal,
+                "way": way,
+                "frequency_Hz": m.frequency,
+                column("amplitude"): m.amplitude,
+                column("swing"): m.swing,
+                "contacts": "open" if m.opens else "closed",
                 "motion": "irregular" if m.irregular else "regular",
             }
-            for way, motions in (("from rest", self.rest), ("upwards", self.up), ("downwards", self.down))
+            for way, motions in (
+                ("from rest", self.rest),
+                ("upwards", self.up),
+                ("downwards", self.down),
+            )
             for m in motions
-        ]  # fmt: skip
+        ]
 
     @property
     def band(self) -> tuple[float, float]:
@@ -133,17 +146,28 @@ class Beyond:
         said += f"{len(looked) - len(lost)} of {counted(len(looked), 'motion')} that were looked at are stable"
         if not lost:
             return [f"{said}."]
-        where = f"at {lost[0]:.5g} Hz" if len(lost) == 1 else f"between {lost[0]:.5g} and {lost[-1]:.5g} Hz"
-        return [f"{said}; those that are not, {where}, are not reached: what is, motions in time say."]
+        where = (
+            f"at {lost[0]:.5g} Hz"
+            if len(lost) == 1
+            else f"between {lost[0]:.5g} and {lost[-1]:.5g} Hz"
+        )
+        return [
+            f"{said}; those that are not, {where}, are not reached: what is, motions in time say."
+        ]
 
     def _in_time(self) -> list[str]:
         of = f"Under F_N = {self.normal:g} N"
         if self.why:
-            return [f"{of} motions in time are not known: {self.why}; respond --over frequency follows the curve."]
+            return [
+                f"{of} motions in time are not known: {self.why}; respond --over frequency follows the curve."
+            ]
         if not self.down:
             return []
         if not (two := self.two):
-            return [f"{of} sweeps in time, upwards and downwards, meet the same motion{self._gap()}.", *self._wild()]
+            return [
+                f"{of} sweeps in time, upwards and downwards, meet the same motion{self._gap()}.",
+                *self._wild(),
+            ]
         low, high = two[0][0].frequency, two[-1][0].frequency
         top = max((pair[1] for pair in two), key=lambda m: m.swing)
         where = f"at {low:.5g} Hz" if low == high else f"from {low:.5g} to {high:.5g} Hz"
@@ -171,26 +195,39 @@ class Beyond:
         for i in range(1, len(known) + 1):
             if i == len(known) or higher[i] != higher[begin]:
                 a, b = known[begin], known[i - 1]
-                span = f"at {a.frequency:.5g} Hz" if a is b else f"from {a.frequency:.5g} to {b.frequency:.5g} Hz"
+                span = (
+                    f"at {a.frequency:.5g} Hz"
+                    if a is b
+                    else f"from {a.frequency:.5g} to {b.frequency:.5g} Hz"
+                )
                 top = max(known[begin:i], key=lambda m: m.amplitude)
                 words = "higher" if higher[begin] else "lower"
-                open_ = "contacts open" if any(m.opens for m in known[begin:i]) else "contacts closed"
-                runs.append(f"the {words} one {span} ({open_}, at most {self._size(top.amplitude)})")
+                open_ = (
+                    "contacts open" if any(m.opens for m in known[begin:i]) else "contacts closed"
+                )
+                runs.append(
+                    f"the {words} one {span} ({open_}, at most {self._size(top.amplitude)})"
+                )
                 begin = i
         return [f"From rest it comes to {', to '.join(runs)}."]
 
     def _left(self, two: Sequence[tuple[Settled, Settled]]) -> list[str]:
         """Where each sweep leaves the motion on which it comes."""
         said = []
-        for way, motions, pair, on in (("upwards", self.up, two[-1], "up"), ("downwards", self.down, two[0], "down")):
+        for way, motions, pair, on in (
+            ("upwards", self.up, two[-1], "up"),
+            ("downwards", self.down, two[0], "down"),
+        ):
             at = next(i for i, m in enumerate(motions) if m.frequency == pair[0].frequency)
             which = "lower" if motions[at] is pair[0] else "higher"
             at = next((i for i in range(at, len(motions) - 1) if _jumps(*motions[i : i + 2])), at)
             last = motions[at]
             stays = f"A slow sweep {way} stays on the {which} one {on} to {last.frequency:.5g} Hz"
             after = motions[at + 1] if at + 1 < len(motions) else None
-            ends = ", where it ends" if after is None else (
-                f" and is at {self._size(after.amplitude)} at {after.frequency:.5g} Hz"
+            ends = (
+                ", where it ends"
+                if after is None
+                else (f" and is at {self._size(after.amplitude)} at {after.frequency:.5g} Hz")
             )
             said.append(f"{stays} ({self._size(last.amplitude)}){ends}.")
         return said
@@ -200,9 +237,17 @@ class Beyond:
         wild = sorted({m.frequency for m in (*self.up, *self.down, *self.rest) if m.irregular})
         if not wild:
             return []
-        top = max((m for m in (*self.up, *self.down, *self.rest) if m.irregular), key=lambda m: m.swing)
-        span = f"at {wild[0]:.5g} Hz" if len(wild) == 1 else f"at frequencies from {wild[0]:.5g} to {wild[-1]:.5g} Hz"
-        return [f"Motions are irregular, without a period, {span}, with swings of up to {self._size(top.swing)}."]
+        top = max(
+            (m for m in (*self.up, *self.down, *self.rest) if m.irregular), key=lambda m: m.swing
+        )
+        span = (
+            f"at {wild[0]:.5g} Hz"
+            if len(wild) == 1
+            else f"at frequencies from {wild[0]:.5g} to {wild[-1]:.5g} Hz"
+        )
+        return [
+            f"Motions are irregular, without a period, {span}, with swings of up to {self._size(top.swing)}."
+        ]
 
 
 def _of_curve(one: Followed) -> str:
@@ -235,7 +280,7 @@ POINTS, LOOKED_AT = 300, 8
 
 def with_curve(
     one: Beyond, settings: CaseSettings, bases: Bases, path: Path | str, keep: Keep, report: Report
-) -> Beyond:  # fmt: skip
+) -> Beyond:
     """The same with the curve of periodic motions from either end of what was looked at, as fine as open contacts need,
     and the stability of some of its points; without it where there are no motions in time to hold it against."""
     if one.why:
@@ -253,7 +298,9 @@ def with_curve(
         if failed <= COARSE or 2 * samples > FINEST:
             break
         samples *= 2
-        report(f"{percent(failed)} of the curve's points fail their checks; once more with {samples} samples")
+        report(
+            f"{percent(failed)} of the curve's points fail their checks; once more with {samples} samples"
+        )
     built = build(finer, bases, path)
     problem = problem_of(built, one.normal if settings.sweep.normal_forces is not None else None)
     each = [_looked_at(problem, f, max(LOOKED_AT // len(found), 1), report) for f in found]
@@ -262,7 +309,7 @@ def with_curve(
 
 def _both_ways(
     settings: CaseSettings, bases: Bases, path: Path | str, keep: Keep, report: Report
-) -> list[Followed]:  # fmt: skip
+) -> list[Followed]:
     """The curve from the upper end, and from the lower one where the first does not arrive there."""
     assert settings.curve is not None and settings.curve.band is not None
     found = list[Followed]()
@@ -270,7 +317,9 @@ def _both_ways(
         if found and found[0].complete:
             break
         way = settings.curve.model_copy(update={"band": band})
-        some, whole = curves(settings.model_copy(update={"curve": way}), bases, path, "frequency", keep, report)
+        some, whole = curves(
+            settings.model_copy(update={"curve": way}), bases, path, "frequency", keep, report
+        )
         if not whole:
             raise KeyboardInterrupt
         found += [replace(f, legs=0) for f in some[:1] if f.rows]  # each is told by where it begins
@@ -280,13 +329,19 @@ def _both_ways(
 def _looked_at(problem: Problem, one: Followed, count: int, report: Report) -> dict[int, Stability]:
     """Place -> stability of some of a curve's points that pass their checks; none where it cannot be told."""
     good, found = np.flatnonzero(one.converged), dict[int, Stability]()
-    for i in good[np.unique(np.linspace(0, len(good) - 1, min(count, len(good))).round().astype(int))]:
+    chosen = np.linspace(0, len(good) - 1, min(count, len(good))).round().astype(int)
+    began = time.monotonic()
+    for i in good[np.unique(chosen)].tolist():
         f = float(one.parameter[i])
         report(f"stability of the curve, {one.label}: {f:.6g} Hz")
         try:
-            found[int(i)] = stability(orbit(problem, one.rows[i]["x"], 2 * np.pi * f), Multipliers(steps=128))
+            motion = orbit(problem, one.rows[i]["x"], 2 * np.pi * f)
         except UserError:
             return {}
+        found[i] = stability(motion, Multipliers(steps=128))
+        began = began if len(found) > 1 else time.monotonic()  # the first one compiles
+        if time.monotonic() - began > LONG:
+            break
     return found
 
 
@@ -301,11 +356,20 @@ def _periods(problem: Problem, gap: tuple[float, float]) -> int:
 
 
 def beyond(
-    problem: Problem, found: HarmonicResponse, gap: tuple[float, float], normal: float, of: Quantity, report: Report
+    problem: Problem,
+    found: HarmonicResponse,
+    gap: tuple[float, float],
+    normal: float,
+    of: Quantity,
+    report: Report,
 ) -> Beyond:
     """Motions in time about a gap (Hz, Hz) of a response."""
     if problem.assembly.ring is not None:
-        return Beyond(normal, gap, why="sectors of a ring need not stay alike in time; microslip orbit integrates")
+        return Beyond(
+            normal,
+            gap,
+            why="sectors of a ring need not stay alike in time; microslip orbit integrates",
+        )
     try:
         return _Swept(problem, found, gap, normal, report).all_of_it(of)
     except (UserError, NotConverged) as error:
@@ -316,14 +380,21 @@ class _Swept:
     """Sweeps in time about a gap."""
 
     def __init__(
-        self, problem: Problem, found: HarmonicResponse, gap: tuple[float, float], normal: float, report: Report
+        self,
+        problem: Problem,
+        found: HarmonicResponse,
+        gap: tuple[float, float],
+        normal: float,
+        report: Report,
     ) -> None:
         self.problem, self.gap, self.normal, self.report = problem, gap, normal, report
         self.asked = found.frequency[found.asked]
         self.step = float(np.median(np.diff(self.asked)))
         self.periods = _periods(problem, gap)
         good = found.converged
-        self.known = dict(zip(found.frequency[good].tolist(), np.abs(found.monitor[good]).tolist(), strict=True))
+        self.known = dict(
+            zip(found.frequency[good].tolist(), np.abs(found.monitor[good]).tolist(), strict=True)
+        )
         solved = zip(found.frequency[good].tolist(), found.x[good], strict=True)
         self.points = [Point(2 * np.pi * f, x, CONVERGED, 0.0, 0) for f, x in solved]
 
@@ -332,18 +403,27 @@ class _Swept:
         below, above = self.asked[self.asked < low].tolist(), self.asked[self.asked > high].tolist()
         within = self.asked[(self.asked >= low) & (self.asked <= high)]
         inside = within[:: 1 + len(within) // WITHIN].tolist()
-        beneath = (self.asked[0] - self.step * np.arange(1, (1 - LOWEST) * self.asked[0] / self.step)).tolist()
-        down, fell = self._way("downwards", [*above[1::-1], *inside[::-1], *below[::-1], *beneath], low, -1.0)
+        beneath = (
+            self.asked[0] - self.step * np.arange(1, (1 - LOWEST) * self.asked[0] / self.step)
+        ).tolist()
+        down, fell = self._way(
+            "downwards", [*above[1::-1], *inside[::-1], *below[::-1], *beneath], low, -1.0
+        )
         again = [m.frequency for m in down[::-1]] if fell else [*below[-2:], *inside, *above[:2]]
         begin = down[-1] if fell else None
-        up, _ = self._way("upwards", [*again, *(f for f in above if f > again[-1])], high, 1.0, begin)
+        up, _ = self._way(
+            "upwards", [*again, *(f for f in above if f > again[-1])], high, 1.0, begin
+        )
         both = Beyond(self.normal, self.gap, up, down).two
         return Beyond(self.normal, self.gap, up, down, self._from_rest(both), of)
 
     def _from_rest(self, both: Sequence[tuple[Settled, Settled]]) -> list[Settled]:
         """Motions from rest where there are two, at some frequencies, and between those that lead to different ones."""
         count = len(both)
-        wanted, found = sorted({round(i * (count - 1) / 3) for i in range(4)} if count else set()), dict[int, Settled]()
+        wanted, found = (
+            sorted({round(i * (count - 1) / 3) for i in range(4)} if count else set()),
+            dict[int, Settled](),
+        )
         while wanted:
             for i in wanted:
                 found[i] = self._at("from rest", both[i][0].frequency)
@@ -354,7 +434,12 @@ class _Swept:
         return [found[i] for i in sorted(found)]
 
     def _way(
-        self, way: str, frequency: Sequence[float], end: float, sign: float, begin: Settled | None = None
+        self,
+        way: str,
+        frequency: Sequence[float],
+        end: float,
+        sign: float,
+        begin: Settled | None = None,
     ) -> tuple[list[Settled], bool]:
         """A stepped sweep, and whether it has come back to the harmonic balance's beyond an end of the gap (Hz), where
         it ends."""
@@ -367,7 +452,9 @@ class _Swept:
                 break
         return motions, alike == ALIKE
 
-    def _on(self, way: str, f: float, begin: Settled | None, halvings: int = HALVINGS) -> list[Settled]:
+    def _on(
+        self, way: str, f: float, begin: Settled | None, halvings: int = HALVINGS
+    ) -> list[Settled]:
         """A step to a frequency (Hz); where the motion is lost on it, by steps of half of it: a sweep that is slow
         enough stays longer."""
         here = self._at(way, f, begin)
@@ -380,13 +467,21 @@ class _Swept:
         self.report(f"motion in time, {way}, F_N = {self.normal:g} N: {f:.6g} Hz")
         began = time.monotonic()
         found = settled(self.problem.assembly, f, self.periods, begin)
-        if begin is not None and (took := time.monotonic() - began) > LONG:  # the first one compiles
-            raise UserError(f"a frequency takes {took:.0f} s, too long for a sweep ([orbit] asks for single ones)")
+        if (
+            begin is not None and (took := time.monotonic() - began) > LONG
+        ):  # the first one compiles
+            raise UserError(
+                f"a frequency takes {took:.0f} s, too long for a sweep ([orbit] asks for single ones)"
+            )
         return found
 
     def _balanced(self, f: float) -> float:
         """Amplitude of the harmonic balance at a frequency (Hz); nan where it has no solution."""
         if f not in self.known:
             point = between(self.problem, self.points, f)
-            self.known[f] = float(abs(operating(self.problem, point).outputs[0, 1])) if point.converged else np.nan
+            self.known[f] = (
+                float(abs(operating(self.problem, point).outputs[0, 1]))
+                if point.converged
+                else np.nan
+            )
         return self.known[f]

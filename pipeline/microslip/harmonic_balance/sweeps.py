@@ -176,7 +176,8 @@ def gaps(response: FrequencyResponse, peaks: Sequence[tuple[float, float]]) -> l
 def _breaks(response: FrequencyResponse) -> list[tuple[int, int]]:
     """Neighbouring points between which a sweep jumps, or of which one is no solution."""
     f, a, ok = response.frequency, np.abs(response.monitor), response.converged
-    close = np.diff(f) < NEAR * _step(response)
+    added = ~response.asked[:-1] & ~response.asked[1:]  # where the last solutions on both sides were looked for
+    close = added & (np.diff(f) < NEAR * _step(response))
     apart = np.abs(np.diff(a)) > JUMP * np.maximum(a[:-1], a[1:])
     return [(int(i), int(i) + 1) for i in np.flatnonzero(~ok[:-1] | ~ok[1:] | close & apart)]
 

@@ -293,10 +293,12 @@ def _response(points: Checkpoint, result: CaseResult, summary: Mapping[str, Any]
 
 def _with_folds(
     rows: Mapping[float, Mapping[str, Any]], folds: Sequence[tuple[float, float]]
-) -> Mapping[float, Mapping[str, Any]]:  # fmt: skip
+) -> Mapping[float, Mapping[str, Any]]:
     """Points by frequency (Hz), with ``fold`` 1 at the folds (Hz, m) of a response that has some."""
+    if not folds:
+        return rows
     at = np.array([f for f, _ in folds])
-    return {f: {**row, "fold": int(np.isclose(f, at, rtol=1e-12).any())} for f, row in rows.items()} if folds else rows
+    return {f: {**row, "fold": int(np.isclose(f, at, rtol=1e-12).any())} for f, row in rows.items()}
 
 
 @dataclass(frozen=True)
