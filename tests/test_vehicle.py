@@ -72,6 +72,16 @@ def test_contacts_of_the_motion_are_those_of_a_pose(case: VehicleCase, vehicle: 
         assert float(found.phi[k]) == pytest.approx(p.phi, abs=2 * x[3] ** 2 / 0.46)
 
 
+def test_a_yawed_wheel_slips_on_its_flange_by_the_velocity_of_its_contact(vehicle: motion.Vehicle) -> None:
+    """56 degrees steep it touches ahead of the axle, where it goes down: omega r yaw/cos(angle), to the first order."""
+    steep = motion.at(vehicle.over, vehicle.reach, 0.0)._replace(slope=np.array([-1.5, 1.5]))
+    moved, yaw = np.zeros(7), 1e-3
+    moved[6] = vehicle.speed / 0.46
+    at = np.array([0.0, 0.0, 0.0, yaw, 0.0, 0.0])
+    _, across, _ = motion._slip(moved, vehicle, at, np.zeros(2), steep)
+    np.testing.assert_allclose(across, moved[6] * steep.radius * yaw * np.sqrt(1 + 1.5**2), rtol=1e-9)
+
+
 def test_slow_hunting_has_the_wave_of_klingel(vehicle: motion.Vehicle) -> None:
     """Slow, without suspension across and along: omega = V sqrt(conicity/(r l)), conicity the slope of the difference
     of the rolling radii; the spin turns the wave a little."""

@@ -13,6 +13,7 @@ from ..data import Array
 from .laws import Surface, rolled_by_characteristic
 from .strips import BLOCK, Forces, Tractions, creep_forces, tractions
 from .temperature import Conductor, conducted, falling, heat_share, settled
+from .wheelset import Drag, Patch, Track, states
 
 COLD = 20.0
 """degrees C at which a characteristic of friction holds."""
@@ -86,6 +87,21 @@ def rolled(
     forces = Forces(*map(np.concatenate, zip(*parts, strict=True)))
     held = Tractions(*map(np.concatenate, zip(*some, strict=True)))
     return States(forces, np.concatenate(hottest) if hottest else None, held)
+
+
+def drag(
+    track: Track, friction: Friction, heat: Heat | None, surface: Surface | None, **how: Any
+) -> Drag:
+    """Of patches, as `rolled` has it, for the vertical balance of `wheelset.patches`."""
+    warm = heat if heat is not None and heat.limit is not None else None
+
+    def across(found: list[Patch]) -> Array:
+        given, speed = states(track, found)
+        if friction.constant and warm is None and surface is None:
+            return creep_forces(*_with_constant(given, friction), **how).y
+        return _rolled(given, friction, speed, warm, surface, how)[0].y
+
+    return across
 
 
 def _with_constant(given: Array, friction: Friction) -> list[Array]:

@@ -13,12 +13,12 @@ from ..data import Array
 from ..errors import UserError
 from .exact import Exact, exact
 from .fastsim import fastsim
-from .rolled import rolled, sources
+from .rolled import drag, rolled, sources
 from .settings import RollingCase
 from .strips import Forces, Tractions
 from .temperature import speed_parameter
 from .wear import strip_depth
-from .wheelset import Patch, Pose, Track, across, axle, patches
+from .wheelset import Drag, Patch, Pose, Track, across, axle, patches, states
 
 UNITS = {"longitudinal": "1", "lateral": "1", "spin": "1_per_m"}
 UNLIKE = 0.02
@@ -250,48 +250,47 @@ def study(case: RollingCase, path: Path) -> Studied:
     Raises:
         UserError: profiles that are none, or do not overlap.
     """
-    track = case.track(path.parent)
-    found, pose = _touching(case, track)
+    track, friction = case.track(path.parent), case.characteristic(path)
+    heat = case.heat.made() if case.heat else None
+    rough, how = case.surface(path), case.model.model_dump(exclude={"exact"})
+    found, pose = _touching(case, track, drag(track, friction, heat, rough, **how))
     creep = _creep(case, found[0] if found else None)
     if not found:
         return Studied(case, track, found, creep, None, None, None, 0, None, None)
-    p, c, friction = found[0], case.creep, case.characteristic(path)
+    p, c = found[0], case.creep
     highest = float(np.max(friction.highest(jnp.ones(1))))
     over = creep[list(UNITS).index(c.over)]
     shown = int(np.abs(over - (0.5 * (c.start + c.stop) if c.shown is None else c.shown)).argmin())
     given, speed = _states(track, found, creep)
     n = len(over)
     kept = np.array([shown, *range(n, len(speed))])
-    heat = case.heat.made() if case.heat else None
-    rough, how = case.surface(path), case.model.model_dump(exclude={"exact"})
-    states = rolled(given, friction, speed, kept, heat, rough, **how)
-    forces, of_pose = (Forces(*(v[part] for v in states.forces)) for part in (slice(n), slice(n, None)))
+    run = rolled(given, friction, speed, kept, heat, rough, **how)
+    forces, of_pose = (Forces(*(v[part] for v in run.forces)) for part in (slice(n), slice(n, None)))
     reference, beside, missed = None, None, ""
     if case.is_constant and rough is None:
         at = np.unique(np.linspace(0, n - 1, 13).astype(int))
         totals = [fastsim(*s[:6], highest, *s[6:])[0] for s in given[:, at].T]  # type: ignore[call-arg]
         reference = at, np.array([np.hypot(f.x, f.y) for f in totals]) / (highest * p.normal_force)
         beside, missed = _exact(case, track, pose, p, creep, np.hypot(forces.x, forces.y), highest)
-    patch, of_patches = (Tractions(*(v[part] for v in states.tractions)) for part in (0, slice(1, None)))
+    patch, of_patches = (Tractions(*(v[part] for v in run.tractions)) for part in (0, slice(1, None)))
     return Studied(case, track, found, creep, forces, reference, beside, shown, patch, of_pose, missed, highest,
-                   states.hottest, of_patches)  # fmt: skip
+                   run.hottest, of_patches)  # fmt: skip
 
 
-def _touching(case: RollingCase, track: Track) -> tuple[list[Patch], Pose]:
+def _touching(case: RollingCase, track: Track, dragged: Drag) -> tuple[list[Patch], Pose]:
     """Patches, the one that carries most first, and the pose; an axle rolls until both wheels carry the same."""
     pose, side, vertical = case.posed(), case.pose.side, case.vertical_force
     if side != "both":
-        return patches(track, pose, side, vertical), pose
-    left, right, pose = axle(track, pose, 2 * vertical, even=True)
+        return patches(track, pose, side, vertical, dragged), pose
+    left, right, pose = axle(track, pose, 2 * vertical, even=True, friction=dragged)
     return sorted([*left, *right], key=lambda p: -p.normal_force), pose
 
 
 def _states(track: Track, found: list[Patch], creep: Array) -> tuple[Array, Array]:
     """(8, n + patches) what `rolled` is given, of the curve and of the pose, and their speeds, m/s."""
-    of_pose = [np.array([q.xi, q.eta, q.phi]) for q in found]
-    patches = [found[0]] * creep.shape[1] + found
-    axes = np.array([[q.a, q.b, q.normal_force, track.elastic.shear, track.elastic.poisson] for q in patches]).T
-    return np.vstack([np.column_stack([creep, *of_pose]), axes]), np.array([q.speed for q in patches])
+    given, speed = states(track, [found[0]] * creep.shape[1] + found)
+    given[:3, : creep.shape[1]] = creep
+    return given, speed
 
 
 def _exact(

@@ -14,10 +14,10 @@ from ..errors import UserError
 from .ellipse import ellipses
 from .laws import Surface
 from .profiles import Profile
-from .rolled import rolled, sources
+from .rolled import drag, rolled, sources
 from .settings import WIDEST, RollingCase
 from .wear import deposited, shortest_smoothing, smoothed, strip_depth
-from .wheelset import Patch, Track, patches
+from .wheelset import Patch, Track, patches, states
 
 STRIP = 1e-4
 """m, of the profiles that wear."""
@@ -147,17 +147,20 @@ def wearing(
 
 def _run(case: RollingCase, track: Track, friction: Friction, surface: Surface | None, lateral: float) -> list[Strips]:
     """A passage in a pose."""
-    found = patches(track, replace(case.posed(), lateral=lateral), case.pose.side, case.vertical_force)
-    if not found:
-        raise UserError("wear: the wheel does not touch the rail, so nothing wears; correct pose or vertical_force")
-    e = track.elastic
-    given = np.array([[p.xi, p.eta, p.phi, p.a, p.b, p.normal_force, e.shear, e.poisson] for p in found]).T
-    speed = np.array([p.speed for p in found])
     heat = case.heat.made() if case.heat else None
     how = case.model.model_dump(exclude={"exact"})
+    pose, vertical = replace(case.posed(), lateral=lateral), case.vertical_force
+    dragged = drag(track, friction, heat, surface, **how)
+    found = patches(track, pose, case.pose.side, vertical, dragged)
+    if not found:
+        raise UserError("wear: the wheel does not touch the rail, so nothing wears; correct pose or vertical_force")
+    given, speed = states(track, found)
     t = rolled(given, friction, speed, np.arange(len(found)), heat, surface, **how).tractions
     q, dx = sources(t, speed)
-    return [Strips(p, t.area[i, :, 0] / dx[i], strip_depth(q[i].T, dx[i], 1.0, speed[i])) for i, p in enumerate(found)]
+    return [
+        Strips(p, t.area[i, :, 0] / dx[i], strip_depth(q[i].T, dx[i], 1.0, speed[i]))
+        for i, p in enumerate(found)
+    ]
 
 
 def _worn(body: Body, runs: list[Strips], coefficient: float, side: str) -> Body:

@@ -6,9 +6,10 @@ are found as the right one: the left one's pose is mirrored first, and what it f
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cache
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -18,6 +19,7 @@ from ..data import Array
 from ..errors import UserError
 from .ellipse import Elastic, ellipses, half_width
 from .profiles import Profile
+from .strips import creep_forces
 
 
 @dataclass(frozen=True)
@@ -86,6 +88,10 @@ class Patch(NamedTuple):
         """Of the track, "left" or "right"."""
         return "right" if self.place[1] > 0 else "left"
 
+    def lifted(self, force_y: float) -> float:
+        """N, upward, that the wheel feels under a tangential force across rolling (N)."""
+        return float(self.normal_force * np.cos(self.angle) + force_y * np.sin(self.angle))
+
     def felt(self, force_x: float, force_y: float, moment: float, about: Array) -> Array:
         """(6,) force and moment about a point (m) that the wheel feels, in track axes (6.5-24 to 6.5-37); the rail
         feels the opposite.
@@ -103,41 +109,58 @@ STEP = 2e-5
 """m, between the points of a wheel at which it is looked for a contact; the summit is found between them."""
 
 
-def patches(track: Track, pose: Pose, side: str, vertical: float) -> list[Patch]:
+Drag = Callable[[list[Patch]], Array]
+"""Patches -> (k,) tangential force of each across rolling, on the wheel, in the axes of `Patch`, N."""
+
+
+def patches(
+    track: Track, pose: Pose, side: str, vertical: float, friction: float | Drag = 0.0
+) -> list[Patch]:
     """Contacts of one wheel under a vertical force, the one with the largest normal force first; none if it is 0.
 
     Args:
-        side: "left" or "right". vertical: N, on this wheel. Friction is left out of the balance.
+        side: "left" or "right". vertical: N, on this wheel, which normal and tangential forces carry together.
+            friction: coefficient of the tangential ones, by `strips.creep_forces`; or what tells them.
 
     Raises:
-        UserError: wheel and rail lie nowhere above each other.
+        UserError: a side, force or friction that is none; wheel and rail lie nowhere above each other; friction drags
+            the wheel down its flange whatever presses it.
     """
-    gap = _gap(track, _seen(pose, side))
-    return _carried(track, pose, side, gap, _height(track, [gap], vertical)) if vertical > 0 else []
+    _sound(pose, vertical, friction)
+    if side not in SIDES:
+        raise UserError(f"side: is {side!r}; give 'left' or 'right'")
+    if vertical == 0:
+        return []
+    return _carried(track, pose, (side,), vertical, _drag(track, friction), vertical).found[0]
 
 
-def axle(track: Track, pose: Pose, vertical: float, even: bool = False) -> tuple[list[Patch], list[Patch], Pose]:
+def axle(
+    track: Track, pose: Pose, vertical: float, even: bool = False, friction: float | Drag = 0.0
+) -> tuple[list[Patch], list[Patch], Pose]:
     """Contacts of the left and of the right wheel of an axle, as `patches`, and its pose.
 
     Args:
         vertical: N, on both wheels together; the roll of the pose shares it, and a wheel may be off its rail. even: the
-            axle rolls until both carry the same, and the roll of the pose is where the search for it begins.
+            axle rolls until both carry the same, and the roll of the pose is where the search for it begins. friction:
+            see `patches`.
 
     Raises:
-        UserError: wheel and rail lie nowhere above each other; no roll within 0.05 rad shares the force evenly.
+        UserError: see `patches`; no roll within 0.05 rad shares the force evenly.
     """
+    _sound(pose, vertical, friction)
+    drag, load = _drag(track, friction), vertical
 
-    def at(pose: Pose) -> tuple[list[Patch], list[Patch]]:
-        gaps = [_gap(track, _seen(pose, side)) for side in SIDES]
-        height = _height(track, gaps, vertical)
-        left, right = (_carried(track, pose, side, g, height) for side, g in zip(SIDES, gaps, strict=True))
-        return left, right
+    def at(pose: Pose) -> _Carried:
+        nonlocal load
+        carried = _carried(track, pose, SIDES, vertical, drag, load)
+        load = carried.load
+        return carried
 
     def uneven(roll: float) -> float:
-        left, right = (sum(p.normal_force * np.cos(p.angle) for p in of) for of in at(replace(pose, roll=roll)))
-        return float(right - left)
+        left, right = at(replace(pose, roll=roll)).lift
+        return right - left
 
-    if not vertical > 0:
+    if vertical == 0:
         return [], [], pose
     if even:
         near = pose.roll
@@ -149,7 +172,8 @@ def axle(track: Track, pose: Pose, vertical: float, even: bool = False) -> tuple
                     f"pose: no roll below {STEEPEST:g} rad shares the vertical force evenly; correct the pose"
                 )
         pose = replace(pose, roll=brentq(uneven, near, far, xtol=1e-10))
-    return *at(pose), pose
+    left, right = at(pose).found
+    return left, right, pose
 
 
 SIDES = ("left", "right")
@@ -161,13 +185,99 @@ def _seen(pose: Pose, side: str) -> Pose:
     return pose.mirrored() if side == "left" else pose
 
 
+def _sound(pose: Pose, vertical: float, friction: float | Drag) -> None:
+    """Refuse numbers that no wheelset has."""
+    turning = 1.0 if pose.turning is None else pose.turning
+    if not np.isfinite([pose.lateral, pose.yaw, pose.roll, pose.speed, turning]).all():
+        raise UserError(f"pose: {pose} is not finite; give numbers")
+    if not (pose.speed > 0 and turning >= 0):
+        raise UserError(
+            f"pose: speed {pose.speed:g} m/s, turning {turning:g} rad/s; the axle moves forward and turns that way"
+        )
+    if not 0 <= vertical < np.inf:
+        raise UserError(f"vertical: is {vertical:g} N; a wheel can only be pressed, give 0 or more")
+    if not callable(friction) and not 0 <= friction < np.inf:
+        raise UserError(f"friction: is {friction:g}; give a coefficient of 0 or more")
+
+
+def _drag(track: Track, friction: float | Drag) -> Drag:
+    if callable(friction):
+        return friction
+    if friction == 0:
+        return lambda found: np.zeros(len(found))
+    return lambda found: _by_strips(track, found, friction)
+
+
+def _by_strips(track: Track, found: list[Patch], friction: float) -> Array:
+    *state, shear, poisson = states(track, found)[0]
+    return creep_forces(*state, friction, shear, poisson).y
+
+
+def states(track: Track, found: list[Patch]) -> tuple[Array, Array]:
+    """(8, k) xi, eta, phi, a, b, normal force, G, nu of patches, and their speeds (k,), m/s."""
+    _, G, nu = track.elastic
+    given = [[p.xi, p.eta, p.phi, p.a, p.b, p.normal_force, G, nu] for p in found]
+    return np.array(given).T, np.array([p.speed for p in found])
+
+
+class _Carried(NamedTuple):
+    """Attributes: found: patches of each side. lift: N, upward, of all forces on each. load: N, of the normal ones on
+    all together."""
+
+    found: list[list[Patch]]
+    lift: list[float]
+    load: float
+
+
+def _carried(
+    track: Track, pose: Pose, sides: tuple[str, ...], vertical: float, drag: Drag, near: float
+) -> _Carried:
+    """At the height at which normal and tangential forces carry a force (N) together.
+
+    What the normal ones carry of it is found by secants between logarithms, from a value nearby (N): their share hardly
+    changes with it.
+    """
+    gaps = [_gap(track, _seen(pose, side)) for side in sides]
+    load, before = near, (0.0, 0.0)
+    for turn in range(30):
+        height = _height(track, gaps, load)
+        found = [_touching(track, pose, s, g, height) for s, g in zip(sides, gaps, strict=True)]
+        lift = _lifts(found, drag)
+        normal = sum(p.lifted(0.0) for of in found for p in of)
+        if not sum(lift) > 0 or load > HELD_DOWN * vertical:
+            break
+        at, left = np.log(load), np.log(load / vertical * sum(lift) / normal)
+        if abs(left) <= BALANCED:
+            return _Carried(found, lift, load)
+        slope = (left - before[1]) / (at - before[0]) if turn else 1.0
+        load, before = float(np.exp(at - left / np.clip(slope, 0.2, 5.0))), (at, left)
+    steep = max((p for of in found for p in of), key=lambda p: p.normal_force)
+    raise UserError(
+        f"pose: friction drags the wheel down its flange, {np.rad2deg(abs(steep.angle)):.3g} degrees steep, by as much "
+        "as the rail lifts it, so that no height carries the vertical force; give less friction or another yaw"
+    )
+
+
+BALANCED = 1e-8
+"""Of the vertical force."""
+HELD_DOWN = 1e3
+"""Times the vertical force: more is no balance."""
+
+
+def _lifts(found: list[list[Patch]], drag: Drag) -> list[float]:
+    """N, upward, of all forces on each wheel."""
+    drags = iter(drag([p for of in found for p in of]))
+    return [sum(p.lifted(float(next(drags))) for p in of) for of in found]
+
+
 def _height(track: Track, gaps: list[Gap], vertical: float) -> float:
-    """z of the axle's middle, below that of the nominal radius, where the patches carry a force (N) together, m."""
+    """z of the axle's middle, below that of the nominal radius, where the normal forces of all patches carry a force
+    (N), m."""
     touch = min(float(np.nanmin(g.gap)) for g in gaps)
 
     @cache  # the search asks for its ends again
     def missing(down: float) -> float:
-        lifted = sum(_lifted(p) for g in gaps for p in _pressed(track, g, touch + down))
+        lifted = sum(p.force * np.cos(p.angle) for g in gaps for p in _pressed(track, g, touch + down))
         return float(vertical ** (2 / 3) - lifted ** (2 / 3))
 
     deep = 1e-4
@@ -175,10 +285,11 @@ def _height(track: Track, gaps: list[Gap], vertical: float) -> float:
         deep *= 4
         if deep > 0.05:
             raise UserError("vertical_force: presses the wheel 50 mm into the rail; give it in N")
-    return touch + (brentq(missing, 0.0, deep, xtol=1e-12, rtol=1e-10) if missing(0.0) > 0 else 0.0)
+    return touch + (brentq(missing, 0.0, deep, xtol=1e-16, rtol=1e-10) if missing(0.0) > 0 else 0.0)
 
 
-def _carried(track: Track, pose: Pose, side: str, gap: Gap, height: float) -> list[Patch]:
+def _touching(track: Track, pose: Pose, side: str, gap: Gap, height: float) -> list[Patch]:
+    """The most loaded first."""
     found = sorted(_pressed(track, gap, height), key=lambda p: -p.force)
     middle = np.array([pose.lateral, height - track.radius])
     return [_patch(track, _seen(pose, side), gap, p, side == "left", middle) for p in found]
@@ -318,8 +429,27 @@ def _curvature(gap: Gap, at: float, half: ArrayLike) -> Array:
     return (ends[1] - ends[0]) / (4 * np.asarray(half))
 
 
-def _lifted(p: Pressed) -> float:
-    return p.force * np.cos(p.angle)
+def creepages(
+    speed: Any, turning: Any, radius: Any, along: Any, yaw: Any, roll: Any, angle: Any, xp: Any = np
+) -> tuple[Any, Any, Any, Any]:
+    """Creepages xi, eta and spin phi (1/m) of a wheel on its rail, and the speed of rolling, m/s, axes of `Patch`.
+
+    The rigid velocity of the point of the wheel's surface that touches, speed x + w x r, where the axle turns by
+    w = -turning (-cos(roll) sin(yaw), cos(roll) cos(yaw), sin(roll)), along the rail and along its surface across it.
+    On a steep flange the contact lies well ahead of the axle, and goes down there as the wheel turns.
+
+    Args:
+        speed: m/s, forward. turning: of the axle, rad/s. radius: of the wheel there, m. along: of the contact ahead of
+            the axle, in axes that yaw with it, m. yaw, roll: rad. angle: of the rail's surface, rad. xp: numpy or jax.
+    """
+    c, s = xp.cos(angle), xp.sin(angle)
+    down, lifted = xp.sqrt(radius**2 - along**2), xp.sin(roll) * along
+    back = turning * (down * xp.cos(yaw) - lifted * xp.sin(yaw))
+    left = turning * (down * xp.sin(yaw) + lifted * xp.cos(yaw))
+    fall = turning * xp.cos(roll) * along
+    V = 0.5 * (speed + back)
+    spun = turning * (xp.cos(roll) * xp.cos(yaw) * s - xp.sin(roll) * c)
+    return (speed - back) / V, (c * left - s * fall) / V, -spun / V, V
 
 
 def _patch(track: Track, pose: Pose, gap: Gap, p: Pressed, left: bool, axle: Array) -> Patch:
@@ -329,11 +459,10 @@ def _patch(track: Track, pose: Pose, gap: Gap, p: Pressed, left: bool, axle: Arr
     z = float(track.rail.height(y - track.rail_at))
     turning = pose.speed / track.radius if pose.turning is None else pose.turning
     r = track.radius + float(track.wheel.height(y_w))
-    rim = turning * r * np.cos(pose.yaw)
-    V = 0.5 * (pose.speed + rim)
-    # the right wheel's, of the wheel relative to the rail: y to the left
-    xi, eta = (pose.speed - rim) / V, turning * r * np.sin(pose.yaw) * np.cos(p.angle) / V
-    phi = -turning * np.sin(p.angle - pose.roll) / V
+    along = x * np.cos(pose.yaw) + (y - pose.lateral) * np.sin(pose.yaw)
+    xi, eta, phi, V = map(
+        float, creepages(pose.speed, turning, r, along, pose.yaw, pose.roll, p.angle)
+    )
     sign = -1.0 if left else 1.0
     place = np.array([x, sign * y, z])
     conformal = p.B < CONFORMAL * p.A or p.b > track.radius * 0.1 or p.b * 2 * max(p.B, 0) > 0.3

@@ -89,7 +89,7 @@ def _slip(moved: Array, v: Vehicle, q: Array, out: Array, t: Touch) -> tuple[Arr
     c = 1 / jnp.sqrt(1 + t.slope**2)
     rim = turning * (t.radius + out)
     across = u[0] - t.radius * u[2] - rim * q[3]
-    down = u[1] + t.across * u[2] - u[4:6]
+    down = u[1] + t.across * u[2] - u[4:6] - rim * q[3] * t.slope  # it touches ahead of the axle
     spin = -turning * (t.slope * c - c * q[2]) - u[3] * c
     return v.speed - rim - u[3] * t.across, -(c * across + t.slope * c * down), spin
 
