@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import astuple
+from dataclasses import astuple, replace
 
 import numpy as np
 import pytest
@@ -13,6 +13,7 @@ from microslip.data import Array
 from microslip.errors import UserError
 from microslip.rolling.half_space import Contact, linear_coefficients, pressed, rolled, shifted, steady_rolling
 from microslip.rolling.half_space_influence import ALL, Grid, Pair, influence, influence_ahead, rectangle
+from microslip.rolling.half_space_normal import normal_contact
 
 STEEL = Pair(82e9, 0.28)
 UNLIKE = Pair(80e9, 0.3, 0.12)
@@ -97,6 +98,28 @@ def test_nothing_overlaps_and_what_touches_has_no_gap(pair: Pair) -> None:
     again = steady_rolling(bumpy(grid), grid, pair, MU, approach=c.approach, creepages=CREEP)
     assert again.pressure == pytest.approx(c.pressure, abs=1e-5 * c.pressure.max())
     assert again.traction == pytest.approx(c.traction, abs=1e-5 * c.pressure.max())
+
+
+@pytest.mark.parametrize("begun", [1, 2])
+def test_a_patch_spreads_from_the_elements_that_touch_first(begun: int) -> None:
+    """Loading goes on from a light touch in one element, or in two alike, which no change of pressure among them tells:
+    the pressure is that of a fresh start."""
+    grid, h = ellipse(14)
+    whole = pressed(h, grid, STEEL, force=LOAD)
+    light = np.zeros(h.shape)
+    light[8 - begun : 8, 7] = 1e6
+    before = replace(whole, pressure=light, traction=0 * whole.traction, slip=0 * whole.slip)
+    c = shifted(h, grid, STEEL, MU, force=LOAD, before=before)
+    assert c.pressure == pytest.approx(whole.pressure, abs=1e-6 * whole.pressure.max())
+
+
+def test_a_patch_moves_to_where_the_bodies_have_come_near() -> None:
+    """Under a given approach what touched lets go and another place joins."""
+    grid, h = ellipse(14)
+    near = h + 2e-4 * (grid.x > 0)
+    c = pressed(near, grid, STEEL, approach=5e-5)
+    other = normal_contact(near[::-1], influence(grid, STEEL), grid.area, approach=5e-5, start=c.pressure)[0]
+    assert other == pytest.approx(c.pressure[::-1], abs=1e-6 * c.pressure.max())
 
 
 def test_bodies_apart_feel_nothing() -> None:

@@ -65,6 +65,7 @@ def _gradients(
     def deformation(p: Array) -> Array:
         return influence(p[None], NORMAL, NORMAL)[0]
 
+    single = float(deformation(_unit(distance.shape)[0]).max())
     if load is not None:
         pressure *= load / pressure.sum()
     direction, before, fresh = np.zeros_like(distance), 1.0, True
@@ -79,11 +80,14 @@ def _gradients(
         if load is not None:
             answer -= answer[touching].mean()
         curvature = float((answer * direction)[touching].sum())
-        if not curvature > 0:  # one element alone, or all at rest
-            return pressure, level
-        length = float((gap * direction)[touching].sum()) / curvature
-        moved = np.maximum(np.where(touching, pressure - length * direction, 0), 0)
         joining = ~touching & (gap < 0)
+        if curvature > 0:
+            length = float((gap * direction)[touching].sum()) / curvature
+        elif joining.any():  # those that touch are at rest among themselves
+            length = 1 / single
+        else:
+            return pressure, level
+        moved = np.maximum(np.where(touching, pressure - length * direction, 0), 0)
         moved[joining] = -length * gap[joining]
         fresh, before = bool(joining.any()), here
         if load is not None:
