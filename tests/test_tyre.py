@@ -76,6 +76,23 @@ def test_a_load_that_falls_lets_go_at_once_what_it_does_not_hold() -> None:
     assert sticks[n] == pytest.approx(sticks[n - 1], rel=0.02)
 
 
+def test_the_patch_follows_its_load() -> None:
+    """A line contact is alike under any load: length and pressure go with its root, the tangential force with it, where
+    all sticks, where part slides, and where all does; 2.4 % off with 20 elements, 0.2 % with 80; there and back."""
+    for slip, friction in ((1e-5, 1.0), (5e-2, 1.0), (0.2, 1.0), (0.9, 0.05)):
+        for share in (0.5, 1.7):
+            off = []
+            for n in (20, 80):
+                b = replace(BRUSH, share=parabola(n), friction=friction, under=40.0)
+                load = 40.0 * np.concatenate([np.ones(4 * n), np.full(4 * n, share), np.ones(4 * n)])
+                force = b.carried(np.full(12 * n, slip), load)
+                off.append(abs(force[8 * n - 1] / force[4 * n - 1] / share - 1))
+                assert force[-1] == pytest.approx(force[4 * n - 1], rel=1e-9)
+            assert off[0] < 0.03 and off[1] < min(0.3 * off[0], 2.5e-3)
+    b = replace(BRUSH, under=40.0)
+    assert (b.carried([1e-2, 1e-2], [40.0, 0.0])[1], b.lengthened(10.0)) == (0.0, 0.5)
+
+
 def test_the_picture_names_the_time_constants_of_the_table(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """Of the same jumps, though it shows the first four passes of them alone."""
     pytest.importorskip("matplotlib")

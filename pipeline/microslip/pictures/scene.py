@@ -81,7 +81,7 @@ def surface(mesh: Mesh, coarse: bool = False) -> Surface:
         pattern = np.array(_COARSE[_corners(kind)] if coarse else _TRIANGLES[kind])
         flat.append(nodes[:, pattern].reshape(-1, 3))
         owner.append(np.repeat(np.arange(count, count + len(nodes)), len(pattern)))
-        sides.append(np.sort(nodes[:, np.array(_SIDES[kind])].reshape(-1, 2), axis=1))
+        sides.append(element_sides(kind, nodes))
         for number, row in enumerate(np.sort(nodes[:, : _corners(kind)], axis=1).tolist()):
             keys[tuple(row)] = count + number
         count += len(nodes)
@@ -106,6 +106,11 @@ def surface(mesh: Mesh, coarse: bool = False) -> Surface:
         np.asarray(split.point_data["source"], dtype=np.int64), split.regular_faces.astype(np.int64), facet, keys,
         np.unique(np.concatenate(sides), axis=0), outline.astype(np.int64),
     )  # fmt: skip
+
+
+def element_sides(kind: str, nodes: Indices) -> Indices:
+    """(s, 2) mesh points of the sides of facets (n, k), the lower one first; those between facets come twice."""
+    return np.sort(nodes[:, np.array(_SIDES[kind])].reshape(-1, 2), axis=1)
 
 
 def _corners(kind: str) -> int:

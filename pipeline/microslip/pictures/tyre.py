@@ -1,20 +1,35 @@
-"""A tyre whose slip jumps: its patch, a jump with the exponential that fits it, time constants over the slip."""
+"""A tyre whose slip jumps: the wheel, its patch, a jump with the exponential that fits it, time constants over the
+slip."""
 
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..data import Array, ModalBasis
+from ..mesh import boundary_facets
 from ..rolling.brush import fitted, jump
 from ..rolling.slip import Studied
 from .plots import COLOURS, empty_figure, plain_axes, save_figure
+from .scene import element_sides
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure, SubFigure
+
+TO_ITS_SIDE = 1e-6
+"""Of the wheel's size: points that near to its outermost plane are of its side."""
 
 
-def tyre_picture(found: Studied, path: Path, title: str) -> Path:
-    """Four panels."""
-    figure = empty_figure(9.6, 6.4)
-    (patch, steady), (one, constants) = figure.subplots(2, 2)
+def tyre_picture(found: Studied, path: Path, title: str, wheel: ModalBasis | None = None) -> Path:
+    """Four panels, and beside them the wheel of a modal file as it stands, whole and near its patch."""
+    figure = empty_figure(9.6 if wheel is None else 13.6, 6.4)
+    panels: Figure | SubFigure = figure
+    if wheel is not None:
+        beside, panels = figure.subfigures(1, 2, width_ratios=(4.2, 9.4))
+        _standing(beside, found, wheel)
+    (patch, steady), (one, constants) = panels.subplots(2, 2)
     for axes in (patch, steady, one, constants):
         plain_axes(axes)
     r, b = found.row, found.brush
@@ -49,3 +64,38 @@ def tyre_picture(found: Studied, path: Path, title: str) -> Path:
     constants.legend(fontsize=8, loc="upper right", ncols=2)
     figure.suptitle(title)
     return save_figure(figure, path)
+
+
+def _standing(figure: SubFigure, found: Studied, wheel: ModalBasis) -> None:
+    """Mesh of the wheel's side at rest and deformed, in its true size."""
+    from matplotlib.collections import LineCollection
+
+    t, group, points = found.case.tyre, wheel.groups[0, 0], wheel.mesh.points
+    down, axle, along = group.interfaces[t.interface].rotation
+    sides = _side(wheel, axle)
+    flat = np.column_stack([points @ along, -points @ down]) * 1e3
+    moved = flat + np.column_stack([group.u_static @ along, -group.u_static @ down]) * 1e3
+    size = 1e3 * np.linalg.norm(group.u_static, axis=1)[sides].mean(axis=1)
+    whole, near = figure.subplots(2, 1, height_ratios=(1.5, 1))
+    for axes in (whole, near):
+        plain_axes(axes)
+        axes.set_aspect("equal")
+        axes.add_collection(LineCollection(flat[sides], colors="0.75", linewidths=0.6))
+        drawn = LineCollection(moved[sides], array=size, cmap="viridis", linewidths=0.9)
+        axes.add_collection(drawn)
+        axes.axhline(moved[:, 1].min(), color="0.2", linewidth=1.2)
+        axes.set(xlabel="x in mm, rolling to the right", ylabel="mm")
+    reach = 1.05 * np.abs(flat).max()
+    half, low = 1.3e3 * found.row.length, moved[:, 1].min()
+    whole.set(xlim=(-reach, reach), ylim=(-reach, reach), title="mesh at rest (grey) and as it stands")
+    near.set(xlim=(-half, half), ylim=(low - 0.3 * half, low + 0.9 * half), title="near the patch, in true size")
+    figure.colorbar(drawn, ax=[whole, near], shrink=0.6, location="bottom", label="displacement in mm")
+
+
+def _side(wheel: ModalBasis, axle: Array) -> Array:
+    """(k, 2) points of the element sides that lie outermost along the axle."""
+    at = wheel.mesh.points @ axle
+    lies = at > at.max() - TO_ITS_SIDE * np.ptp(at)
+    pairs = [element_sides(kind, nodes) for kind, nodes in boundary_facets(wheel.mesh).items()]
+    every = np.unique(np.concatenate(pairs), axis=0)
+    return every[lies[every].all(axis=1)]

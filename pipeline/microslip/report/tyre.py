@@ -22,5 +22,6 @@ def tyre_html(title: str, found: Studied, pictures: Sequence[Path]) -> str:
 
 def _loads(found: Studied) -> Piece:
     columns = found.loads()
-    head = ["load jumps to its share", "force before in N", "after in N", "1 - 1/e of it after s"]
+    head = ["load jumps to its share", "patch then in mm", "force before in N", "after in N", "1 - 1/e of it after s"]
+    columns["patch_length_m"] = 1e3 * columns["patch_length_m"]
     return table(head, [[number(v) for v in row] for row in zip(*columns.values(), strict=True)])

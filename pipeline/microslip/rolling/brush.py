@@ -21,7 +21,8 @@ class Brush:
     """Attributes:
     share: (n,) of the normal force on each element, their sum 1, from the leading edge on. length: of the row, m.
     stiffness: of all elements together, N/m. friction: coefficient. speed: of rolling, m/s. compliance: of the mode,
-    m/N; frequency: of it, rad/s; damping: ratio of it.
+    m/N; frequency: of it, rad/s; damping: ratio of it. under: normal force of which share and length are, N: as in
+    Hertz' line contact the length goes with the root of the force, and the pressure keeps its shape; None: both stay.
 
     Raises:
         UserError: a number that is none of a brush.
@@ -35,11 +36,16 @@ class Brush:
     compliance: float = 0.0
     frequency: float = np.inf
     damping: float = 0.05
+    under: float | None = None
 
     def __post_init__(self) -> None:
-        for key in ("length", "stiffness", "friction", "speed", "frequency"):
-            if not getattr(self, key) > 0:
-                raise UserError(f"{key}: {getattr(self, key):g}; it must be greater than 0")
+        for key in ("length", "stiffness", "friction", "speed", "frequency", "under"):
+            value = getattr(self, key)
+            if value is not None and not (value > 0 and (np.isfinite(value) or key == "frequency")):
+                raise UserError(f"{key}: {value:g}; it must be greater than 0")
+        for key in ("compliance", "damping"):
+            if not 0 <= getattr(self, key) < np.inf:
+                raise UserError(f"{key}: {getattr(self, key):g}; it must be 0 or more")
         if not (np.min(self.share) >= 0 and abs(np.sum(self.share) - 1) < 1e-9):
             raise UserError("share: must be 0 or more everywhere and have the sum 1")
 
@@ -58,21 +64,53 @@ class Brush:
 
         Args:
             slip: (t,) slip over the speed of rolling, in each step. force: (t,) normal force, N.
+
+        Raises:
+            UserError: slip that is not finite, force that is negative.
         """
-        slip, force = np.broadcast_arrays(np.asarray(slip, float), np.asarray(force, float))
-        u, mode = np.zeros(len(self.share)), np.zeros(3)
-        out = np.empty(len(slip))
+        slip, force = np.broadcast_arrays(*(np.atleast_1d(np.asarray(v, float)) for v in (slip, force)))
+        if not (np.isfinite(slip).all() and np.isfinite(force).all() and (force >= 0).all()):
+            raise UserError("slip, force: must be finite, and the force 0 or more")
+        longest = max(1.0, float(self.lengthened(force).max()))
+        u, mode = np.zeros(len(self.share) + 2 * self._beyond(longest)), np.zeros(3)
+        out, scale, elements = np.empty(len(slip)), None, ()
         for i, (s, normal) in enumerate(zip(slip, force, strict=True)):
-            rigid = s * self.speed * self.step
+            if (now := float(self.lengthened(normal))) != scale:
+                scale, elements = now, self._elements(now, longest)
+            share, cover, way = elements
             moved = np.concatenate([[0.0], u[:-1]])
-            way = np.ones(len(u))
-            way[0] = 0.5  # the first element is reached in the middle
-            limit = self.friction * normal * self.share / self.spring
-            mode, u = self._balanced(mode, moved + way * rigid, way, limit)
-            out[i] = self.spring * u.sum()
+            held = self.friction * normal * share
+            limit = np.divide(held, self.spring * cover, out=np.zeros(len(u)), where=cover > 0)
+            far = moved + way * s * self.speed * self.step
+            mode, u = self._balanced(mode, far, way, limit, self.spring * cover)
+            out[i] = self.spring * (cover @ u)
         return out
 
-    def _balanced(self, mode: Array, far: Array, way: Array, limit: Array) -> tuple[Array, Array]:
+    def lengthened(self, force: ArrayLike) -> Array:
+        """By how much the row is longer under a normal force, N, than `length`."""
+        force = np.asarray(force, float)
+        return np.ones_like(force) if self.under is None else np.sqrt(force / self.under)
+
+    def _beyond(self, longest: float) -> int:
+        """Elements before and behind the row that a longest one reaches."""
+        return int(np.ceil(0.5 * len(self.share) * (longest - 1) - 1e-9))
+
+    def _elements(self, scale: float, longest: float) -> tuple[Array, Array, Array]:
+        """Of a row so many times as long: what each element carries of the normal force, how much of it lies in the
+        patch, and how long the material has been in it in a step, over its length. In half lengths from -1 on it enters
+        at -scale."""
+        n, beyond = len(self.share), self._beyond(longest)
+        edge = 2 / n * (np.arange(n + 2 * beyond + 1) - beyond) - 1
+        inside = np.clip(edge, -scale, scale)
+        carried = np.concatenate([[0.0], np.cumsum(self.share)])
+        at = inside / scale if scale > 0 else np.ones_like(edge)
+        share = np.diff(np.interp(at, np.linspace(-1, 1, n + 1), carried))
+        middle = 0.5 * (edge[1:] + edge[:-1])
+        return share, 0.5 * n * np.diff(inside), np.clip(0.5 * n * (middle + scale), 0.0, 1.0)
+
+    def _balanced(
+        self, mode: Array, far: Array, way: Array, limit: Array, spring: Array
+    ) -> tuple[Array, Array]:
         """Mode (w, its velocity and acceleration) and stretches at the end of a step: Newmark's method, and Newton's on
         the one unknown dw, as the force falls with it piecewise straight."""
         if self.compliance == 0:
@@ -87,8 +125,8 @@ class Brush:
         for _ in range(100):
             free = far - way * dw
             u = np.clip(free, -limit, limit)
-            slope = -self.spring * (way * (np.abs(free) < limit)).sum()
-            left = mass * dw - known + w0 - c * self.spring * u.sum()
+            slope = -(spring * way * (np.abs(free) < limit)).sum()
+            left = mass * dw - known + w0 - c * (spring @ u)
             change = -left / (mass - c * slope)
             dw += change
             if abs(change) <= 1e-13 * max(abs(dw), 1e-9):

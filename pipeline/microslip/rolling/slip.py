@@ -149,17 +149,22 @@ class Studied:
         return columns
 
     def loads(self) -> dict[str, Array]:
-        """Of the table of load jumps at the slip shown: force before and after, N, and time constants, s."""
+        """Of the table of load jumps at the slip shown: length of the patch after, m, force before and after, N, and time
+        constants, s."""
         b, s = self.brush, self.case.jumps.shown
-        n = 12 * len(b.share)
         rows = []
         for share in self.case.jumps.loads:
+            longer = float(b.lengthened(share * self.row.force))
+            n = int(np.ceil(12 * max(longer, 1.0) * len(b.share)))
             normal = self.row.force * np.concatenate([np.ones(n), np.full(n, share)])
             force = b.carried(np.full(2 * n, s), normal)[n - 1 :]
             time = b.step * np.arange(n + 1)
             moved = abs(force[-1] - force[0]) > 1e-9 * self.row.force
-            rows.append([share, force[0], force[-1], reached(time, force) if moved else np.nan])
-        return dict(zip(("load_share", "force_before_N", "force_after_N", "reached_s"), np.array(rows).T, strict=True))
+            rows.append([
+                share, longer * b.length, force[0], force[-1], reached(time, force) if moved else np.nan
+            ])  # fmt: skip
+        names = ("load_share", "patch_length_m", "force_before_N", "force_after_N", "reached_s")
+        return dict(zip(names, np.array(rows).reshape(-1, len(names)).T, strict=True))
 
     def sentences(self) -> list[str]:
         """What a reader came for."""
@@ -209,5 +214,6 @@ def study(case: TyreCase, group: ModalGroup) -> Studied:
     brush = Brush(
         found.share, found.length, t.stiffness * found.length * found.width, t.friction, t.speed,
         0.0 if t.rigid else float(yields[k]), float(group.omega[k]), max(float(group.damping_ratio[k]), 0.0),
+        found.force,
     )  # fmt: skip
     return Studied(case, found, brush, float(group.omega[k]) / (2 * np.pi))

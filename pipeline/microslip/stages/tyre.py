@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from ..basis import read_basis
+from ..data import ModalBasis
 from ..errors import told_of
 from ..files import store
 from ..files.tables import write_tables
@@ -33,10 +34,11 @@ def _work(stage: Stage, case: TyreCase, job: RollJob, basis: Path) -> Answer:
     folder = stage.product.parent
     stage.report("jumps of slip and load")
     with told_of(job.path):
-        found = study(case, read_basis(basis).groups[0, 0])
+        wheel = read_basis(basis)
+        found = study(case, wheel.groups[0, 0])
     stage.begin()
     made = _tables(found, folder)
-    drawn = [_picture(found, folder / "pictures", case.name)] if job.pictures else []
+    drawn = [_picture(found, wheel, folder / "pictures", case.name)] if job.pictures else []
     page = folder / "tyre.html"
     store.write_text(page, tyre_html(f"{case.name}: unsteady rolling", found, drawn))
     return Answer([page, *made, *drawn], found.sentences())
@@ -51,7 +53,7 @@ def _tables(found: Studied, folder: Path) -> list[Path]:
     return write_tables(folder, tables, 8)
 
 
-def _picture(found: Studied, folder: Path, name: str) -> Path:
+def _picture(found: Studied, wheel: ModalBasis, folder: Path, name: str) -> Path:
     from ..pictures.tyre import tyre_picture
 
-    return tyre_picture(found, folder / "tyre.png", name)
+    return tyre_picture(found, folder / "tyre.png", name, wheel)
