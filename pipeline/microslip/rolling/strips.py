@@ -95,7 +95,7 @@ class Grid:
         y, width: (ny,) of the strips over b, at Gauss' points, so that what does not slip is integrated exactly.
         chord: (ny,) x_A/a (6.4-28). x: (nx,) middles over x_A. way: (nx,) from middle to middle over the length of an
             element; the first begins at the edge. pressure, stiffness: (nx,) means over the element of what (6.4-29),
-            (6.4-33) and (6.4-39), (6.4-42) distribute. powers: of the chord by which both grow from strip to strip.
+            (6.4-33) and (6.4-39), (6.4-42) distribute, of stiffness weighted by 1 - x. powers: of the chord by which both grow from strip to strip.
             pressed, sprung, spun: sums that make the force F_N and, without slip, C G a b s (6.4-25) and C23 G c^3 phi.
     """
 
@@ -128,7 +128,9 @@ def grid(elements: tuple[int, int], distribution: Distribution) -> Grid:
         pressure, stiffness, powers = mean(edge - edge**3 / 3), np.ones(nx), (2, 0)
     else:
         angle = np.arcsin(edge)
-        pressure, stiffness, powers = mean(0.5 * (angle + edge * np.sqrt(1 - edge**2))), mean(angle), (1, -1)
+        # infinite at the edges: the mean of what stick makes of it, u growing evenly from the leading edge on
+        stiffness = mean(angle + np.sqrt(1 - edge**2)) / (1 - x)
+        pressure, powers = mean(0.5 * (angle + edge * np.sqrt(1 - edge**2))), (1, -1)
     pressed = np.sum(chord ** (powers[0] + 1) * width) * np.sum(pressure) * 2 / nx
     sprung = np.sum(chord ** (powers[1] + 2) * width) * np.sum(stiffness * (1 - x)) * 2 / nx
     spun = np.sum(chord ** (powers[1] + 3) * width) * np.sum(stiffness * (1 - x**2)) * 2 / nx
