@@ -22,7 +22,7 @@ from microslip.vehicle import motion, wearing
 from microslip.vehicle.creep import linear, of_strips, of_table
 from microslip.vehicle.kinematics import Given, recorded
 from microslip.vehicle.settings import VehicleCase, load_kinematics, load_vehicle, track_of
-from microslip.vehicle.study import Studied
+from microslip.vehicle.study import Studied, _went
 
 CASE = Path(__file__).parents[1] / "pipeline" / "cases" / "unround-wheel.toml"
 PLACES = 48
@@ -222,6 +222,16 @@ def test_three_crests_wear_as_the_figure_says(rolling: wearing.Rolling) -> None:
     assert 5 < abs(shift) < 60
 
 
+def test_no_change_is_claimed_that_the_jumps_do_not_tell(rolling: wearing.Rolling) -> None:
+    """What one long jump makes of the waves is off by less than it tells, and told of only where it is more."""
+    *_, (coarse, jump) = wearing.jumps(rolling, 1e6, 1.0, 1e6)
+    *_, (fine, _) = wearing.jumps(rolling, 1e6, 2e-8, 1e5)
+    off = np.abs(wearing.orders_of(coarse.radius, 6) - wearing.orders_of(fine.radius, 6))
+    assert (off <= wearing.uncertain([(coarse, jump)])[:6] + 1e-10).all() and off.max() > 1e-10
+    assert _went(3e-5, 2.992e-5, 1.9e-7).startswith("stays at 30 um: it changes by less than the error")
+    assert _went(3e-5, 2.992e-5, 1e-8).startswith("goes from 30 to 29.92 um")
+
+
 def test_a_round_wheel_stays_round(rolling: wearing.Rolling) -> None:
     """And wears alike on both sides."""
     flat = replace(rolling, shape=np.zeros_like(rolling.shape))
@@ -245,9 +255,13 @@ def test_a_case_from_the_command_line(tmp_path: Path, monkeypatch: pytest.Monkey
     assert main(asked()) == 0
     folder = tmp_path / "build" / "unround-wheel"
     rows = list(csv.DictReader((folder / "growth.csv").open()))
-    assert float(rows[-1]["turns"]) == 1e5 and (folder / "unround.html").is_file()
-    for row in rows[1:]:
-        assert float(row["right_volume_m3"]) == pytest.approx(7e-13 * float(row["right_friction_work_J"]), rel=1e-8)
+    assert float(rows[-1]["total_turns"]) == 1e5 and (folder / "unround.html").is_file()
+    for of in ("jump", "total"):
+        for row in rows[1:]:
+            work = float(row[f"{of}_right_friction_work_J"])
+            assert float(row[f"{of}_right_volume_m3"]) == pytest.approx(7e-13 * work, rel=1e-8)
+    volumes = [float(row["jump_right_volume_m3"]) for row in rows]
+    assert float(rows[-1]["total_right_volume_m3"]) == pytest.approx(sum(volumes), rel=1e-8)
     assert len(list(csv.DictReader((folder / "circumference.csv").open()))) == 48
 
 
@@ -345,7 +359,7 @@ def test_a_run_that_ends_keeps_what_it_has(
     monkeypatch.chdir(tmp_path)
     assert main(asked("wear.coefficient=1e-9", "wear.tolerance=1e-5", "running.turns=1e6")) == 1
     rows = list(csv.DictReader((tmp_path / "build" / "unround-wheel" / "growth.csv").open()))
-    assert 1 < len(rows) and float(rows[-1]["turns"]) < 1e6
+    assert 1 < len(rows) and float(rows[-1]["total_turns"]) < 1e6
     assert "ended early" in capsys.readouterr().err
 
 
@@ -393,7 +407,7 @@ def test_wear_by_a_file_is_that_of_the_vehicle_that_wrote_it(
     np.testing.assert_allclose(depth, own, rtol=5e-3)
     assert max(float(r["standard_error_m"]) for r in rows) < 1e-6 * depth.max()
     (row,) = list(csv.DictReader((tmp_path / "build" / "given" / "wear.csv").open()))[1:]
-    assert float(row["right_volume_m3"]) == pytest.approx(7e-13 * float(row["right_friction_work_J"]), rel=1e-8)
+    assert float(row["total_right_volume_m3"]) == pytest.approx(7e-13 * float(row["total_right_friction_work_J"]), rel=1e-8)
 
 
 def given(folder: Path, columns: dict[str, np.ndarray], *changes: str) -> Given:
@@ -503,7 +517,7 @@ def test_a_groove_that_splits_the_contact_ends_wear_by_a_file(
     said = capsys.readouterr()
     assert "ended early" in said.err and "groove" in said.out + said.err
     rows = list(csv.DictReader((tmp_path / "build" / "given" / "wear.csv").open()))
-    assert 2 < len(rows) and 1e4 < float(rows[-1]["turns"]) < 1e6
+    assert 2 < len(rows) and 1e4 < float(rows[-1]["total_turns"]) < 1e6
 
 
 def cut(columns: dict[str, np.ndarray], kind: str) -> dict[str, np.ndarray]:

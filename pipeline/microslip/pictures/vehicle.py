@@ -64,7 +64,7 @@ def growth_picture(found: Studied, path: Path, title: str) -> Path:
     figure = empty_figure(9.6 if len(found.speeds) else 6.4, 4.4)
     panels = figure.subplots(1, 2 if len(found.speeds) else 1, squeeze=False)[0]
     amplitudes = 1e6 * found.amplitudes()[:, :, found.wheel]
-    km = found.growing()["distance_km"]
+    km = found.growing()["total_distance_km"]
     plain_axes(panels[0])
     low = max(1e-4, 1e-3 * float(amplitudes[-1].max()))
     largest = np.sort(np.argsort(-amplitudes[-1])[:SHOWN])

@@ -31,6 +31,7 @@ from .wearing import (
     filtered,
     orders_of,
     spread,
+    uncertain,
     worn,
 )
 
@@ -328,9 +329,13 @@ class Recorded:
             f"After {now.turns:.4g} turns, by {files} of the file, {1e6 * depth.mean():.4g} um "
             f"are worn where the contact runs, {1e9 * volume:.4g} mm3 in all: the coefficient times the work of "
             f"friction, {work / now.turns if now.turns else now.friction[0]:.4g} J a turn.",
-            f"Over the circumference it differs by {1e6 * np.ptp(depth):.4g} um; order {n + 1} is largest, "
-            f"{1e6 * orders[n]:.3g} um.",
         ]
+        less = max(uncertain(self.history)[n, 0], np.nan_to_num(error).max())
+        if orders[n] > less:
+            told.append(f"Over the circumference it differs by {1e6 * np.ptp(depth):.4g} um; order {n + 1} is largest, "
+                        f"{1e6 * orders[n]:.3g} um.")  # fmt: skip
+        else:
+            told.append(f"Over the circumference it differs by no more than its error, {1e6 * less:.2g} um.")
         if self.wheel.tracks is not None:
             told.append(error_of(self.history))
         if files == 1:

@@ -28,10 +28,20 @@ from .wearing import (
     growth,
     orders_of,
     tread,
+    uncertain,
     worn,
 )
 
 WHEELS = ("right", "left")
+
+
+def _went(first: float, last: float, less: float) -> str:
+    """From one amplitude to another, m, if that is more than it may be off."""
+    if abs(last - first) <= max(less, 1e-9):
+        return f"stays at {1e6 * first:.4g} um: it changes by less than the error of the jumps, {1e6 * less:.2g} um,"
+    return f"goes from {1e6 * first:.4g} to {1e6 * last:.4g} um (its error is below {1e6 * less:.2g} um)"
+
+
 SMALL = 1e-6
 """m, amplitude of each order by which growth is looked for."""
 FASTEST = 200.0
@@ -104,19 +114,17 @@ class Studied:
         """What a reader came for."""
         now, _ = self.history[-1]
         km = 1e-3 * now.turns * self.way
-        found, told = self.amplitudes(), []
+        found, off, told = self.amplitudes(), uncertain(self.history), []
         for k, name in enumerate(WHEELS):
-            first, last = found[0, :, k], found[-1, :, k]
+            first, last, less = found[0, :, k], found[-1, :, k], off[: self.orders, k]
             if not first.max() > 1e-9:
                 continue
             n = int(first.argmax())
-            told.append(
-                f"Order {n + 1} of the {name} wheel goes from {1e6 * first[n]:.4g} to {1e6 * last[n]:.4g} um in "
-                f"{km:.5g} km ({now.turns:.4g} turns)."
-            )
+            told.append(f"Order {n + 1} of the {name} wheel {_went(first[n], last[n], less[n])} in {km:.5g} km "
+                        f"({now.turns:.4g} turns).")  # fmt: skip
             m = int((last - first).argmax())
-            if last[m] - first[m] > 1e-9:
-                told.append(f"Of the others order {m + 1} grows most, to {1e6 * last[m]:.3g} um." if m != n else "")
+            if m != n and last[m] - first[m] > max(less[m], 1e-9):
+                told.append(f"Of the others order {m + 1} grows most, to {1e6 * last[m]:.3g} um.")
         told += self._shifted()
         told.append(error_of(self.history))
         told += [self._hunts(), *self._deep()]

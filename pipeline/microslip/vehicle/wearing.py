@@ -261,13 +261,14 @@ def _stays_on(one: Turn, v: Vehicle) -> None:
 @dataclass(frozen=True)
 class Jump:
     """Attributes: turns: at its end. size: turns. error: of the seen radius against a first-order jump, m. volume:
-    (wheels,) worn of each, m3. work: (wheels,) of friction, J."""
+    (wheels,) worn of each, m3. work: (wheels,) of friction, J. waves: (orders, wheels) of that error's orders, m."""
 
     turns: float
     size: float
     error: float
     volume: Array
     work: Array
+    waves: Array
 
 
 class State(Protocol):
@@ -315,20 +316,23 @@ def jumps(
         now, jump = known[-1]
     else:
         now = r.at(r.new(), 0.0)
-        jump = Jump(0.0, 0.0, 0.0, np.zeros(len(t.sides)), np.zeros(len(t.sides)))
+        none = np.zeros(len(t.sides))
+        jump = Jump(0.0, 0.0, 0.0, none, none, np.zeros((now.depth.shape[1] // 2, len(none))))
         yield now, jump
     size = min(first, turns) if fixed or not jump.size else _next(jump, tolerance)
     while now.turns < turns * (1 - 1e-12):
         size = min(size, turns - now.turns)
         then = r.at(now.depth + size * now.taken, now.turns + size, now)
         mean = 0.5 * (now.taken + then.taken)
-        error = float(np.abs(r.seen(0.5 * size * (then.taken - now.taken), now)).max())
+        off = r.seen(0.5 * size * (then.taken - now.taken), now)
+        error = float(np.abs(off).max())
         if error > tolerance and not fixed:
             size *= max(0.2, 0.9 * (tolerance / error) ** 0.5)
             continue
         work = [size * 0.5 * r.work(one) for one in (now, then)]
         now = r.at(now.depth + size * mean, now.turns + size, then)
-        jump = Jump(now.turns, size, error, t.volume(size * mean), work[0] + work[1])
+        waves = orders_of(off, len(off) // 2)
+        jump = Jump(now.turns, size, error, t.volume(size * mean), work[0] + work[1], waves)
         yield now, jump
         if not fixed:
             size = _next(jump, tolerance)
@@ -374,15 +378,22 @@ def worn(
 
 
 def columns_of(history: Sequence[tuple[State, Jump]], way: float, wheels: Sequence[str]) -> dict[str, Array]:
-    """Of a table over the jumps; way: of a turn, m."""
+    """Of a table over the jumps: what each does, and the total so far; way: of a turn, m."""
     turns = np.array([now.turns for now, _ in history])
-    columns = {"turns": turns, "distance_km": 1e-3 * turns * way}
+    columns = {"total_turns": turns, "total_distance_km": 1e-3 * turns * way}
     columns["jump_turns"] = np.array([j.size for _, j in history])
-    columns["error_m"] = np.array([j.error for _, j in history])
+    each = {"error_m": np.array([j.error for _, j in history])}
     for k, name in enumerate(wheels):
-        columns[f"{name}_volume_m3"] = np.array([j.volume[k] for _, j in history])
-        columns[f"{name}_friction_work_J"] = np.array([j.work[k] for _, j in history])
+        each[f"{name}_volume_m3"] = np.array([j.volume[k] for _, j in history])
+        each[f"{name}_friction_work_J"] = np.array([j.work[k] for _, j in history])
+    for name, values in each.items():
+        columns |= {f"jump_{name}": values, f"total_{name}": np.cumsum(values)}
     return columns
+
+
+def uncertain(history: Sequence[tuple[State, Jump]]) -> Array:
+    """(orders, wheels) by which amplitudes of what is worn may be off at the end, m: of all jumps together."""
+    return np.asarray(sum(j.waves for _, j in history))
 
 
 def error_of(history: Sequence[tuple[State, Jump]]) -> str:
