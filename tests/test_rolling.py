@@ -558,7 +558,7 @@ def test_a_case_makes_its_curve_pictures_and_page(
     solid = Solid(2.1e11, 0.28)
     f = ms.creep_forces(row["longitudinal_creepage"], row["lateral_creepage"], row["spin_1_per_m"], patch["a_m"],
                         patch["b_m"], patch["normal_force_N"], 0.3, solid.shear, 0.28)  # fmt: skip
-    np.testing.assert_allclose([row["F_x_N"], row["F_y_N"], row["M_z_Nm"]], [f.x[0], f.y[0], f.moment[0]], rtol=1e-4)
+    np.testing.assert_allclose([row["F_x_forward_N"], row["F_y_left_N"], row["M_z_up_Nm"]], [f.x[0], f.y[0], f.moment[0]], rtol=1e-4)
     said = capsys.readouterr().out
     assert re.search(r"largest creep force is 1 mu F_N", said)
     assert "data:image/png" in (folder / "rolling.html").read_text()
@@ -566,7 +566,7 @@ def test_a_case_makes_its_curve_pictures_and_page(
     shown = min(rows, key=lambda row: abs(float(row["longitudinal_creepage"]) - 0.0015))
     cells = {name: of[0] for name, of in meshio.read(folder / "tractions.vtu").cell_data.items()}
     sums = [*(cells["area"] @ cells["traction"])[:2], cells["area"] @ cells["pressure"]]
-    expected = [float(shown["F_x_N"]), float(shown["F_y_N"]), patch["normal_force_N"]]
+    expected = [float(shown["F_x_forward_N"]), float(shown["F_y_left_N"]), patch["normal_force_N"]]
     np.testing.assert_allclose(sums, expected, rtol=1e-5)
 
 
@@ -619,6 +619,48 @@ def test_bad_input_is_one_sentence(
     said = capsys.readouterr().err.strip()
     assert named in said and len(said.splitlines()) == 1
     assert not (tmp_path / "build" / "wheel-rail" / "rolling.html").exists()
+
+
+TABLES = {
+    "numbers its rows": "1,-20,3\n2,-10,1\n3,0,0\n4,10,1\n5,20,3",
+    "names what is no profile": "index,z\n1,3\n2,1\n3,0\n4,1\n5,3",
+    "has decimal commas": "-20,5;3,1\n-10,5;1,1\n0,5;0\n10,5;1,1\n20,5;3,1",
+    "has decimal commas and blanks": "-20,5 3,1\n-10,5 1,1\n0,5 0\n10,5 1,1\n20,5 3,1",
+    "has decimal commas and commas": "-20,5,3,1\n-10,5,1,1\n0,5,0,0\n10,5,1,1\n20,5,3,1",
+}
+
+
+@pytest.mark.parametrize("what", TABLES)
+def test_a_table_that_is_no_profile_is_refused(what: str, tmp_path: Path) -> None:
+    """It was read by its first two numbers."""
+    (tmp_path / "p.csv").write_text(TABLES[what])
+    with pytest.raises(UserError, match="columns|decimal commas"):
+        ms.read_profile(tmp_path / "p.csv")
+
+
+def test_columns_of_a_profile_are_those_that_its_head_names(tmp_path: Path) -> None:
+    (tmp_path / "p.csv").write_text("worn_mm,z_mm,y_mm\n" + "\n".join(f"9,{y * y / 400},{y}" for y in range(-20, 21)))
+    p = ms.read_profile(tmp_path / "p.csv")
+    np.testing.assert_allclose(p.z, p.y**2 / 0.4, atol=1e-15)
+
+
+@pytest.mark.parametrize("mirror", ["", "z"])
+def test_a_profile_upside_down_is_told_which_mirror_turns_it(mirror: Any, tmp_path: Path) -> None:
+    """The one that is set is not asked for."""
+    y = np.linspace(-30, 30, 61)
+    up = -1 if mirror else 1
+    z = up * np.where(y < 25, 0.0, (y - 25) * -5.0)
+    np.savetxt(tmp_path / "p.csv", np.column_stack([y, z]), delimiter=",")
+    with pytest.raises(UserError, match=re.escape(f"set mirror = {'' if mirror else 'z'!r}")):
+        ms.read_profile(tmp_path / "p.csv", mirror=mirror)
+
+
+def test_an_inclined_rail_stands_by_its_highest_point() -> None:
+    """A circle of 0.3 m inclined by 25 mrad is highest 7.5 mm beside its origin."""
+    turned = ms.circle(0.3).turned(0.025)
+    assert turned.moved[0] == pytest.approx(0.3 * np.sin(0.025), rel=1e-3)
+    assert turned.moved[1] == pytest.approx(0.3 * (1 - np.cos(0.025)), rel=1e-3)
+    assert float(turned.height(0.0)) == pytest.approx(0.0, abs=1e-12)
 
 
 def test_profiles_that_turn_back_are_named(tmp_path: Path) -> None:

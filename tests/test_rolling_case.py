@@ -22,7 +22,7 @@ from microslip.rolling.behind import even
 from microslip.rolling.laws import Surface
 from microslip.rolling.rolled import COLD
 from microslip.rolling.settings import load_rolling
-from microslip.rolling.study import Studied, study
+from microslip.rolling.study import Studied, rows_of_patches, study
 from microslip.rolling.temperature import falling
 from microslip.rolling.wearing import wearing
 
@@ -48,9 +48,24 @@ def test_what_is_rounding_is_no_force() -> None:
     """A wheel in the middle that rolls freely without spin, and creepage along rolling alone."""
     found = studied("pose.lateral=0.0", "creep.lateral=0.0")
     felt = np.array([row[2:] for row in found.generalised()[1]], float)
-    assert (felt[:, [0, 1, 4, 5]] == 0).all() and felt[0, 2] == pytest.approx(-1e5)
-    assert (found.columns()["F_y_N"] == 0).all() and (found.columns()["M_z_Nm"] == 0).all()
+    assert (felt[:, [0, 1, 4, 5]] == 0).all() and felt[0, 2] == pytest.approx(1e5)
+    assert (found.columns()["F_y_left_N"] == 0).all() and (found.columns()["M_z_up_Nm"] == 0).all()
     assert "feels 0 N forward, 0 N to the right" in found.sentences()[0]
+
+
+def test_tables_have_one_frame() -> None:
+    """x forward, y to the left, z up in all: where the surface is nearly level the forces of the curve are those of the
+    pose on the wheel, and its patch lies right of the middle and near the tops of the rails."""
+    found = studied("pose.yaw=0.002")
+    head, rows = found.generalised()
+    felt, (p,), forces = dict(zip(head, rows[0], strict=True)), found.patches, found.of_pose
+    assert forces is not None and set(head[2:]) > {k for k in found.columns() if k in head}
+    across = forces.y[0] * np.cos(p.angle) - p.normal_force * np.sin(p.angle)
+    assert (felt["F_x_forward_N"], felt["F_y_left_N"]) == pytest.approx((forces.x[0], across), rel=1e-9)
+    assert float(felt["F_z_up_N"]) == pytest.approx(1e5, rel=1e-6)
+    names, places = rows_of_patches(found.patches)
+    place = dict(zip(names, places[0], strict=True))
+    assert place["y_left_m"] == -p.place[1] < 0 and place["z_up_m"] == -p.place[2]
 
 
 def test_a_patch_that_reaches_beyond_a_profile_is_doubted() -> None:
@@ -148,7 +163,7 @@ def test_both_wheels_of_an_axle() -> None:
     assert [p.side for p in one.patches] != [p.side for p in other.patches] and len(one.patches) == 2
     felt = [{p.side: np.array(row[2:], float) for row, p in zip(f.generalised()[1][::2], f.patches, strict=True)}
             for f in (one, other)]  # fmt: skip
-    np.testing.assert_allclose([felt[0][side][2] for side in felt[0]], -1e5, rtol=1e-6)
+    np.testing.assert_allclose([felt[0][side][2] for side in felt[0]], 1e5, rtol=1e-6)
     np.testing.assert_allclose(felt[0]["left"], felt[1]["right"] * [1, -1, 1, -1, 1, -1], rtol=1e-6, atol=1e-2)
     assert sum("wheel feels" in s for s in one.sentences()) == 2 and len(set(one.worn()["patch"])) == 2
 

@@ -90,7 +90,7 @@ def test_the_table_is_what_the_sentence_says(tmp_path: Path, monkeypatch: pytest
     assert f"at most {100 * max(off):.2g} % of mu F_N" in said and f"at {len(exact)} points" in said
 
 
-KEYS = ("F_x_over_mu_F_N", "F_y_over_mu_F_N")
+KEYS = ("F_x_forward_over_mu_F_N", "F_y_left_over_mu_F_N")
 
 
 def test_unlike_bodies_are_both_counted() -> None:

@@ -5,6 +5,7 @@ y runs to the field side, z down; m. A wheel's material lies above its profile, 
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -32,13 +33,15 @@ class Profile:
     """A smooth curve z(y) through points.
 
     Attributes: y, z: (k,) m, y rising. name: for sentences. noise: standard deviation of measured z, m; the curve then
-        keeps that distance from the points on average, which is what makes its curvature usable.
+        keeps that distance from the points on average, which is what makes its curvature usable. moved: y, z of this
+        origin in the axes of the drawn profile, where it has been turned, m.
     """
 
     y: Array
     z: Array
     name: str = "profile"
     noise: float = 0.0
+    moved: tuple[float, float] = (0.0, 0.0)
 
     @cached_property
     def curve(self) -> CubicSpline | UnivariateSpline:
@@ -65,7 +68,7 @@ class Profile:
         return np.where(inside, curve(np.clip(at, self.y[0], self.y[-1])), np.nan)
 
     def turned(self, angle: float) -> Profile:
-        """Inclined by an angle (rad) towards the track, about its highest point where z = 0: a canted rail."""
+        """Inclined by an angle (rad) towards the track: a canted rail. Its origin is the point that is highest then."""
         if not angle:
             return self
         c, s = np.cos(angle), np.sin(angle)
@@ -73,7 +76,9 @@ class Profile:
         turned = _checked(y, z, self.name, self.noise)
         at = np.clip(np.argmin(z), 1, len(z) - 2)
         top = minimize_scalar(turned.height, bounds=sorted((y[at - 1], y[at + 1])), method="bounded").x
-        return replace(turned, y=turned.y - top, z=turned.z - turned.height(top))
+        high = float(turned.height(top))
+        moved = float(c * top - s * high), float(c * high + s * top)
+        return replace(turned, y=turned.y - top, z=turned.z - high, moved=moved)
 
 
 def polynomial(coefficients: Sequence[float], width: float = WIDTH) -> Profile:
@@ -127,15 +132,17 @@ def read_profile(
     sign, shift = np.ones(2), np.zeros(2)
     if path.suffix.lower() in MINIPROF:
         unit, lines = 1e-3, _miniprof(lines, path)
+    if comma := next((line for line in lines if DECIMAL_COMMA.search(line)), None):
+        raise UserError(f"{path}: writes decimal commas ({comma}); write decimal points")
     if "point.begin" in lines:
         begin, end = lines.index("point.begin"), lines.index("point.end") if "point.end" in lines else len(lines)
         unit, sign, shift = _header(lines[:begin], path)
         lines = lines[begin + 1 : end]
-    rows = [line.replace(",", " ").replace(";", " ").split() for line in lines if line]
-    if rows and not is_number(rows[0][0]):
-        rows = rows[1:]
+        rows = [line.replace(",", " ").replace(";", " ").split()[:2] for line in lines if line]
+    else:
+        rows = _table([line for line in lines if line], path)
     try:
-        points = np.array([[float(v) for v in row[:2]] for row in rows])
+        points = np.array([[float(v) for v in row] for row in rows])
     except ValueError as error:
         raise UserError(f"{path}: {error}; a profile is a table of y and z") from error
     if points.ndim != 2 or points.shape[1:] != (2,) or len(points) < 5 or not np.isfinite(points).all():
@@ -147,10 +154,37 @@ def read_profile(
     y, z = y[kept], z[kept]
     middle = float(np.median(z))
     if np.ptp(z) > DEEP and middle - z.min() > z.max() - middle:
+        other = mirror.replace("z", "") if "z" in mirror else mirror + "z"
         raise UserError(
-            f'{path}: lies upside down, as flanges and sides of a head reach down and z with them; set mirror = "z"'
+            f"{path}: lies upside down with mirror = {mirror!r}, as flanges and sides of a head reach down and z with "
+            f"them; set mirror = {other!r}"
         )
     return _checked(y, z, str(path), noise)
+
+
+def _table(lines: list[str], path: Path) -> list[list[str]]:
+    """Rows of y and z of a table, with a head or without; more columns need a head that names both.
+
+    Raises:
+        UserError: columns that could be others.
+    """
+    rows = [line.replace(",", " ").replace(";", " ").split() for line in lines]
+    head = rows.pop(0) if rows and not is_number(rows[0][0]) else []
+    named = {name.lower().removesuffix("_mm").removesuffix("_m"): k for k, name in enumerate(head)}
+    known = {"y", "z"} & set(named)
+    if len(known) == 2 and all(len(row) == len(head) for row in rows):
+        return [[row[named["y"]], row[named["z"]]] for row in rows]
+    if not known and all(len(row) == 2 for row in rows):
+        return rows
+    wide = max(rows, key=len, default=head)
+    raise UserError(
+        f"{path}: has {len(wide)} columns ({' '.join(head or wide)}); a profile is a table of y and z, so leave out the "
+        "others, or name y and z in its first line"
+    )
+
+
+DECIMAL_COMMA = re.compile(r"\d,\d.*[;\t ]\s*[-+]?\d|\d[;\t ]\s*[-+]?\d+,\d")
+"""Beside another mark between the columns."""
 
 
 def _header(lines: list[str], path: Path) -> tuple[float, Array, Array]:

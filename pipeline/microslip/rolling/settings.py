@@ -97,7 +97,8 @@ class Wheel(Section):
 
 
 class Rail(Section):
-    """inclination: of the rail towards the track's middle, rad; a profile that is drawn canted has 0."""
+    """inclination: of the rail towards the track's middle, rad; a profile that is drawn canted has 0. With another one
+    the origin moves to the point that is highest then, and `at` is of that."""
 
     inclination: Annotated[Number, Field(ge=-0.2, le=0.2)] = 0.0
 

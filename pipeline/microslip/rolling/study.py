@@ -37,6 +37,17 @@ ROUNDING, SETTLED = 1e-10, 1e-5
 """Of mu F_N: less is no force, of the strips and of the half-spaces, which are solved to 1e-7 at each element."""
 
 
+AXES, UPRIGHT = ("x_forward", "y_left", "z_up"), np.array([1.0, -1.0, -1.0] * 2)
+"""Of all tables, and what turns track axes into them."""
+
+
+def _heads(x: Array, y: Array, moment: Array, held: float) -> dict[str, Array]:
+    """Columns of forces on the wheel in a patch, across along the rail's surface, N and N m; held: mu F_N, N."""
+    forward, left, up = AXES
+    return {f"F_{forward}_N": x, f"F_{left}_N": y, f"M_{up}_Nm": moment,
+            f"F_{forward}_over_mu_F_N": x / held, f"F_{left}_over_mu_F_N": y / held}  # fmt: skip
+
+
 def without_rounding(values: Array, least: float) -> Array:
     return np.where(np.abs(values) < least, 0.0, values)
 
@@ -65,8 +76,8 @@ class Studied:
     pose_tractions: Tractions | None = None
 
     def generalised(self) -> tuple[list[str], list[list[str | float]]]:
-        """Head and rows: forces of the pose itself on wheel and rail, patch by patch, in track axes, and moments about
-        the middle of the axle and the origin of the rail's profile."""
+        """Head and rows: forces of the pose itself on wheel and rail, patch by patch, and moments about the middle of
+        the axle and the origin of the rail's profile; x forward, y to the left, z up."""
         rows: list[list[str | float]] = []
         for k, p in enumerate(self.patches):
             assert self.of_pose is not None
@@ -75,8 +86,8 @@ class Studied:
             places = {"wheel": np.array([0.0, *p.axle]), "rail": np.array([0.0, side * self.track.rail_at, 0.0])}
             for sign, (body, about) in zip((1.0, -1.0), places.items(), strict=True):
                 felt = without_rounding(sign * p.felt(x, y, moment, about), ROUNDING * p.normal_force)
-                rows.append([k + 1, body, *map(float, felt)])
-        return ["patch", "body", "F_x_N", "F_y_N", "F_z_N", "M_x_Nm", "M_y_Nm", "M_z_Nm"], rows
+                rows.append([k + 1, body, *map(float, felt * UPRIGHT + 0.0)])
+        return ["patch", "body", *(f"F_{axis}_N" for axis in AXES), *(f"M_{axis}_Nm" for axis in AXES)], rows
 
     @property
     def over(self) -> Array:
@@ -97,7 +108,7 @@ class Studied:
         hot = {} if self.hottest is None else {"largest_temperature_C": self.hottest[:n]}
         return {
             "longitudinal_creepage": self.creep[0], "lateral_creepage": self.creep[1], "spin_1_per_m": self.creep[2],
-            "F_x_N": x, "F_y_N": y, "M_z_Nm": turn, "F_x_over_mu_F_N": x / m, "F_y_over_mu_F_N": y / m,
+            **_heads(x, y, turn, m),
             "friction_power_W": self.forces.power * p.speed, "share_sliding": self.forces.sliding, **hot,
         }  # fmt: skip
 
@@ -133,14 +144,25 @@ class Studied:
                 f"mu is the highest coefficient, {self.highest:.4g}; FASTSIM and exact half-spaces know none that "
                 "changes, so that neither stands beside this curve."
             )
-        return [*told, *self._beside_exact(), *self._heated(), *self._worn(), *self.warnings()]
+        return [*told, *self._inclined(), *self._beside_exact(), *self._heated(), *self._worn(), *self.warnings()]
 
     def _felt(self, side: str, name: str) -> str:
         rows = [row for row in self.generalised()[1] if row[1] == "wheel"]
         parts = [row[2:] for row, p in zip(rows, self.patches, strict=True) if p.side == side]
         x, y, z = np.sum(np.array(parts, dtype=float), axis=0)[:3]
-        along, across = ("forward", "backward")[int(x < 0)], ("right", "left")[int(y < 0)]
-        return f"In its pose {name} feels {abs(x):.4g} N {along}, {abs(y):.4g} N to the {across} and {-z:.5g} N upward."
+        along, across = ("forward", "backward")[int(x < 0)], ("right", "left")[int(y > 0)]
+        return f"In its pose {name} feels {abs(x):.4g} N {along}, {abs(y):.4g} N to the {across} and {z:.5g} N upward."
+
+    def _inclined(self) -> list[str]:
+        """Where an inclined rail stands."""
+        y, z = self.track.rail.moved
+        if not (y or z):
+            return []
+        return [
+            f"The rail, inclined by {1e3 * self.case.rail.inclination:.4g} mrad, stands by the point that is highest "
+            f"then: rail.at is of that, which lies {1e3 * abs(y):.4g} mm to the {'field' if y > 0 else 'track'} side "
+            "of the drawn profile's origin."
+        ]
 
     def _heated(self) -> list[str]:
         if self.hottest is None:
@@ -160,7 +182,7 @@ class Studied:
         q, dx = sources(t, speed)
         work = np.stack([strip_depth(s.T, d, 1.0, v) for s, d, v in zip(q, dx, speed, strict=True)])
         patch = np.broadcast_to(np.arange(1, len(work) + 1)[:, None], work.shape)
-        columns = {"patch": patch, "y_m": t.y[..., 0], "width_m": t.area[..., 0] / dx, "work_J_per_m2": work,
+        columns = {"patch": patch, "y_left_m": t.y[..., 0], "width_m": t.area[..., 0] / dx, "work_J_per_m2": work,
                    "depth_m": wear.coefficient * work}  # fmt: skip
         return {name: values.ravel() for name, values in columns.items()}
 
@@ -192,8 +214,8 @@ class Studied:
             return {}
         xi, eta, phi = self.creep[:, e.at]
         x, y = (without_rounding(v, self.held * SETTLED) for v in (e.x, e.y))
-        return {"longitudinal_creepage": xi, "lateral_creepage": eta, "spin_1_per_m": phi, "F_x_N": x, "F_y_N": y,
-                "M_z_Nm": e.moment, "F_x_over_mu_F_N": x / self.held, "F_y_over_mu_F_N": y / self.held}  # fmt: skip
+        given = {"longitudinal_creepage": xi, "lateral_creepage": eta, "spin_1_per_m": phi}
+        return given | _heads(x, y, e.moment, self.held)
 
     def warnings(self) -> list[str]:
         """What a person should doubt."""
@@ -318,7 +340,7 @@ def _creep(case: RollingCase, p: Patch | None) -> Array:
 
 def rows_of_patches(found: list[Patch]) -> tuple[list[str], list[list[float | str]]]:
     """Head and a row for each patch, as in patches.csv."""
-    head = ["x_m", "y_m", "z_m", "y_rail_m", "y_wheel_m", "angle_rad", "A_1_per_m", "B_1_per_m", "a_m", "b_m",
+    head = [*(f"{axis}_m" for axis in AXES), "y_rail_profile_m", "y_wheel_profile_m", "falls_to_right_rad", "A_1_per_m", "B_1_per_m", "a_m", "b_m",
             "approach_m", "largest_pressure_Pa", "normal_force_N", "longitudinal_creepage", "lateral_creepage",
             "spin_1_per_m", "speed_m_per_s", "conformal", "side"]  # fmt: skip
-    return head, [[*(float(v) for v in (*p[0], *p[1:-1])), p.side] for p in found]
+    return head, [[*(float(v) for v in (*p[0] * UPRIGHT[:3], *p[1:-1])), p.side] for p in found]
