@@ -250,16 +250,65 @@ def test_the_short_return_is_that_of_the_point_contact() -> None:
 @pytest.mark.parametrize(
     ("wrong", "said"),
     [
-        ({"normal_force": [1e5, -1e5]}, "normal_force: is -100000 in state 1"), ({"a": 0.0}, "a: is 0 in"),
+        ({"normal_force": [1e5, -1e5]}, "normal_force: is -100000 in state 1"), ({"a": 0.0}, "a: is 0;"),
         ({"friction": -0.3}, "friction: is -0.3"), ({"poisson": 0.7}, "it must be 0 to 0.5"),
         ({"shear": np.nan}, "shear: is nan"), ({"xi": np.inf}, "xi: is inf"), ({"spin": "none"}, "'kalker' or 'book'"),
-        ({"elements": (0, 20)}, "two whole numbers"), ({"elements": 20}, "two whole numbers"),
+        ({"elements": (0, 20)}, "elements: is .* whole numbers"), ({"elements": 20}, "elements: is .* whole numbers"),
     ],
 )  # fmt: skip
 def test_states_that_are_none_are_refused(wrong: dict, said: str) -> None:
     for model in (ms.creep_forces, ms.tractions):
         with pytest.raises(UserError, match=said):
             model(**{"xi": 1e-3, "eta": 0.0, "phi": 0.1, **PATCH, **wrong})
+
+
+TRACK = {"wheel": ms.circle(0.5), "rail": ms.circle(0.3), "radius": 0.46, "wheel_at": 0.75, "rail_at": 0.75}
+STATE = {"xi": 1e-3, "eta": 0.0, "phi": 0.0, **PATCH}
+COLD = {k: v for k, v in STATE.items() if k != "friction"}
+NOT_ROLLING = {
+    "fastsim": [{**STATE, key: v} for key, v in (
+        ("friction", -0.3), ("friction", np.nan), ("xi", np.inf), ("a", 0.0), ("poisson", 0.7), ("phi", "x"),
+        ("elements", (1, 4)), ("elements", 20), ("cover", 0.5), ("bound", "flat"), ("xi", [1e-3, 2e-3]))],
+    "creep_forces": [{**STATE, key: v} for key, v in (
+        ("eta", "x"), ("eta", []), ("a", None), ("elements", "ab"), ("elements", (20.5, 20)), ("spin", "none"))]
+    + [{**STATE, "xi": [1e-3, 2e-3], "eta": [0.0] * 3}],
+    "creep_coefficients": [
+        {"ratio": r, "poisson": nu, "source": s}
+        for r, nu, s in ((-1, NU, "table"), (1, 0.7, "table"), (np.nan, NU, "table"), (1, NU, "none"),
+                         (0, NU, "book"))],
+    "ellipses": [{"A": 1.0, "B": 1.0, "force": 1e4, "modulus": 1e11, key: v} for key, v in (
+        ("A", -1), ("B", np.nan), ("force", -1.0), ("modulus", 0.0), ("A", "x"))],
+    "forces_by_characteristic": [{**COLD, "friction": Coulomb(MU), "speed": 20.0, key: v} for key, v in (
+        ("speed", 0.0), ("xi", np.nan), ("poisson", 0.7), ("friction", 0.3), ("distribution", "none"),
+        ("surface", 3))],
+    "circle": [{"radius": np.nan}, {"radius": "x"}, {"radius": 0.3, "width": -1.0}],
+    "Track": [{**TRACK, "elastic": ELASTIC, key: v} for key, v in (
+        ("radius", -0.46), ("rail_at", np.nan), ("wheel", 3), ("elastic", 3))],
+    "patches": [
+        {"track": Track(**TRACK, elastic=ELASTIC), "pose": ms.Pose(), "side": "right", "vertical": 1e5, key: v}
+        for key, v in (("side", "up"), ("vertical", -1.0), ("vertical", "x"), ("friction", -0.3), ("pose", 3),
+                       ("pose", ms.Pose(lateral=np.nan)), ("pose", ms.Pose(speed=0.0)))],
+    "contact_table": [{"track": None, "load": 1e5, "lateral": 4e-3, "yaw": 0.01, key: v} for key, v in (
+        ("load", np.nan), ("yaw", -1.0), ("points", 3), ("points", (2, 2)), ("checked", 0))],
+    "creep_table": [{"poisson": NU, key: v} for key, v in (
+        ("poisson", 0.7), ("points", 4), ("elements", (1, 1)), ("coefficients", "none"), ("checked", 0))],
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", NOT_ROLLING)
+def test_arguments_that_are_none_are_refused_by_their_name(name: str) -> None:
+    for wrong in NOT_ROLLING[name]:
+        with pytest.raises(UserError):
+            getattr(ms, name)(**wrong)
+
+
+def test_a_read_table_refuses_what_is_no_state() -> None:
+    table = ms.creep_table(NU, points=(4,) * 5, elements=(4, 4), checked=1)
+    state = {k: v for k, v in STATE.items() if k != "poisson"}
+    for key, v in (("friction", -0.3), ("xi", np.nan), ("normal_force", -1.0), ("shear", "x"), ("a", 0.0)):
+        with pytest.raises(UserError, match=key):
+            table.forces(**{**state, key: v})
+    assert np.isfinite(table.forces(**{**state, "friction": 0.0})).all()
 
 
 def test_all_of_a_patch_slides_and_not_more() -> None:
@@ -434,7 +483,7 @@ def test_two_patches_share_the_vertical_force_by_their_stiffness() -> None:
 
 @pytest.fixture(scope="module")
 def contacts() -> ContactTable:
-    return ms.contact_table(track(), 1e5, 4e-3, 0.02, points=(6, 2), checked=6)
+    return ms.contact_table(track(), 1e5, 4e-3, 0.02, points=(6, 2), checked=2)
 
 
 def test_a_table_of_contacts_is_the_axle_between_its_poses(contacts: ContactTable, tmp_path: Path) -> None:
@@ -451,7 +500,7 @@ def test_a_table_of_contacts_is_the_axle_between_its_poses(contacts: ContactTabl
         felt = p.felt(f.x[0], f.y[0], f.moment[0], np.array([0.0, *p.axle]))
         np.testing.assert_allclose(read.felt[0, k, :3], felt[:3], atol=1e-4 * MU * 1e5)
         np.testing.assert_allclose(read.felt[0, k, 3:], felt[3:], atol=1e-4 * MU * 1e5)
-    assert (table.error[3, 2], table.checked, table.jumping) < (1e-3, 12, 1e-9)
+    assert (table.error[3, 2], table.checked, table.jumping) < (1e-3, 4, 1e-9)
 
 
 def test_a_table_of_contacts_is_read_for_other_loads_and_creepages(contacts: ContactTable) -> None:
@@ -487,7 +536,7 @@ def test_jumps_are_flagged_and_not_read_across() -> None:
     y = np.linspace(-0.03, 0.03, 1201)
     z = np.minimum((y - 0.012) ** 2, (y + 0.012) ** 2) / 0.2
     two = track(polynomial([-1.0]), Profile(y, np.minimum(z, 6e-4)))
-    table = ms.contact_table(two, 2e4, 3e-3, 0.01, points=(5, 2), checked=3)
+    table = ms.contact_table(two, 2e4, 3e-3, 0.01, points=(5, 2), checked=1)
     read = table.forces(np.linspace(-3e-3, 3e-3, 25), 0.0, 1.0, MU)
     there = read.patches.normal_force > 0
     assert set(there.sum(axis=-1).ravel()) == {1, 2} and 0 < read.jumps.mean() < 0.5
@@ -558,7 +607,9 @@ def test_a_case_makes_its_curve_pictures_and_page(
     solid = Solid(2.1e11, 0.28)
     f = ms.creep_forces(row["longitudinal_creepage"], row["lateral_creepage"], row["spin_1_per_m"], patch["a_m"],
                         patch["b_m"], patch["normal_force_N"], 0.3, solid.shear, 0.28)  # fmt: skip
-    np.testing.assert_allclose([row["F_x_forward_N"], row["F_y_left_N"], row["M_z_up_Nm"]], [f.x[0], f.y[0], f.moment[0]], rtol=1e-4)
+    np.testing.assert_allclose(
+        [row["F_x_forward_N"], row["F_y_left_N"], row["M_z_up_Nm"]], [f.x[0], f.y[0], f.moment[0]], rtol=1e-4
+    )
     said = capsys.readouterr().out
     assert re.search(r"largest creep force is 1 mu F_N", said)
     assert "data:image/png" in (folder / "rolling.html").read_text()

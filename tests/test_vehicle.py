@@ -407,7 +407,9 @@ def test_wear_by_a_file_is_that_of_the_vehicle_that_wrote_it(
     np.testing.assert_allclose(depth, own, rtol=5e-3)
     assert max(float(r["standard_error_m"]) for r in rows) < 1e-6 * depth.max()
     (row,) = list(csv.DictReader((tmp_path / "build" / "given" / "wear.csv").open()))[1:]
-    assert float(row["total_right_volume_m3"]) == pytest.approx(7e-13 * float(row["total_right_friction_work_J"]), rel=1e-8)
+    assert float(row["total_right_volume_m3"]) == pytest.approx(
+        7e-13 * float(row["total_right_friction_work_J"]), rel=1e-8
+    )
 
 
 def given(folder: Path, columns: dict[str, np.ndarray], *changes: str) -> Given:

@@ -16,7 +16,7 @@ from .plots import COLOURS, empty_figure, plain_axes, save_figure
 from .scene import element_sides
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure, SubFigure
+    from matplotlib.figure import SubFigure
 
 TO_ITS_SIDE = 1e-6
 """Of the wheel's size: points that near to its outermost plane are of its side."""
@@ -25,11 +25,13 @@ TO_ITS_SIDE = 1e-6
 def tyre_picture(found: Studied, path: Path, title: str, wheel: ModalBasis | None = None) -> Path:
     """Four panels, and beside them the wheel of a modal file as it stands, whole and near its patch."""
     figure = empty_figure(9.6 if wheel is None else 13.6, 6.4)
-    panels: Figure | SubFigure = figure
-    if wheel is not None:
-        beside, panels = figure.subfigures(1, 2, width_ratios=(4.2, 9.4))
+    if wheel is None:
+        panels = figure.subplots(2, 2)
+    else:
+        beside, rest = np.ravel(np.asarray(figure.subfigures(1, 2, width_ratios=(4.2, 9.4))))
         _standing(beside, found, wheel)
-    (patch, steady), (one, constants) = panels.subplots(2, 2)
+        panels = rest.subplots(2, 2)
+    patch, steady, one, constants = np.ravel(panels)
     for axes in (patch, steady, one, constants):
         plain_axes(axes)
     r, b = found.row, found.brush
@@ -76,12 +78,12 @@ def _standing(figure: SubFigure, found: Studied, wheel: ModalBasis) -> None:
     flat = np.column_stack([points @ along, -points @ down]) * 1e3
     moved = flat + np.column_stack([group.u_static @ along, -group.u_static @ down]) * 1e3
     size = 1e3 * np.linalg.norm(group.u_static, axis=1)[sides].mean(axis=1)
-    whole, near = figure.subplots(2, 1, height_ratios=(1.5, 1))
+    whole, near = np.asarray(figure.subplots(2, 1, height_ratios=(1.5, 1)))
     for axes in (whole, near):
         plain_axes(axes)
         axes.set_aspect("equal")
-        axes.add_collection(LineCollection(flat[sides], colors="0.75", linewidths=0.6))
-        drawn = LineCollection(moved[sides], array=size, cmap="viridis", linewidths=0.9)
+        axes.add_collection(LineCollection(list(flat[sides]), colors="0.75", linewidths=0.6))
+        drawn = LineCollection(list(moved[sides]), array=size, cmap="viridis", linewidths=0.9)
         axes.add_collection(drawn)
         axes.axhline(moved[:, 1].min(), color="0.2", linewidth=1.2)
         axes.set(xlabel="x in mm, rolling to the right", ylabel="mm")

@@ -73,7 +73,7 @@ class Brush:
             raise UserError("slip, force: must be finite, and the force 0 or more")
         longest = max(1.0, float(self.lengthened(force).max()))
         u, mode = np.zeros(len(self.share) + 2 * self._beyond(longest)), np.zeros(3)
-        out, scale, elements = np.empty(len(slip)), None, ()
+        out, scale, elements = np.empty(len(slip)), -1.0, self._elements(0.0, longest)
         for i, (s, normal) in enumerate(zip(slip, force, strict=True)):
             if (now := float(self.lengthened(normal))) != scale:
                 scale, elements = now, self._elements(now, longest)
@@ -108,9 +108,7 @@ class Brush:
         middle = 0.5 * (edge[1:] + edge[:-1])
         return share, 0.5 * n * np.diff(inside), np.clip(0.5 * n * (middle + scale), 0.0, 1.0)
 
-    def _balanced(
-        self, mode: Array, far: Array, way: Array, limit: Array, spring: Array
-    ) -> tuple[Array, Array]:
+    def _balanced(self, mode: Array, far: Array, way: Array, limit: Array, spring: Array) -> tuple[Array, Array]:
         """Mode (w, its velocity and acceleration) and stretches at the end of a step: Newmark's method, and Newton's on
         the one unknown dw, as the force falls with it piecewise straight."""
         if self.compliance == 0:

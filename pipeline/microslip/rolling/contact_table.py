@@ -21,6 +21,7 @@ from ..files import hdf5
 from ..files.hostile import reading
 from ..files.store import ordinary
 from . import strips
+from .arguments import number, of_kind, wholes
 from .strips import Array
 from .wheelset import Patch, Pose, Track, axle, creepages
 
@@ -141,9 +142,7 @@ class ContactTable(NamedTuple):
         which = np.minimum(np.arange(-(-n // size) * size), n - 1).reshape(-1, size)
         runs = (_rolling(self, *(v[which[run]] for v in (*given, loads))) for run in strips.runs(n, size))
         found = [jax.device_get(run) for run in runs]
-        read = jax.tree.map(
-            lambda *parts: np.concatenate([p.reshape(-1, *p.shape[2:]) for p in parts])[:n], *found
-        )
+        read = jax.tree.map(lambda *parts: np.concatenate([p.reshape(-1, *p.shape[2:]) for p in parts])[:n], *found)
         if not (balanced := np.isfinite(read.patches.normal_force).all(axis=(1, 2))).all():
             i = int(np.argmin(balanced))
             raise UserError(
@@ -168,11 +167,11 @@ def _together(
     added = [np.asarray(v, float) for v in creep]
     added = [v if v.ndim > 1 else np.atleast_1d(v)[:, None] for v in added]
     try:
-        given = strips.broadcast(*pose)
+        given = list(np.broadcast_arrays(*(np.atleast_1d(np.asarray(v, float)) for v in pose)))
         n = np.broadcast_shapes(given[0].shape, *((len(v),) for v in added))[0]
         each = [np.broadcast_to(v, n) for v in given] + [np.broadcast_to(v, (n, 2)) for v in added]
         return each, np.broadcast_to(np.asarray(load, float), (n, 2))
-    except ValueError as error:
+    except (TypeError, ValueError) as error:
         raise UserError(
             f"lateral, yaw, speed, friction, turning, xi, eta, phi, load: shapes do not go together ({error}); give "
             "(n,) of the poses, and (n, 2) of what differs between the left and the right wheel"
@@ -197,42 +196,39 @@ def forces(
     pose = lateral, yaw, 0.5 * (roll[:, 1] - roll[:, 0]), down.mean(axis=1)
     given = pose, speed, turning, friction, (xi, eta, phi), table.shear, table.poisson, weights[-1]
 
-    def lift(log_more: Array) -> Array:
-        return _lift(_rolled(_pressed(patches, jnp.exp(log_more)), *given))
+    def at(more: Array) -> Rolling:
+        return _rolled(_pressed(patches, jnp.where(load > 0, more, 0.0)), *given)
 
-    log_more = _balanced(lift, jnp.maximum(load, EMPTY), jnp.log(jnp.maximum(load, EMPTY) / table.load))
-    return _rolled(_pressed(patches, jnp.where(load > 0, jnp.exp(log_more), 0.0)), *given)
+    return _balanced(at, jnp.maximum(load, EMPTY), load / table.load)
 
 
 def _pressed(p: Patches, more: Array) -> Patches:
     """By normal forces that are so many times (n, 2) as large."""
     more = more[..., None]
     wide = jnp.cbrt(more)
-    return p._replace(
-        a=p.a * wide, b=p.b * wide, pressure=p.pressure * wide, normal_force=p.normal_force * more
-    )
+    return p._replace(a=p.a * wide, b=p.b * wide, pressure=p.pressure * wide, normal_force=p.normal_force * more)
 
 
-def _lift(r: Rolling) -> Array:
-    """(n, 2) N, upward, of all forces on a wheel."""
-    return -r.felt[..., 2]
-
-
-def _balanced(lift: Callable[[Array], Array], load: Array, first: Array) -> Array:
-    """x where lift(x) is the load, by secants between logarithms: the lift is nearly proportional to exp(x), as the
-    share of a tangential force in it changes little. NaN where friction takes all the lift away.
+def _balanced(at: Callable[[Array], Rolling], load: Array, first: Array) -> Rolling:
+    """Rolling where the wheels carry the load (n, 2), by secants between the logarithms of the normal forces and of the
+    lift, which are nearly proportional: the share of a tangential force in the lift changes little. NaN where friction
+    takes all the lift away.
 
     Two steps: to 1e-6 of the load in the mean over the benchmark's flange, 2e-4 at most, with mu = 0.3."""
 
-    def step(of: tuple[Array, ...], _: None) -> tuple[tuple[Array, ...], None]:
+    def step(of: tuple[Array, ...], _: None) -> tuple[tuple[Array, ...], Rolling]:
         before, was, x = of
-        more = jnp.log(lift(x) / load)
+        rolling = at(jnp.exp(x))
+        lift = -rolling.felt[..., 2]
+        more = jnp.log(jnp.where(load > EMPTY, lift, load) / load)
         slope = (more - was) / jnp.where(x == before, 1.0, x - before)
         slope = jnp.where(jnp.abs(x - before) > 1e-9, jnp.clip(slope, 0.2, 5.0), 1.0)
-        return (x, more, x - more / slope), None
+        return (x, more, x - more / slope), rolling
 
-    start = first, jnp.zeros_like(first), first
-    return jax.lax.scan(step, start, None, length=SECANTS)[0][-1]
+    begun = jnp.log(jnp.maximum(first, EMPTY))
+    start = begun, jnp.zeros_like(begun), begun
+    steps = jax.lax.scan(step, start, None, length=SECANTS + 1)[1]
+    return Rolling(*jax.tree.map(lambda v: v[-1], tuple(steps)))
 
 
 SECANTS = 2
@@ -261,8 +257,8 @@ def _rolled(
     p = p._replace(ahead=p.ahead * jnp.sin(yaw))
     along = p.ahead * jnp.cos(yaw) + (p.y - lateral) * jnp.sin(yaw)
     there, radius = p.normal_force > 0, jnp.where(p.radius > 0, p.radius, 1.0)  # 0 of none
-    *creep, V = creepages(speed, turning, radius, along, yaw, roll, p.angle, jnp)
-    xi, eta, phi = (v + added for v, added in zip(creep, each[5:], strict=True))
+    *rigid, V = creepages(speed, turning, radius, along, yaw, roll, p.angle, jnp)
+    xi, eta, phi = (v + added for v, added in zip(rigid, each[5:], strict=True))
     of = xi, eta, phi, *(jnp.where(there, v, 1e-3) for v in (p.a, p.b)), jnp.maximum(p.normal_force, EMPTY)
     flat = [jnp.broadcast_to(v, p.a.shape).ravel() for v in (*of, friction[:, None, None], shear, poisson)]
     creep = strips.forces(strips.poses(*flat))
@@ -319,12 +315,11 @@ def contact_table(
     Raises:
         UserError: a pose in which the profiles do not touch, or touch where one ends; numbers that are none.
     """
-    sizes = (load, lateral, yaw)
-    if not (min(sizes) > 0 and np.isfinite(sizes).all() and points[0] >= 4 and points[1] >= 2 and checked >= 1):
-        raise UserError(
-            "load, lateral, yaw: must be positive; points: four or more of the shift, two of the yaw; checked: one or "
-            "more"
-        )
+    wholes("points", points, (4, 2))
+    for name, value in {"load": load, "checked": checked}.items():
+        number(name, value)
+    if not min(number("lateral", lateral), number("yaw", yaw)) > 0:
+        raise UserError(f"lateral, yaw: reach to {lateral:g} m and {yaw:g} rad to either side; both must be positive")
     shifts, turns = np.linspace(0.0, lateral, points[0]), yaw * np.sqrt(np.linspace(0.0, 1.0, points[1]))
     turns[0] = LEAST * yaw
     p, roll, down = _found(track, load, np.tile(shifts, points[1]), np.repeat(turns, points[0]), report=report)
@@ -430,6 +425,7 @@ FORMAT = "microslip-contact-table-1"
 
 def write_contact_table(path: Path, table: ContactTable) -> Path:
     """As HDF5: a dataset an attribute, those of its patches in a group; complete or not at all."""
+    of_kind(ContactTable, table=table)
     with hdf5.sealed(path) as file:
         file.attrs.update(format=FORMAT, meaning=str(ContactTable.__doc__), patches=str(Patches.__doc__),
                           missed=", ".join(MISSED))  # fmt: skip
@@ -446,6 +442,7 @@ def read_contact_table(path: Path | str) -> ContactTable:
     Raises:
         UserError: another file.
     """
+    of_kind(str | Path, path=path)
     with reading(ordinary(Path(path)), FORMAT, "", "write a table of contacts with [contacts] in a case") as file:
         patches = Patches(*(file["patches"][name][()] for name in Patches._fields))
         rest = {name: file[name][()] for name in ContactTable._fields if name != "patches"}

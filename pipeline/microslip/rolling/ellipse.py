@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from ..contact.hertz import axis_ratio, ellipse_integrals
 from ..contact.solids import Solid, normal_modulus
 from ..data import Array
+from .arguments import number
 
 
 class Elastic(NamedTuple):
@@ -64,8 +65,13 @@ def ellipses(A: ArrayLike, B: ArrayLike, force: ArrayLike, modulus: float) -> El
     Args:
         A, B: half relative curvatures along and across rolling, 1/m: the gap is A x^2 + B y^2. Either may be the larger
             one. force: N, not negative. modulus: E*, Pa.
+
+    Raises:
+        UserError: other numbers.
     """
-    A, B, F = np.broadcast_arrays(*(np.asarray(v, dtype=float) for v in (A, B, force)))
+    number("modulus", modulus)
+    given = {"A": A, "B": B, "force": force}
+    A, B, F = np.broadcast_arrays(*(number(name, v) for name, v in given.items()))
     low, high = np.minimum(A, B), np.maximum(A, B)
     g = axis_ratio(low / high)
     K, D, _ = ellipse_integrals(g)

@@ -11,8 +11,10 @@ from typing import Literal
 import numpy as np
 
 from ..data import Array
+from ..errors import UserError
+from .arguments import grid_of, number, words
 from .kalker import creep_coefficients
-from .strips import Forces, Tractions, blended
+from .strips import Forces, Tractions, blended, states
 
 Bound = Literal["parabolic", "elliptic"]
 
@@ -33,7 +35,16 @@ def fastsim(
     Args:
         elements: (nx, ny) over ``cover`` times the ellipse; one counts when its middle lies inside. bound: of the
             pressure that friction is taken from. blend: see `strips.blended`.
+
+    Raises:
+        UserError: a value or a word that no state of rolling has.
     """
+    given = states(xi, eta, phi, a, b, normal_force, friction, shear, poisson)
+    if len(given[0]) > 1:
+        raise UserError("xi, eta, phi, ...: fastsim is of one state; call it for each")
+    xi, eta, phi, a, b, normal_force, friction, shear, poisson = (float(v[0]) for v in given)
+    elements, cover = grid_of(elements), float(number("cover", cover))
+    words(bound=(bound, Bound))
     L = flexibilities(a, b, shear, poisson)
     if blend:
         L = np.asarray(blended(L, np.array([xi, eta, phi]), a, b, friction * normal_force))

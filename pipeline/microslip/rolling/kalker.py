@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..contact.law import Array
+from .arguments import number, words
 
 Coefficients = Literal["table", "book"]
 
@@ -56,7 +57,6 @@ LEAST = 0.1
 """g below which Kalker's asymptotes are used."""
 
 
-@partial(jax.jit, static_argnames="source")
 def creep_coefficients(ratio: ArrayLike, poisson: ArrayLike, source: Coefficients = "table") -> Array:
     """(4, ...) C11, C22, C23, C33.
 
@@ -66,7 +66,17 @@ def creep_coefficients(ratio: ArrayLike, poisson: ArrayLike, source: Coefficient
 
     Args:
         ratio: a/b, a along rolling. poisson: nu of both bodies combined (`combined`), 0 to 0.5.
+
+    Raises:
+        UserError: a ratio that is not positive, another Poisson's ratio, another source.
     """
+    words(source=(source, Coefficients))
+    return coefficients_at(number("ratio", ratio), number("poisson", poisson), source)
+
+
+@partial(jax.jit, static_argnames="source")
+def coefficients_at(ratio: ArrayLike, poisson: ArrayLike, source: Coefficients = "table") -> Array:
+    """`creep_coefficients` as a pure function of jax."""
     s, nu = jnp.broadcast_arrays(jnp.asarray(ratio, dtype=float), jnp.asarray(poisson, dtype=float))
     g = jnp.minimum(s, 1 / s)
     found = jnp.where(g < LEAST, _asymptotes(s, nu), _between(s, jnp.maximum(g, LEAST), nu))

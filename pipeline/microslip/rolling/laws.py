@@ -18,8 +18,23 @@ from ..contact.hertz import ellipse_integrals
 from ..contact.law import program, settings
 from ..contact.normal import Normal, Preload, Rough
 from ..contact.point import PointContact
+from ..errors import UserError
+from .arguments import broadcast, of_kind
 from .kalker import Coefficients
-from .strips import Array, Distribution, Forces, Grid, Poses, Spin, Tractions, broadcast, grid, over_elements, posed
+from .strips import (
+    NAMES,
+    Array,
+    Distribution,
+    Forces,
+    Grid,
+    Poses,
+    Spin,
+    Tractions,
+    grid,
+    known,
+    over_elements,
+    posed,
+)
 
 
 @settings
@@ -170,7 +185,8 @@ def rolled_by_characteristic(
             left, all of it if not given. surface: rough elements carry the same force together, by the share of their
             area that touches, deeper pressed in; the ellipse stays.
     """
-    *state, V = broadcast(*given, speed)
+    named = dict(zip(NAMES[:6] + NAMES[7:], given, strict=True))
+    *state, V = broadcast(**named, speed=speed)
     highest = np.full_like(V, np.max(friction.highest(jnp.ones(1))))
     of = (*state[:6], highest, *state[6:])
     pose = posed(*of, elements=elements, distribution=distribution, **how)  # type: ignore[misc]
@@ -194,7 +210,14 @@ def forces_by_characteristic(
     Args:
         friction: a characteristic of `contact.friction`. speed: of rolling, m/s. surface: `Surface` of both bodies'
             heights and R_Z. The rest as there.
+
+    Raises:
+        UserError: see there; friction that is no characteristic.
     """
+    if not isinstance(friction, Friction):
+        raise UserError(f"friction: is {friction!r}; give a characteristic of contact.friction, Coulomb(0.3) say")
+    elements = known(elements, distribution, coefficients, spin)
+    of_kind(Surface | None, surface=surface)
     given = xi, eta, phi, a, b, normal_force, shear, poisson
     how: dict[str, Any] = {"coefficients": coefficients, "spin": spin, "surface": surface}
     return rolled_by_characteristic(

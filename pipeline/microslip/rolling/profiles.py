@@ -21,6 +21,7 @@ from ..data import Array
 from ..errors import UserError
 from ..files import store
 from ..settings.mistakes import is_number
+from .arguments import number, words
 
 WIDTH = 0.07
 """m, of profiles that are given by a formula."""
@@ -95,8 +96,9 @@ def circle(radius: float, width: float = WIDTH) -> Profile:
     """An arc that falls to both sides of the origin, as a convex rail or a hollow wheel; a negative radius rises, m.
 
     Raises:
-        UserError: an arc as wide as its circle.
+        UserError: an arc as wide as its circle; numbers that are none.
     """
+    number("profile", radius), number("width", width)
     if not has_arc(radius, width):
         raise UserError(f"profile: a radius of {radius:g} m has no arc {width:g} m wide; correct one of them")
     y = np.linspace(-0.5 * width, 0.5 * width, 401)
@@ -121,9 +123,14 @@ def read_profile(
             of MiniProf do not tell. between: y that are kept, m, after that.
 
     Raises:
-        UserError: no file, no numbers; points that turn back or of another unit.
+        UserError: no file, no numbers; points that turn back or of another unit; arguments that are none.
     """
-    path = Path(path)
+    if not isinstance(path, str | Path):
+        raise UserError(f"path: is {path!r}; give that of a file")
+    path, noise, unit = Path(path), float(number("noise", noise)), float(number("unit", unit))
+    words(mirror=(mirror, Mirror))
+    if np.shape(between) != (2,) or not between[0] < between[1]:
+        raise UserError(f"between: is {between!r}; give two y, m, the lower one first")
     try:
         lines = store.ordinary(path).read_text(encoding="utf-8-sig").splitlines()
     except (OSError, UnicodeDecodeError) as error:
@@ -178,8 +185,8 @@ def _table(lines: list[str], path: Path) -> list[list[str]]:
         return rows
     wide = max(rows, key=len, default=head)
     raise UserError(
-        f"{path}: has {len(wide)} columns ({' '.join(head or wide)}); a profile is a table of y and z, so leave out the "
-        "others, or name y and z in its first line"
+        f"{path}: has {len(wide)} columns ({' '.join(head or wide)}); a profile is a table of y and z, so leave out "
+        "the others, or name y and z in its first line"
     )
 
 

@@ -89,9 +89,7 @@ def rolled(
     return States(forces, np.concatenate(hottest) if hottest else None, held)
 
 
-def drag(
-    track: Track, friction: Friction, heat: Heat | None, surface: Surface | None, **how: Any
-) -> Drag:
+def drag(track: Track, friction: Friction, heat: Heat | None, surface: Surface | None, **how: Any) -> Drag:
     """Of patches, as `rolled` has it, for the vertical balance of `wheelset.patches`."""
     warm = heat if heat is not None and heat.limit is not None else None
 

@@ -149,8 +149,8 @@ class Studied:
         return columns
 
     def loads(self) -> dict[str, Array]:
-        """Of the table of load jumps at the slip shown: length of the patch after, m, force before and after, N, and time
-        constants, s."""
+        """Of the table of load jumps at the slip shown: length of the patch after, m, force before and after, N, and
+        time constants, s."""
         b, s = self.brush, self.case.jumps.shown
         rows = []
         for share in self.case.jumps.loads:

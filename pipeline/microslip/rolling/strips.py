@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cache, partial
-from typing import Any, Literal, NamedTuple, get_args
+from typing import Any, Literal, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -19,8 +19,8 @@ from numpy.typing import ArrayLike
 
 from ..contact.law import program
 from ..contact.point import opposed
-from ..errors import UserError
-from .kalker import Coefficients, creep_coefficients
+from .arguments import TINY, broadcast, grid_of, words
+from .kalker import Coefficients, coefficients_at
 
 Array = Any
 """Of numpy; of jax in what is traced."""
@@ -95,7 +95,8 @@ class Grid:
         y, width: (ny,) of the strips over b, at Gauss' points, so that what does not slip is integrated exactly.
         chord: (ny,) x_A/a (6.4-28). x: (nx,) middles over x_A. way: (nx,) from middle to middle over the length of an
             element; the first begins at the edge. pressure, stiffness: (nx,) means over the element of what (6.4-29),
-            (6.4-33) and (6.4-39), (6.4-42) distribute, of stiffness weighted by 1 - x. powers: of the chord by which both grow from strip to strip.
+            (6.4-33) and (6.4-39), (6.4-42) distribute, of stiffness weighted by 1 - x. powers: of the chord by which
+            both grow from strip to strip.
             pressed, sprung, spun: sums that make the force F_N and, without slip, C G a b s (6.4-25) and C23 G c^3 phi.
     """
 
@@ -232,7 +233,6 @@ def blended(L: Array, creep: Array, a: Array, b: Array, held: Array) -> Array:
     return (1 - w) * L + w * one
 
 
-TINY = 1e-300
 SLIPPERY = 1e-12
 """What stands for no friction: the march divides by what is held."""
 
@@ -244,7 +244,7 @@ def poses(
 ) -> Poses:  # fmt: skip
     """What `forces` takes, from what `creep_forces` takes, arrays (n,): as pure."""
     friction = jnp.maximum(friction, SLIPPERY)
-    G, g = creep_coefficients(a / b, poisson, coefficients)[:3] * shear, grid(elements, distribution)
+    G, g = coefficients_at(a / b, poisson, coefficients)[:3] * shear, grid(elements, distribution)
     if spin == "book":
         return Poses(xi, eta, phi, phi, a, b, normal_force, friction, G[0], G[1])
     turned = 2 * jnp.sqrt(b / a) * G[2] * g.sprung / g.spun  # stiffness against the spin, of the form of G[0] and G[1]
@@ -295,8 +295,8 @@ def creep_forces(
     Raises:
         UserError: a value or a word that no state of rolling has.
     """
-    elements = _known(elements, distribution, coefficients, spin)
-    given = _states(xi, eta, phi, a, b, normal_force, friction, shear, poisson)
+    elements = known(elements, distribution, coefficients, spin)
+    given = states(xi, eta, phi, a, b, normal_force, friction, shear, poisson)
     n = len(given[0])
     filled = [np.concatenate([v, np.repeat(v[-1:], -n % BLOCK)]).reshape(-1, BLOCK) for v in given]
     how = {"elements": elements, "distribution": distribution, "coefficients": coefficients, "spin": spin}
@@ -304,36 +304,22 @@ def creep_forces(
     return Forces(*(np.concatenate([np.asarray(p[k]).ravel() for p in parts])[:n] for k in range(5)))
 
 
-def broadcast(*given: ArrayLike) -> list[np.ndarray]:
-    return list(np.broadcast_arrays(*(np.atleast_1d(np.asarray(v, float)) for v in given)))
+NAMES = "xi", "eta", "phi", "a", "b", "normal_force", "friction", "shear", "poisson"
 
 
-BOUNDS = {
-    "xi": (-np.inf, np.inf, "finite"), "eta": (-np.inf, np.inf, "finite"), "phi": (-np.inf, np.inf, "finite"),
-    "a": (TINY, np.inf, "positive"), "b": (TINY, np.inf, "positive"), "normal_force": (TINY, np.inf, "positive"),
-    "friction": (0.0, np.inf, "0 or more"), "shear": (TINY, np.inf, "positive"), "poisson": (0.0, 0.5, "0 to 0.5"),
-}  # fmt: skip
-"""Least and most of what `creep_forces` takes."""
+def states(*given: ArrayLike) -> list[Array]:
+    """Arrays (n,) of what `creep_forces` takes; see `arguments.broadcast`."""
+    return broadcast(**dict(zip(NAMES, given, strict=True)))
 
 
-def _states(*given: ArrayLike) -> list[np.ndarray]:
-    filled = broadcast(*given)
-    for v, (name, (least, most, must)) in zip(filled, BOUNDS.items(), strict=True):
-        good = np.isfinite(v) & (v >= least) & (v <= most)
-        if not good.all():
-            i = int(np.argmin(good))
-            raise UserError(f"{name}: is {v[i]:g} in state {i}; it must be {must}")
-    return filled
+def known(elements: Any, distribution: str, coefficients: str, spin: str) -> tuple[int, int]:
+    """Elements of a model whose words are known.
 
-
-def _known(elements: Any, distribution: str, coefficients: str, spin: str) -> tuple[int, int]:
-    given = {"distribution": (distribution, Distribution), "coefficients": (coefficients, Coefficients)}
-    for name, (word, words) in {**given, "spin": (spin, Spin)}.items():
-        if word not in get_args(words):
-            raise UserError(f"{name}: is {word!r}; give {' or '.join(map(repr, get_args(words)))}")
-    if np.shape(elements) != (2,) or min(elements) < 2 or any(n != int(n) for n in elements):
-        raise UserError(f"elements: is {elements}; give two whole numbers of 2 or more, along and across")
-    return int(elements[0]), int(elements[1])
+    Raises:
+        UserError: others.
+    """
+    words(distribution=(distribution, Distribution), coefficients=(coefficients, Coefficients), spin=(spin, Spin))
+    return grid_of(elements)
 
 
 def tractions(
@@ -346,8 +332,8 @@ def tractions(
     The slip is s_M - u' with the slope of u through the neighbours, so that friction takes as much power as the
     creepages give (errata to (6.5-16)).
     """
-    elements = _known(elements, distribution, coefficients, spin)
-    given = _states(xi, eta, phi, a, b, normal_force, friction, shear, poisson)
+    elements = known(elements, distribution, coefficients, spin)
+    given = states(xi, eta, phi, a, b, normal_force, friction, shear, poisson)
     how = {"coefficients": coefficients, "spin": spin}
     pose = Poses(*map(np.asarray, posed(*given, elements=elements, distribution=distribution, **how)))  # type: ignore
     return over_elements(pose, grid(elements, distribution), *_marched(pose, elements, distribution))

@@ -340,7 +340,8 @@ def _creep(case: RollingCase, p: Patch | None) -> Array:
 
 def rows_of_patches(found: list[Patch]) -> tuple[list[str], list[list[float | str]]]:
     """Head and a row for each patch, as in patches.csv."""
-    head = [*(f"{axis}_m" for axis in AXES), "y_rail_profile_m", "y_wheel_profile_m", "falls_to_right_rad", "A_1_per_m", "B_1_per_m", "a_m", "b_m",
-            "approach_m", "largest_pressure_Pa", "normal_force_N", "longitudinal_creepage", "lateral_creepage",
-            "spin_1_per_m", "speed_m_per_s", "conformal", "side"]  # fmt: skip
+    head = [*(f"{axis}_m" for axis in AXES), "y_rail_profile_m", "y_wheel_profile_m", "falls_to_right_rad",
+            "A_1_per_m", "B_1_per_m", "a_m", "b_m", "approach_m", "largest_pressure_Pa", "normal_force_N",
+            "longitudinal_creepage", "lateral_creepage", "spin_1_per_m", "speed_m_per_s", "conformal",
+            "side"]  # fmt: skip
     return head, [[*(float(v) for v in (*p[0] * UPRIGHT[:3], *p[1:-1])), p.side] for p in found]

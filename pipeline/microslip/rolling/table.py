@@ -22,8 +22,9 @@ from ..errors import UserError
 from ..files import hdf5
 from ..files.hostile import reading
 from ..files.store import ordinary
+from .arguments import joined, number, of_kind, wholes
 from .kalker import Coefficients, creep_coefficients
-from .strips import BLOCK, Distribution, Forces, Poses, creep_forces, forces, grid, posed
+from .strips import BLOCK, SLIPPERY, Distribution, Forces, Poses, creep_forces, forces, grid, known, posed
 
 POINTS = (19, 36, 33, 39, 13)
 """Of the size of the pull below and above 1/2, its azimuth, its polar angle, a/b."""
@@ -87,16 +88,18 @@ class CreepTable:
         """(3, ...) F_x, F_y in N, M_z in N m, of what `strips.creep_forces` takes.
 
         Raises:
-            UserError: a/b beyond the table.
+            UserError: a/b beyond the table; a value that no state of rolling has.
         """
-        given = (np.asarray(v, dtype=float) for v in (xi, eta, phi, a, b, np.multiply(friction, normal_force)))
-        x, y, turn, a, b, held = np.broadcast_arrays(*given)
+        given = {"xi": xi, "eta": eta, "phi": phi, "a": a, "b": b, "normal_force": normal_force, "friction": friction,
+                 "shear": shear}  # fmt: skip
+        x, y, turn, a, b, normal, mu, G = joined(**given)
+        held = np.maximum(mu, SLIPPERY) * normal
         ratio, c = a / b, np.sqrt(a * b)
         least, most = self.ratio[0] * (1 - 1e-9), self.ratio[-1] * (1 + 1e-9)
         if not ((ratio >= least) & (ratio <= most)).all():
             worst = float(ratio.ravel()[np.argmax(np.abs(np.log(ratio)))])
             raise UserError(f"a, b: a/b is {worst:.4g}, and the table goes from {least:.4g} to {most:.4g}")
-        p = Poses(*map(np.asarray, posed(x, y, turn, a, b, held, np.ones_like(a), shear, self.poisson, **self.how)))
+        p = Poses(*map(np.asarray, posed(x, y, turn, a, b, held, np.ones_like(a), G, self.poisson, **self.how)))
         stiff = p.stiffness_x * c**2 / held
         at, signs = placed(np.stack([x, p.eta * p.stiffness_y / p.stiffness_x, c * p.phi_x]) * stiff, ratio)
         at = np.stack([*at, np.log(ratio), np.log(p.stiffness_y / p.stiffness_x)]).reshape(5, -1)
@@ -204,10 +207,11 @@ def creep_table(
             rest as `strips.creep_forces`.
 
     Raises:
-        UserError: fewer than four points on an axis.
+        UserError: fewer than four points on an axis, as cubics need them; what is none of a table.
     """
-    if min(points) < 4:
-        raise UserError("points: cubics need four or more on each axis of a table; give five numbers")
+    wholes("points", points, (4,) * 5)
+    elements = known(elements, distribution, coefficients, "kalker")
+    number("poisson", poisson), number("checked", checked)
     closely = np.geomspace(1 / WIDEST, WIDEST, 801)
     c = np.asarray(creep_coefficients(closely, poisson, coefficients))
     springs = np.log(c[1] / c[0])  # of the blended ones as well, which are nearer to each other
@@ -245,6 +249,7 @@ AXES = ("size", "azimuth", "polar", "ratio", "springs")
 
 def write_creep_table(path: Path, table: CreepTable) -> Path:
     """As HDF5: a dataset an axis, ``kalker``, ``values`` in whole steps and ``error``; complete or not at all."""
+    of_kind(CreepTable, table=table)
     step = np.abs(table.values).max() / FINEST
     g = grid(tuple(table.how["elements"]), table.how["distribution"])
     with hdf5.sealed(path) as file:

@@ -157,10 +157,7 @@ def _run(case: RollingCase, track: Track, friction: Friction, surface: Surface |
     given, speed = states(track, found)
     t = rolled(given, friction, speed, np.arange(len(found)), heat, surface, **how).tractions
     q, dx = sources(t, speed)
-    return [
-        Strips(p, t.area[i, :, 0] / dx[i], strip_depth(q[i].T, dx[i], 1.0, speed[i]))
-        for i, p in enumerate(found)
-    ]
+    return [Strips(p, t.area[i, :, 0] / dx[i], strip_depth(q[i].T, dx[i], 1.0, speed[i])) for i, p in enumerate(found)]
 
 
 def _worn(body: Body, runs: list[Strips], coefficient: float, side: str) -> Body:

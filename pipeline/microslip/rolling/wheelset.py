@@ -17,6 +17,7 @@ from scipy.optimize import brentq
 
 from ..data import Array
 from ..errors import UserError
+from .arguments import number, of_kind
 from .ellipse import Elastic, ellipses, half_width
 from .profiles import Profile
 from .strips import creep_forces
@@ -38,6 +39,17 @@ class Track:
     wheel_at: float
     rail_at: float
     elastic: Elastic
+
+    def __post_init__(self) -> None:
+        """Raises:
+        UserError: numbers that no track has.
+        """
+        for name in ("radius", "wheel_at", "rail_at"):
+            number(name, getattr(self, name))
+        of_kind(Profile, wheel=self.wheel, rail=self.rail)
+        of_kind(Elastic, elastic=self.elastic)
+        for name, value in self.elastic._asdict().items():
+            number(name, value)
 
 
 @dataclass(frozen=True)
@@ -113,9 +125,7 @@ Drag = Callable[[list[Patch]], Array]
 """Patches -> (k,) tangential force of each across rolling, on the wheel, in the axes of `Patch`, N."""
 
 
-def patches(
-    track: Track, pose: Pose, side: str, vertical: float, friction: float | Drag = 0.0
-) -> list[Patch]:
+def patches(track: Track, pose: Pose, side: str, vertical: float, friction: float | Drag = 0.0) -> list[Patch]:
     """Contacts of one wheel under a vertical force, the one with the largest normal force first; none if it is 0.
 
     Args:
@@ -187,17 +197,10 @@ def _seen(pose: Pose, side: str) -> Pose:
 
 def _sound(pose: Pose, vertical: float, friction: float | Drag) -> None:
     """Refuse numbers that no wheelset has."""
-    turning = 1.0 if pose.turning is None else pose.turning
-    if not np.isfinite([pose.lateral, pose.yaw, pose.roll, pose.speed, turning]).all():
-        raise UserError(f"pose: {pose} is not finite; give numbers")
-    if not (pose.speed > 0 and turning >= 0):
-        raise UserError(
-            f"pose: speed {pose.speed:g} m/s, turning {turning:g} rad/s; the axle moves forward and turns that way"
-        )
-    if not 0 <= vertical < np.inf:
-        raise UserError(f"vertical: is {vertical:g} N; a wheel can only be pressed, give 0 or more")
-    if not callable(friction) and not 0 <= friction < np.inf:
-        raise UserError(f"friction: is {friction:g}; give a coefficient of 0 or more")
+    of_kind(Pose, pose=pose)
+    for name, value in {**vars(pose), "vertical": vertical, "friction": friction}.items():
+        if not (value is None or callable(value)):
+            number(name, value)
 
 
 def _drag(track: Track, friction: float | Drag) -> Drag:
@@ -209,8 +212,8 @@ def _drag(track: Track, friction: float | Drag) -> Drag:
 
 
 def _by_strips(track: Track, found: list[Patch], friction: float) -> Array:
-    *state, shear, poisson = states(track, found)[0]
-    return creep_forces(*state, friction, shear, poisson).y
+    xi, eta, phi, a, b, force, shear, poisson = states(track, found)[0]
+    return creep_forces(xi, eta, phi, a, b, force, friction, shear, poisson).y
 
 
 def states(track: Track, found: list[Patch]) -> tuple[Array, Array]:
@@ -229,9 +232,7 @@ class _Carried(NamedTuple):
     load: float
 
 
-def _carried(
-    track: Track, pose: Pose, sides: tuple[str, ...], vertical: float, drag: Drag, near: float
-) -> _Carried:
+def _carried(track: Track, pose: Pose, sides: tuple[str, ...], vertical: float, drag: Drag, near: float) -> _Carried:
     """At the height at which normal and tangential forces carry a force (N) together.
 
     What the normal ones carry of it is found by secants between logarithms, from a value nearby (N): their share hardly
@@ -460,9 +461,7 @@ def _patch(track: Track, pose: Pose, gap: Gap, p: Pressed, left: bool, axle: Arr
     turning = pose.speed / track.radius if pose.turning is None else pose.turning
     r = track.radius + float(track.wheel.height(y_w))
     along = x * np.cos(pose.yaw) + (y - pose.lateral) * np.sin(pose.yaw)
-    xi, eta, phi, V = map(
-        float, creepages(pose.speed, turning, r, along, pose.yaw, pose.roll, p.angle)
-    )
+    xi, eta, phi, V = map(float, creepages(pose.speed, turning, r, along, pose.yaw, pose.roll, p.angle))
     sign = -1.0 if left else 1.0
     place = np.array([x, sign * y, z])
     conformal = p.B < CONFORMAL * p.A or p.b > track.radius * 0.1 or p.b * 2 * max(p.B, 0) > 0.3

@@ -9,7 +9,7 @@ import jax.numpy as jnp
 from jax import lax
 
 from ..rolling import strips
-from ..rolling.kalker import creep_coefficients
+from ..rolling.kalker import coefficients_at
 from ..rolling.table import CreepTable, cubic, placed
 
 Array = Any
@@ -21,7 +21,7 @@ def linear(
     xi: Array, eta: Array, phi: Array, a: Array, b: Array, force: Array, friction: Array, shear: Array, poisson: Array
 ) -> tuple[Array, Array, Array]:  # fmt: skip
     """Kalker's, without slip: no friction is large enough."""
-    c11, c22, c23, c33 = creep_coefficients(a / b, poisson) * shear
+    c11, c22, c23, c33 = coefficients_at(a / b, poisson) * shear
     c = jnp.sqrt(a * b)
     y = -(c**2) * c22 * eta - c**3 * c23 * phi
     return -(c**2) * c11 * xi, y, c**3 * c23 * eta - c**4 * c33 * phi
