@@ -154,6 +154,9 @@ class ContactTable(NamedTuple):
     def sentence(self) -> str:
         """What it is worth."""
         place, _, _, creep = self.error
+        if not self.jumping < 1:
+            return (f"All {self.checked} wheels that were looked at between the poses of the table of contacts are near a "
+                    "jump, where the nearest pose is taken: its error is not known.")  # fmt: skip
         return (f"Between the poses of the table of contacts forces are off by {100 * creep[0]:.2g} % of mu F_N in the "
                 f"mean, 95 % of {self.checked} wheels by less than {100 * creep[1]:.2g} %, the largest by "
                 f"{100 * creep[2]:.2g} %, and places by at most {1e3 * place[2]:.2g} mm; {100 * self.jumping:.2g} % of "
@@ -393,6 +396,8 @@ def _judged(table: ContactTable, track: Track, checked: int, seed: int) -> Conta
     lateral, yaw = np.random.default_rng(seed).uniform(-1, 1, size=(2, checked)) * table.reach[:, None]
     one, none = np.ones(checked), np.zeros(checked)
     read = table.forces(lateral, yaw, one, MU)
+    if read.jumps.all():
+        return table._replace(checked=2 * checked, jumping=1.0)
     p, roll, down = _found(track, table.load, lateral, yaw, read.roll, MU)
     pose, free = (lateral, yaw, roll, down), one / table.radius
     exact = _exact(_mirrored(p), pose, one, free, MU * one, (none,) * 3, table.shear, table.poisson, read.jumps)
