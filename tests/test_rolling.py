@@ -266,33 +266,79 @@ TRACK = {"wheel": ms.circle(0.5), "rail": ms.circle(0.3), "radius": 0.46, "wheel
 STATE = {"xi": 1e-3, "eta": 0.0, "phi": 0.0, **PATCH}
 COLD = {k: v for k, v in STATE.items() if k != "friction"}
 NOT_ROLLING = {
-    "fastsim": [{**STATE, key: v} for key, v in (
-        ("friction", -0.3), ("friction", np.nan), ("xi", np.inf), ("a", 0.0), ("poisson", 0.7), ("phi", "x"),
-        ("elements", (1, 4)), ("elements", 20), ("cover", 0.5), ("bound", "flat"), ("xi", [1e-3, 2e-3]))],
-    "creep_forces": [{**STATE, key: v} for key, v in (
-        ("eta", "x"), ("eta", []), ("a", None), ("elements", "ab"), ("elements", (20.5, 20)), ("spin", "none"))]
+    "fastsim": [
+        {**STATE, key: v}
+        for key, v in (
+            ("friction", -0.3),
+            ("friction", np.nan),
+            ("xi", np.inf),
+            ("a", 0.0),
+            ("poisson", 0.7),
+            ("phi", "x"),
+            ("elements", (1, 4)),
+            ("elements", 20),
+            ("cover", 0.5),
+            ("bound", "flat"),
+            ("xi", [1e-3, 2e-3]),
+        )
+    ],
+    "creep_forces": [
+        {**STATE, key: v}
+        for key, v in (
+            ("eta", "x"),
+            ("eta", []),
+            ("a", None),
+            ("elements", "ab"),
+            ("elements", (20.5, 20)),
+            ("spin", "none"),
+        )
+    ]
     + [{**STATE, "xi": [1e-3, 2e-3], "eta": [0.0] * 3}],
     "creep_coefficients": [
         {"ratio": r, "poisson": nu, "source": s}
-        for r, nu, s in ((-1, NU, "table"), (1, 0.7, "table"), (np.nan, NU, "table"), (1, NU, "none"),
-                         (0, NU, "book"))],
-    "ellipses": [{"A": 1.0, "B": 1.0, "force": 1e4, "modulus": 1e11, key: v} for key, v in (
-        ("A", -1), ("B", np.nan), ("force", -1.0), ("modulus", 0.0), ("A", "x"))],
-    "forces_by_characteristic": [{**COLD, "friction": Coulomb(MU), "speed": 20.0, key: v} for key, v in (
-        ("speed", 0.0), ("xi", np.nan), ("poisson", 0.7), ("friction", 0.3), ("distribution", "none"),
-        ("surface", 3))],
+        for r, nu, s in ((-1, NU, "table"), (1, 0.7, "table"), (np.nan, NU, "table"), (1, NU, "none"), (0, NU, "book"))
+    ],
+    "ellipses": [
+        {"A": 1.0, "B": 1.0, "force": 1e4, "modulus": 1e11, key: v}
+        for key, v in (("A", -1), ("B", np.nan), ("force", -1.0), ("modulus", 0.0), ("A", "x"))
+    ],
+    "forces_by_characteristic": [
+        {**COLD, "friction": Coulomb(MU), "speed": 20.0, key: v}
+        for key, v in (
+            ("speed", 0.0),
+            ("xi", np.nan),
+            ("poisson", 0.7),
+            ("friction", 0.3),
+            ("distribution", "none"),
+            ("surface", 3),
+        )
+    ],
     "circle": [{"radius": np.nan}, {"radius": "x"}, {"radius": 0.3, "width": -1.0}],
-    "Track": [{**TRACK, "elastic": ELASTIC, key: v} for key, v in (
-        ("radius", -0.46), ("rail_at", np.nan), ("wheel", 3), ("elastic", 3))],
+    "Track": [
+        {**TRACK, "elastic": ELASTIC, key: v}
+        for key, v in (("radius", -0.46), ("rail_at", np.nan), ("wheel", 3), ("elastic", 3))
+    ],
     "patches": [
         {"track": Track(**TRACK, elastic=ELASTIC), "pose": ms.Pose(), "side": "right", "vertical": 1e5, key: v}
-        for key, v in (("side", "up"), ("vertical", -1.0), ("vertical", "x"), ("friction", -0.3), ("pose", 3),
-                       ("pose", ms.Pose(lateral=np.nan)), ("pose", ms.Pose(speed=0.0)))],
-    "contact_table": [{"track": None, "load": 1e5, "lateral": 4e-3, "yaw": 0.01, key: v} for key, v in (
-        ("load", np.nan), ("yaw", -1.0), ("points", 3), ("points", (2, 2)), ("checked", 0))],
-    "creep_table": [{"poisson": NU, key: v} for key, v in (
-        ("poisson", 0.7), ("points", 4), ("elements", (1, 1)), ("coefficients", "none"), ("checked", 0))],
-}  # fmt: skip
+        for key, v in (
+            ("side", "up"),
+            ("vertical", -1.0),
+            ("vertical", "x"),
+            ("friction", -0.3),
+            ("pose", 3),
+            ("pose", ms.Pose(lateral=np.nan)),
+            ("pose", ms.Pose(speed=0.0)),
+        )
+    ],
+    "contact_table": [
+        {"track": None, "load": 1e5, "lateral": 4e-3, "yaw": 0.01, key: v}
+        for key, v in (("load", np.nan), ("yaw", -1.0), ("points", 3), ("points", (2, 2)), ("checked", 0))
+    ],
+    "creep_table": [
+        {"poisson": NU, key: v}
+        for key, v in (("poisson", 0.7), ("points", 4), ("elements", (1, 1)), ("coefficients", "none"), ("checked", 0))
+    ],
+}
 
 
 @pytest.mark.parametrize("name", NOT_ROLLING)

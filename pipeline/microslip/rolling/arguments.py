@@ -14,13 +14,37 @@ from ..errors import UserError
 TINY = 1e-300
 FINITE, POSITIVE, SOME = (-np.inf, np.inf, "finite"), (TINY, np.inf, "positive"), (0.0, np.inf, "0 or more")
 BOUNDS = {
-    "xi": FINITE, "eta": FINITE, "phi": FINITE, "a": POSITIVE, "b": POSITIVE, "normal_force": POSITIVE,
-    "friction": SOME, "shear": POSITIVE, "poisson": (0.0, 0.5, "0 to 0.5"), "speed": POSITIVE, "A": POSITIVE,
-    "B": POSITIVE, "force": SOME, "modulus": POSITIVE, "ratio": POSITIVE, "radius": POSITIVE, "wheel_at": POSITIVE,
-    "rail_at": POSITIVE, "unit": POSITIVE, "noise": SOME, "width": POSITIVE, "cover": (1.0, np.inf, "1 or more"),
-    "profile": FINITE, "lateral": FINITE, "yaw": FINITE, "roll": FINITE, "turning": SOME, "vertical": SOME,
-    "load": POSITIVE, "checked": (1.0, np.inf, "1 or more"),
-}  # fmt: skip
+    "xi": FINITE,
+    "eta": FINITE,
+    "phi": FINITE,
+    "a": POSITIVE,
+    "b": POSITIVE,
+    "normal_force": POSITIVE,
+    "friction": SOME,
+    "shear": POSITIVE,
+    "poisson": (0.0, 0.5, "0 to 0.5"),
+    "speed": POSITIVE,
+    "A": POSITIVE,
+    "B": POSITIVE,
+    "force": SOME,
+    "modulus": POSITIVE,
+    "ratio": POSITIVE,
+    "radius": POSITIVE,
+    "wheel_at": POSITIVE,
+    "rail_at": POSITIVE,
+    "unit": POSITIVE,
+    "noise": SOME,
+    "width": POSITIVE,
+    "cover": (1.0, np.inf, "1 or more"),
+    "profile": FINITE,
+    "lateral": FINITE,
+    "yaw": FINITE,
+    "roll": FINITE,
+    "turning": SOME,
+    "vertical": SOME,
+    "load": POSITIVE,
+    "checked": (1.0, np.inf, "1 or more"),
+}
 """Least and most of each; none is infinite."""
 
 

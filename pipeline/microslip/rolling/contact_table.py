@@ -155,8 +155,10 @@ class ContactTable(NamedTuple):
         """What it is worth."""
         place, _, _, creep = self.error
         if not self.jumping < 1:
-            return (f"All {self.checked} wheels that were looked at between the poses of the table of contacts are near a "
-                    "jump, where the nearest pose is taken: its error is not known.")  # fmt: skip
+            return (
+                f"All {self.checked} wheels that were looked at between the poses of the table of contacts are near a "
+                "jump, where the nearest pose is taken: its error is not known."
+            )
         return (f"Between the poses of the table of contacts forces are off by {100 * creep[0]:.2g} % of mu F_N in the "
                 f"mean, 95 % of {self.checked} wheels by less than {100 * creep[1]:.2g} %, the largest by "
                 f"{100 * creep[2]:.2g} %, and places by at most {1e3 * place[2]:.2g} mm; {100 * self.jumping:.2g} % of "

@@ -160,9 +160,7 @@ class Studied:
             force = b.carried(np.full(2 * n, s), normal)[n - 1 :]
             time = b.step * np.arange(n + 1)
             moved = abs(force[-1] - force[0]) > 1e-9 * self.row.force
-            rows.append([
-                share, longer * b.length, force[0], force[-1], reached(time, force) if moved else np.nan
-            ])  # fmt: skip
+            rows.append([share, longer * b.length, force[0], force[-1], reached(time, force) if moved else np.nan])
         names = ("load_share", "patch_length_m", "force_before_N", "force_after_N", "reached_s")
         return dict(zip(names, np.array(rows).reshape(-1, len(names)).T, strict=True))
 

@@ -44,8 +44,13 @@ AXES, UPRIGHT = ("x_forward", "y_left", "z_up"), np.array([1.0, -1.0, -1.0] * 2)
 def _heads(x: Array, y: Array, moment: Array, held: float) -> dict[str, Array]:
     """Columns of forces on the wheel in a patch, across along the rail's surface, N and N m; held: mu F_N, N."""
     forward, left, up = AXES
-    return {f"F_{forward}_N": x, f"F_{left}_N": y, f"M_{up}_Nm": moment,
-            f"F_{forward}_over_mu_F_N": x / held, f"F_{left}_over_mu_F_N": y / held}  # fmt: skip
+    return {
+        f"F_{forward}_N": x,
+        f"F_{left}_N": y,
+        f"M_{up}_Nm": moment,
+        f"F_{forward}_over_mu_F_N": x / held,
+        f"F_{left}_over_mu_F_N": y / held,
+    }
 
 
 def without_rounding(values: Array, least: float) -> Array:
@@ -295,8 +300,22 @@ def study(case: RollingCase, path: Path) -> Studied:
         reference = at, np.array([np.hypot(f.x, f.y) for f in totals]) / (highest * p.normal_force)
         beside, missed = _exact(case, track, pose, p, creep, np.hypot(forces.x, forces.y), highest)
     patch, of_patches = (Tractions(*(v[part] for v in run.tractions)) for part in (0, slice(1, None)))
-    return Studied(case, track, found, creep, forces, reference, beside, shown, patch, of_pose, missed, highest,
-                   run.hottest, of_patches)  # fmt: skip
+    return Studied(
+        case,
+        track,
+        found,
+        creep,
+        forces,
+        reference,
+        beside,
+        shown,
+        patch,
+        of_pose,
+        missed,
+        highest,
+        run.hottest,
+        of_patches,
+    )
 
 
 def _touching(case: RollingCase, track: Track, dragged: Drag) -> tuple[list[Patch], Pose]:
@@ -340,8 +359,23 @@ def _creep(case: RollingCase, p: Patch | None) -> Array:
 
 def rows_of_patches(found: list[Patch]) -> tuple[list[str], list[list[float | str]]]:
     """Head and a row for each patch, as in patches.csv."""
-    head = [*(f"{axis}_m" for axis in AXES), "y_rail_profile_m", "y_wheel_profile_m", "falls_to_right_rad",
-            "A_1_per_m", "B_1_per_m", "a_m", "b_m", "approach_m", "largest_pressure_Pa", "normal_force_N",
-            "longitudinal_creepage", "lateral_creepage", "spin_1_per_m", "speed_m_per_s", "conformal",
-            "side"]  # fmt: skip
+    head = [
+        *(f"{axis}_m" for axis in AXES),
+        "y_rail_profile_m",
+        "y_wheel_profile_m",
+        "falls_to_right_rad",
+        "A_1_per_m",
+        "B_1_per_m",
+        "a_m",
+        "b_m",
+        "approach_m",
+        "largest_pressure_Pa",
+        "normal_force_N",
+        "longitudinal_creepage",
+        "lateral_creepage",
+        "spin_1_per_m",
+        "speed_m_per_s",
+        "conformal",
+        "side",
+    ]
     return head, [[*(float(v) for v in (*p[0] * UPRIGHT[:3], *p[1:-1])), p.side] for p in found]

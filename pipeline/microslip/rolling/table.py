@@ -90,8 +90,16 @@ class CreepTable:
         Raises:
             UserError: a/b beyond the table; a value that no state of rolling has.
         """
-        given = {"xi": xi, "eta": eta, "phi": phi, "a": a, "b": b, "normal_force": normal_force, "friction": friction,
-                 "shear": shear}  # fmt: skip
+        given = {
+            "xi": xi,
+            "eta": eta,
+            "phi": phi,
+            "a": a,
+            "b": b,
+            "normal_force": normal_force,
+            "friction": friction,
+            "shear": shear,
+        }
         x, y, turn, a, b, normal, mu, G = joined(**given)
         held = np.maximum(mu, SLIPPERY) * normal
         ratio, c = a / b, np.sqrt(a * b)

@@ -332,8 +332,10 @@ class Recorded:
         ]
         less = max(uncertain(self.history)[n, 0], np.nan_to_num(error).max())
         if orders[n] > less:
-            told.append(f"Over the circumference it differs by {1e6 * np.ptp(depth):.4g} um; order {n + 1} is largest, "
-                        f"{1e6 * orders[n]:.3g} um.")  # fmt: skip
+            told.append(
+                f"Over the circumference it differs by {1e6 * np.ptp(depth):.4g} um; order {n + 1} is largest, "
+                f"{1e6 * orders[n]:.3g} um."
+            )
         else:
             told.append(f"Over the circumference it differs by no more than its error, {1e6 * less:.2g} um.")
         if self.wheel.tracks is not None:

@@ -120,8 +120,10 @@ class Studied:
             if not first.max() > 1e-9:
                 continue
             n = int(first.argmax())
-            told.append(f"Order {n + 1} of the {name} wheel {_went(first[n], last[n], less[n])} in {km:.5g} km "
-                        f"({now.turns:.4g} turns).")  # fmt: skip
+            told.append(
+                f"Order {n + 1} of the {name} wheel {_went(first[n], last[n], less[n])} in {km:.5g} km "
+                f"({now.turns:.4g} turns)."
+            )
             m = int((last - first).argmax())
             if m != n and last[m] - first[m] > max(less[m], 1e-9):
                 told.append(f"Of the others order {m + 1} grows most, to {1e6 * last[m]:.3g} um.")
