@@ -240,9 +240,22 @@ def test_kalkers_linear_theory_as_creepage_vanishes() -> None:
         ("creepages", {"force": LOAD, "creepages": (0, 0, 1e9)}),
         ("friction", {"force": LOAD, "friction": np.ones(7)}),
         ("distance", {"force": LOAD, "distance": np.nan}),
+        ("force", {"force": "x"}),
+        ("approach", {"approach": np.nan}),
+        ("creepages", {"force": LOAD, "creepages": "x"}),
+        ("tangential", {"force": LOAD, "tangential": (1.0,)}),
     ],
 )
 def test_mistakes_are_named(key: str, wrong: dict) -> None:
     grid, h = ellipse(12)
     with pytest.raises(UserError, match=f"^{key}"):
         steady_rolling(**{"distance": h, "grid": grid, "pair": STEEL, "friction": MU} | wrong)
+
+
+def test_grids_and_coefficients_of_nothing_are_refused() -> None:
+    for wrong in ((10.5, 10, 1.0, 1.0), (0, 10, 1.0, 1.0), (10, 10, -1.0, 1.0)):
+        with pytest.raises(UserError):
+            Grid(*wrong)  # type: ignore[arg-type]
+    for ratio, poisson, elements in ((-1, 0.3, 4), (0, 0.3, 4), (1, 0.7, 4), (1, 0.3, 1)):
+        with pytest.raises(UserError):
+            linear_coefficients(ratio, poisson, elements)

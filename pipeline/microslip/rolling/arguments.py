@@ -43,6 +43,7 @@ BOUNDS = {
     "turning": SOME,
     "vertical": SOME,
     "load": POSITIVE,
+    "approach": FINITE,
     "checked": (1.0, np.inf, "1 or more"),
 }
 """Least and most of each; none is infinite."""

@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike
 
 from ..data import Array, Flags
 from ..errors import UserError
+from .arguments import number, wholes
 from .half_space_influence import (
     ALL,
     NORMAL,
@@ -194,11 +195,12 @@ def _contact(
     motion: _Motion | None, given: ArrayLike, tangential: Forces, start: Contact | None,
 ) -> Contact:  # fmt: skip
     """Pressure and traction in turns until both stay (Panagiotopoulos); like bodies need one turn."""
-    h, mu, w = grid.field(distance, "distance"), grid.field(friction, "friction"), np.array(given, float)
+    h, mu, w = grid.field(distance, "distance"), grid.field(friction, "friction"), _three(given)
+    for name, value in (("force", force), ("approach", approach)):
+        if value is not None:
+            number(name, value)
     if not np.all(mu >= 0):
         raise UserError("friction: mu is negative or not a number somewhere; it must be 0 or more")
-    if w.shape != (3,) or not np.isfinite(w).all():
-        raise UserError(f"creepages: {w.tolist()}; give three numbers, along x, along y and the spin or turn")
     if motion is not None and (fastest := np.abs(np.tensordot(w, motion.rigid, 1)).max()) > FASTEST:
         raise UserError(
             f"creepages: a slip of {fastest:.3g} times the speed is no rolling any more; creepages have no unit, the "
@@ -222,6 +224,17 @@ def _contact(
     raise UserError(f"distance: pressure and traction have not settled after {ITERATIONS} turns; K is too large")
 
 
+def _three(creepages: ArrayLike) -> Array:
+    """(3,) of a motion."""
+    try:
+        w = np.array(creepages, float)
+    except (TypeError, ValueError):
+        w = np.zeros(0)
+    if w.shape != (3,) or not np.isfinite(w).all():
+        raise UserError(f"creepages: {creepages!r}; give three numbers, along x, along y and the spin or turn")
+    return w
+
+
 def _inside(pressure: Array, grid: Grid) -> None:
     """A patch that reaches the edge is cut off; a grid of one row is two-dimensional."""
     sides = [pressure[0], pressure[-1], *((pressure[:, 0], pressure[:, -1]) if grid.ny > 1 else ())]
@@ -231,6 +244,8 @@ def _inside(pressure: Array, grid: Grid) -> None:
 
 def _sheared(now: Contact, motion: _Motion, tangential: Forces, warm: bool) -> Contact:
     """Tangential problem under a given pressure; the creepage follows where a force is given."""
+    if len(tangential) != 2:
+        raise UserError(f"tangential: is {tangential!r}; give F_x and F_y, N, None where the creepage is given")
     wanted = [k for k in (0, 1) if tangential[k] is not None]
     sums = np.array([tangential[k] for k in wanted], float) / now.grid.area
     if wanted and not np.linalg.norm(sums) < now.bound.sum():
@@ -253,7 +268,11 @@ def linear_coefficients(ratio: float, poisson: float, elements: int = 40) -> Arr
 
     Args:
         ratio: a/b, a along rolling. poisson: nu. elements: along each axis of the ellipse.
+
+    Raises:
+        UserError: a ratio that is not positive, another Poisson's ratio, fewer than four elements.
     """
+    number("ratio", ratio), number("poisson", poisson), wholes("elements", (elements,), (4,))
     coarse, fine = (_coefficients(ratio, poisson, n) for n in (elements, 2 * elements))
     return 2 * fine - coarse
 

@@ -19,6 +19,7 @@ from scipy import fft
 from ..contact.solids import Solid
 from ..data import Array
 from ..errors import UserError
+from .arguments import wholes
 
 
 @dataclass(frozen=True)
@@ -73,7 +74,8 @@ class Grid:
     y0: float = 0.0
 
     def __post_init__(self) -> None:
-        if not (self.nx > 0 and self.ny > 0 and 0 < self.dx < np.inf and 0 < self.dy < np.inf):
+        wholes("nx, ny", (self.nx, self.ny), (1, 1))
+        if not (0 < self.dx < np.inf and 0 < self.dy < np.inf):
             raise UserError(
                 f"grid: {self.nx} x {self.ny} elements of {self.dx:g} m x {self.dy:g} m; all must be greater than 0"
             )
