@@ -14,13 +14,14 @@ import numpy as np
 import pytest
 
 from microslip.cli import main
+from microslip.errors import UserError
 from microslip.files.tables import columns_csv
 from microslip.results import Journal, open_journal, read_journal
 from microslip.rolling.table import creep_table
 from microslip.rolling.wheelset import Pose, patches
 from microslip.vehicle import motion, wearing
 from microslip.vehicle.creep import linear, of_strips, of_table
-from microslip.vehicle.kinematics import Given, recorded
+from microslip.vehicle.kinematics import Given, read_kinematics, recorded
 from microslip.vehicle.settings import VehicleCase, load_kinematics, load_vehicle, track_of
 from microslip.vehicle.study import Studied, _went
 
@@ -520,6 +521,15 @@ def test_a_groove_that_splits_the_contact_ends_wear_by_a_file(
     assert "ended early" in said.err and "groove" in said.out + said.err
     rows = list(csv.DictReader((tmp_path / "build" / "given" / "wear.csv").open()))
     assert 2 < len(rows) and 1e4 < float(rows[-1]["total_turns"]) < 1e6
+
+
+def test_a_table_with_decimal_commas_is_no_kinematics(tmp_path: Path) -> None:
+    """A cell would be two."""
+    head = "time_s,angle_rad,speed_m_per_s,lateral_m,normal_force_N"
+    head += ",longitudinal_creepage,lateral_creepage,spin_1_per_m"
+    (tmp_path / "run.csv").write_text("\n".join([head] + [f"0,{n},{n},20,0,1e5,0,0,0" for n in range(9)]))
+    with pytest.raises(UserError, match="row 2: has 9 cells"):
+        read_kinematics(tmp_path / "run.csv")
 
 
 def cut(columns: dict[str, np.ndarray], kind: str) -> dict[str, np.ndarray]:

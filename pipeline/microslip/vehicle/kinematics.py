@@ -92,6 +92,11 @@ def read_kinematics(path: Path) -> Kinematics:
 
 def _numbers(row: list[str], head: list[str], where: str) -> list[float]:
     """Of the columns that are known, in their order."""
+    if len(row) != len(head):
+        raise UserError(
+            f"{where}: has {len(row)} cells and the first line {len(head)}; write decimal points, and commas between "
+            "the columns alone"
+        )
     found = []
     for column in (*NEEDED, *GIVEN):
         cell = row[head.index(column)] if head.index(column) < len(row) else ""
