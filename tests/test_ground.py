@@ -115,7 +115,7 @@ def test_creep_near_the_limit_is_no_slip_and_a_slip_is_counted_once() -> None:
     assert moved.argmax() == begins and not moved[: len(creeps) - 1].any() and not moved[-2:].any()
 
 
-@pytest.mark.parametrize("slope", [1e6, pytest.param(1e10, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("slope", [1e6, pytest.param(1e9, marks=pytest.mark.slow)])
 def test_every_slip_of_the_closed_form_is_counted_once(slope: float) -> None:
     """Stick-slip on a belt, let go where it sticks, whatever the smoothing: as many as times at which it is fast."""
     law = rate(Exponential(value(0.8), value(0.55), value(1e4)), slope)

@@ -178,7 +178,7 @@ def test_a_block_on_a_belt_sticks_at_its_velocity_and_slips_as_an_oscillator() -
     assert errors[1] < 0.5 * errors[0] < 0.05
 
 
-def rubbing_block(law: object, ground: Ground, force: float = 0.0) -> equations.Equations:
+def rubbing_block(law: object, ground: Ground | None, force: float = 0.0) -> equations.Equations:
     """A mass on a spring along the ground, free along the normal, pressed on it by 14 N."""
     from test_ground import rubbing
 
@@ -198,6 +198,16 @@ def test_a_blade_rubs_a_casing_and_is_taken_along() -> None:
     given = np.diff(found.energy["ground"]) / np.diff(found.time)
     np.testing.assert_allclose(given, mu * NORMAL * V, rtol=1e-9)
     assert found.drift < 1e-12 and found.balance < 1e-10
+
+
+@pytest.mark.parametrize("ground", [None, Ground(0.5)])
+def test_what_rests_is_pressed_from_the_first_step_on(ground: Ground | None) -> None:
+    """By its preload, whatever rounding makes of a place that it does not leave."""
+    e = rubbing_block(SetValued(Coulomb(value(0.3)), value(0.0), value(0.0)), ground)
+    s = Stepper(e, 2 * np.pi / 20 / 512)
+    _, seen, events, _ = s.run(s.start(0 * e.omega2, 0 * e.omega2), np.ones(64, int))
+    np.testing.assert_allclose(seen.force[:, 0], 14.0, rtol=1e-9)
+    assert not (events[:, 2] < 2).any()
 
 
 @pytest.mark.slow

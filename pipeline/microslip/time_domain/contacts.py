@@ -31,6 +31,9 @@ ROUNDING = 1e-14
 SLIDES = 1e-9
 """Share of the largest way of points that is found by iteration, beyond which one slides."""
 
+MEETS = 1e-9
+"""Share of its way in the next step that a point may lack to the other side and touch it."""
+
 FEW = 4096
 """Numbers of a matrix up to which a product is faster as a sum that is compiled together with what surrounds it."""
 
@@ -300,8 +303,8 @@ def _asked(groups: tuple[Group, ...], i: int, masses: bool, free: Any, ahead: An
     if not masses:
         return come.at[:, 0].set(deep - gap), pressed, first, *slopes
     along = goes[:, 0] + law.restitution * come[:, 0]
-    if law.normal is None:
-        along = jnp.where(deep >= gap, along, -jnp.inf)
+    if law.normal is None:  # but for rounding, which would open what rests
+        along = jnp.where(deep + MEETS * jnp.abs(goes[:, 0]) >= gap, along, -jnp.inf)
     return goes.at[:, 0].set(along), pressed, first, *slopes
 
 
