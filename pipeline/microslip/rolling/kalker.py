@@ -14,7 +14,7 @@ import jax.numpy as jnp
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..contact.law import Array, program
+from ..contact.law import Array, inner
 
 Coefficients = Literal["table", "book"]
 
@@ -55,7 +55,7 @@ LEAST = 0.1
 """g below which Kalker's asymptotes are used."""
 
 
-@partial(program, static_argnames="source")
+@partial(inner, static_argnames="source")
 def creep_coefficients(ratio: ArrayLike, poisson: ArrayLike, source: Coefficients = "table") -> Array:
     """(4, ...) C11, C22, C23, C33.
 
