@@ -18,9 +18,9 @@ from ..settings.mistakes import bounded
 KNOWN = (0, 6) <= jax.__version_info__ < (0, 11)  # other versions may not know the options
 
 
-def _compiled(function: Callable[..., Any], options: dict[str, Any], **given: Any) -> Callable[..., Any]:
+def _compiled(function: Callable[..., Any], options: dict[str, Any] | None, **given: Any) -> Callable[..., Any]:
     """`jax.jit` with options of the compiler, in a process that is ready for it."""
-    compiled = jax.jit(function, compiler_options=options if KNOWN else {}, **given)
+    compiled = jax.jit(function, compiler_options=options if KNOWN else None, **given)
 
     @wraps(function)
     def call(*args: Any, **kwargs: Any) -> Any:
@@ -32,6 +32,9 @@ def _compiled(function: Callable[..., Any], options: dict[str, Any], **given: An
 
 program = partial(_compiled, options={"xla_cpu_use_fusion_emitters": False})
 """`jax.jit` of what python calls: compiled in half the time, and slower only where there are hundreds of points."""
+
+inner = partial(_compiled, options=None)
+"""The same of what other programs call too, which choose the options."""
 
 often = partial(_compiled, options={"xla_cpu_prefer_vector_width": 512})
 """The same of hundreds of points: compiled half a second longer, and a third faster."""

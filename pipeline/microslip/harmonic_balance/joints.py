@@ -70,13 +70,43 @@ class Sides:
         return pairs, begins, both[:, begins]
 
     @cached_property
-    def ring(self) -> Indices | None:
-        """(u,) whether the second of two contacts that meet is the first (0), the one behind it (1) or the one before
-        it (2); None where others meet."""
-        i, j = self.met[2]
-        n = len(self.of_contacts[0])
-        away = (j - i) % max(n, 1)
-        return np.where(away == n - 1, 2, away) if n > 2 and np.isin(away, (0, 1, n - 1)).all() else None
+    def ring(self) -> Ring | None:
+        """The smallest gaps that the contacts are those of, so many each, of which each meets the one behind and the
+        one before alone; None where others meet."""
+        (i, j), n = self.met[2], len(self.of_contacts[0])
+        for each in range(1, n // 3 + 1):
+            count, number = n // each, np.arange(n)
+            for gap, place in ((number // each, number % each), (number % count, number // count)):
+                away = (gap[j] - gap[i]) % count
+                whole = n % each == 0 and (count > 3 or each == 1)  # of three gaps each meets all
+                if whole and np.isin(away, (0, 1, count - 1)).all():
+                    return Ring(gap, place, np.where(away == count - 1, 2, away), count, each)
+        return None
+
+
+@dataclass(frozen=True, eq=False)
+class Ring:
+    """Contacts in the gaps of a ring.
+
+    Attributes:
+        gap, place: (n,) of each contact, and its number there. away: (u,) of two contacts that meet, whether the second
+            is in the gap of the first (0), in the one behind (1) or before (2). count: of gaps. each: contacts of one.
+    """
+
+    gap: Indices
+    place: Indices
+    away: Indices
+    count: int
+    each: int
+
+    def solved(self, i: Indices, j: Indices, blocks: Array, right: Array) -> Array:
+        """(n, s) d of the matrix whose (u, s, s) blocks stand at the contacts i, j that meet, and (n, s)."""
+        s, r = right.shape[1], np.empty((self.count, self.each, right.shape[1]))
+        A = np.zeros((3, self.count, self.each, s, self.each, s))
+        A[self.away, self.gap[i], self.place[i], :, self.place[j]] = blocks
+        r[self.gap, self.place] = right
+        D, behind, before = A.reshape(3, self.count, self.each * s, self.each * s)
+        return around(D, behind, before, r.reshape(self.count, -1)).reshape(r.shape)[self.gap, self.place]
 
 
 @dataclass(frozen=True, eq=False)
@@ -181,9 +211,7 @@ class Apart:
         blocks = self.between @ S[j]
         blocks[i == j] += np.eye(s)
         if ring is not None:
-            D, behind, before = A = np.zeros((3, n, s, s))
-            A[ring, i] = blocks
-            return around(D, behind, before, right)
+            return ring.solved(i, j, blocks, right)
         A = np.zeros((n, s, n, s))
         A[i, :, j] = blocks
         return Dense(A.reshape(n * s, n * s)).solve(right.ravel()).reshape(n, s)

@@ -50,7 +50,7 @@ REACHED = "all amplitudes were reached"
 BEYOND = 100.0
 """Logarithm of an amplitude in m, either way, that a step of the corrector may lead to and no motion has."""
 
-RIGID = 3e-5
+RIGID = 1e-6
 """Frequency over the highest one below which a mode is the motion of a body that nothing holds: rounding."""
 
 HELD = 2.0

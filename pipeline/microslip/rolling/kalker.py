@@ -14,7 +14,7 @@ import jax.numpy as jnp
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..contact.law import Array, program
+from ..contact.law import Array, inner
 from .arguments import number, words
 
 Coefficients = Literal["table", "book"]
@@ -73,7 +73,7 @@ def creep_coefficients(ratio: ArrayLike, poisson: ArrayLike, source: Coefficient
     return coefficients_at(number("ratio", ratio), number("poisson", poisson), source)
 
 
-@partial(program, static_argnames="source")
+@partial(inner, static_argnames="source")
 def coefficients_at(ratio: ArrayLike, poisson: ArrayLike, source: Coefficients = "table") -> Array:
     """`creep_coefficients` as a pure function of jax."""
     s, nu = jnp.broadcast_arrays(jnp.asarray(ratio, dtype=float), jnp.asarray(poisson, dtype=float))
