@@ -532,7 +532,9 @@ def test_a_run_says_what_it_will_do_and_how_long_it_took_here(
     for seconds in (150.0, 90.0):
         progress.keep("run box", seconds)
     assert first("run box").endswith("at most about 2 min, as before")
+    (cache.parent / "box").mkdir()
     monkeypatch.chdir(cache.parent)
+    assert first("run box/body.toml").endswith("at most about 2 min, as before")
     assert first("run box").endswith("at most about 2 min, as before")
     progress.keep("run box", 30.0)
     assert first("run box").endswith("at most about 30 s, as before")

@@ -1,4 +1,4 @@
-"""The small meshes of meshes/tiny: written as they stand there, read, and with the frequencies that their page states."""
+"""The small meshes of meshes/tiny: written as they stand there, read, with the frequencies that their page states."""
 
 from __future__ import annotations
 

@@ -205,11 +205,11 @@ RUNS, TITLES = 5, 300
 
 
 def planned(title: str) -> str:
-    """What will be done, and about how long it takes: as runs of this title took on this machine, or as long as such
-    runs take; "" where that is soon."""
+    """What will be done, and about how long it takes: as runs of the same took on this machine, or of what has its
+    name in another folder, or as long as such runs take; "" where that is soon."""
     known, place = _durations(), _key(title)
     words, low, high = PLANS.get(title.split()[0], ("", SHORT, 300))
-    took = known.get(place) or [s for key, more in known.items() if key.split("\n")[0] == title for s in more]
+    took = known.get(place) or [s for key, more in known.items() if _named(key) == _named(place) for s in more]
     if took:
         return f"{words}{'; ' * bool(words)}at most about {_duration(max(took))}, as before" * (max(took) > SHORT)
     usual = f"not timed on this machine yet, such runs take {_duration(low)} to {_duration(high)}"
@@ -231,7 +231,18 @@ def keep(title: str, seconds: float) -> None:
 
 
 def _key(title: str) -> str:
-    return f"{title}\n{Path.cwd()}"
+    """Verb, and the whole path of what it is done to."""
+    verb, _, of = title.partition(" ")
+    with contextlib.suppress(OSError, ValueError, RuntimeError):  # no path, or no folder to be in
+        return f"{verb} {Path(of).resolve()}"
+    return title
+
+
+def _named(key: str) -> str:
+    """Verb, and the last name of a path that says what it is."""
+    verb, _, of = key.partition(" ")
+    path = Path(of)
+    return f"{verb} {path.parent.name if path.name in ('body.toml', 'case.toml', 'system.toml') else path.name}"
 
 
 def _place() -> Path | None:

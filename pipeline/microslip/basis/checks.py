@@ -330,18 +330,18 @@ def _shape_checks(basis: ModalBasis, g: ModalGroup) -> _Findings:
     error = _largest(inner * basis.mass / weight - np.eye(g.n_modes))
     limit = min(1e-8, max(1e-11, 100 * g.checks.get("orthogonality", 1.0)))  # what the solver claims, and rounding
     found: _Findings = [("shapes are mass-orthonormal on the mesh", error, limit, ""), *_place_checks(basis)]
-    if (error := stiffness_error(basis, g)) is not None:
-        found.append(("shapes are stiffness-orthogonal on the mesh", error, 1e-9, ""))
+    if (stiff := stiffness_error(basis, g)) is not None:
+        found.append(("shapes are stiffness-orthogonal on the mesh", stiff, 1e-9, ""))
     if g.residual is not None and g.residual.phi.size:
         found.append(("residual shapes are mass-orthogonal to the modes", _beside(basis, g, g.residual.phi), 1e-6, ""))
     if basis.mesh.materials:
         found.append(("mass of the mesh's materials", abs(weight / basis.mass - 1), 1e-8, ""))
     volume = cell_volumes(basis.mesh) if g.stresses else 0.0
-    if g.stresses and (error := stress_error(basis, g)) is not None:
-        found.append(("stresses follow from strains", error, 1e-9, ""))
+    if (stressed := stress_error(basis, g)) is not None:
+        found.append(("stresses follow from strains", stressed, 1e-9, ""))
     for name, s in g.stresses.items():
-        if (error := strain_error(basis, g, s)) is not None:
-            found.append((f"strains of {name} follow from the shapes", error, 1e-9, ""))
+        if (strained := strain_error(basis, g, s)) is not None:
+            found.append((f"strains of {name} follow from the shapes", strained, 1e-9, ""))
         found.append((f"volume of stress set {name}", abs(float(s.weights.sum()) / volume - 1), 1e-9, ""))
     return found
 
