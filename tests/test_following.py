@@ -212,7 +212,11 @@ def test_an_optimum_where_contacts_would_lift_off_is_marked(tmp_path: Path, monk
 def test_what_was_not_found_stands_in_the_table_with_its_commas(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, undrawn: None
 ) -> None:
-    """And on the page, which could not be made of it."""
+    """And on the page, which could not be made of it; a cross stands for it in the picture."""
+    from microslip.pictures import following as drawing
+
+    figures: list[Any] = []
+    monkeypatch.setattr(drawing, "save_figure", lambda figure, path: figures.append(figure) or path)
     monkeypatch.chdir(tmp_path)
     case = following.Case(Path("case.toml"), {"name": "pit"}, {}, Path("build/pit"))
     vars(case)["quantity"] = METRES
@@ -222,6 +226,9 @@ def test_what_was_not_found_stands_in_the_table_with_its_commas(
     *_, page = following.write_optimum(found, "mass", case)
     rows = list(csv.DictReader(Path("build/pit/optimum.csv").open()))
     assert rows[1]["amplitude_m"] == rows[1]["frequency_Hz"] == ""
+    crosses = [line for line in figures[0].axes[0].get_lines() if line.get_marker() == "x"]
+    assert [list(line.get_xdata()) for line in crosses] == [[2.0]]
+    assert "no resonance known, see the table" in [t.get_text() for t in figures[0].legends[0].get_texts()]
     what = [row["what"] for row in rows]
     assert what == ["highest resonance", said, f"lowest: lost between 1 and 2: {said}"]
     assert "raise samples</td>" in page.read_text()

@@ -202,6 +202,7 @@ def test_the_error_estimate_is_what_more_harmonics_change():
     fine = ms.harmonic_response(duffing(), [1.2], unit="rad/s", harmonics=9)
     truth = abs(fine.amplitude[0] / coarse.amplitude[0] - 1)
     assert 1e-4 < truth <= coarse.error_estimate().readout < 20 * truth
+    assert "% at most" in repr(coarse.error_estimate()) and "too " in repr(coarse.error_estimate())
 
 
 def test_a_point_without_a_solution_says_why():

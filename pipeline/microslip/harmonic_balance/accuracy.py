@@ -72,7 +72,9 @@ class Error:
     change: float = np.nan
 
     def __repr__(self) -> str:
-        share = f"{100 * self.readout:.2g} %" if np.isfinite(self.readout) else "not known: no finer solution was found"
+        side, likely = "high" if self.likely() > 0 else "low", 100 * abs(self.likely())
+        share = f"too {side} by about {likely:.2g} %, {100 * self.readout:.2g} % at most,"
+        share = share if np.isfinite(self.readout) else "not known: no finer solution was found,"
         return f"<Error: {share} of {self.amplitude:.4g}, with {self.harmonics} harmonics and {self.samples} samples>"
 
     @property

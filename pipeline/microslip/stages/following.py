@@ -28,6 +28,7 @@ from ..files.store import ordinary
 from ..files.tables import rows_csv
 from ..harmonic_balance.nonlinear_modes import REACHED
 from ..harmonic_balance.readout import measured
+from ..harmonic_balance.response import NOT_FOUND
 from ..harmonic_balance.solver import CONVERGED
 from ..results import read_response
 from ..results.checks import checked, largest
@@ -424,10 +425,12 @@ def is_optimum(found: Optimum) -> bool:
 
 
 def missed(found: Optimum, over: str) -> str:
-    """Why there is no optimum, and where to look for it; nothing where there is one or the setting hardly matters."""
+    """Why there is no optimum, and where to look for it, or at which values the search failed; nothing where there is
+    one among all values, or the setting hardly matters."""
     low, high, unit = min(found.found), max(found.found), unit_of(over)
     if is_optimum(found) or hardly(found):
-        return ""
+        lost = [f"{v:.4g}" for v, one in found.found.items() if one.status.startswith(NOT_FOUND)]
+        return f"at {', '.join(lost)}{unit} no resonance was found; the optimum is that of the others" if lost else ""
     if found.status != NO_OPTIMUM or found.parameter not in (low, high):
         return f"no optimum was found: {found.status}"
     end = f"--low below {low:g}" if found.parameter == low else f"--high above {high:g}"

@@ -14,6 +14,7 @@ import numpy as np
 from ..basis import read_basis
 from ..case import CaseSettings, checkpoint, load_case, surveys
 from ..case.curves import Followed, curves
+from ..case.messages import method
 from ..data import Array, ModalBasis
 from ..files import store
 from ..files.tables import write_tables
@@ -36,8 +37,6 @@ Tables = Mapping[str, Mapping[str, Array]]
 """File name -> column -> values."""
 Write = Callable[[Tables], None]
 """Writes what there is of the tables of a survey, which may be interrupted."""
-
-_BY_THE_BOOK = "Book mode (Sextro 5.2): one harmonic, constant normal forces, elliptic orbits."
 
 
 @dataclass(frozen=True)
@@ -103,8 +102,8 @@ def _work(
 
     survey = partial(KINDS[kind], write) if kind in KINDS else partial(_curve, kind, points)
     found = survey(settings, {name: read_basis(file) for name, file in files.items()}, case_path, stage.report)
-    if settings.mode == "book" and kind != "identification":
-        found = replace(found, sentences=[*found.sentences, _BY_THE_BOOK])
+    if kind != "identification" and (how := method(settings)):
+        found = replace(found, sentences=[how, *found.sentences])
     write(found.tables)
     names = [*found.tables, *found.draw, _shown(found, kind, settings.name, folder)]
     if not found.whole:
