@@ -293,6 +293,10 @@ def _read_residual(where: h5py.Group, n: int, gauges: dict[str, Rows], sets: dic
     return read(Residual, where, {"node": n}, gauges=own, **held)
 
 
+_SHARED = tuple(f"stress/<name>/{field}" for field in ("points", "weights", "singular"))
+"""What strain and stress of a set have in common."""
+
+
 def _write_stress(group: h5py.Group, name: str, s: StressSet, scales: Scales) -> None:
     """Places and weights of both stand with the stress; the strain's group has links."""
     stress, strain = (group.require_group(kind).create_group(name) for kind in ("stress", "strain"))
@@ -300,9 +304,10 @@ def _write_stress(group: h5py.Group, name: str, s: StressSet, scales: Scales) ->
         where.attrs["location"] = s.location
         where.attrs["order"] = " ".join(VOIGT)
     strain.attrs["shear"] = "engineering"
-    write(group, s, scales, name, part=("stress/<name>/points", "stress/<name>/weights"))
-    for shared in ("place", "points", "weights"):
-        strain[shared] = stress[shared]
+    write(group, s, scales, name, part=_SHARED)
+    for shared in ("place", "points", "weights", "singular"):
+        if shared in stress:
+            strain[shared] = stress[shared]
     write(group, s, {**scales, "place": stress["place"]}, name, part=("strain/", "stress/<name>/T"))
 
 

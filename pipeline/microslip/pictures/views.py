@@ -417,21 +417,26 @@ def stress_sheet(studio: Studio, group: ModalGroup, count: int, camera: Camera) 
     for j in chosen:
         factor = ONE_MILLIMETRE / np.linalg.norm(group.phi[:, :, j], axis=1).max()
         shape = mode_scale(studio, group.phi[:, :, j]) * group.phi[:, :, j]
-        image = stress_tile(studio, 1e-6 * factor * von_mises(stress.stress[:, :, j]), shape, camera, 0.75, "MPa")
+        values = 1e-6 * factor * von_mises(stress.stress[:, :, j])
+        image = stress_tile(studio, values, shape, camera, 0.75, "MPa", singular=stress.singular)
         tiles.append(captioned(image, mode_title(group, j), size=17))
     title = f"{studio.basis.name}: stress modes{at_speed(group)}"
     note = (
         "Equivalent stress (von Mises) in MPa when the largest displacement of the mode is 1 mm; shapes amplified. "
         "The colours leave out the highest 0.2 % of the values; the largest is written below."
-    )
+    ) + f" {ZONES}" * bool(np.any(stress.singular))
     return sheet(tiles, title, note)
+
+
+ZONES = "The largest value is that outside the singular zones of supports, contact edges and sharp inner edges."
 
 
 def stress_tile(
     studio: Studio, values: Array, shape: Array, camera: Camera, factor: float, unit: str, colours: str = STRESS_MAP,
-    mark: int | None = None,
+    mark: int | None = None, singular: Array | None = None,
 ) -> Picture:  # fmt: skip
-    """One deformed body coloured by nodal values (n,), with its colour bar; a ring is drawn round the node `mark`."""
+    """One deformed body coloured by nodal values (n,), with its colour bar; a ring is drawn round the node `mark`.
+    singular: (n,) nodes that the largest value leaves out, or of length 0."""
     outside = studio.outside
     seen = values[outside.source]
     top = float(np.quantile(seen, 0.998)) or 1.0
@@ -443,10 +448,12 @@ def stress_tile(
         for radius, colour, width in ((15, "white", 6), (14, INK, 3)):
             pen(image).ellipse((x - radius, y - radius, x + radius, y + radius), outline=colour, width=width)
     image = scaled(image, factor)
-    peak = float(seen.max())
-    return stacked(
-        [image, colour_bar(_map(colours), "0", number(top), f"{unit}; largest {number(peak)} {unit}", image.width)], 4
-    )
+    inside = np.zeros(len(seen), dtype=bool)
+    if singular is not None and len(singular):
+        inside = np.asarray(singular, dtype=bool)[outside.source]
+    outer = inside if inside.all() else ~inside
+    told = f"{unit}; largest {number(float(seen[outer].max()))} {unit}"
+    return stacked([image, colour_bar(_map(colours), "0", number(top), told, image.width)], 4)
 
 
 def static_picture(studio: Studio, group: ModalGroup) -> Picture | None:
@@ -462,7 +469,8 @@ def static_picture(studio: Studio, group: ModalGroup) -> Picture | None:
     tiles = []
     stress = group.stresses.get("nodes")
     if stress is not None and len(stress.points) == studio.basis.mesh.n_points:
-        image = stress_tile(studio, 1e-6 * von_mises(stress.static_stress), shape, camera, 1.0, "MPa")
+        values = 1e-6 * von_mises(stress.static_stress)
+        image = stress_tile(studio, values, shape, camera, 1.0, "MPa", singular=stress.singular)
         tiles.append(captioned(image, "Equivalent stress", size=17))
     image = stress_tile(studio, 1e3 * size, shape, camera, 1.0, "mm", DISPLACEMENT_MAP)
     tiles.append(captioned(image, "Displacement", size=17))
