@@ -87,3 +87,14 @@ def test_zones_of_a_step() -> None:
     assert width < wide * (1 + 1e-12) and wide < size / 4
     touching = singular_zones(mesh, body(free=True, interfaces=[{"name": "c", "face": "x1"}]))
     np.testing.assert_array_equal(touching.edges[1][0], rim)
+
+
+def test_the_clamp_of_a_sector_ends_where_the_next_one_begins() -> None:
+    """The bore of a sector has two rims, front and rear; on the cut faces the ring goes on."""
+    import sector
+
+    (points, _), = singular_zones(sector.mesh(), sector.settings(6)).edges[-2:-1]
+    radius = np.linalg.norm(points[:, [0, 2]], axis=1)
+    assert radius.max() < 1.001 * sector.BORE
+    ends = np.abs(np.arctan2(points[:, 0], points[:, 2])) > np.pi / 6 - 1e-6
+    assert 0 < ends.sum() <= 4  # corners alone

@@ -89,7 +89,7 @@ def assemble_group(
     run_up = without_massless(run_up_terms(model, state, shapes, Mphi, harmonic), reduced)
     if (settings.output.gauss or settings.output.nodal_stress) and settings.output.stress_at(harmonic):
         report("strain and stress modes")
-    return ModalGroup(
+    group = ModalGroup(
         **of_solution(settings, rows, s, phi, n, state.u.reshape(-1)),
         speed=speed,
         damping_ratio=ratios,
@@ -108,6 +108,16 @@ def assemble_group(
         contacts=contact_states(model.d.mesh, settings, state.contacts),
         residual=_residual(model, settings, state, rows, s, harmonic),
     )
+    return group if settings.output.shapes_at(harmonic) else _without_shapes(group)
+
+
+def _without_shapes(group: ModalGroup) -> ModalGroup:
+    """The group without displacements of the mesh and of the points of its patches."""
+    faces = {name: replace(face, shapes=face.shapes[:0]) for name, face in group.interfaces.items()}
+    residual = group.residual
+    if residual is not None:
+        residual = replace(residual, phi=residual.phi[:0])
+    return replace(group, phi=group.phi[:0], interfaces=faces, residual=residual)
 
 
 def of_solution(

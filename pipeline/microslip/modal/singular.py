@@ -64,8 +64,8 @@ class _Surface:
     Attributes:
         nodes: (f, 9) of the facets, the last one again where they have fewer. corners: (f, 4), of a triangle likewise.
         area: (f, 3) m2, outwards. middle: (f, 3) m.
-        edges: (e, 2) corners, in order. owner: (e, 2) facets of an edge, -1: none. wall: 2 V/S, m. inside: (n,) which
-            nodes lie on a cut face of a cyclic sector: what lies wholly in it is no surface of the ring.
+        edges: (e, 2) corners, in order. owner: (e, 2) facets of an edge, -1: none. wall: 2 V/S, m. cut: (2, n) which
+            nodes lie on either cut face of a cyclic sector: what lies wholly in one is no surface of the ring.
     """
 
     mesh: Mesh
@@ -76,23 +76,24 @@ class _Surface:
     edges: Indices
     owner: Indices
     wall: float
-    inside: Flags
+    cut: Flags
 
     @classmethod
     def of(cls, mesh: Mesh, settings: BodySettings) -> _Surface:
         facets = boundary_facets(mesh)
         nodes = np.concatenate([_filled(f, 9) for f in facets.values()])
         corners = np.concatenate([_filled(f[:, : FACET_CORNERS[kind]], 4) for kind, f in facets.items()])
-        inside = np.zeros(mesh.n_points, dtype=bool)
-        for face in (settings.cyclic.left, settings.cyclic.right) if settings.cyclic else ():
-            inside[mesh.face_points(face)] = True
+        cut = np.zeros((2, mesh.n_points), dtype=bool)
+        faces = (settings.cyclic.left, settings.cyclic.right) if settings.cyclic else ()
+        for of_face, face in zip(cut, faces, strict=False):
+            of_face[mesh.face_points(face)] = True
         a, b, c, d = mesh.points[corners].swapaxes(0, 1)
         area, middle = 0.5 * np.cross(c - a, d - b), (a + b + c + d) / 4
         volume = np.einsum("fi,fi->", area, middle - mesh.points.mean(axis=0)) / 3
-        real = ~inside[corners].all(axis=1)
+        real = ~_wholly(cut, corners)
         wall = 2 * volume / np.linalg.norm(area[real], axis=1).sum()
         edges, owner = _edges(corners)
-        return cls(mesh, nodes, corners, area, middle, edges, owner, float(wall), inside)
+        return cls(mesh, nodes, corners, area, middle, edges, owner, float(wall), cut)
 
     def rim(self, nodes: Indices, wholly: bool = True) -> tuple[Array, float]:
         """Points along the edges of the facets whose corners are all among some nodes, and of those that belong to no
@@ -101,7 +102,7 @@ class _Surface:
         among[nodes] = True
         mine = among[self.corners].all(axis=1)
         on: Flags = (self.owner >= 0) & mine[self.owner]
-        rim = np.flatnonzero((on.sum(axis=1) == 1) & ~self.inside[self.edges].all(axis=1))
+        rim = np.flatnonzero((on.sum(axis=1) == 1) & ~_wholly(self.cut, self.edges))
         length = np.linalg.norm(np.diff(self.mesh.points[self.edges[rim]], axis=1)[:, 0], axis=1)
         around, size = length.sum(), np.linalg.norm(self.area[mine], axis=1).sum()
         if not wholly:
@@ -113,7 +114,7 @@ class _Surface:
 
     def inner(self) -> tuple[Array, float]:
         """Points along the sharp inner edges, and the width of their zone."""
-        both = np.flatnonzero((self.owner >= 0).all(axis=1) & ~self.inside[self.edges].all(axis=1))
+        both = np.flatnonzero((self.owner >= 0).all(axis=1) & ~_wholly(self.cut, self.edges))
         one, other = self.owner[both].T
         turned = self._cosine(one, other) < SHARP
         inwards = np.einsum("ei,ei->e", self.middle[other] - self.middle[one], self.area[one]) > 0
@@ -143,6 +144,11 @@ class _Surface:
             lengths += [np.linalg.norm(near[:, a] - near[:, b], axis=1) for a, b in CELL_TYPES[kind].edges]
         every = np.concatenate(lengths)
         return float(every.mean()) if len(every) else 0.0
+
+
+def _wholly(cut: Flags, nodes: Indices) -> Flags:
+    """(k,) whether all of some nodes (k, m) lie on one of two faces (2, n)."""
+    return np.asarray(cut[:, nodes].all(axis=2).any(axis=0))
 
 
 def _filled(nodes: Indices, count: int) -> Indices:

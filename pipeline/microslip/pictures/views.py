@@ -411,7 +411,8 @@ def stress_sheet(studio: Studio, group: ModalGroup, count: int, camera: Camera) 
     """Equivalent stress of the first elastic modes at 1 mm largest displacement (None without nodal stresses)."""
     stress = group.stresses.get("nodes")
     chosen = [j for j in range(group.n_modes) if group.kind[j] != "rigid"][:count]
-    if stress is None or len(stress.points) != studio.basis.mesh.n_points or not chosen:
+    known = stress is not None and len(stress.points) == len(group.phi) == studio.basis.mesh.n_points
+    if stress is None or not known or not chosen:
         return None
     tiles = []
     for j in chosen:

@@ -559,6 +559,7 @@ class Output(Model):
     nodal_stress: bool = True
     stiffening: bool = False
     stress_nodal_diameters: NodalDiameters = "all"
+    shape_nodal_diameters: NodalDiameters = "all"
 
     @model_validator(mode="after")
     def _possible(self) -> Output:
@@ -569,6 +570,10 @@ class Output(Model):
     def stress_at(self, harmonic: int) -> bool:
         """Whether strain and stress modes are wanted of a nodal diameter."""
         return self.stress_nodal_diameters == "all" or harmonic in self.stress_nodal_diameters
+
+    def shapes_at(self, harmonic: int) -> bool:
+        """Whether shapes of the body and of its patches are wanted of a nodal diameter."""
+        return self.shape_nodal_diameters == "all" or harmonic in self.shape_nodal_diameters
 
 
 class BodySettings(Model):
@@ -624,12 +629,14 @@ class BodySettings(Model):
                 raise ValueError('material.from: "mesh" needs geometry.mesh; write density, young and poisson instead')
         if self.closures and self.rotation.prestress != "nonlinear":
             raise ValueError('closures: contact is found by Newton only; set rotation.prestress = "nonlinear"')
-        beyond = self.output.stress_nodal_diameters
-        if beyond != "all" and max(beyond, default=0) > (self.cyclic.sectors // 2 if self.cyclic else 0):
-            raise ValueError(
-                f"output.stress_nodal_diameters: {max(beyond)} is more than "
-                f"{f'{self.cyclic.sectors} sectors' if self.cyclic else 'a body without [cyclic]'} can have; correct it"
-            )
+        for key in ("stress_nodal_diameters", "shape_nodal_diameters"):
+            beyond = getattr(self.output, key)
+            if beyond != "all" and max(beyond, default=0) > (self.cyclic.sectors // 2 if self.cyclic else 0):
+                raise ValueError(
+                    f"output.{key}: {max(beyond)} is more than "
+                    f"{f'{self.cyclic.sectors} sectors' if self.cyclic else 'a body without [cyclic]'} can have; "
+                    "correct it"
+                )
         return self
 
     def _only_what_matrices_can(self) -> None:

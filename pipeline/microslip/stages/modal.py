@@ -12,6 +12,7 @@ import numpy as np
 
 from .. import __version__
 from ..basis import write_basis
+from ..basis.files import size_in_words
 from ..data import Array, Mesh, ModalBasis
 from ..errors import UserError, told_of
 from ..files import store
@@ -44,7 +45,8 @@ def modes_stage(
 
     def work() -> Made:
         basis, told = basis_of(job, mesh_file, report) if matrices is None else _from_matrices(job, matrices, report)
-        report(f"writing {stage.product}")
+        size = size_in_words(basis)
+        report(f"writing {stage.product}{', ' * bool(size)}{size}")
         write_basis(stage.product, basis)
         warnings.extend(told)
         return Made(note={"warnings": warnings})
