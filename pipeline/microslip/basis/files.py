@@ -101,10 +101,11 @@ def size_in_words(basis: ModalBasis) -> str:
     """About how large the file of a basis is, before it is compressed, and what makes it so."""
     groups = [*basis.groups.values(), *(g for r in basis.ranges.values() for g in r.samples)]
     arrays = {id(a): a.nbytes for g in groups for a in (g.phi, *(f.shapes for f in g.interfaces.values()))}
+    states = {id(g.u_static): g.u_static.nbytes for g in groups}
     shapes = sum(arrays.values())
     sets = [s for g in groups for s in g.stresses.values()]
     sets_bytes = sum(s.strain.nbytes + s.stress.nbytes for s in sets) // 2
-    whole = shapes + sets_bytes + sum(g.u_static.nbytes for g in groups) + sum(s.static_stress.nbytes for s in sets)
+    whole = shapes + sets_bytes + sum(states.values()) + sum(s.static_stress.nbytes for s in sets)
     if whole < ANNOUNCED:
         return ""
     each = {"shapes (output.shapes, output.patch_shapes)": shapes,
@@ -285,9 +286,18 @@ def _write_state(group: h5py.Group, g: ModalGroup, axis: Array, scales: Scales) 
     where.attrs["gyroscopic"] = 0
     where.attrs["terms"] = "1: inside K_r and the modes; the gyroscopic term never is, it stands beside as G_r, and a "
     "circulatory one as N_r"
-    write(group, g, scales, part="rotation/")
+    if (known := _state_of_speed(group, g.u_static)) is None:
+        write(group, g, scales, part="rotation/")
+    else:
+        where["u_static"] = known
     for name, s in sorted(g.stresses.items()):
         write(group, s, None, name, part="rotation/")
+
+
+def _state_of_speed(group: h5py.Group, u: Array) -> h5py.Dataset | None:
+    """The static displacement that another nodal diameter of the same speed has written, if it is this one."""
+    others = (h.get("rotation/u_static") for h in group.parent.values() if h.name != group.name)
+    return next((d for d in others if d is not None and np.array_equal(d[()], u)), None)
 
 
 def _write_residual(group: h5py.Group, r: Residual, scales: Scales) -> None:

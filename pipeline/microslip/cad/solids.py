@@ -8,7 +8,6 @@ import os
 import re
 import sys
 import tempfile
-import threading
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -16,7 +15,7 @@ from pathlib import Path
 import gmsh
 import numpy as np
 
-from microslip.cad.drawing import boundary_surfaces, warn
+from microslip.cad.drawing import boundary_surfaces, time_limit, warn
 from microslip.cad.marks import Marks, marks_of
 from microslip.errors import UserError
 from microslip.files.store import ordinary
@@ -84,23 +83,6 @@ def sew(shapes: Sequence[tuple[int, int]]) -> None:
     with contextlib.suppress(Exception):  # stays surfaces, which load() refuses
         skin = gmsh.model.occ.addSurfaceLoop([tag for dim, tag in shapes if dim == 2], sewing=True)
         gmsh.model.occ.addVolume([skin])
-
-
-@contextlib.contextmanager
-def time_limit(seconds: float, text: str) -> Iterator[None]:
-    """Leave the process when the body of the `with` hangs in foreign code."""
-
-    def leave() -> None:
-        os.write(2, f"{text}\n".encode())
-        os._exit(2)
-
-    timer = threading.Timer(seconds, leave)
-    timer.daemon = True
-    timer.start()
-    try:
-        yield
-    finally:
-        timer.cancel()
 
 
 @contextlib.contextmanager

@@ -15,21 +15,22 @@ from ..mesh.cards import files_of
 from ..mesh.chosen import bodies, of_instances
 from .importing import Imported, body_name, import_file, refuse_taken
 from .parts import Part, Patch, Shape, add_lines, case_lines, drive
+from .stage import Report
 
 
-def import_deck(file: Path, folder: Path | None, unit: str) -> Imported:
+def import_deck(file: Path, folder: Path | None, unit: str, report: Report = lambda _: None) -> Imported:
     """Import a file; a deck whose instances make several bodies in contact becomes an assembly.
 
     Raises:
         UserError: unreadable files, files that are there already.
     """
     if file.suffix.lower() != ".inp" or unit not in UNITS or not _touches(file):
-        return import_file(file, folder, unit)
+        return import_file(file, folder, unit, report=report)
     mesh = read_mesh(file, unit)
     groups = bodies(mesh) if mesh.instances else []
     joints = [(joint, ends) for joint in mesh.joints if (ends := _between(mesh, groups, joint))]
     if not joints:
-        return import_file(file, folder, unit)
+        return import_file(file, folder, unit, report=report)
     home = folder or Path(body_name(file.stem))
     names = [body_name("-".join(group)) for group in groups]
     parts = [Part(file, name, home / name / "body.toml") for name in names]

@@ -113,17 +113,20 @@ def _run_mesher(job: Job, source: Path, product: Path) -> list[str]:
     return [line for line in done.stderr.splitlines() if line.startswith("warning:")]
 
 
-def run_apart(words: list[str], scratch: str) -> subprocess.CompletedProcess[str]:
+def run_apart(
+    words: list[str], scratch: str, limit: float | None = None
+) -> subprocess.CompletedProcess[str]:
     """Run a Python file, or -m and a module, in a process of its own, as gmsh is.
 
-    It ends when this process does, however that ends, and then removes the folder `scratch`.
+    It ends when this process does, however that ends, and then removes the folder `scratch`; after `limit` seconds it
+    is ended and `subprocess.TimeoutExpired` raised.
     """
     paths = [str(PACKAGE.parent), os.environ.get("PYTHONPATH", "")]
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(p for p in paths if p)}
     read, write = os.pipe()  # which nobody writes to: its end is the end of this process
     try:
         command = [sys.executable, "-c", _TO_THE_END, scratch, *words]
-        return subprocess.run(command, stdin=read, capture_output=True, text=True, env=environment)
+        return subprocess.run(command, stdin=read, capture_output=True, text=True, env=environment, timeout=limit)
     finally:
         os.close(read)
         os.close(write)

@@ -22,6 +22,7 @@ from ..mesh import UNITS, boundary_facets, read_mesh
 from ..mesh.touching import touches
 from ..settings.toml import load_toml
 from .importing import CAD, MATRICES, Imported, body_name, cad_result, import_file, refuse_taken
+from .stage import Report
 
 NORMAL_STIFFNESS, TANGENTIAL_STIFFNESS = 4e11, 2e11
 """N/m3, per area of a joint of machined steel: where an own case begins, not a property of it."""
@@ -72,7 +73,9 @@ class Patch:
     friction: float = 0.2
 
 
-def import_parts(files: Sequence[Path], folder: Path | None, unit: str) -> Imported:
+def import_parts(
+    files: Sequence[Path], folder: Path | None, unit: str, report: Report = lambda _: None
+) -> Imported:
     """Write a body.toml around each of several files, with its faces where it touches the others, and a case.toml.
 
     Args:
@@ -85,6 +88,7 @@ def import_parts(files: Sequence[Path], folder: Path | None, unit: str) -> Impor
     """
     home, parts = _parts(files, folder)
     unit = _unit_of(files, unit)
+    report("where the parts touch")
     shapes, patches = _found(parts, unit)
     if not patches:
         raise UserError(
@@ -95,7 +99,7 @@ def import_parts(files: Sequence[Path], folder: Path | None, unit: str) -> Impor
     told: list[str] = []
     for number, part in enumerate(parts):
         if not part.there:
-            written = import_file(part.file, part.body.parent, unit).told[:-1]
+            written = import_file(part.file, part.body.parent, unit, report=report).told[:-1]
             told += [text.splitlines()[0] for text in written]  # a table of surfaces stands in the body.toml as well
         add_lines(part, _joints(parts, number, patches, unit))
     told += [_sentence(parts, patch, unit) for patch in patches]
@@ -154,7 +158,7 @@ def _refuse_named(parts: Sequence[Part], patches: Sequence[Patch]) -> None:
                 raise UserError(f"{parts[i].body}: has a face or an interface '{face}' already; rename or remove it")
 
 
-def import_apart(file: Path, folder: Path | None) -> Imported:
+def import_apart(file: Path, folder: Path | None, report: Report = lambda _: None) -> Imported:
     """The solids of one CAD file as parts of an assembly, each in a file of its own beside its body.toml.
 
     Raises:
@@ -164,12 +168,13 @@ def import_apart(file: Path, folder: Path | None) -> Imported:
     if not ordinary(file).is_file():
         raise UserError(f"{file}: there is no such file; correct the path")
     refuse_taken(home)
+    report(f"solids of {file}")
     with tempfile.TemporaryDirectory() as scratch:
         names = json.loads(cad_result(["--apart", str(file.resolve()), scratch]))
         made = [home / name / f"{name}.step" for name in names]
         for new in made:
             write_text(new, (Path(scratch) / new.name).read_text(encoding="utf-8"))
-    return import_parts(made, home, "mm")
+    return import_parts(made, home, "mm", report)
 
 
 def _unit_of(files: Sequence[Path], unit: str) -> str:
