@@ -47,8 +47,8 @@ def main(arguments: list[str]) -> None:
     elif len(arguments) == 2:
         guarded(lambda: mesh_cad(*arguments), arguments[0])
     else:
-        ways = "SETTINGS OUT.msh", "--list FILE UNIT [TRIANGLES.npz [coarse]]", "--apart FILE FOLDER", "--touches UNIT FILES"
-        sys.exit(f"usage: python -m microslip.cad {' | '.join(ways)}")
+        ways = "SETTINGS OUT.msh | --list FILE UNIT [OUT.npz [coarse]] | --apart FILE FOLDER | --touches UNIT FILES"
+        sys.exit(f"usage: python -m microslip.cad {ways}")
 
 
 if __name__ == "__main__":

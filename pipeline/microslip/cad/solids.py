@@ -20,6 +20,7 @@ from microslip.cad.marks import Marks, marks_of
 from microslip.errors import UserError
 from microslip.files.store import ordinary
 from microslip.mesh import UNITS
+from microslip.plausible import EXTENT
 
 OCC_UNITS = {"m": "M", "cm": "CM", "mm": "MM", "um": "UM", "in": "INCH", "ft": "FT"}
 ENDS = {  # how a complete text file of the kind ends; OpenCASCADE takes half files for whole, or hangs in them
@@ -171,8 +172,8 @@ def count_parts(solids: Sequence[tuple[int, int]]) -> int:
 
 
 def warn_of_unit(path: Path, unit: str) -> None:
-    """Bodies above 100 m or below 1 mm are mostly a wrong unit."""
+    """Bodies above 100 m or below 1 mm are mostly a wrong unit (`plausible.EXTENT`)."""
     box = np.reshape(gmsh.model.getBoundingBox(-1, -1), (2, 3)) * UNITS[unit]
     size = float(np.linalg.norm(box[1] - box[0]))
-    if not 1e-3 <= size <= 100:
+    if not EXTENT[0] <= size <= EXTENT[1]:
         warn(f"{path.name} is {size:.3g} m long in length_unit = {unit!r}; is the unit right?")

@@ -145,6 +145,7 @@ def _run(
         *say.too_coarse(settings, *stuck),
         *say.not_converged(responses),
         *say.idle(idle),
+        *say.doubted(built, resonances, max(forces, default=None)),
         *say.overhangs(responses, resonances),
         *edges.messages(at_the_ends),
     ]

@@ -100,7 +100,7 @@ class _Surface:
         such facet; and the width of the zone. wholly: else only edges across which the surface goes on."""
         among = np.zeros(self.mesh.n_points, dtype=bool)
         among[nodes] = True
-        mine = among[self.corners].all(axis=1)
+        mine: Flags = np.asarray(among[self.corners].all(axis=1))
         on: Flags = (self.owner >= 0) & mine[self.owner]
         rim = np.flatnonzero((on.sum(axis=1) == 1) & ~_wholly(self.cut, self.edges))
         length = np.linalg.norm(np.diff(self.mesh.points[self.edges[rim]], axis=1)[:, 0], axis=1)

@@ -19,6 +19,7 @@ from pydantic import (
     model_validator,
 )
 
+from .. import plausible
 from ..data import Array, Material
 from ..elasticity import isotropic, orthotropic, turned_strain
 from ..mesh import UNITS
@@ -729,16 +730,10 @@ def implausible(settings: BodySettings, size: float) -> list[str]:
     found = []
     m = settings.material
     if isinstance(m, MaterialSettings) and not m.unusual:
-        if not 300 <= m.density <= 25000:
-            found.append(f"material.density = {m.density:g} kg/m3 is no solid's; SI is kg/m3 (steel 7850)")
         stiff = max(m.young) if isinstance(m.young, tuple) else m.young
-        if not 1e8 <= stiff <= 1.3e12:
-            found.append(f"material.young = {stiff:g} Pa is no structural solid's; SI is Pa (steel 2.1e11)")
-    if not 1e-3 <= size <= 50:
-        found.append(
-            f'the body is {size:g} m long; is length_unit = "{settings.length_unit}" right? '
-            "(material.unusual = true silences warnings of this kind)"
-        )
+        found += [plausible.density("material.density", m.density), plausible.modulus("material.young", stiff)]
+    if text := plausible.extent(size, settings.length_unit):
+        found.append(f"{text} (material.unusual = true silences warnings of this kind)")
     if settings.mesh.size is not None and settings.mesh.size > size:
         found.append(f"mesh.size = {settings.mesh.size:g} m is more than the body's {size:g} m; is it in length_unit?")
-    return [] if m.unusual else found
+    return [] if m.unusual else [text for text in found if text]

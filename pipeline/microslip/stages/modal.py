@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from .. import __version__
+from .. import __version__, plausible
 from ..basis import write_basis
 from ..basis.files import size_in_words
 from ..data import Array, Mesh, ModalBasis
@@ -48,6 +48,9 @@ def modes_stage(
         size = size_in_words(basis)
         report(f"writing {stage.product}{', ' * bool(size)}{size}")
         write_basis(stage.product, basis)
+        for text in plausible.of_basis(basis):
+            told.append(f"{job.path}: {text}")
+            report(f"warning: {told[-1]}")
         warnings.extend(told)
         return Made(note={"warnings": warnings})
 
