@@ -296,7 +296,8 @@ def _write_state(group: h5py.Group, g: ModalGroup, axis: Array, scales: Scales) 
 
 def _state_of_speed(group: h5py.Group, u: Array) -> h5py.Dataset | None:
     """The static displacement that another nodal diameter of the same speed has written, if it is this one."""
-    others = (h.get("rotation/u_static") for h in group.parent.values() if h.name != group.name)
+    beside = (h for h in group.parent.values() if isinstance(h, h5py.Group) and h.name != group.name)
+    others = (h.get("rotation/u_static") for h in beside)
     return next((d for d in others if d is not None and np.array_equal(d[()], u)), None)
 
 
