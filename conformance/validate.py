@@ -169,7 +169,7 @@ def _object(place, item, entry, words, schema, sizes, imaginary):
     if entry["type"] == "text":
         if item.dtype.kind != "S":
             found.append(f"{place}: must hold fixed-length text, has {item.dtype}")
-    elif item.dtype.str[1:] != kind:
+    elif item.dtype.str[1:] not in (kind, "f4" if entry.get("single") else kind):
         found.append(f"{place}: must hold 64-bit {entry['type']} numbers, has {item.dtype}")
     if imaginary and not entry.get("complex"):
         found.append(f"{place}: nothing there may be complex")

@@ -217,6 +217,7 @@ MEANING: dict[str, tuple[str, str]] = {
     "cyclic.right": ("", "face towards the next sector: the left one turned by 2 pi / N about the rotation axis"),
     "cyclic.nodal_diameters": ("", "which to analyse, or all from 0 to N/2"),
     "output.stress_nodal_diameters": ("", "nodal diameters whose stress modes are kept (a file grows by them)"),
+    "output.shape_nodal_diameters": ("", "nodal diameters whose shapes, of body and patches, are kept"),
     "rotation.speeds_rpm": ("rpm", "speeds to analyse, rising"),
     "rotation.prestress": ("", "how the stiffness at speed is made, see [modes](modes.md#equilibrium-at-speed)"),
     "rotation.spin_softening": ("", "whether -Omega^2 M P is in K"),

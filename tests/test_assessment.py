@@ -70,7 +70,7 @@ def test_resonances_and_their_stresses(response: Response) -> None:
     assert cycle.amplitude.max() == a[10.0].worst.amplitude == cycle_stress(motion).amplitude.max()
     assert [list(row) for row in found.table()][0] == [
         "normal_force_N", "frequency_Hz", "amplitude_m", "stress_amplitude_Pa", "frequency_of_stress_Hz",
-        "mean_stress_Pa", "location_mm",
+        "mean_stress_Pa", "location_mm", "singular_stress_amplitude_Pa", "singular_location_mm",
     ]  # fmt: skip
     with_limits = assess(response, small_basis(), "tip-probe", limits=LIMITS).table()[0]
     assert with_limits["reserve_factor"] == pytest.approx(300e6 / a[1.0].worst.amplitude, rel=1e-6)

@@ -17,7 +17,9 @@ import numpy as np
 import pytest
 from processes import run
 
+from microslip.basis.integrals import cell_volumes
 from microslip.mesh import mesh_problems, read_mesh
+from microslip.stages import importing
 
 pytestmark = pytest.mark.skipif(importlib.util.find_spec("gmsh") is None, reason="gmsh is not installed")
 
@@ -63,6 +65,20 @@ keep("open.brep")
 ring = occ.cut([(2, occ.addDisk(25, 0, 0, 10, 10))], [(2, occ.addDisk(25, 0, 0, 9, 9))])[0]
 occ.remove(occ.revolve(ring, 0, 0, 0, 0, 1, 0, math.pi / 2)[:0] + ring, recursive=True)
 keep("elbow.step")
+
+def airfoil(chord, turn, z):
+    points = []
+    for i in range(12):
+        t = math.pi * i / 6
+        x = 0.5 * (1 + math.cos(t))
+        y = chord * (0.096 * math.sin(t) * (1.1 - x) + 0.25 * x * (1 - x))
+        x = chord * (x - 0.4)
+        points.append(occ.addPoint(x * math.cos(turn) - y * math.sin(turn),
+                                   x * math.sin(turn) + y * math.cos(turn), z))
+    return occ.addWire([occ.addSpline([*points, points[0]])])
+
+occ.addThruSections([airfoil(40 - 4 * k, 0.2 * k, 20 * k) for k in range(5)])
+keep("airfoil.step")
 gmsh.finalize()
 """
 
@@ -452,3 +468,29 @@ def table_of(cad: Path) -> list[str]:
 )  # fmt: skip
 def test_parts_that_cannot_be_cut(plates: Path, tmp_path: Path, rules: list, words: list[str]) -> None:
     refused(plates / "lower.step", tmp_path / "lower.msh", *words, faces=rules)
+
+
+def test_an_airfoil_of_one_closed_spline(parts: Path, tmp_path: Path) -> None:
+    """Its surface meets itself along a seam, which gmsh refines for ever where it mends triangles that overlap: a table
+    with triangles for its picture, and a mesh of its volume to 2 %: 0.0908 of a square over its chord (periodic cubic
+    spline), that shrinks from 40 to 24 mm, and not what OpenCASCADE integrates."""
+    out = tmp_path / "surfaces.npz"
+    listed = run(["microslip.cad", "--list", str(parts / "airfoil.step"), "mm", str(out)], module=True)
+    assert listed.returncode == 0 and "BSpline surface" in listed.stdout
+    assert len(np.load(out)["triangles"]) < 20_000
+    done = mesh_cad(parts / "airfoil.step", tmp_path / "a.msh", size=8)
+    assert done.returncode == 0, done.stderr
+    drawn = 0.0908 * 80 * (40**2 + 40 * 24 + 24**2) / 3 * 1e-9
+    assert cell_volumes(read_mesh(tmp_path / "a.msh", "mm")) == pytest.approx(drawn, rel=0.02)
+
+
+@pytest.mark.parametrize("limit, tries", [(0.05, 3), (60.0, 1)])
+def test_a_picture_that_takes_too_long_is_left_out(
+    parts: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, limit: float, tries: int
+) -> None:
+    """Triangles as the surfaces bend, coarse ones, then the table alone, each told before it begins."""
+    monkeypatch.setattr(importing, "LONGEST_LOOK", limit)
+    monkeypatch.setattr(importing, "_draw", lambda *_: "")
+    told: list[str] = []
+    text, reason = importing.cad_table(parts / "bracket.step", "mm", tmp_path / "a.png", told.append)
+    assert "surface kind" in text and len(told) == tries and bool(reason) == (tries == 3)

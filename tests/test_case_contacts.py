@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import dataclasses
 import shutil
 import subprocess
 import sys
@@ -83,6 +84,26 @@ def test_what_drives_a_held_place_is_refused_and_what_reads_there_is_told(reduct
     assert [m for m in found.messages if "Monitor 'tip-probe' reads no u_x: 'small' is held there" in m]
     sound = build(made(raw), {"small": small.basis()}, PATH)
     assert not [m for m in sound.messages if "Monitor" in m]
+
+
+def clamped_beside(part: float) -> dict[str, Any]:
+    """The beam held on its right face, from the foot up to a part of its height."""
+    mesh = small.beam()
+    x, _, z = mesh.points.T
+    sets = dict(mesh.point_sets) | {"clamped": np.flatnonzero((x > small.SIZE[0] - 1e-9) & (z < part * HEIGHT + 1e-9))}
+    own = small.table(supports=[{"face": "clamped"}])
+    return {"small": modal_basis(dataclasses.replace(mesh, point_sets=sets), BodySettings.model_validate(own))}
+
+
+@pytest.mark.parametrize("raw", [table(**STIFF), two()], ids=["ground", "two"])
+def test_a_contact_on_a_face_that_supports_hold_is_refused(raw: dict[str, Any]) -> None:
+    """With the face and the reason; of a part that is held the share of the area is told."""
+    with pytest.raises(UserError, match="contacts.*: the supports of 'small' hold the face"):
+        build(made(raw), dict.fromkeys(["small", "a", "b"], clamped_beside(1.0)["small"]), PATH)
+    some = build(made(raw), dict.fromkeys(["small", "a", "b"], clamped_beside(0.5)["small"]), PATH)
+    assert [m for m in some.messages if "hold" in m and "% of the face 'right'" in m]
+    free = build(made(raw), dict.fromkeys(["small", "a", "b"], small.basis()), PATH)
+    assert not [m for m in free.messages if "of the face" in m]
 
 
 TWICE = table(**STIFF) | {"contacts": [{"interface": "right", "friction": 0.3} | STIFF] * 2}

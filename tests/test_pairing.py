@@ -159,6 +159,24 @@ def test_points_are_cut_at_the_outline() -> None:
     assert order == pytest.approx(-2, abs=0.1)
 
 
+def test_slivers_join_their_neighbours() -> None:
+    """A parallelogram whose sides pass a corner of the rectangles by a hair: no point carries less than a tenth of one;
+    area (and with it the stiffness, which goes by area) and first moments stay to rounding, as without joining."""
+    b, h, slant = 0.016, 0.05, 0.0081
+    outline = np.array([[-b, -h], [b, -h + slant], [b, h], [-b, h - slant]]) / 2
+    patch = face([1, 0, 0], [0, 0, 1], [0, 0, 0], extent=tuple(np.ptp(outline, axis=0)), outline=outline)
+    area = b * (h - slant / 2 * 1)
+    for counts in ((2, 8), (3, 25), (8, 2)):
+        points, areas = rigid_points(patch, counts)
+        assert areas.min() > 0.1 * b * h / np.prod(counts)
+        assert areas.sum() == pytest.approx(area, rel=1e-12)
+        np.testing.assert_allclose(areas @ points / area, 0, atol=1e-15)
+    triangle = np.array([[0.0, 0.0], [1e-2, 0.0], [1e-2, 1e-2]])
+    patch = face([1, 0, 0], [0, 0, 1], [0, 0, 0], extent=(1e-2, 1e-2), outline=triangle)
+    points, areas = rigid_points(patch, (1, 1))
+    assert areas.tolist() == pytest.approx([0.5e-4])
+
+
 def test_a_rectangle_is_the_books_grid() -> None:
     points, areas = rigid_points(face([1, 0, 0], [0, 0, 1], [0, 0, 0], (0.072, 0.005)), (12, 3))
     centres, each = grid(0.072, 0.005, (12, 3))

@@ -300,6 +300,12 @@ def the_group(mesh, count=8, **what):
     return modal_basis(mesh, body(**{"modes": {"count": count}, **what})).groups[0, 0]
 
 
+def test_supports_that_hold_every_point_are_refused():
+    mesh = brick("hexahedron", (1, 1, 1))
+    with pytest.raises(UserError, match="supports: hold every point"):
+        modal_basis(mesh, body(supports=[{"face": "x0"}, {"face": "x1"}]))
+
+
 @pytest.mark.parametrize("solver", ["auto", "superlu"])
 def test_static_compliance_of_a_held_body(solver):
     """B K^-1 B^T of a dense direct solution."""

@@ -736,17 +736,20 @@ def import_(file: Path, /, *more: Path, unit: str | None = None, apart: Apart = 
         unit: of lengths; if not given what the file tells (/UNITS of Ansys, data set 164), else mm.
     """
     from .stages.decks import import_apart, import_deck
+    from .stages.importing import CAD
     from .stages.parts import import_parts
 
     parts = [file, *(p for p in more if p.is_file() or (p / "body.toml").is_file() or p is not more[-1])]
     folder = more[-1] if len(parts) <= len(more) else None
     if apart and len(parts) > 1:
         raise UserError(f"import --apart: sets the solids of one file apart, and {len(parts)} parts are given")
-    made = (
-        import_apart(file, folder, unit)
-        if apart
-        else (import_deck(file, folder, unit) if len(parts) == 1 else import_parts(parts, folder, unit))
-    )
+    with progress(f"import {file}", quiet=file.suffix.lower() not in CAD) as report:
+        if apart:
+            made = import_apart(file, folder, unit, report)
+        elif len(parts) == 1:
+            made = import_deck(file, folder, unit, report)
+        else:
+            made = import_parts(parts, folder, unit, report)
     for line in made.told:
         print(line)
 

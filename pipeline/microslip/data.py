@@ -409,6 +409,10 @@ class StressSet:
         "place component", "Pa", "stress of the static state at speed", at="rotation/sigma_static/<name>"
     )]  # fmt: skip
     weights: Annotated[Array, Stored("place", "m^3", "volume that belongs to the place", at="stress/<name>/weights")]
+    singular: Annotated[Flags, Stored(
+        "place", "", "1 in the zone of a support, a contact's edge or a sharp inner edge, where stress is the mesh's, "
+        "see [results](results.md#where-not-to-look)", at="stress/<name>/singular", when="microslip writes it",
+    )] = field(default_factory=lambda: np.zeros(0, dtype=bool))  # fmt: skip
 
 
 CENTRIFUGAL = "rad2/s2"

@@ -99,6 +99,27 @@ def write_basis(path: Path | str, basis: ModalBasis) -> None:
         _write(file, basis)
 
 
+def size_in_words(basis: ModalBasis) -> str:
+    """About how large the file of a basis is, before it is compressed, and what makes it so."""
+    groups = [*basis.groups.values(), *(g for r in basis.ranges.values() for g in r.samples)]
+    arrays = {id(a): a.nbytes for g in groups for a in (g.phi, *(f.shapes for f in g.interfaces.values()))}
+    states = {id(g.u_static): g.u_static.nbytes for g in groups}
+    shapes = sum(arrays.values())
+    sets = [s for g in groups for s in g.stresses.values()]
+    sets_bytes = sum(s.strain.nbytes + s.stress.nbytes for s in sets) // 2
+    whole = shapes + sets_bytes + sum(states.values()) + sum(s.static_stress.nbytes for s in sets)
+    if whole < ANNOUNCED:
+        return ""
+    each = {"shapes (output.shapes, output.patch_shapes)": shapes,
+            "stress modes (output.gauss, output.nodal_stress)": sets_bytes}  # fmt: skip
+    told = ", ".join(f"{1e-6 * size:.0f} MB of {name}" for name, size in each.items() if size > 0.1 * whole)
+    return f"about {1e-6 * whole:.0f} MB: {told}"
+
+
+ANNOUNCED = 2e7
+"""Bytes of a file from which on its size is told before it is written."""
+
+
 def _write(file: h5py.File, basis: ModalBasis) -> None:
     scales = _write_root(file, basis)
     _write_mesh(file, basis.mesh, scales)
@@ -267,9 +288,19 @@ def _write_state(group: h5py.Group, g: ModalGroup, axis: Array, scales: Scales) 
     where.attrs["gyroscopic"] = 0
     where.attrs["terms"] = "1: inside K_r and the modes; the gyroscopic term never is, it stands beside as G_r, and a "
     "circulatory one as N_r"
-    write(group, g, scales, part="rotation/")
+    if (known := _state_of_speed(group, g.u_static)) is None:
+        write(group, g, scales, part="rotation/")
+    else:
+        where["u_static"] = known
     for name, s in sorted(g.stresses.items()):
         write(group, s, None, name, part="rotation/")
+
+
+def _state_of_speed(group: h5py.Group, u: Array) -> h5py.Dataset | None:
+    """The static displacement that another nodal diameter of the same speed has written, if it is this one."""
+    beside = (h for h in group.parent.values() if isinstance(h, h5py.Group) and h.name != group.name)
+    others = (h.get("rotation/u_static") for h in beside)
+    return next((d for d in others if d is not None and np.array_equal(d[()], u)), None)
 
 
 def _write_residual(group: h5py.Group, r: Residual, scales: Scales) -> None:
@@ -284,7 +315,7 @@ def _write_residual(group: h5py.Group, r: Residual, scales: Scales) -> None:
             item = where.create_group(f"{kind}/{name}")
             item["place"] = group[f"stress/{name}/place"]
             axes = [item["place"], scales["component"], where["force"]]
-            put(item, "T", values, f"{unit} per unit force", scales=axes)
+            put(item, "T", single(values), f"{unit} per unit force", scales=axes)
 
 
 def _read_residual(where: h5py.Group, n: int, gauges: dict[str, Rows], sets: dict[str, StressSet]) -> Residual:
@@ -295,16 +326,27 @@ def _read_residual(where: h5py.Group, n: int, gauges: dict[str, Rows], sets: dic
     return read(Residual, where, {"node": n}, gauges=own, **held)
 
 
+def single(values: Array) -> Array:
+    """The same in single precision: what is read and drawn, and goes into no equation of motion."""
+    return values.astype(np.complex64 if np.iscomplexobj(values) else np.float32)
+
+
+_SHARED = tuple(f"stress/<name>/{field}" for field in ("points", "weights", "singular"))
+"""What strain and stress of a set have in common."""
+
+
 def _write_stress(group: h5py.Group, name: str, s: StressSet, scales: Scales) -> None:
     """Places and weights of both stand with the stress; the strain's group has links."""
+    s = replace(s, strain=single(s.strain), stress=single(s.stress))
     stress, strain = (group.require_group(kind).create_group(name) for kind in ("stress", "strain"))
     for where in (stress, strain):
         where.attrs["location"] = s.location
         where.attrs["order"] = " ".join(VOIGT)
     strain.attrs["shear"] = "engineering"
-    write(group, s, scales, name, part=("stress/<name>/points", "stress/<name>/weights"))
-    for shared in ("place", "points", "weights"):
-        strain[shared] = stress[shared]
+    write(group, s, scales, name, part=_SHARED)
+    for shared in ("place", "points", "weights", "singular"):
+        if shared in stress:
+            strain[shared] = stress[shared]
     write(group, s, {**scales, "place": stress["place"]}, name, part=("strain/", "stress/<name>/T"))
 
 

@@ -4,7 +4,8 @@ Only this package and the build files import gmsh, and they are always run as th
 
     python geometry/blade/build.py SETTINGS OUT.msh      a body that draws itself
     python -m microslip.cad SETTINGS OUT.msh             STEP, BREP or IGES, faces picked by rules
-    python -m microslip.cad --list FILE UNIT [OUT.npz]   table of solids and faces to choose from; triangles of them
+    python -m microslip.cad --list FILE UNIT [OUT.npz]   table of solids and faces to choose from; triangles of them,
+                                                         and behind OUT.npz the word coarse: fewer of them
     python -m microslip.cad --apart FILE FOLDER          every solid as a STEP file of its own
     python -m microslip.cad --touches UNIT FILE FILE...  where parts touch, as JSON
 

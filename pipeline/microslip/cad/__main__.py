@@ -29,16 +29,16 @@ def mesh_cad(settings_file: str, out: str) -> None:
     finish(mesh, out)
 
 
-def tell(cad: str, unit: str, triangles: str = "") -> None:
+def tell(cad: str, unit: str, triangles: str = "", coarse: str = "") -> None:
     """Print the table of a CAD file; write triangles for a picture of it if a file is named."""
     print(table(Path(cad), unit))
     if triangles:
-        write_triangles(triangles, unit)
+        write_triangles(triangles, unit, bool(coarse))
 
 
 def main(arguments: list[str]) -> None:
     """Command line: see the package's docstring."""
-    if len(arguments) in (3, 4) and arguments[0] == "--list":
+    if len(arguments) in (3, 4, 5) and arguments[0] == "--list":
         guarded(lambda: tell(*arguments[1:]), arguments[1])
     elif len(arguments) == 3 and arguments[0] == "--apart":
         guarded(lambda: set_apart(*arguments[1:]), arguments[1])
@@ -47,7 +47,7 @@ def main(arguments: list[str]) -> None:
     elif len(arguments) == 2:
         guarded(lambda: mesh_cad(*arguments), arguments[0])
     else:
-        ways = "SETTINGS OUT.msh | --list FILE UNIT [TRIANGLES.npz] | --apart FILE FOLDER | --touches UNIT FILE FILE..."
+        ways = "SETTINGS OUT.msh | --list FILE UNIT [OUT.npz [coarse]] | --apart FILE FOLDER | --touches UNIT FILES"
         sys.exit(f"usage: python -m microslip.cad {ways}")
 
 

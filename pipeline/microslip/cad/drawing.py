@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import math
+import os
 import re
 import signal
 import sys
+import threading
 import tomllib
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -144,6 +147,25 @@ def finish(mesh: dict[str, Any], out: str) -> None:
         raise UserError(f"mesh.order = {order!r} must be 1 or 2")
     set_sizes(mesh)
     try:
+        straightened = generate(order)
+    except UserError:  # by other algorithms, where the first leaves triangles that overlap
+        gmsh.model.mesh.clear()
+        with time_limit(LONGEST_REPAIR, f"gmsh mends the surface for {LONGEST_REPAIR:.0f} s; try another mesh.size"):
+            straightened = generate(order, mend=True)
+    write(out)
+    tags, _, _ = gmsh.model.mesh.getNodes()
+    counts = [len(e) for e in gmsh.model.mesh.getElements(3)[1]]
+    print(f"{Path(out).name}: {len(tags)} nodes, {sum(counts)} elements, {straightened} straightened")
+
+
+LONGEST_REPAIR = 120.0  # seconds; gmsh refines the seam of a closed spline surface for ever
+
+
+def generate(order: int, mend: bool = False) -> int:
+    """Mesh in elements of an order; how many of them were straightened. mend: surfaces with overlapping triangles are
+    meshed anew in other ways, and finer."""
+    gmsh.option.setNumber("Mesh.AlgorithmSwitchOnFailure", mend)
+    try:
         gmsh.model.mesh.generate(3)
         gmsh.model.mesh.setOrder(order)
     except Exception as error:
@@ -152,10 +174,24 @@ def finish(mesh: dict[str, Any], out: str) -> None:
         raise UserError("gmsh left a solid without elements; try another mesh.size")
     straightened = straighten() if order == 2 else 0
     refuse_inverted()
-    write(out)
-    tags, _, _ = gmsh.model.mesh.getNodes()
-    counts = [len(e) for e in gmsh.model.mesh.getElements(3)[1]]
-    print(f"{Path(out).name}: {len(tags)} nodes, {sum(counts)} elements, {straightened} straightened")
+    return straightened
+
+
+@contextlib.contextmanager
+def time_limit(seconds: float, text: str) -> Iterator[None]:
+    """Leave the process when the body of the `with` hangs in foreign code."""
+
+    def leave() -> None:
+        os.write(2, f"{text}\n".encode())
+        os._exit(2)
+
+    timer = threading.Timer(seconds, leave)
+    timer.daemon = True
+    timer.start()
+    try:
+        yield
+    finally:
+        timer.cancel()
 
 
 def set_sizes(mesh: dict[str, Any]) -> None:

@@ -66,11 +66,17 @@ def table(path: Path, unit: str) -> str:
     return "\n".join([first, *solids, head, *faces])
 
 
-def write_triangles(out: str, unit: str) -> None:
-    """Triangles on the boundary of the file that `table` has read, for a picture: points in m, triangles, surfaces."""
+def write_triangles(out: str, unit: str, coarse: bool = False) -> None:
+    """Triangles on the boundary of the file that `table` has read, for a picture: points in m, triangles, surfaces.
+
+    coarse: without regard to how much the surfaces bend.
+    """
     box = np.reshape(gmsh.model.getBoundingBox(-1, -1), (2, 3))
-    gmsh.option.setNumber("Mesh.MeshSizeMax", float(np.linalg.norm(box[1] - box[0])) / 12)
-    gmsh.option.setNumber("Mesh.MeshSizeFromCurvature", 40)
+    diagonal = float(np.linalg.norm(box[1] - box[0]))
+    gmsh.option.setNumber("Mesh.MeshSizeMax", diagonal / 12)
+    gmsh.option.setNumber("Mesh.MeshSizeMin", diagonal / 150)
+    gmsh.option.setNumber("Mesh.MeshSizeFromCurvature", 0 if coarse else 40)
+    gmsh.option.setNumber("Mesh.AlgorithmSwitchOnFailure", 0)  # good enough to be looked at, see `drawing.generate`
     gmsh.model.mesh.generate(2)
     tags, xyz, _ = gmsh.model.mesh.getNodes()
     place = np.zeros(int(tags.max()) + 1, dtype=np.int64)

@@ -8,7 +8,6 @@ import os
 import re
 import sys
 import tempfile
-import threading
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -16,11 +15,12 @@ from pathlib import Path
 import gmsh
 import numpy as np
 
-from microslip.cad.drawing import boundary_surfaces, warn
+from microslip.cad.drawing import boundary_surfaces, time_limit, warn
 from microslip.cad.marks import Marks, marks_of
 from microslip.errors import UserError
 from microslip.files.store import ordinary
 from microslip.mesh import UNITS
+from microslip.plausible import EXTENT
 
 OCC_UNITS = {"m": "M", "cm": "CM", "mm": "MM", "um": "UM", "in": "INCH", "ft": "FT"}
 ENDS = {  # how a complete text file of the kind ends; OpenCASCADE takes half files for whole, or hangs in them
@@ -84,23 +84,6 @@ def sew(shapes: Sequence[tuple[int, int]]) -> None:
     with contextlib.suppress(Exception):  # stays surfaces, which load() refuses
         skin = gmsh.model.occ.addSurfaceLoop([tag for dim, tag in shapes if dim == 2], sewing=True)
         gmsh.model.occ.addVolume([skin])
-
-
-@contextlib.contextmanager
-def time_limit(seconds: float, text: str) -> Iterator[None]:
-    """Leave the process when the body of the `with` hangs in foreign code."""
-
-    def leave() -> None:
-        os.write(2, f"{text}\n".encode())
-        os._exit(2)
-
-    timer = threading.Timer(seconds, leave)
-    timer.daemon = True
-    timer.start()
-    try:
-        yield
-    finally:
-        timer.cancel()
 
 
 @contextlib.contextmanager
@@ -189,8 +172,8 @@ def count_parts(solids: Sequence[tuple[int, int]]) -> int:
 
 
 def warn_of_unit(path: Path, unit: str) -> None:
-    """Bodies above 100 m or below 1 mm are mostly a wrong unit."""
+    """Bodies above 100 m or below 1 mm are mostly a wrong unit (`plausible.EXTENT`)."""
     box = np.reshape(gmsh.model.getBoundingBox(-1, -1), (2, 3)) * UNITS[unit]
     size = float(np.linalg.norm(box[1] - box[0]))
-    if not 1e-3 <= size <= 100:
+    if not EXTENT[0] <= size <= EXTENT[1]:
         warn(f"{path.name} is {size:.3g} m long in length_unit = {unit!r}; is the unit right?")

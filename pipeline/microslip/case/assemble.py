@@ -12,6 +12,7 @@ import numpy as np
 
 from ..data import CENTRIFUGAL, Array, ModalBasis, ModalGroup
 from ..errors import UserError, told_of
+from ..operating.stress import READS_THE_MESH, in_singular_zone
 from ..process import prepare
 from ..reduced.compliance import SURFACE
 from ..system.assembly import Assembly, Contact, Load, Output
@@ -119,6 +120,7 @@ def build(settings: CaseSettings, bases: Mapping[str, ModalBasis], path: Path | 
     ring = Ring(settings.ring.blades, settings.base_order) if settings.ring else None
     outputs = _outputs(settings, bodies, path)
     messages += [_held(w) for w in outputs if _is_still(bodies[w.component], "monitor", w.monitor, w.label)]
+    messages += [_in_zone(w) for w in outputs if _reads_singular(bodies[w.component].group, w.monitor)]
     assembly = Assembly(flowing, tuple(made), loads, outputs, ring, settings.stuck_ratios)
     said = list(dict.fromkeys(messages))
     return Built(settings, bodies, tuple(contacts), tuple(springs), assembly, tuple(said), fitted)
@@ -255,6 +257,14 @@ def _is_still_in(g: ModalGroup, kind: Literal["excitation", "monitor"], name: st
     every = [np.abs(r.rows).max(initial=0.0) for rows in (g.interfaces, held) for r in rows.values()]
     moves = np.abs(own.rows[at]).max(initial=0.0) > STILL * max(every)
     return not moves and max(yields, default=0.0) <= STILL * statics.max(initial=0.0)
+
+
+def _reads_singular(g: ModalGroup, name: str) -> bool:
+    return name in g.gauges and in_singular_zone(g, g.gauges[name].point)
+
+
+def _in_zone(w: Output) -> str:
+    return f"Gauge '{w.monitor}' of '{w.component}' {READS_THE_MESH}; move it away, in body.toml."
 
 
 def _held(w: Output) -> str:

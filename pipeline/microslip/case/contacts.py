@@ -26,10 +26,12 @@ from ..system.component import Component
 from ..system.ground import Ground
 from ..system.nodal import Nodal, nodal, static_compliance
 from ..system.pairing import Pairing, facing, in_ring
+from ..units import percent
 from .compliance import Face, Springs, counted_once, static_answer
 from .loaded import Loaded, axis_of, body_of, place_of
 from .points import (
     curved_springs,
+    cut_at_the_outline,
     nodal_patch,
     number_of_points,
     patch_of,
@@ -72,7 +74,23 @@ def _sides(
     """The one or two bodies of a contact and their interfaces."""
     ends = settings.ends(c)
     loaded = [body_of(bodies, body, path, f"contacts.{c.interface}") for body, _ in ends]
-    return loaded, [b.face(name, path, "contacts") for b, (_, name) in zip(loaded, ends, strict=True)]
+    faces = [b.face(name, path, "contacts") for b, (_, name) in zip(loaded, ends, strict=True)]
+    for b, face, (_, name) in zip(loaded, faces, ends, strict=True):
+        if held_share(face) == 1.0:
+            raise UserError(
+                f"{path}: contacts.{c.interface}: the supports of '{b.basis.name}' hold the face '{name}', so that "
+                "nothing can open or slip there; free it in [[supports]] of the body, or take another face "
+                '(what stands still is against = "ground")'
+            )
+    return loaded, faces
+
+
+def held_share(face: Interface) -> float:
+    """Share of a patch's area that no coordinate of its body moves."""
+    if not len(face.shapes):
+        return 0.0 if face.rows.any() or face.characteristic.any() else 1.0
+    still = ~face.shapes.any(axis=(1, 2))
+    return 1.0 if still.all() else float(face.areas[still].sum() / face.areas.sum())
 
 
 At = Callable[[float | None], tuple["Contact", list[str]]]
@@ -94,6 +112,9 @@ def contact_at(
         second = ContactFace(*ends[1], met.frame, c.against_sector)
     moved = _ground(c, loaded, faces[0])
     said, found, compliance = [f"{c.interface}: {words}" for words in met.messages] if met else [], None, None
+    said += [f"{c.interface}: the supports of '{b.basis.name}' hold {percent(share)} of the face '{name}': nothing "
+             "opens or slips there by itself." for b, face, (_, name) in zip(loaded, faces, ends, strict=True)
+             if (share := held_share(face)) > 0]  # fmt: skip
     if c.patch == "nodal":
         found, first, second, compliance = _in_contact(
             path, c, lambda: _nodal(settings, components, c, (first, second), met)
@@ -114,6 +135,7 @@ def contact_at(
             else:
                 patch = _in_contact(path, c, lambda: patch_of(c, whole, c.what, faces[0], load))
         more = [words] * bool(words) + _in_contact(path, c, lambda: resolved(c, patch, load))
+        more += cut_at_the_outline(c, patch) if found is None else []
         press = partial(preloaded_contact, second=second, normal=c.normal_force, interference=c.interference or 0.0)
         made = _in_contact(path, c, lambda: press(c.interface, patch, first, compliance=compliance))
         return replace(made, ground=moved), more

@@ -18,7 +18,8 @@ from ..contact.solids import Solid
 from ..data import Array, Interface
 from ..errors import UserError
 from ..system.nodal import Nodal
-from ..system.pairing import rigid_points
+from ..system.pairing import SLIVER, rigid_points
+from ..units import counted, percent
 from .compliance import Springs
 from .settings import CaseSettings, ContactSettings
 
@@ -101,6 +102,17 @@ def _points(c: ContactSettings, face: Interface, asked: tuple[int, int]) -> tupl
         if abs(areas.sum() / (width * height) - 1) > 0.01:  # not a rectangle
             return places, areas
     return grid(width, height, counts)
+
+
+def cut_at_the_outline(c: ContactSettings, patch: Patch) -> list[str]:
+    """A message where the outline of a face leaves other points than are asked for."""
+    if c.points is None or c.fit == "exact" or len(patch.points) == number_of_points(c, None):
+        return []
+    return [
+        f"{c.interface}: points = [{c.points[0]}, {c.points[1]}] makes {counted(len(patch.points), 'point')}: the face "
+        f"is no rectangle along t1 and t2, its outline cuts the rectangles, and what is less than {percent(SLIVER)} of "
+        "one joins its neighbour; t2 of the interface turns them."
+    ]
 
 
 # curved faces -------------------------------------------------------------------------------------------------------

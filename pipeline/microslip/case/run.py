@@ -164,6 +164,7 @@ def _run(
         *say.not_found(responses, resonances),
         *say.idle(idle),
         *say.folded(folds, measured(built.assembly)),
+        *say.doubted(built, resonances, max(forces, default=None)),
         *say.overhangs(responses, resonances),
         *edges.messages(at_the_ends),
     ]

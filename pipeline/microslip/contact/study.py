@@ -13,6 +13,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from .. import plausible
 from ..errors import UserError, told_of
 from . import microslip
 from . import settings as S
@@ -83,7 +84,16 @@ def study(path: Path | str, assignments: list[str] | None = None) -> Study:
     if contact.file.wear is not None:
         _wear(contact, found)
     _limits(contact, found)
+    found.sentences += moduli_doubted("", settings)
     return Study(contact, found.tables, found.told, found.sentences, working)
+
+
+def moduli_doubted(where: str, law: S.ContactLaw) -> list[str]:
+    """What is said of moduli that no solid has. where: that they stand in, with a dot."""
+    keys = ("young", "young_2")
+    given = [(key, getattr(law.stiffness, key, None)) for key in keys]
+    told = [plausible.modulus(f"{where}stiffness.{key}", E) for key, E in given if E is not None]
+    return [text for text in told if text]
 
 
 # working point and normal law --------------------------------------------------------------------------------------

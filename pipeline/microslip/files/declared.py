@@ -152,7 +152,8 @@ def read(kind: type[Noun], group: h5py.Group, sizes: Mapping[str, int], name: st
             values[field] = _attributes(group[place] if place else group, attributes, hint)
         elif how.when and place not in group:
             shape = (0, *(sizes.get(d, 0) for d in how.over.split()[1:]))
-            values[field] = None if type(None) in getattr(hint, "__args__", ()) else np.zeros(shape)
+            nothing = np.zeros(shape, bool if hint == Flags else float)
+            values[field] = None if type(None) in getattr(hint, "__args__", ()) else nothing
         else:
             values[field] = _value(group, place, how, hint, sizes)
     return kind(**values, **known)

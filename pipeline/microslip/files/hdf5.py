@@ -92,13 +92,19 @@ def sealed(path: Path | str) -> Iterator[h5py.File]:
         seal(temporary)
 
 
+LARGE = 1 << 16
+"""Bytes of a dataset in single precision from which on it is compressed."""
+_PACKED: dict[str, Any] = {"compression": "gzip", "compression_opts": 1, "shuffle": True}
+
+
 def put(
     group: h5py.Group, name: str, data: Any, unit: str = "", dims: tuple[str, ...] = (),
     scales: Sequence[h5py.Dataset] = (),
 ) -> h5py.Dataset:  # fmt: skip
     """Write a dataset with its unit and its dimensions, named by `dims` or by `scales` (one for every axis).
 
-    Complex numbers become two datasets, the imaginary part under the name with `IMAGINARY` behind it.
+    Complex numbers become two datasets, the imaginary part under the name with `IMAGINARY` behind it. What is in single
+    precision is compressed.
     """
     data = np.asarray(data)
     if np.iscomplexobj(data):
@@ -106,7 +112,8 @@ def put(
         data = data.real
     if data.dtype.kind == "U":
         data = np.char.encode(data, "utf-8") if data.size else data.astype("S1")
-    dataset = group.create_dataset(name, data=data, track_times=False)
+    packed = _PACKED if data.dtype == np.float32 and data.nbytes > LARGE else {}
+    dataset = group.create_dataset(name, data=data, track_times=False, **packed)
     if unit:
         dataset.attrs["unit"] = unit
     for i, label in enumerate(dims or [s.name.rsplit("/", 1)[-1] for s in scales]):

@@ -1,4 +1,5 @@
-"""How strongly the blades of a ring are strained in the first harmonic: the worst of their nodes and gauges."""
+"""How strongly the blades of a ring are strained in the first harmonic: the worst of their gauges, and of their nodes
+outside the singular zones."""
 
 from __future__ import annotations
 
@@ -7,6 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..data import Array, ComplexArray, ModalGroup
+from ..operating.stress import counted
 from ..system.assembly import Assembly
 
 
@@ -44,7 +46,7 @@ def _stress(group: ModalGroup, q: ComplexArray) -> float:
     """Of s = Re(a exp(i t)) the largest s^T Q s over a cycle is (a^H Q a + abs(a^T Q a)) / 2."""
     if "nodes" not in group.stresses:
         return np.nan
-    a = group.stresses["nodes"].stress @ q
+    a = group.stresses["nodes"].stress[counted(group)] @ q
     b = a @ MISES
     squares = (a.conj() * b).sum(axis=1).real + np.abs((a * b).sum(axis=1))
     return float(np.sqrt(0.5 * squares.max()))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import scipy.sparse as sp
@@ -16,18 +16,21 @@ from ..settings.body import BodySettings, Excitation, InterfaceSettings, Monitor
 from .boundary import AXES, require_face
 from .equilibrium import BodyModel, StaticState
 from .rows import Location, Locator, NodeLocator, Patch, at_node, node_patch, patch, point_rows, slope_rows, turning_row
+from .singular import Zones, singular_zones
 
 INTERFACE_LABELS = INTERFACE_ROWS
 
 
 @dataclass(frozen=True)
 class BodyRows:
-    """All rows on nodal displacements, named. Each value is (B (r, 3n), labels, unit, point, distance)."""
+    """All rows on nodal displacements, named. Each value is (B (r, 3n), labels, unit, point, distance). zones: where
+    the stress is a property of the mesh."""
 
     patches: Mapping[str, Patch]
     excitations: Mapping[str, NamedRows]
     monitors: Mapping[str, NamedRows]
     gauges: Mapping[str, NamedRows]
+    zones: Zones = field(default_factory=Zones)
 
     def stacked(self, settings: BodySettings) -> tuple[sp.csr_matrix, tuple[str, ...]]:
         """Every interface (but load faces), excitation and monitor row, for the static compliance."""
@@ -83,7 +86,7 @@ def body_rows(mesh: Mesh, settings: BodySettings) -> BodyRows:
         direction = np.array(g.direction) / np.linalg.norm(g.direction)
         slopes = slope_rows(n, place, direction)
         gauges[g.name] = NamedRows(slopes, ("strain",), "1", place.point, place.distance, direction)
-    return BodyRows(patches, excitations, monitors, gauges)
+    return BodyRows(patches, excitations, monitors, gauges, singular_zones(mesh, settings))
 
 
 def with_centrifugal(rows: BodyRows, model: BodyModel, settings: BodySettings) -> BodyRows:

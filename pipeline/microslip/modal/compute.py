@@ -109,6 +109,8 @@ def prepared(mesh: Mesh, settings: BodySettings, temperature: Array | None) -> P
     d = discretise(mesh, degree, coupled=[coupled_points(p) for p in pairs])
     held = fixed_dofs(mesh, settings)
     fixed = held[held < 3 * mesh.n_points]
+    if len(fixed) == 3 * mesh.n_points:
+        raise UserError("supports: hold every point of the body, so that nothing vibrates; hold fewer of its faces")
     sector = make_sector(d, settings, held, axis, point) if settings.cyclic else None
     free = tied_upper(d.pattern, held, mesh.ties) if sector is None else sector.static
     rows = body_rows(mesh, settings)

@@ -10,6 +10,7 @@ import scipy.linalg
 import scipy.sparse as sp
 from scipy.spatial import ConvexHull, QhullError
 
+from .. import plausible
 from ..data import Array, Indices, Matrices, Mesh, ModalBasis, ModalGroup, Residual
 from ..errors import UserError
 from ..frames import skew
@@ -268,13 +269,12 @@ def _implausible(mesh: Mesh, mass: float) -> list[str]:
         volume = ConvexHull(mesh.points).volume
     except (QhullError, ValueError):  # nodes on a plane or a line
         return []
-    density = mass / volume
-    if 1 <= density <= 25000:
-        return []
-    return [
-        f"{mass:.4g} kg within {volume:.4g} m3 are {density:.3g} kg/m3, which is no solid's; check length_unit and "
-        "geometry.matrices.units"
-    ]
+    told = plausible.density(f"{mass:.4g} kg within {volume:.4g} m3: density", mass / volume, SPARSE)
+    return [f"{told}; check length_unit and geometry.matrices.units"] if told else []
+
+
+SPARSE = 1.0
+"""kg/m3 within the convex hull of a frame of beams, at least."""
 
 
 def _free(body: Matrices, settings: BodySettings) -> Indices:

@@ -89,7 +89,7 @@ def assemble_group(
     run_up = without_massless(run_up_terms(model, state, shapes, Mphi, harmonic), reduced)
     if (settings.output.gauss or settings.output.nodal_stress) and settings.output.stress_at(harmonic):
         report("strain and stress modes")
-    return ModalGroup(
+    group = ModalGroup(
         **of_solution(settings, rows, s, phi, n, state.u.reshape(-1)),
         speed=speed,
         damping_ratio=ratios,
@@ -99,7 +99,7 @@ def assemble_group(
         gyroscopic=_gyroscopic(settings, speed, reduced, run_up, s.found, s.kept),
         invariants=None if settings.cyclic else inertia_invariants(model, state, shapes, Mphi),
         gauges={k: reduced_gauge(v, phi, state) for k, v in rows.gauges.items()},
-        stresses=_stress_sets(model, settings, state, shapes, harmonic),
+        stresses=_stress_sets(model, settings, state, rows, shapes, harmonic),
         u_static=state.u,
         checks={**checks_of(s), **_checks(model, state), **s.indicators},
         prestress=state.prestress if (speed or model.loaded) else "none",
@@ -108,6 +108,16 @@ def assemble_group(
         contacts=contact_states(model.d.mesh, settings, state.contacts),
         residual=_residual(model, settings, state, rows, s, harmonic),
     )
+    return group if settings.output.shapes_at(harmonic) else _without_shapes(group)
+
+
+def _without_shapes(group: ModalGroup) -> ModalGroup:
+    """The group without displacements of the mesh and of the points of its patches."""
+    faces = {name: replace(face, shapes=face.shapes[:0]) for name, face in group.interfaces.items()}
+    residual = group.residual
+    if residual is not None:
+        residual = replace(residual, phi=residual.phi[:0])
+    return replace(group, phi=group.phi[:0], interfaces=faces, residual=residual)
 
 
 def of_solution(
@@ -134,7 +144,7 @@ def of_solution(
 
 
 def _stress_sets(
-    model: BodyModel, settings: BodySettings, state: StaticState, shapes: Array, harmonic: int
+    model: BodyModel, settings: BodySettings, state: StaticState, rows: BodyRows, shapes: Array, harmonic: int
 ) -> dict[str, StressSet]:
     """The sets that the settings ask for, of shapes (n, 3, m)."""
     found: dict[str, StressSet] = {}
@@ -143,7 +153,7 @@ def _stress_sets(
             found["gauss"] = gauss_set(model, state, shapes)
         if settings.output.nodal_stress:
             found["nodes"] = nodal_set(model, state, shapes, harmonic, found.get("gauss"))
-    return found
+    return {k: replace(s, singular=rows.zones.hold(s.points)) for k, s in found.items()}
 
 
 def _residual(
@@ -155,7 +165,7 @@ def _residual(
     n, r = model.d.mesh.n_points, s.reduced.residual.shape[1]
     whole = s.unknowns.expand(s.reduced.residual, n)
     shapes = whole.reshape(n, 3, r)
-    sets = _stress_sets(model, settings, state, shapes, harmonic) if r else {}
+    sets = _stress_sets(model, settings, state, rows, shapes, harmonic) if r else {}
     return Residual(
         s.force_labels,
         shapes if settings.output.shapes else np.zeros((0, 3, r)),

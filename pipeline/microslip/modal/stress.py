@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 import scipy.sparse as sp
 
-from ..data import Array, ModalGroup, StressSet
+from ..data import Array, Flags, Indices, ModalGroup, StressSet
 from ..elasticity import VOIGT_AXES, pushed
 from ..fem.cyclic import CutFaces, CyclicUpper
 from ..fem.discretise import Block
@@ -166,7 +166,17 @@ class StaticExtremes(NamedTuple):
 
 
 def static_extremes(group: ModalGroup) -> StaticExtremes:
-    """The largest displacement and stress of the static state of a group."""
+    """The largest displacement of the static state of a group, and its stress outside singular zones."""
     moved = float(np.linalg.norm(group.u_static, axis=-1).max(initial=0.0))
     stress = group.stresses.get("nodes")
-    return StaticExtremes(moved, np.nan if stress is None else float(von_mises(stress.static_stress).max(initial=0.0)))
+    if stress is None:
+        return StaticExtremes(moved, np.nan)
+    values = von_mises(stress.static_stress)
+    values = values[outside(stress.singular)] if len(stress.singular) else values
+    return StaticExtremes(moved, float(values.max(initial=0.0)))
+
+
+def outside(singular: Flags) -> Indices:
+    """Numbers of the places outside the singular zones; all, where none is left."""
+    singular = np.asarray(singular, dtype=bool)
+    return np.flatnonzero(~singular if not singular.all() else np.ones_like(singular))

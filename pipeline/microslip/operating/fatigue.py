@@ -84,9 +84,9 @@ def endurance(cycle: CycleStress, limits: MaterialLimits, only: Array | None = N
     """The place whose vibration may grow least.
 
     Args:
-        only: numbers of the places that count, all if None: a point force or a clamp has no stress worth reading.
+        only: numbers of the places that count; those outside the singular zones if None.
     """
-    chosen = np.arange(len(cycle.points)) if only is None else np.asarray(only)
+    chosen = cycle.counted if only is None else np.asarray(only)
     margin = vibration_margin(limits, cycle.amplitude[chosen], cycle.mean[chosen])
     i = int(chosen[margin.argmin()])
     a, m = float(cycle.amplitude[i]), float(cycle.mean[i])

@@ -30,7 +30,7 @@ def shape_fields(motion: Motion, basis: ModalBasis, limits: MaterialLimits | Non
     ``amplitude`` (n,) m, half the longest axis of the first harmonic's ellipse; ``mean`` (n, 3) m;
     ``h1_real``, ``h1_imag``, ... (n, 3) m; ``phase`` (n, 3) rad of the first harmonic; with stress modes at the nodes
     ``stress_amplitude``, ``stress_mean``, ``stress_largest`` (n,) Pa, see `stress.CycleStress`, and with limits
-    ``margin`` (n,), Goodman's for the vibration (at most 1000).
+    ``margin`` (n,), Goodman's for the vibration (at most 1000). ``singular`` (n,) 1 in a singular zone.
     """
     a = displacement(motion.at(0), np.arange(basis.mesh.n_points))[0]
     fields: dict[str, Array] = {"mean": a[0].real}
@@ -48,6 +48,7 @@ def _stresses(motion: Motion, basis: ModalBasis, limits: MaterialLimits | None) 
     if len(found.points) != basis.mesh.n_points:
         return {}
     fields = {"stress_amplitude": found.amplitude, "stress_mean": found.mean, "stress_largest": found.largest}
+    fields |= {"singular": found.singular.astype(float)} if found.singular.any() else {}
     if limits is not None:
         fields["margin"] = np.minimum(vibration_margin(limits, found.amplitude, found.mean), 1000.0)
     return fields

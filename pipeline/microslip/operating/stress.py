@@ -12,8 +12,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..data import Array, ComplexArray, ModalGroup, StressSet
+from ..data import Array, ComplexArray, Flags, Indices, ModalGroup, StressSet
 from ..errors import UserError
+from ..modal.stress import outside
 from .cycle import SAMPLES, longest, wave_top
 from .motion import Motion, Part
 
@@ -41,7 +42,7 @@ class CycleStress:
         points: (s, 3) m. amplitude: (s,) largest von Mises stress of sigma(t) - mean over the cycle. mean: (s,) von
             Mises stress of static state and mean, with the sign of its first invariant. largest: (s,) von Mises stress
             of all together at its largest. harmonics: (s, H + 1, 6) complex, the first of them the mean with the
-            static state.
+            static state. singular: (s,) in a singular zone, where numbers are the mesh's (docs/results.md).
     """
 
     points: Array
@@ -49,16 +50,22 @@ class CycleStress:
     mean: Array
     largest: Array
     harmonics: ComplexArray
+    singular: Flags
+
+    @property
+    def counted(self) -> Indices:
+        """Numbers of the places outside the singular zones; all, where none is left."""
+        return outside(self.singular)
 
     @property
     def highest(self) -> float:
-        """Pa, the largest amplitude of all places."""
-        return float(self.amplitude.max())
+        """Pa, the largest amplitude of the places that count."""
+        return float(self.amplitude[self.counted].max())
 
     @property
     def top(self) -> float:
-        """Pa, the largest stress of all places and times."""
-        return float(self.largest.max())
+        """Pa, the largest stress of the places that count, at any time."""
+        return float(self.largest[self.counted].max())
 
     @property
     def means(self) -> tuple[float, float]:
@@ -87,6 +94,31 @@ def places(motion: Motion, location: str = "nodes") -> Array:
     return stress_set(motion.parts[0].group, location).points
 
 
+def singular(group: ModalGroup, location: str = "nodes") -> Flags:
+    """(s,) which places lie in a singular zone; none, where the modal file does not say so."""
+    found = stress_set(group, location)
+    return np.asarray(found.singular, dtype=bool) if len(found.singular) else np.zeros(len(found.points), dtype=bool)
+
+
+def counted(group: ModalGroup, location: str = "nodes") -> Indices:
+    """Numbers of the places outside the singular zones; all, where none is left."""
+    return outside(singular(group, location))
+
+
+READS_THE_MESH = (
+    "stands in the singular zone of a support, a contact's edge or a sharp inner edge, so that what it reads is a "
+    "property of the mesh"
+)
+
+
+def in_singular_zone(group: ModalGroup, point: Array) -> bool:
+    """Whether a point (3,), a gauge's say, lies in a singular zone: what holds for the nearest node holds for it."""
+    if "nodes" not in group.stresses:
+        return False
+    away = np.linalg.norm(group.stresses["nodes"].points - point, axis=1)
+    return bool(singular(group)[away.argmin()])
+
+
 def stress_at(motion: Motion, chosen: slice | list[int] | Array, location: str = "nodes") -> ComplexArray:
     """(f, H + 1, s, 6) harmonics of the stress at some places, Pa; the mean holds the static stress at speed.
 
@@ -106,7 +138,8 @@ def cycle_stress(motion: Motion, point: int = 0, location: str = "nodes") -> Cyc
     parts = [stress_at(one, block, location)[0] for block in _blocks(s, motion.harmonics)]
     sigma = np.concatenate(parts, axis=1).transpose(1, 0, 2)
     mean, alternating, largest = equivalent(sigma)
-    return CycleStress(places(motion, location), alternating, mean, largest, sigma)
+    zones = singular(motion.parts[0].group, location)
+    return CycleStress(places(motion, location), alternating, mean, largest, sigma, zones)
 
 
 @dataclass(frozen=True)
@@ -135,12 +168,12 @@ def stress_peaks(
     """The most stressed place of every point of a sweep, block by block of places.
 
     Args:
-        only: numbers of the places looked at, all of them if None. first_harmonic: the amplitude of the first harmonic
-            alone (the book's, 5.5: "monofrequent"); mean and higher harmonics then count in `largest` alone.
-            largest: whether that is wanted; -1 if not.
+        only: numbers of the places looked at, those outside the singular zones if None. first_harmonic: the amplitude
+            of the first harmonic alone (the book's, 5.5: "monofrequent"); mean and higher harmonics then count in
+            `largest` alone. largest: whether that is wanted; -1 if not.
     """
     at, f = places(motion, location), motion.count
-    chosen = np.arange(len(at)) if only is None else np.asarray(only)
+    chosen = counted(motion.parts[0].group, location) if only is None else np.asarray(only)
     if not len(chosen):
         raise UserError("stress: no place is left to look at")
     kept = [_Highest.none(f, True, first_harmonic), _Highest.none(f, False, False)][: 2 if largest else 1]

@@ -169,7 +169,7 @@ def _scenes(basis: ModalBasis, folder: Path, report: Report) -> dict[str, Path]:
         stressed = studio
         if basis.sectors > 1:
             stressed = replace(studio, basis=_sector(basis, _stressed(basis)))
-            studio = replace(studio, basis=_sector(basis, min(basis.groups)[1]))
+            studio = replace(studio, basis=_sector(basis, _shaped(basis)))
         shown = [g for g in _ends(studio.basis) if len(g.phi)]
         if shown:
             camera = views.mode_camera(studio, shown, MOST_MODES)
@@ -198,6 +198,11 @@ def _ends(basis: ModalBasis) -> list[ModalGroup]:
 def _stressed(basis: ModalBasis) -> int:
     """The lowest nodal diameter whose stress modes the file holds at its nodes, else the lowest of all."""
     return min((k for (_, k), g in basis.groups.items() if "nodes" in g.stresses), default=min(basis.groups)[1])
+
+
+def _shaped(basis: ModalBasis) -> int:
+    """The lowest nodal diameter of which the file holds shapes, else the lowest of all."""
+    return min((k for (_, k), g in basis.groups.items() if len(g.phi)), default=min(basis.groups)[1])
 
 
 def _with_static_stress(basis: ModalBasis, group: ModalGroup) -> ModalGroup:

@@ -160,7 +160,11 @@ def haigh_plot(cycle: CycleStress, limits: MaterialLimits, worst: Endurance, tit
     if limits.yield_strength is not None:
         y = 1e-6 * limits.yield_strength - np.abs(x)
         axes.plot(x[y >= 0], y[y >= 0], color=COLOURS[4], linewidth=1.4, linestyle="--", label="yielding")
-    axes.scatter(mean, amplitude, s=5, color=COLOURS[0], alpha=0.35, linewidths=0, label="places of the body")
+    dots = {"s": 5, "alpha": 0.35, "linewidths": 0}
+    out, zones = cycle.counted, np.flatnonzero(cycle.singular)
+    if len(zones):
+        axes.scatter(mean[zones], amplitude[zones], color="0.6", label="in singular zones", **dots)
+    axes.scatter(mean[out], amplitude[out], color=COLOURS[0], label="places of the body", **dots)
     told = f"worst place: {1e-6 * worst.amplitude:.3g} MPa about {1e-6 * worst.mean:.3g} MPa,\n{_margin(worst)}"
     axes.plot(
         1e-6 * worst.mean, 1e-6 * worst.amplitude, "o", color="#111111", mfc="none", markersize=9, mew=1.8, label=told
@@ -325,9 +329,10 @@ def stress_picture(
         image = views.stress_tile(studio, values, grown * shape, camera, 0.8, unit, largest, mark=mark)
         tiles.append(captioned(image, label, size=16))
     ring = "" if mark is None else f" Ring: the worst place{'' if _seen(studio, mark) else ', on the far side'}."
+    zones = f" {views.ZONES}" if cycle.singular.any() else ""
     note = (
         f"Drawn at {degrees:.0f} degrees of the cycle, {grown:g} times as large; largest displacement "
-        f"{METRES.sized(full_scale, 3)}; grey lines: at rest.{ring}"
+        f"{METRES.sized(full_scale, 3)}; grey lines: at rest.{ring}{zones}"
     )
     return captioned(side_by_side(tiles), title, note, 20)
 

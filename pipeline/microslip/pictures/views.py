@@ -409,7 +409,8 @@ def stress_sheet(studio: Studio, group: ModalGroup, count: int, camera: Camera) 
     """Equivalent stress of the first elastic modes at 1 mm largest displacement (None without nodal stresses)."""
     stress = group.stresses.get("nodes")
     chosen = [j for j in range(group.n_modes) if group.kind[j] != "rigid"][:count]
-    if stress is None or len(stress.points) != studio.basis.mesh.n_points or not chosen:
+    known = stress is not None and len(stress.points) == len(group.phi) == studio.basis.mesh.n_points
+    if stress is None or not known or not chosen:
         return None
     tiles = []
     for j in chosen:
@@ -424,6 +425,9 @@ def stress_sheet(studio: Studio, group: ModalGroup, count: int, camera: Camera) 
         "The colours leave out the highest 0.2 % of the values."
     )
     return sheet(tiles, title, note)
+
+
+ZONES = "The largest value is that outside the singular zones of supports, contact edges and sharp inner edges."
 
 
 def stress_tile(
@@ -470,6 +474,7 @@ def static_picture(studio: Studio, group: ModalGroup) -> Picture | None:
     image = stress_tile(studio, 1e3 * size, shape, camera, 1.0, "mm", 1e3 * static.displacement, DISPLACEMENT_MAP)
     tiles.append(captioned(image, "Displacement", size=17))
     title = f"{studio.basis.name}: static state{at_speed(group)}"
+    zones = f" {ZONES}" if stress is not None and np.any(stress.singular) else ""
     return captioned(
-        side_by_side(tiles), title, f"Displacements drawn {grown:g} times as large; grey lines: at rest.", 22
+        side_by_side(tiles), title, f"Displacements drawn {grown:g} times as large; grey lines: at rest.{zones}", 22
     )

@@ -99,7 +99,24 @@ def _stress(response: Mapping[str, Any], valid: Sequence[Mapping[str, Any]]) -> 
     return [
         f"The largest stress amplitude{of_body} is {number(1e-6 * worst['stress_amplitude_Pa'])} MPa at "
         f"{number(worst['frequency_of_stress_Hz'], 5)} Hz under F_N = {number(worst['normal_force_N'])} N{margin}."
+        f"{_in_zones(worst)}"
     ]
+
+
+def _in_zones(row: Mapping[str, Any]) -> str:
+    """What stands beside supports, edges of contacts and sharp inner edges, and why it is not what counts."""
+    if "singular_stress_amplitude_Pa" not in row:
+        return ""
+    size = number(1e-6 * row["singular_stress_amplitude_Pa"])
+    if row["singular_location_mm"] == row["location_mm"]:
+        return (
+            " The whole body lies in singular zones of supports, edges of contacts and sharp inner edges: it is a "
+            "property of the mesh; take finer elements."
+        )
+    return (
+        f" That is outside the singular zones of supports, edges of contacts and sharp inner edges; in them it is "
+        f"{size} MPa at ({row['singular_location_mm'].replace(' ', ', ')}) mm, a property of the mesh."
+    )
 
 
 def _worth(response: Mapping[str, Any], count: int, doubtful: int) -> str:

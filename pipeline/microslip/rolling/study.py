@@ -8,6 +8,7 @@ from pathlib import Path
 import jax.numpy as jnp
 import numpy as np
 
+from .. import plausible
 from ..contact.solids import mismatch
 from ..data import Array
 from ..errors import UserError
@@ -224,7 +225,11 @@ class Studied:
 
     def warnings(self) -> list[str]:
         """What a person should doubt."""
-        told = []
+        told, wheel, rail = [], self.case.wheel, self.case.rail
+        doubts = [plausible.modulus("wheel.young", wheel.young), plausible.modulus("rail.young", rail.young)]
+        doubts.append(plausible.wheel_load(self.case.vertical_force, wheel.radius))
+        doubts += [plausible.stress("The patch", q.pressure, min(wheel.young, rail.young)) for q in self.patches[:1]]
+        told += [f"warning: {text}" for text in doubts if text]
         if self.highest > STEEPEST:
             told.append(f"warning: friction is {self.highest:g}; steel on steel has 0.05 to 0.6.")
         beta = mismatch(*self.case.solids)

@@ -19,6 +19,7 @@ from pydantic import (
     model_validator,
 )
 
+from .. import plausible
 from ..data import Array, Material
 from ..elasticity import isotropic, orthotropic, turned_strain
 from ..mesh import UNITS
@@ -560,6 +561,7 @@ class Output(Model):
     nodal_stress: bool = True
     stiffening: bool = False
     stress_nodal_diameters: NodalDiameters = "all"
+    shape_nodal_diameters: NodalDiameters = "all"
 
     @model_validator(mode="after")
     def _possible(self) -> Output:
@@ -570,6 +572,10 @@ class Output(Model):
     def stress_at(self, harmonic: int) -> bool:
         """Whether strain and stress modes are wanted of a nodal diameter."""
         return self.stress_nodal_diameters == "all" or harmonic in self.stress_nodal_diameters
+
+    def shapes_at(self, harmonic: int) -> bool:
+        """Whether shapes of the body and of its patches are wanted of a nodal diameter."""
+        return self.shape_nodal_diameters == "all" or harmonic in self.shape_nodal_diameters
 
 
 class BodySettings(Model):
@@ -625,12 +631,14 @@ class BodySettings(Model):
                 raise ValueError('material.from: "mesh" needs geometry.mesh; write density, young and poisson instead')
         if self.closures and self.rotation.prestress != "nonlinear":
             raise ValueError('closures: contact is found by Newton only; set rotation.prestress = "nonlinear"')
-        beyond = self.output.stress_nodal_diameters
-        if beyond != "all" and max(beyond, default=0) > (self.cyclic.sectors // 2 if self.cyclic else 0):
-            raise ValueError(
-                f"output.stress_nodal_diameters: {max(beyond)} is more than "
-                f"{f'{self.cyclic.sectors} sectors' if self.cyclic else 'a body without [cyclic]'} can have; correct it"
-            )
+        for key in ("stress_nodal_diameters", "shape_nodal_diameters"):
+            beyond = getattr(self.output, key)
+            if beyond != "all" and max(beyond, default=0) > (self.cyclic.sectors // 2 if self.cyclic else 0):
+                raise ValueError(
+                    f"output.{key}: {max(beyond)} is more than "
+                    f"{f'{self.cyclic.sectors} sectors' if self.cyclic else 'a body without [cyclic]'} can have; "
+                    "correct it"
+                )
         return self
 
     def _only_what_matrices_can(self) -> None:
@@ -723,16 +731,10 @@ def implausible(settings: BodySettings, size: float) -> list[str]:
     found = []
     m = settings.material
     if isinstance(m, MaterialSettings) and not m.unusual:
-        if not 300 <= m.density <= 25000:
-            found.append(f"material.density = {m.density:g} kg/m3 is no solid's; SI is kg/m3 (steel 7850)")
         stiff = max(m.young) if isinstance(m.young, tuple) else m.young
-        if not 1e8 <= stiff <= 1.3e12:
-            found.append(f"material.young = {stiff:g} Pa is no structural solid's; SI is Pa (steel 2.1e11)")
-    if not 1e-3 <= size <= 50:
-        found.append(
-            f'the body is {size:g} m long; is length_unit = "{settings.length_unit}" right? '
-            "(material.unusual = true silences warnings of this kind)"
-        )
+        found += [plausible.density("material.density", m.density), plausible.modulus("material.young", stiff)]
+    if text := plausible.extent(size, settings.length_unit):
+        found.append(f"{text} (material.unusual = true silences warnings of this kind)")
     if settings.mesh.size is not None and settings.mesh.size > size:
         found.append(f"mesh.size = {settings.mesh.size:g} m is more than the body's {size:g} m; is it in length_unit?")
-    return [] if m.unusual else found
+    return [] if m.unusual else [text for text in found if text]

@@ -39,7 +39,8 @@ class StressedResonance:
     Attributes:
         normal_force: N. frequency: Hz. amplitude: m, of the read-out that is drawn. range: Hz. stressed: number, in its
             series, of the point of that range at which the body's stress amplitude is largest, stressed_at: Hz there.
-            worst: place of the body whose vibration may grow least there (largest amplitude without limits).
+            worst: place of the body whose vibration may grow least there (largest amplitude without limits), outside
+            the singular zones. singular: the same in them; None where the modal file has or names none.
     """
 
     normal_force: float
@@ -49,6 +50,7 @@ class StressedResonance:
     stressed: int
     stressed_at: float
     worst: Endurance
+    singular: Endurance | None = None
 
     def holds(self, frequency: float) -> bool:
         """Whether a frequency (Hz) lies in its range."""
@@ -124,7 +126,15 @@ class Assessment:
         row |= {"mean_stress_Pa": r.worst.mean}
         if self.limits is not None:
             row["reserve_factor"] = r.worst.vibration
-        return row | {"location_mm": " ".join(f"{1e3 * x:.1f}" for x in r.worst.point)}
+        row["location_mm"] = _millimetres(r.worst.point)
+        if r.singular is not None:
+            row["singular_stress_amplitude_Pa"] = r.singular.amplitude
+            row["singular_location_mm"] = _millimetres(r.singular.point)
+        return row
+
+
+def _millimetres(point: Array) -> str:
+    return " ".join(f"{1e3 * x:.1f}" for x in point)
 
 
 def assess(
@@ -160,9 +170,11 @@ def assess(
             peaks = stress_peaks(motion.at(chosen), largest=False)
         sweeps[normal] = (series, motion, chosen, peaks)
         for i, r, j in zip(at, ranges, most, strict=True):
-            worst = endurance(cycle_stress(motion, j), limits or ENDLESS)
+            cycle = cycle_stress(motion, j)
+            worst, zones = endurance(cycle, limits or ENDLESS), np.flatnonzero(cycle.singular)
+            beside = endurance(cycle, limits or ENDLESS, zones) if len(zones) else None
             f, low, high, there = (float(series.frequency[k]) for k in (i, r[0], r[-1], j))
-            found.append(StressedResonance(normal, f, float(size[i]), (low, high), j, there, worst))
+            found.append(StressedResonance(normal, f, float(size[i]), (low, high), j, there, worst, beside))
     several = len(response.bodies) > 1
     return Assessment(name, sweeps, tuple(found), limits, _quantity(response, monitor), everywhere, several=several)
 

@@ -33,22 +33,25 @@ from .parts import (
     shape_of,
     with_names,
 )
+from .stage import Report
 
 
-def import_deck(file: Path, folder: Path | None, unit: str | None) -> Imported:
+def import_deck(
+    file: Path, folder: Path | None, unit: str | None, report: Report = lambda _: None
+) -> Imported:
     """Import a file; a deck whose *CONTACT PAIRs separate bodies becomes an assembly.
 
     Raises:
         UserError: unreadable files, files that are there already.
     """
     if suffix_of(file) != ".inp" or not _touches(file):
-        return import_file(file, folder, unit)
+        return import_file(file, folder, unit, report=report)
     unit = length_unit(unit, file)
     mesh = read_mesh(file, unit)
     groups = bodies(mesh)
     joints, told = _between_bodies(mesh, groups)
     if not joints:
-        made = import_file(file, folder, unit)
+        made = import_file(file, folder, unit, report=report)
         return Imported(made.path, (*made.told[:-1], *told, made.told[-1]))
     meshes = [of_instances(mesh, group) for group in groups]
     patches = list(_patches(joints, meshes, UNITS[unit]))
@@ -58,7 +61,9 @@ def import_deck(file: Path, folder: Path | None, unit: str | None) -> Imported:
     return _assembly(file, folder, unit, groups, meshes, patches, [*said, *texts], force)
 
 
-def import_apart(file: Path, folder: Path | None, unit: str | None) -> Imported:
+def import_apart(
+    file: Path, folder: Path | None, unit: str | None, report: Report = lambda _: None
+) -> Imported:
     """The solids of a CAD file, or the parts of a mesh that share no points, as bodies in contact.
 
     Raises:
@@ -67,7 +72,7 @@ def import_apart(file: Path, folder: Path | None, unit: str | None) -> Imported:
     if not ordinary(file).is_file():
         raise UserError(f"{file}: there is no such file; correct the path")
     if file.suffix.lower() in CAD:
-        return apart_cad(file, folder)
+        return apart_cad(file, folder, report)
     unit = length_unit(unit, file)
     mesh = read_mesh(file, unit)
     groups = bodies(mesh)

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import re
 import shlex
+import subprocess
 import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -23,6 +25,7 @@ from ..mesh.chosen import of_instances
 from ..mesh.raw import Unread, in_file, joined
 from ..units import SYSTEMS, usual_system
 from .meshing import run_apart
+from .stage import Report
 
 MATRICES = (".mtx", ".mm", ".mat", ".h5", ".hdf5", ".npz", ".op4", ".pch", ".dmig", ".sti", ".mas")
 _NODES = (".inp", ".cdb", ".csv", ".txt", ".bdf", ".dat", ".msh", ".med", ".unv")
@@ -45,7 +48,8 @@ class Imported:
 
 
 def import_file(
-    file: Path, folder: Path | None, unit: str | None = None, instances: Sequence[str] = ()
+    file: Path, folder: Path | None, unit: str | None = None, instances: Sequence[str] = (),
+    report: Report = lambda _: None,
 ) -> Imported:
     """Write a body.toml around a CAD file, a mesh or matrices; nothing is copied, the file is named where it lies.
 
@@ -67,7 +71,10 @@ def import_file(
     target = (folder or Path(name)) / "body.toml"
     refuse_taken(target)
     kind = suffix_of(file)
-    made = _matrices if kind in MATRICES else _cad if kind in CAD else partial(_mesh, instances=instances)
+    made = _matrices if kind in MATRICES else partial(_mesh, instances=instances)
+    if kind in CAD:
+        made = partial(_cad, report=report)
+    report(f"reading {file}")
     if made is _matrices and _in_metres(file):
         unit = "m"
     lines, told = made(file, target.parent, unit)
@@ -219,7 +226,14 @@ def _tied(file: Path, mesh: Mesh) -> tuple[Mesh, list[str]]:
     return mesh, told if len(told) <= 12 else [*told[:10], f"and {len(told) - 10} constraints more"]
 
 
-def cad_table(file: Path, unit: str, picture: Path | None = None) -> tuple[str, str]:
+LONGEST_LOOK = 30.0
+"""Seconds that the surfaces of a file may take to be triangulated for a picture, at first as they bend, then coarsely,
+then not at all."""
+
+
+def cad_table(
+    file: Path, unit: str, picture: Path | None = None, report: Report = lambda _: None
+) -> tuple[str, str]:
     """Solids and numbered surfaces of a CAD file, read in a process of its own.
 
     Args:
@@ -234,18 +248,24 @@ def cad_table(file: Path, unit: str, picture: Path | None = None) -> tuple[str, 
     with tempfile.TemporaryDirectory() as scratch:
         triangles = Path(scratch) / "triangles.npz"
         words = ["--list", str(file), unit]
-        text = cad_result([*words, str(triangles)] if picture else words)
-        return text, "" if picture is None else _draw(triangles, f"{file.name}: its surfaces", picture)
+        if picture is not None:
+            for more in ([], ["coarse"]):
+                report(f"{'coarse ' * bool(more)}triangles of {file.name} for a picture, {LONGEST_LOOK:.0f} s at most")
+                with contextlib.suppress(subprocess.TimeoutExpired):
+                    text = cad_result([*words, str(triangles), *more], LONGEST_LOOK)
+                    return text, _draw(triangles, f"{file.name}: its surfaces", picture)
+        report(f"surfaces of {file.name}")
+        return cad_result(words), "" if picture is None else f"not triangulated within {2 * LONGEST_LOOK:.0f} s"
 
 
-def cad_result(words: list[str]) -> str:
+def cad_result(words: list[str], limit: float | None = None) -> str:
     """What the CAD route prints, in a process of its own.
 
     Raises:
-        UserError: what the CAD kernel says.
+        UserError: what the CAD kernel says. TimeoutExpired: nothing within the limit, s.
     """
     with tempfile.TemporaryDirectory() as scratch:
-        done = run_apart(["-m", "microslip.cad", *words], scratch)
+        done = run_apart(["-m", "microslip.cad", *words], scratch, limit)
     if done.returncode:
         raise UserError((done.stderr.strip().splitlines() or [f"{' '.join(words)}: cannot be read"])[-1])
     return done.stdout.strip()
@@ -265,9 +285,9 @@ def _draw(triangles: Path, title: str, picture: Path) -> str:
     return ""
 
 
-def _cad(file: Path, folder: Path, unit: str) -> tuple[list[str], list[str]]:
+def _cad(file: Path, folder: Path, unit: str, report: Report) -> tuple[list[str], list[str]]:
     picture = folder / "surfaces.png"
-    text, reason = cad_table(file, unit, picture)
+    text, reason = cad_table(file, unit, picture, report)
     told = [text, f"warning: no picture of the surfaces: {reason}" if reason else f"{picture}: the surfaces, numbered"]
     if text.count("\nsolid ") > 1:
         apart = f"microslip import {shlex.quote(str(file))} --apart"

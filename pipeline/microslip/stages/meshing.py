@@ -8,6 +8,7 @@ import os
 import subprocess
 import sys
 import tempfile
+import time
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -119,11 +120,14 @@ def _run_mesher(job: Job, source: Path, product: Path) -> tuple[list[str], list[
     return [line for line in done.stderr.splitlines() if line.startswith("warning:")], opened
 
 
-def run_apart(words: list[str], scratch: str) -> subprocess.CompletedProcess[str]:
+def run_apart(
+    words: list[str], scratch: str, limit: float | None = None
+) -> subprocess.CompletedProcess[str]:
     """Run a Python file, or -m and a module, in a process of its own, as gmsh is.
 
     It ends when this process does, however that ends, and then removes the folder `scratch`. There it leaves a list of
-    the files that it read, but for those of Python, of this package and of `scratch`.
+    the files that it read, but for those of Python, of this package and of `scratch`. After `limit` seconds it is ended
+    and `subprocess.TimeoutExpired` raised.
     """
     paths = [str(PACKAGE.parent), os.environ.get("PYTHONPATH", "")]
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(p for p in paths if p)}
@@ -133,7 +137,7 @@ def run_apart(words: list[str], scratch: str) -> subprocess.CompletedProcess[str
         pipes: dict[str, Any] = dict.fromkeys(("stdout", "stderr"), subprocess.PIPE)
         process = subprocess.Popen(command, stdin=read, text=True, env=environment, **pipes)
         try:
-            return _ended(process)
+            return _ended(process, limit)
         finally:
             process.kill()
             process.communicate()
@@ -142,14 +146,17 @@ def run_apart(words: list[str], scratch: str) -> subprocess.CompletedProcess[str
         os.close(write)
 
 
-def _ended(process: subprocess.Popen[str]) -> subprocess.CompletedProcess[str]:
-    """What a process leaves, which is waited for in Python, where a request to end is heard."""
+def _ended(process: subprocess.Popen[str], limit: float | None) -> subprocess.CompletedProcess[str]:
+    """What a process leaves, which is waited for in Python, where a request to end is heard, `limit` s at most."""
+    began = time.monotonic()
     while True:
         with contextlib.suppress(subprocess.TimeoutExpired):
             out, err = process.communicate(timeout=store.POLLED)
             look()  # a terminal asks both
             return subprocess.CompletedProcess(process.args, process.returncode, out, err)
         look()
+        if limit is not None and time.monotonic() - began > limit:
+            raise subprocess.TimeoutExpired(process.args, limit)
 
 
 OPENED = "opened.json"

@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from .. import __version__
+from .. import __version__, plausible
 from ..basis import write_basis
-from ..basis.files import FORMAT
+from ..basis.files import FORMAT, size_in_words
 from ..data import Array, Mesh, ModalBasis
 from ..errors import UserError, told_of
 from ..files import store
@@ -48,8 +48,12 @@ def modes_stage(
 
     def work() -> Made:
         basis, told = basis_of(job, mesh_file, report) if matrices is None else _from_matrices(job, matrices, report)
-        report(f"writing {stage.product}")
+        size = size_in_words(basis)
+        report(f"writing {stage.product}{', ' * bool(size)}{size}")
         write_basis(stage.product, basis)
+        for text in plausible.of_basis(basis):
+            told.append(f"{job.path}: {text}")
+            report(f"warning: {told[-1]}")
         warnings.extend(told)
         return Made(note={"warnings": warnings})
 

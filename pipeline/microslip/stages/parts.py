@@ -31,6 +31,7 @@ from .importing import (
     length_unit,
     refuse_taken,
 )
+from .stage import Report
 
 NORMAL_STIFFNESS, TANGENTIAL_STIFFNESS = 4e11, 2e11
 """N/m3, per area of a joint of machined steel: where an own case begins, not a property of it."""
@@ -82,7 +83,9 @@ class Patch:
     sets: tuple[str, str] = ("", "")
 
 
-def import_parts(files: Sequence[Path], folder: Path | None, unit: str | None) -> Imported:
+def import_parts(
+    files: Sequence[Path], folder: Path | None, unit: str | None, report: Report = lambda _: None
+) -> Imported:
     """Write a body.toml around each of several files, with its faces where it touches the others, and a case.toml.
 
     Args:
@@ -95,6 +98,7 @@ def import_parts(files: Sequence[Path], folder: Path | None, unit: str | None) -
     """
     home, parts = _parts(files, folder)
     unit = _unit_of(files, unit)
+    report("where the parts touch")
     shapes, patches = _found(parts, unit)
     if not patches:
         raise UserError(
@@ -105,7 +109,7 @@ def import_parts(files: Sequence[Path], folder: Path | None, unit: str | None) -
     told: list[str] = []
     for number, part in enumerate(parts):
         if not part.there:
-            written = import_file(part.file, part.body.parent, unit).told[:-1]
+            written = import_file(part.file, part.body.parent, unit, report=report).told[:-1]
             told += [text.splitlines()[0] for text in written]  # a table of surfaces stands in the body.toml as well
         add_lines(part, joint_lines(parts, number, patches, unit))
     told += [sentence(parts, patch, unit) for patch in patches]
@@ -164,7 +168,7 @@ def _refuse_named(parts: Sequence[Part], patches: Sequence[Patch]) -> None:
                 raise UserError(f"{parts[i].body}: has a face or an interface '{face}' already; rename or remove it")
 
 
-def apart_cad(file: Path, folder: Path | None) -> Imported:
+def apart_cad(file: Path, folder: Path | None, report: Report = lambda _: None) -> Imported:
     """The solids of one CAD file as parts of an assembly, each in a file of its own beside its body.toml.
 
     Raises:
@@ -174,12 +178,13 @@ def apart_cad(file: Path, folder: Path | None) -> Imported:
     if not ordinary(file).is_file():
         raise UserError(f"{file}: there is no such file; correct the path")
     refuse_taken(home)
+    report(f"solids of {file}")
     with tempfile.TemporaryDirectory() as scratch:
         names = json.loads(cad_result(["--apart", str(file.resolve()), scratch]))
         made = [home / name / f"{name}.step" for name in names]
         for new in made:
             write_text(new, (Path(scratch) / new.name).read_text(encoding="utf-8"))
-    return import_parts(made, home, "mm")
+    return import_parts(made, home, "mm", report)
 
 
 def _unit_of(files: Sequence[Path], asked: str | None) -> str:

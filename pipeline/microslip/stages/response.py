@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
+from .. import plausible
 from ..basis import read_basis
 from ..case import CaseResult, CaseSettings, checkpoint, load_case, run_case
 from ..case.assemble import build
@@ -174,7 +175,7 @@ def _finished(points: Checkpoint, result: CaseResult, wanted: Wanted, report: Re
         rows = [known.get((row["normal_force_N"], row["frequency_Hz"]), {}) | row for row in more.rows]
         summary["resonances"] = [_ordered(row) for row in rows] or summary["resonances"]
         drawn, files = drawn | more.drawn, files + more.files
-        summary["messages"] += more.messages
+        summary["messages"] += [*more.messages, *_stress_doubted(result, more)]
         summary |= {"stressed_body": more.body} if len(response.bodies) > 1 else {}
     if wanted.pictures and (result.settings.ring is not None or more is not None):
         summary["messages"] += _not_drawn()
@@ -335,6 +336,14 @@ def _assessed(
         contacts = sum(n.startswith("contacts/") and n.endswith("/dissipated") for n in arrays)
         drawn = assessment.draw(found, basis, name, folder / "pictures", scenes, maps, contacts)
     return _Assessed(component, found.table(), drawn, _for_paraview(found, basis, maps, folder), messages)
+
+
+def _stress_doubted(result: CaseResult, more: _Assessed) -> list[str]:
+    """What is said of a stress that no metal bears."""
+    young = plausible.modulus_of(result.built.bodies[more.body].basis)
+    top = max((row["stress_amplitude_Pa"] for row in more.rows), default=0.0)
+    told = plausible.stress(f"Resonances of {more.body}", top, young, "stress amplitude")
+    return [told] if told else []
 
 
 def _lifted_off(result: CaseResult, found: assessment.Assessment) -> dict[float, Array]:

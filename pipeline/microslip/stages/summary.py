@@ -6,6 +6,7 @@ import numpy as np
 
 from ..data import Array, GyroscopicModes, ModalBasis, ModalGroup, SpeedRange
 from ..linalg.gyroscopic import stability_sentence
+from ..operating.stress import READS_THE_MESH, in_singular_zone
 from ..reduced.compliance import sentence
 from ..reduced.coordinates import certified_modes, own_kind
 from ..reduced.quality import sentences
@@ -54,6 +55,8 @@ def basis_summary(basis: ModalBasis) -> list[str]:
             lines.append("  circulatory forces stand beside as N_r: microslip stability tells what they do")
         lines += contact_lines(g)
         lines += [f"  {text}" for text in sentences(g, basis.reduction)]
+        singular = [name for name, gauge in g.gauges.items() if in_singular_zone(g, gauge.point)]
+        lines += [f"  gauge '{name}' {READS_THE_MESH}" for name in singular]
         lines += [
             f"  {i + 1:4d}  {f:14.6g} Hz   D = {d:.4g}   {k}"
             for i, (f, d, k) in enumerate(zip(g.frequency, g.damping_ratio, own_kind(g), strict=True))

@@ -125,11 +125,6 @@ def _interface(component: Component, name: str) -> Interface:
     if name not in group.interfaces:
         raise UserError(f"{component.name}: has no interface '{name}'; it has {', '.join(group.interfaces) or 'none'}")
     found = group.interfaces[name]
-    if not len(found.shapes):
-        raise UserError(
-            f"{component.name}:{name}: a node-wise patch needs the shapes of the patch, which the modal file does not "
-            "hold; write it with output.patch_shapes = true, or take a rigid patch"
-        )
     if "interface-force" in group.kind:
         raise UserError(
             f"{component.name}:{name}: a node-wise patch needs displacements or modes as coordinates, but this modal "
@@ -198,6 +193,12 @@ def _motions(face: Face, indices: Sequence[int], Q: Array, take: Array | None) -
     for index in sorted(set(indices)) if component.sectors > 1 else (0,):
         wave = component.at(index)
         item = wave.group.interfaces[name]
+        if not len(item.shapes):
+            raise UserError(
+                f"{component.name}:{name}: a node-wise patch needs the shapes of the patch, which the modal file does "
+                f"not hold at nodal diameter {wave.group.harmonic}; write it with output.patch_shapes = true and them "
+                "in output.shape_nodal_diameters, or take a rigid patch"
+            )
         S = np.einsum("ab,pbm->pam", Q @ item.rotation, wave._moving(item.shapes))
         found[index] = (S if take is None else np.tensordot(take, S, axes=1)), _per_energy(wave)
     return found

@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from ..data import Array, Interface
 from ..errors import UserError
@@ -192,8 +193,8 @@ def rigid_points(interface: Interface, counts: tuple[int, int] | None = None) ->
     """Points of a patch that moves as a rigid body.
 
     Args:
-        counts: n_y, n_z rectangles along t1 and t2 over the outline (Sextro Eq. (5.2-1)), each cut at the outline;
-            None: the interface's own quadrature points.
+        counts: n_y, n_z rectangles along t1 and t2 over the outline (Sextro Eq. (5.2-1)), each cut at the outline, and
+            slivers joined to their neighbours; None: the interface's own quadrature points.
 
     Returns:
         (n, 2) places along t1 and t2 from the interface's origin, m, and (n,) areas, m2.
@@ -208,7 +209,8 @@ def rigid_points(interface: Interface, counts: tuple[int, int] | None = None) ->
 
 
 def _cells(outline: Array, counts: tuple[int, int]) -> tuple[Array, Array]:
-    """Centres of area and areas of the rectangles of a convex outline's box, cut at it; empty ones are left out."""
+    """Centres of area and areas of the rectangles of a convex outline's box, cut at it; empty ones are left out, and
+    slivers become parts of the piece nearest to them."""
     low, high = outline.min(axis=0), outline.max(axis=0)
     y, z = (np.linspace(a, b, n + 1) for a, b, n in zip(low, high, counts, strict=True))
     whole = np.prod((high - low) / counts)
@@ -220,7 +222,23 @@ def _cells(outline: Array, counts: tuple[int, int]) -> tuple[Array, Array]:
             if area > 1e-9 * whole:
                 found.append((*centre, area))
     rows = np.array(found).reshape(-1, 3)
-    return rows[:, :2], rows[:, 2]
+    return _joined(rows[:, :2], rows[:, 2], SLIVER * whole)
+
+
+SLIVER = 0.1
+"""Share of a whole rectangle below which what the outline leaves of it carries no point of its own."""
+
+
+def _joined(points: Array, areas: Array, least: float) -> tuple[Array, Array]:
+    """Pieces (n, 2) and (n,) with those smaller than `least` joined to the nearest that is not: the area and its first
+    moments stay."""
+    large = np.flatnonzero(areas >= least)
+    if not len(large):
+        return points, areas
+    to = large[cKDTree(points[large]).query(points)[1]]
+    joined = np.bincount(to, areas, len(areas))[large]
+    moment = np.column_stack([np.bincount(to, areas * x, len(areas))[large] for x in points.T])
+    return moment / joined[:, None], joined
 
 
 def _cut(corners: Array, axis: int, at: float, sign: float) -> Array:

@@ -243,8 +243,8 @@ def _with_rows(group: ModalGroup, component: str, name: str, found: FacePressure
     face = group.interfaces[found.face]
     if not len(face.shapes):
         raise UserError(
-            f"{component}: the modal file holds no shapes of face '{found.face}' (output.patch_shapes = false), which "
-            "a pressure field needs; write it with them"
+            f"{component}: the modal file holds no shapes of face '{found.face}' at nodal diameter {group.harmonic} "
+            "(output.patch_shapes, output.shape_nodal_diameters), which a pressure field needs; write it with them"
         )
     centre = face.areas @ face.points / face.areas.sum()
     rows = {}
