@@ -80,7 +80,10 @@ def method(settings: CaseSettings, errors: Mapping[float, Mapping[float, float]]
     count = settings.balanced
     told = "One harmonic, the method of the book (Sextro 5.2)" if count == 1 else f"{count} harmonics"
     if settings.mode == "book":
-        return f"{told}; what it leaves out is not estimated: microslip respond CASE --compare-book shows it."
+        return (
+            "Book mode (Sextro 5.2): one harmonic, constant normal forces, elliptic orbits; what it leaves "
+            "out is not estimated: microslip respond CASE --compare-book shows it."
+        )
     each = [(abs(e), e, n) for n, own in errors.items() for e in own.values() if np.isfinite(e)]
     if not each:
         return f"{told}; what it leaves out is not estimated." if count == 1 else ""
