@@ -66,11 +66,12 @@ def _sentences(response: Mapping[str, Any]) -> list[str]:
 
 def _of_resonances(response: Mapping[str, Any], rows: Sequence[Mapping[str, Any]]) -> list[str]:
     """The same without how it was solved."""
-    if not rows and (lost := response.get("unsolved")):
-        return [f"No resonance was found, though there may be one: {lost}."]
     if not rows:
-        said = "There is no resonance in the band." if "resonances" in response else ""
-        return [said, *(f"{_fold(row, _factors(response))}." for row in response.get("folds", ()))]
+        folds = [f"{_fold(row, _factors(response))}." for row in response.get("folds", ())]
+        if (lost := response.get("unsolved")) or folds:
+            why = f": {lost}" if lost else ""
+            return [f"No resonance was found, though there may be one{why}.", *folds]
+        return ["There is no resonance in the band." if "resonances" in response else ""]
     doubtful = sum(bool(row.get("doubt")) for row in rows)
     lifted, valid = lifted_forces(rows), _valid(rows)
     first, *others = response.get("read_outs", [""])
