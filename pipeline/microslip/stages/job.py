@@ -82,9 +82,15 @@ def job_of(raw: dict[str, Any], folder: Path) -> Job:
     return Job(path, body_settings(raw, path), raw, folder)
 
 
-def is_of_a_body(keys: Mapping[str, Any]) -> bool:
-    """Whether a file with these keys describes a body."""
-    return "geometry" in keys and not ASKED & set(keys)
+def bodies_of(folder: Path) -> Mapping[Path, str]:
+    """File -> name of the bodies in a folder; of a file with a mistake its reader tells when it is run."""
+    found = {}
+    for file in sorted(folder.glob("*.toml")):
+        with suppress(UserError):
+            keys = load_toml(file)
+            if "geometry" in keys and not ASKED & set(keys):
+                found[file] = str(keys.get("name"))
+    return found
 
 
 def _only_one(path: Path, name: str) -> None:
@@ -93,17 +99,12 @@ def _only_one(path: Path, name: str) -> None:
     Raises:
         UserError: with both files.
     """
-    for other in sorted(path.parent.glob("*.toml")):
-        with suppress(UserError):  # its own mistakes are told when it is run
-            keys = load_toml(other)
-            if not other.samefile(path) and keys.get("name") == name and is_of_a_body(keys):
-                break
-    else:
-        return
-    raise UserError(
-        f"{path}: name: {other.name} beside it is a body of the name '{name}' too, and their products would stand in "
-        "one folder; give one of them another name"
-    )
+    same = [file.name for file, called in bodies_of(path.parent).items() if called == name and not file.samefile(path)]
+    if same:
+        raise UserError(
+            f"{path}: name: {same[0]} beside it is a body of the name '{name}' too, and their products would stand in "
+            "one folder; give one of them another name"
+        )
 
 
 def holds_a_case_alone(path: Path) -> bool:

@@ -14,7 +14,7 @@ from ..case.settings import BodyOfCase
 from ..errors import UserError
 from ..files import store
 from ..settings.toml import load_toml
-from .job import ASKED, is_of_a_body, open_job, system_file
+from .job import ASKED, bodies_of, open_job, system_file
 from .modal import modes_stage, system_stage
 from .stage import Report
 
@@ -207,10 +207,10 @@ def find_body(case_path: Path, name: str, root: Path) -> Path:
         UserError: if there is none.
     """
     for number, folder in enumerate((*_above(case_path.parent, root), root)):
-        beside = [folder / "body.toml", *sorted(folder.glob("*.toml"))] if number == 0 else []
+        beside = [folder / "body.toml", *bodies_of(folder)] if number == 0 else []
         usual = [*beside, folder / "geometry" / name / "body.toml", folder / name / "body.toml"]
         for file in (*filter(Path.is_file, usual), *sorted((folder / "geometry").glob("*/*.toml"))):
-            if (keys := load_toml(file)).get("name") == name and is_of_a_body(keys):
+            if load_toml(file).get("name") == name:
                 return file
     raise UserError(
         f"{case_path}: body: no body.toml of a body '{name}' is beside it, nor in {name}/ or geometry/ of its folder, "
