@@ -176,7 +176,7 @@ def test_a_response_that_jumps_is_integrated_in_time(
         Path("build/lifting/response.html"),
     )
     for words in summary["beyond"]:
-        assert words in told and words.split(" N ")[-1] in page.read_text()
+        assert words in told and words.split("F_N = 10 N")[-1] in page.read_text()
     assert "Motions in time" in page.read_text() and "from rest" in page.read_text()
     assert all(row["frequency_Hz"] < 121 for row in summary["resonances"])
     curve = ms.follow(
