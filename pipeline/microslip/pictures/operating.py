@@ -139,7 +139,7 @@ def haigh_plot(cycle: CycleStress, limits: MaterialLimits, worst: Endurance, tit
     if limits.yield_strength is not None:
         y = 1e-6 * limits.yield_strength - np.abs(x)
         axes.plot(x[y >= 0], y[y >= 0], color=COLOURS[4], linewidth=1.4, linestyle="--", label="yielding")
-    dots = {"s": 5, "alpha": 0.35, "linewidths": 0}
+    dots: dict[str, Any] = {"s": 5, "alpha": 0.35, "linewidths": 0}
     out, zones = cycle.counted, np.flatnonzero(cycle.singular)
     if len(zones):
         axes.scatter(mean[zones], amplitude[zones], color="0.6", label="in singular zones", **dots)
