@@ -78,7 +78,7 @@ def test_zones_of_a_step() -> None:
     away = np.linalg.norm((mesh.points - inner)[:, [0, 2]], axis=1)
     for supports in ([], [{"face": "y0", "directions": "y"}]):
         zones = singular_zones(mesh, body(supports=supports, free=not supports))
-        (points, width), = zones.edges
+        ((points, width),) = zones.edges
         np.testing.assert_allclose(points[:, [0, 2]], size / 4, atol=1e-15)
         assert (zones.hold(mesh.points) == (away <= width)).mean() > 0.99
     clamped = singular_zones(mesh, body(supports=[{"face": "x1"}]))
@@ -93,7 +93,7 @@ def test_the_clamp_of_a_sector_ends_where_the_next_one_begins() -> None:
     """The bore of a sector has two rims, front and rear; on the cut faces the ring goes on."""
     import sector
 
-    (points, _), = singular_zones(sector.mesh(), sector.settings(6)).edges[-2:-1]
+    ((points, _),) = singular_zones(sector.mesh(), sector.settings(6)).edges[-2:-1]
     radius = np.linalg.norm(points[:, [0, 2]], axis=1)
     assert radius.max() < 1.001 * sector.BORE
     ends = np.abs(np.arctan2(points[:, 0], points[:, 2])) > np.pi / 6 - 1e-6

@@ -69,8 +69,9 @@ class CycleStress:
 
     @property
     def means(self) -> tuple[float, float]:
-        """Pa, the smallest and the largest mean of all places."""
-        return float(self.mean.min()), float(self.mean.max())
+        """Pa, the smallest and the largest mean of the places that count."""
+        mean = self.mean[self.counted]
+        return float(mean.min()), float(mean.max())
 
 
 def stress_set(group: ModalGroup, location: str = "nodes") -> StressSet:

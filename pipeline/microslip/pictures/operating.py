@@ -185,7 +185,8 @@ def haigh_plot(cycle: CycleStress, limits: MaterialLimits, worst: Endurance, tit
 def _close_up(axes: Axes, cycle: CycleStress) -> None:
     """Where the places fill a corner of the diagram alone: a window on them, or words where no mean stress shows."""
     (left, right), (_, top) = axes.get_xlim(), axes.get_ylim()
-    mean, amplitude, high = 1e-6 * cycle.mean, 1e-6 * cycle.amplitude, 1e-6 * cycle.highest
+    mean, amplitude = (1e-6 * of[cycle.counted] for of in (cycle.mean, cycle.amplitude))
+    high = 1e-6 * cycle.highest
     if not 0 < high < 0.25 * top:
         return
     if np.ptp(mean) < 0.005 * (right - left):
