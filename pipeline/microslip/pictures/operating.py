@@ -168,7 +168,7 @@ def _close_up(axes: Axes, mean: Array, amplitude: Array) -> None:
     if not 0 < high < 0.25 * top:
         return
     if np.ptp(mean) < 0.005 * (right - left):
-        said = f"mean stress of the places {mean.min():.2g} to {mean.max():.2g} MPa,\namplitude up to {high:.3g} MPa"
+        said = f"all places: mean stress {mean.min():.2g} to {mean.max():.2g} MPa,\namplitude up to {high:.3g} MPa"
         line = {"arrowstyle": "-", "color": COLOURS[0]}
         said_beside(axes, said, (mean.mean(), high), (40, 40), fontsize=9, color=COLOURS[0], arrowprops=line)
         return
