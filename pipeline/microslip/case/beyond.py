@@ -91,6 +91,11 @@ class Beyond:
         ]
         return sorted(((low, high) for low, high in apart), key=lambda pair: pair[0].frequency)
 
+    @property
+    def irregular(self) -> list[Settled]:
+        """Motions without a period."""
+        return [m for m in (*self.up, *self.down, *self.rest) if m.irregular]
+
     def rows(self) -> list[dict[str, float | str]]:
         """A row a motion, for tables."""
         column = self.quantity.column
@@ -234,12 +239,10 @@ class Beyond:
 
     def _wild(self) -> list[str]:
         """Where motions are irregular."""
-        wild = sorted({m.frequency for m in (*self.up, *self.down, *self.rest) if m.irregular})
-        if not wild:
+        if not self.irregular:
             return []
-        top = max(
-            (m for m in (*self.up, *self.down, *self.rest) if m.irregular), key=lambda m: m.swing
-        )
+        wild = sorted({m.frequency for m in self.irregular})
+        top = max(self.irregular, key=lambda m: m.swing)
         span = (
             f"at {wild[0]:.5g} Hz"
             if len(wild) == 1
@@ -282,8 +285,9 @@ def with_curve(
     one: Beyond, settings: CaseSettings, bases: Bases, path: Path | str, keep: Keep, report: Report
 ) -> Beyond:
     """The same with the curve of periodic motions from either end of what was looked at, as fine as open contacts need,
-    and the stability of some of its points; without it where there are no motions in time to hold it against."""
-    if one.why:
+    and the stability of some of its points; without it where there are no motions in time to hold it against, or only
+    one that is regular, which then say all there is."""
+    if one.why or not (one.two or one.irregular):
         return one
     low, high = one.band
     harmonics, samples = max(HARMONICS, settings.balanced), max(FINER, settings.sampled)
