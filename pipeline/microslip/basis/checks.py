@@ -27,7 +27,7 @@ from ..linalg.gyroscopic import stability_sentence
 from ..modal.range_basis import Interpolant, frequencies, largest_difference
 from ..reduced.coordinates import compliance_row, held, in_modes, own_stiffness
 from .integrals import cell_volumes, face_mean, modal_mass
-from .strains import stiffness_error, strain_error, stress_error
+from .strains import allowed, stiffness_error, strain_error, stress_error
 
 TOLERANCES = {
     "orthogonality": 1e-9,
@@ -333,17 +333,17 @@ def _shape_checks(basis: ModalBasis, g: ModalGroup) -> _Findings:
         limit = min(limit, max(1e-11, 100 * g.checks.get("orthogonality", 1.0)))  # what the solver claims, and rounding
     found: _Findings = [("shapes are mass-orthonormal on the mesh", error, limit, ""), *_place_checks(basis)]
     if (stiff := stiffness_error(basis, g)) is not None:
-        found.append(("shapes are stiffness-orthogonal on the mesh", stiff, 1e-9, ""))
+        found.append(("shapes are stiffness-orthogonal on the mesh", *stiff, ""))
     if g.residual is not None and g.residual.phi.size:
         found.append(("residual shapes are mass-orthogonal to the modes", _beside(basis, g, g.residual.phi), 1e-6, ""))
     if basis.mesh.materials:
         found.append(("mass of the mesh's materials", abs(weight / basis.mass - 1), 1e-8, ""))
     volume = cell_volumes(basis.mesh) if g.stresses else 0.0
     if (stressed := stress_error(basis, g)) is not None:
-        found.append(("stresses follow from strains", stressed, 1e-9, ""))
+        found.append(("stresses follow from strains", stressed, allowed(g), ""))
     for name, s in g.stresses.items():
         if (strained := strain_error(basis, g, s)) is not None:
-            found.append((f"strains of {name} follow from the shapes", strained, 1e-9, ""))
+            found.append((f"strains of {name} follow from the shapes", strained, allowed(g), ""))
         found.append((f"volume of stress set {name}", abs(float(s.weights.sum()) / volume - 1), 1e-9, ""))
     return found
 

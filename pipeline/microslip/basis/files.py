@@ -59,6 +59,7 @@ from ..files.store import ordinary
 from ..settings.arguments import checked
 from ..topology import CELL_TYPES, FACET_CORNERS
 from .checks import TOLERANCES, Check, check_basis
+from .strains import single
 
 __all__ = ["Check", "check_basis", "open_file", "read_basis", "write_basis"]
 
@@ -324,11 +325,6 @@ def _read_residual(where: h5py.Group, n: int, gauges: dict[str, Rows], sets: dic
             for kind in ("strain", "stress")}  # fmt: skip
     own = {k: array(where, f"gauge/{escaped(k)}/T", len(v.labels), r) for k, v in gauges.items()}
     return read(Residual, where, {"node": n}, gauges=own, **held)
-
-
-def single(values: Array) -> Array:
-    """The same in single precision: what is read and drawn, and goes into no equation of motion."""
-    return values.astype(np.complex64 if np.iscomplexobj(values) else np.float32)
 
 
 _SHARED = tuple(f"stress/<name>/{field}" for field in ("points", "weights", "singular"))

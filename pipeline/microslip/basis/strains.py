@@ -38,28 +38,62 @@ def strains(mesh: Mesh, points: Array, phi: Array) -> Iterator[tuple[Array, Arra
             yield np.stack(eps, axis=2), weights * np.linalg.det(jacobian), material[some]
 
 
-def stiffness_error(basis: ModalBasis, g: ModalGroup) -> float | None:
-    """Largest entry of K_r less phi^H K phi over the largest of K_r, K of the mesh with its materials, with what gives
-    the stresses, or with the isotropic law that fits best; None where the file does not tell: loaded or spinning, at
-    another temperature, few modes, another law and no stresses."""
-    largest, m = float(np.abs(g.K_r).max(initial=0.0)), g.n_modes
-    if not largest or not _at_rest(basis, g) or g.u_static.any():
+def stiffness_error(basis: ModalBasis, g: ModalGroup) -> tuple[float, float] | None:
+    """Largest entry of K_r less phi^H K phi over the largest of K_r, and what it may be (`allowed`). K is of the mesh
+    with its materials, of the isotropic law that fits best, or of the law that gives the stresses; None where the file
+    does not tell: loaded or spinning, at another temperature, few modes, another law and no stresses."""
+    if not np.abs(g.K_r).max(initial=0.0) or not _at_rest(basis, g) or g.u_static.any():
         return None
-    known = np.array([material.elasticity for material in basis.mesh.materials] or _fitted(g)[0])
-    left, products = g.K_r.copy(), np.zeros((6 * m, 6 * m), dtype=g.phi.dtype)
-    for eps, volume, material in strains(basis.mesh, basis.mesh.points, g.phi):
+    if basis.mesh.materials:
+        return _beside(basis.mesh, g, [m.elasticity for m in basis.mesh.materials]), DOUBLE
+    law = _fitted(g)[0]
+    if law and _left(law[0], list(_ISOTROPIC)) > SAME_LAW:
+        return _beside(basis.mesh, g, law), allowed(g)
+    error = _isotropic(basis.mesh, g) if g.n_modes > 2 else np.inf
+    return (error, DOUBLE) if law or error < ISOTROPIC else None
+
+
+def _beside(mesh: Mesh, g: ModalGroup, laws: list[Array]) -> float:
+    """What Hooke matrices, by the number of a cell's material, leave of K_r, over its largest entry."""
+    left, m = g.K_r.copy(), g.n_modes
+    for eps, volume, material in strains(mesh, mesh.points, g.phi):
         weighted = eps * volume[:, :, None, None]
-        if len(known):
-            stress = np.einsum("eab,eqbm->eqam", known[material], weighted)
-            left = left - eps.reshape(-1, m).conj().T @ stress.reshape(-1, m)
-        else:
-            products += eps.reshape(-1, 6 * m).conj().T @ weighted.reshape(-1, 6 * m)
-    if len(known):
-        return float(np.abs(left).max() / largest)
+        stress = np.einsum("eab,eqbm->eqam", np.array(laws)[material], weighted)
+        left = left - eps.reshape(-1, m).conj().T @ stress.reshape(-1, m)
+    return float(np.abs(left).max() / np.abs(g.K_r).max())
+
+
+def _isotropic(mesh: Mesh, g: ModalGroup) -> float:
+    """The same of the isotropic law that leaves least."""
+    m = g.n_modes
+    products = np.zeros((6 * m, 6 * m), dtype=g.phi.dtype)
+    for eps, volume, _ in strains(mesh, mesh.points, g.phi):
+        products += eps.reshape(-1, 6 * m).conj().T @ (eps * volume[:, :, None, None]).reshape(-1, 6 * m)
     parts = products.reshape(6, m, 6, m).transpose(0, 2, 1, 3)
-    bulk, shear = parts[:3, :3].sum(axis=(0, 1)), sum(f * parts[a, a] for a, f in enumerate((2, 2, 2, 1, 1, 1)))
-    error = _left(g.K_r, [bulk, shear]) if m > 2 else np.inf
-    return error if error < ISOTROPIC else None
+    return _left(g.K_r, [np.tensordot(law, parts) for law in _ISOTROPIC])
+
+
+_ISOTROPIC = np.zeros((6, 6)), np.diag([2.0, 2.0, 2.0, 1.0, 1.0, 1.0])
+_ISOTROPIC[0][:3, :3] = 1.0
+"""Hooke matrices of Lame's two constants, engineering shear."""
+
+SAME_LAW = 1e-4
+"""Share of a law that stresses in single precision give, by which one that is isotropic may look as if it were not."""
+
+
+DOUBLE, SINGLE = 1e-9, 2e-7
+"""What may be left of numbers kept in double and in single precision."""
+
+
+def single(values: Array) -> Array:
+    """The same in single precision: what is read and drawn, and goes into no equation of motion."""
+    return values.astype(np.complex64 if np.iscomplexobj(values) else np.float32)
+
+
+def allowed(g: ModalGroup) -> float:
+    """What may be left where a group's strains and stresses take part, which files keep in single precision."""
+    kept = [a for s in g.stresses.values() for a in (s.strain, s.stress)]
+    return SINGLE if all(np.array_equal(a, single(a)) for a in kept) else DOUBLE
 
 
 ISOTROPIC = 1e-2
@@ -76,7 +110,13 @@ def _left(K: Array, terms: list[Array]) -> float:
     """Largest entry that the best combination of matrices leaves of a matrix, over its largest."""
     A, k = (np.concatenate([x.real, x.imag]) for x in (np.stack([t.ravel() for t in terms], axis=1), K.ravel()))
     size = np.maximum(np.abs(A).max(axis=0), 1e-300)
-    return float(np.abs(A / size @ np.linalg.lstsq(A / size, k, rcond=None)[0] - k).max() / np.abs(k).max())
+    with np.errstate(all="ignore"):
+        try:
+            left = A / size @ np.linalg.lstsq(A / size, k, rcond=None)[0] - k
+        except np.linalg.LinAlgError:  # numbers that no body has
+            return np.inf
+        found = float(np.abs(left).max() / np.abs(k).max())
+    return found if np.isfinite(found) else np.inf
 
 
 def _fitted(g: ModalGroup) -> tuple[list[Array], float]:
