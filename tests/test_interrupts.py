@@ -88,6 +88,12 @@ def test_loops_heed_a_request(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, l
                     pass
 
 
+def test_requests_are_heard_before_the_command_line_is_loaded() -> None:
+    """While it is imported, a second on a busy machine, Ctrl-C would be a traceback of Python."""
+    code = "import sys, microslip.__main__; raise SystemExit(sum(m in sys.modules for m in ('cyclopts', 'numpy')))"
+    assert subprocess.run([sys.executable, "-c", code]).returncode == 0
+
+
 IN_A_CALLBACK = """
 import gc, os, sys, time
 from microslip import cli, interrupts

@@ -70,5 +70,5 @@ def test_modes_that_do_not_bend_are_refused() -> None:
     free = ms.structure(np.eye(2), [[1.0, -1.0], [-1.0, 1.0]], force={0: 1.0}, elements=[ms.jenkins(1.0, 1.0, 0, 1)])
     apart = ms.structure(np.eye(2), np.diag([1.0, 4.0]), output=1, elements=[ms.jenkins(1.0, 1.0, 0)])
     for system, mode in ((free, 0), (apart, 1)):
-        with pytest.raises(UserError, match="^mode: number"):
+        with pytest.raises(UserError, match="^mode: "):
             ms.backbone(system, 1e-3, 1.0, mode=mode)

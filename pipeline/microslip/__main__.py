@@ -1,5 +1,15 @@
-"""``python -m microslip``."""
+"""``python -m microslip`` and the console script: requests to end are heard before anything large is loaded."""
 
-from .cli import entry
+from .interrupts import listen
 
-entry()
+
+def entry() -> None:
+    """The command line."""
+    listen()
+    from .cli import entry as typed
+
+    typed()
+
+
+if __name__ == "__main__":
+    entry()

@@ -81,6 +81,8 @@ def listen() -> None:
     is in a library and runs no Python.
     """
     global _mouth
+    if _mouth is not None:
+        return
     ear, _mouth = socket.socketpair()
     _mouth.setblocking(False)
     for number in (signal.SIGINT, signal.SIGTERM):

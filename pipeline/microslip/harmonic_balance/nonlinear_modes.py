@@ -288,16 +288,17 @@ class _Curve:
             raise UserError(f"mode: number {mode + 1}; there are {len(omega)}, counted from 1")
         part, k, q = _only(stuck), stuck.stiffness[0], shapes[:, mode].astype(complex)
         d = np.linalg.solve(np.eye(part.count) + part.residual @ k, part.rows @ q)
-        at = f"{mode + 1} at {omega[mode] / 2 / np.pi:.6g} Hz"
+        hertz = omega / 2 / np.pi  # which say the same where modes are counted from 0 and from 1
+        at = f"mode: that at {hertz[mode]:.6g} Hz"
         if omega[mode] <= RIGID * omega[-1]:
-            lowest = int((omega <= RIGID * omega[-1]).sum()) + 1
-            raise UserError(f"mode: number {at} is a motion that nothing holds; take {lowest} or a higher one")
+            lowest = hertz[omega > RIGID * omega[-1]].min(initial=hertz[-1])
+            raise UserError(f"{at} is a motion that nothing holds; take that at {lowest:.6g} Hz or a higher one")
         moved, reach = np.abs(d), np.abs(part.rows) @ np.abs(q)
         if not (moved > 1e-9 * reach).any():
-            raise UserError(f"mode: number {at} does not move the contacts, so it is linear; take another")
+            raise UserError(f"{at} does not move the contacts, so it is linear; take another")
         seen = complex(part.output[self.output] @ q - part.output_residual[self.output] @ (k @ d))
         if abs(seen) < 1e-9 * np.abs(part.output[self.output]).max(initial=0.0) * np.abs(q).max():
-            raise UserError(f"mode: number {at} does not move the read-out; take another")
+            raise UserError(f"{at} does not move the read-out; take another")
         C = part.viscous(float(omega[mode]))
         xi = float((q.conj() @ C @ q).real / (q.conj() @ part.M @ q).real)
         z = np.zeros((self.problem.coefficients, self.problem.count))
