@@ -188,7 +188,7 @@ def of(assembly: Assembly, Omega: float, second: float | None = None) -> Equatio
 
     Raises:
         UserError: a frequency that is not positive; modes that are not real; a law that does not say what it remembers;
-            circulatory forces.
+            circulatory forces; rigid contacts that nothing can press.
     """
     prepare()
     bounded("frequency", Omega / (2 * np.pi), gt=0)
@@ -210,6 +210,7 @@ def of(assembly: Assembly, Omega: float, second: float | None = None) -> Equatio
     C = V.T @ C @ V
     C = np.where(np.abs(C) < SEEN * np.abs(C).max(initial=0.0), 0.0, C)
     D = rows @ V
+    _can_press(assembly.contacts, D, _real(mean.residual, assembly))
     F_0 = np.concatenate([c.preload for c in assembly.contacts]) if assembly.contacts else np.zeros(0)
     B = _of_harmonics(parts, harmonics, lambda p: V.T @ p.load)
     return Equations(
@@ -231,6 +232,20 @@ def _of_two(assembly: Assembly, ratio: float) -> Assembly:
         )
     loads = (x if x.tone == 1 else replace(x, tone=1, harmonic=x.harmonic * ratio) for x in assembly.loads)  # type: ignore[arg-type]
     return replace(assembly, loads=tuple(loads))
+
+
+def _can_press(contacts: Sequence[Contact], D: Array, R: Array) -> None:
+    """Refuse rigid contacts along whose normal nothing moves: no force would ever press them, nor friction act."""
+    ends = np.cumsum([len(c.offset) for c in contacts])
+    for contact, end in zip(contacts, ends, strict=True):
+        law, own = contact.patch.law, slice(end - len(contact.offset), end)
+        normal = contact.patch.kinematics[:, 0]
+        moved = np.hstack([D[own], R[own]])
+        if isinstance(law, SetValued) and law.normal is None and not (normal @ moved).any():
+            raise UserError(
+                f'contacts.{contact.name}: law "set-valued" is pressed by what moves along its normal, and here nothing '
+                'does, so that it would hold no friction; let the body move there (free = "xz", say), or take another law'
+            )
 
 
 def _remembers(contact: Contact) -> None:
