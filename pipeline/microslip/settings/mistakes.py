@@ -84,8 +84,9 @@ def unfit(value: Any, gt: float | None = None, ge: float | None = None, le: floa
         ("greater_than_equal", -BEYOND, at >= -BEYOND),
     ):
         if not np.all(good):
-            wrong = at[~np.broadcast_to(good, at.shape)].ravel()[0]
-            return f"{_WORDS[kind].format(gt=bound, ge=bound, le=bound)} (it is {wrong:g})"
+            wrong = int(np.argmin(good))
+            which = f"entry {wrong + 1}" if at.size > 1 else "it"
+            return f"{_WORDS[kind].format(gt=bound, ge=bound, le=bound)} ({which} is {at.flat[wrong]:g})"
     return ""
 
 
