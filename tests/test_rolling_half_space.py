@@ -248,7 +248,7 @@ def test_kalkers_linear_theory_as_creepage_vanishes() -> None:
 )
 def test_mistakes_are_named(key: str, wrong: dict) -> None:
     grid, h = ellipse(12)
-    with pytest.raises(UserError, match=f"^(steady_rolling: )?{key}: "):
+    with pytest.raises(UserError, match=f"^(steady_rolling: )?{key}"):
         steady_rolling(**{"distance": h, "grid": grid, "pair": STEEL, "friction": MU} | wrong)
 
 
