@@ -15,10 +15,11 @@ from ..data import Array
 from ..errors import UserError
 from ..settings.arguments import Rows, checked
 from ..settings.numbers import NotNegative, Positive
+from .arguments import Positives
 
 
 @checked
-def depth_along(source: Rows, dx: Positive, coefficient: NotNegative, speed: Positive) -> Array:
+def depth_along(source: Rows, dx: Positives, coefficient: NotNegative, speed: Positive) -> Array:
     """Depth of what passes each element's rear side, Sextro Eqs. (6.8-3), (6.8-4): it grows from the leading edge.
 
     Args:

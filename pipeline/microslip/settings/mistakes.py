@@ -266,7 +266,7 @@ def _words(found: list[tuple[tuple[Any, ...], Any]], error: Any, given: Any) -> 
     if kind in ("too_long", "missing") and isinstance(given, list | tuple):
         wanted = context.get("max_length") or 1 + max(f["loc"][-1] for _, f in found if isinstance(f["loc"][-1], int))
         return f"must have {wanted} entries and has {len(given)}"
-    if given != given:
+    if isinstance(given, float) and given != given:
         return _WORDS["finite_number"]
     either = {f["type"] for _, f in found}
     if "tuple_type" in either and either & _SCALAR and not isinstance(given, list):
