@@ -75,13 +75,12 @@ def unfit(value: Any, gt: float | None = None, ge: float | None = None, le: floa
         at = np.asarray(value, dtype=float)
     except (TypeError, ValueError, OverflowError):
         return f"{_shown(value)} is no number"
+    least, most = -BEYOND if ge is None else ge, BEYOND if le is None else le
     for kind, bound, good in (
         ("finite_number", None, np.isfinite(at)),
         ("greater_than", gt, gt is None or at > gt),
-        ("greater_than_equal", ge, ge is None or at >= ge),
-        ("less_than_equal", le, le is None or at <= le),
-        ("less_than_equal", BEYOND, at <= BEYOND),
-        ("greater_than_equal", -BEYOND, at >= -BEYOND),
+        ("greater_than_equal", least, at >= least),
+        ("less_than_equal", most, at <= most),
     ):
         if not np.all(good):
             wrong = int(np.argmin(good))
