@@ -113,7 +113,8 @@ CALLS = [
         "at": PLACE, "to": PLACE, "name": TEXT,
     }),
     (ms.jenkins, {"stiffness": 1.0, "limit": 1.0},
-     {"stiffness": [*POSITIVE, [1.0, 2.0], np.ones(2)], "limit": [*NOT_NEGATIVE, [1.0]], "at": PLACE, "to": PLACE, "name": TEXT}),
+     {"stiffness": [*POSITIVE, [1.0], np.ones(2)], "limit": [*NOT_NEGATIVE, [1.0]], "at": PLACE, "to": PLACE,
+      "name": TEXT}),
     (ms.stop, {"stiffness": 1.0, "gap": 1.0}, {
         "stiffness": [v for v in POSITIVE if v is not INF], "gap": NUMBER, "at": PLACE, "to": PLACE, "both": TRUTH,
         "restitution": ["x", NAN, -1.0, 2.0, None, []], "name": TEXT,
