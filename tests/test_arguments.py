@@ -90,7 +90,7 @@ CALLS = [
         "elastic": [*SYSTEM, (1e11, 8e10, 0.28)],
     }),
     (ms.Pose, {}, {"lateral": NUMBER, "yaw": NUMBER, "roll": NUMBER, "speed": POSITIVE,
-                   "turning": without_none(NUMBER)}),
+                   "turning": without_none(NOT_NEGATIVE)}),
     (ms.patches, {"track": TRACK, "pose": ms.Pose(), "side": "right", "vertical": 1e5}, SHARED | {"side": WORD}),
     (ms.axle, {"track": TRACK, "pose": ms.Pose(), "vertical": 1e5}, SHARED | {"even": TRUTH}),
     (ms.contact_table, {"track": TRACK, "load": 1e5, "lateral": 4e-3, "yaw": 0.01}, {

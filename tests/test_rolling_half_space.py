@@ -244,6 +244,7 @@ def test_kalkers_linear_theory_as_creepage_vanishes() -> None:
         ("approach", {"approach": np.nan}),
         ("creepages", {"force": LOAD, "creepages": "x"}),
         ("tangential", {"force": LOAD, "tangential": (1.0,)}),
+        ("tangential", {"force": LOAD, "tangential": ["x", None]}),
     ],
 )
 def test_mistakes_are_named(key: str, wrong: dict) -> None:

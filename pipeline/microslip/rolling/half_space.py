@@ -8,7 +8,7 @@ rigid slip w = (xi - phi y, eta + phi x), so a positive creepage gives a negativ
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Annotated
 
@@ -38,7 +38,7 @@ from .half_space_tangential import TOLERANCE, Shear, tractions
 ITERATIONS = 50
 FASTEST = 1e4
 """Slip over the speed of rolling (of a shift m) up to which tractions are looked for."""
-Forces = tuple[float | None, float | None]
+Forces = Sequence[float | None]
 
 
 @dataclass(frozen=True)
@@ -236,6 +236,8 @@ def _inside(pressure: Array, grid: Grid) -> None:
 
 def _sheared(now: Contact, motion: _Motion, tangential: Forces, warm: bool) -> Contact:
     """Tangential problem under a given pressure; the creepage follows where a force is given."""
+    if len(tangential) != 2:
+        raise UserError(f"tangential: is {tangential!r}; give F_x and F_y, N, None where the creepage is given")
     wanted = [k for k in (0, 1) if tangential[k] is not None]
     sums = np.array([tangential[k] for k in wanted], float) / now.grid.area
     if wanted and not np.linalg.norm(sums) < now.bound.sum():

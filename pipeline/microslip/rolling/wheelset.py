@@ -54,7 +54,7 @@ class Pose:
     yaw: Component = 0.0
     roll: Component = 0.0
     speed: Positive = 1.0
-    turning: Component | None = None
+    turning: NotNegative | None = None
 
     def __post_init__(self) -> None:
         check_fields(self)

@@ -262,7 +262,7 @@ def _most_telling(found: list[tuple[tuple[Any, ...], Any]], value: Any) -> tuple
 
 def _words(found: list[tuple[tuple[Any, ...], Any]], error: Any, given: Any) -> str:
     kind, context = error["type"], error.get("ctx", {})
-    if kind in ("too_long", "missing") and isinstance(given, list | tuple):
+    if kind in ("too_long", "missing") and isinstance(given, list):
         wanted = context.get("max_length") or 1 + max(f["loc"][-1] for _, f in found if isinstance(f["loc"][-1], int))
         return f"must have {wanted} entries and has {len(given)}"
     if isinstance(given, float) and given != given:
