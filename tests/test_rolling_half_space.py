@@ -244,11 +244,12 @@ def test_kalkers_linear_theory_as_creepage_vanishes() -> None:
         ("approach", {"approach": np.nan}),
         ("creepages", {"force": LOAD, "creepages": "x"}),
         ("tangential", {"force": LOAD, "tangential": (1.0,)}),
+        ("tangential", {"force": LOAD, "tangential": ["x", None]}),
     ],
 )
 def test_mistakes_are_named(key: str, wrong: dict) -> None:
     grid, h = ellipse(12)
-    with pytest.raises(UserError, match=f"^{key}"):
+    with pytest.raises(UserError, match=f"^(steady_rolling: )?{key}"):
         steady_rolling(**{"distance": h, "grid": grid, "pair": STEEL, "friction": MU} | wrong)
 
 

@@ -115,5 +115,5 @@ def test_source_is_the_work_of_traction_on_slip() -> None:
     ],
 )
 def test_mistakes_are_named(key: str, call) -> None:
-    with pytest.raises(UserError, match=f"^{key}"):
+    with pytest.raises(UserError, match=f"{key}: "):
         call()

@@ -8,12 +8,17 @@ structure is one mode, that gives way along rolling under the force.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
+from pydantic import Field
 
 from ..data import Array
 from ..errors import UserError
+from ..settings.arguments import check_fields, checked, numbers
+from ..settings.numbers import NotNegative, Positive
+from .arguments import NotNegatives, Reals, joined
 
 
 @dataclass(frozen=True)
@@ -28,26 +33,20 @@ class Brush:
         UserError: a number that is none of a brush.
     """
 
-    share: Array
-    length: float
-    stiffness: float
-    friction: float
-    speed: float
-    compliance: float = 0.0
-    frequency: float = np.inf
-    damping: float = 0.05
-    under: float | None = None
+    share: Annotated[Any, numbers(1, ge=0)]
+    length: Positive
+    stiffness: Positive
+    friction: Positive
+    speed: Positive
+    compliance: NotNegative = 0.0
+    frequency: Annotated[float, Field(gt=0)] = np.inf
+    damping: NotNegative = 0.05
+    under: Positive | None = None
 
     def __post_init__(self) -> None:
-        for key in ("length", "stiffness", "friction", "speed", "frequency", "under"):
-            value = getattr(self, key)
-            if value is not None and not (value > 0 and (np.isfinite(value) or key == "frequency")):
-                raise UserError(f"{key}: {value:g}; it must be greater than 0")
-        for key in ("compliance", "damping"):
-            if not 0 <= getattr(self, key) < np.inf:
-                raise UserError(f"{key}: {getattr(self, key):g}; it must be 0 or more")
-        if not (np.min(self.share) >= 0 and abs(np.sum(self.share) - 1) < 1e-9):
-            raise UserError("share: must be 0 or more everywhere and have the sum 1")
+        check_fields(self)
+        if not abs(np.sum(self.share) - 1) < 1e-9:
+            raise UserError(f"Brush: share: must have the sum 1, and has {np.sum(self.share):g}; correct it")
 
     @property
     def step(self) -> float:
@@ -59,7 +58,8 @@ class Brush:
         """N/m of an element."""
         return self.stiffness / len(self.share)
 
-    def carried(self, slip: ArrayLike, force: ArrayLike) -> Array:
+    @checked
+    def carried(self, slip: Reals, force: NotNegatives) -> Array:
         """(t,) tangential force after each step, N, from rest of the springs.
 
         Args:
@@ -68,9 +68,7 @@ class Brush:
         Raises:
             UserError: slip that is not finite, force that is negative.
         """
-        slip, force = np.broadcast_arrays(*(np.atleast_1d(np.asarray(v, float)) for v in (slip, force)))
-        if not (np.isfinite(slip).all() and np.isfinite(force).all() and (force >= 0).all()):
-            raise UserError("slip, force: must be finite, and the force 0 or more")
+        slip, force = map(np.atleast_1d, joined(slip=slip, force=force))
         longest = max(1.0, float(self.lengthened(force).max()))
         u, mode = np.zeros(len(self.share) + 2 * self._beyond(longest)), np.zeros(3)
         out, scale, elements = np.empty(len(slip)), -1.0, self._elements(0.0, longest)

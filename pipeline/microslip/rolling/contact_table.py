@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -20,8 +20,11 @@ from ..errors import UserError
 from ..files import hdf5
 from ..files.hostile import reading
 from ..files.store import ordinary
+from ..settings import arguments
+from ..settings.arguments import Count, Index, wholes
+from ..settings.numbers import Positive
 from . import strips
-from .arguments import number, of_kind, wholes
+from .arguments import NotNegatives, Positives, Reals
 from .strips import Array
 from .wheelset import Patch, Pose, Track, axle, creepages
 
@@ -105,10 +108,10 @@ class ContactTable(NamedTuple):
     checked: int
     jumping: float
 
+    @arguments.checked
     def forces(
-        self, lateral: ArrayLike, yaw: ArrayLike, speed: ArrayLike, friction: ArrayLike, *,
-        turning: ArrayLike | None = None, load: ArrayLike | None = None, xi: ArrayLike = 0.0, eta: ArrayLike = 0.0,
-        phi: ArrayLike = 0.0,
+        self, lateral: Reals, yaw: Reals, speed: Positives, friction: NotNegatives, *, turning: Reals | None = None,
+        load: NotNegatives | None = None, xi: Reals = 0.0, eta: Reals = 0.0, phi: Reals = 0.0,
     ) -> Rolling:  # fmt: skip
         """Patches and forces of n poses, by the strips of `strips.creep_forces`.
 
@@ -132,12 +135,6 @@ class ContactTable(NamedTuple):
             worst = v[np.argmax(np.abs(v))]
             if not abs(worst) <= reach * (1 + 1e-9):
                 raise UserError(f"{name}: is {worst:.4g}, and the table goes from {-reach:.4g} to {reach:.4g}")
-        least = min(given[3].min(), loads.min())
-        if not (all(np.isfinite(v).all() for v in (*given, loads)) and (given[2] > 0).all() and least >= 0):
-            raise UserError(
-                "speed, friction, turning, xi, eta, phi, load: must be finite, speed positive, friction "
-                "and load 0 or more"
-            )
         size = POSES if n > 1 else 1
         which = np.minimum(np.arange(-(-n // size) * size), n - 1).reshape(-1, size)
         runs = (_rolling(self, *(v[which[run]] for v in (*given, loads))) for run in strips.runs(n, size))
@@ -307,9 +304,10 @@ def _mean(values: Array, weights: tuple[Array, ...]) -> Array:
     return jnp.einsum("nsjik,nsj,nsi->nsk", near, between, over)
 
 
+@arguments.checked
 def contact_table(
-    track: Track, load: float, lateral: float, yaw: float, *, points: tuple[int, int] = POINTS, checked: int = 100,
-    seed: int = 0, report: Callable[[str], None] = lambda _: None,
+    track: Track, load: Positive, lateral: Positive, yaw: Positive, *, points: Annotated[Any, wholes(4, 2)] = POINTS,
+    checked: Count = 100, seed: Index = 0, report: Callable[[str], None] = lambda _: None,
 ) -> ContactTable:  # fmt: skip
     """A table over poses, and its error at random ones.
 
@@ -320,11 +318,6 @@ def contact_table(
     Raises:
         UserError: a pose in which the profiles do not touch, or touch where one ends; numbers that are none.
     """
-    wholes("points", points, (4, 2))
-    for name, value in {"load": load, "checked": checked}.items():
-        number(name, value)
-    if not min(number("lateral", lateral), number("yaw", yaw)) > 0:
-        raise UserError(f"lateral, yaw: reach to {lateral:g} m and {yaw:g} rad to either side; both must be positive")
     shifts, turns = np.linspace(0.0, lateral, points[0]), yaw * np.sqrt(np.linspace(0.0, 1.0, points[1]))
     turns[0] = LEAST * yaw
     p, roll, down = _found(track, load, np.tile(shifts, points[1]), np.repeat(turns, points[0]), report=report)
@@ -430,9 +423,9 @@ def _told(r: Rolling, load: float) -> list[Array]:
 FORMAT = "microslip-contact-table-1"
 
 
-def write_contact_table(path: Path, table: ContactTable) -> Path:
+@arguments.checked
+def write_contact_table(path: Path | str, table: ContactTable) -> Path:
     """As HDF5: a dataset an attribute, those of its patches in a group; complete or not at all."""
-    of_kind(ContactTable, table=table)
     with hdf5.sealed(path) as file:
         file.attrs.update(format=FORMAT, meaning=str(ContactTable.__doc__), patches=str(Patches.__doc__),
                           missed=", ".join(MISSED))  # fmt: skip
@@ -440,16 +433,16 @@ def write_contact_table(path: Path, table: ContactTable) -> Path:
             for name, value in nouns._asdict().items():
                 if name != "patches":
                     hdf5.put(group, name, np.asarray(value))
-    return path
+    return Path(path)
 
 
+@arguments.checked
 def read_contact_table(path: Path | str) -> ContactTable:
     """A table that `write_contact_table` wrote.
 
     Raises:
         UserError: another file.
     """
-    of_kind(str | Path, path=path)
     with reading(ordinary(Path(path)), FORMAT, "", "write a table of contacts with [contacts] in a case") as file:
         patches = Patches(*(file["patches"][name][()] for name in Patches._fields))
         rest = {name: file[name][()] for name in ContactTable._fields if name != "patches"}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import cache
 from typing import NamedTuple
 
@@ -11,15 +12,21 @@ from numpy.typing import ArrayLike
 from ..contact.hertz import axis_ratio, ellipse_integrals
 from ..contact.solids import Solid, normal_modulus
 from ..data import Array
-from .arguments import number
+from ..settings.arguments import check_fields, checked
+from ..settings.numbers import Positive
+from .arguments import NotNegatives, Poisson, Positives, joined
 
 
-class Elastic(NamedTuple):
+@dataclass(frozen=True)
+class Elastic:
     """Both bodies as one. Attributes: modulus: E*, Pa. shear: G, Pa. poisson: nu."""
 
-    modulus: float
-    shear: float
-    poisson: float
+    modulus: Positive
+    shear: Positive
+    poisson: Poisson
+
+    def __post_init__(self) -> None:
+        check_fields(self)
 
 
 def combined(first: Solid, second: Solid) -> Elastic:
@@ -59,7 +66,8 @@ class Ellipse(NamedTuple):
     pressure: Array
 
 
-def ellipses(A: ArrayLike, B: ArrayLike, force: ArrayLike, modulus: float) -> Ellipse:
+@checked
+def ellipses(A: Positives, B: Positives, force: NotNegatives, modulus: Positive) -> Ellipse:
     """Hertz' contact for any axis ratio, in both directions (Sextro Eqs. (6.4-9) to (6.4-17), (6.4-24)).
 
     Args:
@@ -69,9 +77,7 @@ def ellipses(A: ArrayLike, B: ArrayLike, force: ArrayLike, modulus: float) -> El
     Raises:
         UserError: other numbers.
     """
-    number("modulus", modulus)
-    given = {"A": A, "B": B, "force": force}
-    A, B, F = np.broadcast_arrays(*(number(name, v) for name, v in given.items()))
+    A, B, F = joined(A=A, B=B, force=force)
     low, high = np.minimum(A, B), np.maximum(A, B)
     g = axis_ratio(low / high)
     K, D, _ = ellipse_integrals(g)

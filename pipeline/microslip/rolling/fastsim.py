@@ -6,15 +6,16 @@ equal rectangles, with the three flexibilities that become one for large creepag
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
 
 from ..data import Array
-from ..errors import UserError
-from .arguments import grid_of, number, words
+from ..settings.arguments import checked, numbers
+from ..settings.numbers import Component, NotNegative, Positive
+from .arguments import Poisson, Resolution
 from .kalker import creep_coefficients
-from .strips import Forces, Tractions, blended, states
+from .strips import Forces, Tractions, blended
 
 Bound = Literal["parabolic", "elliptic"]
 
@@ -25,9 +26,11 @@ def flexibilities(a: float, b: float, shear: float, poisson: float) -> Array:
     return np.asarray([8 * a / (3 * c11), 8 * a / (3 * c22), np.pi * a * np.sqrt(a / b) / (4 * c23)]) / shear
 
 
+@checked
 def fastsim(
-    xi: float, eta: float, phi: float, a: float, b: float, normal_force: float, friction: float, shear: float,
-    poisson: float, elements: tuple[int, int] = (44, 44), cover: float = 1.1, bound: Bound = "parabolic",
+    xi: Component, eta: Component, phi: Component, a: Positive, b: Positive, normal_force: Positive,
+    friction: NotNegative, shear: Positive, poisson: Poisson, elements: Resolution = (44, 44),
+    cover: Annotated[float, numbers(0, ge=1)] = 1.1, bound: Bound = "parabolic",
     blend: bool = True,
 ) -> tuple[Forces, Tractions]:  # fmt: skip
     """Forces and tractions of one state, see `strips.creep_forces` for the arguments.
@@ -39,12 +42,6 @@ def fastsim(
     Raises:
         UserError: a value or a word that no state of rolling has.
     """
-    given = states(xi, eta, phi, a, b, normal_force, friction, shear, poisson)
-    if len(given[0]) > 1:
-        raise UserError("xi, eta, phi, ...: fastsim is of one state; call it for each")
-    xi, eta, phi, a, b, normal_force, friction, shear, poisson = (float(v[0]) for v in given)
-    elements, cover = grid_of(elements), float(number("cover", cover))
-    words(bound=(bound, Bound))
     L = flexibilities(a, b, shear, poisson)
     if blend:
         L = np.asarray(blended(L, np.array([xi, eta, phi]), a, b, friction * normal_force))

@@ -8,15 +8,19 @@ rigid slip w = (xi - phi y, eta + phi x), so a positive creepage gives a negativ
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike
+from pydantic import Field
 
 from ..data import Array, Flags
 from ..errors import UserError
-from .arguments import number, wholes
+from ..settings.arguments import Vector, checked
+from ..settings.numbers import Component, NotNegative, Positive
+from .arguments import NotNegatives, Poisson, Reals
 from .half_space_influence import (
     ALL,
     NORMAL,
@@ -34,7 +38,7 @@ from .half_space_tangential import TOLERANCE, Shear, tractions
 ITERATIONS = 50
 FASTEST = 1e4
 """Slip over the speed of rolling (of a shift m) up to which tractions are looked for."""
-Forces = tuple[float | None, float | None]
+Forces = Sequence[float | None]
 
 
 @dataclass(frozen=True)
@@ -108,8 +112,9 @@ class _Motion:
     past: Array | float = 0.0
 
 
+@checked
 def pressed(
-    distance: ArrayLike, grid: Grid, pair: Pair, force: float | None = None, approach: float | None = None
+    distance: Reals, grid: Grid, pair: Pair, force: NotNegative | None = None, approach: Component | None = None
 ) -> Contact:  # fmt: skip
     """Bodies pressed together without friction.
 
@@ -122,9 +127,10 @@ def pressed(
     return _contact(distance, grid, pair, 0.0, force, approach, None, (0, 0, 0), (None, None), None)
 
 
+@checked
 def shifted(
-    distance: ArrayLike, grid: Grid, pair: Pair, friction: ArrayLike, force: float | None = None,
-    approach: float | None = None, shift: ArrayLike = (0, 0, 0),
+    distance: Reals, grid: Grid, pair: Pair, friction: NotNegatives, force: NotNegative | None = None,
+    approach: Component | None = None, shift: Vector = (0, 0, 0),
     tangential: Forces = (None, None), before: Contact | None = None,
 ) -> Contact:  # fmt: skip
     """Bodies pressed together, then shifted without rolling (Cattaneo's problem).
@@ -142,9 +148,10 @@ def shifted(
     return _contact(distance, grid, pair, friction, force, approach, motion, shift, tangential, before)
 
 
+@checked
 def steady_rolling(
-    distance: ArrayLike, grid: Grid, pair: Pair, friction: ArrayLike, force: float | None = None,
-    approach: float | None = None, creepages: ArrayLike = (0, 0, 0),
+    distance: Reals, grid: Grid, pair: Pair, friction: NotNegatives, force: NotNegative | None = None,
+    approach: Component | None = None, creepages: Vector = (0, 0, 0),
     tangential: Forces = (None, None), start: Contact | None = None,
 ) -> Contact:  # fmt: skip
     """Steady rolling towards +x.
@@ -161,10 +168,11 @@ def steady_rolling(
     return _contact(distance, grid, pair, friction, force, approach, motion, creepages, tangential, start)
 
 
+@checked
 def rolled(
-    before: Contact, distance: ArrayLike, friction: ArrayLike, force: float | None = None,
-    approach: float | None = None, creepages: ArrayLike = (0, 0, 0),
-    tangential: Forces = (None, None), step: float | None = None,
+    before: Contact, distance: Reals, friction: NotNegatives, force: NotNegative | None = None,
+    approach: Component | None = None, creepages: Vector = (0, 0, 0),
+    tangential: Forces = (None, None), step: Positive | None = None,
 ) -> Contact:  # fmt: skip
     """The next moment of transient rolling towards +x, in a frame that goes with the patch.
 
@@ -177,8 +185,6 @@ def rolled(
     """
     grid, pair = before.grid, before.pair
     step = grid.dx if step is None else step
-    if not 0 < step < np.inf:
-        raise UserError(f"step: {step:g} m; the distance rolled must be greater than 0")
     past = -influence_ahead(grid, pair, step)(before.all_tractions, TANGENTIAL, ALL) / step
     motion = _Motion(lambda g: influence(g, pair, step), _rigid(grid, step), past)
     return _contact(distance, grid, pair, friction, force, approach, motion, creepages, tangential, before)
@@ -195,12 +201,9 @@ def _contact(
     motion: _Motion | None, given: ArrayLike, tangential: Forces, start: Contact | None,
 ) -> Contact:  # fmt: skip
     """Pressure and traction in turns until both stay (Panagiotopoulos); like bodies need one turn."""
-    h, mu, w = grid.field(distance, "distance"), grid.field(friction, "friction"), _three(given)
-    for name, value in (("force", force), ("approach", approach)):
-        if value is not None:
-            number(name, value)
-    if not np.all(mu >= 0):
-        raise UserError("friction: mu is negative or not a number somewhere; it must be 0 or more")
+    h, mu, w = grid.field(distance, "distance"), grid.field(friction, "friction"), np.array(given, float)
+    if w.shape != (3,):
+        raise UserError(f"creepages: {given!r}; give three numbers, along x, along y and the spin or turn")
     if motion is not None and (fastest := np.abs(np.tensordot(w, motion.rigid, 1)).max()) > FASTEST:
         raise UserError(
             f"creepages: a slip of {fastest:.3g} times the speed is no rolling any more; creepages have no unit, the "
@@ -222,17 +225,6 @@ def _contact(
         if not pair.mismatch or motion is None or moved <= 10 * TOLERANCE * pressure.max():
             return now
     raise UserError(f"distance: pressure and traction have not settled after {ITERATIONS} turns; K is too large")
-
-
-def _three(creepages: ArrayLike) -> Array:
-    """(3,) of a motion."""
-    try:
-        w = np.array(creepages, float)
-    except (TypeError, ValueError):
-        w = np.zeros(0)
-    if w.shape != (3,) or not np.isfinite(w).all():
-        raise UserError(f"creepages: {creepages!r}; give three numbers, along x, along y and the spin or turn")
-    return w
 
 
 def _inside(pressure: Array, grid: Grid) -> None:
@@ -260,7 +252,8 @@ def _sheared(now: Contact, motion: _Motion, tangential: Forces, warm: bool) -> C
     return replace(now, traction=traction, slip=slip * now.touching, motion=found)
 
 
-def linear_coefficients(ratio: float, poisson: float, elements: int = 40) -> Array:
+@checked
+def linear_coefficients(ratio: Positive, poisson: Poisson, elements: Annotated[int, Field(ge=4)] = 40) -> Array:
     """Kalker's (C11, C22, C23, C33) of an elliptic patch that sticks everywhere (Kalker 1990, 4.2).
 
     F_x = -c^2 G C11 xi, F_y = -c^2 G C22 eta - c^3 G C23 phi, M_z = c^3 G C23 eta - c^4 G C33 phi, c^2 = a b. On
@@ -272,7 +265,6 @@ def linear_coefficients(ratio: float, poisson: float, elements: int = 40) -> Arr
     Raises:
         UserError: a ratio that is not positive, another Poisson's ratio, fewer than four elements.
     """
-    number("ratio", ratio), number("poisson", poisson), wholes("elements", (elements,), (4,))
     coarse, fine = (_coefficients(ratio, poisson, n) for n in (elements, 2 * elements))
     return 2 * fine - coarse
 

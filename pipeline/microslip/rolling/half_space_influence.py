@@ -11,15 +11,18 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike
+from pydantic import Field
 from scipy import fft
 
 from ..contact.solids import Solid
 from ..data import Array
 from ..errors import UserError
-from .arguments import wholes
+from ..settings.arguments import Count, check_fields
+from ..settings.numbers import Component, Positive
 
 
 @dataclass(frozen=True)
@@ -34,15 +37,12 @@ class Pair:
         UserError: G not positive, nu outside -1 < nu <= 0.5.
     """
 
-    shear: float
-    poisson: float
-    mismatch: float = 0.0
+    shear: Positive
+    poisson: Annotated[float, Field(gt=-1, le=0.5)]
+    mismatch: Component = 0.0
 
     def __post_init__(self) -> None:
-        if not 0 < self.shear < np.inf:
-            raise UserError(f"shear: {self.shear:g} Pa is no modulus; it must be greater than 0")
-        if not -1 < self.poisson <= 0.5:
-            raise UserError(f"poisson: {self.poisson:g} is impossible; it lies between -1 and 0.5, 0.3 say")
+        check_fields(self)
 
     @staticmethod
     def of(first: Solid, second: Solid) -> Pair:
@@ -66,19 +66,15 @@ class Grid:
         UserError: no elements, sides that are not positive.
     """
 
-    nx: int
-    ny: int
-    dx: float
-    dy: float
-    x0: float = 0.0
-    y0: float = 0.0
+    nx: Count
+    ny: Count
+    dx: Positive
+    dy: Positive
+    x0: Component = 0.0
+    y0: Component = 0.0
 
     def __post_init__(self) -> None:
-        wholes("nx, ny", (self.nx, self.ny), (1, 1))
-        if not (0 < self.dx < np.inf and 0 < self.dy < np.inf):
-            raise UserError(
-                f"grid: {self.nx} x {self.ny} elements of {self.dx:g} m x {self.dy:g} m; all must be greater than 0"
-            )
+        check_fields(self)
 
     @staticmethod
     def around(a: float, b: float, nx: int, ny: int) -> Grid:

@@ -31,14 +31,10 @@ def normal_contact(
         Pressure (nx, ny), Pa, and approach, m. No contact: zeros.
 
     Raises:
-        UserError: neither or both of force and approach, a force that is negative, no convergence.
+        UserError: neither or both of force and approach, no convergence.
     """
     if (force is None) == (approach is None):
         raise UserError("force, approach: give one of the two, the other follows")
-    if force is not None and not 0 <= force < np.inf:
-        raise UserError(f"force: {force:g} N; bodies without adhesion can only be pressed, give 0 or more")
-    if not np.all(np.isfinite(distance)):
-        raise UserError("distance: not a number somewhere; give the undeformed distance at every element, m")
     touching_at = float(distance.min())
     if force == 0 or (approach is not None and approach <= touching_at):
         return np.zeros(distance.shape), touching_at if approach is None else approach

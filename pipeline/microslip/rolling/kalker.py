@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..contact.law import Array, inner
-from .arguments import number, words
+from ..settings.arguments import checked
+from .arguments import Poissons, Positives, joined
 
 Coefficients = Literal["table", "book"]
 
@@ -56,7 +57,8 @@ LEAST = 0.1
 """g below which Kalker's asymptotes are used."""
 
 
-def creep_coefficients(ratio: ArrayLike, poisson: ArrayLike, source: Coefficients = "table") -> Array:
+@checked
+def creep_coefficients(ratio: Positives, poisson: Poissons, source: Coefficients = "table") -> Array:
     """(4, ...) C11, C22, C23, C33.
 
     Between the rows of the table C g^n is straight over g and 1/C a parabola over Poisson's ratio: at most 1.3 % off
@@ -69,8 +71,7 @@ def creep_coefficients(ratio: ArrayLike, poisson: ArrayLike, source: Coefficient
     Raises:
         UserError: a ratio that is not positive, another Poisson's ratio, another source.
     """
-    words(source=(source, Coefficients))
-    return coefficients_at(number("ratio", ratio), number("poisson", poisson), source)
+    return coefficients_at(*joined(ratio=ratio, poisson=poisson), source)
 
 
 @partial(inner, static_argnames="source")

@@ -18,8 +18,8 @@ from ..contact.hertz import ellipse_integrals
 from ..contact.law import program, settings
 from ..contact.normal import Normal, Preload, Rough
 from ..contact.point import PointContact
-from ..errors import UserError
-from .arguments import broadcast, of_kind
+from ..settings.arguments import checked
+from .arguments import Poissons, Positives, Reals, Resolution, joined
 from .kalker import Coefficients
 from .strips import (
     NAMES,
@@ -31,7 +31,6 @@ from .strips import (
     Spin,
     Tractions,
     grid,
-    known,
     over_elements,
     posed,
 )
@@ -186,7 +185,7 @@ def rolled_by_characteristic(
             area that touches, deeper pressed in; the ellipse stays.
     """
     named = dict(zip(NAMES[:6] + NAMES[7:], given, strict=True))
-    *state, V = broadcast(**named, speed=speed)
+    *state, V = (v.ravel() for v in joined(**named, speed=speed))
     highest = np.full_like(V, np.max(friction.highest(jnp.ones(1))))
     of = (*state[:6], highest, *state[6:])
     pose = posed(*of, elements=elements, distribution=distribution, **how)  # type: ignore[misc]
@@ -199,10 +198,11 @@ def rolled_by_characteristic(
     return Forces(*map(np.asarray, forces)), over
 
 
+@checked
 def forces_by_characteristic(
-    xi: ArrayLike, eta: ArrayLike, phi: ArrayLike, a: ArrayLike, b: ArrayLike, normal_force: ArrayLike,
-    friction: Friction, speed: ArrayLike, shear: ArrayLike, poisson: ArrayLike, *,
-    elements: tuple[int, int] = (20, 20), distribution: Distribution = "constant",
+    xi: Reals, eta: Reals, phi: Reals, a: Positives, b: Positives, normal_force: Positives,
+    friction: Friction, speed: Positives, shear: Positives, poisson: Poissons, *,
+    elements: Resolution = (20, 20), distribution: Distribution = "constant",
     coefficients: Coefficients = "table", spin: Spin = "kalker", surface: Surface | None = None,
 ) -> Forces:  # fmt: skip
     """`strips.creep_forces` with a coefficient over the speed of sliding, and rough surfaces.
@@ -214,12 +214,8 @@ def forces_by_characteristic(
     Raises:
         UserError: see there; friction that is no characteristic.
     """
-    if not isinstance(friction, Friction):
-        raise UserError(f"friction: is {friction!r}; give a characteristic of contact.friction, Coulomb(0.3) say")
-    elements = known(elements, distribution, coefficients, spin)
-    of_kind(Surface | None, surface=surface)
     given = xi, eta, phi, a, b, normal_force, shear, poisson
     how: dict[str, Any] = {"coefficients": coefficients, "spin": spin, "surface": surface}
     return rolled_by_characteristic(
-        *given, friction=friction, speed=speed, elements=elements, distribution=distribution, **how
+        *given, friction=friction, speed=speed, elements=tuple(elements), distribution=distribution, **how
     )[0]

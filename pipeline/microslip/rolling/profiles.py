@@ -20,8 +20,9 @@ from scipy.optimize import minimize_scalar
 from ..data import Array
 from ..errors import UserError
 from ..files import store
+from ..settings.arguments import checked
 from ..settings.mistakes import is_number
-from .arguments import number, words
+from ..settings.numbers import Component, NotNegative, Positive
 
 WIDTH = 0.07
 """m, of profiles that are given by a formula."""
@@ -92,13 +93,13 @@ def has_arc(radius: float, width: float) -> bool:
     return 0 < width < 1.8 * abs(radius)
 
 
-def circle(radius: float, width: float = WIDTH) -> Profile:
+@checked
+def circle(radius: Component, width: Positive = WIDTH) -> Profile:
     """An arc that falls to both sides of the origin, as a convex rail or a hollow wheel; a negative radius rises, m.
 
     Raises:
         UserError: an arc as wide as its circle; numbers that are none.
     """
-    number("profile", radius), number("width", width)
     if not has_arc(radius, width):
         raise UserError(f"profile: a radius of {radius:g} m has no arc {width:g} m wide; correct one of them")
     y = np.linspace(-0.5 * width, 0.5 * width, 401)
@@ -111,9 +112,10 @@ DEEP = 0.015
 """m, that a profile is high if it has a flange, or is that of a rail with its sides."""
 
 
+@checked
 def read_profile(
-    path: Path | str, noise: float = 0.0, unit: float = 1e-3, mirror: Mirror = "",
-    between: tuple[float, float] = EVERYWHERE,
+    path: Path | str, noise: NotNegative = 0.0, unit: Positive = 1e-3, mirror: Mirror = "",
+    between: Sequence[float] = EVERYWHERE,
 ) -> Profile:  # fmt: skip
     """A profile of a file: ``.prr`` and ``.prw`` (points between point.begin and point.end), MiniProf's ``.ban`` and
     ``.whl``, or a table of y and z with commas or blanks between.
@@ -125,11 +127,8 @@ def read_profile(
     Raises:
         UserError: no file, no numbers; points that turn back or of another unit; arguments that are none.
     """
-    if not isinstance(path, str | Path):
-        raise UserError(f"path: is {path!r}; give that of a file")
-    path, noise, unit = Path(path), float(number("noise", noise)), float(number("unit", unit))
-    words(mirror=(mirror, Mirror))
-    if np.shape(between) != (2,) or not between[0] < between[1]:
+    path = Path(path)
+    if len(between) != 2 or not between[0] < between[1]:
         raise UserError(f"between: is {between!r}; give two y, m, the lower one first")
     try:
         lines = store.ordinary(path).read_text(encoding="utf-8-sig").splitlines()

@@ -21,7 +21,8 @@ from numpy.typing import ArrayLike
 from ..contact.law import program
 from ..contact.point import opposed
 from ..interrupts import look
-from .arguments import TINY, broadcast, grid_of, words
+from ..settings.arguments import checked
+from .arguments import NotNegatives, Poissons, Positives, Reals, Resolution, joined
 from .kalker import Coefficients, coefficients_at
 
 Array = Any
@@ -32,6 +33,9 @@ Spin = Literal["kalker", "book"]
 
 BLOCK = 256
 """Poses that are marched side by side: what they remember stays in the nearest cache."""
+
+TINY = 1e-300
+"""Keeps quotients of nothing finite."""
 
 RUN = 8
 """Blocks that a call marches one after the other, where there are so many: calls cost a fifth of the time."""
@@ -282,9 +286,10 @@ def runs(n: int, block: int) -> Iterator[slice]:
         yield slice(i, i + 1)
 
 
+@checked
 def creep_forces(
-    xi: ArrayLike, eta: ArrayLike, phi: ArrayLike, a: ArrayLike, b: ArrayLike, normal_force: ArrayLike,
-    friction: ArrayLike, shear: ArrayLike, poisson: ArrayLike, *, elements: tuple[int, int] = (20, 20),
+    xi: Reals, eta: Reals, phi: Reals, a: Positives, b: Positives, normal_force: Positives,
+    friction: NotNegatives, shear: Positives, poisson: Poissons, *, elements: Resolution = (20, 20),
     distribution: Distribution = "constant", coefficients: Coefficients = "table", spin: Spin = "kalker",
 ) -> Forces:  # fmt: skip
     """Forces on body 1 of any number of states of rolling, by the strip model of Sextro, 6.5.
@@ -302,11 +307,10 @@ def creep_forces(
     Raises:
         UserError: a value or a word that no state of rolling has.
     """
-    elements = known(elements, distribution, coefficients, spin)
     given = states(xi, eta, phi, a, b, normal_force, friction, shear, poisson)
     n = len(given[0])
     filled = [np.concatenate([v, np.repeat(v[-1:], -n % BLOCK)]).reshape(-1, BLOCK) for v in given]
-    how = {"elements": elements, "distribution": distribution, "coefficients": coefficients, "spin": spin}
+    how = {"elements": tuple(elements), "distribution": distribution, "coefficients": coefficients, "spin": spin}
     parts = [_rolled(*(v[run] for v in filled), **how) for run in runs(n, BLOCK)]
     return Forces(*(np.concatenate([np.asarray(p[k]).ravel() for p in parts])[:n] for k in range(5)))
 
@@ -315,23 +319,14 @@ NAMES = "xi", "eta", "phi", "a", "b", "normal_force", "friction", "shear", "pois
 
 
 def states(*given: ArrayLike) -> list[Array]:
-    """Arrays (n,) of what `creep_forces` takes; see `arguments.broadcast`."""
-    return broadcast(**dict(zip(NAMES, given, strict=True)))
+    """Arrays (n,) of what `creep_forces` takes; see `arguments.joined`."""
+    return [v.ravel() for v in joined(**dict(zip(NAMES, given, strict=True)))]
 
 
-def known(elements: Any, distribution: str, coefficients: str, spin: str) -> tuple[int, int]:
-    """Elements of a model whose words are known.
-
-    Raises:
-        UserError: others.
-    """
-    words(distribution=(distribution, Distribution), coefficients=(coefficients, Coefficients), spin=(spin, Spin))
-    return grid_of(elements)
-
-
+@checked
 def tractions(
-    xi: ArrayLike, eta: ArrayLike, phi: ArrayLike, a: ArrayLike, b: ArrayLike, normal_force: ArrayLike,
-    friction: ArrayLike, shear: ArrayLike, poisson: ArrayLike, *, elements: tuple[int, int] = (20, 20),
+    xi: Reals, eta: Reals, phi: Reals, a: Positives, b: Positives, normal_force: Positives,
+    friction: NotNegatives, shear: Positives, poisson: Poissons, *, elements: Resolution = (20, 20),
     distribution: Distribution = "constant", coefficients: Coefficients = "table", spin: Spin = "kalker",
 ) -> Tractions:  # fmt: skip
     """Pressure, tractions and slip over the elements, of the states that `creep_forces` takes: arrays (n, ny, nx).
@@ -339,8 +334,7 @@ def tractions(
     The slip is s_M - u' with the slope of u through the neighbours, so that friction takes as much power as the
     creepages give (errata to (6.5-16)).
     """
-    elements = known(elements, distribution, coefficients, spin)
-    given = states(xi, eta, phi, a, b, normal_force, friction, shear, poisson)
+    elements, given = tuple(elements), states(xi, eta, phi, a, b, normal_force, friction, shear, poisson)
     how = {"coefficients": coefficients, "spin": spin}
     pose = Poses(*map(np.asarray, posed(*given, elements=elements, distribution=distribution, **how)))  # type: ignore
     return over_elements(pose, grid(elements, distribution), *_marched(pose, elements, distribution))

@@ -11,10 +11,9 @@ from dataclasses import dataclass, replace
 from functools import partial, reduce
 from operator import mul
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from ..contact.law import program
 from ..data import Array
@@ -22,9 +21,11 @@ from ..errors import UserError
 from ..files import hdf5
 from ..files.hostile import reading
 from ..files.store import ordinary
-from .arguments import joined, number, of_kind, wholes
+from ..settings import arguments
+from ..settings.arguments import Count, Index, wholes
+from .arguments import NotNegatives, Poisson, Positives, Reals, Resolution, joined
 from .kalker import Coefficients, creep_coefficients
-from .strips import BLOCK, SLIPPERY, Distribution, Forces, Poses, creep_forces, forces, grid, known, posed
+from .strips import BLOCK, NAMES, SLIPPERY, Distribution, Forces, Poses, creep_forces, forces, grid, posed
 
 POINTS = (19, 36, 33, 39, 13)
 """Of the size of the pull below and above 1/2, its azimuth, its polar angle, a/b."""
@@ -81,26 +82,18 @@ class CreepTable:
     def axes(self) -> tuple[Array, ...]:
         return self.size, self.azimuth, self.polar, np.log(self.ratio), self.springs
 
+    @arguments.checked
     def forces(
-        self, xi: ArrayLike, eta: ArrayLike, phi: ArrayLike, a: ArrayLike, b: ArrayLike, normal_force: ArrayLike,
-        friction: ArrayLike, shear: float,
+        self, xi: Reals, eta: Reals, phi: Reals, a: Positives, b: Positives, normal_force: Positives,
+        friction: NotNegatives, shear: Positives,
     ) -> Array:  # fmt: skip
         """(3, ...) F_x, F_y in N, M_z in N m, of what `strips.creep_forces` takes.
 
         Raises:
             UserError: a/b beyond the table; a value that no state of rolling has.
         """
-        given = {
-            "xi": xi,
-            "eta": eta,
-            "phi": phi,
-            "a": a,
-            "b": b,
-            "normal_force": normal_force,
-            "friction": friction,
-            "shear": shear,
-        }
-        x, y, turn, a, b, normal, mu, G = joined(**given)
+        given = xi, eta, phi, a, b, normal_force, friction, shear
+        x, y, turn, a, b, normal, mu, G = joined(**dict(zip(NAMES, given, strict=False)))
         held = np.maximum(mu, SLIPPERY) * normal
         ratio, c = a / b, np.sqrt(a * b)
         least, most = self.ratio[0] * (1 - 1e-9), self.ratio[-1] * (1 + 1e-9)
@@ -204,9 +197,11 @@ def _tabulated(axes: tuple[Array, ...], **how: Any) -> Array:
     return np.rint(values / step) * step
 
 
+@arguments.checked
 def creep_table(
-    poisson: float, *, points: tuple[int, int, int, int, int] = POINTS, elements: tuple[int, int] = ELEMENTS,
-    distribution: Distribution = "constant", coefficients: Coefficients = "table", checked: int = 20_000, seed: int = 0,
+    poisson: Poisson, *, points: Annotated[Any, wholes(4, 4, 4, 4, 4)] = POINTS, elements: Resolution = ELEMENTS,
+    distribution: Distribution = "constant", coefficients: Coefficients = "table", checked: Count = 20_000,
+    seed: Index = 0,
 ) -> CreepTable:  # fmt: skip
     """A table, and its error at random places between its points, of the strips with `spin` "kalker".
 
@@ -217,9 +212,6 @@ def creep_table(
     Raises:
         UserError: fewer than four points on an axis, as cubics need them; what is none of a table.
     """
-    wholes("points", points, (4,) * 5)
-    elements = known(elements, distribution, coefficients, "kalker")
-    number("poisson", poisson), number("checked", checked)
     closely = np.geomspace(1 / WIDEST, WIDEST, 801)
     c = np.asarray(creep_coefficients(closely, poisson, coefficients))
     springs = np.log(c[1] / c[0])  # of the blended ones as well, which are nearer to each other
@@ -227,7 +219,7 @@ def creep_table(
     size = np.concatenate([0.5 * (1 - (1 - below) ** 2), 0.75 - 0.25 * np.cos(np.pi * above[1:])])
     axes = (size, np.pi * (around - 0.5), np.pi / 2 * polar**1.5, np.log(WIDEST) * (2 * ratios - 1),
             np.linspace(min(springs.min(), -NEAR), max(springs.max(), NEAR), 3))  # fmt: skip
-    how: dict[str, Any] = {"elements": elements, "distribution": distribution}
+    how: dict[str, Any] = {"elements": tuple(elements), "distribution": distribution}
     table = CreepTable(
         *axes[:3], np.exp(axes[3]), axes[4], np.vstack([closely, c[:3]]), _tabulated(axes, **how), poisson,
         how | {"coefficients": coefficients}, np.full((3, 3), np.nan), checked,
@@ -255,9 +247,9 @@ FORMAT = "microslip-creep-table-2"
 AXES = ("size", "azimuth", "polar", "ratio", "springs")
 
 
-def write_creep_table(path: Path, table: CreepTable) -> Path:
+@arguments.checked
+def write_creep_table(path: Path | str, table: CreepTable) -> Path:
     """As HDF5: a dataset an axis, ``kalker``, ``values`` in whole steps and ``error``; complete or not at all."""
-    of_kind(CreepTable, table=table)
     step = np.abs(table.values).max() / FINEST
     g = grid(tuple(table.how["elements"]), table.how["distribution"])
     with hdf5.sealed(path) as file:
@@ -267,9 +259,10 @@ def write_creep_table(path: Path, table: CreepTable) -> Path:
         for name in (*AXES, "kalker", "error"):
             hdf5.put(file, name, getattr(table, name))
         hdf5.put(file, "values", np.rint(table.values / step).astype(np.int16))
-    return path
+    return Path(path)
 
 
+@arguments.checked
 def read_creep_table(path: Path | str) -> CreepTable:
     """A table that `write_creep_table` wrote.
 

@@ -13,9 +13,10 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import erfc
 
-from ..contact.solids import refuse_not_positive
 from ..data import Array
 from ..errors import UserError
+from ..settings.arguments import Rows, check_fields, checked
+from ..settings.numbers import NotNegative, Positive
 
 ITERATIONS = 200
 HISTORY = 6
@@ -32,12 +33,12 @@ class Conductor:
         UserError: one of them is not positive.
     """
 
-    conductivity: float
-    density: float
-    heat_capacity: float
+    conductivity: Positive
+    density: Positive
+    heat_capacity: Positive
 
     def __post_init__(self) -> None:
-        refuse_not_positive(**vars(self))
+        check_fields(self)
 
     @property
     def diffusivity(self) -> float:
@@ -55,7 +56,8 @@ def speed_parameter(speed: float, half_length: float, body: Conductor) -> float:
     return speed * half_length / (2 * body.diffusivity)
 
 
-def heat_share(first: Conductor, second: Conductor, speed_first: float, speed_second: float) -> float:
+@checked
+def heat_share(first: Conductor, second: Conductor, speed_first: NotNegative, speed_second: NotNegative) -> float:
     """Part of the heat that flows into the first body, Sextro Eq. (6.7-15): both surfaces are equally hot.
 
     Args:
@@ -64,8 +66,8 @@ def heat_share(first: Conductor, second: Conductor, speed_first: float, speed_se
     Raises:
         UserError: both are zero, or one is negative.
     """
-    if not (min(speed_first, speed_second) >= 0 and speed_first + speed_second > 0):
-        raise UserError("speed: the contact must move over at least one of the bodies; speeds are 0 or more")
+    if speed_first + speed_second == 0:
+        raise UserError("speed: is 0 over both bodies; the contact must move over one of them at least")
     into = [body.effusivity * v**0.5 for body, v in ((first, speed_first), (second, speed_second))]
     return into[0] / sum(into)
 
@@ -75,8 +77,9 @@ def heat_source(traction: Array, slip: Array, speed: float) -> Array:
     return np.maximum(-(traction * slip).sum(axis=0) * speed, 0)
 
 
+@checked
 def conducted(
-    source: Array, dx: float, body: Conductor, share: float, speed: float, depth: float = 0.0
+    source: Rows, dx: Positive, body: Conductor, share: NotNegative, speed: Positive, depth: NotNegative = 0.0
 ) -> Array:  # fmt: skip
     """Exact temperatures of a body under sources that are constant on elements, Sextro Eqs. (6.7-11), (6.7-12).
 
@@ -90,7 +93,6 @@ def conducted(
     Returns:
         (nx, ny) K.
     """
-    _moving(speed)
     edges = (np.arange(len(source) + 1) - 0.5) * dx / speed  # times since an edge of an element passed
     t = body.diffusivity * np.maximum(edges, 0)
     root = np.sqrt(np.where(t > 0, t, 1))
@@ -100,20 +102,15 @@ def conducted(
     return np.where(behind >= 0, response[np.maximum(behind, 0)], 0) @ source
 
 
-def marched(source: Array, dx: float, body: Conductor, share: float, speed: float) -> Array:
+@checked
+def marched(source: Rows, dx: Positive, body: Conductor, share: NotNegative, speed: Positive) -> Array:
     """The book's marching rule, Sextro Eq. (6.7-20): exact for a constant source, otherwise too hot at the rear.
 
     T_i^2 = T_(i-1)^2 + (4/pi) (kappa/V) (share q/lambda)^2 dx. Args and result: see `conducted`, at the surface.
     """
-    _moving(speed)
     gained = 4 / np.pi * body.diffusivity / speed * (share / body.conductivity * source) ** 2 * dx
     from_front = np.cumsum(gained[::-1], axis=0)[::-1]
     return np.sqrt(from_front - gained / 2)
-
-
-def _moving(speed: float) -> None:
-    if not 0 < speed < np.inf:
-        raise UserError(f"speed: {speed:g} m/s; a source that does not move has no temperatures of this kind")
 
 
 def falling(temperature: Array, cold: float, vanishing: float) -> Array:

@@ -13,9 +13,13 @@ from scipy.ndimage import gaussian_filter1d
 
 from ..data import Array
 from ..errors import UserError
+from ..settings.arguments import Rows, checked
+from ..settings.numbers import NotNegative, Positive
+from .arguments import Positives
 
 
-def depth_along(source: Array, dx: float, coefficient: float, speed: float) -> Array:
+@checked
+def depth_along(source: Rows, dx: Positives, coefficient: NotNegative, speed: Positive) -> Array:
     """Depth of what passes each element's rear side, Sextro Eqs. (6.8-3), (6.8-4): it grows from the leading edge.
 
     Args:
@@ -28,10 +32,6 @@ def depth_along(source: Array, dx: float, coefficient: float, speed: float) -> A
     Raises:
         UserError: a speed that is not positive, a negative coefficient.
     """
-    if not 0 < speed < np.inf:
-        raise UserError(f"speed: {speed:g} m/s; the contact must move over the body that wears")
-    if not 0 <= coefficient < np.inf:
-        raise UserError(f"coefficient: {coefficient:g} m^3/J; it must be 0 or more")
     return np.cumsum((coefficient / speed * dx * source)[::-1], axis=0)[::-1]
 
 

@@ -151,6 +151,7 @@ def _run(case: RollingCase, track: Track, friction: Friction, surface: Surface |
     how = case.model.model_dump(exclude={"exact"})
     pose, vertical = replace(case.posed(), lateral=lateral), case.vertical_force
     dragged = drag(track, friction, heat, surface, **how)
+    assert case.pose.side != "both"
     found = patches(track, pose, case.pose.side, vertical, dragged)
     if not found:
         raise UserError("wear: the wheel does not touch the rail, so nothing wears; correct pose or vertical_force")

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cache
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -17,7 +17,8 @@ from scipy.optimize import brentq
 
 from ..data import Array
 from ..errors import UserError
-from .arguments import number, of_kind
+from ..settings.arguments import check_fields, checked
+from ..settings.numbers import Component, NotNegative, Positive
 from .ellipse import Elastic, ellipses, half_width
 from .profiles import Profile
 from .strips import creep_forces
@@ -35,21 +36,13 @@ class Track:
 
     wheel: Profile
     rail: Profile
-    radius: float
-    wheel_at: float
-    rail_at: float
+    radius: Positive
+    wheel_at: Positive
+    rail_at: Positive
     elastic: Elastic
 
     def __post_init__(self) -> None:
-        """Raises:
-        UserError: numbers that no track has.
-        """
-        for name in ("radius", "wheel_at", "rail_at"):
-            number(name, getattr(self, name))
-        of_kind(Profile, wheel=self.wheel, rail=self.rail)
-        of_kind(Elastic, elastic=self.elastic)
-        for name, value in self.elastic._asdict().items():
-            number(name, value)
+        check_fields(self)
 
 
 @dataclass(frozen=True)
@@ -57,11 +50,14 @@ class Pose:
     """Of a wheelset. Attributes: lateral: to the right, m. yaw: about z, roll: about x, rad. speed: m/s, forward.
     turning: of the axle, rad/s, positive forward; None: it rolls, at speed over the nominal radius."""
 
-    lateral: float = 0.0
-    yaw: float = 0.0
-    roll: float = 0.0
-    speed: float = 1.0
-    turning: float | None = None
+    lateral: Component = 0.0
+    yaw: Component = 0.0
+    roll: Component = 0.0
+    speed: Positive = 1.0
+    turning: NotNegative | None = None
+
+    def __post_init__(self) -> None:
+        check_fields(self)
 
     def mirrored(self) -> Pose:
         return replace(self, lateral=-self.lateral, yaw=-self.yaw, roll=-self.roll)
@@ -121,11 +117,16 @@ STEP = 2e-5
 """m, between the points of a wheel at which it is looked for a contact; the summit is found between them."""
 
 
+Side = Literal["left", "right"]
+SIDES = get_args(Side)
 Drag = Callable[[list[Patch]], Array]
 """Patches -> (k,) tangential force of each across rolling, on the wheel, in the axes of `Patch`, N."""
 
 
-def patches(track: Track, pose: Pose, side: str, vertical: float, friction: float | Drag = 0.0) -> list[Patch]:
+@checked
+def patches(
+    track: Track, pose: Pose, side: Side, vertical: NotNegative, friction: NotNegative | Drag = 0.0
+) -> list[Patch]:
     """Contacts of one wheel under a vertical force, the one with the largest normal force first; none if it is 0.
 
     Args:
@@ -136,16 +137,14 @@ def patches(track: Track, pose: Pose, side: str, vertical: float, friction: floa
         UserError: a side, force or friction that is none; wheel and rail lie nowhere above each other; friction drags
             the wheel down its flange whatever presses it.
     """
-    _sound(pose, vertical, friction)
-    if side not in SIDES:
-        raise UserError(f"side: is {side!r}; give 'left' or 'right'")
     if vertical == 0:
         return []
     return _carried(track, pose, (side,), vertical, _drag(track, friction), vertical).found[0]
 
 
+@checked
 def axle(
-    track: Track, pose: Pose, vertical: float, even: bool = False, friction: float | Drag = 0.0
+    track: Track, pose: Pose, vertical: NotNegative, even: bool = False, friction: NotNegative | Drag = 0.0
 ) -> tuple[list[Patch], list[Patch], Pose]:
     """Contacts of the left and of the right wheel of an axle, as `patches`, and its pose.
 
@@ -157,7 +156,6 @@ def axle(
     Raises:
         UserError: see `patches`; no roll within 0.05 rad shares the force evenly.
     """
-    _sound(pose, vertical, friction)
     drag, load = _drag(track, friction), vertical
 
     def at(pose: Pose) -> _Carried:
@@ -186,21 +184,12 @@ def axle(
     return left, right, pose
 
 
-SIDES = ("left", "right")
 STEEPEST = 0.05
 """rad, of roll."""
 
 
 def _seen(pose: Pose, side: str) -> Pose:
     return pose.mirrored() if side == "left" else pose
-
-
-def _sound(pose: Pose, vertical: float, friction: float | Drag) -> None:
-    """Refuse numbers that no wheelset has."""
-    of_kind(Pose, pose=pose)
-    for name, value in {**vars(pose), "vertical": vertical, "friction": friction}.items():
-        if not (value is None or callable(value)):
-            number(name, value)
 
 
 def _drag(track: Track, friction: float | Drag) -> Drag:
@@ -218,8 +207,8 @@ def _by_strips(track: Track, found: list[Patch], friction: float) -> Array:
 
 def states(track: Track, found: list[Patch]) -> tuple[Array, Array]:
     """(8, k) xi, eta, phi, a, b, normal force, G, nu of patches, and their speeds (k,), m/s."""
-    _, G, nu = track.elastic
-    given = [[p.xi, p.eta, p.phi, p.a, p.b, p.normal_force, G, nu] for p in found]
+    e = track.elastic
+    given = [[p.xi, p.eta, p.phi, p.a, p.b, p.normal_force, e.shear, e.poisson] for p in found]
     return np.array(given).T, np.array([p.speed for p in found])
 
 

@@ -7,7 +7,7 @@ import sys
 from collections.abc import Callable, Sequence
 from dataclasses import is_dataclass
 from functools import cache, reduce, wraps
-from operator import or_
+from operator import index, or_
 from types import UnionType
 from typing import Annotated, Any, ParamSpec, TypeVar, Union, get_args, get_origin
 
@@ -24,17 +24,36 @@ Index = Annotated[int, Field(ge=0)]
 Text = Annotated[str, Field(min_length=1)]
 
 
-def numbers(*dimensions: int, gt: float | None = None, ge: float | None = None) -> BeforeValidator:
-    """What an array may be: how many dimensions it has, and bounds of its entries, of which there is one at least."""
+def numbers(
+    *dimensions: int, gt: float | None = None, ge: float | None = None, le: float | None = None
+) -> BeforeValidator:
+    """What an array may be: how many dimensions it has, any if none are named, and bounds of its entries, of which
+    there is one at least."""
 
     def check(value: Any) -> Any:
-        if said := unfit(value, gt=gt, ge=ge):
+        if said := unfit(value, gt, ge, le):
             raise ValueError(said)
-        if (found := np.ndim(value)) not in dimensions:
+        if dimensions and (found := np.ndim(value)) not in dimensions:
             wanted = " or ".join({0: "one number", 1: "a list", 2: "rows of numbers"}[d] for d in dimensions)
             raise ValueError(f"must be {wanted}, and has {found} dimensions")
         if not np.size(value):
             raise ValueError("must not be empty")
+        return value
+
+    return BeforeValidator(check)
+
+
+def wholes(*least: int) -> BeforeValidator:
+    """What a list of whole numbers may be: the least of each."""
+
+    def check(value: Any) -> Any:
+        try:
+            good = [index(n) >= m for n, m in zip(value, least, strict=True)]
+        except (TypeError, ValueError):
+            good = [False]
+        if not all(good):
+            wanted = f"{len(least)} whole numbers of {', '.join(map(str, least))} or more"
+            raise ValueError(f"is {value!r}; give {wanted}")
         return value
 
     return BeforeValidator(check)
@@ -74,14 +93,14 @@ def check(of: Callable[..., Any], given: dict[str, Any]) -> None:
 
 
 def _plain(value: Any) -> Any:
-    """A number of numpy as one of Python."""
-    return value.item() if isinstance(value, np.generic) else value
+    """A number of numpy or jax as one of Python."""
+    return value.item() if getattr(value, "ndim", None) == 0 else value
 
 
 def _made(annotation: Any) -> Any:
-    """The annotation, whose dataclasses stand for what was made by them, not for tables to make them from."""
+    """The annotation, whose dataclasses and named tuples stand for what was made by them, not for what makes them."""
     kind, of = get_origin(annotation), get_args(annotation)
-    if isinstance(annotation, type) and is_dataclass(annotation):
+    if isinstance(annotation, type) and (is_dataclass(annotation) or hasattr(annotation, "_fields")):
         return Annotated[annotation, InstanceOf()]
     if kind is Annotated:
         return Annotated[_made(of[0]), *of[1:]]

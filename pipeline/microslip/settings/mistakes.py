@@ -75,17 +75,17 @@ def unfit(value: Any, gt: float | None = None, ge: float | None = None, le: floa
         at = np.asarray(value, dtype=float)
     except (TypeError, ValueError, OverflowError):
         return f"{_shown(value)} is no number"
+    least, most = -BEYOND if ge is None else ge, BEYOND if le is None else le
     for kind, bound, good in (
         ("finite_number", None, np.isfinite(at)),
         ("greater_than", gt, gt is None or at > gt),
-        ("greater_than_equal", ge, ge is None or at >= ge),
-        ("less_than_equal", le, le is None or at <= le),
-        ("less_than_equal", BEYOND, at <= BEYOND),
-        ("greater_than_equal", -BEYOND, at >= -BEYOND),
+        ("greater_than_equal", least, at >= least),
+        ("less_than_equal", most, at <= most),
     ):
         if not np.all(good):
-            wrong = at[~np.broadcast_to(good, at.shape)].ravel()[0]
-            return f"{_WORDS[kind].format(gt=bound, ge=bound, le=bound)} (it is {wrong:g})"
+            wrong = int(np.argmin(good))
+            which = f"entry {wrong + 1}" if at.size > 1 else "it"
+            return f"{_WORDS[kind].format(gt=bound, ge=bound, le=bound)} ({which} is {at.flat[wrong]:g})"
     return ""
 
 
@@ -265,7 +265,7 @@ def _words(found: list[tuple[tuple[Any, ...], Any]], error: Any, given: Any) -> 
     if kind in ("too_long", "missing") and isinstance(given, list):
         wanted = context.get("max_length") or 1 + max(f["loc"][-1] for _, f in found if isinstance(f["loc"][-1], int))
         return f"must have {wanted} entries and has {len(given)}"
-    if given != given:
+    if isinstance(given, float) and given != given:
         return _WORDS["finite_number"]
     either = {f["type"] for _, f in found}
     if "tuple_type" in either and either & _SCALAR and not isinstance(given, list):

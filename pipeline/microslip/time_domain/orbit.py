@@ -624,7 +624,6 @@ def steps_of_a_sample(e: Equations, samples: int, steps: int | None) -> int:
     if steps is None:
         wanted = max(OF_PERIOD, OF_CONTACT * e.fastest / e.Omega, steps_of_waves(e.contacts, 2 * np.pi / e.Omega))
         return int(2 ** max(0, math.ceil(math.log2(wanted / samples))))
-    bounded("steps", steps, ge=1)
     least = math.ceil(2 * np.pi / e.Omega * e.rate / STABLE)
     if steps < least:
         raise UserError(

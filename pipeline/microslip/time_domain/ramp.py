@@ -14,7 +14,6 @@ import numpy as np
 
 from ..data import CENTRIFUGAL, Array
 from ..errors import UserError
-from ..settings.mistakes import bounded
 from ..system.assembly import Assembly
 
 
@@ -32,11 +31,6 @@ class Ramp:
     time: float
     order: int = 1
     euler: tuple[str, ...] = ()
-
-    def __post_init__(self) -> None:
-        for name in ("first", "last", "time"):
-            bounded(f"run_up.{name}", getattr(self, name), gt=0)
-        bounded("run_up.order", self.order, ge=1)
 
     @property
     def rate(self) -> float:

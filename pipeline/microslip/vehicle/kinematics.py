@@ -16,7 +16,7 @@ from ..errors import UserError
 from ..files import store
 from ..results import Journal
 from ..rolling.wear import smoothed
-from ..rolling.wheelset import Pose, Track, patches
+from ..rolling.wheelset import Pose, Side, Track, patches
 from .motion import Contacts
 from .settings import KinematicsCase, track_of, worn_tracks
 from .wearing import (
@@ -143,7 +143,7 @@ class Places:
         approach, m.
     """
 
-    def __init__(self, k: Kinematics, track: Track, side: str, places: int) -> None:
+    def __init__(self, k: Kinematics, track: Track, side: Side, places: int) -> None:
         """Raises:
         UserError: the wheel leaves the profiles.
         """

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..contact.law import program
 from ..errors import UserError
-from ..rolling.wheelset import Patch, Pose, Track, patches
+from ..rolling.wheelset import Patch, Pose, Side, Track, patches
 
 Array = Any
 """Of numpy; of jax in what is traced."""
@@ -86,7 +86,7 @@ def _standing(track: Track, load: float, y: float) -> list[tuple[float, ...]]:
     """A `Touch` of numbers of each wheel, at one displacement."""
     roll = 0.0
     for _ in range(6):
-        found = [_one(track, load, y, roll, side) for side in ("right", "left")]
+        found = [_one(track, load, y, roll, "right"), _one(track, load, y, roll, "left")]
         (right, _), (left, _) = found
         change = (right.axle[1] - left.axle[1]) / (right.place[1] - left.place[1])
         roll += change
@@ -95,7 +95,7 @@ def _standing(track: Track, load: float, y: float) -> list[tuple[float, ...]]:
     return [_touch(track, p, roll, y) for p, _ in found]
 
 
-def _one(track: Track, load: float, y: float, roll: float, side: str) -> tuple[Patch, str]:
+def _one(track: Track, load: float, y: float, roll: float, side: Side) -> tuple[Patch, str]:
     found = patches(track, Pose(y, 0.0, roll), side, load)
     if len(found) > 1 and found[1].normal_force > 0.5 * found[0].normal_force:
         raise UserError(
