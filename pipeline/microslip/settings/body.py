@@ -621,7 +621,7 @@ class BodySettings(Model):
 
     @model_validator(mode="after")
     def _names_once(self) -> BodySettings:
-        named_once(self, "closures", "bolts", "interfaces", "excitations", "monitors gauges", "parameters")
+        named_once(self, "closures", "bolts", "interfaces", "excitations", "monitors gauges")
         if self.geometry.matrices is not None:
             self._only_what_matrices_can()
         elif self.parameters:

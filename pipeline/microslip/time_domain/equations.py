@@ -243,8 +243,9 @@ def _can_press(contacts: Sequence[Contact], D: Array, R: Array) -> None:
         moved = np.hstack([D[own], R[own]])
         if isinstance(law, SetValued) and law.normal is None and not (normal @ moved).any():
             raise UserError(
-                f'contacts.{contact.name}: law "set-valued" is pressed by what moves along its normal, and here nothing '
-                'does, so that it would hold no friction; let the body move there (free = "xz", say), or take another law'
+                f'contacts.{contact.name}: law "set-valued" is pressed by what moves along its normal, and here '
+                'nothing does, so that it would hold no friction; let the body move there (free = "xz", say), or take '
+                "another law"
             )
 
 
