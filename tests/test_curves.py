@@ -73,7 +73,7 @@ def case(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def rows(name: str) -> dict[str, np.ndarray]:
     with Path(f"build/lifting/{name}").open() as file:
         table = list(csv.DictReader(file))
-    return {key: np.array([float(row[key]) for row in table]) for key in table[0]}
+    return {key: np.array([float(row[key] or "nan") for row in table]) for key in table[0]}
 
 
 def problem(case: Path, normal: float = 10.0) -> Any:

@@ -63,8 +63,8 @@ def test_eigenvalues_that_tell_too_little_are_not_used() -> None:
     free = replace(one, M=np.eye(8), C=C, rows=rows)
     whole = Eliminated((free, free), np.eye(4))
     assert whole.poles is None
-    with pytest.raises(np.linalg.LinAlgError):
-        whole.directly(10.0)  # its mean is nowhere
+    mean, first = whole.directly(10.0).both[0]
+    assert np.isnan(mean[:, 0]).all() and np.isfinite(first).all()  # its mean is nowhere
 
 
 @pytest.mark.parametrize("by_eigenvalues", [True, False])

@@ -254,8 +254,8 @@ def test_the_error_of_an_overhanging_resonance_is_that_of_its_own_motion() -> No
     found = response.harmonic_response(problem, np.linspace(0.6, 1.1, 97) / (2 * np.pi), np.ones(1))
     (peak,) = response.refined_peaks(problem, found)
     assert overhanging(found, [(peak.frequency, peak.amplitude)])
-    errors = {point.Omega: (e, share) for point, e, share in judged(problem, found, [peak])}
+    errors = {one.point.Omega: (one.error, one.bound) for one in judged(problem, found, [peak])}
     e, share = errors[2 * np.pi * peak.frequency]
     assert e.amplitude == pytest.approx(peak.amplitude, rel=1e-6) and 0 < share < 0.1
     another = peak._replace(amplitude=0.5 * peak.amplitude)
-    assert 2 * np.pi * peak.frequency not in {p.Omega for p, *_ in judged(problem, found, [another])}
+    assert 2 * np.pi * peak.frequency not in {one.point.Omega for one in judged(problem, found, [another])}

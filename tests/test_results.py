@@ -361,6 +361,9 @@ def test_damaged_and_foreign_files_get_one_sentence(tmp_path):
     path.write_bytes(b"nothing of the kind" * 99)
     with pytest.raises(UserError, match="no HDF5 file"):
         read_response(path)
+    with pytest.raises(UserError, match="is text, not an HDF5 file"):
+        write_response(path, response(1.0))
+    path.unlink()
     write_response(path, response(1.0))
     data = bytearray(path.read_bytes())
     data[len(data) // 2] ^= 4

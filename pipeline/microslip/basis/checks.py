@@ -340,10 +340,10 @@ def _shape_checks(basis: ModalBasis, g: ModalGroup) -> _Findings:
         found.append(("mass of the mesh's materials", abs(weight / basis.mass - 1), 1e-8, ""))
     volume = cell_volumes(basis.mesh) if g.stresses else 0.0
     if (stressed := stress_error(basis, g)) is not None:
-        found.append(("stresses follow from strains", stressed, allowed(g), ""))
+        found.append(("stresses follow from strains", stressed, allowed(basis), ""))
     for name, s in g.stresses.items():
         if (strained := strain_error(basis, g, s)) is not None:
-            found.append((f"strains of {name} follow from the shapes", strained, allowed(g), ""))
+            found.append((f"strains of {name} follow from the shapes", strained, allowed(basis), ""))
         found.append((f"volume of stress set {name}", abs(float(s.weights.sum()) / volume - 1), 1e-9, ""))
     return found
 

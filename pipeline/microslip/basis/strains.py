@@ -48,7 +48,7 @@ def stiffness_error(basis: ModalBasis, g: ModalGroup) -> tuple[float, float] | N
         return _beside(basis.mesh, g, [m.elasticity for m in basis.mesh.materials]), DOUBLE
     law = _fitted(g)[0]
     if law and _left(law[0], list(_ISOTROPIC)) > SAME_LAW:
-        return _beside(basis.mesh, g, law), allowed(g)
+        return _beside(basis.mesh, g, law), allowed(basis)
     error = _isotropic(basis.mesh, g) if g.n_modes > 2 else np.inf
     return (error, DOUBLE) if law or error < ISOTROPIC else None
 
@@ -90,10 +90,10 @@ def single(values: Array) -> Array:
     return values.astype(np.complex64 if np.iscomplexobj(values) else np.float32)
 
 
-def allowed(g: ModalGroup) -> float:
-    """What may be left where a group's strains and stresses take part, which files keep in single precision."""
-    kept = [a for s in g.stresses.values() for a in (s.strain, s.stress)]
-    return SINGLE if all(np.array_equal(a, single(a)) for a in kept) else DOUBLE
+def allowed(basis: ModalBasis) -> float:
+    """What may be left where strains and stresses take part, which files keep in single precision."""
+    kept = next((g.stresses for g in basis.groups.values() if g.stresses), {})
+    return SINGLE if all(np.array_equal(s.strain, single(s.strain)) for s in kept.values()) else DOUBLE
 
 
 ISOTROPIC = 1e-2
