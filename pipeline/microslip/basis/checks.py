@@ -142,6 +142,7 @@ def _group_checks(basis: ModalBasis, g: ModalGroup, mesh_is_sound: bool) -> _Fin
     found += _compliance_checks(g)
     if _all_rows(g) is None:
         return found
+    kept = g
     if g.to_diagonal is not None:
         found += _transformation_checks(g)
         g = in_modes(g)
@@ -153,7 +154,7 @@ def _group_checks(basis: ModalBasis, g: ModalGroup, mesh_is_sound: bool) -> _Fin
     if g.gyroscopic is not None:
         found += _gyroscopic_checks(g, g.gyroscopic)
     if mesh_is_sound and g.phi.shape[0] and basis.source == "elements":
-        found += _shape_checks(basis, g)
+        found += _shape_checks(basis, g, kept)
         if g.invariants is not None:
             found += _moment_checks(basis, g, g.invariants)
     for name, item in g.interfaces.items():
@@ -322,8 +323,9 @@ def _gyroscopic_checks(g: ModalGroup, y: GyroscopicModes) -> _Findings:
     ]
 
 
-def _shape_checks(basis: ModalBasis, g: ModalGroup) -> _Findings:
-    """The shapes against the mesh they are stored with; one density is the mass over the mesh's volume."""
+def _shape_checks(basis: ModalBasis, g: ModalGroup, kept: ModalGroup) -> _Findings:
+    """The shapes against the mesh they are stored with; one density is the mass over the mesh's volume. kept: the group
+    in the coordinates of the file, in which strains and stresses are as precise as they stand there."""
     inner, weight = modal_mass(basis.mesh, g.phi)
     if not weight > 0:
         return [("volume of the mesh is positive", np.inf, 0.0, "")]
@@ -339,10 +341,10 @@ def _shape_checks(basis: ModalBasis, g: ModalGroup) -> _Findings:
     if basis.mesh.materials:
         found.append(("mass of the mesh's materials", abs(weight / basis.mass - 1), 1e-8, ""))
     volume = cell_volumes(basis.mesh) if g.stresses else 0.0
-    if (stressed := stress_error(basis, g)) is not None:
+    if (stressed := stress_error(basis, kept)) is not None:
         found.append(("stresses follow from strains", stressed, allowed(basis), ""))
-    for name, s in g.stresses.items():
-        if (strained := strain_error(basis, g, s)) is not None:
+    for name, s in kept.stresses.items():
+        if (strained := strain_error(basis, kept, s)) is not None:
             found.append((f"strains of {name} follow from the shapes", strained, allowed(basis), ""))
         found.append((f"volume of stress set {name}", abs(float(s.weights.sum()) / volume - 1), 1e-9, ""))
     return found
