@@ -130,6 +130,7 @@ def _unjudged(request: pytest.FixtureRequest) -> Iterator[None]:
             from microslip.case import run
             from microslip.stages import response
 
+            patched.setattr(response, "jumps", lambda result: [])
             patched.setattr(response, "with_motions", lambda result, report: result)
             judged = run._Left.out
             patched.setattr(run._Left, "out", lambda of, *given: [] if of.tolerance is None else judged(of, *given))

@@ -142,6 +142,23 @@ def case(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 @pytest.mark.slow
+def test_what_is_known_is_written_before_motions_in_time(
+    case: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """They take long, and may be interrupted: table and page are there, without a resonance where the sweep jumps."""
+
+    def interrupted(*_: object) -> Beyond:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("microslip.case.run.beyond", interrupted)
+    assert main(["respond", "case.toml"]) == 130
+    assert "response.html has what is known so far" in capsys.readouterr().err
+    assert Path("build/lifting/response.html").read_text() and not Path("build/lifting/response.json").exists()
+    rows = list(csv.DictReader(Path("build/lifting/response.csv").open()))
+    assert len(rows) > 10 and not list(Path("build/lifting").glob("motions*"))
+
+
+@pytest.mark.slow
 def test_a_response_that_jumps_is_integrated_in_time(
     case: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

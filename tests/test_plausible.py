@@ -74,7 +74,15 @@ def heavier(by: float) -> ModalBasis:
 
 @pytest.mark.parametrize("factor, doubted", [(1.0, False), (1e-5, True), (1e4, True)])
 def test_first_frequency(factor: float, doubted: bool) -> None:
-    assert bool(plausible.of_basis(heavier(factor))) == doubted
+    assert bool(plausible.of_basis(heavier(factor), {})) == doubted
+
+
+def test_a_static_stress_that_no_metal_bears() -> None:
+    """A load in kN where N were meant: of steel 2.6 GPa are the bound."""
+    steel = replace(small.basis(), provenance={"settings": '{"material": {"young": 2.1e11}}'})
+    (said,) = plausible.of_basis(steel, {"static state at 0 rpm": 18.7e9})
+    assert "static state at 0 rpm" in said and "load (N)" in said
+    assert not plausible.of_basis(steel, {"static state at 0 rpm": 1e9})
 
 
 def test_a_case_doubts_its_amplitude_and_the_pressure_of_its_contacts() -> None:

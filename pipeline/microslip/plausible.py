@@ -116,14 +116,17 @@ def first_frequency(value: float, extent: float) -> str:
     )
 
 
-def of_basis(basis: ModalBasis) -> list[str]:
-    """Of a body's modes."""
+def of_basis(basis: ModalBasis, static: Mapping[str, float]) -> list[str]:
+    """Of a body's modes, and of the largest stress of its static states: what they are called -> Pa."""
     if not basis.mesh.n_points or _settings(basis).get("material", {}).get("unusual"):
         return []
     size = float(np.ptp(basis.mesh.points, axis=0).max())
     group = basis.groups[min(basis.groups)]
     elastic = group.omega[group.omega > 0]
-    return [text for text in [first_frequency(float(elastic[0]) / (2 * np.pi), size)] if text] if len(elastic) else []
+    told = [first_frequency(float(elastic[0]) / (2 * np.pi), size)] if len(elastic) else []
+    young = modulus_of(basis)
+    told += [stress(f"The {state}", value, young, "stress") for state, value in static.items()]
+    return [text for text in told if text]
 
 
 def modulus_of(basis: ModalBasis) -> float:

@@ -179,7 +179,10 @@ PLANS = {
     "run": ("mesh, modal file, what the case asks for, pictures and page, each where it is not up to date", 30, 300),
     "mesh": ("the mesh, if it is not up to date", 1, 30),
     "modes": ("mesh, assembly, eigenmodes, rows and stresses, each if it is not up to date", 5, 120),
-    "respond": ("every point of the sweep, peaks between them, their error, stresses and pictures", 15, 180),
+    "respond": (
+        "every point of the sweep, peaks between them, their error, stresses and pictures; where it jumps or has no "
+        "solution motions in time too, minutes more", 15, 180,
+    ),
     "orbit": ("motions period by period, their error, tables and pictures", 15, 180),
     "bifurcate": ("equilibria, periodic orbits that begin at them, tables and pictures", 30, 300),
     "two-tones": ("every pair of frequencies, tables and pictures", 30, 300),

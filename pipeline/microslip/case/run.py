@@ -174,15 +174,25 @@ def _run(
     )  # fmt: skip
 
 
-def with_motions(result: CaseResult, report: Callable[[str], None] = lambda _: None) -> CaseResult:
-    """The same with motions in time where a response jumps or leaves a gap; the book's mode has none."""
+def jumps(result: CaseResult) -> list[tuple[float | None, float, tuple[float, float]]]:
+    """Where responses jump or leave a gap: the normal force that was asked for and its key, Hz and Hz; the book's mode
+    has none."""
     if result.settings.mode == "book":
-        return result
-    forces, found = dict.fromkeys(normal_forces(result.built, "") or (None,)), list[Beyond]()
-    for asked, (normal, r) in zip(forces, result.responses.items(), strict=True):
-        for gap in gaps(r, result.resonances[normal]):
-            problem = problem_of(result.built, asked)
-            found.append(beyond(problem, r, gap, normal, result.quantity, report))
+        return []
+    forces = dict.fromkeys(normal_forces(result.built, "") or (None,))
+    return [
+        (asked, normal, gap)
+        for asked, (normal, r) in zip(forces, result.responses.items(), strict=True)
+        for gap in gaps(r, result.resonances[normal])
+    ]
+
+
+def with_motions(result: CaseResult, report: Callable[[str], None] = lambda _: None) -> CaseResult:
+    """The same with motions in time where responses jump."""
+    found = [
+        beyond(problem_of(result.built, asked), result.responses[n], gap, n, result.quantity, report)
+        for asked, n, gap in jumps(result)
+    ]
     return replace(result, beyond=tuple(found))
 
 

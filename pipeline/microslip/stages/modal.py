@@ -20,6 +20,7 @@ from ..files.hdf5 import refuse_foreign
 from ..mesh import UNITS
 from ..mesh.cards import files_of
 from ..settings.body import BodySettings, MatrixFiles
+from ..units import rpm_text
 from .job import Job
 from .meshing import load_mesh, mesh_stage, touched_files
 from .stage import Made, Report, Stage
@@ -51,7 +52,7 @@ def modes_stage(
         size = size_in_words(basis)
         report(f"writing {stage.product}{', ' * bool(size)}{size}")
         write_basis(stage.product, basis)
-        for text in plausible.of_basis(basis):
+        for text in plausible.of_basis(basis, _static(basis)):
             told.append(f"{job.path}: {text}")
             report(f"warning: {told[-1]}")
         warnings.extend(told)
@@ -59,6 +60,16 @@ def modes_stage(
 
     stage.make(inputs, work)
     return stage.product, warnings
+
+
+def _static(basis: ModalBasis) -> dict[str, float]:
+    """The largest stress of every static state, Pa, by what it is called."""
+    stressed = [g for g in basis.groups.values() if g.stresses]
+    if not stressed:
+        return {}
+    from ..modal.stress import static_extremes
+
+    return {f"static state at {rpm_text(g.speed)}": static_extremes(g).stress for g in stressed}
 
 
 def basis_of(job: Job, mesh_file: Path, report: Report) -> tuple[ModalBasis, list[str]]:

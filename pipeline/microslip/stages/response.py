@@ -19,7 +19,7 @@ from ..case import CaseResult, CaseSettings, checkpoint, load_case, run_case
 from ..case.assemble import build
 from ..case.beyond import with_curve
 from ..case.messages import at_places, lifted, method, off
-from ..case.run import with_motions
+from ..case.run import jumps, with_motions
 from ..case.settings import FIRST_HARMONICS
 from ..data import Array, ModalBasis
 from ..errors import UserError
@@ -108,6 +108,12 @@ def _work(
     try:
         begin = _harmonics(points, settings, bases, case_path) if settings.looks_for_harmonics else FIRST_HARMONICS
         result = run_case(settings, bases, case_path, stage.report, points.journal, begin)
+        if places := jumps(result):
+            _finished(points, result, Wanted("none", pictures=False), stage.report)
+            stage.report(
+                f"{folder / 'response.html'} has what is known so far; at {counted(len(places), 'place')} the response "
+                "jumps, folds or has no solution: dozens of motions in time, of seconds each"
+            )
         result = with_motions(result, stage.report)
         curve = Checkpoint(folder / "curve.points", raw, files, stage.force, stage.begin)
         own = bases, case_path, curve.journal, stage.report
