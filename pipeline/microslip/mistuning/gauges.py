@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Annotated, Any
 
 import numpy as np
 import scipy.linalg
@@ -20,6 +21,8 @@ from numpy.typing import ArrayLike
 
 from ..data import Array
 from ..errors import UserError
+from ..settings.arguments import Index, Rows, Vector, checked, numbers
+from ..settings.numbers import Positive
 from ..system.assembly import Assembly, Linear
 from .estimate import Estimate, accepted, covariance, misfit
 from .linear import held
@@ -87,9 +90,10 @@ class Stuck:
         return part.output @ q + part.output_given, np.array(changes).T
 
 
+@checked
 def blades_from_gauges(
-    ring: Assembly | Stuck, frequency: ArrayLike, amplitude: ArrayLike, noise: ArrayLike, find_level: bool = False,
-    spread: float = 0.01, seed: int = 0,
+    ring: Assembly | Stuck, frequency: Vector, amplitude: Rows, noise: Annotated[Any, numbers(0, 2)],
+    find_level: bool = False, spread: Positive = 0.01, seed: Index = 0,
 ) -> FromGauges:  # fmt: skip
     """Blade frequencies of a ring with sticking contacts, from amplitudes of the read-outs of all sectors.
 

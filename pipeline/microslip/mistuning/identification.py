@@ -20,6 +20,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Annotated, Any
 
 import numpy as np
 import scipy.optimize
@@ -27,6 +28,8 @@ from numpy.typing import ArrayLike
 
 from ..data import Array
 from ..errors import UserError
+from ..settings.arguments import Rows, Vector, checked, numbers
+from ..settings.numbers import Number
 from .estimate import Estimate, covariance, misfit
 
 _ROUNDING = 1e-9
@@ -42,9 +45,10 @@ class FromModes(Estimate):
     tuned_accuracy: Array
 
 
+@checked
 def blades_from_modes(
-    tuned: ArrayLike, frequency: ArrayLike, shapes: ArrayLike, frequency_noise: float, shape_noise: float,
-    share: ArrayLike = 1.0, find_tuned: bool = False,
+    tuned: Vector, frequency: Vector, shapes: Rows, frequency_noise: Number, shape_noise: Number,
+    share: Annotated[Any, numbers(0, 1)] = 1.0, find_tuned: bool = False,
 ) -> FromModes:  # fmt: skip
     """Blade frequencies of a disc from measured modes of one family, a kind of FMM ID.
 

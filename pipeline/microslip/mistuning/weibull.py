@@ -9,13 +9,16 @@ so that w0 is the median, and k follows from s = standard deviation / mean alone
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike
+from pydantic import Field
 from scipy.special import gammaln, psi, zeta
 
 from ..data import Array
 from ..errors import UserError
+from ..settings.arguments import Count, Index, Vector, checked
 
 DRAWS = 20000
 """Samples drawn for an interval of k: its ends then lie within 0.3 % of the probabilities asked for."""
@@ -85,7 +88,13 @@ class Fitted:
     level: float
 
 
-def amplitude_spread(amplitudes: ArrayLike, level: float = 0.95, draws: int = DRAWS, seed: int = 0) -> Fitted:
+@checked
+def amplitude_spread(
+    amplitudes: Vector,
+    level: Annotated[float, Field(gt=0, lt=1)] = 0.95,
+    draws: Count = DRAWS,
+    seed: Index = 0,
+) -> Fitted:
     """Weibull exponent of the amplitudes that gauges measured, with its confidence interval (Sextro 5.6).
 
     n gauges say s only so well. As s of n amplitudes from such a distribution depends on k alone and falls with it,
