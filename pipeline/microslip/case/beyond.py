@@ -270,14 +270,14 @@ def nearer(m: Settled, low: Settled, high: Settled) -> bool:
     return abs(m.amplitude - high.amplitude) < abs(m.amplitude - low.amplitude)
 
 
-HARMONICS, FINER, FINEST = 7, 256, 1024
+HARMONICS, FINER, FINEST = 7, 256, 512
 """Harmonics of a curve of contacts that open and samples of a cycle with which it is begun, at least, and up to which
 samples are doubled. Stability of motions with fewer is not that of what they stand for."""
 
 COARSE = 0.05
 """Share of the points of a curve that may fail their checks."""
 
-POINTS, LOOKED_AT = 300, 8
+POINTS, LOOKED_AT = 120, 8
 """Points of a curve at most, and how many of all are looked at for stability."""
 
 
