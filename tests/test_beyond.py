@@ -141,6 +141,15 @@ def case(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path / "case.toml"
 
 
+def test_motions_that_take_too_long_are_told_in_part() -> None:
+    """Where they ended, and no verdict on what was not seen."""
+    down = [motion(430, 70, True), motion(420, 75, True)]
+    cut = "Motions in time ended after 120 s, upwards before 420 Hz: ..."
+    said = Beyond(100.0, down=down, cut=cut).sentences()
+    assert "in part" in said[0] and "75 µm at 420 Hz" in said[0] and said[1] == cut
+    assert not any("same motion" in words for words in said)
+
+
 @pytest.mark.slow
 def test_what_is_known_is_written_before_motions_in_time(
     case: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch

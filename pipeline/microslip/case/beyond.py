@@ -7,6 +7,7 @@ is left at all. Motions in time do.
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -44,6 +45,9 @@ FORGOTTEN = 4.0
 LOWEST = 0.5
 """Share of the first frequency of a sweep down to which a motion is followed that does not fall back in the band."""
 
+SHARES = {"downwards": 0.5, "upwards": 0.85, "from rest": 1.0}
+"""Of the time that motions may take, until which each of the ways goes on."""
+
 WITHIN, STEPS = 30, 80
 """Frequencies of a sweep in time within a gap, and of all of it, at most."""
 
@@ -64,7 +68,8 @@ class Beyond:
 
     Attributes:
         normal: N. gap: Hz, Hz, where it is looked. up, down: swept upwards and downwards, in that order. rest: each
-            from rest. quantity: what is read. why: why there are none. curves: of periodic motions, with so many
+            from rest. quantity: what is read. why: why there are none. cut: where they ended for
+            want of time. curves: of periodic motions, with so many
             samples of a cycle. stability: of each of them some points, by their place.
     """
 
@@ -75,6 +80,7 @@ class Beyond:
     rest: Sequence[Settled] = ()
     quantity: Quantity = field(default_factory=Quantity)
     why: str = ""
+    cut: str = ""
     curves: Sequence[Followed] = ()
     samples: int = 0
     stability: Sequence[Mapping[int, Stability]] = ()
@@ -168,6 +174,9 @@ class Beyond:
             ]
         if not self.down:
             return []
+        cut = [self.cut] if self.cut else []
+        if cut and not self.two:
+            return [f"{of} motions in time are known in part{self._gap()}.", *cut, *self._wild()]
         if not (two := self.two):
             return [
                 f"{of} sweeps in time, upwards and downwards, meet the same motion{self._gap()}.",
@@ -180,7 +189,7 @@ class Beyond:
             f"{of} there are two motions {where}, found by integrating in time; the higher one swings by up to "
             f"{self._size(top.swing)} at {top.frequency:.5g} Hz."
         ]
-        return [*said, *self._from_rest(two), *self._left(two), *self._wild()]
+        return [*said, *self._from_rest(two), *self._left(two), *cut, *self._wild()]
 
     def _size(self, value: float) -> str:
         return self.quantity.sized(value, 3)
@@ -287,7 +296,7 @@ def with_curve(
     """The same with the curve of periodic motions from either end of what was looked at, as fine as open contacts need,
     and the stability of some of its points; without it where there are no motions in time to hold it against, or only
     one that is regular, which then say all there is."""
-    if one.why or not (one.two or one.irregular):
+    if one.why or one.cut or not (one.two or one.irregular):
         return one
     low, high = one.band
     harmonics, samples = max(HARMONICS, settings.balanced), max(FINER, settings.sampled)
@@ -366,8 +375,9 @@ def beyond(
     normal: float,
     of: Quantity,
     report: Report,
+    patience: float,
 ) -> Beyond:
-    """Motions in time about a gap (Hz, Hz) of a response."""
+    """Motions in time about a gap (Hz, Hz) of a response. patience: s of CPU time after the first of them."""
     if problem.assembly.ring is not None:
         return Beyond(
             normal,
@@ -375,7 +385,7 @@ def beyond(
             why="sectors of a ring need not stay alike in time; microslip orbit integrates",
         )
     try:
-        return _Swept(problem, found, gap, normal, report).all_of_it(of)
+        return _Swept(problem, found, gap, normal, report, patience).all_of_it(of)
     except (UserError, NotConverged) as error:
         return Beyond(normal, gap, why=str(error))
 
@@ -390,7 +400,9 @@ class _Swept:
         gap: tuple[float, float],
         normal: float,
         report: Report,
+        patience: float,
     ) -> None:
+        self.patience, self.began, self.cut = patience, math.inf, ""
         self.problem, self.gap, self.normal, self.report = problem, gap, normal, report
         self.asked = found.frequency[found.asked]
         self.step = float(np.median(np.diff(self.asked)))
@@ -419,7 +431,17 @@ class _Swept:
             "upwards", [*again, *(f for f in above if f > again[-1])], high, 1.0, begin
         )
         both = Beyond(self.normal, self.gap, up, down).two
-        return Beyond(self.normal, self.gap, up, down, self._from_rest(both), of)
+        return Beyond(self.normal, self.gap, up, down, self._from_rest(both), of, cut=self.cut)
+
+    def _spent(self, way: str, f: float) -> bool:
+        """Whether the time is over that a way may take; it is said once, with the frequency (Hz) that is left out."""
+        over = time.process_time() - self.began > SHARES[way] * self.patience
+        if over and not self.cut:
+            self.cut = (
+                f"Motions in time ended after {self.patience:g} s, {way} before {f:.5g} Hz: what comes then is not "
+                "known; give them more time (sweep.patience)."
+            )
+        return over
 
     def _from_rest(self, both: Sequence[tuple[Settled, Settled]]) -> list[Settled]:
         """Motions from rest where there are two, at some frequencies, and between those that lead to different ones."""
@@ -428,7 +450,7 @@ class _Swept:
             sorted({round(i * (count - 1) / 3) for i in range(4)} if count else set()),
             dict[int, Settled](),
         )
-        while wanted:
+        while wanted and not self._spent("from rest", both[wanted[0]][0].frequency):
             for i in wanted:
                 found[i] = self._at("from rest", both[i][0].frequency)
             known = sorted(found)
@@ -449,6 +471,8 @@ class _Swept:
         it ends."""
         motions, alike = list[Settled](), 0
         for f in frequency[:STEPS]:
+            if self._spent(way, f):
+                break
             motions += self._on(way, f, motions[-1] if motions else begin)
             beyond = sign * (f - end) > 0
             alike = alike + 1 if beyond and motions[-1].like(self._balanced(f)) else 0
@@ -462,7 +486,7 @@ class _Swept:
         """A step to a frequency (Hz); where the motion is lost on it, by steps of half of it: a sweep that is slow
         enough stays longer."""
         here = self._at(way, f, begin)
-        if begin is None or halvings == 0 or not _jumps(begin, here):
+        if begin is None or halvings == 0 or not _jumps(begin, here) or self._spent(way, f):
             return [here]
         first = self._on(way, 0.5 * (begin.frequency + f), begin, halvings - 1)
         return [*first, *self._on(way, f, first[-1], halvings - 1)]
@@ -471,6 +495,7 @@ class _Swept:
         self.report(f"motion in time, {way}, F_N = {self.normal:g} N: {f:.6g} Hz")
         began = time.monotonic()
         found = settled(self.problem.assembly, f, self.periods, begin)
+        self.began = min(self.began, time.process_time())  # the first one compiles
         if (
             begin is not None and (took := time.monotonic() - began) > LONG
         ):  # the first one compiles

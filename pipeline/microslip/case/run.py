@@ -177,7 +177,7 @@ def _run(
 def jumps(result: CaseResult) -> list[tuple[float | None, float, tuple[float, float]]]:
     """Where responses jump or leave a gap: the normal force that was asked for and its key, Hz and Hz; the book's mode
     has none."""
-    if result.settings.mode == "book":
+    if result.settings.mode == "book" or not result.settings.sweep.patience:
         return []
     forces = dict.fromkeys(normal_forces(result.built, "") or (None,))
     return [
@@ -190,7 +190,10 @@ def jumps(result: CaseResult) -> list[tuple[float | None, float, tuple[float, fl
 def with_motions(result: CaseResult, report: Callable[[str], None] = lambda _: None) -> CaseResult:
     """The same with motions in time where responses jump."""
     found = [
-        beyond(problem_of(result.built, asked), result.responses[n], gap, n, result.quantity, report)
+        beyond(
+            problem_of(result.built, asked), result.responses[n], gap, n, result.quantity, report,
+            result.settings.sweep.patience,
+        )  # fmt: skip
         for asked, n, gap in jumps(result)
     ]
     return replace(result, beyond=tuple(found))
