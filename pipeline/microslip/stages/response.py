@@ -322,7 +322,7 @@ def _assessed(
 ) -> _Assessed | None:  # fmt: skip
     """Stresses of the body that is watched, where its modal file holds stress modes, and its contacts; in pictures."""
     first = None if wanted.stresses == "none" else checkpoint.drawn_monitor(result.built)
-    basis = result.built.bodies[result.built.assembly.outputs[0].component].basis
+    basis = _watched(result)
     if first is None or not assessment.has_stresses(basis, response, first[0]):
         return None
     component, monitor = first
@@ -344,9 +344,14 @@ def _assessed(
     return _Assessed(component, found.table(), drawn, _for_paraview(found, basis, maps, folder), messages)
 
 
+def _watched(result: CaseResult) -> ModalBasis:
+    """Of the body with the first read-out, which a whole ring has many of."""
+    return result.built.bodies[result.built.assembly.outputs[0].component].basis
+
+
 def _stress_doubted(result: CaseResult, more: _Assessed) -> list[str]:
     """What is said of a stress that no metal bears."""
-    young = plausible.modulus_of(result.built.bodies[more.body].basis)
+    young = plausible.modulus_of(_watched(result))
     top = max((row["stress_amplitude_Pa"] for row in more.rows), default=0.0)
     told = plausible.stress(f"Resonances of {more.body}", top, young, "stress amplitude")
     return [told] if told else []
