@@ -115,8 +115,21 @@ def settings(cls: type[T]) -> type[T]:
         made.__dict__.update(zip(leaves + words, (*values, *rest), strict=True))
         return made
 
+    def pickled(made: Any) -> tuple[Any, ...]:
+        plain = {k: np.asarray(v) if isinstance(v, jax.Array) else v for k, v in vars(made).items()}
+        return _unpickled, (cls, plain, [k for k, v in vars(made).items() if isinstance(v, jax.Array)])
+
     jax.tree_util.register_pytree_with_keys(frozen, keyed, together, apart)
+    frozen.__reduce__ = pickled
     return frozen
+
+
+def _unpickled(cls: type[Any], values: dict[str, Any], arrays: list[str]) -> Any:
+    """A law in another process, whose jax may not have computed yet: it would take doubles as single numbers."""
+    prepare()
+    made = object.__new__(cls)
+    made.__dict__.update(values | {name: jnp.asarray(values[name]) for name in arrays})
+    return made
 
 
 def _check_bounds(made: Any) -> None:

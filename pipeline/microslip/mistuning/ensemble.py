@@ -18,6 +18,7 @@ from ..data import Array
 from ..errors import UserError
 from ..files import store
 from ..interrupts import look
+from ..process import prepare
 from ..settings.mistakes import whole
 from ..units import counted, percent
 from . import rare
@@ -343,6 +344,7 @@ _own: Any = None
 
 def _begin(asked: Asked) -> None:
     global _own
+    prepare()
     _own = asked
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # a terminal asks all; who began them ends them
 
