@@ -77,11 +77,27 @@ def peak(problem: Rated, x: Array, lam: float, settings: Settings | None = None)
 
 
 def placed(problem: Rated, x: Array, lam: float) -> Peak:
-    """The peak at a place of the curve, (n,) and lambda, that is known to be one."""
+    """The peak at a place of the curve, (n,) and lambda, that is known to be one.
+
+    Its height is flat there and says little about its place, on which `rated` depends: where the slope changes its
+    sign within `BESIDE_TOP` uphill, its root is taken.
+    """
     slope = _Slope(problem)
     y = slope.scaled.pack(x, lam)
-    tangent = np.linalg.svd(slope.scaled(y)[1])[2][-1]  # of a singular derivative it is one of them
-    return replace(_peak(slope, slope.at(y, tangent)), kink=False)
+    uphill = np.linalg.svd(slope.scaled(y)[1])[2][-1]  # of a singular derivative it is one of them
+    uphill = uphill if slope(y, uphill) >= 0 else -uphill
+    here, top = slope.at(y, uphill), None
+    ahead = y + BESIDE_TOP * uphill
+    found = correct(slope.scaled, ahead, uphill, float(uphill @ ahead), SEARCH.newton)
+    if found.ok and found.tangent is not None:
+        tangent = found.tangent * np.sign(found.tangent @ uphill) / norm(found.tangent)
+        behind = slope.at(found.y, tangent)
+        top = _pinned(slope, here, behind, False, SEARCH) if behind.slope < 0 else None
+    return replace(top or _peak(slope, here), kink=False)
+
+
+BESIDE_TOP = 1e-3
+"""Scaled length of curve within which the top lies of a peak whose height is known to some seven digits."""
 
 
 def _climbed(problem: Rated, state: State, settings: Settings) -> Peak:
