@@ -15,6 +15,7 @@ from typing import Any
 os.environ.setdefault("OMP_NUM_THREADS", "1")  # before NumPy and MKL are loaded
 
 import pytest
+from durations import Durations
 from hypothesis import HealthCheck, settings
 
 settings.register_profile(
@@ -42,7 +43,7 @@ def locked(package: str) -> bool:
         return False
 
 
-def pytest_configure() -> None:
+def pytest_configure(config: pytest.Config) -> None:
     """Before jax is loaded, and for the processes that tests start."""
     if locked("jaxlib"):
         os.environ.setdefault("XLA_FLAGS", QUICK)
@@ -50,6 +51,9 @@ def pytest_configure() -> None:
         from microslip.process import prepare
 
         prepare()
+    config.pluginmanager.register(durations := Durations(), "durations-of-tests")
+    if find_spec("jax"):
+        durations.listen()
 
 
 def pytest_collection_finish() -> None:

@@ -1,0 +1,66 @@
+"""What every test costs, in CPU seconds: ``build/durations.csv`` after each run, the dearest first.
+
+Seconds of the wall depend on what runs beside it, and compiling on what has run before; both are kept apart.
+"""
+
+from __future__ import annotations
+
+import csv
+import resource
+import time
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+FILE = Path(__file__).resolve().parents[1] / "build/durations.csv"
+COLUMNS = ("cpu_s", "compiling_s", "processes_s")
+"""Of a test with its fixtures: CPU time of the worker without tracing and compiling by jax; that; of its processes."""
+
+
+class Durations:
+    """A plugin: in a worker it measures, where there are none or in the process that began them it writes."""
+
+    def __init__(self) -> None:
+        self.compiling = 0.0
+        self.before = self.now()
+        self.tests: dict[str, Counter[str]] = {}
+
+    def listen(self) -> None:
+        import jax.monitoring
+
+        def compiled(event: str, seconds: float, **_: Any) -> None:
+            self.compiling += seconds if event.startswith("/jax/core/compile/") else 0.0
+
+        jax.monitoring.register_event_duration_secs_listener(compiled)
+
+    def now(self) -> tuple[float, float, float]:
+        children = resource.getrusage(resource.RUSAGE_CHILDREN)
+        return time.process_time(), self.compiling, children.ru_utime + children.ru_stime
+
+    @pytest.hookimpl(wrapper=True)
+    def pytest_runtest_makereport(self, item: pytest.Item) -> Iterator[Any]:
+        report = yield
+        now, before = self.now(), self.before
+        cpu, compiling, processes = (b - a for a, b in zip(before, now, strict=True))
+        self.before = now
+        report.user_properties = [("durations", (max(cpu - compiling, 0.0), compiling, processes))]
+        return report
+
+    def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
+        for name, value in report.user_properties:
+            if name == "durations":
+                spent = self.tests.setdefault(report.nodeid, Counter())
+                spent.update(dict(zip(COLUMNS, value, strict=True)))
+
+    def pytest_sessionfinish(self, session: pytest.Session) -> None:
+        if hasattr(session.config, "workerinput") or not self.tests:
+            return
+        FILE.parent.mkdir(exist_ok=True)
+        dearest = sorted(self.tests.items(), key=lambda one: -sum(one[1].values()))
+        with FILE.open("w", newline="") as file:
+            table = csv.writer(file)
+            table.writerow((*COLUMNS, "test"))
+            table.writerows((*(f"{spent[c]:.3f}" for c in COLUMNS), test) for test, spent in dearest)
