@@ -13,6 +13,8 @@ from pathlib import Path
 from typing import Any
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")  # before NumPy and MKL are loaded
+PROGRAMS = Path(__file__).resolve().parents[1] / "build/programs-of-tests"
+os.environ.setdefault("JAX_COMPILATION_CACHE_DIR", str(PROGRAMS))  # kept between runs, shared by workers
 
 import pytest
 from durations import Durations
@@ -44,15 +46,16 @@ def locked(package: str) -> bool:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Before jax is loaded, and for the processes that tests start."""
+    """Before jax is loaded, and for the processes that tests start; who only hands tests to workers loads nothing."""
     if locked("jaxlib"):
         os.environ.setdefault("XLA_FLAGS", QUICK)
-    if find_spec("jax"):  # tests call laws by themselves, before anything is solved
-        from microslip.process import prepare
-
-        prepare()
     config.pluginmanager.register(durations := Durations(), "durations-of-tests")
-    if find_spec("jax"):
+    if find_spec("jax") and not getattr(config.option, "numprocesses", None):
+        from microslip.process import forget, prepare
+
+        PROGRAMS.mkdir(parents=True, exist_ok=True)
+        prepare()  # tests call laws by themselves, before anything is solved
+        forget(PROGRAMS)
         durations.listen()
 
 

@@ -1,6 +1,6 @@
 """What every test costs, in CPU seconds: ``build/durations.csv`` after each run, the dearest first.
 
-Seconds of the wall depend on what runs beside it, and compiling on what has run before; both are kept apart.
+Seconds of the wall depend on what runs beside it, and compiling on what has run before: that is kept apart.
 """
 
 from __future__ import annotations
@@ -17,7 +17,8 @@ import pytest
 
 FILE = Path(__file__).resolve().parents[1] / "build/durations.csv"
 COLUMNS = ("cpu_s", "compiling_s", "processes_s")
-"""Of a test with its fixtures: CPU time of the worker without tracing and compiling by jax; that; of its processes."""
+"""Of a test with its fixtures: CPU time of the worker; at most that of it during which jax traced and compiled, by the
+wall; of its processes."""
 
 
 class Durations:
@@ -46,7 +47,7 @@ class Durations:
         now, before = self.now(), self.before
         cpu, compiling, processes = (b - a for a, b in zip(before, now, strict=True))
         self.before = now
-        report.user_properties = [("durations", (max(cpu - compiling, 0.0), compiling, processes))]
+        report.user_properties = [("durations", (cpu, min(compiling, cpu), processes))]
         return report
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
@@ -59,7 +60,7 @@ class Durations:
         if hasattr(session.config, "workerinput") or not self.tests:
             return
         FILE.parent.mkdir(exist_ok=True)
-        dearest = sorted(self.tests.items(), key=lambda one: -sum(one[1].values()))
+        dearest = sorted(self.tests.items(), key=lambda one: -one[1]["cpu_s"] - one[1]["processes_s"])
         with FILE.open("w", newline="") as file:
             table = csv.writer(file)
             table.writerow((*COLUMNS, "test"))
