@@ -694,9 +694,10 @@ def first() -> None:
     free = result.free
     axes.semilogy(free.frequency, 1e6 * np.abs(free.monitor), color="0.55", lw=1.2, ls="--", label="free blade")
     for colour, (normal, r) in zip(plots_colours(len(result.responses)), result.responses.items(), strict=True):
-        points = np.vstack([np.column_stack([r.frequency, np.abs(r.monitor)]), result.resonances[normal]])
+        solved = np.column_stack([r.frequency, r.columns()["amplitude_m"]])
+        points = np.vstack([solved, result.resonances[normal]])
         f, a = points[points[:, 0].argsort()].T
-        axes.semilogy(f, 1e6 * a, color=colour, lw=2.0, label=f"{normal:g} N")
+        plots.lighter(axes, f, 1e6 * a, result.unsure(normal, f), color=colour, lw=2.0, label=f"{normal:g} N")
     axes.set_xlim(90, 130)
     axes.set_ylim(2, 2500)
     axes.set_xlabel("excitation frequency in Hz", fontsize=12)
@@ -1567,7 +1568,7 @@ def multicoupling() -> None:
     without = ring_study.highest(alone, r.basis, np.linspace(100.0, 130.0, 13))
     fig = figure(10.0, 4.0)
     axes = fig.subplots(1, 2)
-    study.dampers_picture(found, curves, np.abs(ring_study.frf(alone, study.SHOWN).monitor), *axes)
+    study.dampers_picture(found, curves, ring_study.amplitudes(alone, study.SHOWN), *axes)
     save(drawn(fig), "multicoupling")
     rows = [study.row("no damper", without), *(study.row(f"{n:g}", h) for n, h in found)]
     head = ["damper's normal force, N", "resonance, Hz", "amplitude, um", "stress at the foot, MPa",
