@@ -46,7 +46,7 @@ class Optimum:
     Attributes:
         parameter. resonance: there. status: see `continuation.Lowest`. found: value -> highest resonance in the band,
             rising, of all values that were looked at. rising: value -> rad/s of an end of the band at which the
-            response is higher than the highest resonance in it.
+            response is higher than the highest resonance in it. problem: the balance of `resonance`.
     """
 
     parameter: float
@@ -54,6 +54,7 @@ class Optimum:
     status: str
     found: dict[float, HighestPeak]
     rising: dict[float, float]
+    problem: Problem | None = None
 
     @property
     def spread(self) -> float:
@@ -132,5 +133,6 @@ def optimum(
 
     best: Lowest = lowest(at, values)
     return Optimum(
-        best.parameter, found[best.parameter], best.status, dict(sorted(found.items())), dict(sorted(rising.items()))
-    )
+        best.parameter, found[best.parameter], best.status, dict(sorted(found.items())),
+        dict(sorted(rising.items())), make(best.parameter),
+    )  # fmt: skip

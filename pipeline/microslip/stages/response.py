@@ -13,9 +13,8 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from .. import plausible
 from ..basis import read_basis
-from ..case import CaseResult, CaseSettings, checkpoint, load_case, run_case
+from ..case import CaseResult, CaseSettings, checkpoint, headline, load_case, run_case
 from ..case.assemble import build
 from ..case.beyond import with_curve
 from ..case.messages import at_places, lifted, method, off
@@ -351,10 +350,7 @@ def _watched(result: CaseResult) -> ModalBasis:
 
 def _stress_doubted(result: CaseResult, more: _Assessed) -> list[str]:
     """What is said of a stress that no metal bears."""
-    young = plausible.modulus_of(_watched(result))
-    top = max((row["stress_amplitude_Pa"] for row in more.rows), default=0.0)
-    told = plausible.stress(f"Resonances of {more.body}", top, young, "stress amplitude")
-    return [told] if told else []
+    return headline.stressed(result.built, max((row["stress_amplitude_Pa"] for row in more.rows), default=0.0))
 
 
 def _lifted_off(result: CaseResult, found: assessment.Assessment) -> dict[float, Array]:
