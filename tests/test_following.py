@@ -20,7 +20,7 @@ from microslip.harmonic_balance import peak, reduced
 from microslip.stages import following
 from microslip.units import METRES
 
-pytestmark = pytest.mark.usefixtures("undrawn")
+pytestmark = pytest.mark.usefixtures("undrawn", "unjudged")
 
 
 @pytest.fixture(scope="module")
@@ -253,14 +253,14 @@ def test_a_search_that_fails_does_not_say_that_there_is_nothing(
     assert f"curve.frequency: {why}" in capsys.readouterr().err
 
 
-def test_no_optimum_says_where_to_look(
+def test_a_lowest_place_at_an_end_is_an_answer_and_says_where_to_look(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     one_point(tmp_path, monkeypatch, points=9)
     band = ["--set", "sweep.start=100", "--set", "sweep.stop=140"]
-    assert main(["optimum", "case.toml", "--low", "20", "--high", "30", "--points", "2", *band]) == 1
-    assert "no optimum between 20 and 30 N" in (err := capsys.readouterr().err)
-    assert "lowest at 20 N, an end; look beyond it with --low below 20" in err
+    assert main(["optimum", "case.toml", "--low", "20", "--high", "30", "--points", "2", *band]) == 0
+    assert "normal force = 20 N: the highest resonance" in (out := capsys.readouterr().out)
+    assert "is lowest of all from 20 to 30 N" in out and "look there with --low below 20" in out
     assert [r["what"] for r in table("optimum.csv")[:2]] == ["highest resonance"] * 2
 
 

@@ -19,7 +19,8 @@ from ..modal.stress import outside, von_mises
 from ..units import counted, percent
 from .assemble import Built
 from .contacts import swept
-from .messages import off
+from .messages import method, off
+from .settings import CaseSettings
 
 TRUNCATION = 0.01
 """Estimated error by harmonics that are left out, over the amplitude, above which a message is made."""
@@ -138,10 +139,14 @@ def uncertain(where: str, e: Error, share: float, likely: float) -> str:
     return f"{where} is uncertain by about {off(likely)}, {percent(share)} at most, {said}"
 
 
-def said_of(where: str, e: Error | None) -> list[str]:
-    """The estimated error of a headline in a sentence. where: what it is the error of, and where it stands."""
+def said_of(settings: CaseSettings, where: str, e: Error | None) -> list[str]:
+    """The estimated error of a headline in a sentence, or what the method is known to leave out.
+
+    Args:
+        where: what it is the error of, and where it stands. e: None: none was estimated.
+    """
     if e is None:
-        return []
+        return [how] if (how := method(settings)) else []
     if not np.isfinite(e.readout):
         return [
             f"{where} is uncertain, nobody knows by how much: with twice the harmonics and samples no solution was "
