@@ -142,7 +142,10 @@ class Reading(NamedTuple):
     read: float
 
 
-def changed(problem: Problem, at: Reading, solved: Callable[[Problem, Array], Reading]) -> Error:
+Solve = Callable[[Problem, Array], Reading]
+
+
+def changed(problem: Problem, at: Reading, solved: Solve) -> Error:
     """Estimated error of what is read of a solution.
 
     Args:
@@ -157,9 +160,8 @@ def changed(problem: Problem, at: Reading, solved: Callable[[Problem, Array], Re
         by_samples = abs(first.read - at.read)
         if np.isfinite(second.read):
             by_harmonics, change = abs(second.read - first.read), second.read - at.read
-    return Error(
-        problem.harmonics, samples_of(problem), at.read, by_harmonics, by_samples, second.x, change
-    )
+    H, S = problem.harmonics, samples_of(problem)
+    return Error(H, S, at.read, by_harmonics, by_samples, second.x, change)
 
 
 def _read(problem: Problem, x: Array, Omega: float, output: int) -> float:
@@ -167,9 +169,7 @@ def _read(problem: Problem, x: Array, Omega: float, output: int) -> float:
     return abs(amplitude(at, x, *at.forces(x), output).value)
 
 
-def _resolved(
-    problem: Problem, at: Reading, solved: Callable[[Problem, Array], Reading]
-) -> tuple[Problem, Reading]:
+def _resolved(problem: Problem, at: Reading, solved: Solve) -> tuple[Problem, Reading]:
     """With more samples, as many as it takes for one to lie where each contact sticks, and its solution."""
     samples = DENSER * samples_of(problem)
     while True:

@@ -207,10 +207,8 @@ def unreached(found: Mapping[float, Backbone]) -> str:
     return "; ".join(said)
 
 
-def write_backbones(
-    found: Mapping[float, Backbone], case: Case, remarks: Sequence[str] = ()
-) -> list[Path]:
-    """``backbone.csv``, ``pictures/backbone.png`` and ``backbone.html``."""
+def write_backbones(found: Mapping[float, Backbone], case: Case, remarks: Sequence[str] = ()) -> list[Path]:
+    """``backbone.csv``, ``pictures/backbone.png`` and ``backbone.html``. remarks: see `remarks_on_backbones`."""
     from ..pictures.following import backbone_plot
 
     title, picture = _title(case, "nonlinear mode"), case.folder / "pictures" / "backbone.png"
@@ -307,9 +305,7 @@ def optimum_over(
     return optimum(make, [float(v) for v in values], band, report=report, keep=keep)
 
 
-def remarks_on_optimum(
-    found: Optimum, over: str, case: Case, report: Report = lambda _: None
-) -> list[str]:
+def remarks_on_optimum(found: Optimum, over: str, case: Case, report: Report = lambda _: None) -> list[str]:
     """How uncertain the lowest of the highest resonances is for want of harmonics, and what looks like a number in a
     wrong unit in any of them."""
     best, built, e = found.resonance, case.plain, None
