@@ -105,6 +105,7 @@ def _work(
 
     def write(tables: Tables) -> None:
         begin()
+        stage.clear([points.file.with_suffix(".h5")])
         write_tables(folder, tables, 12)
 
     survey = partial(KINDS[kind], write) if kind in KINDS else partial(_curve, kind, points)
