@@ -162,8 +162,27 @@ def _mode_of(case: Case, problem: Problem, mode: int | None) -> int:
 
     sweep = case.plain.settings.sweep
     if mode is not None:
-        return mode - 1
+        return counted_from_1(problem, mode)
     return strongest(problem, 2 * np.pi * sweep.start, 2 * np.pi * sweep.stop)
+
+
+def counted_from_1(problem: Problem, mode: int) -> int:
+    """Number of a mode with sticking contacts, 0 the lowest, that a person counts from 1.
+
+    Raises:
+        UserError: a rigid motion that neither supports nor contacts hold.
+    """
+    from ..harmonic_balance.nonlinear_modes import RIGID, stuck_modes
+
+    omega = stuck_modes(problem)[0]
+    rigid = int((omega <= RIGID * omega.max(initial=0.0)).sum())
+    if not 1 <= mode <= rigid:
+        return mode - 1
+    first = f"; the first is --mode {rigid + 1}, {omega[rigid] / (2 * np.pi):.5g} Hz" if rigid < len(omega) else ""
+    raise UserError(
+        f"--mode {mode}: is a rigid motion at 0 Hz, which neither supports nor sticking contacts hold, and has no "
+        f"backbone; choose a mode that vibrates{first}"
+    )
 
 
 def remarks_on_backbones(
