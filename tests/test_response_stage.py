@@ -250,9 +250,8 @@ def test_files_of_two_runs_do_not_stand_side_by_side(folder: Path, monkeypatch: 
             running.respond(folder / "case.toml", None, list(changes), report=tell)
 
     ended_at("friction response at", "amplitude=3.0")
-    assert {p for p, data in first.items() if not p.is_file() or p.read_bytes() != data} <= {
-        record, build / "response.points",
-    }  # fmt: skip
+    changed = {p for p, data in first.items() if not p.is_file() or p.read_bytes() != data}
+    assert changed <= {record, build / "response.points"}
     (build / "response.csv").write_text("mine")
     ended_at("3 of 4", "amplitude=3.0")
     left = {str(p.relative_to(build)) for p in build.rglob("*") if p.is_file()}

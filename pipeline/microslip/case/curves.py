@@ -195,8 +195,7 @@ def curves(
         over: of `OVER`. keep: opens the journal of an assembly, in which points are kept as they are found.
 
     Returns:
-        The curves, and whether nobody interrupted: after Ctrl-C what was found until then. See `error_of` for how
-        uncertain they are.
+        The curves, and whether nobody interrupted: after Ctrl-C what was found until then.
 
     Raises:
         UserError: ends that are missing, no resonance to begin at.
@@ -225,9 +224,9 @@ def curves(
 
 
 def highest(found: Sequence[Followed]) -> tuple[Followed, int] | None:
-    """The curve with the largest amplitude of all points that pass their checks, and that point's number."""
-    tops = [(one, int(np.argmax(np.where(one.converged, one.amplitude, -1.0)))) for one in found if one.rows]
-    tops = [(one, i) for one, i in tops if one.converged[i]]
+    """The curve with the largest amplitude of all points that pass their checks, and that point."""
+    heights = [(one, np.where(one.converged, one.amplitude, -1.0)) for one in found if one.rows]
+    tops = [(one, int(height.argmax())) for one, height in heights if one.converged.any()]
     return max(tops, key=lambda top: float(top[0].amplitude[top[1]]), default=None)
 
 

@@ -9,7 +9,7 @@ its sign (`Error.likely`) says on which side the solution errs and by how much: 
 the changes (`Error.readout`), which covers what lies beyond and harmonics that meet a resonance of their own: it errs
 on the high side, about three times.
 
-Reading for, and not estimated from one step of Newton's method: where every sample steps over the phases in which a
+Solved for, and not estimated from one step of Newton's method: where every sample steps over the phases in which a
 contact sticks, the derivative of its force is zero, and such a step sees no change at all.
 """
 

@@ -132,7 +132,6 @@ def optimum(
         return rated(family, value, top)
 
     best: Lowest = lowest(at, values)
-    return Optimum(
-        best.parameter, found[best.parameter], best.status, dict(sorted(found.items())),
-        dict(sorted(rising.items())), make(best.parameter),
-    )  # fmt: skip
+    by_value, ends = dict(sorted(found.items())), dict(sorted(rising.items()))
+    value = best.parameter
+    return Optimum(value, found[value], best.status, by_value, ends, make(value))

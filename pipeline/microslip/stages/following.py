@@ -342,8 +342,12 @@ def remarks_on_optimum(found: Optimum, over: str, case: Case, report: Report = l
 
 
 def write_optimum(
-    found: Optimum, over: str, case: Case, beside: Mapping[str, Array] = _NONE, remarks: Sequence[str] = ()
-) -> list[Path]:  # fmt: skip
+    found: Optimum,
+    over: str,
+    case: Case,
+    beside: Mapping[str, Array] = _NONE,
+    remarks: Sequence[str] = (),
+) -> list[Path]:
     """``optimum.csv``: the highest resonance at every value and the optimum; ``pictures/optimum.png``;
     ``optimum.html``. beside: see `found_before`. remarks: more sentences of the page."""
     from ..pictures.following import optimum_plot
