@@ -135,13 +135,13 @@ def _unjudged(request: pytest.FixtureRequest) -> Iterator[None]:
     sweep jumps or has no solution. The slow tests do both as a user does."""
     with pytest.MonkeyPatch.context() as patched:
         if request.config.getoption("markexpr") == "not slow" and find_spec("jax"):
-            from microslip.case import run
+            from microslip.case import headline
             from microslip.stages import response
 
             patched.setattr(response, "jumps", lambda result: [])
             patched.setattr(response, "with_motions", lambda result, report: result)
-            judged = run._Left.out
-            patched.setattr(run._Left, "out", lambda of, *given: [] if of.tolerance is None else judged(of, *given))
+            asked = headline.is_estimated
+            patched.setattr(headline, "is_estimated", lambda *given, ring=False: ring and asked(*given, ring))
         yield
 
 

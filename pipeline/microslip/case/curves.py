@@ -15,6 +15,7 @@ from ..continuation import Settings
 from ..data import Array
 from ..errors import UserError
 from ..harmonic_balance import families
+from ..harmonic_balance.accuracy import Error
 from ..harmonic_balance.checkpoint import labels, points_of_curve, resumed_curve
 from ..harmonic_balance.envelope import largest
 from ..harmonic_balance.families import Family
@@ -24,6 +25,7 @@ from ..results import Journal
 from ..results.names import exact
 from ..results.series import CONVERGED, READ, of_solutions
 from ..units import METRES, Quantity
+from . import headline
 from .assemble import Built, build
 from .contacts import swept
 from .problem import normal_forces, pressed_by, problem_of
@@ -219,6 +221,25 @@ def curves(
             except KeyboardInterrupt:
                 return [*found, replace(one, rows=points_of_curve(journal, one.name))], False
     return found, True
+
+
+def highest(found: Sequence[Followed]) -> tuple[Followed, int] | None:
+    """The curve with the largest amplitude of all points that pass their checks, and that point."""
+    heights = [(one, np.where(one.converged, one.amplitude, -1.0)) for one in found if one.rows]
+    tops = [(one, int(height.argmax())) for one, height in heights if one.converged.any()]
+    return max(tops, key=lambda top: float(top[0].amplitude[top[1]]), default=None)
+
+
+def error_of(built: Built, one: Followed, i: int) -> Error | None:
+    """Estimated error of the amplitude at a point of a curve, see `headline.estimated`."""
+    family, row = _family(built, problem_of(built, _begun_under(built, one)), one), one.rows[i]
+    at = float(row["parameter"]) * family.unit
+    return headline.estimated(built, family.problem(at), row["x"], family.Omega(at))
+
+
+def _begun_under(built: Built, one: Followed) -> float | None:
+    """Normal force (N) of the contacts at the beginning of a curve."""
+    return one.ends[0] if one.over == "normal_force" else one.normal
 
 
 def _followed(

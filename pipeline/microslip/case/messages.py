@@ -7,14 +7,11 @@ from types import MappingProxyType
 
 import numpy as np
 
-from .. import plausible
 from ..contact.harmonics import fourier
 from ..contact.jenkins import Jenkins
-from ..contact.study import moduli_doubted
 from ..data import Array
 from ..harmonic_balance import FrequencyResponse
 from ..harmonic_balance.problem import Problem
-from ..harmonic_balance.readout import measured
 from ..harmonic_balance.reduced import stuck, stuck_damping, untouched
 from ..harmonic_balance.response import HarmonicResponse, unsolved
 from ..harmonic_balance.sweeps import overhanging
@@ -22,7 +19,6 @@ from ..results.checks import UNCERTAIN, cause
 from ..results.names import apart
 from ..units import Quantity, counted, percent
 from .assemble import Built
-from .contacts import swept
 from .problem import book_models
 from .settings import CaseSettings
 
@@ -102,31 +98,6 @@ def between_equilibria(built: Built) -> list[str]:
     if built.settings.sweep.normal_forces != "static" or not error:
         return []
     return [f"The static normal force is interpolated between two equilibria of the speed range, to {error:.3g} N."]
-
-
-def doubted(
-    built: Built, resonances: Mapping[float, Sequence[tuple[float, float]]], normal: float | None
-) -> list[str]:
-    """What looks like a number in a wrong unit: the highest resonance, and the pressure of contacts under the largest
-    normal force (N)."""
-    read = built.assembly.outputs[0]
-    mesh, found = built.bodies[read.component].basis.mesh, []
-    top = max((a for peaks in resonances.values() for _, a in peaks), default=0.0)
-    unit = measured(built.assembly).unit
-    if unit == "m" and mesh.n_cells:
-        extent = float(np.ptp(mesh.points, axis=0).max())
-        found.append(plausible.amplitude(f"The highest resonance of '{read.monitor}'", top, extent))
-    if unit == "1":
-        found.append(plausible.strain(f"Gauge '{read.monitor}'", top))
-    for c in built.contacts:
-        found += moduli_doubted(f"{c.interface}.", c)
-        found += [plausible.modulus(f"{c.interface}.young", c.young)] if c.young is not None else []
-        body, face = built.settings.ends(c)[0]
-        b, force = built.bodies[body], normal if swept(c) else c.normal_force
-        area = float(b.group.interfaces[face].areas.sum())
-        if force and area > 0 and not c.is_curved:
-            found.append(plausible.stress(f"{c.interface}", force / area, plausible.modulus_of(b.basis)))
-    return [text for text in found if text]
 
 
 def of_stuck_modes(built: Built, normal: float | None) -> list[str]:
