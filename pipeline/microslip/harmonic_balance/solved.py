@@ -106,8 +106,14 @@ class Motions(Series):
 
     def error_estimate(self, i: int | None = None) -> accuracy.Error:
         """What more harmonics and samples would change of a point, the largest one if none is named: ``readout`` is the
-        share of its amplitude."""
+        share of its amplitude.
+
+        Raises:
+            UserError: a point that was not found, or none that was.
+        """
         i = int(np.argmax(np.where(self.converged, self.amplitude, 0.0))) if i is None else i
+        if not self.converged[i]:
+            raise UserError(f"error_estimate: point {i} was not found ({self.status[i]}); take one that was")
         value, point = float(self.parameter[i]), self.points[i]
         return accuracy.error(self.problem(value), point.x, point.Omega)
 
