@@ -57,6 +57,9 @@ FURTHER = 64
 PENETRATES = 1e-6
 """Share of an interference by which a contact may be pressed deeper than it is under the steady loads."""
 
+BEHIND = 1e-12
+"""m by which a point may begin behind what is rigid: rounding."""
+
 UNSOLVED = 1e-6
 """Share of the largest motion of the contacts that an implicit step may miss before a reader is told."""
 
@@ -638,8 +641,15 @@ def begun(e: Equations, start: Start) -> tuple[Array, Array]:
     """(m,) modal displacements and velocities to start from.
 
     Raises:
-        NotConverged: Newton's method finds no rest under the steady loads. UserError: no such start.
+        NotConverged: Newton's method finds no rest under the steady loads. UserError: no such start, or one behind a
+            rigid stop.
     """
+    q, v = _begun(e, start)
+    refuse_behind(e, q)
+    return q, v
+
+
+def _begun(e: Equations, start: Start) -> tuple[Array, Array]:
     if isinstance(start, Released):
         return start.q, start.v
     zero, tight = np.zeros(len(e.omega2)), [c.offset[0] > 0 and not c.preload.any() for c in e.contacts]
@@ -660,6 +670,27 @@ def _closed(contact: Contact) -> bool:
         return False
     overlap = contact.patch.law.overlap(jax.device_put(contact.patch.kinematics @ contact.offset))
     return bool((np.asarray(overlap) > 0).any())
+
+
+def refuse_behind(e: Equations, q: Array) -> None:
+    """Raise `UserError` where bodies of modes alone begin at q (m,) behind what is rigid: nothing would bring them out.
+    Waves of the ground are left out."""
+    for c, u in zip(e.contacts, _places(e, e.D @ q + e.D_o @ e.oscillators(0.0)), strict=True):
+        law = c.patch.law
+        if e.R.any() or not isinstance(law, SetValued) or law.normal is not None or (c.ground and c.ground.waves):
+            continue
+        deep = float(np.max(u[:, 0] - np.asarray(law.gap), initial=0.0))
+        if deep > BEHIND:
+            raise UserError(
+                f"start: begins {deep:.4g} m behind {c.name}, which is rigid; let the bodies go where its gap is open, "
+                "or correct the gap"
+            )
+
+
+def _places(e: Equations, d: Array) -> list[Array]:
+    """(n, 3) m of the points of each contact, of its coordinates (c,)."""
+    parts = np.split(d, np.cumsum([c.patch.count for c in e.contacts])[:-1])
+    return [c.patch.kinematics @ (x + c.offset) for c, x in zip(e.contacts, parts, strict=False)]
 
 
 def _refuse_penetration(e: Equations, q: Array) -> None:
