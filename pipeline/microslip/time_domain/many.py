@@ -77,13 +77,16 @@ class Reached:
     @cached_property
     def points(self) -> Array:
         """(n, 2 m, keep) displacements times their frequencies, and velocities, m kg^1/2 / s."""
-        z = np.concatenate([self.q * np.sqrt(np.abs(self.equations.omega2)), self.v], axis=2)
+        e = self.equations
+        z = np.concatenate([self.q * classification.pace(e.omega2, e.Omega), self.v], axis=2)
         return z.transpose(0, 2, 1)
 
     @cached_property
     def size(self) -> float:
-        """The largest of them that is finite."""
-        return float(np.abs(self.points[np.isfinite(self.points)]).max(initial=0.0))
+        """The largest of them that is finite, but for places of bodies that nothing holds."""
+        held = classification.held(self.equations.omega2, self.equations.Omega)
+        z = np.abs(self.points[:, np.append(held, np.ones_like(held))])
+        return float(z[np.isfinite(z)].max(initial=0.0))
 
     @cached_property
     def repeats(self) -> Array:

@@ -72,6 +72,9 @@ APART = 1e-4
 FOLLOWED = 0.1
 """Share of the largest read-out: with a larger error a motion is not that of its start."""
 
+STILL = 1e-6
+"""Share of the displacements, times their frequencies, below which a swing is none."""
+
 REPEATS = 1e-3
 """Share of the size of a motion within which it counts as having come back."""
 
@@ -189,9 +192,15 @@ class Orbit:
 
     @cached_property
     def stroboscopic(self) -> tuple[Array, float]:
-        """(2 m, periods) modal coordinates, times their frequency, and velocities after every period; the largest of
-        them at any time, m kg^1/2 / s."""
-        return stroboscopic(self.strips("modal_displacement", "modal_velocity"), self.omega2, self.samples)
+        """(2 m, periods) modal coordinates, times their frequency, and velocities after every period; by how much the
+        largest of them swings, m kg^1/2 / s."""
+        strips = self.strips("modal_displacement", "modal_velocity")
+        return stroboscopic(strips, self.omega2, self.Omega, self.samples)
+
+    @cached_property
+    def else_repeats(self) -> int:
+        """`repeats` of all but the places of bodies that nothing holds."""
+        return else_comes_back(*self.stroboscopic, self.omega2, self.Omega)
 
     def times(self, kind: str, contact: int | None = None) -> Array:
         """Times (s) of the events of a kind ("closes", "opens", "slips", "sticks") in the periods that are kept."""
@@ -383,15 +392,28 @@ class Ended:
     exponent: Exponent | None = None
 
 
-def stroboscopic(strips: Iterable[list[Array]], omega2: Array, samples: int) -> tuple[Array, float]:
-    """See `Orbit.stroboscopic`, of strips of modal displacements and velocities."""
-    size, after, begin = 0.0, [np.zeros((2 * len(omega2), 0))], 0
+def stroboscopic(
+    strips: Iterable[list[Array]], omega2: Array, Omega: float, samples: int
+) -> tuple[Array, float]:  # fmt: skip
+    """See `Orbit.stroboscopic`, of strips of modal displacements and velocities. A body that nothing holds swings by
+    its velocity, or it would seem to come back the further it is; and nothing swings by less than `STILL`."""
+    rows = 2 * len(omega2)
+    after, begin, most, fast = [np.zeros((rows, 0))], 0, 0.0, 0.0
+    low, high = np.full(rows, math.inf), np.full(rows, -math.inf)
     for q, q_dot in strips:
-        z = np.concatenate([np.sqrt(np.abs(omega2))[:, None] * q, q_dot])
-        size = max(size, float(np.abs(z).max(initial=0.0)))
+        z = np.concatenate([classification.pace(omega2, Omega)[:, None] * q, q_dot])
+        low, high = (np.minimum(low, z.min(axis=1, initial=math.inf)), np.maximum(high, z.max(axis=1, initial=-math.inf)))
+        most, fast = (max(a, float(np.abs(x).max(initial=0.0))) for a, x in ((most, z), (fast, q_dot)))
         after.append(z[:, (-1 - begin) % samples :: samples])
         begin += z.shape[1]
-    return np.concatenate(after, axis=1), size
+    swings = 0.5 * (high - low)[: len(omega2)][classification.held(omega2, Omega)]
+    return np.concatenate(after, axis=1), max(float(swings.max(initial=0.0)), fast, STILL * most)
+
+
+def else_comes_back(after: Array, size: float, omega2: Array, Omega: float) -> int:
+    """See `Orbit.else_repeats`."""
+    held = classification.held(omega2, Omega)
+    return comes_back(after[np.append(held, np.ones_like(held))], size)
 
 
 def comes_back(after: Array, size: float) -> int:
@@ -491,9 +513,10 @@ def _exponent(stepper: Stepper, now: Now, kept: Kept, samples: int, each: int, d
     """The largest Lyapunov exponent of a motion that has not come back in what was kept; of so many periods at most as
     were done."""
     periods = classification.periods_of(done)
-    after, size = stroboscopic(kept.strips("modal_displacement", "modal_velocity"), stepper.equations.omega2, samples)
+    e, strips = stepper.equations, kept.strips("modal_displacement", "modal_velocity")
+    after, size = stroboscopic(strips, e.omega2, e.Omega, samples)
     few = not periods or after.shape[1] < classification.FEWEST
-    if few or stepper.equations.ramp or comes_back(after, size):
+    if few or e.ramp or else_comes_back(after, size, e.omega2, e.Omega):
         return None
     return classification.exponent(stepper, now, samples, each, periods)
 
