@@ -13,6 +13,7 @@ from microslip.contact.friction import Coulomb, StaticSliding
 from microslip.contact.law import value
 from microslip.contact.normal import Penalty, Preload
 from microslip.contact.point import PointContact
+from microslip.contact.portion import portion
 from microslip.contact.set_valued import SetValued
 from microslip.errors import UserError
 from microslip.system.ground import Ground
@@ -187,6 +188,19 @@ def test_a_block_on_a_belt_sticks_at_its_velocity_and_slips_as_an_oscillator() -
         assert found.drift < 1e-12 and found.balance < 1e-10
         assert found.energy["mechanical"][-1] == pytest.approx(moved[-1] - found.energy["lost"][-1], rel=1e-9)
     assert errors[1] < 0.5 * errors[0] < 0.05
+
+
+def test_sliding_that_saws_is_told() -> None:
+    """A point without mass that slips to less than it stuck by sticks again at once: over a belt its friction hangs on
+    the step, which is said; not of what is set-valued, nor where both values are one."""
+    for static, told in ((0.3, 1), (0.2, 0)):
+        law = PointContact(Preload(value(1.0)), StaticSliding(value(static), value(0.2)), value(100.0))
+        shoe = ms.Element(portion(law, value(1.0)), 0, name="shoe", velocity=0.5)
+        belt = ms.structure(1.0, 1.0, 0.2, output=0, elements=[shoe])
+        found = ms.integrate(belt, 0.2, unit="rad/s", settle=0, keep=1, samples=64)
+        assert sum("point without mass" in said and "shoe" in said for said in found.messages) == told
+    belt = ms.structure(1.0, 1.0, output=0, elements=[ms.friction(0.2, static=0.3, velocity=0.5)])
+    assert not ms.integrate(belt, 0.2, unit="rad/s", settle=0, keep=1, samples=64).messages
 
 
 def rubbing_block(law: object, ground: Ground | None, force: float = 0.0) -> equations.Equations:

@@ -14,6 +14,10 @@ import jax
 import numpy as np
 import scipy.linalg
 
+from ..contact.friction import StaticSliding
+from ..contact.law import Law
+from ..contact.point import PointContact
+from ..contact.portion import Portion
 from ..contact.set_valued import SetValued
 from ..data import Array
 from ..errors import NotConverged, UserError
@@ -546,11 +550,24 @@ def _warnings(equations: Equations, kept: Kept, worst: float) -> tuple[str, ...]
             f"{equations.Omega / (2 * np.pi):.6g} Hz stand for them, and take h times as much in the h-th harmonic, "
             "where a harmonic balance does not; with modal damping both mean the same."
         )
+    if names := [c.name for c in equations.contacts if _saws(c.patch.law)]:
+        said.append(
+            f"Static friction above the sliding one ({', '.join(names)}): a point without mass sticks again as soon as "
+            "it has slipped, so sliding friction saws between both values, with teeth that hang on the step; "
+            'write law = "set-valued" or "rate", or friction that falls with the speed.'
+        )
     if worst > UNSOLVED * kept.widest:
         said.append(f"Contacts were not solved for in every step, to {worst:.2g} m at worst; take more steps.")
     if kept.missed:
         said.append(f"{counted(kept.missed, 'event')} more than are listed, and counted, happened.")
     return tuple(said)
+
+
+def _saws(law: Law) -> bool:
+    """Whether its points slip at once, and to less than they stuck by."""
+    law = law.whole if isinstance(law, Portion) else law
+    friction = law.friction if isinstance(law, PointContact) else None
+    return isinstance(friction, StaticSliding) and bool(np.any(np.asarray(friction.static) > friction.sliding))
 
 
 @dataclass(frozen=True)
