@@ -28,10 +28,10 @@ SYSTEM = ["x", 3.0, None, [], NAN]
 FUNCTION = ["x", 3.0, None]
 MATRIX = ["x", NAN, INF, [], {}, None, RAGGED, [["a"]], np.zeros((2, 3)), np.zeros((1, 1, 1)), 1e200]
 FREQUENCIES = ["x", NAN, INF, [], None, {}, -1.0, 0.0, [[0.1, 0.2]], ["a"], [0.1, NAN], object(), 1e200, 1j]
-PLACE = ["x", NAN, INF, {}]
+PLACE = ["x", NAN, INF, {}, 1.5, -1]
 FILE = [3.0, None, [], NAN]
 FORCE = ["x", NAN, {0: NAN}, {0: "a"}, {"a": 1.0}, {0: None}, {0: INF}, [], [1.0, 2.0], {1.5: 1.0}, {0: [1.0]},
-         {NAN: 1.0}, {0: 1e200}]  # fmt: skip
+         {NAN: 1.0}, {0: 1e200}, {-1: 1.0}]  # fmt: skip
 
 
 def without_none(kind):
@@ -113,7 +113,7 @@ CALLS = [
     (ms.structure, {"M": 1.0, "K": 1.0, "C": 0.1, "force": {0: 0.3}}, {
         "M": MATRIX, "K": MATRIX, "force": FORCE, "steady": FORCE, "second_force": FORCE, "name": TEXT,
         "elements": ["x", 3.0, [1.0], {}, ["x"], NAN],
-        "output": ["x", NAN, 1.5, [NAN], ["x"], [None], [[0]], 5, {}, -7, INF],
+        "output": ["x", NAN, 1.5, -1, [NAN], ["x"], [None], [[0]], 5, {}, -7, INF],
         "damping_ratio": ["x", NAN, INF, -0.1, 1.0, {}, [[0.1]], [], None, ["a"], [0.1, 0.2]],
     } | optional(C=MATRIX)),
     (ms.polynomial, {"stiffness": {3: 1.0}}, {
@@ -154,6 +154,8 @@ CALLS = [
         "system": SYSTEM, "frequency": POSITIVE, "second": without_none(POSITIVE), "unit": WORD, "settle": WHOLE,
         "keep": COUNT, "samples": COUNT, "steps": without_none(COUNT), "method": WORD, "tolerance": POSITIVE,
         "file": [*without_none(FILE), ""], "report": FUNCTION,
+        "start": ["x", 3, None, [], {"a": 1}, {"displacement": {-1: 1.0}}, {"velocity": {0.5: 1.0}}, {"mode": 1},
+                  {"mode": 0, "amplitude": 1.0}, {"mode": 1, "amplitude": "x"}, {"displacement": [1.0, 2.0]}],
     }),
     (ms.integrate_many, {"system": SLIDER, "frequency": 0.24, "displacements": [[0.1]], "velocities": [[0.0]]}, {
         "system": SYSTEM, "frequency": POSITIVE, "unit": WORD, "settle": WHOLE, "keep": COUNT,
@@ -166,10 +168,10 @@ CALLS = [
         "file": [*without_none(FILE), ""], "report": FUNCTION,
     }),
     (ms.bifurcate, {"system": BRUSSELATOR, "start": 1.5, "stop": 1.6, "orbits": False}, {
-        "system": SYSTEM, "start": NUMBER, "stop": [*NUMBER, 1.5], "x": ["x", NAN, [1.0], [NAN, 1.0], [[1.0, 1.0]], {}],
+        "system": [*SYSTEM, lambda p: None, lambda p: "x"], "start": NUMBER, "stop": [*NUMBER, 1.5], "x": ["x", NAN, [1.0], [NAN, 1.0], [[1.0, 1.0]], {}],
         "frequency": without_none(POSITIVE), "unit": WORD, "orbits": TRUTH, "doublings": WHOLE, "starts": COUNT,
         "attractors": ["x", NAN, None, [NAN], ["a"]], "deflate": ["x", NAN, None, [NAN], ["a"]], "nodes": COUNT,
-        "step": POSITIVE, "points": COUNT, "report": FUNCTION,
+        "step": [*POSITIVE, 5], "points": COUNT, "report": FUNCTION,
     }),
     (ms.stability, {"body": FLUTTER}, {
         "body": [3.0, None, NAN, [], (1.0,), ([[1]], [[1]], [["a"]]), ([[NAN]], [[0.0]], [[1.0]]),
@@ -190,6 +192,7 @@ CALLS = [
         "rare": WHOLE, "seed": WHOLE, "stuck": TRUTH, "harmonics": COUNT, "points": without_none(COUNT),
         "workers": COUNT, "report": FUNCTION,
     }),
+    (ms.prepare, {}, dict.fromkeys(("double", "compiler", "cache"), TRUTH)),
     (ms.assemble, {"case": {"body": "vane"}}, {
         "case": FILE, "folder": FILE, "normal_force": without_none(NOT_NEGATIVE), "report": FUNCTION,
     }),
@@ -208,6 +211,18 @@ def test_nonsense_is_refused_by_its_name(function, good, key):
         with pytest.raises(UserError) as caught:
             function(**{**good, key: value})
         assert re.search(rf"\b{key}\b", str(caught.value)), (value, str(caught.value))
+
+
+def test_what_may_be_of_several_kinds_says_of_which() -> None:
+    """No word of TOML, and not one of the kinds alone."""
+    for call, said in (
+        (lambda: ms.integrate(SLIDER, 0.24, start="x"), "start: is 'x'; give 'static', 'rest', 'balance' or a dict"),
+        (lambda: ms.integrate(SLIDER, 0.24, file=""), "file: must not be empty"),
+        (lambda: ms.modes(5), "body: is 5; give a path, text or a dict"),
+        (lambda: ms.follow(SLIDER, 0.1, 0.2, settings=3), "settings: is 3; give Settings or a dict"),
+    ):
+        with pytest.raises(UserError, match=re.escape(said)):
+            call()
 
 
 @pytest.mark.parametrize(

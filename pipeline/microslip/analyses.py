@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
-from pydantic import BeforeValidator
+from pydantic import BeforeValidator, Field
 
 from .case.assemble import Built
 from .case.contacts import swept
@@ -495,7 +495,7 @@ def bifurcate(
     system: Dynamics | Callable[[float], Assembly | Built], start: Number, stop: Number, *, x: Vector | None = None,
     frequency: Positive | None = None, unit: Unit = "Hz", orbits: bool = True, doublings: Index = 1,
     attractors: Sequence[Number] = (), starts: Count = 64, deflate: Sequence[Number] = (), nodes: Count = 32,
-    step: Positive = 0.08, points: Count = 400, report: Report = lambda _: None,
+    step: Annotated[Positive, Field(le=1)] = 0.08, points: Count = 400, report: Report = lambda _: None,
 ) -> Diagram:  # fmt: skip
     """Equilibria over a parameter, their Hopf points, and the periodic orbits that are born there, stable or not.
 
@@ -539,8 +539,14 @@ def bifurcate(
         raise UserError(f"bifurcate: system: {system!r} is none; give Dynamics, or the assembly as a function of p")
     else:
         Omega = None if frequency is None else 2 * np.pi * frequency * HERTZ[unit]
-        made = mechanics.dynamics(lambda p: whole_of(system(p)), min(start, stop), max(start, stop), Omega)
-        begin = equilibrium(of(whole_of(system(start)))) if x is None else np.asarray(x, dtype=float)
+
+        def at(p: float) -> Assembly:
+            if not isinstance(found := system(p), Assembly | Built | Problem):
+                raise UserError(f"bifurcate: system: gives {found!r} at {p:g}; let it give an assembly")
+            return whole_of(found)
+
+        made = mechanics.dynamics(at, min(start, stop), max(start, stop), Omega)
+        begin = equilibrium(of(at(start))) if x is None else np.asarray(x, dtype=float)
     if len(begin) != made.count:
         raise UserError(f"bifurcate: x: has {len(begin)} numbers; the system has {made.count}")
     asked = diagram.Asked(

@@ -12,7 +12,7 @@ import numpy as np
 
 from ..data import Array, ComplexArray
 from ..files import hdf5, store
-from ..units import Quantity
+from ..units import Quantity, counted
 from .dynamics import Dynamics
 from .orbits import Found, extremes
 from .shooting import Orbit
@@ -60,6 +60,11 @@ class Branch:
 
     def __len__(self) -> int:
         return len(self.parameter)
+
+    def __repr__(self) -> str:
+        special = ", ".join(f"{len(self.of_kind(k))} {k}" for k in SPECIAL if len(self.of_kind(k)))
+        points = f"{counted(len(self), 'point')}{special and f' ({special})'}"
+        return f"<Branch {self.name}: {points}, {int(self.stable.sum())} stable; ended: {self.ended}>"
 
     @property
     def still(self) -> bool:

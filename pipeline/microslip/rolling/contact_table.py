@@ -108,6 +108,9 @@ class ContactTable(NamedTuple):
     checked: int
     jumping: float
 
+    def __repr__(self) -> str:
+        return f"<ContactTable: {self.sentence()}>"
+
     @arguments.checked
     def forces(
         self, lateral: Reals, yaw: Reals, speed: Positives, friction: NotNegatives, *, turning: Reals | None = None,

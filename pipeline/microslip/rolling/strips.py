@@ -92,6 +92,9 @@ class Tractions(NamedTuple):
     slip_y: Array
     power: Array
 
+    def __repr__(self) -> str:
+        return f"<Tractions over {' x '.join(map(str, self.pressure.shape))} elements>"
+
 
 @dataclass(frozen=True)
 class Grid:

@@ -78,6 +78,9 @@ class CreepTable:
     error: Array
     checked: int
 
+    def __repr__(self) -> str:
+        return f"<CreepTable: {self.sentence()}>"
+
     @property
     def axes(self) -> tuple[Array, ...]:
         return self.size, self.azimuth, self.polar, np.log(self.ratio), self.springs

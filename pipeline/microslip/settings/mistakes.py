@@ -257,7 +257,8 @@ def _most_telling(found: list[tuple[tuple[Any, ...], Any]], value: Any) -> tuple
     """Of the complaints about one key, the one that fits what was written."""
     if isinstance(value, list):  # an entry, or the length, rather than "is no number"
         return next((f for f in found if len(f[0]) > 0 and f[1]["type"] not in _SCALAR | {"tuple_type"}), found[-1])
-    return next((f for f in found if f[1]["type"] not in ("tuple_type", "list_type")), found[0])
+    kinds = "tuple_type", "list_type", "is_instance_of"
+    return next((f for f in found if f[1]["type"] not in kinds), found[0])
 
 
 def _words(found: list[tuple[tuple[Any, ...], Any]], error: Any, given: Any) -> str:
