@@ -6,8 +6,10 @@ from __future__ import annotations
 import math
 import re
 
+import jax.numpy as jnp
 import numpy as np
 import pytest
+import scipy.sparse as sp
 
 import microslip as ms
 from microslip.contact.friction import Coulomb
@@ -112,7 +114,7 @@ CALLS = [
      {"ring": SYSTEM, "frequency": ["x", NAN, None, []], "amplitude": ["x", NAN, None, [], [1.0]]}),
     (ms.structure, {"M": 1.0, "K": 1.0, "C": 0.1, "force": {0: 0.3}}, {
         "M": MATRIX, "K": MATRIX, "force": FORCE, "steady": FORCE, "second_force": FORCE, "name": TEXT,
-        "elements": ["x", 3.0, [1.0], {}, ["x"], NAN],
+        "elements": ["x", 3.0, [1.0], {}, ["x"], NAN, 2 * [ms.jenkins(1.0, 0.5, name="a")]],
         "output": ["x", NAN, 1.5, -1, [NAN], ["x"], [None], [[0]], 5, {}, -7, INF],
         "damping_ratio": ["x", NAN, INF, -0.1, 1.0, {}, [[0.1]], [], None, ["a"], [0.1, 0.2]],
     } | optional(C=MATRIX)),
@@ -132,19 +134,21 @@ CALLS = [
     (ms.Element, {"law": ms.jenkins(1.0, 1.0).law, "at": 0},
      {"law": SYSTEM, "at": PLACE, "to": PLACE, "along": WORD, "name": TEXT, "length": without_none(POSITIVE)}),
     (ms.Dynamics, {"rate": rate, "labels": ("x", "y"), "scale": np.ones(2)}, {
-        "rate": FUNCTION, "labels": [3, None, (), "x", (1, 2), NAN], "parameter_scale": POSITIVE,
+        "rate": FUNCTION, "labels": [3, None, (), "x", (1, 2), NAN, ("x", "x")], "parameter_scale": POSITIVE,
         "scale": [1.0, "x", NAN, None, [1.0], [1.0, NAN], [1.0, -1.0], [1.0, 0.0], [], {}],
-        "outputs": [3, NAN, (1,)], "units": [3, NAN, (1,)], "bends": ["x", 3.0, NAN, np.eye(3)],
+        "outputs": [3, NAN, (1,), ("a",)], "units": [3, NAN, (1,), ("m",)], "bends": ["x", 3.0, NAN, np.eye(3)],
     } | optional(frequency=FUNCTION, read=FUNCTION)),
     (ms.harmonic_response, {"system": SLIDER, "frequency": [0.1]},
      {"system": SYSTEM, "frequency": FREQUENCIES, "unit": WORD, **BALANCE}),
     (ms.two_tones, {"system": TWO, "first": 0.2, "second": 0.13}, {
         "system": SYSTEM, "first": FREQUENCIES, "second": FREQUENCIES, "free": TRUTH, "unit": WORD, **BALANCE,
-        "turns": without_none(COUNT), "start": ["x", 3.0], "kept": ["x", 3.0],
+        "samples": [*without_none(COUNT), 19],
+        "turns": [*without_none(COUNT), 19], "start": ["x", 3.0], "kept": ["x", 3.0],
     }),
     (ms.follow, {"system": SLIDER, "start": 0.1, "stop": 0.2}, {
         "system": SYSTEM, "start": POSITIVE, "stop": POSITIVE, "over": WORD, "unit": WORD, **BALANCE,
-        "frequency": without_none(POSITIVE), "settings": ["x", 3.0, [0], {3: 1}],
+        "frequency": [*without_none(POSITIVE), 0.15],
+        "settings": ["x", 3.0, [0], {3: 1}, {"low": 0.1}, {"high": 0.2}, {"direction": -1}],
     }),
     (ms.backbone, {"system": SLIDER, "low": 1e-3, "high": 1.0}, {
         "system": SYSTEM, "low": POSITIVE, "high": [*POSITIVE, 1e-4], "mode": [*WHOLE, 5], "output": [*WHOLE, 5],
@@ -163,23 +167,25 @@ CALLS = [
         "velocities": ["x", NAN, [], [[NAN]], [0.1], None, [[0.0], [0.0]], {}], "steps": without_none(COUNT),
     }),
     (ms.run_up, {"system": SLIDER, "start": 0.1, "stop": 0.2, "time": 20.0}, {
-        "system": SYSTEM, "start": POSITIVE, "stop": POSITIVE, "time": POSITIVE, "unit": WORD, "order": COUNT,
+        "system": SYSTEM, "start": POSITIVE, "stop": [*POSITIVE, 0.1], "time": POSITIVE, "unit": WORD, "order": COUNT,
         "euler": ["x", 3.0, None, (1,), NAN], "samples": COUNT, "steps": without_none(COUNT), "begin": WORD,
         "file": [*without_none(FILE), ""], "report": FUNCTION,
     }),
     (ms.bifurcate, {"system": BRUSSELATOR, "start": 1.5, "stop": 1.6, "orbits": False}, {
-        "system": [*SYSTEM, lambda p: None, lambda p: "x"], "start": NUMBER, "stop": [*NUMBER, 1.5], "x": ["x", NAN, [1.0], [NAN, 1.0], [[1.0, 1.0]], {}],
-        "frequency": without_none(POSITIVE), "unit": WORD, "orbits": TRUTH, "doublings": WHOLE, "starts": COUNT,
-        "attractors": ["x", NAN, None, [NAN], ["a"]], "deflate": ["x", NAN, None, [NAN], ["a"]], "nodes": COUNT,
+        "system": [*SYSTEM, lambda p: None, lambda p: "x"], "start": NUMBER, "stop": [*NUMBER, 1.5],
+        "x": ["x", NAN, [1.0], [NAN, 1.0], [[1.0, 1.0]], {}],
+        "frequency": [*without_none(POSITIVE), 3.0], "unit": WORD, "orbits": TRUTH, "doublings": WHOLE, "starts": COUNT,
+        "attractors": ["x", NAN, None, [NAN], ["a"], [5.0], [1.55]],
+        "deflate": ["x", NAN, None, [NAN], ["a"], [5.0], [1.55]], "nodes": COUNT,
         "step": [*POSITIVE, 5], "points": COUNT, "report": FUNCTION,
     }),
     (ms.stability, {"body": FLUTTER}, {
         "body": [3.0, None, NAN, [], (1.0,), ([[1]], [[1]], [["a"]]), ([[NAN]], [[0.0]], [[1.0]]),
-                 ([[1.0]], [[0.0]], [[1.0, 2.0]])],
+                 ([[1.0]], [[0.0]], [[1.0, 2.0]]), *(([[1.0]], [[0.0]], sp.csr_matrix([[K]])) for K in (1 + 0.5j, NAN))],
         "frequency": ["x", 3.0, (1.0,), (NAN, 1.0), ("a", 1.0), (2.0, 1.0), (1.0, 1.0), [], (-1.0, NAN)],
         "growth": ["x", 3.0, (1.0,), (NAN, 1.0), None, (1.0, -1.0)], "over": [3.0, NAN, ""],
         "values": ["x", 3.0, [NAN], [], [1.0, 2.0]], "at": ["x", 3.0, {"a": 1.0}, {"a": "x"}, NAN],
-        "accuracy": POSITIVE, "neutral": NOT_NEGATIVE, "certify": TRUTH, "speed": without_none(WHOLE),
+        "accuracy": POSITIVE, "neutral": NOT_NEGATIVE, "certify": TRUTH, "speed": [*without_none(WHOLE), 0],
         "report": FUNCTION,
     }),
     (ms.Scatter, {"of": "frequency", "deviation": 0.01}, {
@@ -222,6 +228,36 @@ def test_what_may_be_of_several_kinds_says_of_which() -> None:
         (lambda: ms.follow(SLIDER, 0.1, 0.2, settings=3), "settings: is 3; give Settings or a dict"),
     ):
         with pytest.raises(UserError, match=re.escape(said)):
+            call()
+
+
+@pytest.mark.parametrize("given", [1.0, [1.0, 2.0, 3.0], [1, 2], [1j, 2j]])
+def test_a_rate_or_a_read_out_of_another_shape_or_kind_is_refused(given) -> None:
+    for key in ("rate", "read"):
+        made = dynamics(**{key: lambda *_: jnp.asarray(given)})
+        with pytest.raises(UserError, match=f"Dynamics: {key}: gives"):
+            ms.bifurcate(made, 1.5, 1.6, orbits=False)
+
+
+def test_what_is_linear_has_no_bifurcation_and_no_normal_force() -> None:
+    plain, spring = (ms.structure(1.0, 1.0, 0.1, force={0: 1.0}, elements=e) for e in ([], [ms.polynomial({3: 1.0})]))
+    with pytest.raises(UserError, match="bifurcate: system: has no contact"):
+        ms.bifurcate(lambda p: plain, 0.5, 1.0, frequency=0.1)
+    with pytest.raises(UserError, match="over: no contact has a normal force"):
+        ms.follow(spring, 1.0, 2.0, over="normal_force", frequency=0.1)
+
+
+def test_numbers_of_what_a_result_does_not_have(tmp_path) -> None:
+    """A read-out, point, harmonic, contact, branch or kind that is not there is no zero, no empty list, no IndexError."""
+    found, orbit = ms.harmonic_response(SLIDER, [0.1]), ms.integrate(SLIDER, 0.1, settle=0, keep=1, samples=8)
+    two, diagram = ms.two_tones(TWO, 0.2, 0.13, harmonics=2), ms.bifurcate(BRUSSELATOR, 1.5, 1.6, orbits=False)
+    for call in (
+        lambda: found.motion(1), lambda: found.error_estimate(0.5), lambda: found.harmonics([0]),
+        lambda: found.plot(harmonic=9), lambda: orbit.plot(read_out=1), lambda: orbit.count("slips", 1),
+        lambda: two.of(1, 0, 1), lambda: two.plot(point=1), lambda: two.error_estimate(1), lambda: diagram["x"],
+        lambda: diagram.at("x"),
+    ):  # fmt: skip
+        with pytest.raises(UserError):
             call()
 
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from ..data import Array, ComplexArray, Indices
 from ..errors import UserError
+from ..settings.mistakes import numbered
 from ..units import Quantity, counted
 
 if TYPE_CHECKING:
@@ -157,7 +158,7 @@ class Series:
         places = self._places
         if isinstance(readout, int) and 0 <= readout < len(places):
             readout = list(places)[readout]
-        if readout not in places:
+        if not isinstance(readout, str) or readout not in places:
             raise UserError(f"read-out {readout!r}: the response has {', '.join(places) or 'none'}")
         return places[str(readout)]
 
@@ -301,7 +302,9 @@ class Series:
             import matplotlib.pyplot as plt
 
             axes = plt.subplots(layout="constrained")[1]
-        a = self.harmonics(readout)[:, harmonic]
+        a = self.harmonics(readout)
+        numbered("harmonic", harmonic, a.shape[1], "harmonic")
+        a = a[:, harmonic]
         size = np.where(self.converged, np.abs(a) if harmonic else a.real, np.nan)
         top = float(np.nanmax(np.abs(size), initial=0.0))
         quantity = Quantity(unit_of(self._place(readout)[0]))

@@ -15,6 +15,7 @@ from ..errors import UserError
 from ..files.hdf5 import IMAGINARY, put, sealed
 from ..files.hostile import DAMAGE, reading, refuse_damaged
 from ..files.store import ordinary
+from ..settings.mistakes import numbered
 from ..units import Quantity
 from .series import CONVERGED, of_solutions
 
@@ -96,6 +97,7 @@ class TwoTones:
         Raises:
             UserError: a pair that is not balanced.
         """
+        numbered("readout", readout, len(self.readouts), "read-out")
         for sign in (1, -1):
             found = np.flatnonzero((self.pairs == sign * np.array([k_1, k_2])).all(axis=1))
             if len(found):
@@ -185,6 +187,8 @@ class TwoTones:
             axes: of matplotlib, new ones if not given. readout: its number. point: its number; of a single point it
                 need not be given.
         """
+        numbered("readout", readout, len(self.readouts), "read-out")
+        numbered("point", point or 0, len(self), "point")
         if axes is None:
             import matplotlib.pyplot as plt
 

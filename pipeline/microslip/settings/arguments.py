@@ -77,7 +77,11 @@ def checked(function: Callable[P, R]) -> Callable[P, R]:
 
     @wraps(function)
     def call(*args: P.args, **kwargs: P.kwargs) -> R:
-        check(function, signature.bind(*args, **kwargs).arguments)
+        try:
+            given = signature.bind(*args, **kwargs)
+        except TypeError as error:
+            raise TypeError(f"{function.__name__}() {error}") from None
+        check(function, given.arguments)
         return function(*args, **kwargs)
 
     return call

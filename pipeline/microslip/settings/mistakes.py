@@ -100,6 +100,18 @@ def whole(what: str, value: Any, ge: int = 0) -> None:
     bounded(what, value, ge=ge)
 
 
+def numbered(what: str, value: Any, count: int, thing: str) -> None:
+    """Check the number of one of so many things, counted from 0, that is given in Python.
+
+    Raises:
+        UserError: no whole number, or one that is not there.
+    """
+    whole(what, value)
+    if value >= count:
+        has = f"there are {count}, counted from 0" if count else "there are none"
+        raise UserError(f"{what}: there is no {thing} {value}; {has}")
+
+
 def _sentences(errors: list[Any], raw: dict[str, Any], model: type[BaseModel]) -> Iterator[str]:
     """One sentence a key, though a setting that may be one thing or another is complained about twice."""
     by_key: dict[tuple[Any, ...], list[tuple[tuple[Any, ...], Any]]] = {}
@@ -302,7 +314,7 @@ def _shown(value: Any) -> str:
     elif isinstance(value, int) and abs(value) > 10**18:
         text = "a number beyond all bounds"
     else:
-        text = str(value)
+        text = " ".join(str(value).split())
     return text if len(text) <= 60 else text[:57] + "..."
 
 

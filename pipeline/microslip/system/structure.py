@@ -371,6 +371,8 @@ def _contacts(elements: Sequence[Element], component: str, K: Array, force: Arra
         key = kind, e.along, *((np.shape(x), np.asarray(x).tobytes()) for x in leaves)
         patch = patches.setdefault(key, Patch("element", np.zeros((1, 2)), np.ones(1), e.law, shape))
         own = e.name or f"{_kind(e)} {i}"
+        if own in [c.name for c in found]:
+            raise UserError(f"structure: elements: two have the name '{own}'; rename one")
         face, zero = ContactFace(component, own, rows={0: row[None]}), np.zeros(1)
         length = e.length or _length(e.law, row, K, force)
         ground = Ground(e.velocity, 0.5 * math.pi * (e.along == "t2")) if e.velocity else None

@@ -23,7 +23,7 @@ from ..data import Array
 from ..errors import NotConverged, UserError
 from ..files.hdf5 import put, sealed
 from ..interrupts import look
-from ..settings.mistakes import bounded
+from ..settings.mistakes import bounded, numbered
 from ..system.assembly import Contact
 from ..units import METRES, Quantity, counted
 from . import classification
@@ -210,6 +210,8 @@ class Orbit:
         """Times (s) of the events of a kind ("closes", "opens", "slips", "sticks") in the periods that are kept."""
         if kind not in KINDS:
             raise UserError(f"kind: '{kind}' is none of {', '.join(KINDS)}")
+        if contact is not None:
+            numbered("contact", contact, len(self.touching), "contact")
         own = self.events[:, 2] == KINDS.index(kind)
         return self.events[own if contact is None else own & (self.events[:, 1] == contact), 0]
 
@@ -353,6 +355,7 @@ class Orbit:
         Args:
             axes: of matplotlib, new ones with a legend if not given. read_out: its number.
         """
+        numbered("read_out", read_out, len(self.labels), "read-out")
         own = axes is None
         if axes is None:
             import matplotlib.pyplot as plt
@@ -406,7 +409,8 @@ def stroboscopic(
     low, high = np.full(rows, math.inf), np.full(rows, -math.inf)
     for q, q_dot in strips:
         z = np.concatenate([classification.pace(omega2, Omega)[:, None] * q, q_dot])
-        low, high = (np.minimum(low, z.min(axis=1, initial=math.inf)), np.maximum(high, z.max(axis=1, initial=-math.inf)))
+        low = np.minimum(low, z.min(axis=1, initial=math.inf))
+        high = np.maximum(high, z.max(axis=1, initial=-math.inf))
         most, fast = (max(a, float(np.abs(x).max(initial=0.0))) for a, x in ((most, z), (fast, q_dot)))
         after.append(z[:, (-1 - begin) % samples :: samples])
         begin += z.shape[1]
