@@ -248,7 +248,8 @@ def test_what_is_linear_has_no_bifurcation_and_no_normal_force() -> None:
 
 
 def test_numbers_of_what_a_result_does_not_have(tmp_path) -> None:
-    """A read-out, point, harmonic, contact, branch or kind that is not there is no zero, no empty list, no IndexError."""
+    """A read-out, point, harmonic, contact, branch or kind that is not there is no zero, no empty
+    list, no IndexError."""
     found, orbit = ms.harmonic_response(SLIDER, [0.1]), ms.integrate(SLIDER, 0.1, settle=0, keep=1, samples=8)
     two, diagram = ms.two_tones(TWO, 0.2, 0.13, harmonics=2), ms.bifurcate(BRUSSELATOR, 1.5, 1.6, orbits=False)
     for call in (

@@ -423,7 +423,8 @@ def chemical(x: Any, y: Any, p: Any) -> tuple[Any, Any]:
 @pytest.mark.parametrize("one", [lambda x, y, p: circling(jnp.stack([x, y]), p), chemical,
                                  lambda x, y, p: (y, -x + (p - x * x) * y)])  # fmt: skip
 def test_alike_parts_that_are_not_coupled_are_refused_as_what_they_are(one: Any) -> None:
-    """Whatever Newton's method makes of them: it is lost, finds one of both, or what follows is singular."""
+    """Whatever Newton's method makes of them: it is lost, finds one of both, or what follows is
+    singular."""
 
     def rate(z: Any, p: Any, _: Any) -> Any:
         return jnp.stack([*one(z[0], z[1], p), *one(z[2], z[3], p)])

@@ -223,8 +223,8 @@ def test_results_say_themselves_in_a_line():
 
 
 def test_elements_of_laws_that_print_alike_keep_their_own():
-    """Equal ones are evaluated together: those whose numbers are, not those that look so in eight digits or with the
-    middle of a long array left out."""
+    """Equal ones are evaluated together: those whose numbers are, not those that look so in eight
+    digits or with the middle of a long array left out."""
     springs = [Polynomial(np.array([k, 0.0, 0.1])) for k in (1.0, 1.0 + 3e-9, 1.0)]
     contacts = ms.structure(np.eye(3), np.eye(3), elements=[ms.Element(s, i) for i, s in enumerate(springs)]).contacts
     assert contacts[0].patch is contacts[2].patch

@@ -46,9 +46,9 @@ def test_a_ball_comes_to_rest_after_infinitely_many_impacts() -> None:
 
 @pytest.mark.parametrize("restitution", [0.0, 0.01, 0.5])
 def test_what_rests_at_a_rigid_stop_is_where_the_stop_is(restitution: float) -> None:
-    """An impact is found behind the stop, by less than the way of a step. Pressed by 1 N from there the mass stayed where
-    it was found, 9 % too far; it comes out so slowly that what leaves a wall has the speed that restitution leaves it,
-    in first order of the step."""
+    """An impact is found behind the stop, by less than the way of a step. Pressed by 1 N from
+    there the mass stayed where it was found, 9 % too far; it comes out so slowly that what leaves
+    a wall has the speed that restitution leaves it, in first order of the step."""
     errors = []
     for steps in (256, 1024):
         how = {"unit": "rad/s", "settle": 0, "samples": 64, "steps": steps}
@@ -169,7 +169,8 @@ def test_what_cannot_be_is_refused() -> None:
 
 
 def test_nothing_begins_behind_what_is_rigid() -> None:
-    """A stop with a negative gap, or bodies that are let go behind one: they stayed there, as if it were not."""
+    """A stop with a negative gap, or bodies that are let go behind one: they stayed there, as if
+    it were not."""
     for gap, start in ((-0.1, "rest"), (-0.1, "static"), (0.1, {"displacement": {0: 0.5}})):
         swing = ms.structure(1.0, 1.0, 0.1, force={0: 0.2}, elements=[ms.stop(math.inf, gap, restitution=0.5)])
         with pytest.raises(UserError, match="start: begins 0.[14] m behind stop 1"):
@@ -212,8 +213,9 @@ def test_a_block_on_a_belt_sticks_at_its_velocity_and_slips_as_an_oscillator() -
 
 
 def test_sliding_that_saws_is_told() -> None:
-    """A point without mass that slips to less than it stuck by sticks again at once: over a belt its friction hangs on
-    the step, which is said; not of what is set-valued, nor where both values are one."""
+    """A point without mass that slips to less than it stuck by sticks again at once: over a belt
+    its friction hangs on the step, which is said; not of what is set-valued, nor where both values
+    are one."""
     for static, told in ((0.3, 1), (0.2, 0)):
         law = PointContact(Preload(value(1.0)), StaticSliding(value(static), value(0.2)), value(100.0))
         shoe = ms.Element(portion(law, value(1.0)), 0, name="shoe", velocity=0.5)

@@ -221,7 +221,8 @@ def test_line() -> None:
 
 
 def test_a_point_that_was_not_found_tells_no_motion() -> None:
-    """Amplitudes, powers, motion and torus of it are nan, in xarray and in the file too; others keep theirs."""
+    """Amplitudes, powers, motion and torus of it are nan, in xarray and in the file too; others
+    keep theirs."""
     found = ms.two_tones(duffing(), [1.2, 1.3], 0.8, harmonics=2, unit="rad/s")
     lost = replace(found, status=("converged", "iteration limit"))
     for values in (lost.of(1, 0), lost.balance, lost.to_xarray()["lost"].values, lost.supplied[:, 0]):

@@ -64,7 +64,8 @@ class Dynamics:
         return len(self.labels)
 
     def check(self, x: Array, p: float) -> None:
-        """Raise `UserError` where f or what is read is not as long as it should be, or no real number."""
+        """Raise `UserError` where f or what is read is not as long as it should be, or no real
+        number."""
         prepare()  # or it would be traced in single precision
         zero = jnp.zeros(())
         f = jax.eval_shape(lambda x, p: jnp.asarray(self.rate(x, p, zero)), jnp.asarray(x), jnp.asarray(float(p)))

@@ -125,7 +125,8 @@ ALIKE = 1e-9
 
 
 def _refuse_alike(system: Dynamics, x: Array, p: float, omega: float, within: float) -> None:
-    """Raise `UserError` where several pairs have one frequency: each has a shape; two that meet have one."""
+    """Raise `UserError` where several pairs have one frequency: each has a shape; two that meet
+    have one."""
     size = np.asarray(system.scale)
     J = np.asarray(system.still(x, p)[1]) * size / size[:, None]
     if (scipy.linalg.svdvals(J - 1j * omega * np.eye(system.count)) < within * omega).sum() > 1:

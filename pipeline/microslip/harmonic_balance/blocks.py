@@ -184,8 +184,8 @@ def one_plus(pieces: dict[tuple[int, int], Array], sizes: list[int], coefficient
 
 
 def in_a_row(n: int, pairs: Iterable[tuple[int, int]]) -> list[int]:
-    """The n parts in an order in which each is paired with those beside it alone, the last one with the first perhaps:
-    chains one after the other, or one ring. Empty: there is none."""
+    """The n parts in an order in which each is paired with those beside it alone, the last one
+    with the first perhaps: chains one after the other, or one ring. Empty: there is none."""
     beside: list[set[int]] = [set() for _ in range(n)]
     for i, j in pairs:
         if i != j:
@@ -205,8 +205,8 @@ def in_a_row(n: int, pairs: Iterable[tuple[int, int]]) -> list[int]:
 
 
 def _order(sizes: list[int], coefficients: int, row: Iterable[int]) -> Array:
-    """Places in a vector ordered by harmonics, then parts, of one ordered by parts as they are in a row, then
-    harmonics."""
+    """Places in a vector ordered by harmonics, then parts, of one ordered by parts as they are in
+    a row, then harmonics."""
     total, begins = sum(sizes), np.cumsum([0, *sizes])
     return np.concatenate(
         [

@@ -63,7 +63,8 @@ def without_rounding(harmonics: ComplexArray) -> ComplexArray:
 
 
 def of_solutions(columns: Mapping[str, Array], converged: Array, known: Sequence[str] = ()) -> dict[str, Array]:
-    """Columns (f, ...) with nan where a point is no solution, but for those that are known there too."""
+    """Columns (f, ...) with nan where a point is no solution, but for those that are known there
+    too."""
     return {name: v if name in known else of_solution(v, converged) for name, v in columns.items()}
 
 
@@ -76,8 +77,9 @@ def of_solution(values: Array, converged: Array) -> Array:
 class Series:
     """The f points of one sweep or curve, in order.
 
-    Harmonics are complex 0-peak amplitudes with the time factor exp(+i Omega t), the mean first. What is told of a
-    motion is nan where a point is no solution; `arrays` alone keep what the search left there.
+    Harmonics are complex 0-peak amplitudes with the time factor exp(+i Omega t), the mean first.
+    What is told of a motion is nan where a point is no solution; `arrays` alone keep what the
+    search left there.
 
     Attributes:
         name: like ``normal_force = 100``. parameters: what sets it apart, in SI: name -> number. key: (f,) see

@@ -49,7 +49,8 @@ class TwoTones:
             0-peak, in the units of the read-outs. readouts: (w,) names. units: (w,) SI.
         supplied: (f, 2) W by the loads of either tone, in the mean. damped: (f,) W in the bodies. exchanged: (f,) W
             that goes into contacts, by their forces' harmonics; lost: (f,) W that the contacts count themselves, as
-            friction times the path slid, less what moving ground brings. All of them nan where a point was not found.
+            friction times the path slid, less what moving ground brings. All of them nan where a
+            point was not found.
         status: of every point. error: (f,) of the last step of Newton's method, over the size of the unknowns.
             messages: what a reader must know. over: what a sweep runs over.
     """

@@ -120,7 +120,8 @@ _KINDS = {Path: "a path", str: "text", Mapping: "a dict", NoneType: ""}
 
 
 def _told(of: tuple[Any, ...]) -> bool:
-    """Whether an argument of several kinds is one that words tell: a path or a dict, text, things made here."""
+    """Whether an argument of several kinds is one that words tell: a path or a dict, text, things
+    made here."""
     kinds = list(map(_kind, of))
     return bool({Path, Mapping} & set(kinds)) and all(isinstance(k, type) or k is Literal for k in kinds)
 

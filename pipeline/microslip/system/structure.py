@@ -37,7 +37,8 @@ ALONG = {"n": 0, "t1": 1, "t2": 2}
 
 
 def _numbered(at: Any) -> Any:
-    """Numbers of coordinates count from 0; what has more of them, or other ones, is refused where these are known."""
+    """Numbers of coordinates count from 0; what has more of them, or other ones, is refused where
+    these are known."""
     if not np.ndim(at) and not (float(at).is_integer() and at >= 0):
         raise ValueError(f"is {at}; give the number of a coordinate, counted from 0")
     return at

@@ -123,8 +123,8 @@ def sizes(e: Equations, blocks: int) -> Array:
 
 
 def pace(omega2: Array, Omega: float) -> Array:
-    """(m,) rad/s by which displacements of modes are weighed beside velocities: their own, or that of the excitation
-    where no spring holds them."""
+    """(m,) rad/s by which displacements of modes are weighed beside velocities: their own, or that
+    of the excitation where no spring holds them."""
     return np.sqrt(np.where(held(omega2, Omega), np.abs(omega2), Omega**2))
 
 
@@ -220,8 +220,8 @@ def second_frequency(orbit: Orbit) -> float:
 
 
 def kind(orbit: Orbit) -> str:
-    """``periodic``, ``quasi-periodic``, ``chaotic``; ``away``: it comes back but for bodies that nothing holds, which
-    go away; ``settling``: it comes back, but drifts, or
+    """``periodic``, ``quasi-periodic``, ``chaotic``; ``away``: it comes back but for bodies that
+    nothing holds, which go away; ``settling``: it comes back, but drifts, or
     the separation of neighbours shrinks, so that it goes to a motion that comes back; ``run-up``;
     ``open``: it is not known; ``diverged``; ``short``: less than two periods are kept."""
     if math.isfinite(orbit.diverged):

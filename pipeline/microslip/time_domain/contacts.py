@@ -293,7 +293,8 @@ def slid(w: Any, free: Any) -> Any:
 
 def _asked(groups: tuple[Group, ...], i: int, back: Any, free: Any, ahead: Any, dt: Any, held: Held) -> tuple:
     """Of the points of a group: w_0, `pressed` and `first` of `inclusion.solve`, and (n, 2) the slopes of the ground
-    under them that turn their way, and their force. back: see `Meets`; None of bodies that yield."""
+    under them that turn their way, and their force. back: see `Meets`; None of bodies that
+    yield."""
     g, law, before, first = groups[i], groups[i].over, held.places[i], held.forces[i]
     u, then = (_point(groups, i, d) for d in (free, ahead))
     come, goes, deep, slopes = u - before, then - u, u[:, 0], (jnp.zeros((len(u), 2)),) * 2

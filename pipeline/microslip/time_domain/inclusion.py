@@ -10,9 +10,9 @@ A. Curnier, Comput. Methods Appl. Mech. Eng. 92, 1991). Two kinds of bodies give
 - Bodies that yield at once by R (massless boundary; C. D. Monjaraz-Tec, J. Gross, M. Krack, Comput. Struct. 260, 2022):
   w_N is where the point is, w_T how far it came, A = R. An impact needs no law, and energy is kept.
 - Masses (R = 0): the forces of this step move the next one. w is that next motion of a point whose gap is closed, and
-  w_N more by e times the last one: restitution (after L. Paoli, M. Schatzman, SIAM J. Numer. Anal. 40, 2002). An
-  impact is found in the step after it, behind what is rigid; what rests there comes out within about a period, so
-  slowly that the speed of it falls with the step.
+  w_N more by e times the last one: restitution (after L. Paoli, M. Schatzman, SIAM J. Numer. Anal.
+  40, 2002). An impact is found in the step after it, behind what is rigid; what rests there comes
+  out within about a period, so slowly that the speed of it falls with the step.
 
 On ground that moves, w is the motion over it.
 """

@@ -118,7 +118,8 @@ def run(
         exponents: follow a neighbour of each motion too, see `classification.exponent`.
 
     Raises:
-        UserError: starts of other lengths than the assembly has coordinates, or behind what is rigid; see `orbit.run`.
+        UserError: starts of other lengths than the assembly has coordinates, or behind what is
+        rigid; see `orbit.run`.
     """
     x, x_dot = np.atleast_2d(x).astype(float), np.atleast_2d(x_dot).astype(float)
     if x.shape != x_dot.shape or x.shape[1] != len(e.shapes):

@@ -196,8 +196,8 @@ class Orbit:
 
     @cached_property
     def stroboscopic(self) -> tuple[Array, float]:
-        """(2 m, periods) modal coordinates, times their frequency, and velocities after every period; by how much the
-        largest of them swings, m kg^1/2 / s."""
+        """(2 m, periods) modal coordinates, times their frequency, and velocities after every
+        period; by how much the largest of them swings, m kg^1/2 / s."""
         strips = self.strips("modal_displacement", "modal_velocity")
         return stroboscopic(strips, self.omega2, self.Omega, self.samples)
 
@@ -402,8 +402,9 @@ class Ended:
 def stroboscopic(
     strips: Iterable[list[Array]], omega2: Array, Omega: float, samples: int
 ) -> tuple[Array, float]:  # fmt: skip
-    """See `Orbit.stroboscopic`, of strips of modal displacements and velocities. A body that nothing holds swings by
-    its velocity, or it would seem to come back the further it is; and nothing swings by less than `STILL`."""
+    """See `Orbit.stroboscopic`, of strips of modal displacements and velocities. A body that
+    nothing holds swings by its velocity, or it would seem to come back the further it is; and
+    nothing swings by less than `STILL`."""
     rows = 2 * len(omega2)
     after, begin, most, fast = [np.zeros((rows, 0))], 0, 0.0, 0.0
     low, high = np.full(rows, math.inf), np.full(rows, -math.inf)
@@ -685,8 +686,8 @@ def begun(e: Equations, start: Start) -> tuple[Array, Array]:
     """(m,) modal displacements and velocities to start from.
 
     Raises:
-        NotConverged: Newton's method finds no rest under the steady loads. UserError: no such start, or one behind a
-            rigid stop.
+        NotConverged: Newton's method finds no rest under the steady loads. UserError: no such
+            start, or one behind a rigid stop.
     """
     q, v = _begun(e, start)
     refuse_behind(e, q)
@@ -717,8 +718,8 @@ def _closed(contact: Contact) -> bool:
 
 
 def refuse_behind(e: Equations, q: Array) -> None:
-    """Raise `UserError` where bodies of modes alone begin at q (m,) behind what is rigid: nothing would bring them out.
-    Waves of the ground are left out."""
+    """Raise `UserError` where bodies of modes alone begin at q (m,) behind what is rigid: nothing
+    would bring them out. Waves of the ground are left out."""
     for c, u in zip(e.contacts, _places(e, e.D @ q + e.D_o @ e.oscillators(0.0)), strict=True):
         law = c.patch.law
         if e.R.any() or not isinstance(law, SetValued) or law.normal is not None or (c.ground and c.ground.waves):
