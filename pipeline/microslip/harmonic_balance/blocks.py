@@ -209,8 +209,5 @@ def _order(sizes: list[int], coefficients: int, row: Iterable[int]) -> Array:
     a row, then harmonics."""
     total, begins = sum(sizes), np.cumsum([0, *sizes])
     return np.concatenate(
-        [
-            (np.arange(coefficients)[:, None] * total + np.arange(begins[i], begins[i + 1])).ravel()
-            for i in row
-        ]
+        [(np.arange(coefficients)[:, None] * total + np.arange(begins[i], begins[i + 1])).ravel() for i in row]
     )

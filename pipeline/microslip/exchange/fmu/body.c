@@ -330,7 +330,8 @@ CALL fmi2DoStep(fmi2Component c, fmi2Real time, fmi2Real h, fmi2Boolean final)
     if (!(h >= 0) || h > 1e300 || !isfinite(time))
         return refuse((Body *)c, "fmi2DoStep: the step must be a positive time");
     if (!(parts_of(STATE, h) <= MOST))
-        return refuse((Body *)c, "fmi2DoStep: the step is longer than can be followed, some 1e5 periods of the fastest mode; shorten it");
+        return refuse((Body *)c, "fmi2DoStep: the step is longer than can be followed, "
+                                 "some 1e5 periods of the fastest mode; shorten it");
     advance(STATE, h);
     STATE->time = time + h;
     if (finite(STATE->x, 2 * MODES))
