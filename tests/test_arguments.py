@@ -62,14 +62,14 @@ def dynamics(**more):
 BRUSSELATOR = dynamics()
 STATE = {"xi": 1e-3, "eta": 0.0, "phi": 0.1, "a": 8e-3, "b": 4e-3, "normal_force": 8e4, "friction": 0.3, "shear": 8e10,
          "poisson": 0.28}  # fmt: skip
-POISSON = [*NOT_NEGATIVE, 0.7]
+POISSON, FRICTION = [*NOT_NEGATIVE, 0.7], [*NOT_NEGATIVE, 30.0]
 STATES = {"xi": NUMBER, "eta": NUMBER, "phi": NUMBER, "a": POSITIVE, "b": POSITIVE, "normal_force": POSITIVE,
-          "friction": NOT_NEGATIVE, "shear": POSITIVE, "poisson": POISSON}  # fmt: skip
+          "friction": FRICTION, "shear": POSITIVE, "poisson": POISSON}  # fmt: skip
 MODEL = {"elements": [20, "ab", None, (20.5, 20), (1, 4), (20,), (NAN, 4), [[4, 4]]], "distribution": WORD,
          "coefficients": WORD}  # fmt: skip
 ARC = ms.circle(0.3)
 TRACK = ms.Track(ms.circle(0.5), ARC, 0.46, 0.75, 0.75, Elastic(1e11, 8e10, 0.28))
-SHARED = {"pose": [3, None, "x"], "vertical": NOT_NEGATIVE, "friction": NOT_NEGATIVE, "track": SYSTEM}
+SHARED = {"pose": [3, None, "x"], "vertical": NOT_NEGATIVE, "friction": FRICTION, "track": SYSTEM}
 
 CALLS = [
     (ms.fastsim, STATE, {
@@ -91,7 +91,7 @@ CALLS = [
         "wheel": SYSTEM, "rail": SYSTEM, "radius": POSITIVE, "wheel_at": POSITIVE, "rail_at": POSITIVE,
         "elastic": [*SYSTEM, (1e11, 8e10, 0.28)],
     }),
-    (ms.Pose, {}, {"lateral": NUMBER, "yaw": NUMBER, "roll": NUMBER, "speed": POSITIVE,
+    (ms.Pose, {}, {"lateral": NUMBER, "yaw": [*NUMBER, 10.0], "roll": [*NUMBER, -2.0], "speed": POSITIVE,
                    "turning": without_none(NOT_NEGATIVE)}),
     (ms.patches, {"track": TRACK, "pose": ms.Pose(), "side": "right", "vertical": 1e5}, SHARED | {"side": WORD}),
     (ms.axle, {"track": TRACK, "pose": ms.Pose(), "vertical": 1e5}, SHARED | {"even": TRUTH}),

@@ -134,7 +134,7 @@ def _kind(annotation: Any) -> Any:
 
 def _one_of(of: tuple[Any, ...], value: Any) -> Any:
     """Refuse what is of none of some kinds."""
-    words = []
+    words: list[str] = []
     for one in of:
         kind, choices = _kind(one), get_args(one)
         fits = isinstance(value, str) and value in choices if kind is Literal else isinstance(value, kind)
