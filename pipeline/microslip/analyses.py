@@ -333,7 +333,7 @@ def backbone(
     problem = balanced(system, harmonics, samples)
     count = len(problem.assembly.outputs)
     if not count:
-        raise UserError(f"output: there is no read-out {output}; nothing is read: give output to structure")
+        raise UserError(f"output: there is no read-out {output}; nothing is read; give output to structure")
     numbered("output", output, count, "read-out")
     numbered("mode", mode, len(problem.parts[1][0].M), "mode")
     _bends(problem, "the eigenvalues of its matrices")
