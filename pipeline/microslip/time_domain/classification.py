@@ -18,7 +18,7 @@ import numpy as np
 import scipy.optimize
 import scipy.special
 
-from ..data import Array, Indices
+from ..data import Array
 from ..units import counted, percent
 from .stepper import Now, Stepper
 
@@ -128,9 +128,9 @@ def pace(omega2: Array, Omega: float) -> Array:
     return np.sqrt(np.where(held(omega2, Omega), np.abs(omega2), Omega**2))
 
 
-def held(omega2: Array, Omega: float) -> Indices:
+def held(omega2: Array, Omega: float) -> Array:
     """(m,) whether a spring holds a mode."""
-    return np.abs(omega2) > FREE * Omega**2
+    return np.asarray(np.abs(omega2) > FREE * Omega**2)
 
 
 def periods_of(done: int) -> int:
