@@ -363,7 +363,7 @@ def _force(force: Any, n: int, key: str = "force") -> Array:
 
 def _contacts(elements: Sequence[Element], component: str, K: Array, force: Array) -> tuple[Contact, ...]:
     patches: dict[tuple[Any, ...], Patch] = {}  # equal elements are evaluated together
-    found = []
+    found: list[Contact] = []
     for i, e in enumerate(elements, 1):
         row = e.row(len(K))
         shape = np.zeros((1, 3, 1))
