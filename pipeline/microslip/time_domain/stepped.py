@@ -61,7 +61,9 @@ class Settled:
         return abs(self.amplitude - amplitude) <= within * max(self.amplitude, amplitude)
 
 
-def settled(assembly: Assembly, frequency: float, most: int, begin: Settled | None = None) -> Settled:
+def settled(
+    assembly: Assembly, frequency: float, most: int, begin: Settled | None = None
+) -> Settled:
     """The motion at a frequency (Hz), looked at until it does not change any more or `most` periods are over.
 
     Args:
@@ -82,7 +84,9 @@ def settled(assembly: Assembly, frequency: float, most: int, begin: Settled | No
     turning = 2 * np.exp(-2j * np.pi * np.arange(1, KEPT * SAMPLES + 1) / SAMPLES)
     amplitude, spread = np.inf, np.inf
     for _ in range(LOOKS):
-        now = stepper.advanced(now, np.full(SAMPLES, each * SAMPLES), max(most // LOOKS - KEPT, 1))[0]
+        now = stepper.advanced(now, np.full(SAMPLES, each * SAMPLES), max(most // LOOKS - KEPT, 1))[
+            0
+        ]
         now, seen, events, *_ = stepper.advanced(now, np.full(KEPT * SAMPLES, each))
         y = kept_samples.read(e, seen)[0]
         if len(y) < len(turning) or not np.isfinite(seen.mechanical[-1]):
