@@ -135,7 +135,7 @@ def _sentence(name: str, one: Orbit) -> str:
     return f"{name}: {one.said}; {one.labels[0]} swings by {size} on either side{error}."
 
 
-KIND = {"open": "not back yet", "short": "too short to say"}
+KIND = {"open": "not back yet", "short": "too short to say", "away": "goes away"}
 """Of `classification.kind`, what needs other words in a table."""
 
 

@@ -16,7 +16,7 @@ from ..harmonic_balance import accuracy
 from ..harmonic_balance.problem import Problem
 from ..harmonic_balance.response import operating
 from ..harmonic_balance.solver import sweep
-from ..settings.mistakes import bounded
+from ..settings.mistakes import bounded, whole
 from ..units import counted, percent
 from .contacts import Group, Held, answer, untouched
 from .equations import Equations
@@ -117,7 +117,8 @@ def _coordinates(given: Any, count: int, key: str) -> Array:
     values = np.zeros(count)
     if isinstance(given, Mapping):
         for i in given:
-            bounded(f"{key}: a coordinate", i, ge=-count, le=count - 1)
+            whole(f"{key}: a coordinate", i)
+            bounded(f"{key}: a coordinate", i, le=count - 1)
         bounded(key, list(given.values()))
         values[[int(i) for i in given]] = list(given.values())
     elif given is not None:
