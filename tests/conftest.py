@@ -13,8 +13,6 @@ from pathlib import Path
 from typing import Any
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")  # before NumPy and MKL are loaded
-PROGRAMS = Path(__file__).resolve().parents[1] / "build/programs-of-tests"
-os.environ.setdefault("JAX_COMPILATION_CACHE_DIR", str(PROGRAMS))  # kept between runs, shared by workers
 
 import pytest
 from durations import Durations
@@ -24,6 +22,9 @@ settings.register_profile(
     "microslip", derandomize=True, deadline=None, suppress_health_check=[HealthCheck.too_slow], database=None
 )
 settings.load_profile("microslip")
+
+PROGRAMS = Path(__file__).resolve().parents[1] / "build/programs-of-tests"
+os.environ.setdefault("JAX_COMPILATION_CACHE_DIR", str(PROGRAMS))  # kept between runs, shared by workers
 
 if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:  # as in a shell's background job: children would inherit it
     signal.signal(signal.SIGINT, signal.default_int_handler)
