@@ -19,6 +19,7 @@ from microslip.basis import read_basis, write_basis
 from microslip.case import load_case
 from microslip.case.assemble import build
 from microslip.case.beyond import Beyond
+from microslip.case.messages import what_moves
 from microslip.cli import main
 from microslip.harmonic_balance import FrequencyResponse
 from microslip.harmonic_balance.response import operating
@@ -96,7 +97,7 @@ def test_what_is_said_of_two_motions() -> None:
         motion(430, 70),
     ]
     rest = [motion(390, 38), motion(400, 88, True), motion(410, 81, True)]
-    said = Beyond(100.0, (410.0, 420.0), up, down, rest).sentences()
+    said = what_moves(Beyond(100.0, (410.0, 420.0), up, down, rest))
     assert (
         "from 390 to 410 Hz" in said[0]
         and "120 µm at 390 Hz" in said[0]
@@ -118,10 +119,9 @@ def test_what_is_said_of_two_motions() -> None:
         and "30 µm at 380 Hz" in said[3]
     )
     assert "irregular" in said[4] and "400 Hz" in said[4] and len(said) == 5
-    (same,) = Beyond(100.0, (410.0, 420.0), up, up[::-1]).sentences()
-    assert "same motion" in same and Beyond(100.0, why="no form in time").sentences()[0].count(
-        "no form in time"
-    )
+    (same,) = what_moves(Beyond(100.0, (410.0, 420.0), up, up[::-1]))
+    assert "same motion" in same
+    assert "no form in time" in what_moves(Beyond(100.0, why="no form in time"))[0]
 
 
 def test_a_motion_from_rest_is_that_of_the_balance(case: Path) -> None:
@@ -144,9 +144,9 @@ def case(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def test_motions_that_take_too_long_are_told_in_part() -> None:
     """Where they ended, and no verdict on what was not seen."""
     down = [motion(430, 70, True), motion(420, 75, True)]
-    cut = "Motions in time ended after 120 s, upwards before 420 Hz: ..."
-    said = Beyond(100.0, down=down, cut=cut).sentences()
-    assert "in part" in said[0] and "75 µm at 420 Hz" in said[0] and said[1] == cut
+    said = what_moves(Beyond(100.0, down=down, cut=("upwards", 420.0), patience=120.0))
+    assert "in part" in said[0] and "75 µm at 420 Hz" in said[0]
+    assert "120 s, upwards before 420 Hz" in said[1] and "sweep.patience=240" in said[1]
     assert not any("same motion" in words for words in said)
 
 
