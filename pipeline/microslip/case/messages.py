@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from itertools import groupby
+from itertools import groupby, pairwise
 from types import MappingProxyType
 
 import numpy as np
@@ -389,18 +389,17 @@ def _from_rest(b: Beyond, two: Sequence[tuple[Settled, Settled]]) -> list[str]:
 def _left(b: Beyond, two: Sequence[tuple[Settled, Settled]]) -> list[str]:
     """Where each sweep leaves the motion on which it comes."""
     said = []
-    for way, motions, pair in (("up", b.up, two[-1]), ("down", b.down, two[0])):
-        at = next(i for i, m in enumerate(motions) if m.frequency == pair[0].frequency)
-        which = "lower" if motions[at] is pair[0] else "higher"
-        steps = range(at, len(motions) - 1)
-        at = next((i for i in steps if motions[i].jumps_to(motions[i + 1])), at)
-        last, *after = motions[at : at + 2]
+    for way, motions, other, pair in (("up", b.up, b.down, two[-1]), ("down", b.down, b.up, two[0])):
+        i = next(i for i, m in enumerate(motions) if m.frequency == pair[0].frequency)
+        which = "lower" if motions[i] is pair[0] else "higher"
+        alike = {m.frequency for m in other}  # beyond the last place where both differ
+        until = next((j for j in range(i + 1, len(motions)) if motions[j].frequency in alike), i)
+        steps = list(pairwise(motions[i : until + 1]))
+        last, after = max(steps, key=lambda s: s[0].distance(s[1]), default=(motions[-1], None))
         on = f"{last.frequency:.5g} Hz ({b.quantity.sized(last.amplitude, 3)})"
-        ends = [
-            f" and is at {b.quantity.sized(m.amplitude, 3)} at {m.frequency:.5g} Hz" for m in after
-        ]
-        on += ends[0] if ends else ", where it ends"
-        said.append(f"A slow sweep {way}wards stays on the {which} one {way} to {on}.")
+        at = after and f" and is at {b.quantity.sized(after.amplitude, 3)} at {after.frequency:.5g} Hz"
+        ends = at or ", where it ends"
+        said.append(f"A slow sweep {way}wards stays on the {which} one {way} to {on}{ends}.")
     return said
 
 

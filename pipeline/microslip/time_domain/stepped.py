@@ -33,7 +33,7 @@ SETTLED = 0.01
 the spread of its swings besides: that of an irregular motion is not known better by `KEPT` periods."""
 
 DYING = 0.8
-"""Times the spread of swings at the last look, below which what is left of the start still dies away."""
+"""Times what swings differed by at the last look, below which what is left of the start still dies away."""
 
 IRREGULAR = 0.15
 """Share of the largest swing by which that of a period may be less in a motion that counts as regular; small impacts
@@ -74,8 +74,12 @@ class Settled:
         """Whether another amplitude is its own, to a share of the larger one."""
         return abs(self.amplitude - amplitude) <= within * max(self.amplitude, amplitude)
 
+    def distance(self, other: Settled) -> float:
+        """Of amplitudes; infinite where one of them is no number."""
+        return float(np.nan_to_num(abs(self.amplitude - other.amplitude), nan=np.inf))
+
     def jumps_to(self, after: Settled) -> bool:
-        """Whether the motion is lost in a step: its amplitude is another one, and so are its swings."""
+        """Whether the motion is lost in a step: amplitude and swings are other ones."""
         apart = after.swing < self.least or self.swing < after.least
         return not after.like(self.amplitude, LOST) and (apart or not np.isfinite(after.swing))
 
@@ -104,7 +108,7 @@ def settled(
     stepper = Stepper(e, 2 * np.pi / e.Omega / (each * SAMPLES), accounts=False)
     now = _begun(stepper, begin, balance(e) if balance else None)
     turning = 2 * np.exp(-2j * np.pi * np.arange(1, KEPT * SAMPLES + 1) / SAMPLES)
-    known, spread = [*known, np.inf], np.inf
+    known, varies = [*known, np.inf], np.inf
     for _ in range(LOOKS):
         now = stepper.advanced(now, np.full(SAMPLES, each * SAMPLES), max(most // LOOKS - KEPT, 1))[
             0
@@ -115,10 +119,10 @@ def settled(
         if len(y) < len(turning) or not np.isfinite(seen.mechanical[-1]):
             return Settled(frequency, np.nan, np.nan, np.nan, True, end)
         spans = 0.5 * np.ptp(y.reshape(KEPT, SAMPLES), axis=1)
-        amplitude, before = float(abs(np.mean(turning * y))), spread
-        spread = float(np.ptp(spans) / max(spans.max(), 1e-300))
+        amplitude, before, varies = float(abs(np.mean(turning * y))), varies, float(np.ptp(spans))
+        spread = varies / max(spans.max(), 1e-300)
         within = (SETTLED + 0.25 * spread) * amplitude
-        steady = spread <= 2 * SETTLED or spread > DYING * before
+        steady = spread <= 2 * SETTLED or varies > DYING * before
         if steady and np.abs(np.array(known) - amplitude).min() <= within:
             break
         known[-1] = amplitude

@@ -6,6 +6,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from functools import partial
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -19,7 +20,7 @@ from ..harmonic_balance.solver import CONVERGED, Point
 from ..results import Journal
 from ..results.names import exact
 from . import starts
-from .stepped import LOST, Settled, settled
+from .stepped import Settled, settled
 
 FEWEST, MOST = 300, 800
 """Periods at most that a motion is left to itself at a frequency, with much and with little damping."""
@@ -175,28 +176,29 @@ class Sweeps:
         return motions, alike == ALIKE
 
     def _on(self, way: str, f: float, begin: Settled | None) -> list[Settled]:
-        """A step to a frequency (Hz). Where the motion is lost in it, the step is halved about the place: a sweep that
-        is slow enough stays longer."""
-        lost = [self._at(way, f, begin)]
-        if begin is None:
-            return lost
-        on = [begin]
-        while len(on) + len(lost) < 2 + HALVINGS and on[-1].jumps_to(lost[0]):
-            middle = 0.5 * (on[-1].frequency + lost[0].frequency)
-            if self._over(way, middle):
-                return [*on[1:], *lost]
-            m = self._at(way, middle, on[-1])
-            on, lost = (on, [m, *lost]) if on[-1].jumps_to(m) else ([*on, m], lost)
-        if len(on) > 1 and len(lost) == 1 and not self._over(way, f):
-            lost = [self._at(way, f, on[-1])]  # the whole step may have thrown it off
-        return [*on[1:], *lost]
+        """A step to a frequency (Hz). Where the motion is lost in it, the step is halved about the
+        place: a sweep that is slow enough stays longer."""
+        here = self._at(way, f, begin)
+        if begin is None or self._led(f, begin, here):
+            return [here]
+        steps = [begin, here]
+        for _ in range(HALVINGS):
+            i = int(np.argmax([a.distance(b) for a, b in pairwise(steps)]))
+            middle = 0.5 * (steps[i].frequency + steps[i + 1].frequency)
+            if not steps[i].jumps_to(steps[i + 1]) or self._over(way, middle):
+                break
+            steps.insert(i + 1, self._at(way, middle, steps[i]))
+        if len(steps) > 2 and steps[-2].jumps_to(here) and not self._over(way, f):
+            steps[-1] = self._at(way, f, steps[-2])  # the whole step may have thrown it off
+        return steps[1:]
 
     def _at(self, way: str, f: float, begin: Settled | None = None) -> Settled:
         """The motion at a frequency (Hz), as it was kept or integrated now."""
-        after = f"{begin.frequency!r} Hz, {begin.amplitude!r}" if begin else ""
-        series = f"in time {way}, F_N = {exact(self.normal)} N, {self.gap[0]!r} to {self.gap[1]!r}"
-        rows = self.journal.of(series) if self.journal else {}
-        row = rows.get(f, {})
+        low, high = self.gap
+        series = f"in time {way}, F_N = {exact(self.normal)} N, {low!r} to {high!r} Hz"
+        series += f", after {begin.frequency!r} Hz" if begin else ""
+        after = repr(begin.amplitude) if begin else ""
+        row = self.journal.of(series).get(f, {}) if self.journal else {}
         if row.get("after") != after:
             self.report(f"motion in time, {way}, F_N = {self.normal:g} N: {f:.6g} Hz")
             row = self._integrated(way, f, begin) | {"after": after}
@@ -229,17 +231,21 @@ class Sweeps:
         return numbers | end | {"leaves": len(end), "took": took}
 
     def _leading(self, f: float, begin: Settled | None) -> Point | None:
-        """The solution of the harmonic balance to begin on: at the first frequency (Hz), and while the motion is its,
-        on the same side of the gap."""
+        """The solution of the harmonic balance to begin on: at the first frequency (Hz), and while
+        the motion is its, on the same side of the gap."""
         if begin is None:
             return self.balanced.get(f, (None, 0.0))[0]
         low, high = self.gap
         same_side = max(f, begin.frequency) <= low or min(f, begin.frequency) >= high
         before = self.balanced.get(begin.frequency)
-        if not (same_side and before and begin.like(before[1], SAME)):
-            return None
-        point, amplitude = self._balanced(f)
-        return point if begin.like(amplitude, LOST) else None
+        leads = same_side and before is not None and begin.like(before[1], SAME)
+        return self._balanced(f)[0] if leads else None
+
+    def _led(self, f: float, begin: Settled, here: Settled) -> bool:
+        """Whether a motion stays the harmonic balance's in a step to a frequency (Hz), however far
+        its amplitude goes."""
+        leads = self._leading(f, begin) is not None
+        return leads and here.like(self._balanced(f)[1], SAME)
 
     def _balanced(self, f: float) -> tuple[Point | None, float]:
         """Solution and amplitude of the harmonic balance at a frequency (Hz); None and nan where it has none."""
