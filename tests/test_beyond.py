@@ -154,8 +154,8 @@ def test_motions_that_take_too_long_are_told_in_part() -> None:
 
 
 class Bistable:
-    """In place of integrations, 1 s each: below 121 Hz a motion of 1 µm, above 102 Hz one of 10 µm, each kept while it
-    is there."""
+    """In place of integrations, 1 s each: below 121 Hz a motion of 1 µm, above 102 Hz one of 10 µm,
+    each kept while it is there."""
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
         self.clock, self.ends, self.asked = 0.0, np.inf, list[float]()
@@ -177,7 +177,8 @@ class Bistable:
 
 
 def sweeps(case: Path, patience: float, journal: Journal | None = None) -> Motions:
-    """Of the bistable motion about a jump at 121 Hz; the balance knows the lower one below, the higher one above."""
+    """Of the bistable motion about a jump at 121 Hz; the balance knows the lower one below, the
+    higher one above."""
     f = np.arange(90.0, 141.0, 4.0)
     p = problem(case)
     found = SimpleNamespace(
@@ -195,7 +196,8 @@ def table(motions: Sequence[Settled]) -> list[tuple[float, float, bool]]:
 
 
 def test_sweeps_find_both_ends_of_a_motion(case: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Within an eighth of a step, from above and from below; from rest it is the lower one between."""
+    """Within an eighth of a step, from above and from below; from rest it is the lower one
+    between."""
     Bistable(monkeypatch)
     m = sweeps(case, 1e3)
     high = [s.frequency for s in m.down if s.opens]
@@ -211,8 +213,8 @@ def test_sweeps_find_both_ends_of_a_motion(case: Path, monkeypatch: pytest.Monke
 def test_motions_in_time_are_gone_on_with(
     case: Path, monkeypatch: pytest.MonkeyPatch, calls: int
 ) -> None:
-    """Interrupted, or cut for want of patience: with what was kept the answer is that of one run, nothing twice, and
-    the time counts that of both."""
+    """Interrupted, or cut for want of patience: with what was kept the answer is that of one run,
+    nothing twice, and the time counts that of both."""
     fake = Bistable(monkeypatch)
     whole, count = sweeps(case, 1e3), len(fake.asked)
     fake.asked, fake.ends = [], calls
@@ -233,8 +235,8 @@ def test_motions_in_time_are_gone_on_with(
 def test_patience_that_ends_is_told_and_more_of_it_goes_on(
     case: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """The sweep and its resonances stay, what was seen in time is in the table, the sentence says where it ended and
-    what to type; that goes on there, and leaves what was there."""
+    """The sweep and its resonances stay, what was seen in time is in the table, the sentence says
+    where it ended and what to type; that goes on there, and leaves what was there."""
 
     def run(patience: float) -> tuple[str, list[dict], dict]:
         assert main(["respond", "case.toml", "--set", f"sweep.patience={patience:g}"]) == 0

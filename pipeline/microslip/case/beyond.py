@@ -41,9 +41,9 @@ class Beyond:
 
     Attributes:
         normal: N. gap: Hz, Hz, where it is looked. up, down: swept upwards and downwards, in that order. rest: each
-            from rest. quantity: what is read. why: why there are none. cut, patience: the way and the frequency (Hz)
-            before which the CPU time (s) was over. curves: of periodic motions, with so many
-            samples of a cycle. stability: of each of them some points, by their place.
+            from rest. quantity: what is read. why: why there are none. cut, patience: the way and
+            the frequency (Hz) before which the CPU time (s) was over. curves: of periodic motions,
+            with so many samples of a cycle. stability: of each of them some points, by their place.
     """
 
     normal: float

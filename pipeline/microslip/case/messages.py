@@ -321,8 +321,8 @@ def _some(names: Sequence[str], unit: str, between: str = ", ", what: str = "") 
 
 
 def what_moves(b: Beyond) -> list[str]:
-    """Which motion is reached from rest, which other ones there are, how high, and how they are reached; what the curve
-    of periodic motions is and whether it is stable."""
+    """Which motion is reached from rest, which other ones there are, how high, and how they are
+    reached; what the curve of periodic motions is and whether it is stable."""
     return [*_in_time(b), *map(_of_curve, b.curves), *_stable(b)]
 
 

@@ -192,7 +192,8 @@ def with_motions(
     report: Callable[[str], None] = lambda _: None,
     keep: Keep | None = None,
 ) -> CaseResult:
-    """The same with motions in time where responses jump. keep: opens their journal, see `run_case`."""
+    """The same with motions in time where responses jump. keep: opens their journal, see
+    `run_case`."""
     patience, of, built = result.settings.sweep.patience, result.quantity, result.built
     if not (places := jumps(result)):
         return result

@@ -22,18 +22,21 @@ SAMPLES, KEPT = 32, 32
 """Of a period, and periods in which a motion is looked at."""
 
 OF_CONTACT = 12
-"""Steps in a period of the fastest motion with closed contacts, fewer than where a motion itself is asked for. With 8,
-16 and 40 amplitudes of a lap joint that opens and of a shrouded blade differ by 0.5 %, less than `SETTLED`."""
+"""Steps in a period of the fastest motion with closed contacts, fewer than where a motion itself is
+asked for. With 8, 16 and 40 amplitudes of a lap joint that opens and of a shrouded blade differ by
+0.5 %, less than `SETTLED`."""
 
 LOOKS = 8
 """Times at most that a motion is looked at."""
 
 SETTLED = 0.01
-"""Share by which the amplitude may differ from that of the last look when a motion counts as settled, and a quarter of
-the spread of its swings besides: that of an irregular motion is not known better by `KEPT` periods."""
+"""Share by which the amplitude may differ from that of the last look when a motion counts as
+settled, and a quarter of the spread of its swings besides: that of an irregular motion is not known
+better by `KEPT` periods."""
 
 DYING = 0.8
-"""Times what swings differed by at the last look, below which what is left of the start still dies away."""
+"""Times what swings differed by at the last look, below which what is left of the start still dies
+away."""
 
 IRREGULAR = 0.15
 """Share of the largest swing by which that of a period may be less in a motion that counts as regular; small impacts
@@ -41,8 +44,8 @@ among many points leave some hundredths."""
 
 
 BESIDE = 0.1
-"""Share of the way back to where the last motion ended, by which one that begins on a solution of a harmonic balance is
-put beside it: an unstable one is left."""
+"""Share of the way back to where the last motion ended, by which one that begins on a solution of a
+harmonic balance is put beside it: an unstable one is left."""
 
 LOST = 0.2
 """Share by which an amplitude changes in a step in which a motion is lost."""
@@ -55,7 +58,8 @@ class Settled:
     Attributes:
         frequency: Hz. amplitude: 0-peak of the first harmonic of the first read-out over `KEPT` periods, in its unit.
             swing: half of what it spans in the wildest of them, and least: in the calmest. opens: whether a contact
-            does. end: where it is after whole periods: (b, 2 p) as `Now.y`, then all that contacts hold.
+            does. end: where it is after whole periods: (b, 2 p) as `Now.y`, then all that contacts
+            hold.
     """
 
     frequency: float
@@ -95,9 +99,9 @@ def settled(
     """The motion at a frequency (Hz), looked at until it does not change any more or `most` periods are over.
 
     Args:
-        begin: where it begins; at rest under the steady loads if not given. balance: a periodic motion on which it
-            begins instead, but for `BESIDE`. known: amplitudes of motions at this frequency; one that has come to one
-            of them has settled.
+        begin: where it begins; at rest under the steady loads if not given. balance: a periodic
+            motion on which it begins instead, but for `BESIDE`. known: amplitudes of motions at
+            this frequency; one that has come to one of them has settled.
 
     Raises:
         UserError: what has no form in time, see `equations.of`. NotConverged: no rest is found.
@@ -131,7 +135,8 @@ def settled(
 
 
 def _begun(stepper: Stepper, begin: Settled | None, balance: starts.Periodic | None) -> Now:
-    """At rest, where a motion ended, or on a periodic one, a little on the way to where the other ended."""
+    """At rest, where a motion ended, or on a periodic one, a little on the way to where the other
+    ended."""
     if balance is not None:
         now = starts.begun(stepper, balance)
         if begin is None:

@@ -23,13 +23,15 @@ from . import starts
 from .stepped import Settled, settled
 
 FEWEST, MOST = 300, 800
-"""Periods at most that a motion is left to itself at a frequency, with much and with little damping."""
+"""Periods at most that a motion is left to itself at a frequency, with much and with little
+damping."""
 
 FORGOTTEN = 4.0
 """Natural logarithm by which a vibration of the bodies dies away in them."""
 
 LOWEST = 0.5
-"""Share of the first frequency of a sweep down to which a motion is followed that does not fall back in the band."""
+"""Share of the first frequency of a sweep down to which a motion is followed that does not fall
+back in the band."""
 
 DOWN, UP, REST = "downwards", "upwards", "from rest"
 
@@ -46,15 +48,17 @@ HALVINGS = 3
 """Times that a step in which a motion is lost is halved."""
 
 ALIKE = 2
-"""Frequencies one after the other at which a motion is that of the sweep when it counts as having come back to it."""
+"""Frequencies one after the other at which a motion is that of the sweep when it counts as having
+come back to it."""
 
 SAME = 0.05
-"""Share by which a motion may differ from the harmonic balance's that leads it on to the next frequency."""
+"""Share by which a motion may differ from the harmonic balance's that leads it on to the next
+frequency."""
 
 
 class Motions(NamedTuple):
-    """Swept upwards and downwards, in that order, and each from rest; the way and the frequency (Hz) before which the
-    time was over, None: it was enough."""
+    """Swept upwards and downwards, in that order, and each from rest; the way and the frequency
+    (Hz) before which the time was over, None: it was enough."""
 
     up: Sequence[Settled] = ()
     down: Sequence[Settled] = ()
@@ -77,7 +81,8 @@ def nearer(m: Settled, low: Settled, high: Settled) -> bool:
 
 
 def _periods(problem: Problem, gap: tuple[float, float]) -> int:
-    """How long motions are left to themselves, by the least damping of the modes about a gap, stuck and free."""
+    """How long motions are left to themselves, by the least damping of the modes about a gap, stuck
+    and free."""
     part = problem.assembly.joined(1)
     pairs = [(part, problem.assembly.stiffness), (untouched(part), np.zeros((0, 0)))]
     f, D = (np.concatenate([of(one, k) for one, k in pairs]) for of in (stuck, stuck_damping))
@@ -89,8 +94,8 @@ def _periods(problem: Problem, gap: tuple[float, float]) -> int:
 class Sweeps:
     """Sweeps in time about a gap (Hz, Hz) of a response under a normal force (N).
 
-    patience: s of CPU time in all, that of an earlier run counted, but not what compiles. journal: keeps each motion;
-    those of an earlier run are gone on with.
+    patience: s of CPU time in all, that of an earlier run counted, but not what compiles. journal:
+    keeps each motion; those of an earlier run are gone on with.
     """
 
     def __init__(
@@ -145,7 +150,8 @@ class Sweeps:
         return over
 
     def _from_rest(self, two: Sequence[tuple[Settled, Settled]]) -> list[Settled]:
-        """Motions from rest where there are two, at some frequencies, and between those that lead to different ones."""
+        """Motions from rest where there are two, at some frequencies, and between those that lead
+        to different ones."""
         last, found = len(two) - 1, dict[int, Settled]()
         wanted = sorted({round(i * last / 3) for i in range(4)}) if two else []
         while wanted:
@@ -162,8 +168,8 @@ class Sweeps:
     def _way(
         self, way: str, frequency: Sequence[float], end: float, sign: float, motions: list[Settled]
     ) -> tuple[list[Settled], bool]:
-        """A stepped sweep that goes on from motions, and whether it has come back to the harmonic balance's beyond an
-        end of the gap (Hz), where it ends."""
+        """A stepped sweep that goes on from motions, and whether it has come back to the harmonic
+        balance's beyond an end of the gap (Hz), where it ends."""
         alike = 0
         for f in frequency[:STEPS]:
             if self._over(way, f):
@@ -248,7 +254,8 @@ class Sweeps:
         return leads and here.like(self._balanced(f)[1], SAME)
 
     def _balanced(self, f: float) -> tuple[Point | None, float]:
-        """Solution and amplitude of the harmonic balance at a frequency (Hz); None and nan where it has none."""
+        """Solution and amplitude of the harmonic balance at a frequency (Hz); None and nan where it
+        has none."""
         if f not in self.balanced:
             point = between(self.problem, [p for p, _ in self.balanced.values()], f)
             if not point.converged:
