@@ -170,7 +170,7 @@ def _looked_at(problem: Problem, one: Followed, count: int, report: Report) -> d
     """Place -> stability of some of a curve's points that pass their checks; none where it cannot be told."""
     good, found = np.flatnonzero(one.converged), dict[int, Stability]()
     chosen = np.linspace(0, len(good) - 1, min(count, len(good))).round().astype(int)
-    began = time.monotonic()
+    began = time.process_time()
     for i in good[np.unique(chosen)].tolist():
         f = float(one.parameter[i])
         report(f"stability of the curve, {one.label}: {f:.6g} Hz")
@@ -179,8 +179,8 @@ def _looked_at(problem: Problem, one: Followed, count: int, report: Report) -> d
         except UserError:
             return {}
         found[i] = stability(motion, Multipliers(steps=128))
-        began = began if len(found) > 1 else time.monotonic()  # the first one compiles
-        if time.monotonic() - began > LONG:
+        began = began if len(found) > 1 else time.process_time()  # the first one compiles
+        if time.process_time() - began > LONG:
             break
     return found
 

@@ -112,11 +112,9 @@ def settled(
     stepper = Stepper(e, 2 * np.pi / e.Omega / (each * SAMPLES), accounts=False)
     now = _begun(stepper, begin, balance(e) if balance else None)
     turning = 2 * np.exp(-2j * np.pi * np.arange(1, KEPT * SAMPLES + 1) / SAMPLES)
-    known, varies = [*known, np.inf], np.inf
+    unseen, known, varies = max(most // LOOKS - KEPT, 1), [*known, np.inf], np.inf
     for _ in range(LOOKS):
-        now = stepper.advanced(now, np.full(SAMPLES, each * SAMPLES), max(most // LOOKS - KEPT, 1))[
-            0
-        ]
+        now = stepper.advanced(now, np.full(SAMPLES, each * SAMPLES), unseen)[0]
         now, seen, events, *_ = stepper.advanced(now, np.full(KEPT * SAMPLES, each))
         y = kept_samples.read(e, seen)[0]
         end = [np.asarray(x) for x in (now.y, *jax.tree_util.tree_leaves(now.held))]

@@ -114,10 +114,11 @@ class Sweeps:
         self.asked = found.frequency[found.asked]
         self.step = float(np.median(np.diff(self.asked)))
         self.periods = _periods(problem, gap)
-        solved = zip(found.frequency, found.x, found.monitor, found.converged, strict=True)
         self.balanced = {
-            float(f): (Point(2 * np.pi * f, x, CONVERGED, 0.0, 0), float(abs(y)))
-            for f, x, y, good in solved
+            float(f): (Point(2 * np.pi * f, x, CONVERGED, 0.0, 0), float(amplitude))
+            for f, x, amplitude, good in zip(
+                found.frequency, found.x, np.abs(found.monitor), found.converged, strict=True
+            )
             if good
         }
         self.seen = {f: [amplitude] for f, (_, amplitude) in self.balanced.items()}
@@ -229,9 +230,8 @@ class Sweeps:
         took = time.process_time() - began if self.compiled else 0.0
         self.compiled = True
         if took > LONG:
-            raise UserError(
-                f"a frequency takes {took:.0f} s, too long for a sweep ([orbit] asks for single ones)"
-            )
+            why = f"a frequency takes {took:.0f} s, too long for a sweep"
+            raise UserError(f"{why} ([orbit] asks for single ones)")
         end = {f"end/{i}": x for i, x in enumerate(m.end)}
         numbers = {name: getattr(m, name) for name in ("amplitude", "swing", "least", "opens")}
         return numbers | end | {"leaves": len(end), "took": took}
