@@ -22,8 +22,10 @@ from microslip.case import load_case
 from microslip.case.assemble import build
 from microslip.case.beyond import Beyond
 from microslip.case.messages import what_moves
+from microslip.case.problem import problem_of
 from microslip.cli import main
 from microslip.harmonic_balance import FrequencyResponse
+from microslip.harmonic_balance.families import followed, of_frequency
 from microslip.harmonic_balance.response import operating
 from microslip.harmonic_balance.solver import solve
 from microslip.harmonic_balance.sweeps import ends, gaps
@@ -229,6 +231,26 @@ def test_motions_in_time_are_gone_on_with(
     assert [table(way) for way in again[:3]] == [table(way) for way in whole[:3]]
     # a sweep upwards after one that was cut begins elsewhere
     assert count <= len(fake.asked) <= count + len(part.up)
+
+
+@pytest.mark.slow
+def test_a_curve_begins_on_the_solution_of_the_sweep(case: Path) -> None:
+    """Of the two motions at 118 Hz the one that is known, with as many harmonics or more; without it the lower one."""
+    pressed = build(load_case(case)[0], {"lifting": lifting()}, case)
+    p = problem_of(pressed, 10.0)
+    low = solve(p, 2 * np.pi * 118.0, [])
+    high = max((low.x * c for c in (3.0, 5.0)), key=lambda x: np.abs(solve(p, low.Omega, [x]).x).max())
+    high = solve(p, low.Omega, [high]).x
+    assert np.abs(high).max() > 2 * np.abs(low.x).max()
+    for harmonics in (1, 2):
+        q = problem_of(pressed, 10.0, harmonics=harmonics)
+        family = of_frequency(q, 118.0, 119.0)
+        begins = {}
+        for known in (None, high):
+            x = followed(replace(family, known=known), settings={"points": 2}).points[0].x
+            begins[known is None] = np.abs(x).max()
+        assert begins[True] == pytest.approx(np.abs(low.x).max(), rel=0.1)
+        assert begins[False] == pytest.approx(np.abs(high).max(), rel=0.1)
 
 
 @pytest.mark.slow

@@ -118,14 +118,23 @@ POINTS, LOOKED_AT = 120, 8
 
 
 def with_curve(
-    one: Beyond, settings: CaseSettings, bases: Bases, path: Path | str, keep: Keep, report: Report
+    one: Beyond,
+    found: HarmonicResponse,
+    settings: CaseSettings,
+    bases: Bases,
+    path: Path | str,
+    keep: Keep,
+    report: Report,
 ) -> Beyond:
-    """The same with the curve of periodic motions from either end of what was looked at, as fine as open contacts need,
-    and the stability of some of its points; without it where there are no motions in time to hold it against, or only
+    """The same with the curve of periodic motions from either end of what was looked at, begun on the
+    solutions of the sweep where it has some there, as fine as open contacts need, and the stability
+    of some of its points; without it where there are no motions in time to hold it against, or only
     one that is regular, which then say all there is."""
     if one.why or one.cut or not (one.two or one.irregular):
         return one
     low, high = one.band
+    good = found.converged
+    known = dict(zip(found.frequency[good].tolist(), found.x[good], strict=True))
     harmonics, samples = max(HARMONICS, settings.balanced), max(FINER, settings.sampled)
     while True:
         curve = CurveOfCase(band=(low, high), points=POINTS)
@@ -133,8 +142,8 @@ def with_curve(
         if settings.sweep.normal_forces is not None:
             asked["sweep"] = settings.sweep.model_copy(update={"normal_forces": (one.normal,)})
         finer = settings.model_copy(update=asked)
-        found = _both_ways(finer, bases, path, keep, report)
-        failed = 1 - float(np.mean(np.concatenate([f.converged for f in found]))) if found else 0.0
+        both = _both_ways(finer, bases, path, keep, report, known)
+        failed = 1 - float(np.mean(np.concatenate([f.converged for f in both]))) if both else 0.0
         if failed <= COARSE or 2 * samples > FINEST:
             break
         samples *= 2
@@ -143,12 +152,17 @@ def with_curve(
         )
     built = build(finer, bases, path)
     problem = problem_of(built, one.normal if settings.sweep.normal_forces is not None else None)
-    each = [_looked_at(problem, f, max(LOOKED_AT // len(found), 1), report) for f in found]
-    return replace(one, curves=found, samples=samples, stability=each)
+    each = [_looked_at(problem, f, max(LOOKED_AT // len(both), 1), report) for f in both]
+    return replace(one, curves=both, samples=samples, stability=each)
 
 
 def _both_ways(
-    settings: CaseSettings, bases: Bases, path: Path | str, keep: Keep, report: Report
+    settings: CaseSettings,
+    bases: Bases,
+    path: Path | str,
+    keep: Keep,
+    report: Report,
+    known: Mapping[float, Array],
 ) -> list[Followed]:
     """The curve from the upper end, and from the lower one where the first does not arrive there."""
     assert settings.curve is not None and settings.curve.band is not None
@@ -158,7 +172,7 @@ def _both_ways(
             break
         way = settings.curve.model_copy(update={"band": band})
         some, whole = curves(
-            settings.model_copy(update={"curve": way}), bases, path, "frequency", keep, report
+            settings.model_copy(update={"curve": way}), bases, path, "frequency", keep, report, known
         )
         if not whole:
             raise KeyboardInterrupt

@@ -118,7 +118,8 @@ def _work(
         result = with_motions(result, stage.report, motions.journal)
         curve = Checkpoint(folder / "curve.points", raw, files, stage.force, stage.begin)
         own = bases, case_path, curve.journal, stage.report
-        result = replace(result, beyond=tuple(with_curve(b, result.settings, *own) for b in result.beyond))
+        each = (with_curve(b, result.responses[b.normal], result.settings, *own) for b in result.beyond)
+        result = replace(result, beyond=tuple(each))
     except KeyboardInterrupt:
         _unfinished(points)
         raise
