@@ -7,6 +7,7 @@ from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -186,13 +187,21 @@ class Followed:
 
 
 def curves(
-    settings: CaseSettings, bases: Bases, path: Path | str, over: str, keep: Keep, report: Report
+    settings: CaseSettings,
+    bases: Bases,
+    path: Path | str,
+    over: str,
+    keep: Keep,
+    report: Report,
+    known: Mapping[float, Array] = MappingProxyType({}),
 ) -> tuple[list[Followed], bool]:
     """The curves of a case, one for each normal force of its sweep; a second one from the other end where the first
     does not arrive there.
 
     Args:
         over: of `OVER`. keep: opens the journal of an assembly, in which points are kept as they are found.
+        known: Hz -> unknowns of a solution there, with as many harmonics or fewer, on which a curve
+            over the frequency begins.
 
     Returns:
         The curves, and whether nobody interrupted: after Ctrl-C what was found until then.
@@ -214,7 +223,10 @@ def curves(
                     at = asked.frequency or _resonance(built, problem, normal, journal, path, report)
                     one = replace(one, frequency=at)
                 one, pressed = one.named, pressed_by(built, problem) if normal is None else normal
-                found.append(_followed(_family(built, problem, one), problem, one, pressed, journal, report, how))
+                family = _family(built, problem, one)
+                if over == "frequency":
+                    family = replace(family, known=known.get(ends[0]))
+                found.append(_followed(family, problem, one, pressed, journal, report, how))
                 if found[-1].leaves_out:
                     one = found[-1].turned
                     found.append(_followed(_family(built, problem, one), problem, one, pressed, journal, report, how))

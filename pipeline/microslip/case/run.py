@@ -192,15 +192,21 @@ def jumps(result: CaseResult) -> list[tuple[float | None, float, tuple[float, fl
     ]
 
 
-def with_motions(result: CaseResult, report: Callable[[str], None] = lambda _: None) -> CaseResult:
-    """The same with motions in time where responses jump."""
-    found = [
-        beyond(
-            problem_of(result.built, asked), result.responses[n], gap, n, result.quantity, report,
-            result.settings.sweep.patience,
-        )  # fmt: skip
-        for asked, n, gap in jumps(result)
-    ]
+def with_motions(
+    result: CaseResult,
+    report: Callable[[str], None] = lambda _: None,
+    keep: Keep | None = None,
+) -> CaseResult:
+    """The same with motions in time where responses jump. keep: opens their journal, see
+    `run_case`."""
+    patience, of, built = result.settings.sweep.patience, result.quantity, result.built
+    if not (places := jumps(result)):
+        return result
+    with keep(built) if keep else nullcontext() as journal:
+        found = [
+            beyond(problem_of(built, asked), result.responses[n], gap, n, of, report, patience, journal)
+            for asked, n, gap in places
+        ]
     return replace(result, beyond=tuple(found))
 
 

@@ -17,7 +17,7 @@ from ..basis import read_basis
 from ..case import CaseResult, CaseSettings, checkpoint, headline, load_case, run_case
 from ..case.assemble import build
 from ..case.beyond import with_curve
-from ..case.messages import at_places, lifted, method, off
+from ..case.messages import at_places, lifted, method, off, what_moves
 from ..case.run import jumps, with_motions
 from ..case.settings import FIRST_HARMONICS
 from ..data import Array, ModalBasis
@@ -114,10 +114,12 @@ def _work(
                 f"{folder / 'response.html'} has what is known so far; at {counted(len(places), 'place')} the response "
                 "jumps, folds or has no solution: dozens of motions in time, of seconds each"
             )
-        result = with_motions(result, stage.report)
+        motions = Checkpoint(folder / "motions.points", raw, files, stage.force, stage.begin, True)
+        result = with_motions(result, stage.report, motions.journal)
         curve = Checkpoint(folder / "curve.points", raw, files, stage.force, stage.begin)
         own = bases, case_path, curve.journal, stage.report
-        result = replace(result, beyond=tuple(with_curve(b, result.settings, *own) for b in result.beyond))
+        each = (with_curve(b, result.responses[b.normal], result.settings, *own) for b in result.beyond)
+        result = replace(result, beyond=tuple(each))
     except KeyboardInterrupt:
         _unfinished(points, stage)
         raise
@@ -466,7 +468,7 @@ def summarise(result: CaseResult) -> dict[str, Any]:
             {"normal_force_N": n, "frequency_Hz": f, name: a} for n, folds in result.folds.items() for f, a in folds
         ],
         "motions_in_time": [row for one in result.beyond for row in one.rows()],
-        "beyond": [words for one in result.beyond for words in one.sentences()],
+        "beyond": [words for one in result.beyond for words in what_moves(one)],
         "failed_points": failed,
         "messages": list(result.messages),
     }
