@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from itertools import groupby, pairwise
 from types import MappingProxyType
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -22,10 +23,12 @@ from ..time_domain.stepped import Settled
 from ..time_domain.swept import nearer
 from ..units import Quantity, counted, percent
 from .assemble import Built
-from .beyond import Beyond
-from .curves import Followed
 from .problem import book_models
 from .settings import CaseSettings
+
+if TYPE_CHECKING:
+    from .beyond import Beyond
+    from .curves import Followed
 
 OPEN = 0.01
 """Share of points and time that may be open in the book's mode before a message is made."""
