@@ -73,6 +73,7 @@ def sample() -> ModalBasis:
     return read_basis(SAMPLES / "basis.h5")
 
 
+@pytest.mark.usefixtures("unjudged")
 def test_the_free_response_is_that_of_the_denser_body(sample: ModalBasis, folder: Path) -> None:
     """By hand from the modes of the stored one, of three times the mass: 1e-10."""
     path = case(folder, f"mass = {3 * sample.mass!r}")

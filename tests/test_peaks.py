@@ -346,7 +346,9 @@ def test_the_peak_of_a_contact_with_microslip_is_the_highest():
 def test_a_resonance_narrower_than_a_step_is_found_as_a_response_finds_it():
     """Of a stuck contact, whose half-power width is a sixteenth of the step: the peak of the linear system, and to the
     last digit that of the response."""
-    problem, band = pressed(1e6), 2 * np.pi * np.linspace(28, 48, 6)
+    g, force, watched = two_modes()
+    patch, band = rough_patch((3, 2), 4e5), 2 * np.pi * np.linspace(28, 48, 6)
+    problem = of_body(g, (patch,), np.array([1e4]), force, watched, harmonics=2, samples=32, length=1e-5)
     top = highest(problem, band)
     response = filled_response(problem, band / (2 * np.pi), np.zeros(1))
     best = max(refined_peaks(problem, response), key=lambda one: one.amplitude)
