@@ -66,7 +66,7 @@ def test_two_decks_that_touch_are_an_assembly_that_runs(decks_of_plates, capsys)
     case, _ = load_case("joint/case.toml")
     assert [(c.interface, c.against) for c in case.contacts] == [("lower:upper", "upper:lower")]
     quick = ["--no-stress", "--no-pictures", "--set", "sweep.points=3", "--set", "harmonics=1"]
-    quick += ["--set", "amplitude=0.01", "--set", "contacts.lower:upper.points=[2,2]"]  # which sticks
+    quick += ["--set", "amplitude=1e-4", "--set", "contacts.lower:upper.points=[2,2]"]  # which sticks
     assert main(["run", "joint", "-q", *quick]) == 0
     for name, other in (("lower", "upper"), ("upper", "lower")):
         group = read_basis(f"build/{name}/basis.h5").groups[0, 0]
