@@ -18,7 +18,7 @@ from microslip.contact.patch import Patch, grid
 from microslip.contact.point import PointContact
 from microslip.errors import UserError
 from microslip.harmonic_balance import problem as balance
-from microslip.harmonic_balance.nonlinear_modes import _Curve, backbone, strongest, stuck_modes
+from microslip.harmonic_balance.nonlinear_modes import _Curve, backbone, strongest
 from microslip.harmonic_balance.peak import highest, resonance
 from microslip.harmonic_balance.response import of_body, operating
 from microslip.harmonic_balance.solver import solve
@@ -171,7 +171,7 @@ def test_a_nodal_diameter_of_a_ring(order):
     forward, backward = (replace(sector(6, e), outputs=(Output("blade", "tip", "u_y"),)) for e in (order, 6 - order))
     lone, ring = balance.of(forward, **fine), balance.of(forward.unrolled(), **fine)
     mode = strongest(lone, 0.0, 2 * np.pi * 1000.0)
-    ways = [backbone(balance.of(one, **fine), 1e-7, 3e-5, mode, asked=[1e-5]) for one in (forward, backward)]
+    ways = [backbone(balance.of(one, **fine), 1e-6, 1.1e-5, mode, asked=[1e-5]) for one in (forward, backward)]
     found = ways[0]
     i = int(np.argmin(abs(found.amplitude - 1e-5)))
     assert found.complete and found.damping.max() > 2 * found.damping[0]
@@ -201,8 +201,6 @@ def test_a_body_of_one_mode_without_damping():
 def test_mistakes():
     with pytest.raises(UserError, match="there are 1"):
         backbone(sliding(), 1e-6, 1e-5, mode=1)
-    problem = two_modes(4.0)
-    part = problem.parts[1][0]
-    still = replace(part, output=(np.linalg.inv(stuck_modes(problem)[1]) @ np.linalg.inv(part.M))[1:] @ part.M)
+    beside = ms.structure(np.eye(2), np.diag([1.0, 4.0]), elements=[ms.jenkins(1.0, 1.0, at=0)], output=1)
     with pytest.raises(UserError, match="does not move"):
-        backbone(replace(problem, parts=(problem.parts[0], (still,), *problem.parts[2:])), 1e-6, 1e-5)
+        ms.backbone(beside, 1e-6, 1e-5)

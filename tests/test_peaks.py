@@ -368,7 +368,7 @@ def test_a_resonance_narrower_than_a_step_is_found_as_a_response_finds_it():
 def test_optimal_normal_force_against_sweeps():
     """The highest resonance in a band over the normal force: followed to its lowest place, and from sweeps of single
     solutions over 4.5 % around it, force by force; within what sampling ripples."""
-    best = optimum(pressed, [3.0, 5.0, 8.0], BAND)
+    best = optimum(pressed, [3.0, 5.0, 8.0], BAND[::2])
     assert best.status in ("converged", "kink") and not best.rising
     around = best.resonance.Omega / (2 * np.pi) * np.linspace(0.975, 1.02, 46)
 
@@ -422,16 +422,19 @@ def test_the_optimum_of_a_slider_against_sweeps():
     best = optimum(masses, [1.0, 3.0, 12.0], band)
     assert best.status in ("converged", "kink") and 1 < best.parameter < 12
 
-    def swept(normal):
+    def swept(normal, near):
+        """In steps of a fortieth of a hertz within 6 % of a frequency, of a tenth beside it."""
         problem = masses(normal)
-        points = sweep(problem, np.linspace(5, 14, 361))
+        points = sweep(problem, np.union1d(np.linspace(5, 14, 91), np.arange(0.94 * near, 1.06 * near, 0.025)))
         return max(abs(operating(problem, p).outputs[0, 1]) for p in points if p.converged)
 
     for normal, one in best.found.items():
         assert one.status == "converged" and one.amplitude >= best.resonance.amplitude
         if normal in (1.0, 3.0, 12.0, best.parameter):
-            assert swept(normal) * (1 - 1e-4) <= one.amplitude < 1.015 * swept(normal)  # a peak between two points
-    assert min(swept(best.parameter * share) for share in (0.7, 1.4)) > best.resonance.amplitude
+            top = swept(normal, one.Omega / (2 * np.pi))
+            assert top * (1 - 1e-4) <= one.amplitude < 1.015 * top  # a peak between two points
+    near = best.resonance.Omega / (2 * np.pi)
+    assert min(swept(best.parameter * share, near) for share in (0.7, 1.4)) > best.resonance.amplitude
 
 
 @pytest.mark.slow
