@@ -448,11 +448,11 @@ def rubbing_line(frequency: float, samples: int) -> complex:
     turns, k, limit = np.exp(2j * np.pi * np.arange(samples) / samples), 5e5, 0.3 * 5.0
 
     def friction(u: complex) -> complex:
-        path, force, out = (u * turns).real, 0.0, np.zeros(samples)
+        path, force, out = (u * turns).real, 0.0, [0.0] * samples
+        steps = (k * (path - np.roll(path, 1))).tolist()
         for _ in range(3):
-            for i in range(samples):
-                force = float(np.clip(force + k * (path[i] - path[i - 1]), -limit, limit))
-                out[i] = force
+            for i, step in enumerate(steps):
+                out[i] = force = min(max(force + step, -limit), limit)
         return 2 * np.mean(out / turns)
 
     def left(x):
