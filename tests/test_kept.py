@@ -49,7 +49,7 @@ class Stop(Exception):
 
 @pytest.fixture(scope="module")
 def problem() -> balance.Problem:
-    return balance.of(sector(6, 1, push=0.5), **(FINE | {"harmonics": 1}))
+    return balance.of(sector(6, 1, push=0.5), **(FINE | {"harmonics": 1, "samples": 48}))
 
 
 def free(*resonances: float) -> Assembly:

@@ -340,7 +340,7 @@ def marched_map(patch, side, u, samples=2048):
     from microslip.harmonic_balance.point_cycles import traced
     from microslip.operating.contact_maps import contact_map
 
-    force, c = traced(patch.law, patch.kinematics, u, 0.01, samples, 4)
+    force, c = traced(patch.law, patch.kinematics, u, 0.01, samples, 100)
     work = float(c.dissipated.sum())
     return contact_map(patch, side, np.asarray(force), c.taken, c.slipping, c.open, u.shape[1] // 2, work)
 
@@ -388,9 +388,9 @@ def test_where_nothing_slips_a_map_tells_no_work_of_samples(rocked: float, said:
     differs; where nothing opens, nothing is lost, and nothing is said of it."""
     from microslip.pictures.operating import _left
 
-    patch, u0 = linear_patch(normal=50.0, friction=5.0)
-    u = np.zeros((6, 5))
-    u[:, 0], u[5, 1], u[1, 2], u[1, 3] = u0, rocked, 2e-7, 1e-7
+    patch, u0 = linear_patch((2, 2), normal=50.0, friction=5.0)
+    u = np.zeros((6, 3))
+    u[:, 0], u[5, 1], u[1, 1:] = u0, rocked, (1e-7, 2e-7)
     found = marched_map(patch, small_basis().groups[0, 0].interfaces["right"], u, 48)
     assert (found.dissipated >= 0).all() and (found.loss > 0) == bool(said)
     assert _left(found).startswith(said) and ("48 samples" in _left(found)) == bool(said) == (found.unbalanced != 0)
