@@ -331,7 +331,7 @@ def linear_patch(counts=(6, 2), normal=100.0, friction=0.3):
 
     places, areas = grid(0.012, 0.004, counts)
     stiffness = ContactStiffness(1e7 / len(areas), (8e6 / len(areas),) * 2, "surface", "test")
-    patch = Patch("right", places, areas, smooth_point(stiffness, Coulomb(jnp.asarray(friction))))
+    patch = Patch("right", places, areas, smooth_point(stiffness, Coulomb(jnp.asarray(friction, dtype=float))))
     return patch, equilibrium(patch, normal)
 
 
