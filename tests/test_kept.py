@@ -176,12 +176,12 @@ def test_displacement_by_residual_shapes_is_what_the_monitor_reads() -> None:
     group = in_modes(stored)
     from test_operating import linear_patch
 
-    patch, _ = linear_patch()
+    patch, _ = linear_patch((2, 2))
     contact = preloaded_contact("rub", patch, ContactFace("small", "right"), None, normal=100.0)
     component = Component("small", {0: group}, residual_share=np.ones(len(group.compliance.labels)))
     outputs = tuple(Output("small", "tip-probe", f"u_{x}") for x in "xyz")
     assembly = Assembly((component,), (contact,), (Load("small", "shaker", 300.0),), outputs)
-    problem = balance.of(assembly, harmonics=3, samples=64)
+    problem = balance.of(assembly, harmonics=3, samples=48)
     point = solve(problem, 2 * np.pi * 400.0, [])
     assert point.converged
     found = response.operating(problem, point)

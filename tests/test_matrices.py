@@ -448,11 +448,11 @@ def rubbing_line(frequency: float, samples: int) -> complex:
     turns, k, limit = np.exp(2j * np.pi * np.arange(samples) / samples), 5e5, 0.3 * 5.0
 
     def friction(u: complex) -> complex:
-        path, force, out = (u * turns).real, 0.0, np.zeros(samples)
+        path, force, out = (u * turns).real, 0.0, [0.0] * samples
+        steps = (k * (path - np.roll(path, 1))).tolist()
         for _ in range(3):
-            for i in range(samples):
-                force = float(np.clip(force + k * (path[i] - path[i - 1]), -limit, limit))
-                out[i] = force
+            for i, step in enumerate(steps):
+                out[i] = force = min(max(force + step, -limit), limit)
         return 2 * np.mean(out / turns)
 
     def left(x):
@@ -474,6 +474,9 @@ def test_masses_in_a_line_rub_at_a_single_node(tmp_path, capsys, monkeypatch, ea
     The march of this page is off by the second order of a step of 2 pi/2048, some 1e-5 of the friction.
     """
     pytest.importorskip("jax")
+    from microslip.case import run
+
+    monkeypatch.setattr(run._Left, "out", lambda *_: [])  # no estimate of the error of harmonics
     monkeypatch.chdir(tmp_path)
     line(tmp_path, each)
     (tmp_path / "case.toml").write_text(LINE_CASE.replace("LAW", law))

@@ -363,17 +363,24 @@ def test_stress_at_the_worst_node(stuck: bool) -> None:
     assert found.strain == pytest.approx(np.abs(q @ [3.0, -2.0]).max(), rel=1e-6)
 
 
-def test_samples_do_not_depend_on_workers(tuned: Tuned, tmp_path: Path) -> None:
-    """One process and two, and a run that goes on after its first samples: the same bits."""
+def same_bits(one: ensemble.Ensemble, other: ensemble.Ensemble) -> None:
+    assert one.rows.tobytes() == other.rows.tobytes()
+    assert one.envelope.sums.tobytes() == other.envelope.sums.tobytes()
+    assert (one.envelope.bins == other.envelope.bins).all()
+
+
+def test_a_run_goes_on_after_its_first_samples(tuned: Tuned, tmp_path: Path) -> None:
     asked = Asked(tuned, (Scatter("frequency", 0.01),), np.linspace(275, 300, 12), seed=3, stuck=True)
-    one = ensemble.run(asked, 20, workers=1)
-    two = ensemble.run(asked, 20, workers=2)
     ensemble.run(asked, 16, workers=1, file=tmp_path / "m.npz", inputs="a")
     going = ensemble.run(asked, 20, workers=1, file=tmp_path / "m.npz", inputs="a")
-    for other in (two, going):
-        assert one.rows.tobytes() == other.rows.tobytes()
-        assert one.envelope.sums.tobytes() == other.envelope.sums.tobytes()
-        assert (one.envelope.bins == other.envelope.bins).all()
+    same_bits(ensemble.run(asked, 20, workers=1), going)
+
+
+@pytest.mark.slow
+def test_samples_do_not_depend_on_workers(tuned: Tuned) -> None:
+    """One process and two: the same bits. The quick tests share samples between threads (test_mistuning_ensembles)."""
+    asked = Asked(tuned, (Scatter("frequency", 0.01),), np.linspace(275, 300, 12), seed=3, stuck=True)
+    same_bits(ensemble.run(asked, 20, workers=1), ensemble.run(asked, 20, workers=2))
 
 
 def test_a_sample_is_what_its_number_says(tuned: Tuned) -> None:

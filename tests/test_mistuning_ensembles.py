@@ -100,9 +100,9 @@ def test_samples_with_friction_do_not_depend_on_workers(tuned: Tuned, tmp_path: 
     """One process and two, and a run that goes on after its first samples: the same bits."""
     scatter = Scatter("frequency", 0.01), Scatter("friction", 0.1)
     asked = Asked(tuned, scatter, np.linspace(331, 343, 5), seed=3, balance=FINE)
-    one, two = (ensemble.run(asked, 10, workers=workers) for workers in (1, 2))
+    one, two = (ensemble.run(asked, 6, workers=workers) for workers in (1, 2))
     ensemble.run(asked, 4, workers=1, file=tmp_path / "m.npz", inputs="a")
-    going = ensemble.run(asked, 10, workers=1, file=tmp_path / "m.npz", inputs="a")
+    going = ensemble.run(asked, 6, workers=1, file=tmp_path / "m.npz", inputs="a")
     for other in (two, going):
         assert one.rows.tobytes() == other.rows.tobytes()
         assert one.envelope.sums.tobytes() == other.envelope.sums.tobytes()

@@ -18,7 +18,7 @@ from microslip.contact.patch import Patch, grid
 from microslip.contact.point import PointContact
 from microslip.errors import UserError
 from microslip.harmonic_balance import problem as balance
-from microslip.harmonic_balance.nonlinear_modes import _Curve, backbone, strongest, stuck_modes
+from microslip.harmonic_balance.nonlinear_modes import _Curve, backbone, strongest
 from microslip.harmonic_balance.peak import highest, resonance
 from microslip.harmonic_balance.response import of_body, operating
 from microslip.harmonic_balance.solver import solve
@@ -141,7 +141,7 @@ def test_forced_by_what_feeds_the_losses_the_motion_is_the_mode(harmonics):
 def test_a_contact_a_hundred_times_as_stiff_as_its_body_slides_free_in_few_points():
     M, K = np.eye(2), np.array([[200.0, -100.0], [-100.0, 101.0]])
     rubbing = ms.structure(M, K, 1e-4 * K, force={0: 1.0}, elements=[ms.jenkins(1e4, 0.3, at=1)])
-    mode = ms.backbone(rubbing, 1e-3, 0.1, harmonics=1)
+    mode = ms.backbone(rubbing, 1e-3, 0.03, harmonics=1)
     assert mode.complete and len(mode.Omega) < 200
     assert mode.Omega[0] ** 2 == pytest.approx(np.linalg.eigvalsh(K + np.diag([0.0, 1e4]))[0], rel=1e-4)
     assert mode.Omega[-1] ** 2 == pytest.approx(np.linalg.eigvalsh(K)[1], rel=1e-3)
@@ -163,17 +163,17 @@ def test_resonances_at_many_levels_of_load_lie_on_the_backbone():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("order", [1, 3])
-def test_a_nodal_diameter_of_a_ring(order):
+@pytest.mark.parametrize(("order", "low", "large"), [(1, 1e-6, 8e-6), (3, 1e-7, 1e-5)])
+def test_a_nodal_diameter_of_a_ring(order, low, large):
     """One sector for six blades: the mode at a large amplitude, put into all of them, is one of the whole ring; the
     wave that runs the other way has the same frequency and damping."""
     fine = {"harmonics": 3, "samples": 48, "length": 1e-6}
     forward, backward = (replace(sector(6, e), outputs=(Output("blade", "tip", "u_y"),)) for e in (order, 6 - order))
     lone, ring = balance.of(forward, **fine), balance.of(forward.unrolled(), **fine)
     mode = strongest(lone, 0.0, 2 * np.pi * 1000.0)
-    ways = [backbone(balance.of(one, **fine), 1e-7, 3e-5, mode, asked=[1e-5]) for one in (forward, backward)]
+    ways = [backbone(balance.of(one, **fine), low, 1.01 * large, mode, asked=[large]) for one in (forward, backward)]
     found = ways[0]
-    i = int(np.argmin(abs(found.amplitude - 1e-5)))
+    i = int(np.argmin(abs(found.amplitude - large)))
     assert found.complete and found.damping.max() > 2 * found.damping[0]
     v = lone.displacement(found.x[i])
     a = np.array([v[0], *(v[1::2] - 1j * v[2::2])])  # (H + 1, 6) amplitudes, then those of every contact
@@ -181,11 +181,11 @@ def test_a_nodal_diameter_of_a_ring(order):
     turned = turned.reshape(4, 36)
     whole = np.zeros((7, 36))
     whole[0], whole[1::2], whole[2::2] = turned[0].real, turned[1:].real, -turned[1:].imag
-    x, xi = (whole / ring.scale).ravel() * 1e-6 / 1e-5, 2 * found.damping[i] * found.Omega[i]
+    x, xi = (whole / ring.scale).ravel() * 1e-6 / large, 2 * found.damping[i] * found.Omega[i]
     held = replace(ring, stiffness=tuple(2 * k for k in ring.stiffness), share=0.0)
-    R = _Curve(held, 0).evaluate(np.append(x, [found.Omega[i], xi]), np.log(1e-5))[0]
+    R = _Curve(held, 0).evaluate(np.append(x, [found.Omega[i], xi]), np.log(large))[0]
     assert np.abs(R).max() < 1e-7 * np.abs(x).max()
-    j = int(np.argmin(abs(ways[1].amplitude - 1e-5)))
+    j = int(np.argmin(abs(ways[1].amplitude - large)))
     assert ways[1].Omega[j] == pytest.approx(found.Omega[i], rel=1e-9)
     assert ways[1].damping[j] == pytest.approx(found.damping[i], rel=1e-7)
 
@@ -201,8 +201,6 @@ def test_a_body_of_one_mode_without_damping():
 def test_mistakes():
     with pytest.raises(UserError, match="there are 1"):
         backbone(sliding(), 1e-6, 1e-5, mode=1)
-    problem = two_modes(4.0)
-    part = problem.parts[1][0]
-    still = replace(part, output=(np.linalg.inv(stuck_modes(problem)[1]) @ np.linalg.inv(part.M))[1:] @ part.M)
+    beside = ms.structure(np.eye(2), np.diag([1.0, 4.0]), elements=[ms.jenkins(1.0, 1.0, at=0)], output=1)
     with pytest.raises(UserError, match="does not move"):
-        backbone(replace(problem, parts=(problem.parts[0], (still,), *problem.parts[2:])), 1e-6, 1e-5)
+        ms.backbone(beside, 1e-6, 1e-5)

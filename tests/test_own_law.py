@@ -83,8 +83,8 @@ def package(tmp_path: Path) -> dict[str, str]:
     shutil.copy(masses / "system.toml", tmp_path)
     contact = re.search(r"```toml\n(\[\[contacts\]\]\n.*?)```", PAGE, flags=re.S)[1]
     case = (masses / "case.toml").read_text()
-    case, few = re.subn(r"points = \d+", "points = 5", case)
-    assert few == 1
+    case, band = re.subn(r"start = .*\nstop = .*\npoints = \d+", "start = 9.0\nstop = 12.0\npoints = 3", case)
+    assert band == 1  # with the first resonance alone
     whole = re.sub(r"\[\[contacts\]\].*?(?=\[sweep\])", contact, case, flags=re.S)
     (tmp_path / "case.toml").write_text(re.sub(r"normal_forces = .*", "normal_forces = [10.0, 1000.0]", whole))
     return {**os.environ, "PYTHONPATH": str(site)}
@@ -119,7 +119,8 @@ def test_a_law_of_another_package_is_named_in_a_case(
         assert swing <= 4 / np.pi * float(run_page()[0]["Pad"](1e4, 5e3, 0.3, 40.0).hold(normal))
     law, table = tmp_path / "site" / "pads.py", tmp_path / "build/three-masses/response.csv"
     before = table.read_text()
-    law.write_text(law.read_text().replace("return self.mu * pressed", "return 0.5 * self.mu * pressed"))
+    text = law.read_text()  # a number of the law and not its arithmetic: the programs are those of before
+    law.write_text(text.replace("first, contact.mu,", "first, 0.5 * contact.mu,"))
     said = microslip(tmp_path, package, again, "respond case.toml --set contacts.rub.law.kind=mad")
     assert "up to date" not in said and said.endswith("2\n") and '"pad"' in said.splitlines()[-2]
     assert table.read_text() != before

@@ -252,13 +252,15 @@ def test_meshes_that_do_not_match_agree_with_those_that_do() -> None:
     np.testing.assert_allclose(middles, finest[1], rtol=2e-2)
 
 
+FINE: dict[str, float] = {"harmonics": 1, "samples": 32, "cycles": 20, "periodicity": 1e-12, "length": 1e-7}
+
+
 def problem_of(a: Block, b: Block, push: float = 60.0, **settings: float) -> balance.Problem:
     patch, first, second, C = pair(a, b)
     contact = preloaded_contact("joint", patch, first, second, normal=100.0, compliance=C)
     whole = Assembly((component("low", a), component("high", b)), (contact,), (Load("low", "push", push),),
                      (Output("low", "end", "u_x"),))  # fmt: skip
-    return balance.of(whole, **{"harmonics": 1, "samples": 24, "cycles": 20, "periodicity": 1e-12, "length": 1e-7,
-                                **settings})  # fmt: skip
+    return balance.of(whole, **FINE | settings)
 
 
 def soft(n: tuple[int, int, int], of: str) -> Block:
@@ -311,7 +313,7 @@ def test_preload_by_a_force_is_the_interference_that_makes_it() -> None:
     for contact in (by_force, by_balance):
         whole = Assembly((component("low", a), component("high", b)), (contact,), (Load("low", "push", 60.0),),
                          (Output("low", "end", "u_z"),))  # fmt: skip
-        problem = balance.of(whole, harmonics=1, samples=32, cycles=4, periodicity=1e-12, length=1e-7)
+        problem = balance.of(whole, **FINE)
         point = solve(problem, 2 * np.pi * 3000.0, [])
         assert point.converged
         found.append(response.operating(problem, point))
