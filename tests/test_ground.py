@@ -121,7 +121,7 @@ def test_every_slip_of_the_closed_form_is_counted_once(slope: float) -> None:
     law = rate(Exponential(value(0.8), value(0.55), value(1e4)), slope)
     Omega, keep, steps = OMEGA / 8, 4, 8192
     e = equations.of(rubbing(law, Ground(V)), Omega)
-    s = Stepper(e, 2 * np.pi / Omega / steps, accounts=False)
+    s = Stepper(e, 2 * np.pi / Omega / steps)
     each = np.where(np.arange(MOST) < 64 * keep, steps // 64, 0)
     _, seen, listed, *_ = s.run(s.start(0 * e.omega2, 0 * e.omega2), each)
     listed = listed[listed[:, 0] > 0.1]  # the belt takes the mass along first
