@@ -14,7 +14,7 @@ import os
 import re
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -88,8 +88,10 @@ def steps(page: str) -> Iterator[Step]:
         yield Step(more if kind == "file" else "", text)
 
 
-def play(page: str, folder: Path) -> str:
+def play(page: str, folder: Path, more: Mapping[str, str] | None = None) -> str:
     """Do what a page says in an empty folder, with this Python's `microslip`; returns what the commands printed.
+
+    more: words to add to lines that begin so.
 
     Raises:
         RuntimeError: a command failed.
@@ -100,8 +102,13 @@ def play(page: str, folder: Path) -> str:
             (folder / step.path).parent.mkdir(parents=True, exist_ok=True)
             (folder / step.path).write_text(step.text, encoding="utf-8")
         else:
-            shown += [typed(line, folder) for line in step.text.splitlines() if line and not line.startswith("#")]
+            lines = [line for line in step.text.splitlines() if line and not line.startswith("#")]
+            shown += [typed(" ".join([line, *added(line, more or {})]), folder) for line in lines]
     return "\n".join(shown)
+
+
+def added(line: str, more: Mapping[str, str]) -> list[str]:
+    return [words for begin, words in more.items() if line.startswith(begin)]
 
 
 def typed(line: str, folder: Path) -> str:

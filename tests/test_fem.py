@@ -146,9 +146,9 @@ def test_stiffness_mass_and_stress_stiffness_are_scikit_fems(cell_type):
 
 
 def test_many_cells_pass_through_several_batches(monkeypatch):
-    """More cells than one batch holds: 2592 tetrahedra in batches of 500."""
-    monkeypatch.setattr("microslip.fem.operators._BATCH", 50_000)
-    mesh = test_mesh("tetra10", (9, 8, 6))
+    """More cells than one batch holds: 720 tetrahedra in batches of 125."""
+    monkeypatch.setattr("microslip.fem.operators._BATCH", 12_500)
+    mesh = test_mesh("tetra10", (6, 5, 4))
     d = discretise(mesh)
     basis, dofs = oracle(mesh, "tetra10")
     K = d.pattern.full(stiffness(d, STEEL_C))

@@ -33,7 +33,7 @@ def test_ctrl_c_at_random_moments_of_a_motion_ends_it_and_loses_nothing(
     """Each is heard, though HDF5 is writing at most of them; the motion has the bits of one that nobody disturbed."""
     for module in (samples, orbit):
         monkeypatch.setattr(module, "PAUSE", 0.0)
-    path, asked = tmp_path / "orbit.h5", recorded.Asked("it", slider(), 0, 300, 16, 512)
+    path, asked = tmp_path / "orbit.h5", recorded.Asked("it", slider(), 0, 100, 16, 512)
     whole = recorded.run(tmp_path / "whole.h5", [asked])[0]
     draw, heard = random.Random(1), 0
     before = signal.getsignal(signal.SIGINT)

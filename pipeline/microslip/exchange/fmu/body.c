@@ -129,7 +129,7 @@ static void advance(State *s, double h)
     load(s->f, g);
     load(s->rate, slope);
     h /= parts;
-    for (part = 0; part < parts; part++) {
+    for (part = 0; part < parts && finite(s->x, 2 * MODES); part++) { /* beyond all numbers nothing is left to do */
         memcpy(term, s->x, sizeof term);
         for (k = 1; k <= terms; k++) { /* term k: the k-th derivative times h^k / k! */
             for (j = 0; j < MODES; j++) {
