@@ -413,8 +413,9 @@ def test_a_killed_run_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, u
     assert not list((tmp_path / "c").glob("two_tones*"))
 
 
-def test_moving_ground(tmp_path: Path) -> None:
-    """A mass on a belt that slides under it all the time, pushed with two frequencies: as in time."""
+@pytest.fixture
+def belt(tmp_path: Path) -> Any:
+    """A mass on a belt that slides under it all the time, pushed with two frequencies."""
     from microslip.case.assemble import build
     from microslip.system.settings import load_system
 
@@ -422,9 +423,20 @@ def test_moving_ground(tmp_path: Path) -> None:
     rate = 'law = { kind = "rate", slope = 10.0 }\nground = { velocity = 1.0 }'
     (tmp_path / "case.toml").write_text(CASE.replace('law = "jenkins"', rate))
     settings, _ = load_case(tmp_path / "case.toml", ["excitations.0.amplitude=0.2", "excitations.1.amplitude=0.1"])
-    built = build(settings, {"pair": load_system(tmp_path / "system.toml").basis()}, tmp_path / "case.toml")
-    found = ms.two_tones(built, 0.14, 0.1137, harmonics=9)
-    orbit = ms.integrate(built, 0.14, second=0.1137, settle=40, keep=8, samples=64, steps=512)
+    return build(settings, {"pair": load_system(tmp_path / "system.toml").basis()}, tmp_path / "case.toml")
+
+
+def test_moving_ground_supplies_what_is_lost(belt: Any) -> None:
+    """Beside the loads: what the contact exchanges with the bodies and the ground is what friction takes."""
+    found = ms.two_tones(belt, 0.14, 0.1137, harmonics=3)
+    assert found.lost[0] != 0 and abs(found.exchanged[0] - found.lost[0]) < 1e-9 * found.supplied.sum()
+
+
+@pytest.mark.slow
+def test_moving_ground(belt: Any) -> None:
+    """As in time."""
+    found = ms.two_tones(belt, 0.14, 0.1137, harmonics=9)
+    orbit = ms.integrate(belt, 0.14, second=0.1137, settle=40, keep=8, samples=64, steps=512)
     largest = np.abs(orbit.y[0]).max()
     readout = [name.split()[-1] for name in found.readouts].index("u_x")
     row = [label.split()[-1] for label in orbit.labels].index("u_x")
