@@ -359,8 +359,8 @@ def test_what_a_motion_reaches_is_all_that_changes():
         patch=Patch("face", places, np.ones(8), law), offset=np.append(1e-5, np.zeros(5)),
     )  # fmt: skip
     one = solved(problem, 2 * np.pi * 20.0)
-    reached = multipliers(one, 128)
-    carry, unit = _carrier(one, 128)
+    reached = multipliers(one, 256)
+    carry, unit = _carrier(one, 256)
     every = np.linalg.eigvals(carry(np.diag(unit)) / unit[:, None])
     neutral = abs(every - 1) < 1e-9
     rest = every[~neutral][np.argsort(-abs(every[~neutral]))]
