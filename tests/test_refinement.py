@@ -100,7 +100,7 @@ class Brittle(Cubic):
 def test_points_without_a_solution_have_one_beside_them() -> None:
     """The linear oscillator, whose amplitude passes 1 m at two frequencies: there are added points, its 64 samples a
     cycle just not beyond; what lies between is told as what it is."""
-    frequency = np.linspace(0.6, 1.4, 9) / (2 * np.pi)
+    frequency = np.linspace(0.6, 1.4, 5) / (2 * np.pi)
     found = filled_response(spring(Brittle(jnp.asarray(0.0))), frequency, ONE)
     linear = lambda omega: 0.3 / np.hypot(1 - omega**2, 0.05 * omega)  # noqa: E731
     whole = [brentq(lambda omega: linear(omega) - 1.0, *ends) for ends in ((0.6, 1.0), (1.0, 1.4))]
@@ -109,4 +109,4 @@ def test_points_without_a_solution_have_one_beside_them() -> None:
     amplitude = np.abs(found.monitor[found.added])
     np.testing.assert_allclose(amplitude, linear(omega), rtol=1e-9)
     assert (0.999 < amplitude).all() and (amplitude <= 1 / np.cos(np.pi / 64)).all()
-    assert found.converged[found.added].all() and (~found.converged).sum() == 3
+    assert found.converged[found.added].all() and (~found.converged).sum() == 1

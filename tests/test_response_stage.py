@@ -20,6 +20,7 @@ from test_harmonic_balance_laws import sled
 
 from microslip.basis import read_basis, write_basis
 from microslip.case import load_case
+from microslip.cli import main
 from microslip.data import Rows
 from microslip.errors import UserError
 from microslip.files import store
@@ -115,7 +116,7 @@ def test_interrupted_and_resumed(folder: Path) -> None:
 
 QUICK = (
     CASE.replace('law = "smooth"\npoints = [2, 2]\n', 'law = "jenkins"\n').replace("points = 9", "points = 4")
-    .replace("samples = 24", "samples = 8").replace("[50.0]\n", "[1e4]\n#")
+    .replace("samples = 24", "samples = 8").replace("[50.0]", "[1e4]").split("[material_limits]")[0]
 )  # fmt: skip
 """Linear, as it sticks, and without margins: it costs little."""
 
@@ -317,8 +318,7 @@ def test_killed_while_it_writes_from_the_command_line(folder: Path) -> None:
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
     done = subprocess.run([sys.executable, "-c", code], cwd=folder, env=environment, capture_output=True)
     assert done.returncode == -9 and (build / "response.csv").read_bytes() != table
-    again = subprocess.run([sys.executable, "-m", "microslip", "respond", "."], cwd=folder, env=environment)
-    assert again.returncode == 0 and (build / "response.csv").read_bytes() == table
+    assert main(["respond", "."]) == 0 and (build / "response.csv").read_bytes() == table
     found = read_response(build / "response.h5").series[0].arrays
     assert found.keys() == points.keys() and all(np.array_equal(found[n], points[n]) for n in points)
 
@@ -337,23 +337,23 @@ def test_what_was_run_before_changes_nothing(folder: Path) -> None:
 
 @pytest.mark.slow
 def test_killed_and_resumed_from_the_command_line(folder: Path) -> None:
-    """SIGKILL after a few points, three times; the command then ends with the response of one go, 1e-6."""
+    """SIGKILL after a few points, twice; the command then ends with the response of one go, 1e-6."""
     command = [sys.executable, "-m", "microslip", "respond", str(folder), "--set", "sweep.points=33"]
     points = folder / "build" / "vane" / "response.points"
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
-    for more in (3, 8, 14):
+    for more in (3, 14):
         process = subprocess.Popen(command, cwd=folder, env=environment, stderr=subprocess.DEVNULL)
         while process.poll() is None and count(points) < more:
             time.sleep(0.02)
         process.kill()
         process.wait()
         assert more <= count(points) < 34
-    ended = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True)
-    assert ended.returncode == 0, ended.stderr
+    assert main(command[3:]) == 0
     resumed = read_response(points.with_name("response.h5")).series[0]
     respond(folder, "sweep.points=33", force=True)
     whole = read_response(points.with_name("response.h5")).series[0]
     grid = whole.arrays["peak"] == 0
+    assert grid.sum() >= 33
     np.testing.assert_array_equal(resumed.key[resumed.arrays["peak"] == 0], whole.key[grid])
     a, b = (s.monitor("probe")[s.arrays["peak"] == 0] for s in (resumed, whole))
     np.testing.assert_allclose(a, b, rtol=0, atol=1e-6 * np.abs(b).max())
@@ -463,6 +463,7 @@ def test_a_point_that_fails_is_kept_with_its_status(folder: Path, monkeypatch: p
         return replace(found, status="no convergence") if abs(at.Omega - 2 * np.pi * 360.0) < 1e-6 else found
 
     monkeypatch.setattr(solver, "newton", stubborn)
+    (folder / "case.toml").write_text(CASE.split("[material_limits]")[0])
     told, converged = respond(folder, "sweep.points=5")
     assert not converged and any("1 point did not converge" in t and "360 Hz" in t for t in told)
     series = read_response(folder / "build/vane/response.h5").series[0]
@@ -722,7 +723,7 @@ def test_a_body_that_can_be_made_is(folder: Path) -> None:
 
 def test_what_jenkins_elements_do_not_follow_is_told(folder: Path) -> None:
     """Jenkins elements under 0.05 N, which are too weakly pressed, and under 500 N, which are not."""
-    text = CASE.replace('law = "smooth"\npoints = [2, 2]\n', 'law = "jenkins"\n').replace("[50.0]", "[0.05, 500.0]")
+    text = QUICK.replace("points = 4", "points = 9").replace("[1e4]", "[0.05, 500.0]")
     (folder / "case.toml").write_text(text.replace("start = 300.0", "start = 250.0"))
     told, _ = respond(folder)
     (said,) = [t for t in told if "does not follow" in t]

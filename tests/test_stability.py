@@ -424,26 +424,31 @@ def ring():
     return problem, found.x, orbit(problem, found.x, RING)
 
 
+@pytest.fixture(scope="module")
+def of_ring(ring):
+    """Its multipliers."""
+    return multipliers(ring[2], 256)
+
+
 @pytest.mark.slow
-def test_sectors_that_are_driven_alike_may_part_company(ring):
+def test_sectors_that_are_driven_alike_may_part_company(ring, of_ring):
     """The travelling wave of equal blades loses stability by a real multiplier: a solution of the sector, and one of
     the ring, but not the one that the ring takes. A sector alone cannot tell."""
     lone = balance.of(sector(4, 1), harmonics=3, samples=48, length=1e-6)
     with pytest.raises(UserError, match="take all of them"):
         orbit(lone, lone.at(RING).reference, RING)
-    values = multipliers(ring[2], 256)
-    assert 1.004 < abs(values[0]) < 1.01 and abs(values[0].imag) < 1e-9 and abs(values[1]) < 1
+    assert 1.004 < abs(of_ring[0]) < 1.01 and abs(of_ring[0].imag) < 1e-9 and abs(of_ring[1]) < 1
 
 
 @pytest.mark.slow
-def test_blades_part_company_in_time_as_fast_as_the_multiplier_says(ring):
+def test_blades_part_company_in_time_as_fast_as_the_multiplier_says(ring, of_ring):
     """Central differences over 240 periods from the wave, a thousandth larger: blades 0 and 2 swing less and less, 1
     and 3 more and more, and the difference grows from period to period as the multiplier tells (30 % of its growth:
     both ways err by a thousandth of a multiplier)."""
     difference = parting(*ring, periods=240)
     assert difference[-1] > 2 * difference[120]
     grows = (difference[-1] / difference[160]) ** (1 / 79)
-    assert grows - 1 == pytest.approx(abs(multipliers(ring[2], 256)[0]) - 1, rel=0.3)
+    assert grows - 1 == pytest.approx(abs(of_ring[0]) - 1, rel=0.3)
 
 
 def parting(problem, x, one, periods, steps=1000):

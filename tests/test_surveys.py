@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from test_assembly import blade, sector
+from test_assembly import blade
 from test_speed_range import ranged
 
 from microslip.basis import write_basis
@@ -19,11 +19,9 @@ from microslip.case.problem import problem_of
 from microslip.cli import main
 from microslip.data import ModalBasis, StressSet
 from microslip.harmonic_balance import envelope, identification, response
-from microslip.harmonic_balance import problem as balance
 from microslip.harmonic_balance.envelope import Envelope
+from microslip.harmonic_balance.problem import Problem
 from microslip.stages.surveying import _ranges_sentences, survey_stage
-from microslip.system.assembly import Load
-from microslip.system.component import Component, Ring
 
 RING = """
 name = "ring"
@@ -31,8 +29,7 @@ body = "blade"
 excitation = "gas"
 monitor = "tip"
 harmonics = 1
-samples = 16
-cycles = 10
+samples = 24
 [ring]
 blades = 6
 [[contacts]]
@@ -129,18 +126,16 @@ def stressed() -> ModalBasis:
     return replace(bare, groups={(0, 0): replace(group, stresses={"nodes": held})})
 
 
-def test_the_worst_engine_order_in_stress_and_its_best_normal_force() -> None:
+def test_the_worst_engine_order_in_stress_and_its_best_normal_force(ring: Path) -> None:
     """Stress follows the read-out, so its largest is that of the amplitude; the worst of the orders is the largest of
     the table, and its lowest that of the forces under which no order is missing."""
-    one = sector(6, 1, normal=1e4, push=1.0)
-    held = replace(one, components=(Component("blade", {0: stressed().groups[0, 0]}),))
 
-    def build(order: int, push: float) -> balance.Problem:
-        driven = replace(held, ring=Ring(6, order), loads=(Load("blade", "gas", push),))
-        return balance.of(driven, harmonics=1, samples=16, cycles=10, length=1e-6)
+    def driven(order: int, push: float) -> Problem:
+        settings, _ = load_case(ring, [f"ring.engine_order={order}", f"amplitude={push}"])
+        return problem_of(build(settings, {"blade": stressed()}, ring), 1e4)
 
     found = [
-        replace(envelope.over_orders(partial(build, push=push), [1, 2], (200.0, 420.0), 45), normal_force=push)
+        replace(envelope.over_orders(partial(driven, push=push), [1, 2], (200.0, 420.0), 45), normal_force=push)
         for push in (2.0, 1.0)
     ]
     for r in found:
@@ -251,7 +246,7 @@ name = "line"
 body = "{body}"
 monitor = "end"
 harmonics = 1
-samples = 16
+samples = 24
 [[excitations]]
 row = "gas"
 amplitude = 1e4

@@ -418,7 +418,8 @@ def given(folder: Path, columns: dict[str, np.ndarray], *changes: str) -> Given:
     return recorded(load_kinematics(written(folder, columns), ["kinematics.turns=1", *changes])[0], folder).wheel
 
 
-QUICK = ("kinematics.places=24", 'wear.profile="kept"', "model.elements=[8,8]")
+FEW = ("kinematics.places=24", "model.elements=[8,8]")
+QUICK = (*FEW, 'wear.profile="kept"')
 
 
 def swaying(first: float, side: float = 1.0) -> dict[str, np.ndarray]:
@@ -472,9 +473,9 @@ def test_a_file_and_its_vehicle_wear_alike_as_profiles_are_renewed(
     shaped = replace(rolling, shape=lobes * rolling.shape)
     columns, now = table(shaped, 1)
     own, _, _ = depth_of(replace(shaped, profile=case.profiles(CASE.parent, rolling.tread.y)), 1e5)
-    read, _, _ = depth_of(given(tmp_path, columns), 1e5)
+    read, _, _ = depth_of(given(tmp_path, columns, "kinematics.places=24"), 1e5)
     kept = 1e5 * rolling.tread.seen(now.taken, now.one.on)[:, 0]
-    assert np.abs(read - own).max() < off * np.abs(kept - own).max()
+    assert np.abs(read - own[::2]).max() < off * np.abs(kept - own).max()
 
 
 def test_little_wear_of_given_kinematics_is_that_of_kept_profiles(rolling: wearing.Rolling, tmp_path: Path) -> None:
@@ -490,7 +491,7 @@ def test_little_wear_of_given_kinematics_is_that_of_kept_profiles(rolling: weari
 
 def test_the_error_of_jumps_by_a_file_is_less_than_they_tell(rolling: wearing.Rolling, tmp_path: Path) -> None:
     """Against jumps of a quarter."""
-    wheel = given(tmp_path, table(rolling, 1)[0], "kinematics.places=24")
+    wheel = given(tmp_path, table(rolling, 1)[0], *FEW)
     whole, _, told = depth_of(wheel, 1e5)
     fine, _, less = depth_of(wheel, 1e5, 4)
     assert 0 < np.abs(whole - fine).max() < told and less < told
@@ -499,12 +500,12 @@ def test_the_error_of_jumps_by_a_file_is_less_than_they_tell(rolling: wearing.Ro
 def test_a_place_wears_as_a_wheel_that_runs_everywhere_as_there(rolling: wearing.Rolling, tmp_path: Path) -> None:
     """Where the force is largest, against a file in which it is as large all round."""
     columns = table(rolling, 1)[0]
-    n = int(columns["normal_force_N"][:PLACES].argmax())
-    same = {k: v if k in ("time_s", "angle_rad") else np.full_like(v, v[n]) for k, v in columns.items()}
+    n = int(columns["normal_force_N"][:PLACES:2].argmax())  # of every second place, as the wheel of the file has them
+    same = {k: v if k in ("time_s", "angle_rad") else np.full_like(v, v[2 * n]) for k, v in columns.items()}
     areas = []
     for folder, table_ in ((tmp_path / "waves", columns), (tmp_path / "same", same)):
         folder.mkdir()
-        areas.append(depth_of(given(folder, table_), 1e5)[1].depth[0, n].sum())
+        areas.append(depth_of(given(folder, table_, *FEW), 1e5)[1].depth[0, n].sum())
     assert areas[0] == pytest.approx(areas[1], rel=1e-4)
 
 

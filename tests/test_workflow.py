@@ -142,16 +142,29 @@ def stopped(*_: object, **__: object) -> None:
     raise Stopped
 
 
-@pytest.mark.drawn
-def test_products_of_the_whole_chain_are_complete(box: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    job = open_job(box, root=box)
-    page, converged = running.run_body(job)
+def answered(box: Path, job: Job, wanted: response.Wanted, *names: str) -> Path:
+    """The page of a chain, which is whole, with products beside it."""
+    page, converged = running.run_body(job, wanted=wanted)
     assert converged and page == box / "build/box/report.html"
-    build = box / "build" / "box"
     text = page.read_text()
     assert text.rstrip().endswith("</html>") and "Hz" in text and 'src="http' not in text
-    for name in ("basis.h5", "response.csv", "response.json", "pictures/response.png"):
-        assert (build / name).stat().st_size > 100, name
+    for name in ("basis.h5", "response.csv", "response.json", *names):
+        assert (page.parent / name).stat().st_size > 100, name
+    return page
+
+
+def test_products_of_a_chain_without_pictures_are_complete(box: Path) -> None:
+    job, wanted, told = open_job(box, root=box), response.Wanted("all", False), list[str]()
+    answered(box, job, wanted)
+    running.run_body(job, report=told.append, wanted=wanted)
+    assert sum("is up to date" in t for t in told) == 4
+
+
+@pytest.mark.slow
+@pytest.mark.drawn
+def test_products_of_the_whole_chain_are_complete(box: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    job, build = open_job(box, root=box), box / "build" / "box"
+    page = answered(box, job, response.ALL, "pictures/response.png")
     drawn = json.loads(store.sidecar_path(page).read_text())["files"] if store.sidecar_path(page).is_file() else {}
     assert not drawn or {f"pictures/{name}.png" for name in ("mesh", "interfaces", "compliance")} <= set(drawn)
     assert all((build / name).stat().st_size > 1000 for name in drawn)
@@ -387,7 +400,8 @@ def test_what_a_path_means(tmp_path, monkeypatch):
         places.meant(Path("geometry"), case=True)
 
 
-FEW = ["sweep.start=350.0", "sweep.stop=420.0", "sweep.points=5", "sweep.normal_forces=[100.0]", "harmonics=1"]
+FEW = ["sweep.start=350.0", "sweep.stop=420.0", "sweep.points=5", "sweep.normal_forces=[100.0]", "harmonics=1",
+       "samples=24", "contacts.0.points=[2,2]", "contacts.1.points=[2,2]"]  # fmt: skip
 
 
 def resonance(at: Path, how: response.Wanted) -> dict[str, float]:

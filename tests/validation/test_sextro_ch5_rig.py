@@ -33,8 +33,8 @@ class Rig:
     result: CaseResult
 
 
-def meshed(case: str, folder: Path) -> tuple[Path, CaseSettings, dict[str, ModalBasis]]:
-    """The case with 6 x 2 points a contact, and its bodies of coarse elements."""
+def meshed(case: str, folder: Path, coarser: float = 1.0) -> tuple[Path, CaseSettings, dict[str, ModalBasis]]:
+    """The case with 6 x 2 points a contact, and its bodies of coarse elements, or of `coarser` ones."""
     path = ROOT / f"pipeline/cases/{case}.toml"
     settings, _ = load_case(path, list(BAND))
     few = tuple(c.model_copy(update={"points": (6, 2)}) for c in settings.contacts)
@@ -44,7 +44,8 @@ def meshed(case: str, folder: Path) -> tuple[Path, CaseSettings, dict[str, Modal
     bodies = {}
     for b in settings.components:
         name = b.body or b.name
-        coarse = ["mesh.size=16"] if "blade" in name else ["mesh.size=30", "mesh.local={contact=8}"]
+        size, local = 30 * coarser, f"mesh.local={{contact={8 * coarser:g}}}"
+        coarse = [f"mesh.size={16 * coarser:g}"] if "blade" in name else [f"mesh.size={size:g}", local]
         job = open_job(ROOT / f"geometry/{files[name]}.toml", ["output.gauss=false", *coarse], folder)
         bodies[b.name] = read_basis(modes_stage(job)[0])
     return path, settings.model_copy(update={"contacts": few}), bodies
@@ -67,7 +68,7 @@ def second(tmp_path_factory) -> Rig:
 
 def test_sticking_frequencies_at_780_newton(tmp_path: Path) -> None:
     """The printed ones, as below, of the linear system alone."""
-    path, settings, bodies = meshed("rig", tmp_path)
+    path, settings, bodies = meshed("rig", tmp_path, coarser=1.5)
     assembly = build(settings, bodies, path).pressed(780.0)
     found = stuck(assembly.joined(1), assembly.stiffness)
     for printed in PRINTED:

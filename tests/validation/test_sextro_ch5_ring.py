@@ -102,6 +102,7 @@ def test_order_12_of_an_inclined_shroud_is_best_where_it_no_longer_separates(rin
     assert (np.diff([h.stress for h in two]) > 0).all()
 
 
+@pytest.mark.slow
 def test_the_stress_at_the_foot_is_that_of_bending(ring: study.Ring) -> None:
     """Against E times the strain of the gauge 20 mm above the clamp: more, by up to a factor of three, for there it
     bends more and the edge is singular."""
