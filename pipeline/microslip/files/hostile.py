@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 import os
+import signal
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
@@ -164,11 +166,13 @@ with h5py.File(path, "r") as file:
 _GUARD = """
 import sys
 from pathlib import Path
-path, memory, source, code = Path(sys.argv[1]), int(sys.argv[2]), sys.argv[3], sys.argv[4]
+path, memory, seconds = Path(sys.argv[1]), int(sys.argv[2]), int(sys.argv[3])
+source, code = sys.argv[4], sys.argv[5]
 sys.path.insert(0, source)
 try:
     import resource
     resource.setrlimit(resource.RLIMIT_AS, (memory, memory))
+    resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds + 1))
 except (ImportError, ValueError, OSError):
     pass  # not on Windows
 try:
@@ -180,19 +184,29 @@ except Exception:
 """
 
 
+WAITS = 10
+"""How many times the processor time that a trial may take it is waited for: others may be at work, or it may sleep."""
+
+
 def trial(code: str, path: Path, seconds: float = 20.0) -> str:
     """Run `code` on a file (it sees ``path``) in a process of its own, whatever becomes of it.
+
+    Args:
+        seconds: of processor time that it may take, beside some for the size of the file.
 
     Returns:
         Nothing if the process came to an end, with a result or a Python exception; else what happened.
     """
     size = path.stat().st_size
+    seconds = math.ceil(seconds + size / 1e7)
     environment = {**os.environ, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
-    words = [str(path.resolve()), str((4 << 30) + 100 * size), str(Path(__file__).parents[2]), code]
+    source = str(Path(__file__).parents[2])
+    words = [str(path.resolve()), str((4 << 30) + 100 * size), str(seconds), source, code]
+    command = [sys.executable, "-c", _GUARD, *words]
     try:
-        done = subprocess.run(
-            [sys.executable, "-c", _GUARD, *words], capture_output=True, env=environment, timeout=seconds + size / 1e7
-        )
+        done = subprocess.run(command, capture_output=True, env=environment, timeout=WAITS * seconds)
     except subprocess.TimeoutExpired:
+        return "does not come to an end"
+    if -done.returncode == getattr(signal, "SIGXCPU", None):
         return "does not come to an end"
     return {0: "", 7: "wants too much memory"}.get(done.returncode, "crashes")
