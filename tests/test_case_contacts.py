@@ -118,13 +118,13 @@ def built(raw: dict[str, Any]) -> Any:
 
 @pytest.fixture
 def unestimated(monkeypatch: pytest.MonkeyPatch) -> None:
-    """What the harmonics leave is not estimated in slow tests that look at the balance alone; rigid patches are."""
+    """What harmonics leave is not estimated where the balance alone is looked at."""
     monkeypatch.setattr(_Left, "out", lambda *_: [])
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("patch", ["nodal", "rigid"])
-def test_a_beam_whose_patch_deforms_on_the_ground(patch: str, request: pytest.FixtureRequest) -> None:
+def test_a_beam_whose_patch_deforms_on_the_ground(patch: str, request: Any) -> None:
     """It converges, and says how many deformations there are."""
     if patch == "nodal":
         request.getfixturevalue("unestimated")
@@ -422,7 +422,8 @@ normal_stiffness = 1e9
 tangential_stiffness = 8e8
 friction = 0.3
 """
-    case.write_text(text.replace("friction = 0.3", 'friction = 0.3\nlaw = "jenkins"'))  # soon compiled
+    jenkins = 'friction = 0.3\nlaw = "jenkins"'  # soon compiled
+    case.write_text(text.replace("friction = 0.3", jenkins))
     assert main(["respond", str(case), "--no-pictures", "--no-stress", "-q"]) == 0
     before = {p: p.read_bytes() for p in tmp_path.rglob("*") if p.is_file()}
     for old, new, words in (
@@ -498,8 +499,8 @@ print(code, own[1] if own else resource.getrusage(resource.RUSAGE_SELF).ru_maxrs
     "keys", [{"harmonics": 6, "samples": 96, "contacts.right.points": [60, 60]}, {"harmonics": 24, "samples": 500}]
 )
 def test_the_estimated_memory_is_that_of_a_response_within_a_factor_of_two(tmp_path, monkeypatch, keys) -> None:
-    """Peak of a process of its own: derivatives of many points, tangents of many harmonics and samples. All of them
-    stick, so that few steps of Newton's method need all that memory."""
+    """Peak of a process of its own: derivatives of many points, tangents of many harmonics and
+    samples. All of them stick, so that few steps of Newton's method need all that memory."""
     words = sample_case(tmp_path, monkeypatch, cycles=4, amplitude=1e-3, **keys)
     done = subprocess.run([sys.executable, "-c", PEAK, "respond", *words, "-q"], capture_output=True, text=True)
     code, peak = done.stdout.split()[-2:]

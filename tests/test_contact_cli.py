@@ -249,12 +249,11 @@ ALTERNATIVES = {
 }
 
 
-ALSO = ("table", "gaussian", "exponential")  # heights in a table as a profile has them, and others cut off
+ALSO = ("table", "gaussian", "exponential")  # tables of heights, as a profile becomes one
+KINDS = [pytest.param(k, marks=pytest.mark.slow) if k in ALSO else k for k in ALTERNATIVES]
 
 
-@pytest.mark.parametrize(
-    "kind", [pytest.param(k, marks=pytest.mark.slow) if k in ALSO else k for k in ALTERNATIVES]
-)
+@pytest.mark.parametrize("kind", KINDS)
 def test_other_sources_and_heights(kind: str, tmp_path: Path) -> None:
     """Each is a law whose force rises from 0, whose stiffness is its slope, and whose P is held by friction."""
     stiffness, roughness = ALTERNATIVES[kind]

@@ -151,7 +151,8 @@ def test_cycles_go_on_until_the_sliders_have_settled(name: str, enough: int) -> 
     values, transform = fourier(u.shape[2] // 2, 32)
     path = np.tile(np.einsum("sh,nkh->snk", values, u), (enough, 1, 1))
     force = np.array(MARCHED(example.law, path, example.period / 32, example.law.init(len(u)))[0])
-    short, long = (np.einsum("hs,snk->nkh", transform, force[32 * (n - 1) : 32 * n]) for n in (2, enough))
+    cycles = (force[32 * (n - 1) : 32 * n] for n in (2, enough))
+    short, long = (np.einsum("hs,snk->nkh", transform, cycle) for cycle in cycles)
     how = {"samples": 32, "count": 20, "periodicity": 1e-9}
     ended = np.array(force_alone(example.law, u, example.period, **how))
     largest = np.abs(long).max()

@@ -190,9 +190,10 @@ def test_a_rough_contact_whose_load_swings_is_of_second_order_in_the_samples(swi
     samples, found = (64, 256, 2048), []
     for s in samples:
         path = motion(2 * np.pi / s * np.arange(4 * s)[:, None])
-        force = marched(law, np.pad(path, ((0, 4 * 2048 - len(path)), (0, 0), (0, 0)), mode="edge"), 1 / s).force
+        longest = np.pad(path, ((0, 4 * 2048 - len(path)), (0, 0), (0, 0)), mode="edge")
+        force = marched(law, longest, 1 / s).force
         before, last = force[2 * s : 3 * s], force[3 * s : 4 * s]
-        assert np.allclose(last, before, rtol=0, atol=1e-9 * np.abs(last).max())  # what slides comes round at once
+        assert np.allclose(last, before, rtol=0, atol=1e-9 * np.abs(last).max())  # it forgets
         found.append(2 / s * np.einsum("snk,s->nk", last, np.exp(-2j * np.pi / s * np.arange(s))))
     samples, right = samples[:2], found[2]
     wrong = [np.abs(few - right)[:, 1:] for few in found[:2]]

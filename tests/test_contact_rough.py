@@ -107,7 +107,8 @@ def test_the_area_rises_from_zero_to_one_and_the_force_is_c1(law) -> None:
     assert np.all(np.diff(area) >= -1e-15) and abs(area[-1] - 1) < 1e-12
     assert np.abs(np.diff(area)).max() < 5e-4 * 5  # no jump: the steepest area here has a slope below 5
     for f in (AREA, VOLUME, ENERGY):
-        assert np.all(np.asarray(f(law, np.resize([-1.0, -1e-9, 0.0], 400))) == 0)  # the shape of above
+        nothing = np.asarray(f(law, np.resize([-1.0, -1e-9, 0.0], 400)))  # the program of above
+        assert np.all(nothing == 0)
 
 
 @each(ALL)
