@@ -30,7 +30,8 @@ if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:  # as in a shell's backgro
 
 
 QUICK = (
-    "--xla_cpu_use_fusion_emitters=false --xla_backend_optimization_level=0 --xla_cpu_parallel_codegen_split_count=1"
+    "--xla_cpu_use_fusion_emitters=false --xla_backend_optimization_level=0 --xla_cpu_parallel_codegen_split_count=1 "
+    "--xla_llvm_disable_expensive_passes=true"
 )
 """Compile in a quarter of the time: a test runs a program once or twice, and each piece that a program is split into
 costs a compiler of its own. That a user's gives the same numbers: test_conformance, the sample from a wheel."""
