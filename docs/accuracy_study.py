@@ -1,4 +1,4 @@
-"""Picture and tables of docs/accuracy.md: what the estimates and checks of a response say, against what is true."""
+"""Picture and table of docs/accuracy.md: what bounds and checks of a response say, against what is true."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def system(seed: int, **fine: Any) -> tuple[Problem, float]:
 
 
 def told(seed: int) -> dict[tuple[int, int], tuple[float, float, float]]:
-    """(harmonics, samples) -> true error, estimated error, energy that is not counted, all as shares."""
+    """(harmonics, samples) -> true error, its bound, energy that is not counted, all as shares."""
     fine, f = system(seed, **TRUE)
     exact = solve(fine, 2 * np.pi * f, [])
     right, out = abs(operating(fine, exact).outputs[0, 1]), {}
@@ -61,24 +61,24 @@ def rows(found: list[dict[tuple[int, int], tuple[float, float, float]]]) -> list
     """Of every number of harmonics and samples: errors, how many are covered, energy not counted."""
     out = []
     for H, n in sorted({key for one in found for key in one}):
-        true, estimate, counted = np.array([one[H, n] for one in found if (H, n) in one]).T
-        covered = int(((true <= estimate) | (true < 1e-4)).sum())
+        true, bound, counted = np.array([one[H, n] for one in found if (H, n) in one]).T
+        covered = int(((true <= bound) | (true < 1e-4)).sum())
         pairs = ((true, np.median), (true, np.max), (counted, np.median), (counted, np.max))
         out.append([str(H), str(n), *[f"{100 * of(x):.2g} %" for x, of in pairs], f"{covered} of {len(true)}"])
     return out
 
 
 def figure(fig: Any, found: list[dict[tuple[int, int], tuple[float, float, float]]]) -> Any:
-    """Left: estimate over true error. Right: true error and energy that is not counted over the samples."""
+    """Left: bound over true error. Right: true error and energy that is not counted over the samples."""
     left, right = fig.subplots(1, 2)
     for H, colour in zip(HARMONICS, (RED, BLUE, GREY), strict=True):
-        true, estimate, _ = np.array([one[H, 64] for one in found if (H, 64) in one]).T
-        left.loglog(100 * true, 100 * estimate, ".", color=colour, ms=6, label=f"{H} harmonic" + "s" * (H > 1))
+        true, bound, _ = np.array([one[H, 64] for one in found if (H, 64) in one]).T
+        left.loglog(100 * true, 100 * bound, ".", color=colour, ms=6, label=f"{H} harmonic" + "s" * (H > 1))
     ends = np.array([1e-4, 30.0])
     left.loglog(ends, ends, "k-", lw=0.8)
     left.annotate("as large as the error", (3e-3, 2e-3), fontsize=8, rotation=38)
-    left.set(xlabel="true error of the amplitude in %", ylabel="estimated in %", xlim=ends, ylim=ends)
-    left.set_title("printed estimate, 64 samples", fontsize=10)
+    left.set(xlabel="true error of the amplitude in %", ylabel="its bound in %", xlim=ends, ylim=ends)
+    left.set_title("the bound that is printed, 64 samples", fontsize=10)
     left.legend(fontsize=8, loc="upper left", frameon=False)
     counted = np.array([[one[3, n][2] for n in SAMPLES] for one in found if all((3, n) in one for n in SAMPLES)])
     right.loglog(SAMPLES, 100 * counted.T, color=GREY, lw=0.5)

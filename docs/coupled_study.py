@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 from damper_study import Bases, opened
-from ring_study import Highest, frf, highest
+from ring_study import Highest, amplitudes, frf, highest
 
 from microslip.case.problem import problem_of
 from microslip.data import Array, ModalBasis
@@ -44,7 +44,7 @@ def over_forces(case: str, forces: Sequence[float], bases: Bases, *changes: str)
         peaks = filter(None, (response.highest(problem, swept, bracket) for bracket in brackets(swept)))
         sizes = [(size, point.Omega / (2 * np.pi)) for point, size in peaks]
         size, frequency = max(sizes, default=(np.nan, np.nan))
-        found.append(StressedResonance(normal, frequency, size, (BAND, np.abs(swept.monitor))))
+        found.append(StressedResonance(normal, frequency, size, (BAND, swept.columns()["amplitude_m"])))
     return found
 
 
@@ -67,7 +67,7 @@ def dampers(basis: ModalBasis) -> tuple[list[tuple[float, Highest]], list[tuple[
     built = opened("multicoupling", lambda _: basis)
     problems = {normal: problem_of(built, normal) for normal in DAMPER}
     found = [(normal, highest(p, basis, WIDE)) for normal, p in problems.items()]
-    return found, [(normal, np.abs(frf(problems[normal], SHOWN).monitor)) for normal in (10.0, 30.0, 300.0)]
+    return found, [(normal, amplitudes(problems[normal], SHOWN)) for normal in (10.0, 30.0, 300.0)]
 
 
 def dampers_picture(

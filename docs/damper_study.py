@@ -25,8 +25,8 @@ Bases = Callable[[str], ModalBasis]
 
 @dataclass(frozen=True)
 class Curve:
-    """A response: frequency (f,) in Hz, first harmonics (f, w) of the read-outs, which points converged (f,), and the
-    largest share of a contact's points and time that would be open there (f,)."""
+    """A response: frequency (f,) in Hz, first harmonics (f, w) of the read-outs, nan where a point is no solution,
+    which points converged (f,), and the largest share of a contact's points and time that would be open there (f,)."""
 
     frequency: Array
     outputs: Array
@@ -60,10 +60,11 @@ def followed(problem: Problem, frequency: Array, finer: int = 3) -> Curve:
     for _ in range(finer):
         points = _halved(problem, points)
     seen = [operating(problem, p) for p in points]
-    first = np.array([o.outputs[:, 1] for o in seen])
+    solved = np.array([p.converged for p in points])
+    first = np.where(solved[:, None], [o.outputs[:, 1] for o in seen], np.nan)
     lifted = np.array([max((float(c.open.mean()) for c in o.cycles.values()), default=0.0) for o in seen])
     frequency = np.array([p.Omega for p in points]) / (2 * np.pi)
-    return Curve(frequency, first, np.array([p.converged for p in points]), lifted)
+    return Curve(frequency, first, solved, lifted)
 
 
 def _halved(problem: Problem, points: list[Point]) -> list[Point]:

@@ -7,36 +7,18 @@ from typing import Any
 
 import numpy as np
 
-from microslip.case import checkpoint, load_case, run_case
+from microslip.case import checkpoint, load_case
 from microslip.case.assemble import build
 from microslip.case.problem import problem_of
 from microslip.data import ModalBasis
-from microslip.harmonic_balance.checkpoint import labels, record
+from microslip.harmonic_balance.checkpoint import record
 from microslip.harmonic_balance.response import operating
-from microslip.harmonic_balance.solver import Point, sweep
-from microslip.results import response_of
-from microslip.stages.assessment import Assessment, assess
+from microslip.harmonic_balance.solver import sweep
 
 CASES = Path(__file__).parents[1] / "pipeline" / "cases"
 AT_SPEED = ("mesh.size=12", "rotation={speeds_rpm=[3000.0], point=[0.0, 0.0, -250.0]}", "output.gauss=false")
-
-
-def assessed(basis: ModalBasis) -> Assessment:
-    """The stresses of the blade case round its first resonance, driven by 3 N."""
-    changes = ["sweep.start=120", "sweep.stop=240", "sweep.points=61", "amplitude=3.0"]
-    settings, raw = load_case(CASES / "blade.toml", changes)
-    result = run_case(settings, basis, CASES / "blade.toml")
-    name = next(iter(result.built.bodies))
-    head = checkpoint.head_of(result.built, raw, {name: ""}, {name: ""})
-    points: dict[str, dict[float, dict[str, Any]]] = {}
-    for normal, r in result.responses.items():
-        problem = problem_of(result.built, normal)
-        solved = [Point(2 * np.pi * f, x, s, 0.0, 0) for f, x, s in zip(r.frequency, r.x, r.status, strict=True)]
-        rows = [record(problem, p, operating(problem, p)) for p in solved]
-        points[checkpoint.series_name(normal)] = {row["frequency"]: row for row in rows}
-    told = {"parameters": {name: {"normal_force": n} for name, n in zip(points, result.responses, strict=True)}}
-    response = response_of({**head, **told, "labels": labels(problem)}, points)
-    return assess(response, basis, settings.monitor or "", limits=settings.material_limits)
+DRIVEN = """--set name=blade-at-3000-rpm --set body=blade-at-speed --set amplitude=3.0 --set sweep.start=120
+    --set sweep.stop=240 --set sweep.points=31 --set sweep.normal_forces=[100.0,300.0]""".split()
 
 
 def maps(basis: ModalBasis, normal: float, hertz: float) -> list[Any]:

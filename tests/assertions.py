@@ -1,7 +1,7 @@
 """How many assertions the tests make, by kind: ``python tests/assertions.py [folder]``.
 
-A mathematical one compares numbers: with a tolerance, by order, or for equality of what is no text. One of wording looks
-into a text, or expects a refusal. What is left tells true from false.
+A mathematical one compares numbers: with a tolerance, by order, or for equality of what is no
+text. One of wording looks into a text, or expects a refusal. What is left tells true from false.
 """
 
 from __future__ import annotations

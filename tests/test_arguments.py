@@ -6,8 +6,10 @@ from __future__ import annotations
 import math
 import re
 
+import jax.numpy as jnp
 import numpy as np
 import pytest
+import scipy.sparse as sp
 
 import microslip as ms
 from microslip.contact.friction import Coulomb
@@ -28,10 +30,10 @@ SYSTEM = ["x", 3.0, None, [], NAN]
 FUNCTION = ["x", 3.0, None]
 MATRIX = ["x", NAN, INF, [], {}, None, RAGGED, [["a"]], np.zeros((2, 3)), np.zeros((1, 1, 1)), 1e200]
 FREQUENCIES = ["x", NAN, INF, [], None, {}, -1.0, 0.0, [[0.1, 0.2]], ["a"], [0.1, NAN], object(), 1e200, 1j]
-PLACE = ["x", NAN, INF, {}]
+PLACE = ["x", NAN, INF, {}, 1.5, -1]
 FILE = [3.0, None, [], NAN]
 FORCE = ["x", NAN, {0: NAN}, {0: "a"}, {"a": 1.0}, {0: None}, {0: INF}, [], [1.0, 2.0], {1.5: 1.0}, {0: [1.0]},
-         {NAN: 1.0}, {0: 1e200}]  # fmt: skip
+         {NAN: 1.0}, {0: 1e200}, {-1: 1.0}]  # fmt: skip
 
 
 def without_none(kind):
@@ -60,14 +62,14 @@ def dynamics(**more):
 BRUSSELATOR = dynamics()
 STATE = {"xi": 1e-3, "eta": 0.0, "phi": 0.1, "a": 8e-3, "b": 4e-3, "normal_force": 8e4, "friction": 0.3, "shear": 8e10,
          "poisson": 0.28}  # fmt: skip
-POISSON = [*NOT_NEGATIVE, 0.7]
+POISSON, FRICTION = [*NOT_NEGATIVE, 0.7], [*NOT_NEGATIVE, 30.0]
 STATES = {"xi": NUMBER, "eta": NUMBER, "phi": NUMBER, "a": POSITIVE, "b": POSITIVE, "normal_force": POSITIVE,
-          "friction": NOT_NEGATIVE, "shear": POSITIVE, "poisson": POISSON}  # fmt: skip
+          "friction": FRICTION, "shear": POSITIVE, "poisson": POISSON}  # fmt: skip
 MODEL = {"elements": [20, "ab", None, (20.5, 20), (1, 4), (20,), (NAN, 4), [[4, 4]]], "distribution": WORD,
          "coefficients": WORD}  # fmt: skip
 ARC = ms.circle(0.3)
 TRACK = ms.Track(ms.circle(0.5), ARC, 0.46, 0.75, 0.75, Elastic(1e11, 8e10, 0.28))
-SHARED = {"pose": [3, None, "x"], "vertical": NOT_NEGATIVE, "friction": NOT_NEGATIVE, "track": SYSTEM}
+SHARED = {"pose": [3, None, "x"], "vertical": NOT_NEGATIVE, "friction": FRICTION, "track": SYSTEM}
 
 CALLS = [
     (ms.fastsim, STATE, {
@@ -89,7 +91,7 @@ CALLS = [
         "wheel": SYSTEM, "rail": SYSTEM, "radius": POSITIVE, "wheel_at": POSITIVE, "rail_at": POSITIVE,
         "elastic": [*SYSTEM, (1e11, 8e10, 0.28)],
     }),
-    (ms.Pose, {}, {"lateral": NUMBER, "yaw": NUMBER, "roll": NUMBER, "speed": POSITIVE,
+    (ms.Pose, {}, {"lateral": NUMBER, "yaw": [*NUMBER, 10.0], "roll": [*NUMBER, -2.0], "speed": POSITIVE,
                    "turning": without_none(NOT_NEGATIVE)}),
     (ms.patches, {"track": TRACK, "pose": ms.Pose(), "side": "right", "vertical": 1e5}, SHARED | {"side": WORD}),
     (ms.axle, {"track": TRACK, "pose": ms.Pose(), "vertical": 1e5}, SHARED | {"even": TRUTH}),
@@ -112,8 +114,8 @@ CALLS = [
      {"ring": SYSTEM, "frequency": ["x", NAN, None, []], "amplitude": ["x", NAN, None, [], [1.0]]}),
     (ms.structure, {"M": 1.0, "K": 1.0, "C": 0.1, "force": {0: 0.3}}, {
         "M": MATRIX, "K": MATRIX, "force": FORCE, "steady": FORCE, "second_force": FORCE, "name": TEXT,
-        "elements": ["x", 3.0, [1.0], {}, ["x"], NAN],
-        "output": ["x", NAN, 1.5, [NAN], ["x"], [None], [[0]], 5, {}, -7, INF],
+        "elements": ["x", 3.0, [1.0], {}, ["x"], NAN, 2 * [ms.jenkins(1.0, 0.5, name="a")]],
+        "output": ["x", NAN, 1.5, -1, [NAN], ["x"], [None], [[0]], 5, {}, -7, INF],
         "damping_ratio": ["x", NAN, INF, -0.1, 1.0, {}, [[0.1]], [], None, ["a"], [0.1, 0.2]],
     } | optional(C=MATRIX)),
     (ms.polynomial, {"stiffness": {3: 1.0}}, {
@@ -132,19 +134,21 @@ CALLS = [
     (ms.Element, {"law": ms.jenkins(1.0, 1.0).law, "at": 0},
      {"law": SYSTEM, "at": PLACE, "to": PLACE, "along": WORD, "name": TEXT, "length": without_none(POSITIVE)}),
     (ms.Dynamics, {"rate": rate, "labels": ("x", "y"), "scale": np.ones(2)}, {
-        "rate": FUNCTION, "labels": [3, None, (), "x", (1, 2), NAN], "parameter_scale": POSITIVE,
+        "rate": FUNCTION, "labels": [3, None, (), "x", (1, 2), NAN, ("x", "x")], "parameter_scale": POSITIVE,
         "scale": [1.0, "x", NAN, None, [1.0], [1.0, NAN], [1.0, -1.0], [1.0, 0.0], [], {}],
-        "outputs": [3, NAN, (1,)], "units": [3, NAN, (1,)], "bends": ["x", 3.0, NAN, np.eye(3)],
+        "outputs": [3, NAN, (1,), ("a",)], "units": [3, NAN, (1,), ("m",)], "bends": ["x", 3.0, NAN, np.eye(3)],
     } | optional(frequency=FUNCTION, read=FUNCTION)),
     (ms.harmonic_response, {"system": SLIDER, "frequency": [0.1]},
      {"system": SYSTEM, "frequency": FREQUENCIES, "unit": WORD, **BALANCE}),
     (ms.two_tones, {"system": TWO, "first": 0.2, "second": 0.13}, {
         "system": SYSTEM, "first": FREQUENCIES, "second": FREQUENCIES, "free": TRUTH, "unit": WORD, **BALANCE,
-        "turns": without_none(COUNT), "start": ["x", 3.0], "kept": ["x", 3.0],
+        "samples": [*without_none(COUNT), 19],
+        "turns": [*without_none(COUNT), 19], "start": ["x", 3.0], "kept": ["x", 3.0],
     }),
     (ms.follow, {"system": SLIDER, "start": 0.1, "stop": 0.2}, {
         "system": SYSTEM, "start": POSITIVE, "stop": POSITIVE, "over": WORD, "unit": WORD, **BALANCE,
-        "frequency": without_none(POSITIVE), "settings": ["x", 3.0, [0], {3: 1}],
+        "frequency": [*without_none(POSITIVE), 0.15],
+        "settings": ["x", 3.0, [0], {3: 1}, {"low": 0.1}, {"high": 0.2}, {"direction": -1}],
     }),
     (ms.backbone, {"system": SLIDER, "low": 1e-3, "high": 1.0}, {
         "system": SYSTEM, "low": POSITIVE, "high": [*POSITIVE, 1e-4], "mode": [*WHOLE, 5], "output": [*WHOLE, 5],
@@ -154,6 +158,8 @@ CALLS = [
         "system": SYSTEM, "frequency": POSITIVE, "second": without_none(POSITIVE), "unit": WORD, "settle": WHOLE,
         "keep": COUNT, "samples": COUNT, "steps": without_none(COUNT), "method": WORD, "tolerance": POSITIVE,
         "file": [*without_none(FILE), ""], "report": FUNCTION,
+        "start": ["x", 3, None, [], {"a": 1}, {"displacement": {-1: 1.0}}, {"velocity": {0.5: 1.0}}, {"mode": 1},
+                  {"mode": 0, "amplitude": 1.0}, {"mode": 1, "amplitude": "x"}, {"displacement": [1.0, 2.0]}],
     }),
     (ms.integrate_many, {"system": SLIDER, "frequency": 0.24, "displacements": [[0.1]], "velocities": [[0.0]]}, {
         "system": SYSTEM, "frequency": POSITIVE, "unit": WORD, "settle": WHOLE, "keep": COUNT,
@@ -161,23 +167,26 @@ CALLS = [
         "velocities": ["x", NAN, [], [[NAN]], [0.1], None, [[0.0], [0.0]], {}], "steps": without_none(COUNT),
     }),
     (ms.run_up, {"system": SLIDER, "start": 0.1, "stop": 0.2, "time": 20.0}, {
-        "system": SYSTEM, "start": POSITIVE, "stop": POSITIVE, "time": POSITIVE, "unit": WORD, "order": COUNT,
+        "system": SYSTEM, "start": POSITIVE, "stop": [*POSITIVE, 0.1], "time": POSITIVE, "unit": WORD, "order": COUNT,
         "euler": ["x", 3.0, None, (1,), NAN], "samples": COUNT, "steps": without_none(COUNT), "begin": WORD,
         "file": [*without_none(FILE), ""], "report": FUNCTION,
     }),
     (ms.bifurcate, {"system": BRUSSELATOR, "start": 1.5, "stop": 1.6, "orbits": False}, {
-        "system": SYSTEM, "start": NUMBER, "stop": [*NUMBER, 1.5], "x": ["x", NAN, [1.0], [NAN, 1.0], [[1.0, 1.0]], {}],
-        "frequency": without_none(POSITIVE), "unit": WORD, "orbits": TRUTH, "doublings": WHOLE, "starts": COUNT,
-        "attractors": ["x", NAN, None, [NAN], ["a"]], "deflate": ["x", NAN, None, [NAN], ["a"]], "nodes": COUNT,
-        "step": POSITIVE, "points": COUNT, "report": FUNCTION,
+        "system": [*SYSTEM, lambda p: None, lambda p: "x"], "start": NUMBER, "stop": [*NUMBER, 1.5],
+        "x": ["x", NAN, [1.0], [NAN, 1.0], [[1.0, 1.0]], {}],
+        "frequency": [*without_none(POSITIVE), 3.0], "unit": WORD, "orbits": TRUTH, "doublings": WHOLE, "starts": COUNT,
+        "attractors": ["x", NAN, None, [NAN], ["a"], [5.0], [1.55]],
+        "deflate": ["x", NAN, None, [NAN], ["a"], [5.0], [1.55]], "nodes": COUNT,
+        "step": [*POSITIVE, 5], "points": COUNT, "report": FUNCTION,
     }),
     (ms.stability, {"body": FLUTTER}, {
         "body": [3.0, None, NAN, [], (1.0,), ([[1]], [[1]], [["a"]]), ([[NAN]], [[0.0]], [[1.0]]),
-                 ([[1.0]], [[0.0]], [[1.0, 2.0]])],
+                 ([[1.0]], [[0.0]], [[1.0, 2.0]]),
+                 *(([[1.0]], [[0.0]], sp.csr_matrix([[K]])) for K in (1 + 0.5j, NAN))],
         "frequency": ["x", 3.0, (1.0,), (NAN, 1.0), ("a", 1.0), (2.0, 1.0), (1.0, 1.0), [], (-1.0, NAN)],
         "growth": ["x", 3.0, (1.0,), (NAN, 1.0), None, (1.0, -1.0)], "over": [3.0, NAN, ""],
         "values": ["x", 3.0, [NAN], [], [1.0, 2.0]], "at": ["x", 3.0, {"a": 1.0}, {"a": "x"}, NAN],
-        "accuracy": POSITIVE, "neutral": NOT_NEGATIVE, "certify": TRUTH, "speed": without_none(WHOLE),
+        "accuracy": POSITIVE, "neutral": NOT_NEGATIVE, "certify": TRUTH, "speed": [*without_none(WHOLE), 0],
         "report": FUNCTION,
     }),
     (ms.Scatter, {"of": "frequency", "deviation": 0.01}, {
@@ -190,6 +199,7 @@ CALLS = [
         "rare": WHOLE, "seed": WHOLE, "stuck": TRUTH, "harmonics": COUNT, "points": without_none(COUNT),
         "workers": COUNT, "report": FUNCTION,
     }),
+    (ms.prepare, {}, dict.fromkeys(("double", "compiler", "cache"), TRUTH)),
     (ms.assemble, {"case": {"body": "vane"}}, {
         "case": FILE, "folder": FILE, "normal_force": without_none(NOT_NEGATIVE), "report": FUNCTION,
     }),
@@ -208,6 +218,49 @@ def test_nonsense_is_refused_by_its_name(function, good, key):
         with pytest.raises(UserError) as caught:
             function(**{**good, key: value})
         assert re.search(rf"\b{key}\b", str(caught.value)), (value, str(caught.value))
+
+
+def test_what_may_be_of_several_kinds_says_of_which() -> None:
+    """No word of TOML, and not one of the kinds alone."""
+    for call, said in (
+        (lambda: ms.integrate(SLIDER, 0.24, start="x"), "start: is 'x'; give 'static', 'rest', 'balance' or a dict"),
+        (lambda: ms.integrate(SLIDER, 0.24, file=""), "file: must not be empty"),
+        (lambda: ms.modes(5), "body: is 5; give a path, text or a dict"),
+        (lambda: ms.follow(SLIDER, 0.1, 0.2, settings=3), "settings: is 3; give Settings or a dict"),
+    ):
+        with pytest.raises(UserError, match=re.escape(said)):
+            call()
+
+
+@pytest.mark.parametrize("given", [1.0, [1.0, 2.0, 3.0], [1, 2], [1j, 2j]])
+def test_a_rate_or_a_read_out_of_another_shape_or_kind_is_refused(given) -> None:
+    for key in ("rate", "read"):
+        made = dynamics(**{key: lambda *_: jnp.asarray(given)})
+        with pytest.raises(UserError, match=f"Dynamics: {key}: gives"):
+            ms.bifurcate(made, 1.5, 1.6, orbits=False)
+
+
+def test_what_is_linear_has_no_bifurcation_and_no_normal_force() -> None:
+    plain, spring = (ms.structure(1.0, 1.0, 0.1, force={0: 1.0}, elements=e) for e in ([], [ms.polynomial({3: 1.0})]))
+    with pytest.raises(UserError, match="bifurcate: system: has no contact"):
+        ms.bifurcate(lambda p: plain, 0.5, 1.0, frequency=0.1)
+    with pytest.raises(UserError, match="over: no contact has a normal force"):
+        ms.follow(spring, 1.0, 2.0, over="normal_force", frequency=0.1)
+
+
+def test_numbers_of_what_a_result_does_not_have(tmp_path) -> None:
+    """A read-out, point, harmonic, contact, branch or kind that is not there is no zero, no empty
+    list, no IndexError."""
+    found, orbit = ms.harmonic_response(SLIDER, [0.1]), ms.integrate(SLIDER, 0.1, settle=0, keep=1, samples=8)
+    two, diagram = ms.two_tones(TWO, 0.2, 0.13, harmonics=2), ms.bifurcate(BRUSSELATOR, 1.5, 1.6, orbits=False)
+    for call in (
+        lambda: found.motion(1), lambda: found.error_estimate(0.5), lambda: found.harmonics([0]),
+        lambda: found.plot(harmonic=9), lambda: orbit.plot(read_out=1), lambda: orbit.count("slips", 1),
+        lambda: two.of(1, 0, 1), lambda: two.plot(point=1), lambda: two.error_estimate(1), lambda: diagram["x"],
+        lambda: diagram.at("x"),
+    ):  # fmt: skip
+        with pytest.raises(UserError):
+            call()
 
 
 @pytest.mark.parametrize(

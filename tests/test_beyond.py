@@ -6,8 +6,10 @@ import csv
 import json
 import subprocess
 import sys
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -19,14 +21,18 @@ from microslip.basis import read_basis, write_basis
 from microslip.case import load_case
 from microslip.case.assemble import build
 from microslip.case.beyond import Beyond
+from microslip.case.messages import what_moves
+from microslip.case.problem import problem_of
 from microslip.cli import main
 from microslip.harmonic_balance import FrequencyResponse
+from microslip.harmonic_balance.families import followed, of_frequency
 from microslip.harmonic_balance.response import operating
 from microslip.harmonic_balance.solver import solve
 from microslip.harmonic_balance.sweeps import ends, gaps
-from microslip.results import read_response
+from microslip.results import Journal, open_journal, read_response
 from microslip.stages.places import modal_files
 from microslip.time_domain.stepped import Settled, settled
+from microslip.time_domain.swept import Motions, Sweeps
 
 pytestmark = pytest.mark.usefixtures("undrawn", "unjudged")
 
@@ -96,7 +102,7 @@ def test_what_is_said_of_two_motions() -> None:
         motion(430, 70),
     ]
     rest = [motion(390, 38), motion(400, 88, True), motion(410, 81, True)]
-    said = Beyond(100.0, (410.0, 420.0), up, down, rest).sentences()
+    said = what_moves(Beyond(100.0, (410.0, 420.0), up, down, rest))
     assert (
         "from 390 to 410 Hz" in said[0]
         and "120 µm at 390 Hz" in said[0]
@@ -118,10 +124,9 @@ def test_what_is_said_of_two_motions() -> None:
         and "30 µm at 380 Hz" in said[3]
     )
     assert "irregular" in said[4] and "400 Hz" in said[4] and len(said) == 5
-    (same,) = Beyond(100.0, (410.0, 420.0), up, up[::-1]).sentences()
-    assert "same motion" in same and Beyond(100.0, why="no form in time").sentences()[0].count(
-        "no form in time"
-    )
+    (same,) = what_moves(Beyond(100.0, (410.0, 420.0), up, up[::-1]))
+    assert "same motion" in same
+    assert "no form in time" in what_moves(Beyond(100.0, why="no form in time"))[0]
 
 
 def test_a_motion_from_rest_is_that_of_the_balance(case: Path) -> None:
@@ -144,10 +149,131 @@ def case(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def test_motions_that_take_too_long_are_told_in_part() -> None:
     """Where they ended, and no verdict on what was not seen."""
     down = [motion(430, 70, True), motion(420, 75, True)]
-    cut = "Motions in time ended after 120 s, upwards before 420 Hz: ..."
-    said = Beyond(100.0, down=down, cut=cut).sentences()
-    assert "in part" in said[0] and "75 µm at 420 Hz" in said[0] and said[1] == cut
+    said = what_moves(Beyond(100.0, down=down, cut=("upwards", 420.0), patience=120.0))
+    assert "in part" in said[0] and "75 µm at 420 Hz" in said[0]
+    assert "120 s, upwards before 420 Hz" in said[1] and "sweep.patience=240" in said[1]
     assert not any("same motion" in words for words in said)
+
+
+class Bistable:
+    """In place of integrations, 1 s each: below 121 Hz a motion of 1 µm, above 102 Hz one of 10 µm,
+    each kept while it is there."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.clock, self.ends, self.asked = 0.0, np.inf, list[float]()
+        monkeypatch.setattr("microslip.time_domain.swept.settled", self)
+        none = SimpleNamespace(converged=False)
+        monkeypatch.setattr("microslip.time_domain.swept.between", lambda *_: none)
+        now = SimpleNamespace(process_time=lambda: self.clock)
+        monkeypatch.setattr("microslip.time_domain.swept.time", now)
+
+    def __call__(self, _: object, f: float, *more: object) -> Settled:
+        if len(self.asked) == self.ends:
+            raise KeyboardInterrupt
+        begin = more[1]
+        self.clock += 1.0
+        self.asked.append(f)
+        was_high = begin is not None and begin.amplitude > 5e-6 or more[2] is not None and f > 121
+        a = 1e-5 if f > 102 and (was_high or f > 121) else 1e-6
+        return Settled(f, a, a, a, a > 5e-6, [np.array([[a, 0.0]]), np.array([True])])
+
+
+def sweeps(case: Path, patience: float, journal: Journal | None = None) -> Motions:
+    """Of the bistable motion about a jump at 121 Hz; the balance knows the lower one below, the
+    higher one above."""
+    f = np.arange(90.0, 141.0, 4.0)
+    p = problem(case)
+    found = SimpleNamespace(
+        frequency=f,
+        asked=f > 0,
+        converged=f > 0,
+        monitor=np.where(f > 121, 1e-5, 1e-6),
+        x=np.zeros((len(f), 1)),
+    )
+    return Sweeps(p, found, (120.9, 121.1), 10.0, lambda _: None, patience, journal).motions()
+
+
+def table(motions: Sequence[Settled]) -> list[tuple[float, float, bool]]:
+    return [(m.frequency, m.amplitude, m.opens) for m in motions]
+
+
+def test_sweeps_find_both_ends_of_a_motion(case: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Within an eighth of a step, from above and from below; from rest it is the lower one
+    between."""
+    Bistable(monkeypatch)
+    m = sweeps(case, 1e3)
+    high = [s.frequency for s in m.down if s.opens]
+    assert m.cut is None and 102 < min(high) <= 102.5 and m.down[0].frequency == 126
+    low = [s.frequency for s in m.up if not s.opens]
+    assert 120.5 <= max(low) <= 121 and m.up[0].frequency == m.down[-1].frequency
+    assert len(m.rest) == 4 and not any(s.opens for s in m.rest)
+    said = what_moves(Beyond(10.0, (120.9, 121.1), *m[:3]))
+    assert "upwards stays on the lower one" in said[2] and "10 µm at 121.5 Hz" in said[2]
+
+
+@pytest.mark.parametrize("calls", [1, 7, 20])
+def test_motions_in_time_are_gone_on_with(
+    case: Path, monkeypatch: pytest.MonkeyPatch, calls: int
+) -> None:
+    """Interrupted, or cut for want of patience: with what was kept the answer is that of one run,
+    nothing twice, and the time counts that of both."""
+    fake = Bistable(monkeypatch)
+    whole, count = sweeps(case, 1e3), len(fake.asked)
+    fake.asked, fake.ends = [], calls
+    with open_journal(case.parent / "m", "same", {}) as journal, pytest.raises(KeyboardInterrupt):
+        sweeps(case, 1e3, journal)
+    fake.ends = np.inf
+    with open_journal(case.parent / "m", "same", {}) as journal:
+        part, fake.ends = sweeps(case, 10.0, journal), np.inf
+        assert part.cut is not None and part.cut[0] == "downwards"
+        assert len(part.down) > 4 and set(table(part.down)) <= set(table(whole.down))
+        again = sweeps(case, 1e3, journal)
+    assert [table(way) for way in again[:3]] == [table(way) for way in whole[:3]]
+    # a sweep upwards after one that was cut begins elsewhere
+    assert count <= len(fake.asked) <= count + len(part.up)
+
+
+@pytest.mark.slow
+def test_a_curve_begins_on_the_solution_of_the_sweep(case: Path) -> None:
+    """Of the two motions at 118 Hz the one that is known, with as many harmonics or more; without it the lower one."""
+    pressed = build(load_case(case)[0], {"lifting": lifting()}, case)
+    p = problem_of(pressed, 10.0)
+    low = solve(p, 2 * np.pi * 118.0, [])
+    high = max((low.x * c for c in (3.0, 5.0)), key=lambda x: np.abs(solve(p, low.Omega, [x]).x).max())
+    high = solve(p, low.Omega, [high]).x
+    assert np.abs(high).max() > 2 * np.abs(low.x).max()
+    for harmonics in (1, 2):
+        q = problem_of(pressed, 10.0, harmonics=harmonics)
+        family = of_frequency(q, 118.0, 119.0)
+        begins = {}
+        for known in (None, high):
+            x = followed(replace(family, known=known), settings={"points": 2}).points[0].x
+            begins[known is None] = np.abs(x).max()
+        assert begins[True] == pytest.approx(np.abs(low.x).max(), rel=0.1)
+        assert begins[False] == pytest.approx(np.abs(high).max(), rel=0.1)
+
+
+@pytest.mark.slow
+def test_patience_that_ends_is_told_and_more_of_it_goes_on(
+    case: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The sweep and its resonances stay, what was seen in time is in the table, the sentence says
+    where it ended and what to type; that goes on there, and leaves what was there."""
+
+    def run(patience: float) -> tuple[str, list[dict], dict]:
+        assert main(["respond", "case.toml", "--set", f"sweep.patience={patience:g}"]) == 0
+        rows = list(csv.DictReader(Path("build/lifting/motions.csv").open()))
+        return capsys.readouterr().err, rows, json.loads(Path("build/lifting/response.json").read_text())
+
+    said, rows, summary = run(1e-3)
+    ends = "Motions in time ended after 0.001 s, downwards before "
+    assert ends in said and "--set sweep.patience=0.002, which goes on from there" in said
+    assert len(rows) == 2 and "known in part" in summary["beyond"][0] and summary["resonances"]
+    begun = said.count("motion in time, ")
+    more, further, after = run(1.0)
+    assert begun == 2 and more.count("motion in time, ") >= len(further) - 2 > 0
+    assert all(row in further for row in rows) and f"{ends[:-11]}" not in more
+    assert after["resonances"] == summary["resonances"]
 
 
 @pytest.mark.slow
@@ -164,7 +290,7 @@ def test_what_is_known_is_written_before_motions_in_time(
     assert "response.html has what is known so far" in capsys.readouterr().err
     assert Path("build/lifting/response.html").read_text() and not Path("build/lifting/response.json").exists()
     rows = list(csv.DictReader(Path("build/lifting/response.csv").open()))
-    assert len(rows) > 10 and not list(Path("build/lifting").glob("motions*"))
+    assert len(rows) > 10 and not Path("build/lifting/motions.csv").exists()
 
 
 @pytest.mark.slow

@@ -415,12 +415,24 @@ def test_orbits_are_born_at_both_of_two_hopf_points_at_one_value() -> None:
     assert all("bound" in b.ended for b in orbits)
 
 
-def test_alike_parts_that_are_not_coupled_are_refused_as_what_they_are() -> None:
-    def rate(z: Any, p: Any, _: Any) -> Any:
-        return jnp.stack([*circling(z[:2], p), *circling(z[2:], p)])
+def reacting(x: Any, y: Any, p: Any) -> tuple[Any, Any]:
+    """The Brusselator."""
+    return 1 - (p + 1) * x + x * x * y, p * x - x * x * y
 
+
+@pytest.mark.parametrize("one", [lambda x, y, p: circling(jnp.stack([x, y]), p), reacting,
+                                 lambda x, y, p: (y, -x + (p - x * x) * y)])  # fmt: skip
+def test_alike_parts_that_are_not_coupled_are_refused_as_what_they_are(one: Any) -> None:
+    """Whatever Newton's method makes of them: it is lost, finds one of both, or what follows is
+    singular."""
+
+    def rate(z: Any, p: Any, _: Any) -> Any:
+        return jnp.stack([*one(z[0], z[1], p), *one(z[2], z[3], p)])
+
+    start, rest = (1.5, [1.0, 1.5] * 2) if one is reacting else (-1.0, [0.0] * 4)
+    system = Dynamics(rate, ("x", "y", "u", "v"), np.ones(4))
     with pytest.raises(UserError, match="alike and not coupled"):
-        diagram(Dynamics(rate, ("x", "y", "u", "v"), np.ones(4), 2.0), np.zeros(4), Asked(-1.0, 1.0))
+        ms.bifurcate(system, start, start + 1.5, x=rest, orbits=False)
 
 
 def test_extremes_lie_between_the_samples() -> None:

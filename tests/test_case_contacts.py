@@ -36,6 +36,7 @@ from microslip.harmonic_balance.cost import aft_bytes
 from microslip.modal.compute import modal_basis
 from microslip.settings.body import BodySettings, validate
 from microslip.stages import checkpoint
+from microslip.stages.modal import held_faces
 
 pytestmark = pytest.mark.usefixtures("undrawn", "unjudged")
 
@@ -105,6 +106,9 @@ def test_a_contact_on_a_face_that_supports_hold_is_refused(raw: dict[str, Any]) 
     assert [m for m in some.messages if "hold" in m and "% of the face 'right'" in m]
     free = build(made(raw), dict.fromkeys(["small", "a", "b"], small.basis()), PATH)
     assert not [m for m in free.messages if "of the face" in m]
+    (said,) = held_faces(clamped_beside(1.0)["small"])
+    assert said.startswith("interfaces.right: the supports hold its whole face")
+    assert held_faces(clamped_beside(0.5)["small"]) == held_faces(small.basis()) == []
 
 
 TWICE = table(**STIFF) | {"contacts": [{"interface": "right", "friction": 0.3} | STIFF] * 2}

@@ -112,6 +112,31 @@ def test_a_motion_that_settles_is_not_called_chaotic() -> None:
     assert classification.kind(found) == "settling"
 
 
+def test_what_goes_away_does_not_come_back() -> None:
+    """A free mass under a force, let go with a velocity: it goes on by V T in every period,
+    however far it has come; let go at rest it swings in its place. So do many starts."""
+    free = ms.structure(1.0, 0.0, force={0: 1.0}, output=0)
+    how = {"unit": "rad/s", "keep": 8, "samples": 16}
+    for settle in (0, 3000):
+        away = ms.integrate(free, 1.0, settle=settle, start={"velocity": {0: 0.1}}, **how)
+        assert away.repeats == 0 and away.exponent is None and classification.kind(away) == "away"
+        assert away.said == "goes away from where it was, else comes back after 1 period"
+    assert ms.integrate(free, 1.0, settle=0, start="rest", **how).repeats == 1
+    many = ms.integrate_many(free, 1.0, [[0.0], [0.0]], [[0.1], [0.0]], unit="rad/s", settle=3000, keep=8)
+    assert many.repeats.tolist() == [0, 1]
+
+
+def test_a_large_load_that_is_steady_hides_no_motion() -> None:
+    """Two masses apart, one that vibrates at two frequencies and one that a steady load holds ten
+    thousand times further away: within a thousandth of that the first had come back. What rests,
+    comes back."""
+    two = ms.structure(np.eye(2), np.diag([1.0, 2.0]), force={0: 1.0}, steady={1: 2e4}, output=0)
+    found = ms.integrate(two, np.sqrt(2), unit="rad/s", settle=0, keep=60, samples=16)
+    assert found.repeats == 0 and classification.kind(found) == "quasi-periodic"
+    still = ms.structure(1.0, 1.0, 0.1, steady={0: 1.0}, output=0)
+    assert ms.integrate(still, 1.0, unit="rad/s", settle=0, keep=8, samples=16).repeats == 1
+
+
 def test_memory_in_whole_numbers_is_said_to_have_no_exponent() -> None:
     e = equations.of(ms.structure(1.0, 1.0, 0.1, force={0: 1.0}, elements=[ms.jenkins(1.0, 0.2)]), 1.0)
     stepper = Stepper(e, 0.01)

@@ -9,8 +9,8 @@ import pytest
 from test_harmonic_balance_time import group, held
 
 from microslip.contact.sliders import jenkins
+from microslip.harmonic_balance import blocks, reduced, response
 from microslip.harmonic_balance import problem as balance
-from microslip.harmonic_balance import reduced, response
 from microslip.harmonic_balance.readout import amplitude
 from microslip.harmonic_balance.reduced import Eliminated, seen
 from microslip.harmonic_balance.solver import solve
@@ -89,3 +89,31 @@ def test_without_damping_the_resonance_of_the_stuck_contact_is_a_point_as_any(by
             assert amplitude(at, point.x, *at.forces(point.x)).value == pytest.approx(o.outputs[0, 1], rel=1e-9)
             found.append(abs(o.outputs[0, 1]))
         assert found[1] == pytest.approx(0.5 * (found[0] + found[2]), rel=1e-4)
+
+
+@pytest.mark.parametrize(
+    "pairs, row",
+    [
+        ([(0, 3), (3, 5), (5, 1), (1, 4), (4, 2), (2, 0)], True),  # a ring
+        ([(0, 3), (3, 5), (1, 4), (4, 2)], True),  # two chains
+        ([(0, 1), (1, 2), (2, 0), (3, 4), (4, 5), (5, 3)], False),  # two rings
+        ([(0, 1), (0, 2), (0, 3), (4, 5)], False),  # a star
+    ],
+)
+def test_parts_in_a_row_are_solved_one_by_one_however_they_are_numbered(pairs, row) -> None:
+    """The solution is that of the dense matrix, of the transposed one too."""
+    rng, sizes, W = np.random.default_rng(3), [2, 1, 3, 2, 1, 2], 3
+    every = [(i, i) for i in range(6)] + pairs + [(j, i) for i, j in pairs]
+    pieces = {(i, j): 0.1 * rng.normal(size=(W * sizes[i], W * sizes[j])) for i, j in every}
+    ends = np.cumsum([0, *sizes])
+    A = np.zeros((W, ends[-1], W, ends[-1]))
+    for (i, j), block in pieces.items():
+        own = block.reshape(W, sizes[i], W, sizes[j])
+        A[:, ends[i] : ends[i + 1], :, ends[j] : ends[j + 1]] = own
+    dense = np.eye(W * ends[-1]) + A.reshape(W * ends[-1], -1)
+    made = blocks.one_plus(pieces, sizes, W)
+    assert isinstance(made, blocks.Cyclic if row else blocks.Dense)
+    right = rng.normal(size=len(dense))
+    np.testing.assert_allclose(made.solve(right), np.linalg.solve(dense, right), rtol=0, atol=1e-13)
+    np.testing.assert_allclose(made.transposed.solve(right), np.linalg.solve(dense.T, right), rtol=0, atol=1e-13)
+    np.testing.assert_allclose(made.dense(), dense, rtol=0, atol=1e-15)

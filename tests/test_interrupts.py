@@ -53,6 +53,27 @@ def test_ctrl_c_at_random_moments_of_a_motion_ends_it_and_loses_nothing(
     assert all(np.array_equal(whole.array(name), found.array(name)) for name in samples.UNITS)
 
 
+def test_no_period_of_a_motion_is_computed_twice(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Ended at the 20th of 60 periods, far within the second between two states that are kept: 41 are left."""
+    looks, asked = list[int](), recorded.Asked("it", slider(), 0, 60, 16, 512)
+
+    def ended_at(number: int) -> None:
+        looks.append(number)
+        if len(looks) == number:
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(samples, "PAUSE", 1e6)
+    monkeypatch.setattr(orbit, "look", lambda: ended_at(20))
+    with pytest.raises(KeyboardInterrupt):
+        recorded.run(tmp_path / "orbit.h5", [asked])
+    looks.clear()
+    monkeypatch.setattr(orbit, "look", lambda: ended_at(-1))
+    found = recorded.run(tmp_path / "orbit.h5", [asked])[0]
+    assert len(looks) == 41
+    whole = recorded.run(tmp_path / "whole.h5", [asked])[0]
+    assert all(np.array_equal(whole.array(name), found.array(name)) for name in samples.UNITS)
+
+
 def asked_to_end(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(interrupts, "_requests", [signal.SIGINT])
     monkeypatch.setattr(interrupts, "_raised", 0)

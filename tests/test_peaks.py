@@ -388,8 +388,8 @@ def test_a_setting_that_hardly_matters_is_said_to():
         found = peaks.Optimum(3.0, tops[3.0], NO_OPTIMUM, tops, {})
         assert found.spread == pytest.approx(most / 4.2109 - 1)
         assert ("hardly matters" in optimum_message(found, "normal_force")) is word
-        beyond = "an end; look beyond it with --high above 3" in missed(found, "normal_force")
-        assert beyond is not word and ("is lowest" in optimum_message(found, "normal_force")) is not word
+        beyond = "look there with --high above 3" in (said := optimum_message(found, "normal_force"))
+        assert beyond is not word and ("is lowest" in said) is not word and not missed(found, "normal_force")
     tops[2.5] = peaks.HighestPeak(np.nan, np.nan, np.zeros(1), "not found: 3 of 9 points did not converge")
     found = peaks.Optimum(2.0, tops[2.0], "converged", tops, {})
     assert "at 2.5 N no resonance was found" in missed(found, "normal_force")

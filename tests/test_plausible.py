@@ -5,13 +5,14 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 import small
 from test_case_contacts import PATH, STIFF, made, table
 
 from microslip import plausible
 from microslip.case.assemble import build
-from microslip.case.messages import doubted
+from microslip.case.headline import bent_by, doubted
 from microslip.contact.hertz import Hertz
 from microslip.contact.solids import Solid
 from microslip.contact.study import study
@@ -90,6 +91,23 @@ def test_a_case_doubts_its_amplitude_and_the_pressure_of_its_contacts() -> None:
     basis = replace(small.basis(), provenance={"settings": '{"material": {"young": 2.1e11}}'})
     built = build(made(table(**STIFF, includes="surface")), {"small": basis}, PATH)
     assert plausible.modulus_of(basis) == 2.1e11
-    assert doubted(built, {200.0: [(400.0, 1e-3)]}, 200.0) == []
-    amplitude, pressure = doubted(built, {2e8: [(400.0, 2e-2)]}, 2e8)
+    assert doubted(built, 1e-3, 200.0) == []
+    amplitude, pressure = doubted(built, 2e-2, 2e8)
     assert "20 mm" in amplitude and "% of the modulus" in pressure
+
+
+@pytest.mark.parametrize("newtons, doubted_by", [(50.0, 0), (2e4, 1), (5e4, 2)])
+def test_a_load_in_the_wrong_unit_is_doubted_far_from_any_resonance(newtons: float, doubted_by: int) -> None:
+    """50 N bend a bar of 20 x 30 x 120 mm by 4 um, whatever is looked at; 50 kN by 4 mm, and break it. Euler and
+    Bernoulli: F L^3 / (3 E I) along each axis and M c / I of both at the root; 2 % of shear, and 10 % of
+    the stress in the singular zone that does not count."""
+    steel = replace(small.basis(), provenance={"settings": '{"material": {"young": 2.1e11}}'})
+    group = steel.groups[0, 0]
+    bent = bent_by(group, newtons * group.excitations["shaker"].rows[0])
+    (b, h, L), F = small.SIZE, newtons * np.array([1.0, 2.0]) / np.sqrt(5)
+    inertia, edge = np.array([h * b**3, b * h**3]) / 12, np.array([b, h]) / 2
+    assert bent.distance == pytest.approx(np.linalg.norm(F * L**3 / (3 * 2.1e11 * inertia)), rel=0.03)
+    assert bent.stress == pytest.approx((F * L * edge / inertia).sum(), rel=0.15)
+    raw = table(**STIFF, includes="surface") | {"amplitude": newtons}
+    said = doubted(build(made(raw), {"small": steel}, PATH), 0.0)
+    assert len(said) == doubted_by and all("under its load held still" in text for text in said)

@@ -213,6 +213,24 @@ def test_a_point_without_a_solution_says_why():
     assert len(bad) == 0 or "not converged" in repr(found)
 
 
+def test_results_say_themselves_in_a_line():
+    """Without their arrays."""
+    decay = ms.Dynamics(lambda x, p, _: -x, ("x", "y"), np.ones(2))
+    diagram = ms.bifurcate(decay, 1.0, 2.0, orbits=False)
+    wheel = ms.circle(0.46)
+    for one in (diagram, *diagram.branches, diagram.branches[0].orbit(decay, 0), wheel):
+        assert "array(" not in repr(one) and len(repr(one)) < 200 and type(one).__name__ in repr(one)
+
+
+def test_elements_of_laws_that_print_alike_keep_their_own():
+    """Equal ones are evaluated together: those whose numbers are, not those that look so in eight
+    digits or with the middle of a long array left out."""
+    springs = [Polynomial(np.array([k, 0.0, 0.1])) for k in (1.0, 1.0 + 3e-9, 1.0)]
+    contacts = ms.structure(np.eye(3), np.eye(3), elements=[ms.Element(s, i) for i, s in enumerate(springs)]).contacts
+    assert contacts[0].patch is contacts[2].patch
+    assert contacts[1].patch.law.stiffness[0] == 1.0 + 3e-9 and contacts[0].patch.law.stiffness[0] == 1.0
+
+
 def test_a_backbone_goes_from_stuck_to_free(tmp_path):
     system = ms.structure(1.0, 1.0, 0.01, force={0: 1.0}, elements=[ms.jenkins(3.0, 0.3)])
     mode = ms.backbone(system, 1e-3, 1e2, harmonics=3)

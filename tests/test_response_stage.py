@@ -22,6 +22,7 @@ from microslip.basis import read_basis, write_basis
 from microslip.case import load_case
 from microslip.data import Rows
 from microslip.errors import UserError
+from microslip.files import store
 from microslip.results import read_response
 from microslip.stages import response as making
 from microslip.stages import running
@@ -222,6 +223,44 @@ def test_what_was_spoiled_is_made_again(folder: Path) -> None:
     assert not any("up to date" in t for t in told) and computed(told) == []
     assert {p.name for p, data in whole.items() if p.read_bytes() != data} == set()
     assert any("up to date" in t for t in respond(folder, "sweep.points=3")[0])
+
+
+def test_files_of_two_runs_do_not_stand_side_by_side(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """With another load, ended before its first point: all of the first run stands. Ended at the third point: what is
+    known of the new run, and nothing of the first but a file that somebody has changed. To its end: what the new run
+    has not, a picture say, is gone."""
+    (folder / "case.toml").write_text(QUICK)
+    monkeypatch.setattr(making, "_assessed", lambda *_: None)
+    respond(folder)
+    build = folder / "build" / "vane"
+    extra = build / "pictures" / "response_of_old.png"
+    extra.write_bytes(b"old")
+    record = build / "response.record.json"
+    note = json.loads(record.read_text())
+    note["files"][f"pictures/{extra.name}"] = store.hash_file(extra)
+    record.write_text(json.dumps(note))
+    first = {p: p.read_bytes() for p in build.rglob("*") if p.is_file()}
+
+    def ended_at(begin: str, *changes: str) -> None:
+        def tell(text: str) -> None:
+            if text.startswith(begin):
+                raise KeyboardInterrupt
+
+        with pytest.raises(KeyboardInterrupt):
+            running.respond(folder / "case.toml", None, list(changes), report=tell)
+
+    ended_at("friction response at", "amplitude=3.0")
+    changed = {p for p, data in first.items() if not p.is_file() or p.read_bytes() != data}
+    assert changed <= {record, build / "response.points"}
+    (build / "response.csv").write_text("mine")
+    ended_at("3 of 4", "amplitude=3.0")
+    left = {str(p.relative_to(build)) for p in build.rglob("*") if p.is_file()}
+    assert left == {"response.points", "response.h5", "response.csv"}
+    assert not read_response(build / "response.h5").finished and (build / "response.csv").read_text() == "mine"
+    respond(folder)
+    respond(folder, "amplitude=3.0")
+    assert not extra.exists() and not list(build.glob(".*")) and record.is_file()
+    assert computed(respond(folder, "amplitude=3.0")[0]) == []  # up to date
 
 
 @pytest.mark.slow

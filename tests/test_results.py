@@ -98,13 +98,16 @@ def test_the_table_has_every_point_of_every_series() -> None:
 
 def test_what_is_no_solution_has_no_numbers_of_a_motion() -> None:
     """The point at 40 Hz did not converge: its cells are empty in the table but for how it was looked for, nan in the
-    data frame and in xarray, so that the largest of a column is one of a solution; the file keeps what there was."""
+    data frame and in xarray, so that the largest of a column is one of a solution, and so is what
+    a series says itself; `arrays` keep what there was."""
     series = sweep([10.0, 20.0, 40.0])
     last = list(csv.DictReader(response_table({5.0: series}).splitlines()))[-1]
     known = {"frequency_Hz": "40", "asked": "1", "converged_FN_5_N": "0", "iterations_FN_5_N": "4"}
     assert {name: v for name, v in last.items() if v} == {**known, "harmonics_FN_5_N": "1"}
     assert series.columns()["amplitude_m"][:2].tolist() == [30.0, 60.0]
-    assert series.to_dataframe()["amplitude_m"].max() == 60.0 and series.amplitude[2] == 120.0
+    assert series.to_dataframe()["amplitude_m"].max() == 60.0 and series.arrays["monitors/tip"][2, 0, 1] == 120.0
+    for told in (series.amplitude, series.phase, series.dissipated, series.by_slip, series.monitor("tip")[:, 0, 1]):
+        assert np.isnan(told).tolist() == [False, False, True]
     known = series.to_xarray()
     assert abs(known["monitors.tip"]).max() == 60.0 and known["iterations"].values.tolist() == [4, 4, 4]
 

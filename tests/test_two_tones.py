@@ -220,6 +220,17 @@ def test_line() -> None:
     assert commensurate(3.0, 2.0, 3) in ((2, 3), (3, 2)) and commensurate(1.0, GOLDEN, 20) is None
 
 
+def test_a_point_that_was_not_found_tells_no_motion() -> None:
+    """Amplitudes, powers, motion and torus of it are nan, in xarray and in the file too; others
+    keep theirs."""
+    found = ms.two_tones(duffing(), [1.2, 1.3], 0.8, harmonics=2, unit="rad/s")
+    lost = replace(found, status=("converged", "iteration limit"))
+    for values in (lost.of(1, 0), lost.balance, lost.to_xarray()["lost"].values, lost.supplied[:, 0]):
+        assert np.isnan(values).tolist() == [False, True]
+    assert np.isnan(lost.motion([0.3], 1)).all() and np.isnan(lost.torus(1, count=4)).all()
+    assert np.abs(lost.of(1, 0))[0] == np.abs(found.of(1, 0))[0] and "1 not converged" in repr(lost)
+
+
 def test_kept(tmp_path: Path) -> None:
     """A result comes back from its file, tabulates, draws and says itself; another kind of file is left."""
     found = ms.two_tones(duffing(), [1.2, 1.3], 0.8, harmonics=3, unit="rad/s")

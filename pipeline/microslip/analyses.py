@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
-from pydantic import BeforeValidator
+from pydantic import BeforeValidator, Field
 
 from .case.assemble import Built
 from .case.contacts import swept
@@ -23,7 +23,7 @@ from .harmonic_balance.problem import Problem
 from .harmonic_balance.solved import Motions
 from .harmonic_balance.solver import sweep
 from .settings.arguments import Count, Frequencies, Index, Rows, Text, Vector, checked
-from .settings.mistakes import bounded
+from .settings.mistakes import bounded, numbered
 from .settings.numbers import Number, Positive
 from .system.assembly import Assembly
 
@@ -190,6 +190,12 @@ def two_tones(
     for key, given, has in (("start", start, "time"), ("kept", kept, "of")):
         if given is not None and not hasattr(given, has):
             raise UserError(f"two_tones: {key}: {given!r} is none; leave it out, or see its description")
+    for key, count in (("samples", samples), ("turns", turns)):
+        if count is not None and count < 4 * harmonics:
+            raise UserError(
+                f"two_tones: {key}: {count} are too few for {harmonics} harmonics; take {4 * harmonics} at least, "
+                f"better {8 * harmonics}"
+            )
     assembly, turn = whole_of(system), 2 * np.pi * HERTZ[unit]
     one, two = (np.atleast_1d(np.asarray(f, dtype=float)) * turn for f in (first, second))
     try:
@@ -263,13 +269,22 @@ def follow(
     _bends(problem, "harmonic_response")
     if start == stop:
         raise UserError(f"stop: {stop:g} is the start too; give two ends between which the curve is followed")
+    if taken := {"direction", "low", "high"} & set(settings if isinstance(settings, Mapping) else ()):
+        raise UserError(f"settings: {min(taken)}: start and stop say where the curve goes; leave it out")
     if over == "frequency":
+        if frequency is not None:
+            raise UserError("frequency: is what varies; leave it out, or say over what the curve goes instead")
         bounded("start", start, gt=0)
         bounded("stop", stop, gt=0)
         family = families.of_frequency(problem, start * hertz, stop * hertz)
     else:
         if frequency is None:
             raise UserError(f"frequency: is missing: at which frequency does the {over.replace('_', ' ')} vary?")
+        if over == "normal_force":
+            bounded("start", start, ge=0)
+            bounded("stop", stop, ge=0)
+            if not any(c.preload[0] > 0 for c in problem.assembly.contacts):
+                raise UserError("over: no contact has a normal force; take another")
         make = families.of_load if over == "load" else families.of_normal_force
         family = make(problem, frequency * hertz, start, stop)
     found = families.from_both_ends(family, report, settings)
@@ -317,11 +332,10 @@ def backbone(
     """
     problem = balanced(system, harmonics, samples)
     count = len(problem.assembly.outputs)
-    if output >= count:
-        has = f"there are {count}, counted from 0" if count else "nothing is read; give output to structure"
-        raise UserError(f"output: there is no read-out {output}; {has}")
-    if mode >= (modes := len(problem.parts[1][0].M)):
-        raise UserError(f"mode: there is no mode {mode}; there are {modes}, counted from 0")
+    if not count:
+        raise UserError(f"output: there is no read-out {output}; nothing is read; give output to structure")
+    numbered("output", output, count, "read-out")
+    numbered("mode", mode, len(problem.parts[1][0].M), "mode")
     _bends(problem, "the eigenvalues of its matrices")
     if not high > low:
         raise UserError(f"high: {high:g} is not above low, {low:g}; give the smaller amplitude first")
@@ -481,6 +495,8 @@ def run_up(
     from .time_domain import equations, orbit, recorded
     from .time_domain.ramp import Ramp
 
+    if start == stop:
+        raise UserError("stop: is the start; give another, or integrate at one frequency")
     turn = 2 * np.pi * HERTZ[unit]
     ramp = Ramp(turn * start, turn * stop, time, order, euler)
     found = equations.of_ramp(whole_of(system), ramp)
@@ -495,7 +511,7 @@ def bifurcate(
     system: Dynamics | Callable[[float], Assembly | Built], start: Number, stop: Number, *, x: Vector | None = None,
     frequency: Positive | None = None, unit: Unit = "Hz", orbits: bool = True, doublings: Index = 1,
     attractors: Sequence[Number] = (), starts: Count = 64, deflate: Sequence[Number] = (), nodes: Count = 32,
-    step: Positive = 0.08, points: Count = 400, report: Report = lambda _: None,
+    step: Annotated[Positive, Field(le=1)] = 0.08, points: Count = 400, report: Report = lambda _: None,
 ) -> Diagram:  # fmt: skip
     """Equilibria over a parameter, their Hopf points, and the periodic orbits that are born there, stable or not.
 
@@ -532,17 +548,33 @@ def bifurcate(
 
     if start == stop:
         raise UserError("stop: is the start; give two different values of the parameter")
+    for key, asked_at in (("attractors", attractors), ("deflate", deflate)):
+        if odd := [p for p in asked_at if not min(start, stop) <= p <= max(start, stop)]:
+            raise UserError(f"bifurcate: {key}: {odd[0]:g} is not between {start:g} and {stop:g}; correct it")
+        if len(asked_at) and not orbits:
+            raise UserError(f"bifurcate: {key}: are orbits; leave them out, or orbits=False")
     if isinstance(system, diagram.Dynamics):
+        if frequency is not None:
+            raise UserError("bifurcate: frequency: is of an assembly's loads; give Dynamics its own")
         made = replace(system, parameter_scale=abs(stop - start))
         begin = np.zeros(made.count) if x is None else np.asarray(x, dtype=float)
     elif not callable(system):
         raise UserError(f"bifurcate: system: {system!r} is none; give Dynamics, or the assembly as a function of p")
     else:
+
+        def at(p: float) -> Assembly:
+            if not isinstance(found := system(p), Assembly | Built | Problem):
+                raise UserError(f"bifurcate: system: gives {found!r} at {p:g}; let it give an assembly")
+            return whole_of(found)
+
+        if not at(start).contacts:
+            raise UserError("bifurcate: system: has no contact or element, so it is linear; take stability")
         Omega = None if frequency is None else 2 * np.pi * frequency * HERTZ[unit]
-        made = mechanics.dynamics(lambda p: whole_of(system(p)), min(start, stop), max(start, stop), Omega)
-        begin = equilibrium(of(whole_of(system(start)))) if x is None else np.asarray(x, dtype=float)
+        made = mechanics.dynamics(at, min(start, stop), max(start, stop), Omega)
+        begin = equilibrium(of(at(start))) if x is None else np.asarray(x, dtype=float)
     if len(begin) != made.count:
         raise UserError(f"bifurcate: x: has {len(begin)} numbers; the system has {made.count}")
+    made.check(begin, start)
     asked = diagram.Asked(
         start, stop, orbits, doublings, nodes, step, points, tuple(attractors), starts, deflate=tuple(deflate)
     )

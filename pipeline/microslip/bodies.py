@@ -132,7 +132,7 @@ def stability(
         window = (q.asked.growth, q.asked.frequency)
         growth = window[0] if math.isinf(growth[0]) and math.isinf(growth[1]) else growth
         neutral, body, at = neutral or q.asked.neutral, q.family(), {**q.at, **(at or {})}
-        frequency = frequency or window[1]
+        frequency, speed = frequency or window[1], None
     if isinstance(body, Assembly | Built):
         equations = sliding.of(whole_of(body))
         C, K = sliding.linearised(equations, sliding.equilibrium(equations))

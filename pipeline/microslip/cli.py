@@ -575,7 +575,8 @@ def backbone(
         opened = _followed(case, basis, set_)
         with making(opened.folder / "backbone.csv", report):
             found = following.backbones(opened, mode, low, high, report)
-            files = following.write_backbones(found, opened)
+            remarks = following.remarks_on_backbones(found, opened, mode, report)
+            files = following.write_backbones(found, opened, remarks)
     for file in files:
         _say(file, quiet)
     if why := following.unreached(found):
@@ -609,7 +610,8 @@ def optimum(
         with making(opened.folder / "optimum.csv", report):
             others = following.found_before(beside, over, opened)
             found = following.optimum_over(opened, over, low, high, points, report)
-            files = following.write_optimum(found, over, opened, others)
+            remarks = following.remarks_on_optimum(found, over, opened, report)
+            files = following.write_optimum(found, over, opened, others, remarks)
     _say(following.told(found, over, opened), quiet)
     for file in files:
         _say(file, quiet)

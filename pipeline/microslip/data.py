@@ -377,6 +377,14 @@ class Interface:
     )] = field(default_factory=lambda: np.zeros((0, 3, 0)))  # fmt: skip
 
     @property
+    def held_share(self) -> float:
+        """Share of the patch's area that no coordinate of its body moves: supports hold it."""
+        if not len(self.shapes):
+            return 0.0 if self.rows.any() or self.characteristic.any() else 1.0
+        still = ~self.shapes.any(axis=(1, 2))
+        return 1.0 if still.all() else float(self.areas[still].sum() / self.areas.sum())
+
+    @property
     def area(self) -> float:
         """m2, of the patch."""
         return float(self.areas.sum())

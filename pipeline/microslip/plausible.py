@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from .data import ModalBasis
+from .units import percent
 
 DENSITY = 300.0, 25_000.0
 """kg/m3 of wood and of osmium."""
@@ -21,6 +22,8 @@ EXTENT = 1e-3, 100.0
 """m of a body."""
 TRAVEL = 0.05
 """Amplitude over the body's extent up to which displacements are small."""
+BENT = 0.01
+"""Deflection by a vibrating load that is held still, over the body's extent: in resonance it is ten times as much."""
 CARRIED = 1 / 80
 """Pressure or stress over the modulus: hardened steel flows at a hundredth, a patch at 1.6 times that."""
 OF_ITS_WEIGHT = 0.1
@@ -68,6 +71,17 @@ def amplitude(what: str, value: float, of: float) -> str:
     return (
         f"{what} moves by {1e3 * value:.3g} mm, {100 * value / of:.2g} % of the {1e3 * of:.3g} mm of its body: beyond "
         "what small displacements describe. Are load (N), modulus (Pa) and damping right?"
+    )
+
+
+def bent(what: str, value: float, of: float) -> str:
+    """m, deflection of a body `of` that extent, m, by a load that vibrates, were it held still."""
+    if not of > 0 or not value > BENT * of:
+        return ""
+    return (
+        f"{what} under its load held still bends by {1e3 * value:.3g} mm, {percent(value / of)} of "
+        f"its {1e3 * of:.3g} mm, and in resonance by many times that. Is the load in N, or the "
+        "pressure in Pa, and the modulus in Pa?"
     )
 
 

@@ -37,8 +37,11 @@ def prepare(*, double: bool = True, compiler: bool = True, cache: bool = True) -
         A sentence for each change; those of the first call, if this is another one.
 
     Raises:
-        UserError: 64 bit are neither asked for nor there.
+        UserError: 64 bit are neither asked for nor there; what is neither true nor false.
     """
+    for key, value in (("double", double), ("compiler", compiler), ("cache", cache)):
+        if not isinstance(value, bool):
+            raise UserError(f"prepare: {key}: must be true or false (it is {value!r}); correct it")
     if _done:
         return tuple(_done)
     if double:

@@ -11,8 +11,9 @@ import h5py
 import numpy as np
 
 from ..data import Array, ComplexArray
+from ..errors import UserError
 from ..files import hdf5, store
-from ..units import Quantity
+from ..units import Quantity, counted
 from .dynamics import Dynamics
 from .orbits import Found, extremes
 from .shooting import Orbit
@@ -60,6 +61,11 @@ class Branch:
 
     def __len__(self) -> int:
         return len(self.parameter)
+
+    def __repr__(self) -> str:
+        special = ", ".join(f"{len(self.of_kind(k))} {k}" for k in SPECIAL if len(self.of_kind(k)))
+        points = f"{counted(len(self), 'point')}{special and f' ({special})'}"
+        return f"<Branch {self.name}: {points}, {int(self.stable.sum())} stable; ended: {self.ended}>"
 
     @property
     def still(self) -> bool:
@@ -129,11 +135,16 @@ class Collected:
     branches: tuple[Branch, ...]
 
     def __getitem__(self, name: str) -> Branch:
-        return next(b for b in self.branches if b.name == name)
+        known = {b.name: b for b in self.branches}
+        if name not in known:
+            raise UserError(f"branch '{name}': there are {', '.join(known)}")
+        return known[name]
 
     def at(self, kind: str) -> dict[str, Array]:
         """Branch -> values of the parameter at its points of a kind: ``Hopf``, ``fold``, ``period doubling``,
         ``torus``, ``branch point``."""
+        if kind not in SPECIAL:
+            raise UserError(f"kind: '{kind}' is none of {', '.join(SPECIAL)}")
         values = {b.name: b.parameter[b.of_kind(kind)] for b in self.branches}
         return {name: at for name, at in values.items() if len(at)}
 

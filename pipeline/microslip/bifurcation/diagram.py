@@ -14,6 +14,7 @@ from ..continuation.curve import State
 from ..data import Array
 from ..errors import UserError
 from ..process import prepare
+from ..units import counted
 from . import deflation, equilibria, floquet, flow, orbits, switching
 from .basin import Attractor, attractors
 from .branches import EQUILIBRIA, Branch, Collected, joined, of_orbits
@@ -71,6 +72,10 @@ class Diagram(Collected):
     attractors: tuple[Attractor, ...] = ()
     deflated: tuple[orbits.Found, ...] = ()
     messages: tuple[str, ...] = ()
+
+    def __repr__(self) -> str:
+        branches = "; ".join(f"{b.name}: {counted(len(b), 'point')}" for b in self.branches)
+        return f"<Diagram: {counted(len(self.hopf), 'Hopf point')}; {'; '.join([branches, *self.messages])}>"
 
     def plot(self, axes: Axes, label: str = "parameter", read_out: int = 0) -> None:
         """Half of the way from the smallest to the largest value of a read-out, in matplotlib's axes."""

@@ -14,6 +14,7 @@ from pydantic import Field
 
 from ..data import Array
 from ..errors import UserError
+from ..process import prepare
 from ..settings.arguments import check_fields, numbers
 from ..settings.numbers import Positive
 from ..units import Quantity
@@ -51,10 +52,28 @@ class Dynamics:
             raise UserError(f"Dynamics: scale: has {len(self.scale)} numbers; there are {self.count} labels")
         if self.bends is not None and len(self.bends) != self.count:
             raise UserError(f"Dynamics: bends: has {len(self.bends)} rows; there are {self.count} labels")
+        if len(set(self.labels)) < self.count:
+            raise UserError(f"Dynamics: labels: {', '.join(self.labels)}: two are alike; rename one")
+        if self.read is None and self.outputs and len(self.outputs) != self.count:
+            raise UserError(f"Dynamics: outputs: are {len(self.outputs)}, and {self.count} coordinates; give read too")
+        if self.units and len(self.units) != len(self.named):
+            raise UserError(f"Dynamics: units: are {len(self.units)} of {len(self.named)} read-outs; give one for each")
 
     @property
     def count(self) -> int:
         return len(self.labels)
+
+    def check(self, x: Array, p: float) -> None:
+        """Raise `UserError` where f or what is read is not as long as it should be, or no real
+        number."""
+        prepare()  # or it would be traced in single precision
+        zero = jnp.zeros(())
+        f = jax.eval_shape(lambda x, p: jnp.asarray(self.rate(x, p, zero)), jnp.asarray(x), jnp.asarray(float(p)))
+        for key, found, count in (("rate", f, self.count), ("read", self.seen(x, p), len(self.named))):
+            if np.shape(found) != (count,) or not np.issubdtype(found.dtype, np.floating):
+                raise UserError(
+                    f"Dynamics: {key}: gives {found.dtype} of shape {np.shape(found)}; let it give {count} real numbers"
+                )
 
     def seen(self, x: Array, p: float) -> Array:
         """(..., w) of x (..., n)."""

@@ -109,20 +109,31 @@ def _is_same(system: Dynamics, one: Hopf, other: Hopf) -> bool:
 
 def _sought(system: Dynamics, x: Array, p: float, omega: float) -> Hopf:
     try:
-        return hopf(system, x, p, omega)
+        found = hopf(system, x, p, omega)
     except (Lost, np.linalg.LinAlgError) as error:
-        size = np.asarray(system.scale)
-        J = np.asarray(system.still(x, p)[1]) * size / size[:, None]
-        small = scipy.linalg.svdvals(J - 1j * omega * np.eye(system.count)) < NEAR * omega
-        if small.sum() > 1:  # each pair has a shape; two that meet have one
-            raise UserError(
-                f"near {p:.4g} of the parameter several pairs of roots cross the imaginary axis at {omega:.4g} rad/s: "
-                "parts that are alike and not coupled; follow one of them, or couple them"
-            ) from error
+        _refuse_alike(system, x, p, omega, NEAR)
         raise UserError(
             f"near {p:.4g} of the parameter no single pair of roots crosses the imaginary axis at {omega:.4g} rad/s: "
             "without damping pairs run along it until two of them meet; give the bodies damping"
         ) from error
+    _refuse_alike(system, found.x, found.p, found.omega, ALIKE)
+    return found
+
+
+ALIKE = 1e-9
+"""Share of the frequency within which two pairs of roots are one where a Hopf point was found."""
+
+
+def _refuse_alike(system: Dynamics, x: Array, p: float, omega: float, within: float) -> None:
+    """Raise `UserError` where several pairs have one frequency: each has a shape; two that meet
+    have one."""
+    size = np.asarray(system.scale)
+    J = np.asarray(system.still(x, p)[1]) * size / size[:, None]
+    if (scipy.linalg.svdvals(J - 1j * omega * np.eye(system.count)) < within * omega).sum() > 1:
+        raise UserError(
+            f"near {p:.4g} of the parameter several pairs of roots cross the imaginary axis at {omega:.4g} rad/s: "
+            "parts that are alike and not coupled; follow one of them, or couple them"
+        )
 
 
 def hopf(system: Dynamics, x: Array, p: float, omega: float) -> Hopf:

@@ -31,6 +31,9 @@ class Orbit:
     p: float
     turns: int = 1
 
+    def __repr__(self) -> str:
+        return f"<Orbit: period {self.period:.6g} s at {self.p:.6g}, {len(self.x)} nodes>"
+
     def sampled(self, each: int = 8) -> Array:
         """(m each, n) at equal times of one period."""
         found = flow.samples(self.system, self.x, self.p, self.period, self.turns, each)

@@ -76,21 +76,13 @@ def _sides(
     loaded = [body_of(bodies, body, path, f"contacts.{c.interface}") for body, _ in ends]
     faces = [b.face(name, path, "contacts") for b, (_, name) in zip(loaded, ends, strict=True)]
     for b, face, (_, name) in zip(loaded, faces, ends, strict=True):
-        if held_share(face) == 1.0:
+        if face.held_share == 1.0:
             raise UserError(
                 f"{path}: contacts.{c.interface}: the supports of '{b.basis.name}' hold the face '{name}', so that "
                 "nothing can open or slip there; free it in [[supports]] of the body, or take another face "
                 '(what stands still is against = "ground")'
             )
     return loaded, faces
-
-
-def held_share(face: Interface) -> float:
-    """Share of a patch's area that no coordinate of its body moves."""
-    if not len(face.shapes):
-        return 0.0 if face.rows.any() or face.characteristic.any() else 1.0
-    still = ~face.shapes.any(axis=(1, 2))
-    return 1.0 if still.all() else float(face.areas[still].sum() / face.areas.sum())
 
 
 At = Callable[[float | None], tuple["Contact", list[str]]]
@@ -114,7 +106,7 @@ def contact_at(
     said, found, compliance = [f"{c.interface}: {words}" for words in met.messages] if met else [], None, None
     said += [f"{c.interface}: the supports of '{b.basis.name}' hold {percent(share)} of the face '{name}': nothing "
              "opens or slips there by itself." for b, face, (_, name) in zip(loaded, faces, ends, strict=True)
-             if (share := held_share(face)) > 0]  # fmt: skip
+             if (share := face.held_share) > 0]  # fmt: skip
     if c.patch == "nodal":
         found, first, second, compliance = _in_contact(
             path, c, lambda: _nodal(settings, components, c, (first, second), met)

@@ -7,6 +7,7 @@ from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,7 @@ from ..continuation import Settings
 from ..data import Array
 from ..errors import UserError
 from ..harmonic_balance import families
+from ..harmonic_balance.accuracy import Error
 from ..harmonic_balance.checkpoint import labels, points_of_curve, resumed_curve
 from ..harmonic_balance.envelope import largest
 from ..harmonic_balance.families import Family
@@ -24,6 +26,7 @@ from ..results import Journal
 from ..results.names import exact
 from ..results.series import CONVERGED, READ, of_solutions
 from ..units import METRES, Quantity
+from . import headline
 from .assemble import Built, build
 from .contacts import swept
 from .problem import normal_forces, pressed_by, problem_of
@@ -184,13 +187,21 @@ class Followed:
 
 
 def curves(
-    settings: CaseSettings, bases: Bases, path: Path | str, over: str, keep: Keep, report: Report
+    settings: CaseSettings,
+    bases: Bases,
+    path: Path | str,
+    over: str,
+    keep: Keep,
+    report: Report,
+    known: Mapping[float, Array] = MappingProxyType({}),
 ) -> tuple[list[Followed], bool]:
     """The curves of a case, one for each normal force of its sweep; a second one from the other end where the first
     does not arrive there.
 
     Args:
         over: of `OVER`. keep: opens the journal of an assembly, in which points are kept as they are found.
+        known: Hz -> unknowns of a solution there, with as many harmonics or fewer, on which a curve
+            over the frequency begins.
 
     Returns:
         The curves, and whether nobody interrupted: after Ctrl-C what was found until then.
@@ -212,13 +223,35 @@ def curves(
                     at = asked.frequency or _resonance(built, problem, normal, journal, path, report)
                     one = replace(one, frequency=at)
                 one, pressed = one.named, pressed_by(built, problem) if normal is None else normal
-                found.append(_followed(_family(built, problem, one), problem, one, pressed, journal, report, how))
+                family = _family(built, problem, one)
+                if over == "frequency":
+                    family = replace(family, known=known.get(ends[0]))
+                found.append(_followed(family, problem, one, pressed, journal, report, how))
                 if found[-1].leaves_out:
                     one = found[-1].turned
                     found.append(_followed(_family(built, problem, one), problem, one, pressed, journal, report, how))
             except KeyboardInterrupt:
                 return [*found, replace(one, rows=points_of_curve(journal, one.name))], False
     return found, True
+
+
+def highest(found: Sequence[Followed]) -> tuple[Followed, int] | None:
+    """The curve with the largest amplitude of all points that pass their checks, and that point."""
+    heights = [(one, np.where(one.converged, one.amplitude, -1.0)) for one in found if one.rows]
+    tops = [(one, int(height.argmax())) for one, height in heights if one.converged.any()]
+    return max(tops, key=lambda top: float(top[0].amplitude[top[1]]), default=None)
+
+
+def error_of(built: Built, one: Followed, i: int) -> Error | None:
+    """Estimated error of the amplitude at a point of a curve, see `headline.estimated`."""
+    family, row = _family(built, problem_of(built, _begun_under(built, one)), one), one.rows[i]
+    at = float(row["parameter"]) * family.unit
+    return headline.estimated(built, family.problem(at), row["x"], family.Omega(at))
+
+
+def _begun_under(built: Built, one: Followed) -> float | None:
+    """Normal force (N) of the contacts at the beginning of a curve."""
+    return one.ends[0] if one.over == "normal_force" else one.normal
 
 
 def _followed(

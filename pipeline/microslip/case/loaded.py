@@ -45,6 +45,12 @@ class Loaded:
         return self.basis.mass if self.settings.mass is None else self.settings.mass
 
     @property
+    def extent(self) -> float:
+        """m, the longest side of the box round its mesh; 0 of one without cells."""
+        mesh = self.basis.mesh
+        return float(np.ptp(mesh.points, axis=0).max()) if mesh.n_cells else 0.0
+
+    @property
     def has_residual(self) -> bool:
         return has_residual(self.stored[min(self.stored)], self.basis.reduction)
 

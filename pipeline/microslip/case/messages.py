@@ -3,28 +3,32 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import groupby, pairwise
 from types import MappingProxyType
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .. import plausible
 from ..contact.harmonics import fourier
 from ..contact.jenkins import Jenkins
-from ..contact.study import moduli_doubted
 from ..data import Array
 from ..harmonic_balance import FrequencyResponse
 from ..harmonic_balance.problem import Problem
-from ..harmonic_balance.readout import measured
 from ..harmonic_balance.reduced import stuck, stuck_damping, untouched
 from ..harmonic_balance.response import HarmonicResponse, unsolved
 from ..harmonic_balance.sweeps import overhanging
 from ..results.checks import UNCERTAIN, cause
 from ..results.names import apart
+from ..time_domain.stepped import Settled
+from ..time_domain.swept import nearer
 from ..units import Quantity, counted, percent
 from .assemble import Built
-from .contacts import swept
 from .problem import book_models
 from .settings import CaseSettings
+
+if TYPE_CHECKING:
+    from .beyond import Beyond
+    from .curves import Followed
 
 OPEN = 0.01
 """Share of points and time that may be open in the book's mode before a message is made."""
@@ -102,31 +106,6 @@ def between_equilibria(built: Built) -> list[str]:
     if built.settings.sweep.normal_forces != "static" or not error:
         return []
     return [f"The static normal force is interpolated between two equilibria of the speed range, to {error:.3g} N."]
-
-
-def doubted(
-    built: Built, resonances: Mapping[float, Sequence[tuple[float, float]]], normal: float | None
-) -> list[str]:
-    """What looks like a number in a wrong unit: the highest resonance, and the pressure of contacts under the largest
-    normal force (N)."""
-    read = built.assembly.outputs[0]
-    mesh, found = built.bodies[read.component].basis.mesh, []
-    top = max((a for peaks in resonances.values() for _, a in peaks), default=0.0)
-    unit = measured(built.assembly).unit
-    if unit == "m" and mesh.n_cells:
-        extent = float(np.ptp(mesh.points, axis=0).max())
-        found.append(plausible.amplitude(f"The highest resonance of '{read.monitor}'", top, extent))
-    if unit == "1":
-        found.append(plausible.strain(f"Gauge '{read.monitor}'", top))
-    for c in built.contacts:
-        found += moduli_doubted(f"{c.interface}.", c)
-        found += [plausible.modulus(f"{c.interface}.young", c.young)] if c.young is not None else []
-        body, face = built.settings.ends(c)[0]
-        b, force = built.bodies[body], normal if swept(c) else c.normal_force
-        area = float(b.group.interfaces[face].areas.sum())
-        if force and area > 0 and not c.is_curved:
-            found.append(plausible.stress(f"{c.interface}", force / area, plausible.modulus_of(b.basis)))
-    return [text for text in found if text]
 
 
 def of_stuck_modes(built: Built, normal: float | None) -> list[str]:
@@ -310,3 +289,125 @@ def _some(names: Sequence[str], unit: str, between: str = ", ", what: str = "") 
     """The first of some names, and how many more there are."""
     more = f" and {len(names) - SAID} more{what}" if len(names) > SAID else ""
     return between.join(names[:SAID]) + unit + more
+
+
+# motions in time ---------------------------------------------------------------------------------------------------
+
+
+def what_moves(b: Beyond) -> list[str]:
+    """Which motion is reached from rest, which other ones there are, how high, and how they are
+    reached; what the curve of periodic motions is and whether it is stable."""
+    return [*_in_time(b), *map(_of_curve, b.curves), *_stable(b)]
+
+
+def _in_time(b: Beyond) -> list[str]:
+    of = f"Under F_N = {b.normal:g} N"
+    if b.why:
+        more = "respond --over frequency follows the curve"
+        return [f"{of} motions in time are not known: {b.why}; {more}."]
+    if b.cut and not b.down:
+        return [f"{of} motions in time are not known.", *_cut(b)]
+    if not b.down:
+        return []
+    top = max(b.down, key=lambda m: m.swing)
+    highest = f"at most {b.quantity.sized(top.swing, 3)} at {top.frequency:.5g} Hz"
+    if two := b.two:
+        top = max((high for _, high in two), key=lambda m: m.swing)
+        said = [
+            f"{of} there are two motions {_span([m for m, _ in two])}, found by integrating in time; the higher one "
+            f"swings by up to {b.quantity.sized(top.swing, 3)} at {top.frequency:.5g} Hz.",
+            *_from_rest(b, two),
+            *_left(b, two),
+        ]
+    elif b.cut:
+        said = [f"{of} motions in time are known in part, {highest}."]
+    else:
+        said = [f"{of} sweeps in time, upwards and downwards, meet the same motion, {highest}."]
+    return [*said, *_cut(b), *_wild(b)]
+
+
+def _span(motions: Sequence[Settled], words: str = "") -> str:
+    """Where motions are, in words."""
+    f = [m.frequency for m in motions]
+    low, high = min(f), max(f)
+    return f"at {low:.5g} Hz" if low == high else f"{words}from {low:.5g} to {high:.5g} Hz"
+
+
+def _cut(b: Beyond) -> list[str]:
+    """Where the time for motions was over, and what to do."""
+    if not b.cut:
+        return []
+    way, f = b.cut
+    return [
+        f"Motions in time ended after {b.patience:g} s, {way} before {f:.5g} Hz: what comes then is not known; run "
+        f"again with --set sweep.patience={2 * b.patience:g}, which goes on from there."
+    ]
+
+
+def _from_rest(b: Beyond, two: Sequence[tuple[Settled, Settled]]) -> list[str]:
+    """Which of two motions is reached from rest, in ranges of frequency."""
+    at = {low.frequency: (low, high) for low, high in two}
+    known = sorted((m for m in b.rest if m.frequency in at), key=lambda m: m.frequency)
+    if not known:
+        return []
+    runs = list[str]()
+    for higher, group in groupby(known, lambda m: nearer(m, *at[m.frequency])):
+        run = list(group)
+        contacts = "open" if any(m.opens for m in run) else "closed"
+        top = b.quantity.sized(max(m.amplitude for m in run), 3)
+        which = "higher" if higher else "lower"
+        runs.append(f"the {which} one {_span(run)} (contacts {contacts}, at most {top})")
+    return [f"From rest it comes to {', to '.join(runs)}."]
+
+
+def _left(b: Beyond, two: Sequence[tuple[Settled, Settled]]) -> list[str]:
+    """Where each sweep leaves the motion on which it comes."""
+    said = []
+    for way, motions, other, pair in (("up", b.up, b.down, two[-1]), ("down", b.down, b.up, two[0])):
+        i = next(i for i, m in enumerate(motions) if m.frequency == pair[0].frequency)
+        which = "lower" if motions[i] is pair[0] else "higher"
+        alike = {m.frequency for m in other}  # beyond the last place where both differ
+        until = next((j for j in range(i + 1, len(motions)) if motions[j].frequency in alike), i)
+        steps = list(pairwise(motions[i : until + 1]))
+        last, after = max(steps, key=lambda s: s[0].distance(s[1]), default=(motions[-1], None))
+        on = f"{last.frequency:.5g} Hz ({b.quantity.sized(last.amplitude, 3)})"
+        at = after and f" and is at {b.quantity.sized(after.amplitude, 3)} at {after.frequency:.5g} Hz"
+        ends = at or ", where it ends"
+        said.append(f"A slow sweep {way}wards stays on the {which} one {way} to {on}{ends}.")
+    return said
+
+
+def _wild(b: Beyond) -> list[str]:
+    """Where motions are irregular."""
+    if not b.irregular:
+        return []
+    top = b.quantity.sized(max(m.swing for m in b.irregular), 3)
+    span = _span(b.irregular, "at frequencies ")
+    return [f"Motions are irregular, without a period, {span}, with swings of up to {top}."]
+
+
+def _of_curve(one: Followed) -> str:
+    """A curve in a sentence."""
+    said = f"Curve of periodic motions, {one.sentences()[0]}"
+    more = f"; it goes on from {one.parameter[-1]:.5g} Hz (respond --over frequency)."
+    return said if not one.status.startswith("points") else said.removesuffix(".") + more
+
+
+def _stable(b: Beyond) -> list[str]:
+    """How many of the motions on the curves are stable, and where some are not."""
+    looked = [
+        (float(one.parameter[i]), s.stable)
+        for one, each in zip(b.curves, b.stability, strict=True)
+        for i, s in each.items()
+    ]
+    if not looked:
+        return []
+    lost = sorted(f for f, stable in looked if not stable)
+    many = f"{len(looked) - len(lost)} of {counted(len(looked), 'motion')} that were looked at are stable"
+    said = f"On the curve, by harmonic balance with {b.samples} samples of a cycle, {many}"
+    if not lost:
+        return [f"{said}."]
+    where = f"at {lost[0]:.5g} Hz"
+    if len(lost) > 1:
+        where = f"between {lost[0]:.5g} and {lost[-1]:.5g} Hz"
+    return [f"{said}; those that are not, {where}, are not reached: what is, motions in time say."]

@@ -28,7 +28,7 @@ from ..results import Journal
 from ..results.checks import UNCERTAIN
 from ..system.assembly import Assembly, Linear
 from ..units import Quantity, counted, percent
-from . import edges
+from . import edges, headline
 from . import messages as say
 from .assemble import Built, build
 from .beyond import Beyond, beyond
@@ -123,7 +123,7 @@ def run_case(
     """
     if not settings.looks_for_harmonics:
         return _run(settings, basis, path, report, keep, None)
-    tolerance = settings.harmonics_error or TRUNCATION
+    tolerance = settings.harmonics_error or headline.TRUNCATION
     while True:
         try:
             return _run(settings.with_harmonics(begin), basis, path, report, keep, tolerance)
@@ -164,7 +164,7 @@ def _run(
         *say.not_found(responses, resonances),
         *say.idle(idle),
         *say.folded(folds, measured(built.assembly)),
-        *say.doubted(built, resonances, max(forces, default=None)),
+        *headline.doubted(built, largest_of(responses), max(forces, default=None)),
         *say.overhangs(responses, resonances),
         *edges.messages(at_the_ends),
     ]
@@ -172,6 +172,11 @@ def _run(
         settings, responses, free, stuck[0], resonances, built.speed, tuple(messages), built,
         tuple(at_the_ends), left.most, stuck[1], left.errors, folds,
     )  # fmt: skip
+
+
+def largest_of(responses: Mapping[float, HarmonicResponse]) -> float:
+    """The largest amplitude of the first read-out, in its unit, of all points that are solutions."""
+    return max((float(np.abs(r.monitor[r.converged]).max(initial=0.0)) for r in responses.values()), default=0.0)
 
 
 def jumps(result: CaseResult) -> list[tuple[float | None, float, tuple[float, float]]]:
@@ -187,15 +192,21 @@ def jumps(result: CaseResult) -> list[tuple[float | None, float, tuple[float, fl
     ]
 
 
-def with_motions(result: CaseResult, report: Callable[[str], None] = lambda _: None) -> CaseResult:
-    """The same with motions in time where responses jump."""
-    found = [
-        beyond(
-            problem_of(result.built, asked), result.responses[n], gap, n, result.quantity, report,
-            result.settings.sweep.patience,
-        )  # fmt: skip
-        for asked, n, gap in jumps(result)
-    ]
+def with_motions(
+    result: CaseResult,
+    report: Callable[[str], None] = lambda _: None,
+    keep: Keep | None = None,
+) -> CaseResult:
+    """The same with motions in time where responses jump. keep: opens their journal, see
+    `run_case`."""
+    patience, of, built = result.settings.sweep.patience, result.quantity, result.built
+    if not (places := jumps(result)):
+        return result
+    with keep(built) if keep else nullcontext() as journal:
+        found = [
+            beyond(problem_of(built, asked), result.responses[n], gap, n, of, report, patience, journal)
+            for asked, n, gap in places
+        ]
     return replace(result, beyond=tuple(found))
 
 
@@ -323,10 +334,6 @@ def _about_resonances(part: Linear, frequency: Array) -> Array:
     return found[(found > frequency[0]) & (found < frequency[-1])]
 
 
-TRUNCATION = 0.01
-"""Estimated error of the highest point of a response, by harmonics that are left out, above which a message is made."""
-
-
 class _Left:
     """What harmonics and samples that are left out would change.
 
@@ -351,9 +358,7 @@ class _Left:
             _TooFew: more of them are enough, where their number is looked for.
         """
 
-        settings = self.built.settings
-        whole = settings.ring is not None and settings.ring.model == "full"
-        if not problem.groups or settings.mode == "book" or (whole and self.tolerance is None):
+        if not headline.is_estimated(self.built, problem, ring=self.tolerance is not None):
             return []
         looked_at = judged(problem, found, peaks)
         for point, estimate, share, _ in looked_at if self.tolerance is not None else ():
@@ -365,17 +370,14 @@ class _Left:
             self.lost[normal] = lost
         point, e, share, likely = max(looked_at, key=lambda one: one.bound)
         self.most = max(self.most or 0.0, share)
-        where = f"At F_N = {normal:g} N the amplitude at {point.Omega / (2 * np.pi):.6g} Hz is uncertain"
-        balanced = counted(problem.harmonics, "harmonic")
-        if share <= (TRUNCATION if self.tolerance is None else self.tolerance) or not np.isfinite(share):
+        where = f"At F_N = {normal:g} N the amplitude at {point.Omega / (2 * np.pi):.6g} Hz"
+        if share <= (headline.TRUNCATION if self.tolerance is None else self.tolerance) or not np.isfinite(share):
             return []
         if self.tolerance is not None:
-            return [f"{where} by about {percent(share)} with {balanced}, above harmonics_error; no solution with more "
-                    "was found."]  # fmt: skip
-        what = "harmonics" if e.by_harmonics > e.by_samples else "samples"
-        said = f"mostly for want of {what}, with {balanced} and {e.samples} samples; raise {what}"
-        said += f" (and samples to {16 * (problem.harmonics + 2)} or more)." if what == "harmonics" else "."
-        return [f"{where} by about {say.off(likely)}, {percent(share)} at most, {said}"]
+            balanced = counted(problem.harmonics, "harmonic")
+            return [f"{where} is uncertain by about {percent(share)} with {balanced}, above "
+                    "harmonics_error; no solution with more was found."]  # fmt: skip
+        return [headline.uncertain(where, e, share, likely)]
 
     def unknown(self) -> list[str]:
         """A message on all places whose error nobody knows, and what to do about them."""
@@ -395,7 +397,7 @@ class _Left:
         """Raise `_TooFew` where more harmonics are enough for a point."""
 
         floor = FLOOR * float(np.abs(found.monitor[found.converged]).max(initial=0.0))
-        e = enough(problem, point, self.tolerance or TRUNCATION, floor=floor, first=estimate)
+        e = enough(problem, point, self.tolerance or headline.TRUNCATION, floor=floor, first=estimate)
         if (n := e.problem.harmonics) > problem.harmonics:
             said = f"at F_N = {normal:g} N and {point.Omega / (2 * np.pi):.6g} Hz an error of about {percent(share)}"
             raise _TooFew(n, f"{said} is left with {counted(problem.harmonics, 'harmonic')}; all once more with {n}")

@@ -48,6 +48,23 @@ def _one_force(built: Built, path: Path | str, key: str) -> float | None:
     return forces[0] if forces else None
 
 
+def at_its_beginning(settings: CaseSettings, bases: Bases, path: Path | str, kind: str) -> Built:
+    """The case as a survey (``orders``, ``speeds``, or another that changes neither) begins with it."""
+    if kind == "orders" and settings.ring is not None and settings.orders is not None:
+        orders = settings.orders.engine_orders
+        return build(_of_order(settings, 1 if orders == "all" else orders[0]), bases, path)
+    if kind == "speeds" and settings.speeds is not None:
+        turning = [b.name for b in settings.components if bases[b.name].ranges]
+        return build(_at_speed(settings, turning, settings.speeds.start_rpm), bases, path)
+    return build(settings, bases, path)
+
+
+def _of_order(settings: CaseSettings, order: int) -> CaseSettings:
+    assert settings.ring is not None
+    ring = settings.ring.model_copy(update={"engine_order": order})
+    return settings.model_copy(update={"ring": ring})
+
+
 def over_orders(
     settings: CaseSettings, bases: Bases, path: Path | str, report: Report,
     keep: Callable[[dict[str, OverOrders]], None] = lambda _: None,
@@ -71,7 +88,7 @@ def over_orders(
 
     @cache
     def at(order: int) -> Built:
-        return build(settings.model_copy(update={"ring": ring.model_copy(update={"engine_order": order})}), bases, path)
+        return build(_of_order(settings, order), bases, path)
 
     found: dict[str, OverOrders] = {}
     sweep = settings.sweep

@@ -426,15 +426,44 @@ def is_up_to_date(product: Path | str, inputs: Mapping[str, Any]) -> bool:
 
 def unfinished(product: Path | str) -> None:
     """Take the sidecar of a product away, before the first of its files is written: a run that ends here is begun anew.
+    What it lists is remembered until `clear_former`.
 
     Raises:
         UserError: no right to.
     """
+    product = Path(product)
     try:
-        for name in {sidecar_path(product).name, f"{Path(product).name}.json"}:  # as it was called first
-            Path(product).with_name(name).unlink(missing_ok=True)
+        if sidecar_path(product).is_file():
+            os.replace(sidecar_path(product), _former(product))
+        for name in {sidecar_path(product).name, f"{product.name}.json"}:  # as it was called first
+            product.with_name(name).unlink(missing_ok=True)
     except OSError as error:
         raise UserError(refused(sidecar_path(product), error)) from error
+
+
+def _former(product: Path) -> Path:
+    """Where the sidecar of a product's former making stands while it is made anew."""
+    return product.with_name(f".{product.name}.former")
+
+
+def clear_former(product: Path | str, keep: Iterable[Path] = ()) -> None:
+    """Remove what a former making of a product has left, as soon as files of the new one stand beside it: of the files
+    that its sidecar listed those which nobody has changed.
+
+    Args:
+        keep: files of the new making, and others that stay.
+    """
+    product, stay = Path(product), {Path(file) for file in keep}
+    try:
+        note = json.loads(ordinary(_former(product)).read_text())
+        listed = {product.name: note["product"], **note["files"]}
+    except (OSError, ValueError, KeyError, TypeError):  # none, or not ours
+        listed = {}
+    for file, digest in ((product.parent / name, digest) for name, digest in listed.items()):
+        inside = product.parent in file.parents and ".." not in file.parts
+        if inside and file not in stay and file.is_file() and hash_file(file) == digest:
+            file.unlink()
+    _former(product).unlink(missing_ok=True)
 
 
 def note_product(

@@ -15,7 +15,7 @@ contact sticks, the derivative of its force is zero, and such a step sees no cha
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -57,8 +57,9 @@ class Error:
     """Estimated error of a solution.
 
     Attributes:
-        harmonics, samples: of the solution. amplitude: of the read-out's first harmonic. by_harmonics, by_samples: what
-            more of them change of it, in its unit; infinite where no such solution was found.
+        harmonics, samples: of the solution. amplitude: of the read-out's first harmonic, or what else is read of it.
+            by_harmonics, by_samples: what more of them change of it, in its unit; infinite where no such solution was
+            found.
         x: (size,) unknowns of the finer solution, a start for it. change: of the amplitude with more of both, with its
             sign; NaN where no such solution was found.
     """
@@ -124,19 +125,43 @@ def finer(problem: Problem, harmonics: int, samples: int = 0, seldom: bool = Fal
 
 def error(problem: Problem, x: Array, Omega: float, output: int = 0) -> Error:
     """Estimated error of the solution x (size,) at Omega (rad/s)."""
-    before, samples = _read(problem, x, Omega, output), samples_of(problem)
-    sampled, first = _resolved(problem, x, Omega)
+
+    def solved(more: Problem, start: Array) -> Reading:
+        point = newton(more.at(Omega), start)
+        read = _read(more, point.x, Omega, output) if point.converged else np.nan
+        return Reading(point.x, Omega, read)
+
+    return changed(problem, Reading(x, Omega, _read(problem, x, Omega, output)), solved)
+
+
+class Reading(NamedTuple):
+    """A solution x (size,) at Omega (rad/s), and what is read of it; NaN: none was found."""
+
+    x: Array
+    Omega: float
+    read: float
+
+
+Solve = Callable[[Problem, Array], Reading]
+
+
+def changed(problem: Problem, at: Reading, solved: Solve) -> Error:
+    """Estimated error of what is read of a solution.
+
+    Args:
+        solved: finds the solution of a finer problem from a start x (size,).
+    """
+    sampled, first = _resolved(problem, at, solved)
     larger = finer(sampled, more(problem.harmonics), seldom=True)
-    second = newton(larger.at(Omega), np.concatenate([first.x, np.zeros(larger.size - problem.size)]))
+    second = solved(larger, np.concatenate([first.x, np.zeros(larger.size - problem.size)]))
     by_samples = by_harmonics = np.inf
     change = np.nan
-    if first.converged:
-        after = _read(sampled, first.x, Omega, output)
-        by_samples = abs(after - before)
-        if second.converged:
-            last = _read(larger, second.x, Omega, output)
-            by_harmonics, change = abs(last - after), last - before
-    return Error(problem.harmonics, samples, before, by_harmonics, by_samples, second.x, change)
+    if np.isfinite(first.read):
+        by_samples = abs(first.read - at.read)
+        if np.isfinite(second.read):
+            by_harmonics, change = abs(second.read - first.read), second.read - at.read
+    H, S = problem.harmonics, samples_of(problem)
+    return Error(H, S, at.read, by_harmonics, by_samples, second.x, change)
 
 
 def _read(problem: Problem, x: Array, Omega: float, output: int) -> float:
@@ -144,14 +169,15 @@ def _read(problem: Problem, x: Array, Omega: float, output: int) -> float:
     return abs(amplitude(at, x, *at.forces(x), output).value)
 
 
-def _resolved(problem: Problem, x: Array, Omega: float) -> tuple[Problem, Point]:
+def _resolved(problem: Problem, at: Reading, solved: Solve) -> tuple[Problem, Reading]:
     """With more samples, as many as it takes for one to lie where each contact sticks, and its solution."""
     samples = DENSER * samples_of(problem)
     while True:
         sampled = finer(problem, problem.harmonics, samples, seldom=True)
-        point = newton(sampled.at(Omega), x)
-        if not point.converged or not samples or samples > FINEST or not _blind(sampled, point.x, Omega):
-            return sampled, point
+        found = solved(sampled, at.x)
+        known = np.isfinite(found.read)
+        if not known or not samples or samples > FINEST or not _blind(sampled, found.x, found.Omega):
+            return sampled, found
         samples *= 2
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Protocol
@@ -153,19 +154,23 @@ def _solved(A: Array, B: Array) -> Array:
 
 
 def one_plus(pieces: dict[tuple[int, int], Array], sizes: list[int], coefficients: int) -> Matrix:
-    """1 + the blocks (i, j) -> (W s_i, W s_j), as what can be solved fastest. The blocks (i, i) are overwritten."""
+    """1 + the blocks (i, j) -> (W s_i, W s_j), as what can be solved fastest, however the parts are
+    numbered. The blocks (i, i) are overwritten."""
     n = len(sizes)
     diagonal = [pieces[i, i] for i in range(n)]
     for block, s in zip(diagonal, sizes, strict=True):
         block.flat[:: coefficients * s + 1] += 1.0
     if n == 1:
         return Dense(diagonal[0])
-    order = _order(sizes, coefficients)
-    whole = Cyclic(diagonal, [None] * n, [None] * n, order)
-    if n > 2 and all((i - j) % n in (0, 1, n - 1) for i, j in pieces):
-        whole.behind[:] = [pieces.get((i, (i + 1) % n)) for i in range(n)]
-        whole.before[:] = [pieces.get((i, (i - 1) % n)) for i in range(n)]
-        return whole
+    if n > 2 and (row := in_a_row(n, pieces)):
+        behind, before = [*row[1:], row[0]], [row[-1], *row[:-1]]
+        return Cyclic(
+            [diagonal[i] for i in row],
+            [pieces.get(pair) for pair in zip(row, behind, strict=True)],
+            [pieces.get(pair) for pair in zip(row, before, strict=True)],
+            _order(sizes, coefficients, row),
+        )
+    order = _order(sizes, coefficients, range(n))
     begins = np.cumsum([0, *(coefficients * s for s in sizes)])
     A = np.zeros((begins[-1], begins[-1]))
     for i in range(n):
@@ -174,16 +179,35 @@ def one_plus(pieces: dict[tuple[int, int], Array], sizes: list[int], coefficient
         if i != j:
             A[begins[i] : begins[i + 1], begins[j] : begins[j + 1]] = block
     out = np.empty_like(A)
-    out[np.ix_(whole.order, whole.order)] = A
+    out[np.ix_(order, order)] = A
     return Dense(out)
 
 
-def _order(sizes: list[int], coefficients: int) -> Array:
-    """Places in a vector ordered by harmonics, then parts, of one ordered by parts, then harmonics."""
+def in_a_row(n: int, pairs: Iterable[tuple[int, int]]) -> list[int]:
+    """The n parts in an order in which each is paired with those beside it alone, the last one
+    with the first perhaps: chains one after the other, or one ring. Empty: there is none."""
+    beside: list[set[int]] = [set() for _ in range(n)]
+    for i, j in pairs:
+        if i != j:
+            beside[i].add(j)
+            beside[j].add(i)
+    if max(map(len, beside)) > 2:
+        return []
+    row: dict[int, None] = {}
+    for begin in sorted(range(n), key=lambda i: len(beside[i]) == 2):  # chains at their ends
+        if row and begin not in row and len(beside[begin]) == 2:
+            return []  # a ring beside others
+        at: int | None = begin if begin not in row else None
+        while at is not None:
+            row[at] = None
+            at = next((j for j in sorted(beside[at]) if j not in row), None)
+    return list(row)
+
+
+def _order(sizes: list[int], coefficients: int, row: Iterable[int]) -> Array:
+    """Places in a vector ordered by harmonics, then parts, of one ordered by parts as they are in
+    a row, then harmonics."""
     total, begins = sum(sizes), np.cumsum([0, *sizes])
     return np.concatenate(
-        [
-            (np.arange(coefficients)[:, None] * total + np.arange(b, e)).ravel()
-            for b, e in zip(begins[:-1], begins[1:], strict=True)
-        ]
+        [(np.arange(coefficients)[:, None] * total + np.arange(begins[i], begins[i + 1])).ravel() for i in row]
     )

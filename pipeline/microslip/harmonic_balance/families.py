@@ -78,6 +78,8 @@ class Family:
         equations: see `continuation.Equations`. begin, end: of its lambda. unit: lambda of one unit of the parameter
             that people read. words: "Hz", ... problem, Omega: the balance and the frequency (rad/s) at a lambda.
         narrow: (m, 2) values of lambda that no step may pass unseen, and how wide what is there is.
+        known: (k,) unknowns of a solution at the beginning with as many harmonics or fewer, where
+            the curve begins; None: one is looked for.
     """
 
     equations: continuation.Equations
@@ -88,11 +90,12 @@ class Family:
     problem: Callable[[float], Problem]
     Omega: Callable[[float], float]
     narrow: Array = field(default_factory=lambda: np.zeros((0, 2)))
+    known: Array | None = None
 
     @property
     def turned(self) -> Family:
         """From the other end."""
-        return replace(self, begin=self.end, end=self.begin)
+        return replace(self, begin=self.end, end=self.begin, known=None)
 
     def reached(self, branch: Branch) -> bool:
         """Whether a curve arrived at the other end, and did not come back to where it began."""
@@ -232,11 +235,13 @@ def followed(
 def _begun(family: Family, equations: _Noted, settings: Settings) -> State | str:
     """The first state; where there is none, why. Where all is smooth the linear response leads there at once."""
     problem, Omega = family.problem(family.begin), family.Omega(family.begin)
-    if equations.smooth:
+    if equations.smooth and family.known is None:
         state = continuation.start(equations, problem.at(Omega).reference, family.begin, settings)
         if not state.status:
             return state
-    first = solve(problem, Omega, [])
+    known = np.zeros(0) if family.known is None else family.known
+    guess = np.concatenate([known, np.zeros(problem.size - len(known))])
+    first = solve(problem, Omega, [guess] if len(known) else [])
     if not first.converged:
         return first.status
     return equations.told(continuation.start(equations, first.x, family.begin, settings))

@@ -31,6 +31,7 @@ from ..results.series import Series, of_solutions
 from ..system import assembly
 from ..system.assembly import Linear
 from ..units import METRES, Quantity, counted
+from .accuracy import Error, Reading, changed
 from .checks import checks
 from .problem import AtFrequency, Problem
 from .readout import amplitude, measured
@@ -273,6 +274,27 @@ def sliding_amplitude(problem: Problem, mode: int) -> float:
     return float(problem.length / curve.x_scale[0])
 
 
+def error(problem: Problem, found: Backbone, at: int, mode: int = 0, output: int = 0) -> Error:
+    """Estimated error of the damping ratio of a nonlinear mode's point number `at`, by the mode of the same amplitude
+    with more samples and harmonics (see `accuracy.error`). Other arguments: as of `backbone`."""
+    problem, rest = about_rest(problem)
+    A = float(found.amplitude[at])
+
+    def solved(finer: Problem, x: Array) -> Reading:
+        curve = _Curve(replace(finer, stiffness=tuple(HELD * k for k in finer.stiffness), share=0.0), output)
+        curve.linear(finer, mode)
+        curve.x_scale[:-2] *= _growth(finer, mode)
+        curve.hold(rest)
+        known = [found.Omega[at], 2 * found.damping[at] * found.Omega[at]]
+        state = start(curve, np.append(x / curve.units(A)[0], known), float(np.log(A)))
+        if not state.found:
+            return Reading(x, float(found.Omega[at]), np.nan)
+        z = state.found[0].x
+        return Reading(z[:-2] * curve.units(A)[0], float(z[-2]), float(z[-1] / (2 * z[-2])))
+
+    return changed(problem, Reading(found.x[at], found.Omega[at], found.damping[at]), solved)
+
+
 class _Curve:
     """The equations of `backbone` for `continuation`: z = (x / `units`, Omega, xi), lambda = ln A."""
 
@@ -311,10 +333,14 @@ class _Curve:
     def begun(self, z: Array, rest: Array, lam: float, settings: Settings) -> State:
         """The first point, from the linear mode about x (size,) at rest, whose mean is there however small the
         amplitude is: `held` is not counted in this."""
-        self.held = float(np.abs(rest).max(initial=0.0)) * self.problem.length / self.x_scale[0]
+        self.hold(rest)
         first, mean = z.copy(), slice(self.problem.count)
         first[mean] = rest[mean] / self.units(np.exp(lam))[0][mean]
         return start(self, first, lam, settings)
+
+    def hold(self, rest: Array) -> None:
+        """Set `held` by x (size,) at rest."""
+        self.held = float(np.abs(rest).max(initial=0.0)) * self.problem.length / self.x_scale[0]
 
     def units(self, A: float) -> tuple[Array, Array]:
         """(n,) of x at an amplitude, and their derivatives by its logarithm: A / length, of the mean not less than of

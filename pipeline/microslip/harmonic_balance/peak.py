@@ -46,7 +46,7 @@ class Optimum:
     Attributes:
         parameter. resonance: there. status: see `continuation.Lowest`. found: value -> highest resonance in the band,
             rising, of all values that were looked at. rising: value -> rad/s of an end of the band at which the
-            response is higher than the highest resonance in it.
+            response is higher than the highest resonance in it. problem: the balance of `resonance`.
     """
 
     parameter: float
@@ -54,6 +54,7 @@ class Optimum:
     status: str
     found: dict[float, HighestPeak]
     rising: dict[float, float]
+    problem: Problem | None = None
 
     @property
     def spread(self) -> float:
@@ -131,6 +132,6 @@ def optimum(
         return rated(family, value, top)
 
     best: Lowest = lowest(at, values)
-    return Optimum(
-        best.parameter, found[best.parameter], best.status, dict(sorted(found.items())), dict(sorted(rising.items()))
-    )
+    by_value, ends = dict(sorted(found.items())), dict(sorted(rising.items()))
+    value = best.parameter
+    return Optimum(value, found[value], best.status, by_value, ends, make(value))

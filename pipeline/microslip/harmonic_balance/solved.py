@@ -13,6 +13,7 @@ from ..data import Array
 from ..errors import UserError
 from ..results.files import Response, read_response, stacked, write_response
 from ..results.series import Series
+from ..settings.mistakes import numbered
 from ..units import Quantity
 from . import accuracy
 from .checkpoint import labels, record
@@ -102,12 +103,20 @@ class Motions(Series):
 
     def motion(self, i: int) -> Operating:
         """All that belongs to point number i: coordinates of the bodies, forces and cycles of the contacts."""
+        numbered("i", i, len(self), "point")
         return operating(self.problem(float(self.parameter[i])), self.points[i])
 
     def error_estimate(self, i: int | None = None) -> accuracy.Error:
         """What more harmonics and samples would change of a point, the largest one if none is named: ``readout`` is the
-        share of its amplitude."""
+        share of its amplitude.
+
+        Raises:
+            UserError: a point that was not found, or none that was.
+        """
         i = int(np.argmax(np.where(self.converged, self.amplitude, 0.0))) if i is None else i
+        numbered("i", i, len(self), "point")
+        if not self.converged[i]:
+            raise UserError(f"error_estimate: point {i} was not found ({self.status[i]}); take one that was")
         value, point = float(self.parameter[i]), self.points[i]
         return accuracy.error(self.problem(value), point.x, point.Omega)
 

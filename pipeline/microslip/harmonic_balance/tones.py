@@ -14,6 +14,7 @@ from ..data import Array
 from ..errors import UserError
 from ..results.journal import Journal
 from ..results.tones import TwoTones
+from ..settings.mistakes import numbered
 from . import reduced
 from .readout import measured
 from .torus import Torus, commensurate, with_mean
@@ -52,6 +53,7 @@ class Solved(TwoTones):
         Raises:
             UserError: a point that was not found.
         """
+        numbered("i", i, len(self), "point")
         own = self.points[i]
         if own.status != CONVERGED:
             raise UserError(f"error_estimate: point {i} was not found ({own.status}); take one that was")

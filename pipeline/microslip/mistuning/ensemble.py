@@ -76,6 +76,11 @@ class Ensemble:
     def __len__(self) -> int:
         return len(self.rows)
 
+    def __repr__(self) -> str:
+        known = self.amplification[self.solved]
+        said = f"amplification at most {known.max():.4g}" if len(known) else "none solved"
+        return f"<Ensemble: {counted(len(self), 'sample')}, {said}>"
+
     def column(self, name: str) -> Array:
         """(n,) one of `COLUMNS`."""
         return self.rows[:, COLUMNS.index(name)]

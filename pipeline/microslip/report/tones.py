@@ -28,7 +28,9 @@ def tones_html(title: str, found: TwoTones, point: int, messages: Sequence[str],
     """
     album = Album({p.name: p for p in pictures})
     pieces: list[Piece] = list(album.begun(""))
-    pieces += [say(*messages, READ_AS, tone="note"), _pairs(found, point)]
+    pieces.append(say(*messages, READ_AS, tone="note"))
+    if found.converged[point]:
+        pieces.append(_pairs(found, point))
     if len(found) > 1:
         pieces.append(fold("All points, as in two_tones.csv", _points(found)))
     return page(title, pieces)

@@ -11,6 +11,7 @@ import numpy as np
 
 from ..data import Array, ComplexArray, Indices
 from ..errors import UserError
+from ..settings.mistakes import numbered
 from ..units import Quantity, counted
 
 if TYPE_CHECKING:
@@ -62,8 +63,14 @@ def without_rounding(harmonics: ComplexArray) -> ComplexArray:
 
 
 def of_solutions(columns: Mapping[str, Array], converged: Array, known: Sequence[str] = ()) -> dict[str, Array]:
-    """Columns (f,) with nan where a point is no solution, but for those that are known there too."""
-    return {name: v if name in known else np.where(converged, v, np.nan) for name, v in columns.items()}
+    """Columns (f, ...) with nan where a point is no solution, but for those that are known there
+    too."""
+    return {name: v if name in known else of_solution(v, converged) for name, v in columns.items()}
+
+
+def of_solution(values: Array, converged: Array) -> Array:
+    """(f, ...) values with nan where a point is no solution."""
+    return np.where(converged.reshape(-1, *np.ones(np.ndim(values) - 1, dtype=int)), values, np.nan)
 
 
 @dataclass(frozen=True)
@@ -71,6 +78,8 @@ class Series:
     """The f points of one sweep or curve, in order.
 
     Harmonics are complex 0-peak amplitudes with the time factor exp(+i Omega t), the mean first.
+    What is told of a motion is nan where a point is no solution; `arrays` alone keep what the
+    search left there.
 
     Attributes:
         name: like ``normal_force = 100``. parameters: what sets it apart, in SI: name -> number. key: (f,) see
@@ -141,14 +150,17 @@ class Series:
             UserError: none of that name.
         """
         name, row = self._place(readout)
-        return np.asarray(self.arrays[name][:, row], dtype=complex)
+        return self._of_solution(self.arrays[name][:, row].astype(complex))
+
+    def _of_solution(self, values: Array) -> Any:
+        return of_solution(values, self.converged)
 
     def _place(self, readout: str | int) -> tuple[str, int]:
         """Name of the array of a read-out, and its row."""
         places = self._places
         if isinstance(readout, int) and 0 <= readout < len(places):
             readout = list(places)[readout]
-        if readout not in places:
+        if not isinstance(readout, str) or readout not in places:
             raise UserError(f"read-out {readout!r}: the response has {', '.join(places) or 'none'}")
         return places[str(readout)]
 
@@ -161,7 +173,7 @@ class Series:
         known = {n.split("/", 1)[1]: n for n in self.arrays if n.startswith(READ)}
         if name not in known:
             raise UserError(f"monitor '{name}': the response has {', '.join(known) or 'none'}")
-        return np.asarray(self.arrays[known[name]], dtype=complex)
+        return self._of_solution(self.arrays[known[name]].astype(complex))
 
     @property
     def amplitude(self) -> Array:
@@ -192,7 +204,7 @@ class Series:
 
     def _summed(self, what: str) -> Array:
         values = [v for n, v in self.arrays.items() if n.startswith("contacts/") and n.endswith(f"/{what}")]
-        return np.sum(values, axis=0) if values else np.zeros(len(self))
+        return self._of_solution(np.sum(values, axis=0) if values else np.zeros(len(self)))
 
     @property
     def quantity(self) -> Quantity:
@@ -254,8 +266,7 @@ class Series:
     def _variable(self, name: str) -> tuple[tuple[str, ...], Array, dict[str, str]]:
         values, (*above, last) = self.arrays[name], name.split("/")
         if name in OF_A_MOTION or name.startswith((*READ, "bodies/", "contacts/")):
-            solved = self.converged.reshape(-1, *np.ones(values.ndim - 1, dtype=int))
-            values = np.where(solved, values, np.nan)
+            values = self._of_solution(values)
         owner = "/".join(above[1:]) or last
         axes = ("point", *(f"{name.replace('/', '.')}_{i}" for i in range(1, values.ndim)))
         if name.startswith(READ):
@@ -293,7 +304,9 @@ class Series:
             import matplotlib.pyplot as plt
 
             axes = plt.subplots(layout="constrained")[1]
-        a = self.harmonics(readout)[:, harmonic]
+        a = self.harmonics(readout)
+        numbered("harmonic", harmonic, a.shape[1], "harmonic")
+        a = a[:, harmonic]
         size = np.where(self.converged, np.abs(a) if harmonic else a.real, np.nan)
         top = float(np.nanmax(np.abs(size), initial=0.0))
         quantity = Quantity(unit_of(self._place(readout)[0]))

@@ -45,6 +45,6 @@ def _columns(s: Series) -> dict[str, Array]:
     """Heading -> (f,) numbers: those of a series, and how they were found."""
     found = {name: values for name, values in s.columns().items() if name != "frequency_Hz"}
     return found | {
-        "slip_dissipated_J": np.where(s.converged, s.by_slip, np.nan),
+        "slip_dissipated_J": s.by_slip,
         **{name: np.asarray(s.arrays[name]) for name in ("harmonics", "iterations")},
     }

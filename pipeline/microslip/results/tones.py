@@ -15,6 +15,7 @@ from ..errors import UserError
 from ..files.hdf5 import IMAGINARY, put, sealed
 from ..files.hostile import DAMAGE, reading, refuse_damaged
 from ..files.store import ordinary
+from ..settings.mistakes import numbered
 from ..units import Quantity
 from .series import CONVERGED, of_solutions
 
@@ -29,6 +30,9 @@ UNITS = {
     "error": "",
 }  # fmt: skip
 """Array of a file -> its unit; that of amplitudes is the read-outs' own."""
+
+OF_A_MOTION = ("amplitude", "supplied", "damped", "exchanged", "lost")
+"""Arrays that tell nothing where a point was not found."""
 
 SHOWN = 6
 """Pairs that a curve shows at most."""
@@ -45,7 +49,8 @@ class TwoTones:
             0-peak, in the units of the read-outs. readouts: (w,) names. units: (w,) SI.
         supplied: (f, 2) W by the loads of either tone, in the mean. damped: (f,) W in the bodies. exchanged: (f,) W
             that goes into contacts, by their forces' harmonics; lost: (f,) W that the contacts count themselves, as
-            friction times the path slid, less what moving ground brings.
+            friction times the path slid, less what moving ground brings. All of them nan where a
+            point was not found.
         status: of every point. error: (f,) of the last step of Newton's method, over the size of the unknowns.
             messages: what a reader must know. over: what a sweep runs over.
     """
@@ -63,6 +68,11 @@ class TwoTones:
     status: tuple[str, ...]
     error: Array
     messages: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        told = {name: np.asarray(getattr(self, name)) for name in OF_A_MOTION}
+        for name, values in of_solutions(told, self.converged).items():
+            object.__setattr__(self, name, values)
 
     def __len__(self) -> int:
         return len(self.first)
@@ -88,6 +98,7 @@ class TwoTones:
         Raises:
             UserError: a pair that is not balanced.
         """
+        numbered("readout", readout, len(self.readouts), "read-out")
         for sign in (1, -1):
             found = np.flatnonzero((self.pairs == sign * np.array([k_1, k_2])).all(axis=1))
             if len(found):
@@ -136,8 +147,7 @@ class TwoTones:
         each = {f"{name}_{a}_{b}": size[:, j] for j, (a, b) in enumerate(self.pairs)}
         own = {"supplied_1_W": self.supplied[:, 0], "supplied_2_W": self.supplied[:, 1], "damped_W": self.damped}
         tones = {"frequency_1_Hz": self.first, "frequency_2_Hz": self.second}
-        told = of_solutions({**each, **own, "lost_W": self.lost}, self.converged)
-        return {**tones, **told, "status": list(self.status)}
+        return {**tones, **each, **own, "lost_W": self.lost, "status": list(self.status)}
 
     def to_xarray(self) -> Any:
         """Everything as an `xarray.Dataset` over ``point``, ``readout`` and ``pair``; units are attributes."""
@@ -178,6 +188,8 @@ class TwoTones:
             axes: of matplotlib, new ones if not given. readout: its number. point: its number; of a single point it
                 need not be given.
         """
+        numbered("readout", readout, len(self.readouts), "read-out")
+        numbered("point", point or 0, len(self), "point")
         if axes is None:
             import matplotlib.pyplot as plt
 
@@ -201,7 +213,7 @@ class TwoTones:
         return axes
 
     def _curves(self, axes: Axes, readout: int) -> Axes:
-        size = np.where(self.converged[:, None], np.abs(self.amplitude[:, readout]), np.nan)
+        size = np.abs(self.amplitude[:, readout])
         by, unit = Quantity(self.units[readout]).scale(float(np.nanmax(size, initial=0.0)))
         strongest = [j for j in np.argsort(-np.nanmax(size, axis=0, initial=0.0)) if self.pairs[j].any()][:SHOWN]
         for j in strongest:

@@ -11,13 +11,17 @@ from pydantic import Field
 from ..data import Array
 from ..errors import UserError
 from ..settings.arguments import numbers, wholes
+from ..settings.numbers import MOST_FRICTION, Component
 
 Reals = Annotated[Any, numbers()]
-"""Arrays of any shape, as the three below."""
+"""Arrays of any shape, as the four below."""
 Positives = Annotated[Any, numbers(gt=0)]
 NotNegatives = Annotated[Any, numbers(ge=0)]
+Frictions = Annotated[Any, numbers(ge=0, le=MOST_FRICTION)]
 Poissons = Annotated[Any, numbers(ge=0, le=0.5)]
 Poisson = Annotated[float, Field(ge=0, le=0.5)]
+Angle = Annotated[Component, Field(ge=-np.pi / 2, le=np.pi / 2)]
+"""rad; degrees are mostly beyond it."""
 Resolution = Annotated[Any, wholes(2, 2)]
 """Along and across rolling."""
 

@@ -24,7 +24,7 @@ from ..settings import arguments
 from ..settings.arguments import Count, Index, wholes
 from ..settings.numbers import Positive
 from . import strips
-from .arguments import NotNegatives, Positives, Reals
+from .arguments import Frictions, NotNegatives, Positives, Reals
 from .strips import Array
 from .wheelset import Patch, Pose, Track, axle, creepages
 
@@ -108,9 +108,12 @@ class ContactTable(NamedTuple):
     checked: int
     jumping: float
 
+    def __repr__(self) -> str:
+        return f"<ContactTable: {self.sentence()}>"
+
     @arguments.checked
     def forces(
-        self, lateral: Reals, yaw: Reals, speed: Positives, friction: NotNegatives, *, turning: Reals | None = None,
+        self, lateral: Reals, yaw: Reals, speed: Positives, friction: Frictions, *, turning: Reals | None = None,
         load: NotNegatives | None = None, xi: Reals = 0.0, eta: Reals = 0.0, phi: Reals = 0.0,
     ) -> Rolling:  # fmt: skip
         """Patches and forces of n poses, by the strips of `strips.creep_forces`.

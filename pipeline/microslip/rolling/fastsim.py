@@ -12,7 +12,7 @@ import numpy as np
 
 from ..data import Array
 from ..settings.arguments import checked, numbers
-from ..settings.numbers import Component, NotNegative, Positive
+from ..settings.numbers import Coefficient, Component, Positive
 from .arguments import Poisson, Resolution
 from .kalker import creep_coefficients
 from .strips import Forces, Tractions, blended
@@ -29,7 +29,7 @@ def flexibilities(a: float, b: float, shear: float, poisson: float) -> Array:
 @checked
 def fastsim(
     xi: Component, eta: Component, phi: Component, a: Positive, b: Positive, normal_force: Positive,
-    friction: NotNegative, shear: Positive, poisson: Poisson, elements: Resolution = (44, 44),
+    friction: Coefficient, shear: Positive, poisson: Poisson, elements: Resolution = (44, 44),
     cover: Annotated[float, numbers(0, ge=1)] = 1.1, bound: Bound = "parabolic",
     blend: bool = True,
 ) -> tuple[Forces, Tractions]:  # fmt: skip

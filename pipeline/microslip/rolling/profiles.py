@@ -45,6 +45,9 @@ class Profile:
     noise: float = 0.0
     moved: tuple[float, float] = (0.0, 0.0)
 
+    def __repr__(self) -> str:
+        return f"<Profile {self.name}: {len(self.y)} points, y from {self.y[0]:.6g} to {self.y[-1]:.6g} m>"
+
     @cached_property
     def curve(self) -> CubicSpline | UnivariateSpline:
         if self.noise:

@@ -22,7 +22,7 @@ from ..contact.law import program
 from ..contact.point import opposed
 from ..interrupts import look
 from ..settings.arguments import checked
-from .arguments import NotNegatives, Poissons, Positives, Reals, Resolution, joined
+from .arguments import Frictions, Poissons, Positives, Reals, Resolution, joined
 from .kalker import Coefficients, coefficients_at
 
 Array = Any
@@ -91,6 +91,9 @@ class Tractions(NamedTuple):
     slip_x: Array
     slip_y: Array
     power: Array
+
+    def __repr__(self) -> str:
+        return f"<Tractions over {' x '.join(map(str, self.pressure.shape))} elements>"
 
 
 @dataclass(frozen=True)
@@ -289,7 +292,7 @@ def runs(n: int, block: int) -> Iterator[slice]:
 @checked
 def creep_forces(
     xi: Reals, eta: Reals, phi: Reals, a: Positives, b: Positives, normal_force: Positives,
-    friction: NotNegatives, shear: Positives, poisson: Poissons, *, elements: Resolution = (20, 20),
+    friction: Frictions, shear: Positives, poisson: Poissons, *, elements: Resolution = (20, 20),
     distribution: Distribution = "constant", coefficients: Coefficients = "table", spin: Spin = "kalker",
 ) -> Forces:  # fmt: skip
     """Forces on body 1 of any number of states of rolling, by the strip model of Sextro, 6.5.
@@ -326,7 +329,7 @@ def states(*given: ArrayLike) -> list[Array]:
 @checked
 def tractions(
     xi: Reals, eta: Reals, phi: Reals, a: Positives, b: Positives, normal_force: Positives,
-    friction: NotNegatives, shear: Positives, poisson: Poissons, *, elements: Resolution = (20, 20),
+    friction: Frictions, shear: Positives, poisson: Poissons, *, elements: Resolution = (20, 20),
     distribution: Distribution = "constant", coefficients: Coefficients = "table", spin: Spin = "kalker",
 ) -> Tractions:  # fmt: skip
     """Pressure, tractions and slip over the elements, of the states that `creep_forces` takes: arrays (n, ny, nx).

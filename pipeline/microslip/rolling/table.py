@@ -23,7 +23,7 @@ from ..files.hostile import reading
 from ..files.store import ordinary
 from ..settings import arguments
 from ..settings.arguments import Count, Index, wholes
-from .arguments import NotNegatives, Poisson, Positives, Reals, Resolution, joined
+from .arguments import Frictions, Poisson, Positives, Reals, Resolution, joined
 from .kalker import Coefficients, creep_coefficients
 from .strips import BLOCK, NAMES, SLIPPERY, Distribution, Forces, Poses, creep_forces, forces, grid, posed
 
@@ -78,6 +78,9 @@ class CreepTable:
     error: Array
     checked: int
 
+    def __repr__(self) -> str:
+        return f"<CreepTable: {self.sentence()}>"
+
     @property
     def axes(self) -> tuple[Array, ...]:
         return self.size, self.azimuth, self.polar, np.log(self.ratio), self.springs
@@ -85,7 +88,7 @@ class CreepTable:
     @arguments.checked
     def forces(
         self, xi: Reals, eta: Reals, phi: Reals, a: Positives, b: Positives, normal_force: Positives,
-        friction: NotNegatives, shear: Positives,
+        friction: Frictions, shear: Positives,
     ) -> Array:  # fmt: skip
         """(3, ...) F_x, F_y in N, M_z in N m, of what `strips.creep_forces` takes.
 

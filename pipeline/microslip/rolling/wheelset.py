@@ -18,7 +18,8 @@ from scipy.optimize import brentq
 from ..data import Array
 from ..errors import UserError
 from ..settings.arguments import check_fields, checked
-from ..settings.numbers import Component, NotNegative, Positive
+from ..settings.numbers import Coefficient, Component, NotNegative, Positive
+from .arguments import Angle
 from .ellipse import Elastic, ellipses, half_width
 from .profiles import Profile
 from .strips import creep_forces
@@ -51,8 +52,8 @@ class Pose:
     turning: of the axle, rad/s, positive forward; None: it rolls, at speed over the nominal radius."""
 
     lateral: Component = 0.0
-    yaw: Component = 0.0
-    roll: Component = 0.0
+    yaw: Angle = 0.0
+    roll: Angle = 0.0
     speed: Positive = 1.0
     turning: NotNegative | None = None
 
@@ -125,7 +126,7 @@ Drag = Callable[[list[Patch]], Array]
 
 @checked
 def patches(
-    track: Track, pose: Pose, side: Side, vertical: NotNegative, friction: NotNegative | Drag = 0.0
+    track: Track, pose: Pose, side: Side, vertical: NotNegative, friction: Coefficient | Drag = 0.0
 ) -> list[Patch]:
     """Contacts of one wheel under a vertical force, the one with the largest normal force first; none if it is 0.
 
@@ -144,7 +145,7 @@ def patches(
 
 @checked
 def axle(
-    track: Track, pose: Pose, vertical: NotNegative, even: bool = False, friction: NotNegative | Drag = 0.0
+    track: Track, pose: Pose, vertical: NotNegative, even: bool = False, friction: Coefficient | Drag = 0.0
 ) -> tuple[list[Patch], list[Patch], Pose]:
     """Contacts of the left and of the right wheel of an axle, as `patches`, and its pose.
 

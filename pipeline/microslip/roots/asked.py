@@ -45,6 +45,8 @@ def roots_of(
 
 
 def _family(body: Any, speed: int | None) -> Family:
+    if speed is not None and not isinstance(body, ModalBasis):
+        raise UserError("stability: speed: is that of a modal file or basis; leave it out")
     if isinstance(body, Family):
         return body
     if isinstance(body, ModalBasis):
@@ -68,7 +70,7 @@ def _family(body: Any, speed: int | None) -> Family:
 
 
 def _matrix(A: Any, key: str) -> Any:
-    if not sp.issparse(A) and (said := unfit(A)):
+    if said := unfit(A.tocsr().data if sp.issparse(A) else A):
         raise UserError(f"stability: body: {key}: {said}; correct it")
     A = A.tocsr().astype(float) if sp.issparse(A) else np.atleast_2d(np.asarray(A, dtype=float))
     if A.ndim != 2 or A.shape[0] != A.shape[1]:

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import inspect
+import reprlib
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import is_dataclass
-from functools import cache, reduce, wraps
+from functools import cache, partial, reduce, wraps
 from operator import index, or_
-from types import UnionType
-from typing import Annotated, Any, ParamSpec, TypeVar, Union, get_args, get_origin
+from pathlib import Path
+from types import NoneType, UnionType
+from typing import Annotated, Any, Literal, ParamSpec, TypeVar, Union, get_args, get_origin
 
 import numpy as np
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, InstanceOf, create_model
@@ -75,7 +77,11 @@ def checked(function: Callable[P, R]) -> Callable[P, R]:
 
     @wraps(function)
     def call(*args: P.args, **kwargs: P.kwargs) -> R:
-        check(function, signature.bind(*args, **kwargs).arguments)
+        try:
+            given = signature.bind(*args, **kwargs)
+        except TypeError as error:
+            raise TypeError(f"{function.__name__}() {error}") from None
+        check(function, given.arguments)
         return function(*args, **kwargs)
 
     return call
@@ -105,8 +111,38 @@ def _made(annotation: Any) -> Any:
     if kind is Annotated:
         return Annotated[_made(of[0]), *of[1:]]
     if kind in (Union, UnionType):
-        return reduce(or_, map(_made, of))
+        made = reduce(or_, map(_made, of))
+        return Annotated[made, BeforeValidator(partial(_one_of, of))] if _told(of) else made
     return kind[tuple(map(_made, of))] if kind in (Sequence, tuple) else annotation
+
+
+_KINDS = {Path: "a path", str: "text", Mapping: "a dict", NoneType: ""}
+
+
+def _told(of: tuple[Any, ...]) -> bool:
+    """Whether an argument of several kinds is one that words tell: a path or a dict, text, things
+    made here."""
+    kinds = list(map(_kind, of))
+    return bool({Path, Mapping} & set(kinds)) and all(isinstance(k, type) or k is Literal for k in kinds)
+
+
+def _kind(annotation: Any) -> Any:
+    """A class, or Literal."""
+    origin = get_origin(annotation)
+    return _kind(get_args(annotation)[0]) if origin is Annotated else (origin or annotation)
+
+
+def _one_of(of: tuple[Any, ...], value: Any) -> Any:
+    """Refuse what is of none of some kinds."""
+    words: list[str] = []
+    for one in of:
+        kind, choices = _kind(one), get_args(one)
+        fits = isinstance(value, str) and value in choices if kind is Literal else isinstance(value, kind)
+        if fits:
+            return value
+        words += map(repr, choices) if kind is Literal else [_KINDS.get(kind, kind.__name__)]
+    *some, last = filter(None, words)
+    raise ValueError(f"is {reprlib.repr(value)}; give {', '.join(some)}{' or ' if some else ''}{last}")
 
 
 @cache

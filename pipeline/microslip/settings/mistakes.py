@@ -100,6 +100,18 @@ def whole(what: str, value: Any, ge: int = 0) -> None:
     bounded(what, value, ge=ge)
 
 
+def numbered(what: str, value: Any, count: int, thing: str) -> None:
+    """Check the number of one of so many things, counted from 0, that is given in Python.
+
+    Raises:
+        UserError: no whole number, or one that is not there.
+    """
+    whole(what, value)
+    if value >= count:
+        has = f"there are {count}, counted from 0" if count else "there are none"
+        raise UserError(f"{what}: there is no {thing} {value}; {has}")
+
+
 def _sentences(errors: list[Any], raw: dict[str, Any], model: type[BaseModel]) -> Iterator[str]:
     """One sentence a key, though a setting that may be one thing or another is complained about twice."""
     by_key: dict[tuple[Any, ...], list[tuple[tuple[Any, ...], Any]]] = {}
@@ -257,7 +269,8 @@ def _most_telling(found: list[tuple[tuple[Any, ...], Any]], value: Any) -> tuple
     """Of the complaints about one key, the one that fits what was written."""
     if isinstance(value, list):  # an entry, or the length, rather than "is no number"
         return next((f for f in found if len(f[0]) > 0 and f[1]["type"] not in _SCALAR | {"tuple_type"}), found[-1])
-    return next((f for f in found if f[1]["type"] not in ("tuple_type", "list_type")), found[0])
+    kinds = "tuple_type", "list_type", "is_instance_of"
+    return next((f for f in found if f[1]["type"] not in kinds), found[0])
 
 
 def _words(found: list[tuple[tuple[Any, ...], Any]], error: Any, given: Any) -> str:
@@ -301,7 +314,7 @@ def _shown(value: Any) -> str:
     elif isinstance(value, int) and abs(value) > 10**18:
         text = "a number beyond all bounds"
     else:
-        text = str(value)
+        text = " ".join(str(value).split())
     return text if len(text) <= 60 else text[:57] + "..."
 
 

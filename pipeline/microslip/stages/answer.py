@@ -31,17 +31,11 @@ class Answer(NamedTuple):
 
 
 def answered(stage: Stage, inputs: Mapping[str, Any], work: Callable[[], Answer]) -> Answer:
-    """The answer that a stage's product (JSON) holds, made where it is not up to date; see `Stage.make`.
-
-    Files of the answer before, which this one has not, are removed.
-    """
+    """The answer that a stage's product (JSON) holds, made where it is not up to date; see `Stage.make`."""
     folder = stage.product.parent
 
     def make() -> Made:
-        former = _files_of(stage.product)
         found = work()
-        for path in former - set(found.files):
-            path.unlink(missing_ok=True)
         names = [str(path.relative_to(folder)) for path in found.files]
         told = {"files": names, "said": list(found.said), "whole": bool(found.whole)}
         store.write_json(stage.product, told)
@@ -50,15 +44,6 @@ def answered(stage: Stage, inputs: Mapping[str, Any], work: Callable[[], Answer]
     stage.make(inputs, make)
     told = json.loads(stage.product.read_text())
     return Answer([folder / name for name in told["files"]], told["said"], told["whole"])
-
-
-def _files_of(product: Path) -> set[Path]:
-    """Files of a product that stands there, in its folder or below."""
-    try:
-        names = [Path(name) for name in json.loads(product.read_text())["files"]]
-    except (OSError, ValueError, KeyError, TypeError):  # none, or not ours
-        return set()
-    return {product.parent / name for name in names if not name.is_absolute() and ".." not in name.parts}
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from .. import sliding
 from ..bifurcation import branches, mechanics
 from ..bifurcation.diagram import Asked, Diagram, diagram
 from ..bifurcation.recorded import Branches, write_bifurcation
-from ..case import CaseSettings, checkpoint
+from ..case import CaseSettings, checkpoint, headline
 from ..case.questions import BifurcationOfCase
 from ..errors import NotConverged, UserError
 from ..files import store
@@ -70,6 +70,9 @@ def _work(stage: Stage, case: CaseJob) -> Answer:
     made.append(write_bifurcation(folder / "bifurcation.h5", whole))
     drawn = _pictures(folder / "pictures", settings, found) if case.pictures else []
     sentences = [s for asked, one in zip(settings.bifurcation, found, strict=True) for s in told(asked, one)]
+    swings = [b.swing[:, 0] for one in found for b in one.branches if not b.still and b.swing.size]
+    top = max((float(np.max(swing, initial=0.0)) for swing in swings), default=0.0)
+    sentences += headline.doubted(case.built(), top)
     page = bifurcation_html(f"{settings.name}: bifurcations", settings.bifurcation, found, sentences, drawn)
     store.write_text(folder / "bifurcation.html", page)
     lost = any(b.lost for one in found for b in one.branches)

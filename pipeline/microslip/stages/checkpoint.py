@@ -42,7 +42,7 @@ class Checkpoint:
         file: the journal. raw: the case file. modal_files: body of the case -> its modal file. fresh: forget what is
             there. begin: is called before anything is written. whole_sweep: the points depend on the sweep that they
             are points of, as where a motion may be one of several. report: is told why points of a run that did not
-            end are not gone on with; None: nobody is.
+            end are not gone on with; None: nobody is. opened: whether points are kept by now.
     """
 
     file: Path
@@ -52,6 +52,7 @@ class Checkpoint:
     begin: Callable[[], None]
     whole_sweep: bool = False
     report: Callable[[str], None] | None = None
+    opened: bool = False
 
     @contextlib.contextmanager
     def journal(self, built: Built) -> Iterator[Journal]:
@@ -62,7 +63,7 @@ class Checkpoint:
         self._tell(parts)
         self.begin()
         with open_journal(self.file, store.fingerprint(parts), head | {"made_of": parts}, self.fresh) as journal:
-            self.fresh, self.report = False, None
+            self.fresh, self.report, self.opened = False, None, True
             yield journal
 
     def inputs(self, built: Built) -> str:

@@ -41,6 +41,13 @@ class Born:
         """Whether all were followed to an end."""
         return not any(c.lost for c in (*self.own, *(c for _, c in self.relief)))
 
+    @property
+    def largest(self) -> float:
+        """The largest amplitude of the first read-out of all cycles, in its unit; 0 where there is none."""
+        every = (*self.own, *(c for _, c in self.relief))
+        tops = [c.columns[c.system.column("amplitude", 0)] for c in every if c.system.named]
+        return max((float(np.max(column, initial=0.0)) for column in tops), default=0.0)
+
     def columns(self, across: str) -> dict[str, Array]:
         """Of the relief, a row an orbit. across: name of the second parameter."""
         parts = [{across: np.full(len(c.orbits), value)} | c.columns for value, c in self.relief]

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..basis import read_basis
-from ..case import checkpoint, load_case
+from ..case import checkpoint, headline, load_case
 from ..case.assemble import Built
 from ..case.messages import lifts
 from ..case.problem import pressed_by, problem_of
@@ -83,7 +83,11 @@ class Case(Varied):
         return self.built(dict.fromkeys(all_of_them if key in OF_CONTACTS else [key], value), f"--over {key}")
 
     def table(self, name: str, head: Sequence[str], rows: Iterable[Sequence[str]]) -> Path:
-        """A CSV file of the case."""
+        """A CSV file of the case, whose picture and page are yet to be made: those of an earlier
+        run must not stand beside it, should this one end here."""
+        stem = name.removesuffix(".csv")
+        for former in (f"{stem}.html", f"pictures/{stem}.png"):
+            (self.folder / former).unlink(missing_ok=True)
         store.write_text(self.folder / name, rows_csv(head, rows))
         return self.folder / name
 
@@ -123,11 +127,10 @@ def backbones(
             band of the sweep if not given.
         low, high: amplitudes, m; from a thirtieth to thirty times where the contacts begin to slide if not given.
     """
-    from ..harmonic_balance.nonlinear_modes import about_rest, backbone, sliding_amplitude, strongest
+    from ..harmonic_balance.nonlinear_modes import about_rest, backbone, sliding_amplitude
 
     found: dict[float, Backbone] = {}
     built, of = case.plain, case.quantity
-    band = [2 * np.pi * f for f in (built.settings.sweep.start, built.settings.sweep.stop)]
     forces = [n for n in normal_forces(built) if n != 0] or normal_forces(built)
     if 0.0 in normal_forces(built):
         report("left out: a normal force of 0 N, under which nothing sticks")
@@ -135,7 +138,7 @@ def backbones(
         problem = about_rest(problem_of(built, asked, form="relative"))[0]
         normal = pressed_by(built, problem) if asked is None else asked
         report(f"backbone at F_N = {normal:g} N, {count} of {len(forces)}")
-        number = mode - 1 if mode is not None else strongest(problem, band[0], band[1])
+        number = _mode_of(case, problem, mode)
         begins = sliding_amplitude(problem, number)
         found[normal] = backbone(problem, low or begins / 30, high or begins * 30, number, report=report)
         _backbone_table(found, case)
@@ -152,6 +155,69 @@ def backbones(
     return found
 
 
+def _mode_of(case: Case, problem: Problem, mode: int | None) -> int:
+    """Number of a mode with sticking contacts, 0 the lowest: the one asked for (from 1), or the strongest of the
+    sweep's band."""
+    from ..harmonic_balance.nonlinear_modes import strongest
+
+    sweep = case.plain.settings.sweep
+    if mode is not None:
+        return counted_from_1(problem, mode)
+    return strongest(problem, 2 * np.pi * sweep.start, 2 * np.pi * sweep.stop)
+
+
+def counted_from_1(problem: Problem, mode: int) -> int:
+    """Number of a mode with sticking contacts, 0 the lowest, that a person counts from 1.
+
+    Raises:
+        UserError: a rigid motion that neither supports nor contacts hold.
+    """
+    from ..harmonic_balance.nonlinear_modes import RIGID, stuck_modes
+
+    omega = stuck_modes(problem)[0]
+    rigid = int((omega <= RIGID * omega.max(initial=0.0)).sum())
+    if not 1 <= mode <= rigid:
+        return mode - 1
+    first = f"; the first is --mode {rigid + 1}, {omega[rigid] / (2 * np.pi):.5g} Hz" if rigid < len(omega) else ""
+    raise UserError(
+        f"--mode {mode}: is a rigid motion at 0 Hz, which neither supports nor sticking contacts hold, and has no "
+        f"backbone; choose a mode that vibrates{first}"
+    )
+
+
+def remarks_on_backbones(
+    found: Mapping[float, Backbone], case: Case, mode: int | None = None, report: Report = lambda _: None
+) -> list[str]:
+    """How uncertain the largest damping ratio is for want of harmonics, and what looks like a number in a wrong unit.
+
+    Args:
+        mode: see `backbones`.
+    """
+    from ..harmonic_balance import nonlinear_modes
+
+    known = [(n, one) for n, one in found.items() if len(one.damping) and not one.failing]
+    if not known:
+        return []
+    normal, best = max(known, key=lambda pair: float(pair[1].damping.max()))
+    at, built, e = int(best.damping.argmax()), case.plain, None
+    asked = None if normal_forces(built) == (None,) else normal
+    problem = nonlinear_modes.about_rest(problem_of(built, asked, form="relative"))[0]
+    if headline.is_estimated(built, problem):
+        report("error of harmonics and samples")
+        e = nonlinear_modes.error(problem, best, at, _mode_of(case, problem, mode))
+    amplitude = float(best.amplitude[at])
+    where = f"The damping ratio at {case.quantity.sized(amplitude, 3)} under F_N = {normal:g} N"
+    said = headline.said_of(built.settings, where, e)
+    return _told_of(said, headline.doubted(built, amplitude, max(found)), report)
+
+
+def _told_of(said: list[str], doubts: list[str], report: Report) -> list[str]:
+    """Both, reported."""
+    for text in [*said, *(f"warning: {doubt}" for doubt in doubts)]:
+        report(text)
+    return [*said, *doubts]
+
+
 def unreached(found: Mapping[float, Backbone]) -> str:
     """Which nonlinear modes do not reach all amplitudes, or hold motions that fail their checks; nothing where none."""
     early = [f"{normal:g} N" for normal, one in found.items() if one.status != REACHED]
@@ -160,14 +226,14 @@ def unreached(found: Mapping[float, Backbone]) -> str:
     return "; ".join(said)
 
 
-def write_backbones(found: Mapping[float, Backbone], case: Case) -> list[Path]:
-    """``backbone.csv``, ``pictures/backbone.png`` and ``backbone.html``."""
+def write_backbones(found: Mapping[float, Backbone], case: Case, remarks: Sequence[str] = ()) -> list[Path]:
+    """``backbone.csv``, ``pictures/backbone.png`` and ``backbone.html``. remarks: see `remarks_on_backbones`."""
     from ..pictures.following import backbone_plot
 
     title, picture = _title(case, "nonlinear mode"), case.folder / "pictures" / "backbone.png"
     files = [_backbone_table(found, case), backbone_plot(found, title, picture, case.quantity)]
     said = [_backbone_message(normal, one, case.quantity) for normal, one in sorted(found.items())]
-    return [*files, _page(case, "backbone", title, said, files)]
+    return [*files, _page(case, "backbone", title, [*said, *remarks], files)]
 
 
 def _backbone_message(normal: float, one: Backbone, of: Quantity) -> str:
@@ -258,9 +324,32 @@ def optimum_over(
     return optimum(make, [float(v) for v in values], band, report=report, keep=keep)
 
 
-def write_optimum(found: Optimum, over: str, case: Case, beside: Mapping[str, Array] = _NONE) -> list[Path]:
+def remarks_on_optimum(found: Optimum, over: str, case: Case, report: Report = lambda _: None) -> list[str]:
+    """How uncertain the lowest of the highest resonances is for want of harmonics, and what looks like a number in a
+    wrong unit in any of them."""
+    best, built, e = found.resonance, case.plain, None
+    known = {value: one for value, one in found.found.items() if one.status == CONVERGED}
+    if not known:
+        return []
+    if found.problem is not None and best.status == CONVERGED:
+        report("error of harmonics and samples")
+        e = headline.estimated(built, found.problem, best.x, best.Omega)
+    at = f"{best.Omega / (2 * np.pi):.6g} Hz under {over} = {found.parameter:.6g}{unit_of(over)}"
+    said = headline.said_of(built.settings, f"The amplitude at {at}", e)
+    forces = known if over == NORMAL_FORCE else [n for n in normal_forces(built) if n is not None]
+    largest = max(one.amplitude for one in known.values())
+    return _told_of(said, headline.doubted(built, largest, max(forces, default=None)), report)
+
+
+def write_optimum(
+    found: Optimum,
+    over: str,
+    case: Case,
+    beside: Mapping[str, Array] = _NONE,
+    remarks: Sequence[str] = (),
+) -> list[Path]:
     """``optimum.csv``: the highest resonance at every value and the optimum; ``pictures/optimum.png``;
-    ``optimum.html``. beside: see `found_before`."""
+    ``optimum.html``. beside: see `found_before`. remarks: more sentences of the page."""
     from ..pictures.following import optimum_plot
 
     files, title = [_optimum_table(found.found, over, case, found)], _title(case, "highest resonance and optimum")
@@ -273,6 +362,7 @@ def write_optimum(found: Optimum, over: str, case: Case, beside: Mapping[str, Ar
         f"{told(found, over, case)}.",
         *([f"{why}."] if (why := missed(found, over)) else []),
         *(_lowest_of(name, values, over, case.quantity) for name, values in beside.items()),
+        *remarks,
     ]
     return [*files, _page(case, "optimum", title, said, files)]
 
@@ -380,7 +470,8 @@ def optimum_message(found: Optimum, over: str, of: Quantity = METRES) -> str:
     else:
         lines = f"{name} = {found.parameter:.6g}{unit}: the highest resonance, {height} at "
         lines += f"{best.Omega / 2 / np.pi:.6g} Hz, is lowest"
-        lines += _FOUND_AS.get(found.status, "") if is_optimum(found) else " of those that were found"
+        lines += _FOUND_AS.get(found.status, "") or _at_an_end(found, unit)
+        lines += "" if is_optimum(found) or end_of(found) else " of those that were found"
     return lines + _unknown(found, unit) + _rising(found, unit)
 
 
@@ -424,20 +515,34 @@ def is_optimum(found: Optimum) -> bool:
     return found.status in ("converged", "kink", "two peaks")
 
 
-def missed(found: Optimum, over: str) -> str:
-    """Why there is no optimum, and where to look for it, or at which values the search failed; nothing where there is
-    one among all values, or the setting hardly matters."""
-    low, high, unit = min(found.found), max(found.found), unit_of(over)
-    if is_optimum(found) or hardly(found):
-        lost = [f"{v:.4g}" for v, one in found.found.items() if one.status.startswith(NOT_FOUND)]
-        return f"at {', '.join(lost)}{unit} no resonance was found; the optimum is that of the others" if lost else ""
-    if found.status != NO_OPTIMUM or found.parameter not in (low, high):
-        return f"no optimum was found: {found.status}"
-    end = f"--low below {low:g}" if found.parameter == low else f"--high above {high:g}"
+def end_of(found: Optimum) -> str:
+    """The end of the range at which the resonance is lowest, by the option that moves it; nothing where there is an
+    optimum in between, or none is known."""
+    if found.status != NO_OPTIMUM:
+        return ""
+    return {min(found.found): "--low", max(found.found): "--high"}.get(found.parameter, "")
+
+
+def _at_an_end(found: Optimum, unit: str) -> str:
+    """That it is lowest at an end, and where to look for an optimum."""
+    if not (end := end_of(found)):
+        return ""
+    low, high = min(found.found), max(found.found)
+    beyond = f"--low below {low:g}" if end == "--low" else f"--high above {high:g}"
     return (
-        f"no optimum between {low:g} and {high:g}{unit}: the resonance is lowest at {found.parameter:g}{unit}, an end; "
-        f"look beyond it with {end}"
+        f" of all from {low:g} to {high:g}{unit}: it falls towards this end, so an optimum may lie "
+        f"beyond; look there with {beyond}"
     )
+
+
+def missed(found: Optimum, over: str) -> str:
+    """Why it is not known where the resonance is lowest, or at which values the search failed; nothing where it is, or
+    the setting hardly matters."""
+    if not (is_optimum(found) or hardly(found) or end_of(found)):
+        return f"no optimum was found: {found.status}"
+    lost = [f"{v:.4g}" for v, one in found.found.items() if one.status.startswith(NOT_FOUND)]
+    unit, what = unit_of(over), "optimum" if is_optimum(found) else "lowest"
+    return f"at {', '.join(lost)}{unit} no resonance was found; the {what} is that of the others" if lost else ""
 
 
 # stability -----------------------------------------------------------------------------------------------------------

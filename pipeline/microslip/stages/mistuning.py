@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from ..basis import read_basis
-from ..case import CaseSettings
+from ..case import CaseSettings, headline
 from ..case.assemble import Built, build
 from ..case.contacts import swept
 from ..case.problem import book_models
@@ -76,12 +76,20 @@ def _work(stage: Stage, case: CaseJob, workers: int | None) -> Answer:
     lone = first is not None and what.tuned.body(first).sectors == 1 and settings.stuck_ratios is None
     near = approximation(what, first) if first and lone and not what.stuck else None
     alone = near is not None and len(what.scatter) > 1
-    sentences = [*said(found), *([FIRST_ALONE] if alone else []), *built.messages]
+    doubts = _doubted(found, built, asked)
+    sentences = [*said(found), *([FIRST_ALONE] if alone else []), *built.messages, *doubts]
     made = _written(found, near, folder)
     drawn = _pictures(found, worst, near, folder / "pictures", settings.name) if worst and case.pictures else []
     page = folder / "mistuning.html"
     store.write_text(page, mistuning_html(f"{settings.name}: mistuned", found, sentences, drawn))
     return Answer([page, *made, *drawn], sentences, bool(found.solved.all()))
+
+
+def _doubted(found: Ensemble, built: Built, asked: MistuningOfCase) -> list[str]:
+    """What looks like a number in a wrong unit: of the highest blade of all samples, or the tuned ring's."""
+    amplitude, stress = (float(np.nanmax(found.column(of), initial=0.0)) for of in ("amplitude", "stress_Pa"))
+    top = max(amplitude, found.tuned.top.amplitude)
+    return headline.doubted(built, top, _normal_force(built, asked), stress)
 
 
 FIRST_ALONE = "First order is of the first scatter of frequencies alone; the samples have all that scatters."

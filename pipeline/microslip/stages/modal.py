@@ -52,7 +52,7 @@ def modes_stage(
         size = size_in_words(basis)
         report(f"writing {stage.product}{', ' * bool(size)}{size}")
         write_basis(stage.product, basis)
-        for text in plausible.of_basis(basis, _static(basis)):
+        for text in (*plausible.of_basis(basis, _static(basis)), *held_faces(basis)):
             told.append(f"{job.path}: {text}")
             report(f"warning: {told[-1]}")
         warnings.extend(told)
@@ -60,6 +60,17 @@ def modes_stage(
 
     stage.make(inputs, work)
     return stage.product, warnings
+
+
+def held_faces(basis: ModalBasis) -> list[str]:
+    """A sentence for each face of contacts that the supports hold, on which a case is refused later."""
+    faces = basis.groups[min(basis.groups)].interfaces
+    return [
+        f"interfaces.{name}: the supports hold its whole face, so that nothing can open or slip there, "
+        "and a contact on it is refused; free it in [[supports]], or take another face"
+        for name, face in faces.items()
+        if face.role != "load" and face.held_share == 1.0
+    ]
 
 
 def _static(basis: ModalBasis) -> dict[str, float]:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline
 
-from ..case import CaseSettings
+from ..case import CaseSettings, headline
 from ..case.assemble import Built
 from ..case.contacts import swept
 from ..case.problem import problem_of
@@ -46,7 +46,7 @@ def _work(stage: Stage, case: CaseJob) -> Answer:
     stage.begin()
     ran = recorded.run(folder / "orbit.h5", motions, case.made_by(stage), case.force, case.report)
     found = [(m.name, m) for m in ran]
-    notes, messages = _notes(found), _messages(found, built)
+    notes, messages = _notes(found), [*_messages(found, built), *_doubted(found, built)]
     store.write_text(folder / "orbit.csv", columns_csv(_table(found), 8))
     drawn = _pictures(found, folder / "pictures", name) if case.pictures else []
     moving = moving_bodies(found, built, folder) if case.pictures else []
@@ -118,6 +118,14 @@ def _messages(found: Sequence[tuple[str, Orbit]], built: Built) -> list[str]:
     return [*own, *built.messages]
 
 
+def _doubted(found: Sequence[tuple[str, Orbit]], built: Built) -> list[str]:
+    """What looks like a number in a wrong unit."""
+    ends = [_ends(one) for _, one in found if len(one.time)]
+    swing = max((0.5 * (largest - smallest) for largest, smallest in ends), default=0.0)
+    asked = built.settings.orbit
+    return headline.doubted(built, swing, asked.normal_force if asked else None)
+
+
 def _sentence(name: str, one: Orbit) -> str:
     if not len(one.time):
         return f"{name}: {one.said}."
@@ -127,7 +135,7 @@ def _sentence(name: str, one: Orbit) -> str:
     return f"{name}: {one.said}; {one.labels[0]} swings by {size} on either side{error}."
 
 
-KIND = {"open": "not back yet", "short": "too short to say"}
+KIND = {"open": "not back yet", "short": "too short to say", "away": "goes away"}
 """Of `classification.kind`, what needs other words in a table."""
 
 

@@ -13,12 +13,11 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from .. import plausible
 from ..basis import read_basis
-from ..case import CaseResult, CaseSettings, checkpoint, load_case, run_case
+from ..case import CaseResult, CaseSettings, checkpoint, headline, load_case, run_case
 from ..case.assemble import build
 from ..case.beyond import with_curve
-from ..case.messages import at_places, lifted, method, off
+from ..case.messages import at_places, lifted, method, off, what_moves
 from ..case.run import jumps, with_motions
 from ..case.settings import FIRST_HARMONICS
 from ..data import Array, ModalBasis
@@ -109,17 +108,20 @@ def _work(
         begin = _harmonics(points, settings, bases, case_path) if settings.looks_for_harmonics else FIRST_HARMONICS
         result = run_case(settings, bases, case_path, stage.report, points.journal, begin)
         if places := jumps(result):
-            _finished(points, result, Wanted("none", pictures=False), stage.report)
+            known = _finished(points, result, Wanted("none", pictures=False), stage.report)
+            stage.clear(folder / name for name in known["files"])
             stage.report(
                 f"{folder / 'response.html'} has what is known so far; at {counted(len(places), 'place')} the response "
                 "jumps, folds or has no solution: dozens of motions in time, of seconds each"
             )
-        result = with_motions(result, stage.report)
+        motions = Checkpoint(folder / "motions.points", raw, files, stage.force, stage.begin, True)
+        result = with_motions(result, stage.report, motions.journal)
         curve = Checkpoint(folder / "curve.points", raw, files, stage.force, stage.begin)
         own = bases, case_path, curve.journal, stage.report
-        result = replace(result, beyond=tuple(with_curve(b, result.settings, *own) for b in result.beyond))
+        each = (with_curve(b, result.responses[b.normal], result.settings, *own) for b in result.beyond)
+        result = replace(result, beyond=tuple(each))
     except KeyboardInterrupt:
-        _unfinished(points)
+        _unfinished(points, stage)
         raise
     summary = _finished(points, result, wanted, stage.report)
     store.write_json(stage.product, summary)
@@ -138,12 +140,15 @@ def _harmonics(points: Checkpoint, settings: CaseSettings, bases: Mapping[str, M
     return FIRST_HARMONICS
 
 
-def _unfinished(points: Checkpoint) -> None:
-    """``response.h5`` of what there is so far."""
-    points.begin()
-    if points.file.is_file():
-        with contextlib.suppress(UserError):
-            write_response(points.file.with_suffix(".h5"), read_response(points.file))
+def _unfinished(points: Checkpoint, stage: Stage) -> None:
+    """``response.h5`` of what there is so far, in place of what an earlier run has left; without a point of this run
+    all stays as it was."""
+    with contextlib.suppress(UserError):
+        if points.opened and any(read_journal(points.file)[1].values()):
+            found = read_response(points.file)
+            points.begin()
+            stage.clear()
+            write_response(points.file.with_suffix(".h5"), found)
 
 
 def _tell(summary: Mapping[str, Any], report: Report) -> None:
@@ -351,10 +356,7 @@ def _watched(result: CaseResult) -> ModalBasis:
 
 def _stress_doubted(result: CaseResult, more: _Assessed) -> list[str]:
     """What is said of a stress that no metal bears."""
-    young = plausible.modulus_of(_watched(result))
-    top = max((row["stress_amplitude_Pa"] for row in more.rows), default=0.0)
-    told = plausible.stress(f"Resonances of {more.body}", top, young, "stress amplitude")
-    return [told] if told else []
+    return headline.stressed(result.built, max((row["stress_amplitude_Pa"] for row in more.rows), default=0.0))
 
 
 def _lifted_off(result: CaseResult, found: assessment.Assessment) -> dict[float, Array]:
@@ -466,7 +468,7 @@ def summarise(result: CaseResult) -> dict[str, Any]:
             {"normal_force_N": n, "frequency_Hz": f, name: a} for n, folds in result.folds.items() for f, a in folds
         ],
         "motions_in_time": [row for one in result.beyond for row in one.rows()],
-        "beyond": [words for one in result.beyond for words in one.sentences()],
+        "beyond": [words for one in result.beyond for words in what_moves(one)],
         "failed_points": failed,
         "messages": list(result.messages),
     }

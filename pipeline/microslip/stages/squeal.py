@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from .. import sliding
-from ..case import CaseSettings
+from ..case import CaseSettings, headline
 from ..case.questions import Cycle, Over, StabilityOfCase
 from ..case.settings import GROUND
 from ..data import Array, ComplexArray, ModalBasis
@@ -111,6 +111,7 @@ def _work(stage: Stage, case: CaseJob) -> Answer:
     if asked.cycle:
         said += [words for c in cycles.own for words in sentences_of(c, asked.cycle)]
         said += sentence_of_relief(cycles, asked.cycle)
+        said += headline.doubted(case.built(), cycles.largest)
     moves = moving(state, found, varied.bases, settings, folder) if case.pictures else []
     names = _written(folder, settings.name, found, over, full, said, case.pictures, (cycles, asked.cycle), moves)
     complete = found.complete and all(one.complete for one in full) and cycles.whole

@@ -62,7 +62,9 @@ class Stage:
                 return False
             made = work()
             if made.whole:
-                store.note_product(self.product, all_inputs, made.files, made.opened, **made.note)
+                files = [*made.files]
+                self.clear([self.product, *files])
+                store.note_product(self.product, all_inputs, files, made.opened, **made.note)
             return True
 
     def is_made(self, inputs: Mapping[str, Any]) -> bool:
@@ -81,6 +83,10 @@ class Stage:
     def begin(self) -> None:
         """What stands there counts no more: a run that ends here is begun anew."""
         store.unfinished(self.product)
+
+    def clear(self, keep: Iterable[Path] = ()) -> None:
+        """What a former run has left goes, but files to `keep`, of this one. See `store.clear_former`."""
+        store.clear_former(self.product, keep)
 
 
 @cache

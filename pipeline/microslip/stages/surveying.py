@@ -12,9 +12,10 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from ..basis import read_basis
-from ..case import CaseSettings, checkpoint, load_case, surveys
-from ..case.curves import Followed, curves
-from ..case.messages import method
+from ..case import CaseSettings, checkpoint, headline, load_case, surveys
+from ..case.assemble import Built, build
+from ..case.curves import UNITS, Followed, curves, error_of, highest
+from ..case.problem import normal_forces
 from ..data import Array, ModalBasis
 from ..files import store
 from ..files.tables import write_tables
@@ -46,6 +47,9 @@ class Survey:
     Attributes:
         tables: file name -> (column -> values). draw: file name -> what draws it. sentences: for the reader. missing:
             what was asked for and is not known, in words; nothing where all is. whole: nobody interrupted it.
+            largest: amplitudes of the first read-out, and stress: Pa, of which the largest are looked at, see
+            `headline.doubted`; none where it is about neither. remarks: on how uncertain it is; None: that was
+            not estimated.
     """
 
     tables: Tables
@@ -53,6 +57,9 @@ class Survey:
     sentences: list[str] = field(default_factory=list)
     missing: str = ""
     whole: bool = True
+    largest: Array | None = None
+    stress: Array = field(default_factory=lambda: np.zeros(0))
+    remarks: list[str] | None = None
 
 
 def survey_stage(
@@ -98,12 +105,17 @@ def _work(
 
     def write(tables: Tables) -> None:
         begin()
+        stage.clear([points.file.with_suffix(".h5")])
         write_tables(folder, tables, 12)
 
     survey = partial(KINDS[kind], write) if kind in KINDS else partial(_curve, kind, points)
-    found = survey(settings, {name: read_basis(file) for name, file in files.items()}, case_path, stage.report)
-    if kind != "identification" and (how := method(settings)):
-        found = replace(found, sentences=[how, *found.sentences])
+    bases = {name: read_basis(file) for name, file in files.items()}
+    found = survey(settings, bases, case_path, stage.report)
+    if found.largest is not None:
+        how = headline.said_of(settings, "", None) if found.remarks is None else found.remarks
+        built = surveys.at_its_beginning(settings, bases, case_path, kind)
+        doubts = headline.doubted(built, _top(found.largest), _pressing(built, case_path), _top(found.stress))
+        found = replace(found, sentences=[*how, *found.sentences, *doubts])
     write(found.tables)
     names = [*found.tables, *found.draw, _shown(found, kind, settings.name, folder)]
     if not found.whole:
@@ -111,6 +123,16 @@ def _work(
     store.write_text(said, "\n".join([f"{', '.join(names)}: {found.missing}", *found.sentences]) + "\n")
     beside = [points.file.with_suffix(".h5")] if kind not in KINDS else []
     return Made([*(folder / name for name in names), *beside])
+
+
+def _top(values: Array) -> float:
+    """The largest of those that are known, 0 where none is."""
+    return float(np.nanmax(values, initial=0.0))
+
+
+def _pressing(built: Built, path: Path) -> float | None:
+    """N, the largest normal force of the sweep."""
+    return max(normal_forces(built, path), default=None)
 
 
 def _told(said: Path) -> tuple[list[Path], list[str], str]:
@@ -162,7 +184,10 @@ def _orders(write: Write, settings: CaseSettings, bases: Bases, path: Path, repo
     if len(found) > 1:
         words = f"{settings.name}: the worst of all engine orders over the normal force"
         draw = {"pictures/orders_worst.png": lambda p: worst_order_picture(list(found.values()), p, words)} | draw
-    return Survey(tables(found), draw, _worst_sentences(list(found.values())), failed)
+    every = list(found.values())
+    amplitude, stress = (np.concatenate([getattr(r, of) for r in every]) for of in ("amplitude", "stress"))
+    said = _worst_sentences(every)
+    return Survey(tables(found), draw, said, failed, largest=amplitude, stress=stress)
 
 
 def _padded(column: Array, left: int) -> Array:
@@ -259,6 +284,7 @@ def _speeds(write: Write, settings: CaseSettings, bases: Bases, path: Path, repo
         {"pictures/speeds.png": lambda p: speed_line_picture(*drawn, p, title, r.quantity)},
         said,
         _unsolved(int((~r.converged).sum())),
+        largest=amplitude,
     )
 
 
@@ -272,7 +298,7 @@ def _ranges(write: Write, settings: CaseSettings, bases: Bases, path: Path, repo
     title = f"{settings.name}: over {', '.join(e.names).replace('_', ' ')}"
     return Survey(
         tables(e), {"pictures/ranges.png": lambda p: envelope_picture(e, p, title)}, _ranges_sentences(e),
-        _unsolved(int((~e.converged).sum())),
+        _unsolved(int((~e.converged).sum())), largest=e.peaks,
     )  # fmt: skip
 
 
@@ -321,6 +347,7 @@ def _curve(over: str, points: Checkpoint, settings: CaseSettings, bases: Bases, 
     if not found:
         raise KeyboardInterrupt
     columns = {name: np.concatenate([one.columns()[name] for one in found]) for name in found[0].columns()}
+    error, remarks = _error(found, settings, bases, path, report) if whole else (None, None)
     title, name = f"{settings.name}: over the {over.replace('_', ' ')}", f"over_{over}"
     response = _written(points, found, whole)
     failed = _unsolved(sum(int((~s.converged).sum()) for s in response.series))
@@ -332,10 +359,28 @@ def _curve(over: str, points: Checkpoint, settings: CaseSettings, bases: Bases, 
     return Survey(
         {f"{name}.csv": columns},
         {f"pictures/{name}.png": lambda p: curve_plot(drawn, p, title)} if drawn else {},
-        [*(words for one in found for words in one.sentences(by)), sentence(response, None)],
+        [*(words for one in found for words in one.sentences(by)), sentence(response, error)],
         "; ".join([*missing, *filter(None, [failed])]),
         whole,
+        largest=np.concatenate([np.where(one.converged, one.amplitude, 0.0) for one in found]),
+        remarks=remarks,
     )
+
+
+def _error(
+    found: Sequence[Followed], settings: CaseSettings, bases: Bases, path: Path, report: Report
+) -> tuple[float | None, list[str] | None]:
+    """Estimated error of the highest point, over its amplitude, and what is said of it; None where there is none."""
+    if (top := highest(found)) is None:
+        return None, None
+    one, i = top
+    report("error of harmonics and samples")
+    e = error_of(build(settings, bases, path), one, i)
+    at = f"{one.parameter[i]:.6g} {UNITS[one.over]}"
+    said = headline.said_of(settings, f"{one.label}: the amplitude at {at}", e)
+    if e is None:
+        return None, None
+    return e.readout, said if e.readout > headline.TRUNCATION else []
 
 
 def _written(points: Checkpoint, found: list[Followed], whole: bool) -> Response:

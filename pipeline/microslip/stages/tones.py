@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..analyses import two_tones
+from ..case import headline
 from ..errors import UserError
 from ..files import store
 from ..files.tables import columns_csv
@@ -53,7 +54,9 @@ def _work(stage: Stage, case: CaseJob) -> Answer:
     stage.begin()
     best = int(np.argmax(np.where(found.converged, np.abs(found.of(1, 0)), -1.0)))
     left_out = found.error_estimate(best) if found.converged[best] else np.inf
-    messages = [*_sentences(found, best, left_out), *found.messages, *built.messages]
+    reached = np.abs(found.amplitude[found.converged, 0, 1:]).sum(axis=-1).max(initial=0.0)
+    doubts = headline.doubted(built, float(reached))
+    messages = [*_sentences(found, best, left_out), *found.messages, *built.messages, *doubts]
     columns = found.columns()
     store.write_text(folder / "two_tones.csv", columns_csv(columns, 10))
     found.save(folder / "two_tones.h5")

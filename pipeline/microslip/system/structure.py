@@ -12,9 +12,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any, Literal
 
+import jax
 import numpy as np
 import scipy.linalg
-from pydantic import BeforeValidator, Field
+from pydantic import AfterValidator, BeforeValidator, Field
 
 from ..contact.elements import Polynomial, Stop
 from ..contact.friction import Coulomb, Friction, StaticSliding
@@ -33,7 +34,17 @@ from .component import Component
 from .ground import Ground
 
 ALONG = {"n": 0, "t1": 1, "t2": 2}
-At = Annotated[Any, numbers(0, 1)]
+
+
+def _numbered(at: Any) -> Any:
+    """Numbers of coordinates count from 0; what has more of them, or other ones, is refused where
+    these are known."""
+    if not np.ndim(at) and not (float(at).is_integer() and at >= 0):
+        raise ValueError(f"is {at}; give the number of a coordinate, counted from 0")
+    return at
+
+
+At = Annotated[Any, AfterValidator(_numbered), numbers(0, 1)]
 """Number of a coordinate from 0, or (n,) weights of all."""
 Matrix = Annotated[Any, numbers(0, 2)]
 Share = Annotated[NotNegative, Field(le=1)]
@@ -68,7 +79,7 @@ HIGHEST = 100
 def _forces(force: Any) -> Any:
     """Amplitudes by coordinate, or of all."""
     values = list(force.values()) if isinstance(force, Mapping) else force
-    if isinstance(force, Mapping) and (said := unfit(list(force))):
+    if isinstance(force, Mapping) and (said := unfit(list(force), ge=0)):
         raise ValueError(f"its coordinates: {said}")
     try:
         at = np.asarray(values)
@@ -134,7 +145,7 @@ def _row(at: Any, count: int, key: str) -> Array:
         if np.shape(at) != (count,):
             raise UserError(f"{key}: weights of shape {np.shape(at)}; the structure has {count} coordinates")
         return np.asarray(at, dtype=float)
-    if not float(at).is_integer() or not -count <= at < count:
+    if not float(at).is_integer() or not 0 <= at < count:
         raise UserError(f"{key}: there is no coordinate {at}; the structure has {count}, counted from 0")
     return np.eye(count)[int(at)]
 
@@ -351,15 +362,18 @@ def _force(force: Any, n: int, key: str = "force") -> Array:
 
 
 def _contacts(elements: Sequence[Element], component: str, K: Array, force: Array) -> tuple[Contact, ...]:
-    patches: dict[str, Patch] = {}  # equal elements are evaluated together
-    found = []
+    patches: dict[tuple[Any, ...], Patch] = {}  # equal elements are evaluated together
+    found: list[Contact] = []
     for i, e in enumerate(elements, 1):
         row = e.row(len(K))
         shape = np.zeros((1, 3, 1))
         shape[0, ALONG[e.along], 0] = 1.0
-        key = f"{e.law!r} {e.along}"
+        leaves, kind = jax.tree_util.tree_flatten(e.law)
+        key = kind, e.along, *((np.shape(x), np.asarray(x).tobytes()) for x in leaves)
         patch = patches.setdefault(key, Patch("element", np.zeros((1, 2)), np.ones(1), e.law, shape))
         own = e.name or f"{_kind(e)} {i}"
+        if own in [c.name for c in found]:
+            raise UserError(f"structure: elements: two have the name '{own}'; rename one")
         face, zero = ContactFace(component, own, rows={0: row[None]}), np.zeros(1)
         length = e.length or _length(e.law, row, K, force)
         ground = Ground(e.velocity, 0.5 * math.pi * (e.along == "t2")) if e.velocity else None

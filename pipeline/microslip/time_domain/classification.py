@@ -118,9 +118,19 @@ def exponent(stepper: Stepper, now: Now, samples: int, each: int, periods: int, 
 
 def sizes(e: Equations, blocks: int) -> Array:
     """(b, 2 p) by which displacements and velocities of the modes are weighed in a separation, 1/s and 1."""
-    weights = np.where(np.abs(e.omega2) > FREE * e.Omega**2, np.abs(e.omega2), e.Omega**2)
-    weights = np.sqrt(weights).reshape(blocks, -1)
+    weights = pace(e.omega2, e.Omega).reshape(blocks, -1)
     return np.concatenate([weights, np.ones_like(weights)], axis=1)
+
+
+def pace(omega2: Array, Omega: float) -> Array:
+    """(m,) rad/s by which displacements of modes are weighed beside velocities: their own, or that
+    of the excitation where no spring holds them."""
+    return np.sqrt(np.where(held(omega2, Omega), np.abs(omega2), Omega**2))
+
+
+def held(omega2: Array, Omega: float) -> Array:
+    """(m,) whether a spring holds a mode."""
+    return np.asarray(np.abs(omega2) > FREE * Omega**2)
 
 
 def periods_of(done: int) -> int:
@@ -210,7 +220,8 @@ def second_frequency(orbit: Orbit) -> float:
 
 
 def kind(orbit: Orbit) -> str:
-    """``periodic``, ``quasi-periodic``, ``chaotic``; ``settling``: it comes back, but drifts, or
+    """``periodic``, ``quasi-periodic``, ``chaotic``; ``away``: it comes back but for bodies that
+    nothing holds, which go away; ``settling``: it comes back, but drifts, or
     the separation of neighbours shrinks, so that it goes to a motion that comes back; ``run-up``;
     ``open``: it is not known; ``diverged``; ``short``: less than two periods are kept."""
     if math.isfinite(orbit.diverged):
@@ -221,6 +232,8 @@ def kind(orbit: Orbit) -> str:
         return "short"
     if orbit.repeats:
         return "settling" if orbit.drifts > SETTLED else "periodic"
+    if orbit.else_repeats:
+        return "away"
     if orbit.exponent is None or not math.isfinite(orbit.exponent.value):
         return "open"
     if math.isfinite(second_frequency(orbit)):
@@ -244,6 +257,7 @@ def said(orbit: Orbit) -> str:
         "drifting": f"still settles, by {percent(orbit.drifts)} of its size in {counted(kept - kept // 2, 'period')}; "
         f"comes back after {counted(p, 'period')} within 0.1 %",
         "periodic": f"comes back after {counted(p, 'period')}",
+        "away": f"goes away from where it was, else comes back after {counted(orbit.else_repeats, 'period')}",
         "chaotic": f"chaotic, largest Lyapunov exponent {orbit.exponent}",
         "quasi-periodic": f"quasi-periodic, second frequency {second_frequency(orbit):.5g} of the excitation's",
         "settling": f"still settles after {kept} periods, largest Lyapunov exponent {orbit.exponent}",

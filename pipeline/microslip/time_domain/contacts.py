@@ -260,7 +260,8 @@ def rigid_answer(
     """
     states, points = map(list, others)
     spots = [i for i, g in enumerate(groups) if g.rigid]
-    asked = [_asked(groups, i, bodies is None, free, ahead, dt, held) for i in spots]
+    back = meets.back if bodies is None else None
+    asked = [_asked(groups, i, back, free, ahead, dt, held) for i in spots]
     ways, pressed, first, *slopes = (jnp.concatenate(x) for x in zip(*asked, strict=True))
     if any(isinstance(groups[i].law, Moving) and groups[i].law.wavy for i in spots):
         meets = over_waves(meets, *slopes)
@@ -290,9 +291,10 @@ def slid(w: Any, free: Any) -> Any:
     return norm(w[:, 1:].T) > SLIDES * jnp.maximum(jnp.abs(w), jnp.abs(free))[:, 1:].max()
 
 
-def _asked(groups: tuple[Group, ...], i: int, masses: bool, free: Any, ahead: Any, dt: Any, held: Held) -> tuple:
+def _asked(groups: tuple[Group, ...], i: int, back: Any, free: Any, ahead: Any, dt: Any, held: Held) -> tuple:
     """Of the points of a group: w_0, `pressed` and `first` of `inclusion.solve`, and (n, 2) the slopes of the ground
-    under them that turn their way, and their force."""
+    under them that turn their way, and their force. back: see `Meets`; None of bodies that
+    yield."""
     g, law, before, first = groups[i], groups[i].over, held.places[i], held.forces[i]
     u, then = (_point(groups, i, d) for d in (free, ahead))
     come, goes, deep, slopes = u - before, then - u, u[:, 0], (jnp.zeros((len(u), 2)),) * 2
@@ -300,11 +302,13 @@ def _asked(groups: tuple[Group, ...], i: int, masses: bool, free: Any, ahead: An
         come, goes, deep, first, slopes = g.law.passed(before, u, then, first, dt, held.states[i])
     pressed = jnp.full(len(u), jnp.nan) if law.normal is None else law.normal.force(deep)
     gap = jnp.broadcast_to(law.gap, len(u))
-    if not masses:
+    if back is None:
         return come.at[:, 0].set(deep - gap), pressed, first, *slopes
     along = goes[:, 0] + law.restitution * come[:, 0]
     if law.normal is None:  # but for rounding, which would open what rests
-        along = jnp.where(deep + MEETS * jnp.abs(goes[:, 0]) >= gap, along, -jnp.inf)
+        out = back * jnp.maximum(deep - gap - jnp.abs(goes[:, 0]), 0.0)  # so far that rounding does not open it
+        out = jnp.where(come[:, 0] > out, 0.0, out)  # no part of an impact
+        along = jnp.where(deep + MEETS * jnp.abs(goes[:, 0]) >= gap, along + out, -jnp.inf)
     return goes.at[:, 0].set(along), pressed, first, *slopes
 
 

@@ -10,7 +10,9 @@ A. Curnier, Comput. Methods Appl. Mech. Eng. 92, 1991). Two kinds of bodies give
 - Bodies that yield at once by R (massless boundary; C. D. Monjaraz-Tec, J. Gross, M. Krack, Comput. Struct. 260, 2022):
   w_N is where the point is, w_T how far it came, A = R. An impact needs no law, and energy is kept.
 - Masses (R = 0): the forces of this step move the next one. w is that next motion of a point whose gap is closed, and
-  w_N more by e times the last one: restitution (after L. Paoli, M. Schatzman, SIAM J. Numer. Anal. 40, 2002).
+  w_N more by e times the last one: restitution (after L. Paoli, M. Schatzman, SIAM J. Numer. Anal.
+  40, 2002). An impact is found in the step after it, behind what is rigid; what rests there comes
+  out within about a period, so slowly that the speed of it falls with the step.
 
 On ground that moves, w is the motion over it.
 """
@@ -43,21 +45,22 @@ orders leave no more to rounding."""
 
 class Meets(NamedTuple):
     """Points that answer. A: (3 p, 3 p) m/N. r: (p, 3) N/m, that each meets by itself. slow: share of r that always
-    ends."""
+    ends. back: share by which masses come out again in a step from where an impact found them."""
 
     A: Any
     r: Any
     slow: Any
+    back: Any
 
 
-def meets(A: Any) -> Meets:
-    """A: (3 p, 3 p) m/N, symmetric and not negative, but for rounding."""
+def meets(A: Any, back: Any = 0.0) -> Meets:
+    """A: (3 p, 3 p) m/N, symmetric and not negative, but for rounding. back: see `Meets`."""
     diagonal = jnp.diag(A).reshape(-1, 3)
     across = jnp.maximum(diagonal[:, 1], diagonal[:, 2])
     r = ratio(jnp.ones_like(diagonal), jnp.stack([diagonal[:, 0], across, across], axis=1))
     root = jnp.sqrt(r.reshape(-1))
     largest = jnp.linalg.eigvalsh(root[:, None] * A * root).max(initial=1.0)
-    return Meets(A, r, 1 / largest)
+    return Meets(A, r, 1 / largest, jnp.asarray(back))
 
 
 def over_waves(M: Meets, slope: Any, lean: Any) -> Meets:

@@ -24,7 +24,7 @@ from .bodies import Bodies, Now, Options
 from .classification import Exponent
 from .contacts import Group
 from .equations import Equations
-from .orbit import REPEATS, comes_back, steps_of_a_sample
+from .orbit import REPEATS, comes_back, refuse_behind, steps_of_a_sample
 from .stepper import Stepper
 
 OPEN, DIVERGED = -1, -2
@@ -77,13 +77,16 @@ class Reached:
     @cached_property
     def points(self) -> Array:
         """(n, 2 m, keep) displacements times their frequencies, and velocities, m kg^1/2 / s."""
-        z = np.concatenate([self.q * np.sqrt(np.abs(self.equations.omega2)), self.v], axis=2)
+        e = self.equations
+        z = np.concatenate([self.q * classification.pace(e.omega2, e.Omega), self.v], axis=2)
         return z.transpose(0, 2, 1)
 
     @cached_property
     def size(self) -> float:
-        """The largest of them that is finite."""
-        return float(np.abs(self.points[np.isfinite(self.points)]).max(initial=0.0))
+        """The largest of them that is finite, but for places of bodies that nothing holds."""
+        held = classification.held(self.equations.omega2, self.equations.Omega)
+        z = np.abs(self.points[:, np.append(held, np.ones_like(held))])
+        return float(z[np.isfinite(z)].max(initial=0.0))
 
     @cached_property
     def repeats(self) -> Array:
@@ -115,7 +118,8 @@ def run(
         exponents: follow a neighbour of each motion too, see `classification.exponent`.
 
     Raises:
-        UserError: starts of other lengths than the assembly has coordinates; see `orbit.run`.
+        UserError: starts of other lengths than the assembly has coordinates, or behind what is
+        rigid; see `orbit.run`.
     """
     x, x_dot = np.atleast_2d(x).astype(float), np.atleast_2d(x_dot).astype(float)
     if x.shape != x_dot.shape or x.shape[1] != len(e.shapes):
@@ -123,13 +127,15 @@ def run(
             f"starts: displacements {x.shape} and velocities {x_dot.shape} must both be (n, {len(e.shapes)}), a column "
             "for each coordinate of the system"
         )
+    to_modes = e.shapes.T @ e.assembly.joined(1).M.real
+    for place in x:
+        refuse_behind(e, to_modes @ place)
     periods = classification.periods_of(settle + keep) if exponents else 0
     if exponents and not periods:
         least = classification.ALIGNED + classification.FEWEST
         raise UserError(f"exponents: take {least} periods at least; settle and keep are {settle + keep} together")
     each = steps_of_a_sample(e, 1, steps)
     stepper = Stepper(e, 2 * np.pi / e.Omega / each, accounts=False)
-    to_modes = e.shapes.T @ e.assembly.joined(1).M.real
     shape = (len(x), stepper.bodies.omega2.shape[0], -1)
     y = np.concatenate([(x @ to_modes.T).reshape(shape), (x_dot @ to_modes.T).reshape(shape)], axis=2)
     counts = np.array([settle * each, each]) * 2**stepper.options.halvings

@@ -14,12 +14,16 @@ import jax
 import numpy as np
 import scipy.linalg
 
+from ..contact.friction import StaticSliding
+from ..contact.law import Law
+from ..contact.point import PointContact
+from ..contact.portion import Portion
 from ..contact.set_valued import SetValued
 from ..data import Array
 from ..errors import NotConverged, UserError
 from ..files.hdf5 import put, sealed
 from ..interrupts import look
-from ..settings.mistakes import bounded
+from ..settings.mistakes import bounded, numbered
 from ..system.assembly import Contact
 from ..units import METRES, Quantity, counted
 from . import classification
@@ -57,6 +61,9 @@ FURTHER = 64
 PENETRATES = 1e-6
 """Share of an interference by which a contact may be pressed deeper than it is under the steady loads."""
 
+BEHIND = 1e-12
+"""m by which a point may begin behind what is rigid: rounding."""
+
 UNSOLVED = 1e-6
 """Share of the largest motion of the contacts that an implicit step may miss before a reader is told."""
 
@@ -68,6 +75,9 @@ APART = 1e-4
 
 FOLLOWED = 0.1
 """Share of the largest read-out: with a larger error a motion is not that of its start."""
+
+STILL = 1e-6
+"""Share of the displacements, times their frequencies, below which a swing is none."""
 
 REPEATS = 1e-3
 """Share of the size of a motion within which it counts as having come back."""
@@ -186,14 +196,22 @@ class Orbit:
 
     @cached_property
     def stroboscopic(self) -> tuple[Array, float]:
-        """(2 m, periods) modal coordinates, times their frequency, and velocities after every period; the largest of
-        them at any time, m kg^1/2 / s."""
-        return stroboscopic(self.strips("modal_displacement", "modal_velocity"), self.omega2, self.samples)
+        """(2 m, periods) modal coordinates, times their frequency, and velocities after every
+        period; by how much the largest of them swings, m kg^1/2 / s."""
+        strips = self.strips("modal_displacement", "modal_velocity")
+        return stroboscopic(strips, self.omega2, self.Omega, self.samples)
+
+    @cached_property
+    def else_repeats(self) -> int:
+        """`repeats` of all but the places of bodies that nothing holds."""
+        return else_comes_back(*self.stroboscopic, self.omega2, self.Omega)
 
     def times(self, kind: str, contact: int | None = None) -> Array:
         """Times (s) of the events of a kind ("closes", "opens", "slips", "sticks") in the periods that are kept."""
         if kind not in KINDS:
             raise UserError(f"kind: '{kind}' is none of {', '.join(KINDS)}")
+        if contact is not None:
+            numbered("contact", contact, len(self.touching), "contact")
         own = self.events[:, 2] == KINDS.index(kind)
         return self.events[own if contact is None else own & (self.events[:, 1] == contact), 0]
 
@@ -337,6 +355,7 @@ class Orbit:
         Args:
             axes: of matplotlib, new ones with a legend if not given. read_out: its number.
         """
+        numbered("read_out", read_out, len(self.labels), "read-out")
         own = axes is None
         if axes is None:
             import matplotlib.pyplot as plt
@@ -380,15 +399,30 @@ class Ended:
     exponent: Exponent | None = None
 
 
-def stroboscopic(strips: Iterable[list[Array]], omega2: Array, samples: int) -> tuple[Array, float]:
-    """See `Orbit.stroboscopic`, of strips of modal displacements and velocities."""
-    size, after, begin = 0.0, [np.zeros((2 * len(omega2), 0))], 0
+def stroboscopic(
+    strips: Iterable[list[Array]], omega2: Array, Omega: float, samples: int
+) -> tuple[Array, float]:  # fmt: skip
+    """See `Orbit.stroboscopic`, of strips of modal displacements and velocities. A body that
+    nothing holds swings by its velocity, or it would seem to come back the further it is; and
+    nothing swings by less than `STILL`."""
+    rows = 2 * len(omega2)
+    after, begin, most, fast = [np.zeros((rows, 0))], 0, 0.0, 0.0
+    low, high = np.full(rows, math.inf), np.full(rows, -math.inf)
     for q, q_dot in strips:
-        z = np.concatenate([np.sqrt(np.abs(omega2))[:, None] * q, q_dot])
-        size = max(size, float(np.abs(z).max(initial=0.0)))
+        z = np.concatenate([classification.pace(omega2, Omega)[:, None] * q, q_dot])
+        low = np.minimum(low, z.min(axis=1, initial=math.inf))
+        high = np.maximum(high, z.max(axis=1, initial=-math.inf))
+        most, fast = (max(a, float(np.abs(x).max(initial=0.0))) for a, x in ((most, z), (fast, q_dot)))
         after.append(z[:, (-1 - begin) % samples :: samples])
         begin += z.shape[1]
-    return np.concatenate(after, axis=1), size
+    swings = 0.5 * (high - low)[: len(omega2)][classification.held(omega2, Omega)]
+    return np.concatenate(after, axis=1), max(float(swings.max(initial=0.0)), fast, STILL * most)
+
+
+def else_comes_back(after: Array, size: float, omega2: Array, Omega: float) -> int:
+    """See `Orbit.else_repeats`."""
+    held = classification.held(omega2, Omega)
+    return comes_back(after[np.append(held, np.ones_like(held))], size)
 
 
 def comes_back(after: Array, size: float) -> int:
@@ -488,9 +522,10 @@ def _exponent(stepper: Stepper, now: Now, kept: Kept, samples: int, each: int, d
     """The largest Lyapunov exponent of a motion that has not come back in what was kept; of so many periods at most as
     were done."""
     periods = classification.periods_of(done)
-    after, size = stroboscopic(kept.strips("modal_displacement", "modal_velocity"), stepper.equations.omega2, samples)
+    e, strips = stepper.equations, kept.strips("modal_displacement", "modal_velocity")
+    after, size = stroboscopic(strips, e.omega2, e.Omega, samples)
     few = not periods or after.shape[1] < classification.FEWEST
-    if few or stepper.equations.ramp or comes_back(after, size):
+    if few or e.ramp or else_comes_back(after, size, e.omega2, e.Omega):
         return None
     return classification.exponent(stepper, now, samples, each, periods)
 
@@ -520,11 +555,24 @@ def _warnings(equations: Equations, kept: Kept, worst: float) -> tuple[str, ...]
             f"{equations.Omega / (2 * np.pi):.6g} Hz stand for them, and take h times as much in the h-th harmonic, "
             "where a harmonic balance does not; with modal damping both mean the same."
         )
+    if names := [c.name for c in equations.contacts if _saws(c.patch.law)]:
+        said.append(
+            f"Static friction above the sliding one ({', '.join(names)}): a point without mass sticks again as soon as "
+            "it has slipped, so sliding friction saws between both values, with teeth that hang on the step; "
+            'write law = "set-valued" or "rate", or friction that falls with the speed.'
+        )
     if worst > UNSOLVED * kept.widest:
         said.append(f"Contacts were not solved for in every step, to {worst:.2g} m at worst; take more steps.")
     if kept.missed:
         said.append(f"{counted(kept.missed, 'event')} more than are listed, and counted, happened.")
     return tuple(said)
+
+
+def _saws(law: Law) -> bool:
+    """Whether its points slip at once, and to less than they stuck by."""
+    law = law.whole if isinstance(law, Portion) else law
+    friction = law.friction if isinstance(law, PointContact) else None
+    return isinstance(friction, StaticSliding) and bool(np.any(np.asarray(friction.static) > friction.sliding))
 
 
 @dataclass(frozen=True)
@@ -638,8 +686,15 @@ def begun(e: Equations, start: Start) -> tuple[Array, Array]:
     """(m,) modal displacements and velocities to start from.
 
     Raises:
-        NotConverged: Newton's method finds no rest under the steady loads. UserError: no such start.
+        NotConverged: Newton's method finds no rest under the steady loads. UserError: no such
+            start, or one behind a rigid stop.
     """
+    q, v = _begun(e, start)
+    refuse_behind(e, q)
+    return q, v
+
+
+def _begun(e: Equations, start: Start) -> tuple[Array, Array]:
     if isinstance(start, Released):
         return start.q, start.v
     zero, tight = np.zeros(len(e.omega2)), [c.offset[0] > 0 and not c.preload.any() for c in e.contacts]
@@ -660,6 +715,27 @@ def _closed(contact: Contact) -> bool:
         return False
     overlap = contact.patch.law.overlap(jax.device_put(contact.patch.kinematics @ contact.offset))
     return bool((np.asarray(overlap) > 0).any())
+
+
+def refuse_behind(e: Equations, q: Array) -> None:
+    """Raise `UserError` where bodies of modes alone begin at q (m,) behind what is rigid: nothing
+    would bring them out. Waves of the ground are left out."""
+    for c, u in zip(e.contacts, _places(e, e.D @ q + e.D_o @ e.oscillators(0.0)), strict=True):
+        law = c.patch.law
+        if e.R.any() or not isinstance(law, SetValued) or law.normal is not None or (c.ground and c.ground.waves):
+            continue
+        deep = float(np.max(u[:, 0] - np.asarray(law.gap), initial=0.0))
+        if deep > BEHIND:
+            raise UserError(
+                f"start: begins {deep:.4g} m behind {c.name}, which is rigid; let the bodies go where its gap is open, "
+                "or correct the gap"
+            )
+
+
+def _places(e: Equations, d: Array) -> list[Array]:
+    """(n, 3) m of the points of each contact, of its coordinates (c,)."""
+    parts = np.split(d, np.cumsum([c.patch.count for c in e.contacts])[:-1])
+    return [c.patch.kinematics @ (x + c.offset) for c, x in zip(e.contacts, parts, strict=False)]
 
 
 def _refuse_penetration(e: Equations, q: Array) -> None:

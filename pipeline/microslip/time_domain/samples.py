@@ -239,8 +239,7 @@ class InFile:
         self.widest = max(self.widest, float(np.abs(rows["contact_displacement"]).max(initial=0.0)))
 
     def mark(self, where: Where, done: int) -> None:
-        if time.monotonic() - self.recording.marked >= PAUSE:
-            self.recording.mark(self, where, done)
+        self.recording.mark(self, where, done)
 
     def strips(self, *names: str) -> Iterator[list[Array]]:
         for begin in range(0, self.filled, STRIP):
@@ -261,7 +260,8 @@ class Recording:
 
     Attributes:
         path: of the product. file: open beside it. state: where a motion was when that was kept last, and the arrays of
-            `Where`. ended: number of a motion -> what is told of it. marked: s, when the state was kept last.
+            `Where`. ended: number of a motion -> what is told of it. marked: s, when the state was kept last. latest:
+            a state since then, which is kept when the run is interrupted.
     """
 
     path: Path
@@ -270,15 +270,23 @@ class Recording:
     state: tuple[dict[str, Any], list[Array]]
     ended: dict[int, dict[str, Any]]
     marked: float = 0.0
+    latest: tuple[dict[str, Any], Where] | None = None
 
     def motion(self, number: int) -> InFile:
         return InFile(self, self.file[f"motion_{number + 1}"], number)
 
     def mark(self, of: InFile, where: Where, done: int) -> None:
+        self.latest = {"motion": of.number, "done": done, **{k: getattr(of, k) for k in _COUNTS}}, where
+        if time.monotonic() - self.marked >= PAUSE:
+            self.keep_latest()
+
+    def keep_latest(self) -> None:
+        """Keep the state of the last whole period, if it is not kept yet."""
         import jax
 
-        told = {"motion": of.number, "done": done, **{k: getattr(of, k) for k in _COUNTS}}
-        self._keep(told, [np.asarray(x) for x in jax.tree_util.tree_leaves(where)])
+        if self.latest is not None:
+            told, where = self.latest
+            self._keep(told, [np.asarray(x) for x in jax.tree_util.tree_leaves(where)])
 
     def end(self, number: int, told: dict[str, Any]) -> None:
         self.ended[number] = told
@@ -291,7 +299,7 @@ class Recording:
         arrays = {"told": np.array(text), **{f"leaf_{i:04d}": x for i, x in enumerate(leaves)}}
         with complete_or_absent(_state(self.path)) as temporary, open(temporary, "wb") as file:
             np.savez(file, allow_pickle=False, **arrays)
-        self.state, self.marked = (told, list(leaves)), time.monotonic()
+        self.state, self.marked, self.latest = (told, list(leaves)), time.monotonic(), None
 
 
 def _state(path: Path) -> Path:
@@ -326,7 +334,11 @@ def recording(
     try:
         with create(_part(path), again=True) as file:
             found = Recording(path, inputs, file, (told, leaves), ended)
-            yield found
+            try:
+                yield found
+            except KeyboardInterrupt:
+                found.keep_latest()
+                raise
             for number, one in found.ended.items():
                 _finish(file[f"motion_{number + 1}"], one)
         seal(_part(path))

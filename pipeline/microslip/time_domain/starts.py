@@ -4,7 +4,7 @@ contacts remember."""
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import jax
@@ -15,8 +15,8 @@ from ..errors import NotConverged, UserError
 from ..harmonic_balance import accuracy
 from ..harmonic_balance.problem import Problem
 from ..harmonic_balance.response import operating
-from ..harmonic_balance.solver import sweep
-from ..settings.mistakes import bounded
+from ..harmonic_balance.solver import Point, sweep
+from ..settings.mistakes import bounded, whole
 from ..units import counted, percent
 from .contacts import Group, Held, answer, untouched
 from .equations import Equations
@@ -117,7 +117,8 @@ def _coordinates(given: Any, count: int, key: str) -> Array:
     values = np.zeros(count)
     if isinstance(given, Mapping):
         for i in given:
-            bounded(f"{key}: a coordinate", i, ge=-count, le=count - 1)
+            whole(f"{key}: a coordinate", i)
+            bounded(f"{key}: a coordinate", i, le=count - 1)
         bounded(key, list(given.values()))
         values[[int(i) for i in given]] = list(given.values())
     elif given is not None:
@@ -137,6 +138,12 @@ def of_balance(e: Equations, problem: Problem) -> Periodic:
     point = sweep(problem, np.array([e.Omega / (2 * np.pi)]))[0]
     if not point.converged:
         raise NotConverged(f'start: harmonic balance found no vibration ({point.status}); write start = "static"')
+    beside = accuracy.SAFETY * accuracy.left_out(problem, point.x, e.Omega)
+    return replace(of_point(e, problem, point), beside=beside)
+
+
+def of_point(e: Equations, problem: Problem, point: Point) -> Periodic:
+    """A solution of a harmonic balance of the same assembly, whatever it leaves out."""
     found, contacts = operating(problem, point), e.contacts
     bodies = [np.concatenate(parts) for parts in zip(*found.q.values(), strict=True)]
     M = e.assembly.joined(1).M.real
@@ -146,8 +153,7 @@ def of_balance(e: Equations, problem: Problem) -> Periodic:
     for one, c in zip(relative, contacts, strict=True):
         one[:, 0] -= c.offset
     d = np.concatenate(relative) if relative else np.zeros((0, problem.coefficients))
-    beside = accuracy.SAFETY * accuracy.left_out(problem, point.x, e.Omega)
-    return Periodic(q.sum(axis=0).real, (turns @ q).real, d, beside)
+    return Periodic(q.sum(axis=0).real, (turns @ q).real, d)
 
 
 def begun(stepper: Stepper, start: Periodic) -> Now:

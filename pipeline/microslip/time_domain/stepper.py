@@ -180,7 +180,7 @@ class Stepper:
             p = blocks(e)[1]
             speeds = scipy.linalg.block_diag(*flows.stack[0][:p, p : 2 * p].transpose(2, 0, 1))
             D = self._points[0][rigid].reshape(-1, len(e.omega2))
-            return meets(D @ speeds @ D.T * self.tau)
+            return meets(D @ speeds @ D.T * self.tau, self.tau * e.Omega)
         names = ", ".join(c.name for c in e.contacts)
         if not rigid.all() or any(g.over.normal is not None for g in self.groups):
             raise UserError(

@@ -115,11 +115,16 @@ static double rate(const State *s)
     return sqrt(most_k) + most_c;
 }
 
+/* short ones that make up a step of h, see advance */
+static double parts_of(const State *s, double h) { return 1 + floor(h * rate(s) / 4); }
+
+#define MOST 1e6 /* of them, some seconds; a communication step takes a few */
+
 /* The solution after h by its Taylor series, in parts so short that its terms are all that rounding leaves:
    4^33 / 33! = 8e-18, 1 / 21! = 2e-20 */
 static void advance(State *s, double h)
 {
-    double term[2 * MODES], next[2 * MODES], g[MODES], slope[MODES], parts = 1 + floor(h * rate(s) / 4), part;
+    double term[2 * MODES], next[2 * MODES], g[MODES], slope[MODES], parts = parts_of(s, h), part;
     int j, k, terms = h * rate(s) < 1 ? 20 : 32;
     load(s->f, g);
     load(s->rate, slope);
@@ -324,6 +329,9 @@ CALL fmi2DoStep(fmi2Component c, fmi2Real time, fmi2Real h, fmi2Boolean final)
     State before = *STATE;
     if (!(h >= 0) || h > 1e300 || !isfinite(time))
         return refuse((Body *)c, "fmi2DoStep: the step must be a positive time");
+    if (!(parts_of(STATE, h) <= MOST))
+        return refuse((Body *)c, "fmi2DoStep: the step is longer than can be followed, "
+                                 "some 1e5 periods of the fastest mode; shorten it");
     advance(STATE, h);
     STATE->time = time + h;
     if (finite(STATE->x, 2 * MODES))

@@ -1,0 +1,264 @@
+"""Sweeps in time about a place where a response jumps or leaves a gap: downwards, upwards, and
+from rest where both are on different motions."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from functools import partial
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+
+from ..errors import UserError
+from ..harmonic_balance.problem import Problem
+from ..harmonic_balance.reduced import stuck, stuck_damping, untouched
+from ..harmonic_balance.refinement import between
+from ..harmonic_balance.response import HarmonicResponse, operating
+from ..harmonic_balance.solver import CONVERGED, Point
+from ..results import Journal
+from ..results.names import exact
+from . import starts
+from .stepped import Settled, settled
+
+FEWEST, MOST = 300, 800
+"""Periods at most that a motion is left to itself at a frequency, with much and with little
+damping."""
+
+FORGOTTEN = 4.0
+"""Natural logarithm by which a vibration of the bodies dies away in them."""
+
+LOWEST = 0.5
+"""Share of the first frequency of a sweep down to which a motion is followed that does not fall
+back in the band."""
+
+DOWN, UP, REST = "downwards", "upwards", "from rest"
+
+SHARES = {DOWN: 0.5, UP: 0.85, REST: 1.0}
+"""Of the time that motions may take, until which each of the ways goes on."""
+
+WITHIN, STEPS = 30, 80
+"""Frequencies of a sweep in time within a gap, and of all of it, at most."""
+
+LONG = 120.0
+"""s that a motion at a frequency may take in a sweep that nobody asked for."""
+
+HALVINGS = 3
+"""Times that a step in which a motion is lost is halved."""
+
+ALIKE = 2
+"""Frequencies one after the other at which a motion is that of the sweep when it counts as having
+come back to it."""
+
+SAME = 0.05
+"""Share by which a motion may differ from the harmonic balance's that leads it on to the next
+frequency."""
+
+
+class Motions(NamedTuple):
+    """Swept upwards and downwards, in that order, and each from rest; the way and the frequency
+    (Hz) before which the time was over, None: it was enough."""
+
+    up: Sequence[Settled] = ()
+    down: Sequence[Settled] = ()
+    rest: Sequence[Settled] = ()
+    cut: tuple[str, float] | None = None
+
+
+def apart(up: Sequence[Settled], down: Sequence[Settled]) -> list[tuple[Settled, Settled]]:
+    """The lower and the higher motion where two sweeps are on different ones, by frequency."""
+    known = {m.frequency: m for m in up}
+    pairs = [(known[m.frequency], m) for m in down if m.frequency in known]
+    pairs = [(a, b) for a, b in pairs if not a.like(b.amplitude)]
+    found = [(a, b) if a.amplitude < b.amplitude else (b, a) for a, b in pairs]
+    return sorted(found, key=lambda pair: pair[0].frequency)
+
+
+def nearer(m: Settled, low: Settled, high: Settled) -> bool:
+    """Whether a motion is the higher one of two."""
+    return abs(m.amplitude - high.amplitude) < abs(m.amplitude - low.amplitude)
+
+
+def _periods(problem: Problem, gap: tuple[float, float]) -> int:
+    """How long motions are left to themselves, by the least damping of the modes about a gap, stuck
+    and free."""
+    part = problem.assembly.joined(1)
+    pairs = [(part, problem.assembly.stiffness), (untouched(part), np.zeros((0, 0)))]
+    f, D = (np.concatenate([of(one, k) for one, k in pairs]) for of in (stuck, stuck_damping))
+    about = D[(f > 0.5 * gap[0]) & (f < 2 * gap[1]) & (D > 0)]
+    wanted = FORGOTTEN / (2 * np.pi * about.min(initial=1.0))
+    return int(np.clip(wanted, FEWEST, MOST))
+
+
+class Sweeps:
+    """Sweeps in time about a gap (Hz, Hz) of a response under a normal force (N).
+
+    patience: s of CPU time in all, that of an earlier run counted, but not what compiles. journal:
+    keeps each motion; those of an earlier run are gone on with.
+    """
+
+    def __init__(
+        self,
+        problem: Problem,
+        found: HarmonicResponse,
+        gap: tuple[float, float],
+        normal: float,
+        report: Callable[[str], None],
+        patience: float,
+        journal: Journal | None = None,
+    ) -> None:
+        self.problem, self.gap, self.normal, self.report = problem, gap, normal, report
+        self.patience, self.spent, self.compiled = patience, 0.0, False
+        self.journal, self.cut = journal, None
+        self.asked = found.frequency[found.asked]
+        self.step = float(np.median(np.diff(self.asked)))
+        self.periods = _periods(problem, gap)
+        self.balanced = {
+            float(f): (Point(2 * np.pi * f, x, CONVERGED, 0.0, 0), float(amplitude))
+            for f, x, amplitude, good in zip(
+                found.frequency, found.x, np.abs(found.monitor), found.converged, strict=True
+            )
+            if good
+        }
+        self.seen = {f: [amplitude] for f, (_, amplitude) in self.balanced.items()}
+
+    cut: tuple[str, float] | None
+
+    def motions(self) -> Motions:
+        """All of them, or those for which the time was enough.
+
+        Raises:
+            UserError, NotConverged: see `settled`; a motion takes too long.
+        """
+        low, high = self.gap
+        below, above = self.asked[self.asked < low].tolist(), self.asked[self.asked > high].tolist()
+        within = self.asked[(self.asked >= low) & (self.asked <= high)]
+        inside = within[:: 1 + len(within) // WITHIN].tolist()
+        beneath = np.arange(1, (1 - LOWEST) * self.asked[0] / self.step) * self.step
+        under = [*below[::-1], *(self.asked[0] - beneath).tolist()]
+        down, fell = self._way(DOWN, [*above[1::-1], *inside[::-1], *under], low, -1.0, [])
+        back = [m.frequency for m in down[-2::-1]] if fell else [*below[-2:], *inside, *above[:2]]
+        further = [f for f in above if f > max(back)]
+        up, _ = self._way(UP, [*back, *further], high, 1.0, down[-1:] if fell else [])
+        return Motions(up, down, self._from_rest(apart(up, down)), self.cut)
+
+    def _over(self, way: str, f: float) -> bool:
+        """Whether the time is over that a way may take before a frequency (Hz)."""
+        over = self.spent > SHARES[way] * self.patience
+        if over and self.cut is None:
+            self.cut = way, f
+        return over
+
+    def _from_rest(self, two: Sequence[tuple[Settled, Settled]]) -> list[Settled]:
+        """Motions from rest where there are two, at some frequencies, and between those that lead
+        to different ones."""
+        last, found = len(two) - 1, dict[int, Settled]()
+        wanted = sorted({round(i * last / 3) for i in range(4)}) if two else []
+        while wanted:
+            for i in wanted:
+                if self._over(REST, two[i][0].frequency):
+                    return [found[i] for i in sorted(found)]
+                found[i] = self._at(REST, two[i][0].frequency)
+            known = sorted(found)
+            higher = [nearer(found[i], *two[i]) for i in known]
+            pairs = zip(known, known[1:], higher, higher[1:], strict=False)
+            wanted = [(i + j) // 2 for i, j, a, b in pairs if a != b and j > i + 1]
+        return [found[i] for i in sorted(found)]
+
+    def _way(
+        self, way: str, frequency: Sequence[float], end: float, sign: float, motions: list[Settled]
+    ) -> tuple[list[Settled], bool]:
+        """A stepped sweep that goes on from motions, and whether it has come back to the harmonic
+        balance's beyond an end of the gap (Hz), where it ends."""
+        alike = 0
+        for f in frequency[:STEPS]:
+            if self._over(way, f):
+                break
+            motions = [*motions, *self._on(way, f, motions[-1] if motions else None)]
+            back = sign * (f - end) > 0 and motions[-1].like(self._balanced(f)[1])
+            alike = alike + 1 if back else 0
+            if alike == ALIKE or not np.isfinite(motions[-1].amplitude):
+                break
+        return motions, alike == ALIKE
+
+    def _on(self, way: str, f: float, begin: Settled | None) -> list[Settled]:
+        """A step to a frequency (Hz). Where the motion is lost in it, the step is halved about the
+        place: a sweep that is slow enough stays longer."""
+        here = self._at(way, f, begin)
+        if begin is None or self._led(f, begin, here):
+            return [here]
+        steps = [begin, here]
+        for _ in range(HALVINGS):
+            i = int(np.argmax([a.distance(b) for a, b in pairwise(steps)]))
+            middle = 0.5 * (steps[i].frequency + steps[i + 1].frequency)
+            if not steps[i].jumps_to(steps[i + 1]) or self._over(way, middle):
+                break
+            steps.insert(i + 1, self._at(way, middle, steps[i]))
+        if len(steps) > 2 and steps[-2].jumps_to(here) and not self._over(way, f):
+            steps[-1] = self._at(way, f, steps[-2])  # the whole step may have thrown it off
+        return steps[1:]
+
+    def _at(self, way: str, f: float, begin: Settled | None = None) -> Settled:
+        """The motion at a frequency (Hz), as it was kept or integrated now."""
+        low, high = self.gap
+        series = f"in time {way}, F_N = {exact(self.normal)} N, {low!r} to {high!r} Hz"
+        series += f", after {begin.frequency!r} Hz" if begin else ""
+        after = repr(begin.amplitude) if begin else ""
+        row = self.journal.of(series).get(f, {}) if self.journal else {}
+        if row.get("after") != after:
+            self.report(f"motion in time, {way}, F_N = {self.normal:g} N: {f:.6g} Hz")
+            row = self._integrated(way, f, begin) | {"after": after}
+            if self.journal:
+                self.journal.keep(series, f, row)
+        self.spent += row["took"]
+        end = [np.asarray(row[f"end/{i}"]) for i in range(row["leaves"])]
+        amplitude, swing, least = (row[name] for name in ("amplitude", "swing", "least"))
+        m = Settled(f, amplitude, swing, least, bool(row["opens"]), end)
+        self.seen.setdefault(f, []).extend([] if m.irregular else [m.amplitude])
+        return m
+
+    def _integrated(self, way: str, f: float, begin: Settled | None) -> dict:
+        """What a journal keeps of a motion, with the CPU time (s) that it took beside compiling.
+
+        Raises:
+            UserError: it takes too long.
+        """
+        began, point = time.process_time(), None if way == REST else self._leading(f, begin)
+        on = partial(starts.of_point, problem=self.problem, point=point) if point else None
+        m = settled(self.problem.assembly, f, self.periods, begin, on, self.seen.get(f, ()))
+        took = time.process_time() - began if self.compiled else 0.0
+        self.compiled = True
+        if took > LONG:
+            why = f"a frequency takes {took:.0f} s, too long for a sweep"
+            raise UserError(f"{why} ([orbit] asks for single ones)")
+        end = {f"end/{i}": x for i, x in enumerate(m.end)}
+        numbers = {name: getattr(m, name) for name in ("amplitude", "swing", "least", "opens")}
+        return numbers | end | {"leaves": len(end), "took": took}
+
+    def _leading(self, f: float, begin: Settled | None) -> Point | None:
+        """The solution of the harmonic balance to begin on: at the first frequency (Hz), and while
+        the motion is its, on the same side of the gap."""
+        if begin is None:
+            return self.balanced.get(f, (None, 0.0))[0]
+        low, high = self.gap
+        same_side = max(f, begin.frequency) <= low or min(f, begin.frequency) >= high
+        before = self.balanced.get(begin.frequency)
+        leads = same_side and before is not None and begin.like(before[1], SAME)
+        return self._balanced(f)[0] if leads else None
+
+    def _led(self, f: float, begin: Settled, here: Settled) -> bool:
+        """Whether a motion stays the harmonic balance's in a step to a frequency (Hz), however far
+        its amplitude goes."""
+        leads = self._leading(f, begin) is not None
+        return leads and here.like(self._balanced(f)[1], SAME)
+
+    def _balanced(self, f: float) -> tuple[Point | None, float]:
+        """Solution and amplitude of the harmonic balance at a frequency (Hz); None and nan where it
+        has none."""
+        if f not in self.balanced:
+            point = between(self.problem, [p for p, _ in self.balanced.values()], f)
+            if not point.converged:
+                return None, np.nan
+            self.balanced[f] = point, float(abs(operating(self.problem, point).outputs[0, 1]))
+        return self.balanced[f]
