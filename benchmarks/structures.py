@@ -1,7 +1,7 @@
 """Frequency responses of small systems, as a user calls for them, against pyHarm in one run.
 
     python benchmarks/structures.py            # 7 harmonics, 128 samples; pyHarm takes minutes of the cantilever
-    python benchmarks/structures.py --quick    # one round, pyHarm's quicker way alone
+    python benchmarks/structures.py --quick    # one round, pyHarm's quicker way, one first call
 
 duffing: q'' + 0.05 q' + q + 0.05 q^3 = 0.4 cos(Omega t) from 0.3 to 2.5, over both folds. cantilever: a clamped beam of
 ten elements (20 coordinates; length, bending stiffness and mass per length 1), 0.5 % of damping in every mode, pushed
@@ -148,6 +148,8 @@ def main(argv: list[str] | None = None) -> None:
     }
     for make, peers in ways.items():
         compared(make, fine, rounds, peers[:1] if arguments.quick else peers)
+        if make is duffing or not arguments.quick:
+            print_first_call(make.__name__)
 
 
 def compared(make: Callable[[], Any], fine: tuple[int, int], rounds: int, peers: list[tuple[str, str]]) -> None:
@@ -177,7 +179,11 @@ def compared(make: Callable[[], Any], fine: tuple[int, int], rounds: int, peers:
         print(f"{line} {moved(found, peer):.0e} |", flush=True)
     if not PYHARM.is_file():
         print("\npyHarm is not installed: sh tests/peers/setup.sh pyharm")
-    empty, filled = first_call(make.__name__)
+
+
+def print_first_call(name: str) -> None:
+    """What the first curve of a process costs."""
+    empty, filled = first_call(name)
     words = f"{filled[0]:.1f} ({filled[1]:.1f}) with a filled cache, {empty[0]:.1f} ({empty[1]:.1f}) with an empty one"
     print(f"\nFirst curve of a process, wall (CPU) s: {words}.", flush=True)
 

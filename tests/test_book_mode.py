@@ -306,12 +306,12 @@ def test_stiffness_is_symmetric_and_makes_the_force(name: str, made: dict[str, b
         assert (work >= -1e-16).all() and work.sum() == pytest.approx(lost, rel=1e-9, abs=1e-15)
 
 
-@pytest.mark.parametrize("name", LAWS)
+@pytest.mark.parametrize("name", [slow(n) if n in ("smooth", "Iwan") else n for n in LAWS])
 def test_points_in_time_are_those_that_the_patch_is_made_of(name: str, made: dict[str, book.BookPatch]) -> None:
     """Mean, cos and sin of the points' forces, contracted with the kinematics, are the patch's."""
     contact = made[name]
-    u = np.concatenate([motion(1), motion(2)])
-    for one, F, seen in zip(contact.traced(u), contact.force(u), contact.point_cycles(u), strict=True):
+    for u in (motion(1), motion(2)):
+        one, F, seen = contact.traced(u)[0], contact.force(u)[0], contact.point_cycles(u)[0]
         whole = np.einsum("nia,sni->sa", contact.patch.kinematics, one.force)
         wave = np.fft.rfft(whole, axis=0)[:2] / len(whole)
         found = np.stack([wave[0].real, 2 * wave[1].real, -2 * wave[1].imag], axis=1)
@@ -321,12 +321,13 @@ def test_points_in_time_are_those_that_the_patch_is_made_of(name: str, made: dic
 
 def test_contacts_are_evaluated_on_their_own(made: dict[str, book.BookPatch]) -> None:
     u = np.concatenate([motion(1), motion(2), motion(3)])
-    force, slope = made["rough"].forces(u)
+    contact = made["strips"]
+    force, slope = contact.forces(u)
     for i in range(3):
-        one, its = made["rough"].forces(u[i : i + 1])
+        one, its = contact.forces(u[i : i + 1])
         assert np.allclose(force[i], one[0], rtol=1e-12) and np.allclose(slope[i], its[0], rtol=1e-9, atol=1e-3)
-    assert made["rough"].rate(u) is None
-    model: Forces = made["rough"]
+    assert contact.rate(u) is None
+    model: Forces = contact
     assert model.point_cycles(u, 1.0)[2].unsteady == 0
 
 
@@ -340,13 +341,13 @@ def test_means_keep_the_preload_whatever_the_vibration(made: dict[str, book.Book
         assert np.allclose(contact.force(swung)[0, :, 0], [780, 0, 0, 0, 0, 0], rtol=0, atol=1e-6)
 
 
-@pytest.mark.parametrize("counts", [(1, 1), slow((12, 2)), (72, 5)])
+@pytest.mark.parametrize("counts", [(1, 1), slow((12, 2)), slow((72, 5))])
 def test_resultants_do_not_know_the_number_of_points(counts: tuple[int, int]) -> None:
     """In translation: the factor 1 / (n_y n_z) that 5.2-5 leaves out is in the numbers of the law."""
     u = motion(4)
     u[0, 3:] = 0.0
     found = book.book_patch(patch(rough(counts[0] * counts[1]), counts)).force(u)
-    one = book.book_patch(patch(rough(4), (2, 2))).force(u)
+    one = book.book_patch(patch(rough(12))).force(u)
     assert np.allclose(found, one, rtol=1e-9, atol=1e-9)
 
 
@@ -426,22 +427,25 @@ def test_the_diagonal_form_gives_the_same_forces_and_survives_what_does_not_move
 # Assemblies --------------------------------------------------------------------------------------------------------
 
 
-def test_a_sector_stands_for_the_ring_and_energy_closes() -> None:
+@pytest.mark.parametrize("ring", [False, slow(True)], ids=["energy", "ring"])
+def test_a_sector_stands_for_the_ring_and_energy_closes(ring: bool) -> None:
     """The balance with the book's contact: one sector against six, 1e-9; work of the loads is damping and friction."""
     one, Omega = sector(6, 1, normal=20.0, push=12.0), 2 * np.pi * 60.0
     found = []
-    for assembly in (one, one.unrolled()):
+    for assembly in (one, one.unrolled()) if ring else (one,):
         model = book.book_patch(assembly.contacts[0].patch)
         models = dict.fromkeys(range(len(assembly.contacts)), model)
         problem = balance.of(assembly, harmonics=1, length=1e-6, models=models)
         point = solve(problem, Omega, [])
         assert point.converged
         found.append(response.operating(problem, point))
-    turn = np.exp(2j * np.pi * np.arange(2) * np.arange(6)[:, None] / 6)
-    assert np.allclose(found[1].outputs, found[0].outputs[0] * turn, rtol=0, atol=1e-9 * np.abs(found[0].outputs).max())
     lost = found[0].cycles["shroud"].dissipated.sum()
     assert lost > 0 and found[0].supplied == pytest.approx(found[0].damped + lost, rel=1e-9)
-    assert found[0].cycles["shroud"].slipping.mean() > 0 and found[1].supplied == pytest.approx(6 * found[0].supplied)
+    assert found[0].cycles["shroud"].slipping.mean() > 0
+    if ring:
+        turned = found[0].outputs[0] * np.exp(2j * np.pi * np.arange(2) * np.arange(6)[:, None] / 6)
+        assert np.allclose(found[1].outputs, turned, rtol=0, atol=1e-9 * np.abs(turned).max())
+        assert found[1].supplied == pytest.approx(6 * found[0].supplied)
 
 
 # The book's figures 5.2-4 to 5.2-7 -----------------------------------------------------------------------------------

@@ -24,6 +24,7 @@ from microslip.case.assemble import build
 from microslip.case.checkpoint import files_of, of_points
 from microslip.case.contacts import memory_of
 from microslip.case.curves import curves
+from microslip.case.run import _Left
 from microslip.cli import main
 from microslip.contact.curved import Line, foundation_of_line
 from microslip.contact.patch import pressure
@@ -119,10 +120,18 @@ def built(raw: dict[str, Any]) -> Any:
     return build(settings, {b.name: small.basis() for b in settings.components}, PATH)
 
 
+@pytest.fixture
+def unestimated(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What harmonics leave is not estimated where the balance alone is looked at."""
+    monkeypatch.setattr(_Left, "out", lambda *_: [])
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("patch", ["nodal", "rigid"])
-def test_a_beam_whose_patch_deforms_on_the_ground(patch: str) -> None:
+def test_a_beam_whose_patch_deforms_on_the_ground(patch: str, request: Any) -> None:
     """It converges, and says how many deformations there are."""
+    if patch == "nodal":
+        request.getfixturevalue("unestimated")
     result = run_case(made(table(**STIFF, patch=patch, law="smooth")), {"small": small.basis()}, PATH)
     assert result.responses[200.0].converged.all()
     assert any("deformations of the bodies" in r for r in result.messages) == (patch == "nodal")
@@ -310,6 +319,7 @@ def test_a_line_of_contact_in_pieces() -> None:
     assert contact.offset[0] == pytest.approx(float(line.approach(200.0, HEIGHT)), rel=1e-3)
 
 
+@pytest.mark.usefixtures("unestimated")
 @pytest.mark.parametrize("fit, points", CURVED)
 @pytest.mark.slow
 def test_the_books_mode_of_a_curved_contact(fit: str, points: list[int]) -> None:
@@ -328,6 +338,7 @@ def test_one_round_contact() -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("unestimated")
 @pytest.mark.parametrize("fit, points", CURVED)
 def test_a_curved_face_that_converges_in_a_case(fit: str, points: list[int]) -> None:
     result = run_case(made(table(**PIN, fit=fit, points=points)), {"small": small.basis()}, PATH)
@@ -415,8 +426,9 @@ normal_stiffness = 1e9
 tangential_stiffness = 8e8
 friction = 0.3
 """
-    case.write_text(text)
-    assert main(["respond", str(case), "-q"]) == 0
+    jenkins = 'friction = 0.3\nlaw = "jenkins"'  # soon compiled
+    case.write_text(text.replace("friction = 0.3", jenkins))
+    assert main(["respond", str(case), "--no-pictures", "--no-stress", "-q"]) == 0
     before = {p: p.read_bytes() for p in tmp_path.rglob("*") if p.is_file()}
     for old, new, words in (
         ("0.02, 0.0", "0.02, 0.9", "do not face each other"),

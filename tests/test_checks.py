@@ -117,7 +117,7 @@ def test_a_wrong_solution_is_not_called_converged(what: str, monkeypatch: pytest
     else:
         missing = 1e-3 * (np.arange(4) == ("supplied", "damped").index(what))
         monkeypatch.setattr(reduced, "work", lambda *given: tuple(np.array(work(*given)) + missing * work(*given)[0]))
-    problem = balance.of(cantilever(), 3, 64, length=0.0125)
+    problem = balance.of(cantilever(), 1, 64, length=0.0125)
     found = response.harmonic_response(problem, np.array([0.6]), np.ones(1))
     assert [cause(status) for status in found.status] == ["read-out" if what == "read-out" else "energy"]
 
@@ -162,7 +162,7 @@ def test_why_a_point_fails(monkeypatch: pytest.MonkeyPatch) -> None:
     newton = solver.newton
     monkeypatch.setattr(solver, "newton", lambda *a, **k: replace(newton(*a, **k), status="60 steps"))
     for assembly, why in ((gaping, "gaping contacts"), (cantilever(), "iteration limit")):
-        problem = balance.of(assembly, 1, 32, length=0.01)
+        problem = balance.of(assembly, 1, 64, length=0.0125)
         status = solve(problem, 2 * np.pi * 0.5, []).status
         assert status == f"{why}: 60 steps"
 

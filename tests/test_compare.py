@@ -22,6 +22,8 @@ from microslip.pictures import can_draw
 from microslip.reduced.correlation import POINT, compare_groups
 from microslip.settings.body import BodySettings
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 
 @cache
 def finer() -> ModalBasis:

@@ -26,6 +26,7 @@ from microslip.stages import response as making
 from microslip.stages import running
 
 pytest.importorskip("matplotlib")
+pytestmark = pytest.mark.usefixtures("undrawn", "unjudged")
 SAMPLES = Path(running.__file__).parents[1] / "samples"
 
 CASE = """

@@ -412,7 +412,7 @@ def test_a_range_follows_the_stiffness_through_the_closing_of_an_open_contact():
 
 def test_shroud_closes_at_a_speed_and_presses_harder_beyond():
     """Open below, closed above; an interference presses harder at every one."""
-    mesh, speeds = shrouded((1, 1, 4), gap=1e-5), (0.0, 2000.0, 4000.0, 8000.0, 12000.0)
+    mesh, speeds = shrouded((1, 1, 4), gap=1e-5), (0.0, 4000.0, 12000.0)
     groups = modal_basis(mesh, settings_of(speeds)).groups
     found = [groups[i, 0].contacts["shroud"] for i in range(len(speeds))]
     force = np.array([c.normal_force for c in found])

@@ -249,7 +249,11 @@ ALTERNATIVES = {
 }
 
 
-@pytest.mark.parametrize("kind", ALTERNATIVES)
+ALSO = ("table", "gaussian", "exponential")  # tables of heights, as a profile becomes one
+KINDS = [pytest.param(k, marks=pytest.mark.slow) if k in ALSO else k for k in ALTERNATIVES]
+
+
+@pytest.mark.parametrize("kind", KINDS)
 def test_other_sources_and_heights(kind: str, tmp_path: Path) -> None:
     """Each is a law whose force rises from 0, whose stiffness is its slope, and whose P is held by friction."""
     stiffness, roughness = ALTERNATIVES[kind]

@@ -20,6 +20,7 @@ from microslip.contact.wear import worn_law
 ROUGH = EXAMPLES["rough point"]
 NEAR = jax.jit(force_near, static_argnames=("samples", "count", "chunk"))
 MARCHED = jax.jit(march)
+PERIODIC = jax.jit(periodic, static_argnums=3)
 
 
 def some(n, harmonics=3, seed=0, example=ROUGH):
@@ -51,7 +52,7 @@ def test_a_jenkins_element_has_its_closed_form() -> None:
     u[0, 1, 1] = x * limit / k
     errors = []
     for samples in (64, 256, 1024):
-        f = np.asarray(force_harmonics(law, u, 1.0, samples=samples)[0])[0, 1]
+        f = np.asarray(force_alone(law, u, 1.0, samples=samples))[0, 1]
         errors.append(abs((f[1] - 1j * f[2]) / u[0, 1, 1] - exact) / k)
     assert errors[-1] < 1e-5 and all(a > 8 * b for a, b in zip(errors, errors[1:], strict=False))
 
@@ -61,7 +62,7 @@ def orbit(a, b, limit):
     law = PointContact(Preload(jnp.asarray(1.0)), Coulomb(jnp.asarray(limit)), jnp.asarray(1.0))
     u = np.zeros((1, 3, 3))
     u[0, 1, 1], u[0, 2, 2] = a, b
-    return np.asarray(force_harmonics(law, u, 1.0, samples=4096, count=3)[0])[0, 1, 1:]
+    return np.asarray(force_alone(law, u, 1.0, samples=4096, count=3))[0, 1, 1:]
 
 
 def test_on_a_circular_orbit_the_force_lags_by_a_constant_angle() -> None:
@@ -103,7 +104,8 @@ def test_chunks_and_values_per_point_change_nothing() -> None:
         assert np.allclose(a, b, rtol=0, atol=1e-12 * np.abs(a).max())
 
 
-def test_tables_are_not_taken_for_values_per_point() -> None:
+@pytest.mark.parametrize("derived", [False, pytest.param(True, marks=pytest.mark.slow)])
+def test_tables_are_not_taken_for_values_per_point(derived: bool) -> None:
     """A table of as many nodes as there are points, and one table for each point, treated in chunks."""
     n = 50
     x = np.linspace(0, 1, n)
@@ -112,17 +114,18 @@ def test_tables_are_not_taken_for_values_per_point() -> None:
     assert same.x.shape == (n,) and own.x.shape[0] == n and own.x.ndim == 2
     for heights in (same, own):
         law = dataclasses.replace(ROUGH.law, normal=dataclasses.replace(ROUGH.law.normal, heights=heights))
-        whole, parts = (force_harmonics(law, some(n), ROUGH.period, chunk=c) for c in (n, 16))
-        for a, b in zip(whole, parts, strict=True):
+        ways = [force_harmonics if derived else force_alone, law, some(n), ROUGH.period]
+        whole, parts = (ways[0](*ways[1:], chunk=c) for c in (n, 16))
+        for a, b in zip(whole if derived else [whole], parts if derived else [parts], strict=True):
             assert np.allclose(a, b, rtol=0, atol=1e-12 * np.abs(a).max())
 
 
 def test_harmonics_are_those_of_the_marched_cycle() -> None:
     u = some(4)
     values, transform = fourier(3, 64)
-    force, _ = periodic(ROUGH.law, np.einsum("sh,nkh->snk", values, u), ROUGH.period, 2)[:2]
+    force, _ = PERIODIC(ROUGH.law, np.einsum("sh,nkh->snk", values, u), ROUGH.period, 2)[:2]
     expected = np.einsum("hs,snk->nkh", transform, force)
-    found = force_harmonics(ROUGH.law, u, ROUGH.period)[0]
+    found = force_alone(ROUGH.law, u, ROUGH.period)
     assert np.allclose(found, expected, rtol=0, atol=1e-12 * np.abs(force).max())
 
 
@@ -145,10 +148,13 @@ def test_cycles_go_on_until_the_sliders_have_settled(name: str, enough: int) -> 
     """
     example, u = swinging(name)
     u = u[[6, 15, 18, 38, 39]]  # the slow ones
-    long, ended, short = (
-        np.array(force_alone(example.law, u, example.period, samples=32, count=count, periodicity=periodicity))
-        for count, periodicity in ((enough, 0.0), (20, 1e-9), (2, 0.0))
-    )
+    values, transform = fourier(u.shape[2] // 2, 32)
+    path = np.tile(np.einsum("sh,nkh->snk", values, u), (enough, 1, 1))
+    force = np.array(MARCHED(example.law, path, example.period / 32, example.law.init(len(u)))[0])
+    cycles = (force[32 * (n - 1) : 32 * n] for n in (2, enough))
+    short, long = (np.einsum("hs,snk->nkh", transform, cycle) for cycle in cycles)
+    how = {"samples": 32, "count": 20, "periodicity": 1e-9}
+    ended = np.array(force_alone(example.law, u, example.period, **how))
     largest = np.abs(long).max()
     assert np.abs(ended - long).max() < 5 * RECALL * largest < 0.3 * np.abs(short - long).max()
 
@@ -238,7 +244,7 @@ def test_a_constant_normal_load_takes_no_cycle_more(slides: float, most: int) ->
     t = 2 * np.pi * np.arange(64) / 64
     path = np.zeros((64, 1, 3))
     path[:, 0, 1] = slides * 2e-6 * np.cos(t - 0.3)
-    done = periodic(law, path, 1.0, 100, 1e-13).cycles
+    done = PERIODIC(law, path, 1.0, 100, 1e-13).cycles
     assert int(done) == most
 
 
@@ -249,7 +255,7 @@ def test_a_contact_that_is_open_where_cycles_end_takes_two() -> None:
     motion = 1e-6 * np.stack([np.sin(t + 0.05), 2 + np.cos(t), 0 * t], axis=1)[:, None]
     assert motion[-1, 0, 0] < 0 < motion[0, 0, 0]
     long = np.asarray(MARCHED(law, np.concatenate([motion] * 3), 1 / 64, law.init(1))[0])[-64:]
-    ended = np.asarray(periodic(law, motion, 1.0, 50, 1e-10).force)
+    ended = np.asarray(PERIODIC(law, motion, 1.0, 50, 1e-10).force)
     assert np.abs(ended - long).max() < 1e-12 * np.abs(long).max()
 
 

@@ -95,10 +95,10 @@ def differences(f, x, h):
 def test_volume_and_energy_are_integrals_of_the_area(law) -> None:
     """Between the breaks, where all three are smooth: differences of fourth order have 1e-12 / h = 1e-9 of rounding."""
     x = np.linspace(-0.5, 2.0, 400)
-    x = x[np.abs(x[:, None] - np.asarray(law.breaks())).min(axis=1) > 4e-3]
+    smooth = np.abs(x[:, None] - np.asarray(law.breaks())).min(axis=1) > 4e-3
     for f, slope in ((ENERGY, VOLUME), (VOLUME, AREA)):
         found = differences(lambda s, f=f: np.asarray(f(law, s)), x, 1e-3)
-        assert np.abs(found - slope(law, x)).max() < 1e-9
+        assert np.abs(found - slope(law, x))[smooth].max() < 1e-9
 
 
 @each(SEPARATING)
@@ -107,7 +107,8 @@ def test_the_area_rises_from_zero_to_one_and_the_force_is_c1(law) -> None:
     assert np.all(np.diff(area) >= -1e-15) and abs(area[-1] - 1) < 1e-12
     assert np.abs(np.diff(area)).max() < 5e-4 * 5  # no jump: the steepest area here has a slope below 5
     for f in (AREA, VOLUME, ENERGY):
-        assert np.all(np.asarray(f(law, np.array([-1.0, -1e-9, 0.0]))) == 0)
+        nothing = np.asarray(f(law, np.resize([-1.0, -1e-9, 0.0], 400)))  # the program of above
+        assert np.all(nothing == 0)
 
 
 @each(ALL)
