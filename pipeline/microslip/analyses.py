@@ -190,11 +190,12 @@ def two_tones(
     for key, given, has in (("start", start, "time"), ("kept", kept, "of")):
         if given is not None and not hasattr(given, has):
             raise UserError(f"two_tones: {key}: {given!r} is none; leave it out, or see its description")
-    for key, count in (("samples", samples), ("turns", turns)):
-        if count is not None and count < 4 * harmonics:
+    fewest = ("samples", samples, 4 * harmonics), ("turns", turns, 2 * harmonics + 1)
+    for key, count, least in fewest:
+        if count is not None and count < least:
             raise UserError(
-                f"two_tones: {key}: {count} are too few for {harmonics} harmonics; take {4 * harmonics} at least, "
-                f"better {8 * harmonics}"
+                f"two_tones: {key}: {count} are too few for {harmonics} harmonics; take {least} at "
+                f"least, better {8 * harmonics}"
             )
     assembly, turn = whole_of(system), 2 * np.pi * HERTZ[unit]
     one, two = (np.atleast_1d(np.asarray(f, dtype=float)) * turn for f in (first, second))
