@@ -140,7 +140,7 @@ def _unjudged(request: pytest.FixtureRequest) -> Iterator[None]:
             from microslip.stages import response
 
             patched.setattr(response, "jumps", lambda result: [])
-            patched.setattr(response, "with_motions", lambda result, report: result)
+            patched.setattr(response, "with_motions", lambda result, *_: result)
             asked = headline.is_estimated
             patched.setattr(headline, "is_estimated", lambda *given, ring=False: ring and asked(*given, ring))
         yield
