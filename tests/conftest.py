@@ -51,6 +51,7 @@ def pytest_configure(config: pytest.Config) -> None:
     """Before jax is loaded, and for the processes that tests start; who only hands tests to workers loads nothing."""
     if locked("jaxlib"):
         os.environ.setdefault("XLA_FLAGS", QUICK)
+    gc.disable()  # what is imported stays; pytest_collection_finish
     config.pluginmanager.register(durations := Durations(), "durations-of-tests")
     if find_spec("jax") and not getattr(config.option, "numprocesses", None):
         from microslip.process import forget, prepare
@@ -67,6 +68,7 @@ def pytest_collection_finish() -> None:
     gc.collect()
     gc.freeze()
     gc.set_threshold(20_000, 20, 20)
+    gc.enable()
 
 
 def held() -> float:
