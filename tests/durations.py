@@ -15,6 +15,10 @@ from typing import Any
 
 import pytest
 
+QUICK = 1.5
+"""CPU seconds, compiling left out, that a quick test is to take at most: those above are listed."""
+NEVER = 4.0
+"""A run of quick tests fails over one above this, whatever the machine is and does beside."""
 FILE = Path(__file__).resolve().parents[1] / "build/durations.csv"
 COLUMNS = ("cpu_s", "compiling_s", "processes_s")
 """Of a test with its fixtures: CPU time of the worker; at most that of it during which jax traced and compiled, by the
@@ -50,6 +54,23 @@ class Durations:
         report.user_properties = [("durations", (cpu, min(compiling, cpu), processes))]
         return report
 
+    def pytest_collection_finish(self) -> None:
+        self.before = self.now()  # what is imported is not the first test's
+
+    @property
+    def slow(self) -> list[tuple[float, str]]:
+        """CPU seconds without compiling, and name, of tests above `QUICK`; the dearest first."""
+        own = {
+            test: spent["cpu_s"] - spent["compiling_s"] + spent["processes_s"]
+            for test, spent in self.tests.items()
+        }
+        return sorted(((s, test) for test, s in own.items() if s > QUICK), reverse=True)
+
+    def pytest_terminal_summary(self, terminalreporter: Any, config: pytest.Config) -> None:
+        if config.getoption("markexpr") == "not slow":
+            for seconds, test in self.slow:
+                terminalreporter.write_line(f"{seconds:5.1f} CPU s: {test}")
+
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
         for name, value in report.user_properties:
             if name == "durations":
@@ -59,6 +80,9 @@ class Durations:
     def pytest_sessionfinish(self, session: pytest.Session) -> None:
         if hasattr(session.config, "workerinput") or not self.tests:
             return
+        quick = session.config.getoption("markexpr") == "not slow"
+        if quick and self.slow and self.slow[0][0] > NEVER and session.exitstatus == 0:
+            session.exitstatus = pytest.ExitCode.TESTS_FAILED
         FILE.parent.mkdir(exist_ok=True)
         dearest = sorted(self.tests.items(), key=lambda one: -one[1]["cpu_s"] - one[1]["processes_s"])
         with FILE.open("w", newline="") as file:

@@ -83,6 +83,13 @@ def every_kind(folder: Path) -> list[Path]:
 # ---------------------------------------------------------------- the schema is what is written
 
 
+def test_a_small_file_of_each_sample_conforms(tmp_path: Path) -> None:
+    for name in SMALL:
+        write_basis(tmp_path / f"{name}.h5", built(name))
+        assert validate.validate(tmp_path / f"{name}.h5") == [], name
+
+
+@pytest.mark.slow
 def test_the_schema_and_the_writer_say_the_same(tmp_path: Path) -> None:
     """Every file conforms, and every entry of the schema stands in one of them."""
     assert (SCHEMA.table["format"], SCHEMA.table["format_version"]) == (FORMAT, FORMAT_VERSION)
