@@ -143,7 +143,7 @@ CALLS = [
     (ms.two_tones, {"system": TWO, "first": 0.2, "second": 0.13}, {
         "system": SYSTEM, "first": FREQUENCIES, "second": FREQUENCIES, "free": TRUTH, "unit": WORD, **BALANCE,
         "samples": [*without_none(COUNT), 19],
-        "turns": [*without_none(COUNT), 19], "start": ["x", 3.0], "kept": ["x", 3.0],
+        "turns": [*without_none(COUNT), 10], "start": ["x", 3.0], "kept": ["x", 3.0],
     }),
     (ms.follow, {"system": SLIDER, "start": 0.1, "stop": 0.2}, {
         "system": SYSTEM, "start": POSITIVE, "stop": POSITIVE, "over": WORD, "unit": WORD, **BALANCE,
