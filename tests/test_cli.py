@@ -556,6 +556,10 @@ def test_what_will_be_done_is_said_before_what_does_it_is_loaded(
         with progress.progress("run ./box/body.toml"):
             pass
         assert before.startswith("run box: mesh, modal file") and not said(capsys)[1]
+    for words, plan in (([], "every point of the sweep"), (["--over=load"], "what [curve]")):
+        with progress.announced(["respond", "box", *words]):
+            time.sleep(0.2)
+        assert said(capsys)[1].startswith(f"respond box: {plan}")
     for words in (["run", "box", "-q"], ["run"], ["init", "box"]):
         with progress.announced(words):
             time.sleep(0.05)

@@ -297,6 +297,8 @@ def test_the_answer_is_a_resonance_that_is_valid() -> None:
     for unknown in (None, np.inf):
         words = said(response_html({"resonances": rows, "estimated_error_of_harmonics": unknown}, {}))
         assert "how uncertain amplitudes are is not known at some places" in words
+    words = said(response_html({"resonances": [], "estimated_error_of_harmonics": np.inf}, {}))
+    assert "error of harmonicsnot known" in words and "inf" not in words
     words = said(response_html({"resonances": rows, "estimated_error_of_harmonics": 1.3e-13}, {}))
     assert "highest resonance found is 80.65 µm at 171.1 Hz" in words and "lowest with 12.74 µm" in words
     assert "Under FN = 20 N contacts would lift off" in words

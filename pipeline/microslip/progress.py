@@ -51,8 +51,11 @@ def announced(words: Sequence[str]) -> Iterator[None]:
     longer than `LOADING`, it is said before."""
     global _typed, _told_first
     verb, *others = [word for word in words if not word.startswith("-")][:2] or [""]
+    title, over = " ".join([verb, *others]), any(word.split("=")[0] == "--over" for word in words)
+    if verb == "respond" and over:  # another work, which takes another time
+        verb = "respond--over"
     _typed, _told_first = " ".join([verb, *others]), False
-    timer = threading.Timer(LOADING, _say_first, (_typed, _typed))
+    timer = threading.Timer(LOADING, _say_first, (title, _typed))
     timer.daemon = True
     if verb in PLANS and others and not {"-q", "--quiet", "-h", "--help"} & set(words):
         timer.start()
@@ -181,7 +184,14 @@ PLANS = {
     "modes": ("mesh, assembly, eigenmodes, rows and stresses, each if it is not up to date", 5, 120),
     "respond": (
         "every point of the sweep, peaks between them, their error, stresses and pictures; where it jumps or has no "
-        "solution motions in time too, minutes more", 15, 180,
+        "solution motions in time too, minutes more",
+        15,
+        180,
+    ),
+    "respond--over": (
+        "what [curve] or the table of that name asks, its error, tables and pictures",
+        10,
+        300,
     ),
     "orbit": ("motions period by period, their error, tables and pictures", 15, 180),
     "bifurcate": ("equilibria, periodic orbits that begin at them, tables and pictures", 30, 300),

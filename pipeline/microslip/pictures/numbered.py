@@ -44,7 +44,10 @@ def surfaces_picture(points: Array, triangles: Indices, surface: Indices, title:
         stage.close()
     hidden = [str(v) for v in np.setdiff1d(names, used)]
     more = f" Hidden here, or too small for a number: {', '.join(hidden)}." if hidden else ""
-    note = f"The numbers are those of the table and of geometry.faces.surfaces. Seen from two opposite sides.{more}"
+    note = (
+        "The numbers are those of the table and of geometry.faces.surfaces. Seen from two opposite sides. "
+        f"Teeth along an edge are the triangles' of this picture, not the file's.{more}"
+    )
     return save_png(captioned(side_by_side(views), title, note, 22), path)
 
 

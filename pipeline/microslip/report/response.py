@@ -398,4 +398,6 @@ def _label(key: str) -> str:
 def _cell(value: Any) -> str:
     if isinstance(value, list):
         return ", ".join(map(_cell, value))
+    if isinstance(value, float) and not math.isfinite(value):
+        return "not known"
     return number(value, 5) if isinstance(value, float) else str(value)
