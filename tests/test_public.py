@@ -314,6 +314,20 @@ def test_the_modes_of_a_dict_are_those_of_its_mesh(tmp_path):
     assert not list(tmp_path.glob("build/*"))
 
 
+def test_the_modes_of_a_system_by_hand_are_those_of_its_matrices(tmp_path):
+    place = tmp_path / "pair"
+    place.mkdir()
+    ground, between = ["ground", "a"], ["a", "b"]
+    masses = "".join(f'[[masses]]\nname = "{n}"\nmass = 1.0\nat = [0, 0, 0]\nfree = "x"\n' for n in "ab")
+    springs = "".join(f"[[springs]]\nbetween = {pair}\nstiffness = 1.0\n" for pair in (ground, between))
+    (place / "system.toml").write_text(f'name = "pair"\n{masses}{springs}', encoding="utf-8")
+    golden = (np.sqrt(5.0) + np.array([-1.0, 1.0])) / 2.0
+    for body in (place, str(place / "system.toml")):
+        omega = ms.modes(body, tmp_path).groups[0, 0].frequency * 2.0 * np.pi
+        np.testing.assert_allclose(omega, golden, rtol=1e-12)
+    assert (tmp_path / "build/pair/basis.h5").is_file()
+
+
 def test_importing_the_package_imports_nothing_else():
     code = (
         "import sys, microslip as ms; dir(ms); print(sorted({'numpy', 'jax', 'h5py', 'matplotlib'} & set(sys.modules)))"

@@ -22,7 +22,7 @@ from .settings.arguments import Index, Text, Vector, checked
 from .settings.mistakes import unfit, validate
 from .settings.numbers import NotNegative, Number, Positive
 from .settings.toml import load_toml
-from .stages.job import job_of, open_job
+from .stages.job import job_of, open_job, system_file
 from .stages.places import modal_files
 from .system.assembly import Assembly
 
@@ -62,8 +62,8 @@ def modes(
 
     Args:
         body: a body.toml or its folder, made where it is not up to date, as ``microslip modes`` does (``meshes/`` and
-            ``build/`` in the folder); or the keys of a body.toml (``docs/body_toml.md``) as a dict with
-            ``geometry.mesh``, of which nothing is written.
+            ``build/`` in the folder); a system.toml of masses, rigid bodies or matrices, likewise; or the keys of a
+            body.toml (``docs/body_toml.md``) as a dict with ``geometry.mesh``, of which nothing is written.
         folder: where paths and products begin. report: is told what is under way.
 
     Raises:
@@ -85,6 +85,8 @@ def modes(
         if job.settings.geometry.mesh is None:
             raise UserError("geometry.mesh: is missing: a body given as a dict has a mesh; or write a body.toml")
         return modal.basis_of(job, job.mesh_file, report)[0]
+    if (system := system_file(Path(body))) is not None:
+        return read_basis(modal.system_stage(system, report=report, root=Path(folder)))
     return read_basis(modal.modes_stage(open_job(body, root=folder), report=report)[0])
 
 
