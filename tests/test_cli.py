@@ -532,8 +532,8 @@ def test_a_run_says_what_it_will_do_and_how_long_it_took_here(
     assert first("run box").endswith("at most about 2 min, as before")
     (cache.parent / "box").mkdir()
     monkeypatch.chdir(cache.parent)
-    assert first("run box/body.toml").endswith("at most about 2 min, as before")
-    assert first("run box").endswith("at most about 2 min, as before")
+    elsewhere = "one of that name in another folder took 2 min"
+    assert first("run box/body.toml").endswith(elsewhere) and first("run box").endswith(elsewhere)
     progress.keep("run box", 30.0)
     assert first("run box").endswith("at most about 30 s, as before")
     progress.keep("run box", 0.1)

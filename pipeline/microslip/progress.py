@@ -218,13 +218,17 @@ RUNS, TITLES = 5, 300
 
 
 def planned(title: str) -> str:
-    """What will be done, and about how long it takes: as runs of the same took on this machine, or of what has its
-    name in another folder, or as long as such runs take; "" where that is soon."""
+    """What will be done, and about how long it takes: as runs of the same took on this machine, or
+    as long as such runs take, those of what has its name in another folder with them; "" where that
+    is soon."""
     known, place = _durations(), _key(title)
     words, low, high = PLANS.get(title.split()[0], ("", SHORT, 300))
-    took = known.get(place) or [s for key, more in known.items() if _named(key) == _named(place) for s in more]
-    if took:
+    if took := known.get(place):
         return f"{words}{'; ' * bool(words)}at most about {_duration(max(took))}, as before" * (max(took) > SHORT)
+    if took := [s for key, more in known.items() if _named(key) == _named(place) for s in more]:
+        low, high = min(low, *took), max(high, *took)
+        elsewhere = f"one of that name in another folder took {_duration(max(took))}"
+        return f"{words}{'; ' * bool(words)}{_duration(low)} to {_duration(high)}; {elsewhere}"
     usual = f"not timed on this machine yet, such runs take {_duration(low)} to {_duration(high)}"
     return f"{words}{'; ' * bool(words)}{usual}" * (high > SHORT)
 
