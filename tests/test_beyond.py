@@ -288,7 +288,9 @@ def test_what_is_known_is_written_before_motions_in_time(
     monkeypatch.setattr("microslip.case.run.beyond", interrupted)
     assert main(["respond", "case.toml"]) == 130
     assert "response.html has what is known so far" in capsys.readouterr().err
-    assert Path("build/lifting/response.html").read_text() and not Path("build/lifting/response.json").exists()
+    page = Path("build/lifting/response.html").read_text()
+    assert "Motions in time are not on this page yet" in page
+    assert not Path("build/lifting/response.json").exists()
     rows = list(csv.DictReader(Path("build/lifting/response.csv").open()))
     assert len(rows) > 10 and not Path("build/lifting/motions.csv").exists()
 

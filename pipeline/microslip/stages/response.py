@@ -108,11 +108,14 @@ def _work(
         begin = _harmonics(points, settings, bases, case_path) if settings.looks_for_harmonics else FIRST_HARMONICS
         result = run_case(settings, bases, case_path, stage.report, points.journal, begin)
         if places := jumps(result):
-            known = _finished(points, result, Wanted("none", pictures=False), stage.report)
+            at = f"at {counted(len(places), 'place')} the response jumps, folds or has no solution"
+            left = f"Motions in time are not on this page yet: {at}; the same command goes on."
+            so_far = replace(result, messages=(*result.messages, left))
+            known = _finished(points, so_far, Wanted("none", pictures=False), stage.report)
             stage.clear(folder / name for name in known["files"])
             stage.report(
-                f"{folder / 'response.html'} has what is known so far; at {counted(len(places), 'place')} the response "
-                "jumps, folds or has no solution: dozens of motions in time, of seconds each"
+                f"{folder / 'response.html'} has what is known so far; {at}: dozens of motions in "
+                "time, of seconds each"
             )
         motions = Checkpoint(folder / "motions.points", raw, files, stage.force, stage.begin, True)
         result = with_motions(result, stage.report, motions.journal)
