@@ -3,8 +3,9 @@
     python tests/mutants.py         all of them
     python tests/mutants.py 3 17    these numbers
 
-The tests that should see it are run on that copy; the first one that fails has caught it. At the end those that caught
-a mistake must pass on the copy without any. Exit code 1: a mistake SURVIVED, or its old text is not in the file once.
+The tests that should see it are run on that copy; the first one that fails has caught it. At the
+end those that caught a mistake must pass on the copy without any. Exit code 1: a mistake SURVIVED,
+its old text does not stand in the file once, or a test fails without it as well.
 """
 
 from __future__ import annotations
@@ -23,8 +24,8 @@ ROOT = Path(__file__).resolve().parents[1]
 
 
 class Mistake(NamedTuple):
-    """Attributes: what: in words. file: of the package. old, new: text that stands there once, and what is put in its
-    place. tests: quick ones that should see it, files or tests of them, in the folder of tests."""
+    """Attributes: what: in words. file: of the package. old, new: text that stands there once, and
+    what is put in its place. tests: quick ones that should see it, files or tests of them."""
 
     what: str
     file: str
@@ -132,7 +133,8 @@ MISTAKES = (
         "harmonic_balance/reduced.py",
         "lost += 0.5 * _squared(turning, q).imag",
         "lost += _squared(turning, q).imag",
-        "test_roots.py::test_the_harmonic_balance_takes_circulatory_forces_and_motions_in_time_refuse_them",
+        "test_roots.py::"
+        "test_the_harmonic_balance_takes_circulatory_forces_and_motions_in_time_refuse_them",
     ),
     Mistake(
         "stability: sign of a speed along the orbit",
@@ -389,17 +391,22 @@ def copied(folder: Path) -> None:
 
 
 def failing(folder: Path, *tests: str) -> list[str]:
-    """Of quick tests in a copy, those that fail, up to the first one. Programs are kept in the folder of `conftest`."""
+    """Of quick tests in a copy, the first one that fails. Programs are kept where `conftest` does.
+
+    Raises:
+        SystemExit: pytest does not run them.
+    """
     programs = os.environ.get("JAX_COMPILATION_CACHE_DIR", str(ROOT / "build/programs-of-tests"))
     package = {"PYTHONPATH": str(folder / "pipeline"), "JAX_COMPILATION_CACHE_DIR": programs}
     how = ["-x", "-q", "-m", "not slow", "--tb=no", "-rfE", "-p", "no:cacheprovider"]
-    ended = subprocess.run(
-        [sys.executable, "-m", "pytest", *how, *(f"tests/{test}" for test in tests)],
-        cwd=folder, env=os.environ | package, capture_output=True, text=True,
-    )  # fmt: skip
-    found = re.findall(r"^(?:FAILED|ERROR) tests/(.+?::.+?)(?: - .*)?$", ended.stdout, re.MULTILINE)
+    asked = [sys.executable, "-m", "pytest", *how, *(f"tests/{test}" for test in tests)]
+    given = {"cwd": folder, "env": os.environ | package, "capture_output": True, "text": True}
+    ended = subprocess.run(asked, **given)
+    failed = r"^(?:FAILED|ERROR) tests/(.+?::.+?)(?: - .*)?$"
+    found = re.findall(failed, ended.stdout, re.MULTILINE)
     if ended.returncode != (1 if found else 0):
-        raise SystemExit(f"pytest ends with {ended.returncode}:\n{ended.stdout[-3000:]}{ended.stderr[-3000:]}")
+        said = f"{ended.stdout[-3000:]}{ended.stderr[-3000:]}"
+        raise SystemExit(f"pytest ends with {ended.returncode}:\n{said}")
     return found
 
 
@@ -432,8 +439,8 @@ def main(numbers: list[int]) -> int:
                 continue
             text = (folder / "pipeline/microslip" / mistake.file).read_text(encoding="utf-8")
             if text.count(mistake.old) != 1:
-                said = f"its old text stands {text.count(mistake.old)} times in {mistake.file}: correct the table"
-                tests = []
+                count, tests = text.count(mistake.old), list[str]()
+                said = f"its old text stands {count} times in {mistake.file}; correct the table"
             else:
                 begun = spent()
                 tests = caught(folder, mistake)
