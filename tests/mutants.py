@@ -34,6 +34,11 @@ class Mistake(NamedTuple):
     tests: str
     test: str = ""
 
+    @property
+    def asked(self) -> str:
+        """As pytest names it, in the folder of tests."""
+        return f"{self.tests}::{self.test}" if self.test else self.tests
+
 
 MISTAKES = (
     # contact laws
@@ -460,7 +465,7 @@ def caught(folder: Path, mistake: Mistake) -> list[str]:
     right, made = file.read_text(encoding="utf-8"), file.stat().st_mtime
     file.write_text(right.replace(mistake.old, mistake.new), encoding="utf-8")
     try:
-        return failing(folder, mistake.tests + (f"::{mistake.test}" if mistake.test else ""))
+        return failing(folder, mistake.asked)
     finally:
         file.write_text(right, encoding="utf-8")
         os.utime(file, (made, made))  # so old that no byte code of the mistake is taken for it
@@ -488,7 +493,7 @@ def main(numbers: list[int]) -> int:
             else:
                 begun = spent()
                 tests = caught(folder, mistake)
-                said = f"caught by {tests[0]}" if tests else f"SURVIVED {mistake.tests} {mistake.test}"
+                said = f"caught by {tests[0]}" if tests else f"SURVIVED {mistake.asked}"
                 said += f" ({spent() - begun:.0f} CPU s)"
             seen |= dict.fromkeys(tests)
             wrong += not tests
