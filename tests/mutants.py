@@ -88,7 +88,7 @@ MISTAKES = (
         "self.depth / (self.exponent + 1) * self._power",
         "self.depth / self.exponent * self._power",
         "test_contact_rough.py",
-        "test_stiffness_and_energy_belong_to_the_force",
+        "test_the_energy_of_a_power_law_is_the_integral_of_its_force",
     ),
     Mistake(
         "rough layer: sign of what shortening adds to its stiffness",
@@ -401,7 +401,7 @@ MISTAKES = (
         '"mass": time**2}',
         '"mass": time}',
         "test_matrices.py",
-        "test_rows_in_another_order_and_other_units_are_the_same_body",
+        "test_every_matrix_has_its_own_power_of_the_unit_of_time",
     ),
     Mistake(
         "universal file: order of the wedge's nodes",
