@@ -372,7 +372,7 @@ def test_laws_come_to_another_process_in_double_precision() -> None:
     given = {"input": pickle.dumps(law), "capture_output": True, "check": True}
     came = subprocess.run([sys.executable, "-c", there], **given).stdout
     for left, came_back in zip(*map(jax.tree.leaves, (law, pickle.loads(came))), strict=True):
-        assert came_back.dtype == np.float64 and np.array_equal(left, came_back)
+        assert np.asarray(came_back).dtype == np.float64 and np.array_equal(left, came_back)
 
 
 def test_derivatives_with_respect_to_a_law_have_any_sign() -> None:
