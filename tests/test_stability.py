@@ -213,7 +213,8 @@ def test_a_pair_that_turns_and_grows():
 
 
 def test_damping_that_follows_speed_and_place_leaves_the_product_of_the_multipliers():
-    """x'' + u v x' + 1.7 x = 0 with u = cos t + sin t, v = u': it is exp(-integral of u v) = 1 (Liouville)."""
+    """x'' + u v x' + 1.7 x = 0 with u = cos t + sin t, v = u': it is
+    exp(-integral of u v) = 1 (Liouville)."""
     swing = np.zeros((3, 3))
     swing[0] = [0, 1, 1]
     one = moving(Rubbing(), along(1), np.eye(1), np.zeros((1, 1)), 1.7 * np.eye(1), swing, 1.0)
