@@ -125,7 +125,8 @@ def test_brusselator() -> None:
 
 def test_criticality_counts_quadratic_terms() -> None:
     """x' = -y - r^2 x + 1.5 x^2 + 2 x y, y' = x - r^2 y: r' = (-1 + 1.5 * 2 / 8) r^3
-    (J. Guckenheimer, P. Holmes, Nonlinear Oscillations, Eq. (3.4.11)), r^2 twice the square of a unit shape's amplitude."""
+    (J. Guckenheimer, P. Holmes, Nonlinear Oscillations, Eq. (3.4.11)),
+    r^2 twice the square of a unit shape's amplitude."""
 
     def rate(z: Any, p: Any, _: Any) -> Any:
         x, y = circling(z, p)
