@@ -123,6 +123,19 @@ def test_brusselator() -> None:
     assert point.criticality < 0
 
 
+def test_criticality_counts_quadratic_terms() -> None:
+    """x' = -y - r^2 x + 1.5 x^2 + 2 x y, y' = x - r^2 y: r' = (-1 + 1.5 * 2 / 8) r^3
+    (J. Guckenheimer, P. Holmes, Nonlinear Oscillations, Eq. (3.4.11)),
+    r^2 twice the square of a unit shape's amplitude."""
+
+    def rate(z: Any, p: Any, _: Any) -> Any:
+        x, y = circling(z, p)
+        return jnp.stack([x + 1.5 * z[0] ** 2 + 2 * z[0] * z[1], y])
+
+    system = Dynamics(rate, ("x", "y"), np.ones(2), 2.0)
+    assert equilibria.lyapunov(system, np.zeros(2), 0.0, 1.0) == pytest.approx(-1.25, abs=1e-12)
+
+
 def test_shooting_is_harmonic_balance() -> None:
     """On the same orbit of the Brusselator: 40 harmonics to 1e-9, and fewer the worse."""
     system = chemical().system

@@ -1,6 +1,9 @@
 """What every contact law must satisfy, on random closed paths: `contact.EXAMPLES` decides which laws are tried."""
 
 import dataclasses
+import pickle
+import subprocess
+import sys
 
 import jax
 import jax.numpy as jnp
@@ -360,6 +363,16 @@ def test_nonsense_is_refused_where_a_law_is_made(example) -> None:
             for change in (lambda value, bad=bad: bad, lambda value, bad=bad: jnp.append(value, bad)):
                 with pytest.raises(UserError, match=name):
                     again(change)
+
+
+def test_laws_come_to_another_process_in_double_precision() -> None:
+    """Which has computed nothing yet: jax would make single numbers of them."""
+    law = EXAMPLES["smooth point"].law
+    there = "import pickle, sys; sys.stdout.buffer.write(pickle.dumps(pickle.load(sys.stdin.buffer)))"
+    given = {"input": pickle.dumps(law), "capture_output": True, "check": True}
+    came = subprocess.run([sys.executable, "-c", there], **given).stdout
+    for left, came_back in zip(*map(jax.tree.leaves, (law, pickle.loads(came))), strict=True):
+        assert np.asarray(came_back).dtype == np.float64 and np.array_equal(left, came_back)
 
 
 def test_derivatives_with_respect_to_a_law_have_any_sign() -> None:

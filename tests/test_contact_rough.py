@@ -212,6 +212,12 @@ def test_stiffness_and_energy_belong_to_the_force(law) -> None:
     assert np.all(np.diff(force) >= 0) and np.all(share >= 0)
 
 
+def test_the_energy_of_a_power_law_is_the_integral_of_its_force() -> None:
+    """4 N at 2 um behind a gap of 1 um, to the power 2.5: F_NS u_NS / 3.5 (u / u_NS)^3.5."""
+    law, u = Potential(4.0, 2e-6, 2.5, 1e-6), np.array([0.0, 2e-6, 3e-6])
+    np.testing.assert_allclose(law.stored(u), 8e-6 / 3.5 * np.array([0.0, 0.5**3.5, 1.0]), rtol=1e-13)
+
+
 def test_the_hyperbolic_law_stays_finite_beyond_its_layer() -> None:
     """Up to a tenth of the length as printed; from there on a line, C1."""
     law = Hyperbolic(C, R, Polynomial(), L)

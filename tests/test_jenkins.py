@@ -74,6 +74,14 @@ def test_a_cycle_takes_what_the_law_counts_and_gives_nothing_back() -> None:
     np.testing.assert_allclose(taken, lost, rtol=0, atol=1e-4 * size.max())
 
 
+def test_the_slip_is_what_the_spring_with_the_slider_does_not_take() -> None:
+    u = path(1, LAW, points=1, samples=32)
+    force, state = jax.jit(march)(LAW.law, u, 1e-4, LAW.law.init(1))
+    slid = np.asarray(u)[-1, 0, 2] - np.asarray(force)[-1, 0, 2] / 2e6
+    assert abs(slid) > 1e-7
+    np.testing.assert_allclose(LAW.law.slip(state), [[0.0, slid]], rtol=1e-9)
+
+
 def test_it_does_not_open_and_holds_its_limit() -> None:
     u = path(5, LAW) - jnp.array([3e-5, 0.0, 0.0])
     force = np.asarray(FORCES(LAW.law, u, LAW.period, 2)[0])

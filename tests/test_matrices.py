@@ -22,7 +22,7 @@ from microslip.basis import check_basis, read_basis
 from microslip.cli import main
 from microslip.elasticity import isotropic
 from microslip.errors import UserError
-from microslip.exchange.matrices import matrix_names, read_matrices
+from microslip.exchange.matrices import _in_si, matrix_names, read_matrices
 from microslip.fem.discretise import discretise
 from microslip.fem.operators import mass, stiffness
 from microslip.modal.compute import modal_basis
@@ -277,6 +277,13 @@ def test_nodes_come_from_grid_cards_and_tables(tmp_path, kind):
         found = read_nodes(tmp_path / "a.mat", "", "mm")
     np.testing.assert_array_equal(found.node_id, beam().node_id)
     np.testing.assert_allclose(found.points, beam().points, atol=1e-13 if kind == "grid" else 1e-17)
+
+
+def test_every_matrix_has_its_own_power_of_the_unit_of_time():
+    """kN/mm, kN ms/mm and kg; of rotations kN mm, N m s and kg mm2."""
+    for role, unit in (("stiffness", 1e6), ("damping", 1e3), ("gyroscopic", 1e3), ("mass", 1.0)):
+        found = _in_si(sp.identity(2, format="csr"), role, "mm-kg-ms", np.array([0, 3])).toarray()
+        np.testing.assert_allclose(found, unit * np.diag([1.0, 1e-6]), rtol=1e-14)
 
 
 def test_rows_in_another_order_and_other_units_are_the_same_body(tmp_path):

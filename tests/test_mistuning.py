@@ -569,6 +569,15 @@ def test_intervals_hold_the_truth(share: float, n: int) -> None:
     assert 930 <= hit <= 970
 
 
+@pytest.mark.parametrize("share, n", [(0.5, 60), (0.95, 400)])
+def test_intervals_are_no_wider_than_they_must_be(share: float, n: int) -> None:
+    """Of n samples that are their own ranks: at either end 2.5 % are left out at most, and
+    one rank less would leave out more."""
+    q, below = quantile(np.arange(1.0, n + 1), share), scipy.stats.binom(n, share)
+    assert below.cdf(q.low - 1) <= 0.025 < below.cdf(q.low)
+    assert below.sf(q.high - 1) <= 0.025 < below.sf(q.high - 2)
+
+
 def test_envelopes_are_those_of_all_samples() -> None:
     """Mean, deviation, k and quantiles that need no memory are those of all numbers together."""
     y = np.random.default_rng(0).weibull(3.0, (400, 2, 10))

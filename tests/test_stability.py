@@ -64,6 +64,17 @@ class Pulling(Law):
         return jnp.zeros_like(u).at[:, 1].set(-self.c * v[:, 1]), state
 
 
+@settings
+class Rubbing(Law):
+    """Along t1 a damper of u_n v_n."""
+
+    def init(self, n):
+        return ()
+
+    def step(self, u, v, dt, state):
+        return jnp.zeros_like(u).at[:, 1].set(u[:, 0] * v[:, 0] * v[:, 1]), state
+
+
 ONE_POINT = np.hstack([np.eye(3), np.zeros((3, 3))])[None]
 
 
@@ -199,6 +210,15 @@ def test_a_pair_that_turns_and_grows():
     found = stability(one)
     assert found.loss == "Neimark-Sacker" and not found.stable
     assert found.growth == pytest.approx(np.exp(0.02 * np.pi), rel=1e-7)
+
+
+def test_damping_that_follows_speed_and_place_leaves_the_product_of_the_multipliers():
+    """x'' + u v x' + 1.7 x = 0 with u = cos t + sin t, v = u': it is
+    exp(-integral of u v) = 1 (Liouville)."""
+    swing = np.zeros((3, 3))
+    swing[0] = [0, 1, 1]
+    one = moving(Rubbing(), along(1), np.eye(1), np.zeros((1, 1)), 1.7 * np.eye(1), swing, 1.0)
+    assert np.prod(multipliers(one, 512)) == pytest.approx(1.0, abs=1e-3)
 
 
 def test_what_multipliers_say():

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import tomllib
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -94,6 +95,41 @@ def test_slow_hunting_has_the_wave_of_klingel(vehicle: motion.Vehicle) -> None:
     wave = 2.0 * np.sqrt(conicity / (o.radius[0, middle] * o.across[0, middle]))
     slow = vehicle._replace(speed=2.0, stiffness=free, damping=0 * free + np.diag([0, 1e5, 0, 0, 1e5, 1e5]))
     assert motion.hunting(slow).imag == pytest.approx(wave, rel=0.05)
+
+
+RATES = jax.jit(motion.rates, static_argnums=1)
+
+
+@jax.jit
+def _stored(v: motion.Vehicle, x: Any, out: Any, dx: Any, turned: Any) -> Any:
+    """W, the change of `motion.energy`."""
+    return jax.jvp(partial(motion.energy, v), (x, out), (dx, turned))[1]
+
+
+def test_pull_and_torque_bring_what_is_stored_rubbed_and_damped(vehicle: motion.Vehicle) -> None:
+    """At once, to rounding, of wheels out of round that slip, roll and yaw."""
+    v, rng = vehicle._replace(torque=500.0), np.random.default_rng(2)
+    x = motion.steady(v)
+    x[:4] += np.array([5e-4, 2e-5, 2e-5, 2e-3])  # both wheels stay on their rails
+    x[6:12] = 0.1 * rng.normal(size=6)
+    out, rise = np.array([2e-5, -1e-5]), np.array([3e-4, -2e-4])
+    dx, powers = map(np.asarray, RATES(v, linear, x, out, rise))
+    brought = powers[0] + powers[1] - powers[2] - powers[3]
+    stored = float(_stored(v, x, out, dx, x[12] * rise))
+    assert (np.abs(powers) > 1e-6 * np.abs(powers).max()).all()
+    assert stored == pytest.approx(brought, abs=1e-9 * np.abs(powers).max())
+
+
+def test_an_axle_off_its_rails_keeps_its_angular_momentum(vehicle: motion.Vehicle) -> None:
+    """Running forward that is -I omega along the axle, which yaw turns backward by -psi and roll
+    downward by phi."""
+    over, none = vehicle.over, 0 * np.array(vehicle.stiffness)
+    loose = vehicle._replace(over=over._replace(spring=0 * over.spring), stiffness=none, damping=none)
+    x = np.zeros(13)
+    x[8], x[9], x[12] = 0.3, -0.2, 150.0
+    dx = np.asarray(RATES(loose, linear, x, np.zeros(2), np.zeros(2))[0])
+    spun = vehicle.spin_inertia * x[12] * np.array([x[9], -x[8]])
+    np.testing.assert_allclose((vehicle.mass @ dx[6:12])[2:4], -spun, rtol=1e-12)
 
 
 @pytest.mark.slow
