@@ -17,7 +17,7 @@ import pytest
 
 QUICK = 1.5
 """CPU seconds, compiling left out, that a quick test is to take at most: those above are listed."""
-NEVER = 4.0
+NEVER = 10.0
 """A run of quick tests fails over one above this, whatever the machine is and does beside."""
 FILE = Path(__file__).resolve().parents[1] / "build/durations.csv"
 COLUMNS = ("cpu_s", "compiling_s", "processes_s")
@@ -69,7 +69,8 @@ class Durations:
     def pytest_terminal_summary(self, terminalreporter: Any, config: pytest.Config) -> None:
         if config.getoption("markexpr") == "not slow":
             for seconds, test in self.slow:
-                terminalreporter.write_line(f"{seconds:5.1f} CPU s: {test}")
+                verdict = f", above {NEVER:g}: make it smaller or slow" if seconds > NEVER else ""
+                terminalreporter.write_line(f"{seconds:5.1f} CPU s{verdict}: {test}")
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
         for name, value in report.user_properties:
