@@ -401,8 +401,8 @@ def test_a_mistake_of_the_program_is_not_hidden(monkeypatch: pytest.MonkeyPatch)
         (["mesh", "box", "--set", "mesh.size=1"], "meshing", "meshes/box.msh", signal.SIGINT),
         (["mesh", "box", "--set", "mesh.size=1"], "meshing", "meshes/box.msh", signal.SIGTERM),
         pytest.param(
-            ["modes", "box", "--set", "mesh.size=3.5", "--set", "modes.count=400"], "eigenmodes: ", "build/box/basis.h5",
-            signal.SIGINT, marks=pytest.mark.slow,
+            ["modes", "box", "--set", "mesh.size=3.5", "--set", "modes.count=400"], "eigenmodes: ",
+            "build/box/basis.h5", signal.SIGINT, marks=pytest.mark.slow,
         ),
     ],
     ids=["while gmsh works", "ended while gmsh works", "while the modes are solved"],

@@ -226,9 +226,9 @@ def planned(title: str) -> str:
     if took := known.get(place):
         return f"{words}{'; ' * bool(words)}at most about {_duration(max(took))}, as before" * (max(took) > SHORT)
     if took := [s for key, more in known.items() if _named(key) == _named(place) for s in more]:
-        low, high = min(low, *took), max(high, *took)
+        usual = f"{_duration(min(low, *took))} to {_duration(max(high, *took))}"
         elsewhere = f"one of that name in another folder took {_duration(max(took))}"
-        return f"{words}{'; ' * bool(words)}{_duration(low)} to {_duration(high)}; {elsewhere}"
+        return f"{words}{'; ' * bool(words)}{usual}; {elsewhere}"
     usual = f"not timed on this machine yet, such runs take {_duration(low)} to {_duration(high)}"
     return f"{words}{'; ' * bool(words)}{usual}" * (high > SHORT)
 
