@@ -23,7 +23,7 @@ from .harmonic_balance.problem import Problem
 from .harmonic_balance.solved import Motions
 from .harmonic_balance.solver import sweep
 from .settings.arguments import Count, Frequencies, Index, Rows, Text, Vector, checked
-from .settings.mistakes import bounded, numbered
+from .settings.mistakes import bounded, numbered, too_few
 from .settings.numbers import Number, Positive
 from .system.assembly import Assembly
 
@@ -79,7 +79,7 @@ def balanced(system: System, harmonics: int | None = None, samples: int | None =
         return problem_of(system, None, **{key: n for key, n in asked.items() if n is not None})
     H = 3 if harmonics is None else harmonics
     if samples is not None and samples < 4 * H:
-        raise UserError(f"samples: {samples} are too few for {H} harmonics; take {4 * H} at least, better {16 * H}")
+        raise UserError(f"samples: {too_few(samples, H, 4 * H, 16 * H)}")
     return balance.of(system, H, max(64, 16 * H) if samples is None else samples)
 
 
@@ -193,10 +193,7 @@ def two_tones(
     fewest = ("samples", samples, 4 * harmonics), ("turns", turns, 2 * harmonics + 1)
     for key, count, least in fewest:
         if count is not None and count < least:
-            raise UserError(
-                f"two_tones: {key}: {count} are too few for {harmonics} harmonics; take {least} at "
-                f"least, better {8 * harmonics}"
-            )
+            raise UserError(f"two_tones: {key}: {too_few(count, harmonics, least, 8 * harmonics)}")
     assembly, turn = whole_of(system), 2 * np.pi * HERTZ[unit]
     one, two = (np.atleast_1d(np.asarray(f, dtype=float)) * turn for f in (first, second))
     try:

@@ -23,7 +23,7 @@ from ..harmonic_balance.stability import Settings as Multipliers
 from ..harmonic_balance.stability import Stability, orbit, stability
 from ..results import Journal
 from ..time_domain.stepped import Settled
-from ..time_domain.swept import DOWN, LONG, REST, UP, Sweeps, apart
+from ..time_domain.swept import DOWN, LONG, REST, UP, Sweeps, on_two_motions
 from ..units import Quantity, percent
 from .assemble import build
 from .curves import Followed, Keep, curves
@@ -62,7 +62,7 @@ class Beyond:
     @property
     def two(self) -> list[tuple[Settled, Settled]]:
         """The lower and the higher motion where sweeps upwards and downwards are on different ones, by frequency."""
-        return apart(self.up, self.down)
+        return on_two_motions(self.up, self.down)
 
     @property
     def irregular(self) -> list[Settled]:

@@ -14,6 +14,7 @@ from ..contact.point import OfPoint
 from ..contact.settings import ContactLaw
 from ..operating.fatigue import MaterialLimits
 from ..reduced.compliance import BULK_AND_SURFACE
+from ..settings.mistakes import too_few
 from ..settings.numbers import (
     Model,
     Name,
@@ -394,10 +395,8 @@ class CaseSettings(Model):
             raise ValueError(said)
         count = self.number_of_harmonics
         if self.sampled < 4 * count:
-            raise ValueError(
-                f"samples: {self.sampled} are too few for {count} harmonics; take at least {4 * count}, better "
-                f"{GOOD_SAMPLES_EACH * count}"
-            )
+            words = too_few(self.sampled, count, 4 * count, GOOD_SAMPLES_EACH * count)
+            raise ValueError(f"samples: {words}")
         return self._automatic()._book()._pressed()._damped()
 
     def _damped(self) -> CaseSettings:

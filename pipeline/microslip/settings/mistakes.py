@@ -89,6 +89,11 @@ def unfit(value: Any, gt: float | None = None, ge: float | None = None, le: floa
     return ""
 
 
+def too_few(count: int, harmonics: int, least: int, better: int) -> str:
+    """That points of a cycle are too few for its harmonics."""
+    return f"{count} are too few for {harmonics} harmonics; take at least {least}, better {better}"
+
+
 def whole(what: str, value: Any, ge: int = 0) -> None:
     """Check a count that is given in Python.
 

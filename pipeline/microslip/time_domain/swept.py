@@ -66,7 +66,7 @@ class Motions(NamedTuple):
     cut: tuple[str, float] | None = None
 
 
-def apart(up: Sequence[Settled], down: Sequence[Settled]) -> list[tuple[Settled, Settled]]:
+def on_two_motions(up: Sequence[Settled], down: Sequence[Settled]) -> list[tuple[Settled, Settled]]:
     """The lower and the higher motion where two sweeps are on different ones, by frequency."""
     known = {m.frequency: m for m in up}
     pairs = [(known[m.frequency], m) for m in down if m.frequency in known]
@@ -110,7 +110,8 @@ class Sweeps:
     ) -> None:
         self.problem, self.gap, self.normal, self.report = problem, gap, normal, report
         self.patience, self.spent, self.compiled = patience, 0.0, False
-        self.journal, self.cut = journal, None
+        self.journal = journal
+        self.cut: tuple[str, float] | None = None
         self.asked = found.frequency[found.asked]
         self.step = float(np.median(np.diff(self.asked)))
         self.periods = _periods(problem, gap)
@@ -122,8 +123,6 @@ class Sweeps:
             if good
         }
         self.seen = {f: [amplitude] for f, (_, amplitude) in self.balanced.items()}
-
-    cut: tuple[str, float] | None
 
     def motions(self) -> Motions:
         """All of them, or those for which the time was enough.
@@ -141,7 +140,7 @@ class Sweeps:
         back = [m.frequency for m in down[-2::-1]] if fell else [*below[-2:], *inside, *above[:2]]
         further = [f for f in above if f > max(back)]
         up, _ = self._way(UP, [*back, *further], high, 1.0, down[-1:] if fell else [])
-        return Motions(up, down, self._from_rest(apart(up, down)), self.cut)
+        return Motions(up, down, self._from_rest(on_two_motions(up, down)), self.cut)
 
     def _over(self, way: str, f: float) -> bool:
         """Whether the time is over that a way may take before a frequency (Hz)."""
