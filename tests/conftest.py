@@ -88,8 +88,8 @@ WITHIN_A_FILE = 1e9
 def drop(most: float) -> None:
     """Compiled programs are shared by all tests until there are too many: each keeps memory, in pieces of which a
     process may have 65530 mapped (20,000 at 1.5 GB); beyond that the compiler crashes."""
-    if "jax" in sys.modules and held() > most:
-        sys.modules["jax"].clear_caches()
+    if "microslip.programs" in sys.modules and held() > most:
+        sys.modules["microslip.programs"].dropped()
         gc.collect()
         if sys.platform == "linux":
             trim = getattr(ctypes.CDLL(None), "malloc_trim", None)  # give it back: glibc alone has it

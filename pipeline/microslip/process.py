@@ -87,6 +87,11 @@ def keep_compiled() -> Path | None:
     return folder
 
 
+def kept_in() -> Path | None:
+    """The folder of compiled programs, if there is one."""
+    return Path(folder) if (folder := _known("jax_compilation_cache_dir")) else None
+
+
 def _folder() -> Path | None:
     try:
         folder = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache", "microslip", "jax")

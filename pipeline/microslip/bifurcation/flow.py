@@ -15,7 +15,7 @@ import jax.numpy as jnp
 import numpy as np
 from scipy.integrate import DOP853
 
-from ..contact.law import program
+from ..programs import program
 from .dynamics import Dynamics
 
 MOST = 4000

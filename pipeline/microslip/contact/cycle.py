@@ -5,10 +5,11 @@ from __future__ import annotations
 import jax
 import jax.numpy as jnp
 
+from ..programs import inner
 from .law import Array, Law, State
 
 
-@jax.jit
+@inner
 def stepped(law: Law, u: Array, v: Array, dt: Array | float, state: State) -> tuple[Array, State]:
     """`Law.step`, which python reads once for all its uses."""
     return law.step(u, v, dt, state)

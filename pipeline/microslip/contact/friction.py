@@ -18,13 +18,14 @@ from pydantic import Field
 from scipy.interpolate import PchipInterpolator
 
 from ..errors import UserError
+from ..programs import program
 from ..settings.mistakes import bounded
 from ..settings.numbers import Coefficient, NotNegative, Number, Positive
 from .curves import read_table
 from .heights import Heights
 from .keys import Columns, FileName
 from .kinds import Kind, beside
-from .law import Array, number, program, settings, value, values
+from .law import Array, number, settings, value, values
 
 if TYPE_CHECKING:
     from .settings import Temperature

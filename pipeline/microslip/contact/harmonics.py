@@ -14,6 +14,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from ..programs import inner
 from .law import Array, Law, point_axes
 from .periodic import Known, near, unknown, with_slopes
 
@@ -41,7 +42,7 @@ def fourier(harmonics: int, samples: int) -> tuple[Any, Any]:
     return values, weights[:, None] * values.T
 
 
-@partial(jax.jit, static_argnames=("samples", "count", "chunk"))
+@partial(inner, static_argnames=("samples", "count", "chunk"))
 def force_harmonics(
     law: Law, u: Array, period: Array | float, samples: int = 64, count: int = 2, chunk: int = CHUNK,
     periodicity: Array | float = 0.0,
@@ -68,7 +69,7 @@ def force_harmonics(
     return force, slope
 
 
-@partial(jax.jit, static_argnames=("samples", "count", "chunk"))
+@partial(inner, static_argnames=("samples", "count", "chunk"))
 def force_alone(
     law: Law, u: Array, period: Array | float, samples: int = 64, count: int = 2, chunk: int = CHUNK_ALONE,
     periodicity: Array | float = 0.0,

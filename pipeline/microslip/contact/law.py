@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass, field, fields, is_dataclass
-from functools import partial, wraps
+from functools import partial
 from typing import Any, ClassVar, NamedTuple, TypeVar, dataclass_transform
 
 import jax
@@ -13,34 +13,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..process import prepare
+from ..programs import inner, program
 from ..settings.mistakes import bounded
-
-KNOWN = (0, 6) <= jax.__version_info__ < (0, 11)  # other versions may not know the options
-
-
-def _compiled(function: Callable[..., Any], options: dict[str, Any] | None, **given: Any) -> Callable[..., Any]:
-    """`jax.jit` with options of the compiler, in a process that is ready for it."""
-    compiled = jax.jit(function, compiler_options=options if KNOWN else None, **given)
-
-    @wraps(function)
-    def call(*args: Any, **kwargs: Any) -> Any:
-        prepare()
-        return compiled(*args, **kwargs)
-
-    return call
-
-
-program = partial(_compiled, options={"xla_cpu_use_fusion_emitters": False})
-"""`jax.jit` of what python calls: compiled in half the time, and slower only where there are hundreds of points."""
-
-inner = partial(_compiled, options=None)
-"""The same of what other programs call too, which choose the options."""
-
-often = partial(_compiled, options={"xla_cpu_prefer_vector_width": 512})
-"""The same of hundreds of points: compiled half a second longer, and a third faster."""
-
-seldom = partial(_compiled, options={"xla_cpu_use_fusion_emitters": False, "xla_backend_optimization_level": 0})
-"""The same of what is called some dozens of times: compiled in a quarter of the time, half as fast."""
 
 
 @partial(program, static_argnames="what")
@@ -354,7 +328,7 @@ def march(law: Law, u: Array, dt: float | Array, state: State, v: Array | None =
     return force, state
 
 
-@jax.jit
+@inner
 def history(law: Law, u: Array, dt: float | Array, state: State | None = None) -> History:
     """Forces, slip path and dissipated energy of a prescribed motion u (s, n, 3) in m, steps of dt seconds.
 

@@ -16,8 +16,9 @@ import numpy as np
 
 from ..data import Array, Indices
 from ..errors import NotConverged, UserError
+from ..programs import seldom
 from .cycle import stepped
-from .law import Law, seldom
+from .law import Law
 
 
 @dataclass(frozen=True)

@@ -27,6 +27,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from ..programs import inner
 from .cycle import blank, march, push
 from .law import Array, Law, State
 from .linearised import Linearised, linearised
@@ -118,7 +119,7 @@ class _Solving(NamedTuple):
     periodic: Array
 
 
-@partial(jax.jit, static_argnames="count")
+@partial(inner, static_argnames="count")
 def periodic(
     law: Law, path: Array, period: float | Array, count: int = 2, periodicity: float | Array = 0.0
 ) -> Periodic:  # fmt: skip

@@ -15,11 +15,12 @@ import jax
 import jax.numpy as jnp
 from jax.custom_derivatives import SymbolicZero
 
+from ..programs import seldom
 from ..reduced.compliance import BULK_AND_SURFACE
 from ..settings.numbers import NotNegative, Positive, PositiveLength
 from .friction import Friction
 from .kinds import LawKind
-from .law import Array, Law, Step, norm, number, ratio, root, seldom, settings, static, value
+from .law import Array, Law, Step, norm, number, ratio, root, settings, static, value
 from .normal import Hyperbolic, Normal, Preload
 
 if TYPE_CHECKING:

@@ -15,12 +15,13 @@ import numpy as np
 
 from .. import plausible
 from ..errors import UserError, told_of
+from ..programs import program
 from . import microslip
 from . import settings as S
 from .composed import ContactModel, compose
 from .friction import FASTEST, OfLubricated, coefficients, lubricated, smoothed
 from .jenkins import Jenkins
-from .law import history, program, values
+from .law import history, values
 from .layer import Layer, quasi_static_error
 from .normal import Preload, Rough
 from .point import PointContact

@@ -26,9 +26,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..errors import NotConverged, UserError
+from ..programs import program
 from .friction import Friction, coefficients
 from .heights import Heights, Tabulated, as_table, summed
-from .law import program
 from .normal import Rough
 
 

@@ -31,6 +31,7 @@ from ..contact.portion import Portion
 from ..contact.sliders import Iwan, Strips
 from ..data import Array, ComplexArray
 from ..errors import UserError
+from ..programs import inner
 from .orbits import TOLERANCE, Orbits, orbits
 from .point_cycles import Cycle, Traced, above_rounding
 from .tables import Spline, Table, in_chunks, kept, law_hash, refined
@@ -421,7 +422,7 @@ def _motion(G: jax.Array, u: jax.Array) -> tuple[jax.Array, jax.Array]:
     return v[0], v[1:, 1:].reshape(4, -1)
 
 
-@jax.jit
+@inner
 def _resultants(points: Points, G: jax.Array, u: jax.Array) -> jax.Array:
     """(c, k, 3) resultants of (c, k, 3) coordinates."""
 
@@ -434,7 +435,7 @@ def _resultants(points: Points, G: jax.Array, u: jax.Array) -> jax.Array:
     return jax.lax.map(one, u)
 
 
-@jax.jit
+@inner
 def _with_slope(points: Points, G: jax.Array, u: jax.Array) -> tuple[jax.Array, jax.Array]:
     """(c, k, 3) resultants and (c, k, 3, k, 3) their derivative; derivatives point by point, then contracted.
 
@@ -533,7 +534,7 @@ class BookPatch:
             raise ValueError(f"book mode: one harmonic, (contacts, {self.patch.count}, 3); u has the shape {u.shape}")
 
 
-@jax.jit
+@inner
 def _point_cycles(points: Points, G: jax.Array, u: jax.Array) -> tuple[jax.Array, ...]:
     """(c, n) J dissipated in the plane, and shares of the cycle that are slip and open."""
     wave = jnp.asarray(np.cos(2 * np.pi * (np.arange(SAMPLES) + 0.5) / SAMPLES))
@@ -551,7 +552,7 @@ def _point_cycles(points: Points, G: jax.Array, u: jax.Array) -> tuple[jax.Array
     return jax.lax.map(one, u)
 
 
-@jax.jit
+@inner
 def _of_points(points: Points, G: jax.Array, u: jax.Array) -> jax.Array:
     """(c, n, 3, 3) mean, cos and sin of the forces of the points along n, t1, t2, N; the sum of them is `_resultants`'.
 
@@ -567,7 +568,7 @@ def _of_points(points: Points, G: jax.Array, u: jax.Array) -> jax.Array:
     return jax.lax.map(one, u)
 
 
-@jax.jit
+@inner
 def _stiffness(points: Points, G: jax.Array, u: jax.Array) -> jax.Array:
     """(c, k, k) the complex stiffness of every point in the axes of the contact, contracted."""
 

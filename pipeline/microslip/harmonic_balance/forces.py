@@ -17,11 +17,12 @@ import jax.numpy as jnp
 import numpy as np
 
 from ..contact.harmonics import CHUNK, CHUNK_ALONE, force_harmonics, force_near, fourier
-from ..contact.law import Law, often, point_axes, program, seldom
+from ..contact.law import Law, point_axes
 from ..contact.patch import Patch
 from ..contact.periodic import Known, periodic, unknown, with_slopes
 from ..contact.thinned import thinned
 from ..data import Array
+from ..programs import often, program, seldom
 from .point_cycles import Cycle, Traced, derivative, needs_rate, traced
 from .torus import Torus
 

@@ -21,6 +21,7 @@ import numpy as np
 
 from ..contact.law import settings
 from ..data import Array, ComplexArray
+from ..programs import inner
 from .tables import Spline, Table, fitted, in_chunks, kept, read, refined
 
 THINNEST, LONGEST = 1e-5, 1e6
@@ -74,7 +75,7 @@ def _turned(parts: jax.Array, e: jax.Array) -> jax.Array:
     return jnp.stack([e[0] * parts[0] - e[1] * parts[1], e[1] * parts[0] + e[0] * parts[1]])
 
 
-@partial(jax.jit, static_argnames="samples")
+@partial(inner, static_argnames="samples")
 def half_cycle(F: jax.Array, A: jax.Array, B: jax.Array, samples: int) -> tuple[jax.Array, jax.Array]:
     """Force after half a cycle from the apex (A, 0), and (4, n) first harmonics over it by straight ways.
 
@@ -99,7 +100,7 @@ def half_cycle(F: jax.Array, A: jax.Array, B: jax.Array, samples: int) -> tuple[
     return F, summed * (2 / np.pi)
 
 
-@partial(jax.jit, static_argnames="samples")
+@partial(inner, static_argnames="samples")
 def sliding_half(
     psi: jax.Array, A: jax.Array, B: jax.Array, samples: int
 ) -> tuple[jax.Array, jax.Array, jax.Array, jax.Array]:

@@ -10,10 +10,11 @@ import jax.numpy as jnp
 import numpy as np
 
 from ..contact.harmonics import fourier
-from ..contact.law import Law, State, Step, seldom
+from ..contact.law import Law, State, Step
 from ..contact.periodic import periodic
 from ..contact.point import PointContact
 from ..data import Array
+from ..programs import seldom
 
 
 def needs_rate(law: Law) -> bool:

@@ -26,6 +26,7 @@ from ..contact.law import Law, State
 from ..contact.periodic import periodic
 from ..data import Array, ComplexArray
 from ..errors import UserError
+from ..programs import inner
 from .problem import Problem
 
 Loss = Literal["", "fold", "flip", "Neimark-Sacker"]
@@ -293,7 +294,7 @@ def _middle(orbit: Orbit, h: float) -> _Body:
 # the contacts along the orbit ---------------------------------------------------------------------------------------
 
 
-@partial(jax.jit, static_argnames=("steps", "count"))
+@partial(inner, static_argnames=("steps", "count"))
 def _followed(
     laws: tuple[Law, ...], kinematics: tuple[jax.Array, ...], parts: tuple[jax.Array, ...], period: float, steps: int,
     count: int, body: _Body,
@@ -358,7 +359,7 @@ def _matters(effects: Array) -> tuple[bool, ...]:
     return tuple(bool(t) for t in told)
 
 
-@jax.jit
+@inner
 def _effects(law: Law, u: jax.Array, v: jax.Array, states: State, dt: float) -> jax.Array:
     """(leaves, 1 + leaves) largest change along the orbit of the force, and of every leaf, when a leaf is moved."""
     leaves, tree = jax.tree_util.tree_flatten(states)
@@ -384,7 +385,7 @@ def _effects(law: Law, u: jax.Array, v: jax.Array, states: State, dt: float) -> 
 # perturbations carried along ----------------------------------------------------------------------------------------
 
 
-@partial(jax.jit, static_argnames=("memory",))
+@partial(inner, static_argnames=("memory",))
 def _carried(
     laws: tuple[Law, ...], kinematics: tuple[jax.Array, ...], path: _Path, body: _Body, starts: jax.Array, dt: float,
     memory: _Memory,

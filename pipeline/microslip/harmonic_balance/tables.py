@@ -20,10 +20,11 @@ import jax.numpy as jnp
 import numpy as np
 
 from .. import __version__
-from ..contact.law import program, settings
+from ..contact.law import settings
 from ..data import Array
 from ..errors import UserError
 from ..files.store import complete_or_absent
+from ..programs import program
 
 FORMAT, VERSION = "microslip table", 1
 

@@ -22,9 +22,10 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from ..contact.law import Law, program
+from ..contact.law import Law
 from ..data import Array, ComplexArray
 from ..errors import UserError
+from ..programs import program
 from ..system.assembly import Assembly, Linear
 from . import problem as balance
 from . import reduced

@@ -15,11 +15,11 @@ import jax.numpy as jnp
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..contact.law import program
 from ..errors import UserError
 from ..files import hdf5
 from ..files.hostile import reading
 from ..files.store import ordinary
+from ..programs import program
 from ..settings import arguments
 from ..settings.arguments import Count, Index, wholes
 from ..settings.numbers import Positive

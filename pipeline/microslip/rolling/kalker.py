@@ -14,7 +14,8 @@ import jax.numpy as jnp
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..contact.law import Array, inner
+from ..contact.law import Array
+from ..programs import inner
 from ..settings.arguments import checked
 from .arguments import Poissons, Positives, joined
 

@@ -15,9 +15,10 @@ from numpy.typing import ArrayLike
 from ..contact.friction import Friction
 from ..contact.heights import Heights
 from ..contact.hertz import ellipse_integrals
-from ..contact.law import program, settings
+from ..contact.law import settings
 from ..contact.normal import Normal, Preload, Rough
 from ..contact.point import PointContact
+from ..programs import program
 from ..settings.arguments import checked
 from .arguments import Poissons, Positives, Reals, Resolution, joined
 from .kalker import Coefficients

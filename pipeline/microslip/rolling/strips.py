@@ -18,9 +18,9 @@ import jax.numpy as jnp
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..contact.law import program
 from ..contact.point import opposed
 from ..interrupts import look
+from ..programs import program
 from ..settings.arguments import checked
 from .arguments import Frictions, Poissons, Positives, Reals, Resolution, joined
 from .kalker import Coefficients, coefficients_at

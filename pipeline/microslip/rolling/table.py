@@ -15,12 +15,12 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from ..contact.law import program
 from ..data import Array
 from ..errors import UserError
 from ..files import hdf5
 from ..files.hostile import reading
 from ..files.store import ordinary
+from ..programs import program
 from ..settings import arguments
 from ..settings.arguments import Count, Index, wholes
 from .arguments import Frictions, Poisson, Positives, Reals, Resolution, joined

@@ -9,9 +9,10 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from ..contact.law import Law, Step, norm, seldom
+from ..contact.law import Law, Step, norm
 from ..contact.patch import Patch
 from ..contact.set_valued import SetValued
+from ..programs import seldom
 from .ground import Moving
 from .inclusion import Meets, over_waves, solve
 

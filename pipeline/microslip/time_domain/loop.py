@@ -13,7 +13,7 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 
-from ..contact.law import program
+from ..programs import inner, program
 from . import fourth, kicks
 from .bodies import Bodies, Hardest, Listed, Now, Options, Seen, exponent
 from .contacts import Group, Held, moved, parts, times, untouched
@@ -28,7 +28,7 @@ ROUNDING = 1e-6
 """Share of a leap that is left out, so that rounding does not bring it into contact."""
 
 
-@partial(jax.jit, static_argnums=0)
+@partial(inner, static_argnums=0)
 def begun(options: Options, groups: tuple[Group, ...], B: Bodies, y: Any, o: Any, held: Held | None) -> Now:
     """At time 0, bodies at y (b, 2 p), the contacts there from what they held, or never touched before."""
     q, v = jnp.split(y, 2, axis=1)

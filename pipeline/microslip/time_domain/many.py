@@ -15,10 +15,10 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from ..contact.law import program
 from ..data import Array
 from ..errors import UserError
 from ..interrupts import look
+from ..programs import program
 from . import classification, loop
 from .bodies import Bodies, Now, Options
 from .classification import Exponent

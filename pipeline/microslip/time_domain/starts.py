@@ -16,6 +16,7 @@ from ..harmonic_balance import accuracy
 from ..harmonic_balance.problem import Problem
 from ..harmonic_balance.response import operating
 from ..harmonic_balance.solver import Point, sweep
+from ..programs import inner
 from ..settings.mistakes import bounded, whole
 from ..units import counted, percent
 from .contacts import Group, Held, answer, untouched
@@ -175,7 +176,7 @@ def begun(stepper: Stepper, start: Periodic) -> Now:
     return stepper.start(start.q, start.v, held=held)
 
 
-@jax.jit
+@inner
 def _led(groups: tuple[Group, ...], held: Held, d: Any, v: Any, dt: Any) -> Held:
     """What contacts hold after a path (s, c)."""
     return jax.lax.scan(lambda h, one: (answer(groups, None, *one, dt, h, False), None), held, (d, v))[0]

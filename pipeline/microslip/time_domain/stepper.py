@@ -18,10 +18,10 @@ import jax.numpy as jnp
 import numpy as np
 import scipy.linalg
 
-from ..contact.law import program
 from ..data import Array
 from ..errors import UserError
 from ..harmonic_balance.forces import repeated
+from ..programs import program
 from . import fourth, loop
 from .bodies import Bodies, Hardest, Now, Options, Seen
 from .braking import Braking

@@ -15,7 +15,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from ..contact.law import program
+from ..programs import program
 from .creep import Creep, linear
 from .touch import Touch, at, touched
 

@@ -8,8 +8,8 @@ from typing import Any, NamedTuple
 import jax.numpy as jnp
 import numpy as np
 
-from ..contact.law import program
 from ..errors import UserError
+from ..programs import program
 from ..rolling.wheelset import Patch, Pose, Side, Track, patches
 
 Array = Any

@@ -1,0 +1,112 @@
+"""Compiled programs that are kept whole: read by what they were made from, or made anew."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+import microslip as ms
+from microslip import programs
+from microslip.contact import jenkins, patch
+from microslip.contact.law import Law, settings
+
+PLACES = np.zeros((2, 1, 3)) + np.array([1e-6, 0.0, 0.0])
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setattr(programs, "kept_in", lambda: tmp_path)
+    monkeypatch.setattr(patch._tangents, "made", {})
+    return tmp_path
+
+
+@pytest.fixture
+def law() -> Law:
+    return ms.jenkins(1e5, 10.0).law
+
+
+def again(law: Any) -> np.ndarray:
+    """As a process that begins."""
+    patch._tangents.made.clear()
+    return np.asarray(patch._tangents(law, PLACES))
+
+
+def kept(folder: Path) -> set[Path]:
+    return set(folder.glob("*-program"))
+
+
+def test_a_program_is_read_with_the_same_bits(folder: Path, law: Law, monkeypatch: pytest.MonkeyPatch) -> None:
+    first = again(law)
+    assert len(kept(folder)) == 1
+    monkeypatch.setattr(programs, "_compiled", lambda *_: pytest.fail("compiled"))
+    np.testing.assert_array_equal(again(law), first)
+    np.testing.assert_array_equal(again(ms.jenkins(2e5, 10.0).law), 2 * first)  # numbers are no part of it
+
+
+def test_what_is_damaged_is_made_again(folder: Path, law: Law) -> None:
+    first = again(law)
+    for file in folder.iterdir():
+        file.write_bytes(file.read_bytes()[:1000])
+    np.testing.assert_array_equal(again(law), first)
+    again(law)
+    assert [file.stat().st_size > 1000 for file in kept(folder)] == [True]
+
+
+def test_a_replaced_constant_or_function_makes_another_program(
+    folder: Path, law: Law, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    again(law)
+    for owner, name, value in ((jenkins, "SHARE", 3.0), (jenkins.Jenkins, "step", lambda *given: given)):
+        with monkeypatch.context() as patched:
+            patched.setattr(owner, name, value, raising=name == "step")
+            asked = programs.Program._file(patch._tangents, _asked(law))
+            assert asked is not None and not asked.exists()
+    asked = programs.Program._file(patch._tangents, _asked(law))
+    assert asked is not None and asked.exists()
+
+
+@settings
+class Strange(Law):
+    """A law of another package."""
+
+    stiffness: Any
+
+    def init(self, n: int) -> Any:
+        return jnp.zeros((2, n))
+
+    def step(self, u: Any, v: Any, dt: Any, state: Any) -> Any:
+        return self.stiffness * u, state
+
+
+def test_what_is_not_of_this_package_is_not_kept(folder: Path, law: Law) -> None:
+    assert programs.Program._file(patch._tangents, _asked(Strange(jnp.asarray(1.0)))) is None
+    double = programs.program(lambda x: 2 * x)
+    assert float(double(3.0)) == 6.0 and not kept(folder)
+
+
+def _asked(law: Law) -> tuple[Any, Any, Any]:
+    leaves, tree = programs.jax.tree_util.tree_flatten(((law, PLACES), {}))
+    return tree, tuple(map(programs._type, leaves)), ()
+
+
+@pytest.mark.slow
+def test_another_process_finds_them(tmp_path: Path) -> None:
+    """By names that do not hang on the order of sets in a process."""
+    ask = (
+        "import numpy as np, microslip as ms; s = ms.structure(1.0, 100.0, 0.1, force={0: 1.0}, output=0, "
+        "elements=[ms.jenkins(1e2, 0.5)]); print(ms.harmonic_response(s, np.linspace(1, 3, 5), harmonics=1).amplitude)"
+    )
+    said, held = [], []
+    for seed in "12":
+        environment = os.environ | {"PYTHONHASHSEED": seed, "JAX_COMPILATION_CACHE_DIR": str(tmp_path)}
+        found = subprocess.run([sys.executable, "-c", ask], env=environment, capture_output=True, text=True, check=True)
+        said.append(found.stdout)
+        held.append(kept(tmp_path))
+    assert said[0] == said[1] and held[0] == held[1] and held[0]
