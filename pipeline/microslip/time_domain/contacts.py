@@ -273,10 +273,18 @@ def rigid_answer(
         return jnp.concatenate([groups[i].over.friction.coefficient(x, jnp.nan_to_num(n)) for i, x, n in each])
 
     highest = coefficients(jnp.zeros(len(ways)))
-    f, w, missed = solve(meets, ways, lambda _: highest, pressed, first)
-    if not all(groups[i].over.friction.constant for i in spots):
-        slides = slid(w, ways)
+
+    def further(before: tuple, _: Any) -> tuple[tuple, None]:
+        """With the coefficient at rest first; then with that of its speed where a point slides by that."""
+        f, _, _, slides = before
         f, w, missed = solve(meets, ways, lambda x: jnp.where(slides, coefficients(x / dt), highest), pressed, f)
+        return (f, w, missed, slid(w, ways)), None
+
+    if all(groups[i].over.friction.constant for i in spots):
+        f, w, missed = solve(meets, ways, lambda _: highest, pressed, first)
+    else:
+        begin = first, ways, jnp.zeros(()), jnp.zeros(len(ways), bool)
+        f, w, missed, _ = jax.lax.scan(further, begin, length=2)[0]
     slipped = jnp.where(slid(w, ways)[:, None], w[:, 1:], 0.0)
     for i, force, way in zip(spots, jnp.split(f, ends), jnp.split(slipped, ends), strict=True):
         points[i], states[i] = _held(groups[i], force, way, _point(groups, i, free), dt, held.states[i])

@@ -19,7 +19,6 @@ On ground that moves, w is the motion over it.
 
 from __future__ import annotations
 
-from functools import partial
 from typing import Any, NamedTuple
 
 import jax
@@ -99,21 +98,21 @@ class Asked(NamedTuple):
         """w, (p, 3) m."""
         return self.reach - (self.M.A @ f.reshape(-1)).reshape(f.shape)
 
-    def aimed(self, f: Any, share: float) -> tuple[Any, Any]:
+    def aimed(self, f: Any, share: Any) -> tuple[Any, Any]:
         """f + r w, (p, 3) N, and coefficients of friction (p,). share: of `Meets.r` that is r."""
         w = self.motion(f)
         return f + share * self.M.r * w, self.mu(norm(w[:, 1:].T))
 
-    def projected(self, f: Any, share: float = 1.0) -> Any:
+    def projected(self, f: Any, share: Any = 1.0) -> Any:
         """(p, 3) N."""
         x, coefficient = self.aimed(f, share)
         return self.meet * within(x, self.pressed, coefficient)
 
-    def residual(self, f: Any, share: float = 1.0) -> Any:
+    def residual(self, f: Any) -> Any:
         """(p, 3) N."""
-        return self.meet * (f - self.projected(f, share))
+        return self.meet * (f - self.projected(f))
 
-    def newton(self, f: Any, share: float) -> Any:
+    def newton(self, f: Any, share: Any) -> Any:
         """(p, 3) N, a step of Newton's method further."""
         M, n = self.M, f.size
         x, coefficient = self.aimed(f, share)
@@ -121,26 +120,39 @@ class Asked(NamedTuple):
         turned = jnp.eye(n) - share * M.r.reshape(-1)[:, None] * M.A
         P = jnp.einsum("pij,pjk->pik", self.meet[:, :, None] * P, turned.reshape(*f.shape, -1))
         J = jnp.eye(n) - P.reshape(n, -1)
-        way = jnp.linalg.solve(J + 1e-12 * jnp.eye(n), self.residual(f, share).reshape(-1))
+        missed = self.meet * (f - self.meet * within(x, self.pressed, coefficient))
+        way = jnp.linalg.solve(J + 1e-12 * jnp.eye(n), missed.reshape(-1))
         return f - way.reshape(f.shape)
 
-    def until(self, enough: float, most: int, further: Any, f: Any) -> Any:
-        """Forces after as many steps as they need, or at most. further: a step. enough: a share of the largest."""
+    def off(self, f: Any, r: Any) -> Any:
+        """Share of the largest force that is missed, by a residual."""
+        return jnp.abs(r).max() / jnp.maximum(jnp.abs(f).max(), jnp.abs(self.M.r * self.reach).max())
 
-        def off(f: Any, r: Any) -> Any:
-            return jnp.abs(r).max() / jnp.maximum(jnp.abs(f).max(), jnp.abs(self.M.r * self.reach).max())
+    def found(self, f: Any) -> Any:
+        """(p, 3) N: one way after the other from where the one before left it, if that is not enough. A loop for all
+        of them: each way stands once in the program."""
+        shares = jnp.stack([jnp.ones(()), *(jnp.asarray(share) for share, _ in NEWTON), self.M.slow])
+        most = jnp.asarray([PROJECTIONS, *(steps for _, steps in NEWTON), CAREFUL])
 
         def wanted(carried: tuple) -> Any:
-            i, f, r = carried
-            return (i < most) & (off(f, r) > EXACT)
+            return carried[0] < len(most)
 
-        def one(carried: tuple) -> tuple:
-            f = further(carried[1])
-            return carried[0] + 1, f, self.residual(f)
+        def further(carried: tuple) -> tuple:
+            way, i, f, r = carried
+            curved, share = (way > 0) & (way <= len(NEWTON)), shares[way]
+            f = jax.lax.cond(curved, self.newton, self.projected, f, share)
+            finite = jnp.isfinite(f).all()
+            f = jnp.where(finite, f, 0.0)
+            r = self.residual(f)
+            off = self.off(f, r)
+            ended = ~finite | ~(off > EXACT) | (i + 1 >= most[way])
+            after = jnp.where(finite & ~(off > ENOUGH), len(most), way + 1)
+            return jnp.where(ended, after, way), jnp.where(ended, 0, i + 1), f, r
 
         f = jnp.where(jnp.isfinite(f).all(), f, 0.0)
         r = self.residual(f)
-        return jax.lax.while_loop(wanted, one, (jnp.where(off(f, r) > enough, 0, most), f, r))[1]
+        begin = jnp.where(self.off(f, r) > EXACT, 0, len(most))
+        return jax.lax.while_loop(wanted, further, (begin, jnp.zeros((), int), f, r))[2]
 
 
 def solve(M: Meets, w_0: Any, mu: Any, pressed: Any, first: Any) -> tuple[Any, Any, Any]:
@@ -152,8 +164,5 @@ def solve(M: Meets, w_0: Any, mu: Any, pressed: Any, first: Any) -> tuple[Any, A
     """
     meets = jnp.isfinite(w_0[:, :1]) * jnp.ones(3)
     asked = Asked(M, jnp.where(jnp.isfinite(w_0), w_0, 0.0), meets, mu, pressed)
-    f = asked.until(EXACT, PROJECTIONS, asked.projected, meets * first)
-    for share, most in NEWTON:
-        f = asked.until(ENOUGH, most, partial(asked.newton, share=share), f)
-    f = asked.until(ENOUGH, CAREFUL, partial(asked.projected, share=M.slow), f)
+    f = asked.found(meets * first)
     return f, asked.motion(f), jnp.abs(ratio(asked.residual(f), M.r)).max(initial=0.0)
