@@ -21,6 +21,7 @@ SMALL_LOOPS = "--xla_backend_extra_options=xla_cpu_small_while_loop_byte_thresho
 
 log = logging.getLogger("microslip")
 _done: list[str] = []
+_kept: list[Path] = []
 
 
 def prepare(*, double: bool = True, compiler: bool = True, cache: bool = True) -> tuple[str, ...]:
@@ -84,12 +85,13 @@ def keep_compiled() -> Path | None:
         if name.upper() not in os.environ:
             _told(name, value)
     warnings.filterwarnings("ignore", "Error (reading|writing) persistent compilation cache")
+    _kept.append(folder)
     return folder
 
 
 def kept_in() -> Path | None:
-    """The folder of compiled programs, if there is one."""
-    return Path(folder) if (folder := _known("jax_compilation_cache_dir")) else None
+    """The folder of compiled programs, None if none are kept."""
+    return _kept[-1] if _kept else None
 
 
 def _folder() -> Path | None:
