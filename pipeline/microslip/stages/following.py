@@ -26,6 +26,7 @@ from ..errors import UserError
 from ..files import store
 from ..files.store import ordinary
 from ..files.tables import rows_csv
+from ..harmonic_balance.growing import verdict
 from ..harmonic_balance.nonlinear_modes import REACHED
 from ..harmonic_balance.readout import measured
 from ..harmonic_balance.response import NOT_FOUND
@@ -336,6 +337,8 @@ def remarks_on_optimum(found: Optimum, over: str, case: Case, report: Report = l
         e = headline.estimated(built, found.problem, best.x, best.Omega)
     at = f"{best.Omega / (2 * np.pi):.6g} Hz under {over} = {found.parameter:.6g}{unit_of(over)}"
     said = headline.said_of(built.settings, f"The amplitude at {at}", e)
+    if found.problem is not None and best.status == CONVERGED:
+        said += verdict(found.problem, best.x, best.Omega, f"The motion at {at}")
     forces = known if over == NORMAL_FORCE else [n for n in normal_forces(built) if n is not None]
     largest = max(one.amplitude for one in known.values())
     return _told_of(said, headline.doubted(built, largest, max(forces, default=None)), report)

@@ -14,10 +14,7 @@ import jax
 import numpy as np
 import scipy.linalg
 
-from ..contact.friction import StaticSliding
-from ..contact.law import Law
-from ..contact.point import PointContact
-from ..contact.portion import Portion
+from ..contact.point import saws
 from ..contact.set_valued import SetValued
 from ..data import Array
 from ..errors import NotConverged, UserError
@@ -555,7 +552,7 @@ def _warnings(equations: Equations, kept: Kept, worst: float) -> tuple[str, ...]
             f"{equations.Omega / (2 * np.pi):.6g} Hz stand for them, and take h times as much in the h-th harmonic, "
             "where a harmonic balance does not; with modal damping both mean the same."
         )
-    if names := [c.name for c in equations.contacts if _saws(c.patch.law)]:
+    if names := [c.name for c in equations.contacts if saws(c.patch.law)]:
         said.append(
             f"Static friction above the sliding one ({', '.join(names)}): a point without mass sticks again as soon as "
             "it has slipped, so sliding friction saws between both values, with teeth that hang on the step; "
@@ -566,13 +563,6 @@ def _warnings(equations: Equations, kept: Kept, worst: float) -> tuple[str, ...]
     if kept.missed:
         said.append(f"{counted(kept.missed, 'event')} more than are listed, and counted, happened.")
     return tuple(said)
-
-
-def _saws(law: Law) -> bool:
-    """Whether its points slip at once, and to less than they stuck by."""
-    law = law.whole if isinstance(law, Portion) else law
-    friction = law.friction if isinstance(law, PointContact) else None
-    return isinstance(friction, StaticSliding) and bool(np.any(np.asarray(friction.static) > friction.sliding))
 
 
 @dataclass(frozen=True)
