@@ -27,6 +27,7 @@ from .settings.arguments import Count, Frequencies, Index, Rows, Text, Vector, c
 from .settings.mistakes import bounded, numbered, too_few
 from .settings.numbers import Number, Positive
 from .system.assembly import Assembly
+from .units import hertz
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
@@ -121,12 +122,12 @@ def _warn(call: str, said: Sequence[str]) -> None:
         warnings.warn(f"{call}: {one}", stacklevel=4)
 
 
-def _highest(problem: Problem, points: Sequence[Point], unit: Unit) -> list[str]:
+def _highest(problem: Problem, points: Sequence[Point]) -> list[str]:
     """Whether the largest motion is stable, where the linear part feeds motions."""
     if not (good := [p for p in points if p.converged]):
         return []
     top = max(good, key=lambda p: float(np.abs(p.x).max(initial=0.0)))
-    at = f"the largest motion, at {top.Omega / (2 * np.pi * HERTZ[unit]):.6g} {unit},"
+    at = f"the largest motion, at {hertz(top.Omega / (2 * np.pi))},"
     return verdict(problem, top.x, top.Omega, at)
 
 
@@ -162,7 +163,7 @@ def harmonic_response(
     problem = _driven(balanced(system, harmonics, samples))
     asked = np.atleast_1d(np.asarray(frequency, dtype=float)) * HERTZ[unit]
     points, hertz = sweep(problem, asked, report), HERTZ[unit]
-    _warn("harmonic_response", [*fed(problem.assembly, unit), *_highest(problem, points, unit)])
+    _warn("harmonic_response", [*fed(problem.assembly), *_highest(problem, points)])
     known = {} if hertz == 1 else {"parameter": asked / hertz}
     return Motions("response", points, lambda _: problem, over=_over("frequency", unit), known=known)
 
@@ -219,7 +220,7 @@ def two_tones(
     except ValueError:
         raise UserError(f"second: {len(two)} frequencies and {len(one)} first ones; give as many, or one") from None
     _check_tones(assembly, one, two, free)
-    _warn("two_tones", fed(assembly, unit)[len(growing(assembly, unit)) if free else 0 :])
+    _warn("two_tones", fed(assembly)[len(growing(assembly)) if free else 0 :])
     b = two_tone.of(assembly, float(one[0]), float(two[0]), harmonics, samples, turns, free=free)
     begin = None
     if free:
@@ -307,7 +308,7 @@ def follow(
     found = families.from_both_ends(family, report, settings)
     family = replace(family, unit=family.unit * hertz, words=unit) if over == "frequency" else family
     points = [p for one in found for p in one.points]
-    _warn("follow", fed(problem.assembly, unit))
+    _warn("follow", fed(problem.assembly))
     known = {
         "parameter": np.array([p.lam for p in points]) / family.unit,
         "fold": np.array([p.kind == "fold" for p in points], dtype=float),

@@ -14,6 +14,7 @@ from ..contact.point import saws
 from ..data import Array
 from ..errors import UserError
 from ..system.assembly import Assembly, Linear
+from ..units import hertz
 from .problem import Problem
 from .stability import Settings, orbit, stability
 
@@ -22,13 +23,9 @@ NEUTRAL = 1e-9
 at zero, rigid motions, are known to the square root of rounding: those below 1e-6 of the largest count as none."""
 
 
-def growing(assembly: Assembly, unit: str = "Hz") -> list[str]:
+def growing(assembly: Assembly) -> list[str]:
     """A sentence on the free motion that grows fastest, with open or sliding contacts that hold nothing and with
-    sticking ones; nothing where damping is nowhere negative and stiffness symmetric (Hermitian in a wave).
-
-    Args:
-        unit: "Hz" or "rad/s".
-    """
+    sticking ones; nothing where damping is nowhere negative and stiffness symmetric (Hermitian in a wave)."""
     waves = [m.at(assembly.index(1)) for m in assembly.components]
     fed = any(_feeds(at.matrices[2], at.matrices[1] + at.circulatory) for at in waves)
     fed = fed or any(_feeds(f.C, f.K) for f in assembly.flow)
@@ -42,8 +39,7 @@ def growing(assembly: Assembly, unit: str = "Hz") -> list[str]:
     said = []
     for when, K in kinds:
         if (root := _fastest(part, K)) is not None:
-            at = f"{abs(root.imag) / (1.0 if unit == 'rad/s' else 2 * np.pi):.5g} {unit}"
-            said.append(f"{when} the motion at {at} grows by exp({root.real:.3g} t/s)")
+            said.append(f"{when} the motion at {hertz(abs(root.imag) / (2 * np.pi))} grows by exp({root.real:.3g} t/s)")
     if not said:
         return []
     return [f"{' and '.join([said[0], *(s[0].lower() + s[1:] for s in said[1:])])}: its damping is negative, or "
@@ -70,10 +66,10 @@ def _fastest(part: Linear, K: Array) -> complex | None:
     return complex(max(roots[grow], key=lambda s: s.real)) if grow.any() else None
 
 
-def fed(assembly: Assembly, unit: str = "Hz") -> list[str]:
+def fed(assembly: Assembly) -> list[str]:
     """`growing`, and what static friction above the sliding one does between two samples."""
     names = [c.name for c in assembly.contacts if saws(c.patch.law)]
-    return growing(assembly, unit) + [
+    return growing(assembly) + [
         f"Static friction above the sliding one ({name}): a point without mass sticks again as soon as it has slipped, "
         "so sliding friction saws between both values and the answer hangs on samples; write law = \"rate\", or "
         "friction that falls with the speed."

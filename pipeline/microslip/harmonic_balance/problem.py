@@ -22,6 +22,7 @@ from ..errors import UserError
 from ..process import prepare
 from ..settings.mistakes import bounded
 from ..system.assembly import Assembly, Linear, stuck_modes
+from ..units import hertz
 from . import blocks, by_hand, reduced
 from .blocks import Matrix
 from .forces import AFT, Forces
@@ -420,7 +421,7 @@ class AtFrequency:
             return (
                 f"no balance: a body {AWAY}: nothing balances the steady forces on it; give it weak_springs or a spring"
             )
-        return f"resonance: nothing limits a motion at {h * f:.6g} Hz; give its mode some damping"
+        return f"resonance: nothing limits a motion at {hertz(h * f)}; give its mode some damping"
 
     @cached_property
     def rounding(self) -> tuple[float, float]:

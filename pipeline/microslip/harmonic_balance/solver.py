@@ -15,6 +15,7 @@ from ..data import Array
 from ..errors import NotConverged, UserError
 from ..interrupts import look
 from ..settings.mistakes import bounded
+from ..units import hertz
 from . import pseudo_transient
 from .forces import AFT
 from .problem import AWAY, NO_NUMBER, AtFrequency, Problem, Tried
@@ -387,7 +388,7 @@ def sweep(
             done.append(known[float(f)])
             continue
         failed = sum(not p.converged for p in done)
-        told = f"{i + 1} of {len(frequency)} frequencies: {f:.6g} Hz" + (f", {failed} not converged" if failed else "")
+        told = f"{i + 1} of {len(frequency)} frequencies: {hertz(f)}" + (f", {failed} not converged" if failed else "")
         report(told)
         good = _behind(done)
         starts = [] if start is None or done else [start]
@@ -404,7 +405,7 @@ def sweep(
             report(said)
     for i in range(len(done) - 2, -1, -1):  # from the other side, along which there may be a way
         if not done[i].converged and not done[i].away and done[i + 1].converged:
-            report(f"{i + 1} of {len(frequency)} frequencies: {frequency[i]:.6g} Hz once more, from above")
+            report(f"{i + 1} of {len(frequency)} frequencies: {hertz(frequency[i])} once more, from above")
             done[i] = _walked(problem, done[i + 1], done[i])
             keep(done[i])
     return done

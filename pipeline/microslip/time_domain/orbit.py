@@ -22,7 +22,7 @@ from ..files.hdf5 import put, sealed
 from ..interrupts import look
 from ..settings.mistakes import bounded, numbered
 from ..system.assembly import Contact
-from ..units import METRES, Quantity, counted
+from ..units import METRES, UNIT_OF_FREQUENCY, Quantity, counted, hertz
 from . import classification
 from . import samples as kept_samples
 from .bodies import Hardest, Now, Seen
@@ -97,6 +97,7 @@ class Orbit:
             end, 1 at most; nan if it was not looked for. diverged: time (s) at which numbers became infinite;
             inf: never.
         exponent: the largest Lyapunov exponent, looked for where the motion does not come back; None: it was not.
+        shown: unit of frequencies in sentences.
     """
 
     equations: Equations
@@ -117,6 +118,7 @@ class Orbit:
     diverged: float = math.inf
     exponent: Exponent | None = None
     messages: tuple[str, ...] = field(default=())
+    shown: str = field(default_factory=UNIT_OF_FREQUENCY.get)
 
     def __repr__(self) -> str:
         w = self.Omega
@@ -257,8 +259,8 @@ class Orbit:
             if len(y) and (high := float(np.abs(y[0]).max())) > top:
                 top, at = high, float(w[np.abs(y[0]).argmax()]) / (2 * np.pi)
         way = "up" if last > first else "down"
-        said = f"run-{way} from {first / 2 / np.pi:.6g} to {last / 2 / np.pi:.6g} Hz"
-        return f"{said}, largest at {at:.6g} Hz" if self.labels else said
+        said = f"run-{way} from {hertz(first / 2 / np.pi, self.shown)} to {hertz(last / 2 / np.pi, self.shown)}"
+        return f"{said}, largest at {hertz(at, self.shown)}" if self.labels else said
 
     @property
     def drift(self) -> float:
@@ -549,7 +551,7 @@ def _warnings(equations: Equations, kept: Kept, worst: float) -> tuple[str, ...]
     if any(H.any() for c in equations.assembly.components for H in c.loss.values()):
         said.append(
             f"Loss factors (structural damping) have no form in time: dampers that take as much at "
-            f"{equations.Omega / (2 * np.pi):.6g} Hz stand for them, and take h times as much in the h-th harmonic, "
+            f"{hertz(equations.Omega / (2 * np.pi))} stand for them, and take h times as much in the h-th harmonic, "
             "where a harmonic balance does not; with modal damping both mean the same."
         )
     if names := [c.name for c in equations.contacts if saws(c.patch.law)]:
