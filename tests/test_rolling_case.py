@@ -14,6 +14,7 @@ from scipy.optimize import brentq
 
 import microslip as ms
 from microslip.cli import main
+from microslip.errors import UserError
 from microslip.contact.friction import Coulomb
 from microslip.contact.heights import Polynomial
 from microslip.contact.law import value
@@ -302,3 +303,12 @@ def test_what_yields_behind_a_patch_is_counted_once(
     assert "larger than the face" in capsys.readouterr().err
     assert main(["roll", "case.toml", *sets, "--set", "rail.young=1e11", "-q"]) == 2
     assert "rail.young" in capsys.readouterr().err
+
+
+def test_keys_of_the_other_kind_of_profile_are_refused() -> None:
+    """A mirror, noise or a range of a formula, and a width of a file, would do nothing."""
+    for change in ('wheel.mirror="y"', "rail.noise=1e-5", "wheel.between=[-0.01, 0.01]"):
+        with pytest.raises(UserError, match=change.split("=")[0].replace(".", r"[.: ]+")):
+            load_rolling(CASE, ["wheel.profile=-0.5", "rail.profile=0.3", change])
+    with pytest.raises(UserError, match="width"):
+        load_rolling(CASE, ['wheel.profile="S1002.prw"', "wheel.width=0.05"])

@@ -307,6 +307,10 @@ def optimum_over(
         raise UserError(f"{over}:{given} give --low and --high, two {kind}, the first one smaller")
     if over == NORMAL_FORCE and not forces:
         raise UserError(f"{case.path}: no contact is pressed by the sweep's normal forces; there is nothing to change")
+    if over != NORMAL_FORCE:  # what is wrong with the key, or at an end, is said before anything is computed
+        _check_key(over, case)
+        for value in (low, high):
+            case.with_(over, value)
     between = float(np.sqrt(low * high)) if over == NORMAL_FORCE else forces[-1] if forces else None
     length = problem_of(built, between).length
 
@@ -323,6 +327,17 @@ def optimum_over(
 
     values = np.linspace(low, high, points) if signed else np.geomspace(low, high, points)
     return optimum(make, [float(v) for v in values], band, report=report, keep=keep)
+
+
+def _check_key(over: str, case: Case) -> None:
+    """Refuse a key of contacts that names none of them."""
+    whose, _, key = over.partition(".")
+    if whose == "contacts" and key in OF_CONTACTS:
+        names = ", ".join(c.interface for c in case.plain.settings.contacts)
+        raise UserError(
+            f"{case.path}: --over {over}: names no contact; write --over {key} for all of them, or contacts.NAME.{key} "
+            f"with NAME of {names}"
+        )
 
 
 def remarks_on_optimum(found: Optimum, over: str, case: Case, report: Report = lambda _: None) -> list[str]:
