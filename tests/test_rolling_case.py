@@ -14,11 +14,12 @@ from scipy.optimize import brentq
 
 import microslip as ms
 from microslip.cli import main
-from microslip.errors import UserError
 from microslip.contact.friction import Coulomb
 from microslip.contact.heights import Polynomial
 from microslip.contact.law import value
 from microslip.contact.solids import Solid
+from microslip.errors import UserError
+from microslip.pictures.rolling import stretched
 from microslip.rolling.behind import even
 from microslip.rolling.laws import Surface
 from microslip.rolling.rolled import COLD
@@ -312,3 +313,9 @@ def test_keys_of_the_other_kind_of_profile_are_refused() -> None:
             load_rolling(CASE, ["wheel.profile=-0.5", "rail.profile=0.3", change])
     with pytest.raises(UserError, match="width"):
         load_rolling(CASE, ['wheel.profile="S1002.prw"', "wheel.width=0.05"])
+
+
+def test_narrow_patches_are_drawn_with_room_for_their_numbers() -> None:
+    """A flange's patch, seventeen times as long as wide, is drawn three times as long; a usual one as it is."""
+    for size, drawn in (((17.0, 1.0), 1 / 3), ((1.0, 17.0), 3.0), ((1.0, 2.0), 2.0), ((2.0, 1.0), 0.5)):
+        assert stretched(np.array(size)) * size[1] / size[0] == pytest.approx(drawn)

@@ -98,9 +98,9 @@ def init(name: str = "", folder: Path | None = None, /) -> None:
     """Copy a runnable body (and its case) to start from.
 
     Args:
-        name: a body (blade, shroud, pin, ...; all are listed if none is given); `own` for a commented body.toml around your
-            own CAD file or mesh; `three-masses` for a system by hand; `sample` for a modal file with a case; `contact`
-            for contact laws.
+        name: a body (blade, shroud, pin, ...; all are listed if none is given); `own` for a commented body.toml
+            around your own CAD file or mesh; `three-masses` for a system by hand; `sample` for a modal file with a
+            case; `contact` for contact laws.
         folder: where to; ./NAME if not given.
     """
     known = sorted(p.name for p in _bodies().iterdir() if (p / "body.toml").is_file())
