@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import math
 import re
+import warnings
 
 import jax.numpy as jnp
 import numpy as np
@@ -278,3 +279,18 @@ def test_numbers_of_numpy_are_numbers():
     found = ms.harmonic_response(one, np.float64(0.05), harmonics=np.int64(1))
     exact = 1 / abs(1 - (0.1 * np.pi) ** 2 + 0.25j * 0.1 * np.pi)
     np.testing.assert_allclose(found.amplitude, exact, rtol=1e-6)
+
+
+def test_sentences_speak_in_the_unit_that_is_asked_for() -> None:
+    """Reports, causes of failure and results: those of a call in rad/s hold no Hz, those of the next one do."""
+    undamped = ms.structure(1.0, 1.0, force={0: 0.3})
+    pushed = ms.structure(1.0, 1.0, -0.01, force={0: 0.3}, second_force={0: 0.1}, elements=[ms.polynomial({3: 0.1})])
+    said: list[str] = []
+    with warnings.catch_warnings(record=True) as warned:
+        warnings.simplefilter("always")
+        said += ms.harmonic_response(undamped, [1.0], unit="rad/s", report=said.append).status
+        said += [repr(ms.two_tones(pushed, 0.3, 0.17, harmonics=2, unit="rad/s", report=said.append))]
+        rising = ms.run_up(undamped, 0.3, 0.6, 60.0, unit="rad/s", samples=32)
+        said += [rising.run_up, *(str(w.message) for w in warned)]
+    assert len([one for one in said if "rad/s" in one]) >= 5 and not [one for one in said if "Hz" in one]
+    assert "0.0477465 Hz" in ms.run_up(undamped, 0.3 / (2 * np.pi), 0.5, 5.0, samples=32).run_up

@@ -157,6 +157,14 @@ def test_set_overrides_and_output_goes_where_it_is_told(folder: Path, capsys: py
     assert read_basis(folder / "two.h5").groups[0, 0].n_modes == 2
 
 
+def test_init_without_a_name_lists_what_can_be_had(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """The names of the list that a wrong name is answered with; nothing is written."""
+    assert main(["init"]) == 0
+    listed = said(capsys)[0].split(": ")[1].strip()
+    assert main(["init", "blad"]) == 2 and listed in said(capsys)[1] and "blade, " in listed
+    assert not any(p.name == "blade" for p in folder.iterdir())
+
+
 def test_init_copies_a_runnable_body_and_overwrites_nothing(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     for name in ("blade", "shroud", "pendulum", "half-pipe"):
         assert main(["init", name]) == 0

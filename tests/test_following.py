@@ -107,6 +107,21 @@ def test_stability_of_one_point(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
     assert len(rows) >= 3 and all(r["stable"] == "1" and 0 < float(r["growth"]) <= 1 for r in rows)
 
 
+@pytest.mark.parametrize(
+    ("over", "high", "words"),
+    [("contacts.friction", 0.5, "--over friction"), ("contacts.0.fricton", 0.5, "unknown"), ("friction", 9.0, "5")],
+)
+def test_what_is_wrong_with_an_optimum_is_said_before_a_sweep(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, over: str, high: float, words: str
+) -> None:
+    """A key of no contact, one that is misspelled, and a value that is wrong at the far end alone."""
+    one_point(tmp_path, monkeypatch, points=3)
+    case, told = cli._followed(Path("case.toml"), None, ()), list[str]()
+    with pytest.raises(UserError, match=f"case.toml: .*{words}"):
+        following.optimum_over(case, over, 0.1, high, report=told.append)
+    assert not told
+
+
 @pytest.mark.slow
 def test_optimum_over_the_normal_force(capsys: pytest.CaptureFixture[str]) -> None:
     """Lower than at both neighbours, which are solved for themselves by another way: the sweep's refined peaks."""
@@ -304,7 +319,9 @@ def test_an_angle_is_followed_through_nothing(monkeypatch: pytest.MonkeyPatch) -
     asked = []
     monkeypatch.setattr(peak, "optimum", lambda make, values, *_, **__: asked.append(values))
     case = cli._followed(Path("case.toml"), None, ())
-    following.optimum_over(case, "bodies.sled.turn", -4.0, 4.0, 5)
+    with monkeypatch.context() as turned:  # a case of one body has no key of the kind
+        turned.setattr(following.Case, "with_", lambda *_: None)
+        following.optimum_over(case, "bodies.sled.turn", -4.0, 4.0, 5)
     following.optimum_over(case, "friction", 0.1, 0.4, 3)
     np.testing.assert_allclose(asked[0], [-4, -2, 0, 2, 4])
     np.testing.assert_allclose(asked[1], [0.1, 0.2, 0.4])

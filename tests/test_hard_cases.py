@@ -7,12 +7,14 @@ and fold the curve for themselves, two stable motions at one frequency, hardenin
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 
 import jax.numpy as jnp
 import numpy as np
 import pytest
 from test_harmonic_balance_time import beam_in_space, cantilever, duffing, group, held
 
+import microslip as ms
 from microslip.contact.friction import Coulomb
 from microslip.contact.normal import Penalty
 from microslip.contact.point import PointContact
@@ -80,3 +82,31 @@ def apart(problem: Problem, one: Branch, other: Branch) -> float:
         share = np.clip(((point - z[:-1]) * legs).sum(axis=1) / size, 0, 1)[:, None]
         found = max(found, float(np.linalg.norm(z[:-1] + share * legs - point, axis=1).min()))
     return found
+
+
+@pytest.mark.parametrize("stiffness", [1e12, 1e15])
+def test_stiff_contacts_are_rigid_links(stiffness: float) -> None:
+    """Two masses whose second one a stiff spring, or a stop that a steady force keeps closed, holds, or which it joins,
+    move as one mass does to the digits that rounding leaves; they are called solved."""
+    K = np.array([[2.0, -1.0], [-1.0, 2.0]])
+    whole = partial(ms.structure, np.eye(2), K, 0.02 * K, output=0)
+    W = np.array([0.7, 1.2])
+    alone = 0.3 / abs(2.0 - W**2 + 0.04j * W)
+    joined = 0.3 / abs(2.0 - 2 * W**2 + 0.04j * W)
+    for element, steady, expected in (
+        (ms.polynomial({1: stiffness}, 1), 0.0, alone),
+        (ms.stop(stiffness, -0.1, 1), 5.0, alone),
+        (ms.polynomial({1: stiffness}, 0, 1), 0.0, joined),
+        (ms.jenkins(stiffness, 1.0, 0, 1), 0.0, joined),
+    ):
+        made = whole(force={0: 0.3}, steady={1: steady}, elements=[element])
+        found = ms.harmonic_response(made, W, unit="rad/s")
+        assert found.converged.all(), found.status
+        np.testing.assert_allclose(found.amplitude, expected, rtol=3e-4)
+
+
+def test_why_a_hard_stop_has_no_solution_names_what_a_person_can_set() -> None:
+    found = ms.harmonic_response(
+        ms.structure(1.0, 1.0, 0.02, force={0: 0.3}, elements=[ms.stop(1e15, 0.1)]), [1.0], unit="rad/s"
+    )
+    assert not found.converged.any() and "samples" in found.status[0] and "points" not in found.status[0]

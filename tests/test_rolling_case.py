@@ -18,6 +18,8 @@ from microslip.contact.friction import Coulomb
 from microslip.contact.heights import Polynomial
 from microslip.contact.law import value
 from microslip.contact.solids import Solid
+from microslip.errors import UserError
+from microslip.pictures.rolling import stretched
 from microslip.rolling.behind import even
 from microslip.rolling.laws import Surface
 from microslip.rolling.rolled import COLD
@@ -302,3 +304,18 @@ def test_what_yields_behind_a_patch_is_counted_once(
     assert "larger than the face" in capsys.readouterr().err
     assert main(["roll", "case.toml", *sets, "--set", "rail.young=1e11", "-q"]) == 2
     assert "rail.young" in capsys.readouterr().err
+
+
+def test_keys_of_the_other_kind_of_profile_are_refused() -> None:
+    """A mirror, noise or a range of a formula, and a width of a file, would do nothing."""
+    for change in ('wheel.mirror="y"', "rail.noise=1e-5", "wheel.between=[-0.01, 0.01]"):
+        with pytest.raises(UserError, match=change.split("=")[0].replace(".", r"[.: ]+")):
+            load_rolling(CASE, ["wheel.profile=-0.5", "rail.profile=0.3", change])
+    with pytest.raises(UserError, match="width"):
+        load_rolling(CASE, ['wheel.profile="S1002.prw"', "wheel.width=0.05"])
+
+
+def test_narrow_patches_are_drawn_with_room_for_their_numbers() -> None:
+    """A flange's patch, seventeen times as long as wide, is drawn three times as long; a usual one as it is."""
+    for size, drawn in (((17.0, 1.0), 1 / 3), ((1.0, 17.0), 3.0), ((1.0, 2.0), 2.0), ((2.0, 1.0), 0.5)):
+        assert stretched(np.array(size)) * size[1] / size[0] == pytest.approx(drawn)

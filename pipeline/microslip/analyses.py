@@ -18,14 +18,16 @@ from .continuation import Settings
 from .errors import UserError
 from .harmonic_balance import families, nonlinear_modes
 from .harmonic_balance import problem as balance
+from .harmonic_balance.growing import fed, growing, verdict
 from .harmonic_balance.nonlinear_modes import Backbone
 from .harmonic_balance.problem import Problem
 from .harmonic_balance.solved import Motions
-from .harmonic_balance.solver import sweep
+from .harmonic_balance.solver import Point, sweep
 from .settings.arguments import Count, Frequencies, Index, Rows, Text, Vector, checked
 from .settings.mistakes import bounded, numbered, too_few
 from .settings.numbers import Number, Positive
 from .system.assembly import Assembly
+from .units import hertz
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
@@ -114,6 +116,21 @@ def _driven(problem: Problem) -> Problem:
     return problem
 
 
+def _warn(call: str, said: Sequence[str]) -> None:
+    """Warn who called the function of that name."""
+    for one in said:
+        warnings.warn(f"{call}: {one}", stacklevel=4)
+
+
+def _highest(problem: Problem, points: Sequence[Point]) -> list[str]:
+    """Whether the largest motion is stable, where the linear part feeds motions."""
+    if not (good := [p for p in points if p.converged]):
+        return []
+    top = max(good, key=lambda p: float(np.abs(p.x).max(initial=0.0)))
+    at = f"the largest motion, at {hertz(top.Omega / (2 * np.pi))},"
+    return verdict(problem, top.x, top.Omega, at)
+
+
 @checked
 def harmonic_response(
     system: System, frequency: Frequencies, *, harmonics: Count | None = None, samples: Count | None = None,
@@ -131,7 +148,8 @@ def harmonic_response(
 
     Returns:
         A `Motions`: ``plot()``, ``to_dataframe()``, ``to_xarray()``, ``save(path)``. A point that was not found is
-        there with its cause in ``status``.
+        there with its cause in ``status``. Python warns where damping is negative, and says then whether the largest
+        motion is stable, and of friction that hangs on the samples.
 
     Raises:
         UserError: no frequency, or one that is not positive.
@@ -145,6 +163,7 @@ def harmonic_response(
     problem = _driven(balanced(system, harmonics, samples))
     asked = np.atleast_1d(np.asarray(frequency, dtype=float)) * HERTZ[unit]
     points, hertz = sweep(problem, asked, report), HERTZ[unit]
+    _warn("harmonic_response", [*fed(problem.assembly), *_highest(problem, points)])
     known = {} if hertz == 1 else {"parameter": asked / hertz}
     return Motions("response", points, lambda _: problem, over=_over("frequency", unit), known=known)
 
@@ -201,6 +220,7 @@ def two_tones(
     except ValueError:
         raise UserError(f"second: {len(two)} frequencies and {len(one)} first ones; give as many, or one") from None
     _check_tones(assembly, one, two, free)
+    _warn("two_tones", fed(assembly)[len(growing(assembly)) if free else 0 :])
     b = two_tone.of(assembly, float(one[0]), float(two[0]), harmonics, samples, turns, free=free)
     begin = None
     if free:
@@ -288,6 +308,7 @@ def follow(
     found = families.from_both_ends(family, report, settings)
     family = replace(family, unit=family.unit * hertz, words=unit) if over == "frequency" else family
     points = [p for one in found for p in one.points]
+    _warn("follow", fed(problem.assembly))
     known = {
         "parameter": np.array([p.lam for p in points]) / family.unit,
         "fold": np.array([p.kind == "fold" for p in points], dtype=float),
@@ -337,6 +358,7 @@ def backbone(
     _bends(problem, "the eigenvalues of its matrices")
     if not high > low:
         raise UserError(f"high: {high:g} is not above low, {low:g}; give the smaller amplitude first")
+    _warn("backbone", fed(problem.assembly))
     return nonlinear_modes.backbone(problem, low, high, mode, output, report=report)
 
 
@@ -633,6 +655,5 @@ def mistune(
     found = ensemble.run(asked, samples, until, workers, executor=executor, report=report)
     if rare:
         found.rare = ensemble.choose(found, rare, workers, executor=executor, report=report)
-    for said in found.unsure:
-        warnings.warn(f"mistune: {said}", stacklevel=2)
+    _warn("mistune", [*fed(system), *found.unsure])
     return found

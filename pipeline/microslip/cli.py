@@ -94,17 +94,20 @@ def _cases() -> Path:
 
 
 @app.command
-def init(name: str, folder: Path | None = None, /) -> None:
+def init(name: str = "", folder: Path | None = None, /) -> None:
     """Copy a runnable body (and its case) to start from.
 
     Args:
-        name: a body (blade, shroud, pin, ...; a wrong name lists them); `own` for a commented body.toml around your
-            own CAD file or mesh; `three-masses` for a system by hand; `sample` for a modal file with a case; `contact`
-            for contact laws.
+        name: a body (blade, shroud, pin, ...; all are listed if none is given); `own` for a commented body.toml
+            around your own CAD file or mesh; `three-masses` for a system by hand; `sample` for a modal file with a
+            case; `contact` for contact laws.
         folder: where to; ./NAME if not given.
     """
     known = sorted(p.name for p in _bodies().iterdir() if (p / "body.toml").is_file())
     more = [*_MADE, "own"]
+    if not name:
+        print(f"What can be had, by microslip init NAME [FOLDER]: {', '.join([*known, *more])}")
+        return
     if name not in [*known, *more]:
         raise UserError(f"init {name}: there is no such body; choose one of {', '.join([*known, *more])}")
     target = folder or Path(name)

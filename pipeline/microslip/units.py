@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
@@ -50,6 +52,26 @@ def from_rpm(rpm: Speed) -> Speed:
 def rpm_text(speed: float) -> str:
     """An angular speed (rad/s) for people: "4500 rpm"."""
     return f"{to_rpm(speed):.6g} rpm"
+
+
+UNIT_OF_FREQUENCY: ContextVar[str] = ContextVar("unit of frequencies", default="Hz")
+"""In which sentences give frequencies: that which a public function was asked for, "Hz" or "rad/s"."""
+
+
+@contextmanager
+def frequencies_in(unit: Any) -> Iterator[None]:
+    """Sentences give frequencies in this unit, in the one as before if it is none."""
+    before = UNIT_OF_FREQUENCY.set(unit if unit in ("Hz", "rad/s") else UNIT_OF_FREQUENCY.get())
+    try:
+        yield
+    finally:
+        UNIT_OF_FREQUENCY.reset(before)
+
+
+def hertz(frequency: float, unit: str = "") -> str:
+    """A frequency (Hz) for people, "80 Hz" or "503 rad/s". unit: `UNIT_OF_FREQUENCY` if empty."""
+    unit = unit or UNIT_OF_FREQUENCY.get()
+    return f"{frequency * (2 * math.pi if unit == 'rad/s' else 1.0):.6g} {unit}"
 
 
 def counted(number: int, thing: str) -> str:

@@ -20,6 +20,7 @@ from ..harmonic_balance.accuracy import Error
 from ..harmonic_balance.checkpoint import labels, points_of_curve, resumed_curve
 from ..harmonic_balance.envelope import largest
 from ..harmonic_balance.families import Family
+from ..harmonic_balance.growing import verdict
 from ..harmonic_balance.problem import Problem
 from ..harmonic_balance.readout import measured
 from ..results import Journal
@@ -242,11 +243,14 @@ def highest(found: Sequence[Followed]) -> tuple[Followed, int] | None:
     return max(tops, key=lambda top: float(top[0].amplitude[top[1]]), default=None)
 
 
-def error_of(built: Built, one: Followed, i: int) -> Error | None:
-    """Estimated error of the amplitude at a point of a curve, see `headline.estimated`."""
+def error_of(built: Built, one: Followed, i: int) -> tuple[Error | None, list[str]]:
+    """Of a point of a curve the estimated error of its amplitude, see `headline.estimated`, and whether it is stable
+    where the linear part feeds motions."""
     family, row = _family(built, problem_of(built, _begun_under(built, one)), one), one.rows[i]
     at = float(row["parameter"]) * family.unit
-    return headline.estimated(built, family.problem(at), row["x"], family.Omega(at))
+    problem, Omega = family.problem(at), family.Omega(at)
+    said = verdict(problem, row["x"], Omega, f"{one.label}: the highest motion, at {Omega / (2 * np.pi):.6g} Hz,")
+    return headline.estimated(built, problem, row["x"], Omega), said
 
 
 def _begun_under(built: Built, one: Followed) -> float | None:

@@ -13,6 +13,7 @@ from ..contact.study import moduli_doubted
 from ..data import Array, ModalGroup
 from ..harmonic_balance import accuracy
 from ..harmonic_balance.accuracy import Error
+from ..harmonic_balance.growing import fed, growing
 from ..harmonic_balance.problem import Problem
 from ..harmonic_balance.readout import measured
 from ..modal.stress import outside, von_mises
@@ -28,15 +29,18 @@ TRUNCATION = 0.01
 # numbers in a wrong unit -----------------------------------------------------------------------------------------
 
 
-def doubted(built: Built, largest: float, normal: float | None = None, stress: float = 0.0) -> list[str]:
-    """What looks like a number in a wrong unit: an amplitude, a stress, the pressure of contacts, and loads by
-    themselves, which may be far from any resonance.
+def doubted(
+    built: Built, largest: float, normal: float | None = None, stress: float = 0.0, in_time: bool = False
+) -> list[str]:
+    """What grows by itself, and what looks like a number in a wrong unit: an amplitude, a stress, the pressure of
+    contacts, and loads by themselves, which may be far from any resonance.
 
     Args:
         largest: amplitude of the first read-out, in its unit. normal: N, the largest that presses the contacts of the
-            sweep. stress: Pa, the largest amplitude in the body that is read. Zero or NaN: not known.
+            sweep. stress: Pa, the largest amplitude in the body that is read. Zero or NaN: not known. in_time: a motion
+            in time, which tells itself what friction does between two steps.
     """
-    said = []
+    said = (growing if in_time else fed)(built.pressed(normal))
     if built.assembly.outputs:
         read = built.assembly.outputs[0]
         body, unit = built.bodies[read.component], measured(built.assembly).unit

@@ -17,6 +17,7 @@ from ..harmonic_balance.accuracy import FLOOR, Error, enough, judged
 from ..harmonic_balance.book import normal_law
 from ..harmonic_balance.checkpoint import labels, resumed_response
 from ..harmonic_balance.cost import GIB
+from ..harmonic_balance.growing import verdict
 from ..harmonic_balance.problem import Problem
 from ..harmonic_balance.readout import measured
 from ..harmonic_balance.reduced import stuck, stuck_damping
@@ -229,11 +230,21 @@ def _answered(
         responses[key], resonances[key] = found, [(one.frequency, one.amplitude) for one in peaks]
         messages += say.not_periodic(key, found.unsteady, built.settings)
         messages += say.lifting(built, problem, found, key) + say.pulling(built, found, key)
-        messages += say.across(problem, found, key)
+        messages += say.across(problem, found, key) + _verdict(problem, found, key)
         messages += [] if still(found) else left.out(problem, found, peaks, key)
         if key == max(responses):
             stiff = _stuck(problem.assembly)
     return responses, resonances, folds, stiff, messages
+
+
+def _verdict(problem: Problem, found: HarmonicResponse, normal: float) -> list[str]:
+    """Whether the highest point is stable, where the linear part feeds motions."""
+    if not found.converged.any():
+        return []
+    i = int(np.argmax(np.where(found.converged, np.abs(found.monitor), -1.0)))
+    f = float(found.frequency[i])
+    at = f"At F_N = {normal:g} N the highest motion, at {f:.6g} Hz,"
+    return verdict(problem, found.x[i], 2 * np.pi * f, at)
 
 
 def _report_memory(built: Built, report: Callable[[str], None]) -> None:

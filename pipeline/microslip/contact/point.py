@@ -13,12 +13,13 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jax.custom_derivatives import SymbolicZero
 
 from ..programs import seldom
 from ..reduced.compliance import BULK_AND_SURFACE
 from ..settings.numbers import NotNegative, Positive, PositiveLength
-from .friction import Friction
+from .friction import Friction, StaticSliding
 from .kinds import LawKind
 from .law import Array, Law, Step, norm, number, ratio, root, settings, static, value
 from .normal import Hyperbolic, Normal, Preload
@@ -575,3 +576,11 @@ def _follows(law: PointContact) -> Array:
     zero = jnp.zeros_like(law.stiffness_1)
     rubs = jnp.any(law.stiffness_1 * law.friction.coefficient(zero, zero + 1, zero) != 0)
     return jnp.where(rubs, 0.0 if law.damping is None else jnp.min(law.damping), jnp.inf)
+
+
+def saws(law: Law) -> bool:
+    """Whether its points slip at once, and to less than they stuck by."""
+    law = getattr(law, "whole", law)
+    if not isinstance(law, PointContact) or not isinstance(law.friction, StaticSliding):
+        return False
+    return bool(np.any(np.asarray(law.friction.static) > law.friction.sliding))

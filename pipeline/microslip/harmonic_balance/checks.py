@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..data import ComplexArray
-from ..results.checks import Checks, resting, shares, work
+from ..data import Array, ComplexArray
+from ..results.checks import MOTION, Checks, resting, shares, work
 from ..system.component import Component
 from .problem import Problem
 from .solver import Point
@@ -36,20 +36,30 @@ def _apart(problem: Problem, found: Operating) -> float:
     """See `Checks.motion`."""
     away = largest = 0.0
     each = [_moving(problem, m, found) for m in problem.assembly.components]
-    sides: dict[tuple[int, int], ComplexArray] = {key: moved for one in each for key, moved in one.items()}
+    sides = {key: moved for one in each for key, moved in one.items()}
     for i, contact in enumerate(problem.assembly.contacts):
         G, u = contact.patch.kinematics, found.relative[contact.name]
         seen = np.column_stack([u[:, 0] - contact.offset, u[:, 1::2] - 1j * u[:, 2::2]])
-        read = sides[i, 0] - sides.get((i, 1), 0.0)
-        away = max(away, float(np.abs(G @ (read - seen)).max(initial=0.0)))
-        largest = max(largest, float(np.abs(G @ seen).max(initial=0.0)))
+        (first, most), (second, other) = sides[i, 0], sides.get((i, 1), (0.0, 0.0))
+        away = max(away, float(np.abs(G @ (first - second - seen)).max(initial=0.0)))
+        could = float((np.abs(G) @ (most + other)).max(initial=0.0))
+        largest = max(largest, float(np.abs(G @ seen).max(initial=0.0)), LEFT / MOTION * could)
     return away / largest if largest else 0.0
 
 
-def _moving(problem: Problem, component: Component, found: Operating) -> dict[tuple[int, int], ComplexArray]:
-    """(contact, side) of a component -> (k, H + 1) its motion there, from its coordinates and the forces on it."""
+LEFT = 1e-12
+"""Of the motion that coordinates as large could make of a contact's sides, what rounding may leave of the relative one:
+two masses that 1e12 N/m join move alike to twelve digits. Springs of 1e12 and 1e15 N/m leave 1e-14 of it."""
+
+
+def _moving(
+    problem: Problem, component: Component, found: Operating
+) -> dict[tuple[int, int], tuple[ComplexArray, Array]]:
+    """(contact, side) of a component -> (k, H + 1) its motion there, from its coordinates and the forces on it, and
+    (k,) the largest that coordinates of that size could make."""
     a, sides = problem.assembly, problem.assembly.sides(component.name)
-    moved = {(i, j): np.empty((a.contacts[i].patch.count, problem.harmonics + 1), complex) for i, j, _ in sides}
+    counts = {(i, j): a.contacts[i].patch.count for i, j, _ in sides}
+    moved = {at: (np.empty((n, problem.harmonics + 1), complex), np.zeros(n)) for at, n in counts.items()}
     for hs in problem.waves:
         index, q = a.index(hs[0]), np.array([found.q[component.name][h] for h in hs])
         at = component.at(index)
@@ -58,10 +68,12 @@ def _moving(problem: Problem, component: Component, found: Operating) -> dict[tu
         lossy = 1 - 1j * component.residual_loss if hs[0] and at.loss is not None else 1.0
         forces = np.array([lossy * touched + loaded for touched, loaded in both])
         for i, j, s in sides:
-            own = s.motion(at, index, a.blades) @ q.T
+            T = s.motion(at, index, a.blades)
+            own, (motion, most) = T @ q.T, moved[i, j]
+            np.maximum(most, np.linalg.norm(T, axis=1) * np.linalg.norm(q, axis=1).max(), out=most)
             if s.rows is None and labels:
                 own = own + s.frame @ at.residual(s.labels, labels) @ forces.T * s.phase(index, a.blades)
-            moved[i, j][:, hs] = own
+            motion[:, hs] = own
     return moved
 
 

@@ -165,6 +165,8 @@ class Backbone:
 
 def _in_words(status: str, points: Sequence[Point], low: float, high: float, of: Quantity) -> str:
     """Why a curve between two amplitudes ended, without the logarithm that it runs over."""
+    if status.startswith("points"):
+        return f"{len(points)} points do not reach {high:.4g} {of.said}; take a lower high"
     if not status.startswith("bound"):
         return status
     back = f"it came back to {low:.4g} {of.said} without reaching {high:.4g} {of.said}; take another low"

@@ -22,6 +22,7 @@ from ..errors import UserError
 from ..process import prepare
 from ..settings.mistakes import bounded
 from ..system.assembly import Assembly, Linear, stuck_modes
+from ..units import hertz
 from . import blocks, by_hand, reduced
 from .blocks import Matrix
 from .forces import AFT, Forces
@@ -420,19 +421,27 @@ class AtFrequency:
             return (
                 f"no balance: a body {AWAY}: nothing balances the steady forces on it; give it weak_springs or a spring"
             )
-        return f"resonance: nothing limits a motion at {h * f:.6g} Hz; give its mode some damping"
+        return f"resonance: nothing limits a motion at {hertz(h * f)}; give its mode some damping"
 
     @cached_property
-    def rounding(self) -> float:
-        """The rounding of forces as large as the preloads, as it may be seen in R."""
-        p, pressed = self.problem, np.zeros(self.problem.count)
+    def rounding(self) -> tuple[float, float]:
+        """As they may be seen in R, the rounding of forces as large as the preloads, and that of the contacts'
+        stiffness times a motion and times a gap as long, over the largest of x."""
+        p = self.problem
+        pressed, stiff = np.zeros((2, p.count))
         for g in p.groups:
+            k = np.array([np.abs(np.diag(p.assembly.contacts[i].stiffness)) for i in g.contacts])
             for side in (g.first, g.second):
                 if side is not None:
                     np.add.at(pressed, side, np.abs(g.preload).max(axis=1, keepdims=True))
-        pressed *= p.length / p.scale
+                    np.add.at(stiff, side, 2 * k)
+        return self._seen(pressed * (p.length / p.scale)), self._seen(stiff * p.scale)
+
+    def _seen(self, force: Array) -> float:
+        """The rounding of forces (c,), in R."""
+        p = self.problem
         seen = [
-            (np.abs(both[:, 0, :, :, 1:]) @ pressed[at][:, None, :, None])[..., 0] / p.scale[at][:, None]
+            (np.abs(both[:, 0, :, :, 1:]) @ force[at][:, None, :, None])[..., 0] / p.scale[at][:, None]
             for (_, at), both in zip(p.alike, self.both, strict=True)
         ]
         return float(np.finfo(float).eps * max((one.max(initial=0.0) for one in seen), default=0.0))

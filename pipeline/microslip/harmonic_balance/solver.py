@@ -15,6 +15,7 @@ from ..data import Array
 from ..errors import NotConverged, UserError
 from ..interrupts import look
 from ..settings.mistakes import bounded
+from ..units import hertz
 from . import pseudo_transient
 from .forces import AFT
 from .problem import AWAY, NO_NUMBER, AtFrequency, Problem, Tried
@@ -59,8 +60,9 @@ class Point:
 
 
 ROUNDING = 4.0
-"""Times the rounding of the preloads, at which R counts as nothing, if that is less than `AT_MOST` of x: forces that
-press a contact a million times more than anything moves it leave no more of R than their last digits."""
+"""Times the rounding of the preloads and of what contacts make of their motion, at which R counts as nothing, if that
+is less than `AT_MOST` of x: forces that press a contact a million times more than anything moves it, and springs a
+million times stiffer than what is taken into the bodies, leave no more of R than their last digits."""
 
 AT_MOST = 1e-5
 """Share of x that rounding may be."""
@@ -110,7 +112,7 @@ def newton(
         history.append(error)
         if not np.isfinite(error):
             return Point(at.Omega, x, at.undefined(x) or "not a number", error, count, history=tuple(history))
-        if error <= max(tolerance, min(ROUNDING * at.rounding / size, AT_MOST)):
+        if error <= max(tolerance, min(ROUNDING * (at.rounding[0] / size + at.rounding[1]), AT_MOST)):
             return Point(at.Omega, x, CONVERGED, error, count, slope=slope, history=tuple(history))
         if error < 0.5 * halved:
             halved, last = error, count
@@ -336,6 +338,12 @@ class OverLoad:
         return at.residual_of(x, force), at.jacobian(slope).dense(), at.load_rate()
 
 
+UNFINISHED = (
+    "the curve over the load is not followed to its end (more samples, softer contacts or a motion in time may lead "
+    "there); it ends"
+)
+
+
 def _raised(problem: Problem, Omega: float, most: int = 150) -> Point:
     """The load from nothing to its whole size along the curve of solutions, which may turn back on its way."""
     at, whole = problem.at(Omega), problem.share
@@ -350,7 +358,7 @@ def _raised(problem: Problem, Omega: float, most: int = 150) -> Point:
     reached = branch.points[-1].lam / whole if branch.points and whole else 0.0
     error = float(np.abs(at.residual(x)).max() / max(np.abs(x).max(), 1e-300))
     turned = sum(p.kind == "fold" for p in branch.points)
-    words = f"the curve over the load {TURNS} {turned} times and ends" if turned else branch.status
+    words = f"the curve over the load {TURNS} {turned} times and ends" if turned else UNFINISHED
     return Point(Omega, x, f"{words} at {reached:.3g} of the load", error, spent)
 
 
@@ -380,7 +388,7 @@ def sweep(
             done.append(known[float(f)])
             continue
         failed = sum(not p.converged for p in done)
-        told = f"{i + 1} of {len(frequency)} frequencies: {f:.6g} Hz" + (f", {failed} not converged" if failed else "")
+        told = f"{i + 1} of {len(frequency)} frequencies: {hertz(f)}" + (f", {failed} not converged" if failed else "")
         report(told)
         good = _behind(done)
         starts = [] if start is None or done else [start]
@@ -397,7 +405,7 @@ def sweep(
             report(said)
     for i in range(len(done) - 2, -1, -1):  # from the other side, along which there may be a way
         if not done[i].converged and not done[i].away and done[i + 1].converged:
-            report(f"{i + 1} of {len(frequency)} frequencies: {frequency[i]:.6g} Hz once more, from above")
+            report(f"{i + 1} of {len(frequency)} frequencies: {hertz(frequency[i])} once more, from above")
             done[i] = _walked(problem, done[i + 1], done[i])
             keep(done[i])
     return done

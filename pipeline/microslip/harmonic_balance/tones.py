@@ -15,6 +15,7 @@ from ..errors import UserError
 from ..results.journal import Journal
 from ..results.tones import TwoTones
 from ..settings.mistakes import numbered
+from ..units import hertz
 from . import reduced
 from .readout import measured
 from .torus import Torus, commensurate, with_mean
@@ -180,7 +181,7 @@ def swept(
         balances.append(here)
         if found.status == CONVERGED:
             known.append(found.x)
-        report(f"point {i + 1} of {len(first)}, {one / (2 * np.pi):.6g} and {found.second / (2 * np.pi):.6g} Hz")
+        report(f"point {i + 1} of {len(first)}, {hertz(one / (2 * np.pi))} and {hertz(found.second / (2 * np.pi))}")
     return of_points(points, balances)
 
 
@@ -205,7 +206,7 @@ def _said(points: Sequence[Point], b: TwoTone) -> tuple[str, ...]:
     for p in points:
         if small := commensurate(p.first, p.second, b.torus.order):
             return (
-                f"At {p.first / (2 * np.pi):.6g} Hz the frequencies are as {small[0]} to {small[1]}, so that there the "
+                f"At {hertz(p.first / (2 * np.pi))} the frequencies are as {small[0]} to {small[1]}, so that there the "
                 "motion repeats: what is given holds for every phase between the tones; one phase alone is found by "
                 "harmonic_response with loads of these harmonics of the common frequency.",
             )

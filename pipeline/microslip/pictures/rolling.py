@@ -54,7 +54,10 @@ def traction_picture(found: Studied, path: Path, title: str) -> Path:
     step = (max(1, t.x.shape[0] // 10), max(1, t.x.shape[1] // 10))
     pick = np.s_[step[0] // 2 :: step[0], step[1] // 2 :: step[1]]
     left.quiver(1e3 * t.x[pick], 1e3 * t.y[pick], t.traction_x[pick], t.traction_y[pick], color="white", width=0.004)
-    left.set(xlabel="x in mm, rolling to the right", ylabel="y in mm", aspect="equal", title="traction in MPa")
+    stretch = stretched(np.ptp(_corners(t), axis=(0, 1)))
+    x_said, y_said = (f" ({k:.2g} times as wide)" if k > 1 else "" for k in (1 / stretch, stretch))
+    left.set(xlabel=f"x in mm{x_said}, rolling to the right", ylabel=f"y in mm{y_said}", title="traction in MPa")
+    left.set_aspect(stretch)
     figure.colorbar(image, ax=left, shrink=0.85)
     row = t.x.shape[0] // 2
     x, limit = 1e3 * t.x[row], mu * t.pressure[row] / 1e6
@@ -67,6 +70,17 @@ def traction_picture(found: Studied, path: Path, title: str) -> Path:
     over = LABELS[found.case.creep.over].split(" in ")[0]
     figure.suptitle(f"{title}: {over} {found.over[found.shown]:.4g}")
     return save_figure(figure, path)
+
+
+NARROW = 1 / 3
+"""Width over length of a drawn patch at least, with room for the numbers of both axes; those of a flange are 1 / 17."""
+
+
+def stretched(size: Array) -> float:
+    """How many times as wide the second axis is drawn as the first, for patches (2,) m long and wide that are narrower
+    one way than `NARROW`."""
+    slender = float(size[1] / size[0])
+    return NARROW / slender if slender < NARROW else min(1 / (NARROW * slender), 1.0)
 
 
 def wearing_picture(worn: Wearing, path: Path, title: str) -> Path:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,7 +16,7 @@ from ..files.hdf5 import IMAGINARY, put, sealed
 from ..files.hostile import DAMAGE, reading, refuse_damaged
 from ..files.store import ordinary
 from ..settings.mistakes import numbered
-from ..units import Quantity
+from ..units import UNIT_OF_FREQUENCY, Quantity, hertz
 from .series import CONVERGED, of_solutions
 
 if TYPE_CHECKING:
@@ -52,7 +52,7 @@ class TwoTones:
             friction times the path slid, less what moving ground brings. All of them nan where a
             point was not found.
         status: of every point. error: (f,) of the last step of Newton's method, over the size of the unknowns.
-            messages: what a reader must know. over: what a sweep runs over.
+            messages: what a reader must know. over: what a sweep runs over. shown: unit of frequencies in sentences.
     """
 
     first: Array
@@ -68,6 +68,7 @@ class TwoTones:
     status: tuple[str, ...]
     error: Array
     messages: tuple[str, ...] = ()
+    shown: str = field(default_factory=UNIT_OF_FREQUENCY.get)
 
     def __post_init__(self) -> None:
         told = {name: np.asarray(getattr(self, name)) for name in OF_A_MOTION}
@@ -243,9 +244,9 @@ class TwoTones:
         said = f"{len(self)} point{'s' if len(self) != 1 else ''}, {self.order} harmonics"
         if len(self):
             said += (
-                f"; first {self.first.min():.6g} to {self.first.max():.6g} Hz"
+                f"; first {hertz(self.first.min(), self.shown)} to {hertz(self.first.max(), self.shown)}"
                 if len(self) > 1
-                else (f"; {self.first[0]:.6g} and {self.second[0]:.6g} Hz")
+                else (f"; {hertz(self.first[0], self.shown)} and {hertz(self.second[0], self.shown)}")
             )
         if self.amplitude.size and self.converged.any():
             one, two = (np.where(self.converged, np.abs(self.of(*k)), 0.0).max() for k in ((1, 0), (0, 1)))

@@ -68,6 +68,12 @@ class Section(Model):
 
     @model_validator(mode="after")
     def _is_an_arc(self) -> Section:
+        measured = isinstance(self.profile, str)
+        idle = [key for key in (("width",) if measured else ("mirror", "noise", "between")) if getattr(self, key)]
+        if asked := [key for key in idle if key in self.model_fields_set]:
+            of, other = ("a file", "a formula") if measured else ("a formula", "a file")
+            how = "give between" if measured else "change width or the signs of the coefficients"
+            raise ValueError(f"{asked[0]}: is of a profile from {other}, this one is from {of}; remove it, or {how}")
         if isinstance(self.profile, float) and not has_arc(self.profile, self.width):
             raise ValueError(
                 f"a profile of radius {self.profile:g} m has no arc {self.width:g} m wide; correct profile or width"

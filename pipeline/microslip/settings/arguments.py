@@ -16,6 +16,7 @@ from typing import Annotated, Any, Literal, ParamSpec, TypeVar, Union, get_args,
 import numpy as np
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, InstanceOf, create_model
 
+from ..units import frequencies_in
 from .mistakes import unfit, validate
 
 P = ParamSpec("P")
@@ -71,7 +72,8 @@ def checked(function: Callable[P, R]) -> Callable[P, R]:
     """The function, whose arguments are looked at before it is called.
 
     A call raises `UserError`: an argument that is none of what its annotation says; the sentence begins with the
-    names of the function and the argument.
+    names of the function and the argument. Sentences made during the call give frequencies in its ``unit``, if it has
+    one.
     """
     signature = inspect.signature(function)
 
@@ -82,7 +84,8 @@ def checked(function: Callable[P, R]) -> Callable[P, R]:
         except TypeError as error:
             raise TypeError(f"{function.__name__}() {error}") from None
         check(function, given.arguments)
-        return function(*args, **kwargs)
+        with frequencies_in(given.arguments.get("unit")):
+            return function(*args, **kwargs)
 
     return call
 

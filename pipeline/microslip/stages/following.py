@@ -26,6 +26,7 @@ from ..errors import UserError
 from ..files import store
 from ..files.store import ordinary
 from ..files.tables import rows_csv
+from ..harmonic_balance.growing import verdict
 from ..harmonic_balance.nonlinear_modes import REACHED
 from ..harmonic_balance.readout import measured
 from ..harmonic_balance.response import NOT_FOUND
@@ -306,6 +307,10 @@ def optimum_over(
         raise UserError(f"{over}:{given} give --low and --high, two {kind}, the first one smaller")
     if over == NORMAL_FORCE and not forces:
         raise UserError(f"{case.path}: no contact is pressed by the sweep's normal forces; there is nothing to change")
+    if over != NORMAL_FORCE:  # what is wrong with the key, or at an end, is said before anything is computed
+        _check_key(over, case)
+        for value in (low, high):
+            case.with_(over, value)
     between = float(np.sqrt(low * high)) if over == NORMAL_FORCE else forces[-1] if forces else None
     length = problem_of(built, between).length
 
@@ -324,6 +329,17 @@ def optimum_over(
     return optimum(make, [float(v) for v in values], band, report=report, keep=keep)
 
 
+def _check_key(over: str, case: Case) -> None:
+    """Refuse a key of contacts that names none of them."""
+    whose, _, key = over.partition(".")
+    if whose == "contacts" and key in OF_CONTACTS:
+        names = ", ".join(c.interface for c in case.plain.settings.contacts)
+        raise UserError(
+            f"{case.path}: --over {over}: names no contact; write --over {key} for all of them, or contacts.NAME.{key} "
+            f"with NAME of {names}"
+        )
+
+
 def remarks_on_optimum(found: Optimum, over: str, case: Case, report: Report = lambda _: None) -> list[str]:
     """How uncertain the lowest of the highest resonances is for want of harmonics, and what looks like a number in a
     wrong unit in any of them."""
@@ -336,6 +352,8 @@ def remarks_on_optimum(found: Optimum, over: str, case: Case, report: Report = l
         e = headline.estimated(built, found.problem, best.x, best.Omega)
     at = f"{best.Omega / (2 * np.pi):.6g} Hz under {over} = {found.parameter:.6g}{unit_of(over)}"
     said = headline.said_of(built.settings, f"The amplitude at {at}", e)
+    if found.problem is not None and best.status == CONVERGED:
+        said += verdict(found.problem, best.x, best.Omega, f"The motion at {at}")
     forces = known if over == NORMAL_FORCE else [n for n in normal_forces(built) if n is not None]
     largest = max(one.amplitude for one in known.values())
     return _told_of(said, headline.doubted(built, largest, max(forces, default=None)), report)

@@ -123,7 +123,7 @@ def _doubted(found: Sequence[tuple[str, Orbit]], built: Built) -> list[str]:
     ends = [_ends(one) for _, one in found if len(one.time)]
     swing = max((0.5 * (largest - smallest) for largest, smallest in ends), default=0.0)
     asked = built.settings.orbit
-    return headline.doubted(built, swing, asked.normal_force if asked else None)
+    return headline.doubted(built, swing, asked.normal_force if asked else None, in_time=True)
 
 
 def _sentence(name: str, one: Orbit) -> str:

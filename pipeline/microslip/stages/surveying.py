@@ -375,12 +375,12 @@ def _error(
         return None, None
     one, i = top
     report("error of harmonics and samples")
-    e = error_of(build(settings, bases, path), one, i)
+    e, fed = error_of(build(settings, bases, path), one, i)
     at = f"{one.parameter[i]:.6g} {UNITS[one.over]}"
     said = headline.said_of(settings, f"{one.label}: the amplitude at {at}", e)
     if e is None:
-        return None, None
-    return e.readout, said if e.readout > headline.TRUNCATION else []
+        return None, [*said, *fed] if fed else None
+    return e.readout, [*(said if e.readout > headline.TRUNCATION else []), *fed]
 
 
 def _written(points: Checkpoint, found: list[Followed], whole: bool) -> Response:

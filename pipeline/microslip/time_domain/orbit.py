@@ -14,10 +14,7 @@ import jax
 import numpy as np
 import scipy.linalg
 
-from ..contact.friction import StaticSliding
-from ..contact.law import Law
-from ..contact.point import PointContact
-from ..contact.portion import Portion
+from ..contact.point import saws
 from ..contact.set_valued import SetValued
 from ..data import Array
 from ..errors import NotConverged, UserError
@@ -25,7 +22,7 @@ from ..files.hdf5 import put, sealed
 from ..interrupts import look
 from ..settings.mistakes import bounded, numbered
 from ..system.assembly import Contact
-from ..units import METRES, Quantity, counted
+from ..units import METRES, UNIT_OF_FREQUENCY, Quantity, counted, hertz
 from . import classification
 from . import samples as kept_samples
 from .bodies import Hardest, Now, Seen
@@ -100,6 +97,7 @@ class Orbit:
             end, 1 at most; nan if it was not looked for. diverged: time (s) at which numbers became infinite;
             inf: never.
         exponent: the largest Lyapunov exponent, looked for where the motion does not come back; None: it was not.
+        shown: unit of frequencies in sentences.
     """
 
     equations: Equations
@@ -120,6 +118,7 @@ class Orbit:
     diverged: float = math.inf
     exponent: Exponent | None = None
     messages: tuple[str, ...] = field(default=())
+    shown: str = field(default_factory=UNIT_OF_FREQUENCY.get)
 
     def __repr__(self) -> str:
         w = self.Omega
@@ -260,8 +259,8 @@ class Orbit:
             if len(y) and (high := float(np.abs(y[0]).max())) > top:
                 top, at = high, float(w[np.abs(y[0]).argmax()]) / (2 * np.pi)
         way = "up" if last > first else "down"
-        said = f"run-{way} from {first / 2 / np.pi:.6g} to {last / 2 / np.pi:.6g} Hz"
-        return f"{said}, largest at {at:.6g} Hz" if self.labels else said
+        said = f"run-{way} from {hertz(first / 2 / np.pi, self.shown)} to {hertz(last / 2 / np.pi, self.shown)}"
+        return f"{said}, largest at {hertz(at, self.shown)}" if self.labels else said
 
     @property
     def drift(self) -> float:
@@ -552,10 +551,10 @@ def _warnings(equations: Equations, kept: Kept, worst: float) -> tuple[str, ...]
     if any(H.any() for c in equations.assembly.components for H in c.loss.values()):
         said.append(
             f"Loss factors (structural damping) have no form in time: dampers that take as much at "
-            f"{equations.Omega / (2 * np.pi):.6g} Hz stand for them, and take h times as much in the h-th harmonic, "
+            f"{hertz(equations.Omega / (2 * np.pi))} stand for them, and take h times as much in the h-th harmonic, "
             "where a harmonic balance does not; with modal damping both mean the same."
         )
-    if names := [c.name for c in equations.contacts if _saws(c.patch.law)]:
+    if names := [c.name for c in equations.contacts if saws(c.patch.law)]:
         said.append(
             f"Static friction above the sliding one ({', '.join(names)}): a point without mass sticks again as soon as "
             "it has slipped, so sliding friction saws between both values, with teeth that hang on the step; "
@@ -566,13 +565,6 @@ def _warnings(equations: Equations, kept: Kept, worst: float) -> tuple[str, ...]
     if kept.missed:
         said.append(f"{counted(kept.missed, 'event')} more than are listed, and counted, happened.")
     return tuple(said)
-
-
-def _saws(law: Law) -> bool:
-    """Whether its points slip at once, and to less than they stuck by."""
-    law = law.whole if isinstance(law, Portion) else law
-    friction = law.friction if isinstance(law, PointContact) else None
-    return isinstance(friction, StaticSliding) and bool(np.any(np.asarray(friction.static) > friction.sliding))
 
 
 @dataclass(frozen=True)
