@@ -17,6 +17,7 @@ import numpy as np
 import pytest
 import small
 from attack import toml
+from refusals import refused, refused_command
 
 from microslip.basis import write_basis
 from microslip.case import CaseSettings, run_case
@@ -203,8 +204,7 @@ def test_no_force_fits_no_curve() -> None:
     """Nothing to fit at: 0 N among the forces, and a curve over the force, along which the law is one."""
     raw = table(**PIN)
     raw["sweep"]["normal_forces"] = [0.0, 200.0]
-    with pytest.raises(UserError, match=r"case.toml: contacts.right: fitted_at"):
-        built(raw)
+    refused("case.toml: contacts.right: fitted_at", built, raw)
     raw["sweep"]["normal_forces"] = [100.0, 200.0]
     with pytest.raises(UserError, match=r"case.toml: contacts.right.fitted_at"):
         curves(made(raw), {"small": small.basis()}, PATH, "normal_force", lambda _: nullcontext(), lambda _: None)
@@ -220,8 +220,7 @@ def test_jenkins_elements_of_a_file_are_those_of_the_case(tmp_path: Path) -> Non
     own = build(made(table(**STIFF, law="jenkins")), bases, path).pressed(200.0).contacts[0].patch
     assert len(found.points) == 4 and found.law == own.law
     raw["contacts"][0]["patch"] = "nodal"
-    with pytest.raises(UserError, match="contact.toml: patch: law = "):
-        build(made(raw), bases, path)
+    refused("contact.toml: patch: law = ", build, made(raw), bases, path)
 
 
 CURVE = "0 0\n1 10\n2 30\n3 60\n4 100\n"
@@ -478,12 +477,11 @@ def test_what_does_not_fit_into_the_memory_is_refused(tmp_path, monkeypatch, cap
 
 def test_the_limit_of_the_memory_is_ones_own(tmp_path, monkeypatch, capsys) -> None:
     words = sample_case(tmp_path, monkeypatch, harmonics=1, samples=8, memory_limit=0.4)
-    assert main(["respond", *words]) == 2 and "memory_limit is 0.4" in capsys.readouterr().err
+    refused_command(["respond", *words], capsys, "memory_limit is 0.4")
     settings = made(table(**STIFF, law="smooth", points=[6, 5]) | {"harmonics": 4})
     assert 0.5 < memory_of(settings, 30, 6) / 2**30 < 0.6
     monkeypatch.setattr("microslip.case.contacts.of_this_machine", lambda: 0.5 * 2.0**30)
-    with pytest.raises(UserError, match="this machine has 0.5;"):
-        build(settings, {"small": small.basis()}, PATH)
+    refused("this machine has 0.5;", build, settings, {"small": small.basis()}, PATH)
     build(settings.model_copy(update={"memory_limit": 3.0}), {"small": small.basis()}, PATH)
 
 

@@ -297,6 +297,7 @@ MISTAKES = [
     (["run", "box/case.toml", "--set", "monitor=top", "-q"], "no monitor 'top'; it has tip"),
     (["run", "stray.toml"], "no body.toml of a body 'nobody'"),
     (["check", "gone.h5"], "gone.h5"),
+    (["export", "gone.h5", "--to", "dmig"], "gone.h5"),
     (["check", "empty"], "empty: is a folder without a modal file"),
     (["check", "box"], "box: holds a body, not its modal file; give build/NAME/basis.h5"),
     (["modes", "meshes/box.msh"], "is no body.toml; make one around it with: microslip import meshes/box.msh"),

@@ -12,6 +12,7 @@ import small
 from closed_forms.indentation import rectangle_compliance
 from meshes import STEEL, body, brick
 from patch_bounds import patch_bounds
+from refusals import refused
 from scipy.integrate import dblquad
 from test_reduction import block
 from test_truncation import chain
@@ -135,8 +136,7 @@ def test_a_stamp_is_stiffer_than_a_pressure_and_converges() -> None:
 
 def test_patches_that_cannot_be_examined_are_refused() -> None:
     mesh = brick("hexahedron20", (1, 1, 1), (0.1, B, H))
-    with pytest.raises(UserError, match="none"):
-        patch_bounds(mesh, body(supports=[{"face": "x0"}]))
+    refused("none", patch_bounds, mesh, body(supports=[{"face": "x0"}]))
     touching = [{**RIGHT, "partner": ""}, {"name": "side", "face": "y1", "t2": [0.0, 0.0, 1.0]}]
     with pytest.raises(UserError, match="share points"):
         patch_bounds(mesh, body(supports=[{"face": "x0"}], interfaces=touching))

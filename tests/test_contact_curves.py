@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from refusals import refused
 from scipy.integrate import quad
 
 from microslip.contact.curves import NormalCurve, curve, read_columns, read_curve
@@ -80,8 +81,7 @@ def test_energy_is_the_integral_of_the_force_and_the_inverse_inverts():
     F = np.array([1e-3, 10.0, 700.0, 5e3])
     assert c.force(c.approach(F)) == pytest.approx(F, rel=1e-9)
     assert c.approach(0.0) == pytest.approx(c.separation, abs=1e-12)
-    with pytest.raises(UserError, match="must not be negative"):
-        c.approach(-1.0)
+    refused("must not be negative", c.approach, -1.0)
 
 
 def test_a_curve_that_begins_under_load_is_led_to_zero_by_the_third_power():
@@ -102,8 +102,7 @@ def test_leading_zeros_are_the_open_contact():
 def test_noise_that_is_stated_is_evened():
     u = np.arange(8) * 1e-6
     F = np.array([0, 1, 4, 3.8, 9, 16, 15.9, 25])
-    with pytest.raises(UserError, match="point 4: the force falls from 4 to 3.8 N"):
-        curve(u, F)
+    refused("point 4: the force falls from 4 to 3.8 N", curve, u, F)
     c = curve(u, F, noise=0.3)
     assert (np.diff(c.loads) >= 0).all() and np.abs(c.force(u) - F).max() < 0.15
     assert curve(u, [-0.1, 0, 1, 4, 9, 16, 20, 25], noise=0.2).loads[0] == 0
@@ -141,8 +140,7 @@ def test_lines_of_heading_before_the_numbers_are_passed_over(tmp_path, heading):
 
 def test_a_wrong_number_below_the_heading_is_no_heading(tmp_path):
     (tmp_path / "rig.csv").write_text("u;F\n0,O;0\n1,5;2\n")
-    with pytest.raises(UserError, match="line 2: column 1: '0.O' is no number"):
-        read_columns(tmp_path / "rig.csv", (1, 2))
+    refused("line 2: column 1: '0.O' is no number", read_columns, tmp_path / "rig.csv", (1, 2))
 
 
 def test_columns_by_name_units_and_an_opening_branch(tmp_path):
@@ -222,10 +220,7 @@ def test_wrong_requests_are_refused(tmp_path):
     ):
         with pytest.raises(UserError, match=words):
             read_curve(path, **arguments)
-    with pytest.raises(UserError, match="cannot be read"):
-        read_curve(tmp_path / "none.csv")
+    refused("cannot be read", read_curve, tmp_path / "none.csv")
     path.write_bytes(b"\x00\x01\x02")
-    with pytest.raises(UserError, match="is no text file"):
-        read_curve(path)
-    with pytest.raises(UserError, match="one force for each approach"):
-        curve([0, 1], [0, 1, 2])
+    refused("is no text file", read_curve, path)
+    refused("one force for each approach", curve, [0, 1], [0, 1, 2])

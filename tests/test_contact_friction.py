@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from refusals import refused
 from scipy.integrate import quad
 from scipy.interpolate import pchip_interpolate
 
@@ -321,10 +322,8 @@ def test_the_fluid_part_diverges_with_the_logarithm_of_the_film(u) -> None:
 
 
 def test_lubricated_needs_contact_and_a_film() -> None:
-    with pytest.raises(UserError, match="do not touch"):
-        lubricated(Polynomial(), [0.5, 0.0], [1.0], 0.1)
-    with pytest.raises(UserError, match="film"):
-        lubricated(Polynomial(), [0.5], [1.0], 0.1, 0.0)
+    refused("do not touch", lubricated, Polynomial(), [0.5, 0.0], [1.0], 0.1)
+    refused("film", lubricated, Polynomial(), [0.5], [1.0], 0.1, 0.0)
 
 
 # smoothed ------------------------------------------------------------------------------------------------------------

@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
+from refusals import refused
 from scipy.integrate import quad
 from scipy.optimize import brentq
 
@@ -248,8 +249,7 @@ def test_settings_of_strips_may_differ_from_point_to_point():
     together = MARCH(both, np.concatenate([u, u], axis=1))
     for i, law in enumerate(laws):
         assert np.allclose(together[:, i], MARCH(law, u)[:, 0], rtol=1e-12, atol=1e-12)
-    with pytest.raises(UserError, match="point to point"):
-        both.approach(100.0)
+    refused("point to point", both.approach, 100.0)
 
 
 @pytest.mark.parametrize("count", [1, 7])
@@ -495,8 +495,7 @@ def test_a_force_that_is_not_convex_has_no_strips():
         def approach(self, force):
             return np.square(force)
 
-    with pytest.raises(UserError, match="does not rise"):
-        mindlin(Softening(), MU, 1e-6, 4)
+    refused("does not rise", mindlin, Softening(), MU, 1e-6, 4)
 
 
 def test_strips_are_a_law_whose_settings_are_leaves():

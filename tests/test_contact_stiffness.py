@@ -13,6 +13,7 @@ from closed_forms.bars import rod_frequencies
 from closed_forms.beams import euler_bernoulli
 from closed_forms.joined_beams import hinge_spring, shear_spring
 from meshes import STEEL, body, brick
+from refusals import refused
 from scipy.special import ellipe, ellipk, gamma
 
 from microslip.contact import joined_beams
@@ -322,12 +323,9 @@ def test_half_curvatures_of_turned_cylinders_and_of_a_groove():
     angles = np.linspace(-np.pi / 2, np.pi / 2, 200_001)
     assert gap(turned) == pytest.approx(low) and low == pytest.approx(gap(angles).min(), rel=1e-9)
     assert high == pytest.approx(gap(angles).max(), rel=1e-9)
-    with pytest.raises(UserError, match="do not touch in a point"):
-        half_curvatures((np.inf, 0.02))
-    with pytest.raises(UserError, match="do not touch in a point"):
-        half_curvatures((0.01, 0.01), (np.inf, -0.009))
-    with pytest.raises(UserError, match="radius of curvature is 0"):
-        half_curvatures((0.0, 0.01))
+    refused("do not touch in a point", half_curvatures, (np.inf, 0.02))
+    refused("do not touch in a point", half_curvatures, (0.01, 0.01), (np.inf, -0.009))
+    refused("radius of curvature is 0", half_curvatures, (0.0, 0.01))
 
 
 def test_moduli_of_a_pair():
@@ -531,14 +529,10 @@ def test_two_layers_in_series_are_one_layer_of_both_depths():
     assert both.all == pytest.approx(whole.all, rel=1e-14) and both.includes == BULK
     rigid = in_series(whole, ContactStiffness(np.inf, (np.inf, np.inf), SURFACE))
     assert rigid.all == pytest.approx(whole.all) and rigid.includes == BULK_AND_SURFACE
-    with pytest.raises(UserError, match="counted twice"):
-        in_series(rigid, ContactStiffness(1e9, (1e9, 1e9), SURFACE))
-    with pytest.raises(UserError, match="includes: 'all'"):
-        ContactStiffness(1e9, (1e9, 1e9), "all")
-    with pytest.raises(UserError, match="tangential: 0 N/m"):
-        ContactStiffness(1e9, (0.0, 1e9), SURFACE)
-    with pytest.raises(UserError, match="tangential: nan N/m"):
-        ContactStiffness(1e9, (1e9, np.nan), SURFACE)
+    refused("counted twice", in_series, rigid, ContactStiffness(1e9, (1e9, 1e9), SURFACE))
+    refused("includes: 'all'", ContactStiffness, 1e9, (1e9, 1e9), "all")
+    refused("tangential: 0 N/m", ContactStiffness, 1e9, (0.0, 1e9), SURFACE)
+    refused("tangential: nan N/m", ContactStiffness, 1e9, (1e9, np.nan), SURFACE)
 
 
 def test_two_bodies_of_a_point_contact_are_in_series():
@@ -576,8 +570,7 @@ def test_finite_element_source_is_what_the_eigenmodes_leave():
         found = of_patch(bar(method), method, "right")
         assert found.normal == pytest.approx(1 / left, rel=1e-3), method
         assert found.includes == BULK and min(found.tangential) > 0
-    with pytest.raises(UserError, match="no interface 'left'; the file has right"):
-        of_patch(bar("rubin"), "rubin", "left")
+    refused("no interface 'left'; the file has right", of_patch, bar("rubin"), "rubin", "left")
 
 
 @pytest.mark.parametrize("method", ["eigenmodes", "rubin", "craig-bampton"])
@@ -606,8 +599,7 @@ def test_two_elastic_bodies_are_freed_of_their_bulk_one_after_the_other():
 
 def test_stiffness_that_cannot_count_the_bulk_is_refused():
     stiff = ContactStiffness(1e12, (1e12, 1e12), BULK_AND_SURFACE)
-    with pytest.raises(UserError, match="said to count the bulk"):
-        for_basis(stiff, bar("rubin"), "rubin", "right")
+    refused("said to count the bulk", for_basis, stiff, bar("rubin"), "rubin", "right")
 
 
 # resonances --------------------------------------------------------------------------------------------------------
@@ -741,10 +733,8 @@ def test_two_bodies_joined_by_a_contact_in_closed_form():
         identify(
             joined(one, "face", two, "face", given={"tangential": k_t}), [MeasuredResonance(f[0], 0.1, 1)], ["normal"]
         )
-    with pytest.raises(UserError, match="no interface 'side'; the body has face"):
-        joined(one, "side")
-    with pytest.raises(UserError, match="includes must be"):
-        joined(one, "face", includes="all")
+    refused("no interface 'side'; the body has face", joined, one, "side")
+    refused("includes must be", joined, one, "face", includes="all")
 
 
 def test_joined_bodies_are_those_with_a_link_between_them():

@@ -9,6 +9,7 @@ import pytest
 import small
 from hypothesis import given
 from hypothesis import strategies as st
+from refusals import refused
 
 from microslip.data import ModalBasis
 from microslip.errors import UserError
@@ -70,8 +71,7 @@ def test_a_body_is_found_again_in_another_order_on_fewer_points() -> None:
 
 def test_points_in_another_unit_or_place_are_refused() -> None:
     basis = small.basis()
-    with pytest.raises(UserError, match="one unit of length"):
-        compare_groups(basis, thinned(basis, 7, shift=0.01))
+    refused("one unit of length", compare_groups, basis, thinned(basis, 7, shift=0.01))
     with pytest.raises(UserError, match="same nearest node"):
         nearest_points(np.array([[0.0, 0, 0], [0, 0, 1e-4]]), basis.mesh.points, 1e-3)
 
@@ -80,5 +80,4 @@ def test_bodies_without_shapes_are_refused() -> None:
     basis = small.basis()
     g = basis.groups[0, 0]
     bare = replace(basis, groups={(0, 0): replace(g, phi=g.phi[:0])})
-    with pytest.raises(UserError, match="no shapes"):
-        compare_groups(basis, bare)
+    refused("no shapes", compare_groups, basis, bare)

@@ -12,6 +12,7 @@ from closed_forms.bars import box_frequencies
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from meshes import STEEL, body, brick, moved, renumbered, roller_box, rotation_matrix, shaken
+from refusals import refused
 
 from microslip.errors import NotConverged, UserError
 from microslip.fem.discretise import discretise, free_upper
@@ -289,13 +290,11 @@ def test_sliding_bodies_are_named():
     mesh = brick("tetra10", (1, 1, 1))
     with pytest.raises(UserError, match="translation along x"):
         the_modes(mesh, supports=[{"face": "x0", "directions": "yz"}, {"face": "x1", "directions": "yz"}])
-    with pytest.raises(UserError, match="all six rigid motions"):
-        the_modes(mesh)
+    refused("all six rigid motions", the_modes, mesh)
 
 
 def test_more_modes_than_degrees_of_freedom_are_refused():
-    with pytest.raises(UserError, match="modes.count"):
-        the_modes(brick("tetra10", (1, 1, 1)), **CLAMPED, modes={"count": 80})
+    refused("modes.count", the_modes, brick("tetra10", (1, 1, 1)), **CLAMPED, modes={"count": 80})
 
 
 # ---------------------------------------------------------------- one definite form

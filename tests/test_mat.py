@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 import pytest
 import small
+from refusals import refused
 from scipy.io import loadmat
 
-from microslip.errors import UserError
 from microslip.exchange import formats, writer
 from microslip.exchange.mat import field_names, write_mat
 
@@ -135,8 +135,7 @@ def test_names_are_legal_and_unique() -> None:
 
 def test_a_folder_that_cannot_be_written(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
-    with pytest.raises(UserError, match="cannot be written"):
-        write_mat(small.basis(), tmp_path / "file" / "basis.mat")
+    refused("cannot be written", write_mat, small.basis(), tmp_path / "file" / "basis.mat")
 
 
 def test_the_table_of_writers(tmp_path: Path) -> None:

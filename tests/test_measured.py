@@ -11,6 +11,7 @@ import pytest
 import small
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from refusals import refused
 from test_fuzz import user_errors_only
 
 from microslip.basis import check_basis, read_basis, write_basis
@@ -135,16 +136,13 @@ def test_files_that_are_wrong(tmp_path: Path) -> None:
         with pytest.raises(UserError, match=words):
             read_measured(tmp_path / f"{name}.uff")
     strange = measure(tmp_path / "s.uff", basis, spec_data_type=2)
-    with pytest.raises(UserError, match="specific data type 2"):
-        read_measured(strange)
-    with pytest.raises(UserError, match="no such file"):
-        read_measured(tmp_path / "none.uff")
+    refused("specific data type 2", read_measured, strange)
+    refused("no such file", read_measured, tmp_path / "none.uff")
     # metres read as millimetres: refused where it is compared
     (tmp_path / "m.uff").write_text("".join(p for p in parts if kind(p) != 164))
     far, told = read_measured(tmp_path / "m.uff", unit="m")
     assert "does not tell its units" in told[0]
-    with pytest.raises(UserError, match="one unit of length"):
-        compare_groups(far, basis)
+    refused("one unit of length", compare_groups, far, basis)
 
 
 def respond(path: Path, basis: ModalBasis, scale: float = 1.0) -> Path:

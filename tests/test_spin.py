@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 import scipy.linalg
 from meshes import body, brick
+from refusals import refused
 from rings import AXIS, disc_sector, full_ring
 
 from microslip.basis.integrals import convected
@@ -181,10 +182,8 @@ def test_a_shape_that_would_not_stand_is_refused(ground: dict, text: str) -> Non
 
 def test_what_the_inertia_needs_of_the_modal_file() -> None:
     basis, two = held_disc(), [*rubs(), opposite(rpm=61.0)]
-    with pytest.raises(UserError, match="'disc' otherwise than another contact does; write the same rpm"):
-        assembled(two, basis)
-    with pytest.raises(UserError, match="point and inertia in both"):
-        assembled([*rubs(), opposite(inertia=False)], basis)
+    refused("'disc' otherwise than another contact does; write the same rpm", assembled, two, basis)
+    refused("point and inertia in both", assembled, [*rubs(), opposite(inertia=False)], basis)
     assert assembled([*rubs(), opposite()], basis).components[2].spin is not None
     with pytest.raises(UserError, match="inertia: is that of material that turns; add rpm"):
         assembled([RUBS | {"ground": {"velocity": 1.0, "inertia": False}}], basis)

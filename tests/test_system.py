@@ -14,6 +14,7 @@ import pytest
 import scipy.linalg
 from box import edit
 from closed_forms.one_harmonic import JenkinsContact, frequency_response, stuck_frequencies
+from refusals import refused, refused_command
 
 from microslip.basis import check_basis, read_basis, write_basis
 from microslip.cli import main
@@ -224,9 +225,8 @@ def test_a_name_used_twice_is_refused(
     name = entry.split('"')[1]
     assert f'name = "{name}"' in THREE
     Path("system.toml").write_text(f"{THREE}\n[[{key}]]\n{entry}\n")
-    assert main(["run", "system.toml", "--quiet"]) == 2
-    said = capsys.readouterr().err
-    assert f"system.toml: {key}: " in said and f"'{name}'" in said and not Path("build").exists()
+    refused_command(["run", "system.toml", "--quiet"], capsys, f"system.toml: {key}: ", f"'{name}'")
+    assert not Path("build").exists()
     more = Monitor("end", "m1"), Force("shaker", "m2", (1, 0, 0)), Contact("rub", "m1", normal=(0, 0, 1))
     keys = ("monitors", "forces", "contacts")
     for kind, twice in zip(keys, more, strict=True):
@@ -247,8 +247,7 @@ def test_matrices_that_no_system_has() -> None:
             System.of_matrices("s", M, K).basis()
     with pytest.raises(UserError, match="no spring holds"):
         System("s", [Body("a", 1.0, free="x")], [Damper("ground", "a", 1.0)]).basis()
-    with pytest.raises(UserError, match="Give its axis"):
-        System("s", [Body("a", 1.0)], [Spring("ground", "a", 1.0)]).basis()
+    refused("Give its axis", System("s", [Body("a", 1.0)], [Spring("ground", "a", 1.0)]).basis)
 
 
 def test_a_point_contact_has_the_extents_of_its_case(tmp_path: Path) -> None:
@@ -312,7 +311,7 @@ def test_a_folder_with_a_case_alone_is_run(tmp_path: Path, monkeypatch: pytest.M
     case.write_text(case.read_text() + '[[bodies]]\nname = "masses"\nfile = "masses.h5"\n')
     assert main(["run", "mine", "-q"]) == 0
     assert (tmp_path / "build" / "mine" / "response.csv").is_file()
-    assert main(["modes", "mine"]) == 2 and "microslip run mine" in capsys.readouterr().err
+    refused_command(["modes", "mine"], capsys, "microslip run mine")
 
 
 def test_a_read_out_that_nothing_moves_and_a_case_without_contacts(
@@ -491,5 +490,4 @@ def test_a_law_without_a_value_under_its_preload_is_named() -> None:
         def step(self, u, v, dt, state):
             return jnp.sqrt(-u * u - 1), state
 
-    with pytest.raises(UserError, match="Pressed"):
-        rubbed(law=Pressed())
+    refused("Pressed", rubbed, law=Pressed())
