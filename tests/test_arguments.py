@@ -236,8 +236,7 @@ def test_what_may_be_of_several_kinds_says_of_which() -> None:
 def test_a_rate_or_a_read_out_of_another_shape_or_kind_is_refused(given) -> None:
     for key in ("rate", "read"):
         made = dynamics(**{key: lambda *_: jnp.asarray(given)})
-        with pytest.raises(UserError, match=f"Dynamics: {key}: gives"):
-            ms.bifurcate(made, 1.5, 1.6, orbits=False)
+        refused(f"Dynamics: {key}: gives", ms.bifurcate, made, 1.5, 1.6, orbits=False)
 
 
 def test_what_is_linear_has_no_bifurcation_and_no_normal_force() -> None:
@@ -267,8 +266,7 @@ def test_numbers_of_what_a_result_does_not_have(tmp_path) -> None:
     [{"points": "a"}, {"points": NAN}, {"points": -1}, {"step_max": -1.0}, {"step": NAN}, {"step_max": "a"}],
 )
 def test_steps_along_a_curve_that_are_none(settings):
-    with pytest.raises(UserError, match=str(next(iter(settings)))):
-        ms.follow(SLIDER, 0.1, 0.2, settings=settings)
+    refused(str(next(iter(settings))), ms.follow, SLIDER, 0.1, 0.2, settings=settings)
 
 
 def test_numbers_of_numpy_are_numbers():

@@ -548,8 +548,7 @@ def test_a_spline_has_the_fourth_order() -> None:
     ],
 )  # fmt: skip
 def test_other_laws_are_refused(law: object, strips: int, why: str) -> None:
-    with pytest.raises(UserError, match=why):
-        book.book_patch(patch(law), strips)
+    refused(why, book.book_patch, patch(law), strips)
 
 
 def test_more_harmonics_are_refused() -> None:

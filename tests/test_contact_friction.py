@@ -28,7 +28,6 @@ from microslip.contact.friction import (
     smoothed,
 )
 from microslip.contact.heights import Linear, Polynomial, tabulated
-from microslip.errors import UserError
 
 V = np.array([0.0, 1e-3, 0.02, 0.22, 1.0, 7.0])
 N = np.full(V.shape, 100.0)
@@ -180,9 +179,7 @@ def test_temperature_may_differ_from_point_to_point() -> None:
     ],
 )
 def test_bad_tables_are_told_in_a_sentence(speeds, values, shift, said) -> None:
-    with pytest.raises(UserError, match=said) as caught:
-        characteristic(speeds, values, "mu.csv", **shift)
-    assert str(caught.value).startswith("mu.csv: ")
+    assert refused(said, characteristic, speeds, values, "mu.csv", **shift).startswith("mu.csv: ")
 
 
 # random in time ------------------------------------------------------------------------------------------------------
@@ -254,8 +251,7 @@ def test_scatter_never_makes_friction_negative() -> None:
     ("deviation", "memory", "said"), [(-0.1, 1.0, "deviation"), (0.1, 0.0, "memory"), (np.nan, 1.0, "deviation")]
 )
 def test_bad_scatter_is_told_in_a_sentence(deviation, memory, said) -> None:
-    with pytest.raises(UserError, match=said):
-        scattered(Coulomb(value(0.3)), deviation, memory)
+    refused(said, scattered, Coulomb(value(0.3)), deviation, memory)
 
 
 def test_scattered_settings_are_leaves() -> None:

@@ -29,7 +29,6 @@ from microslip.contact.heights import (
 from microslip.contact.normal import Greenwood, Hyperbolic, Penalty, Potential, Rough, measured
 from microslip.contact.sliders import rough_strips
 from microslip.contact.wear import course
-from microslip.errors import UserError
 
 TRIES = hypothesis_settings(max_examples=25, deadline=None, derandomize=True)
 C, R, L = 2.4e8, 12e-6, 120e-6
@@ -263,16 +262,15 @@ def test_different_shapes_combine_by_the_squares_of_their_depths() -> None:
 @pytest.mark.parametrize(
     ("x", "area", "sentence"),
     [
-        ([0, 1, 0.5], [0, 0.5, 1], r"x\[2\] = 0.5 lies below"),
+        ([0, 1, 0.5], [0, 0.5, 1], "x[2] = 0.5 lies below"),
         ([0, 0.5, 1], [0, 0.6, 0.5], "falls from 0.6 to 0.5"),
-        ([0, 0.5, 1], [0, np.nan, 1], r"area\[1\] is not a finite number"),
+        ([0, 0.5, 1], [0, np.nan, 1], "area[1] is not a finite number"),
         ([0, 0.5, 1], [0.1, 0.5, 1], "must go from 0 to 1"),
         ([0], [0], "two or more nodes"),
     ],
 )
 def test_a_wrong_height_distribution_is_told_in_a_sentence(x, area, sentence) -> None:
-    with pytest.raises(UserError, match=sentence):
-        tabulated(x, area)
+    refused(sentence, tabulated, x, area)
 
 
 def test_surfaces_without_depths_are_not_combined() -> None:

@@ -140,8 +140,7 @@ def test_yield_check_names_the_overloaded_points_the_worst_first():
     ],
 )
 def test_yield_check_refuses(arguments, words):
-    with pytest.raises(UserError, match=words):
-        Layer(IRON, 0.01).check_yield(*arguments)
+    refused(words, Layer(IRON, 0.01).check_yield, *arguments)
 
 
 # frequencies of the layer ------------------------------------------------------------------------------------------
@@ -210,8 +209,7 @@ def test_the_allowed_frequency_meets_the_tolerance_exactly(tolerance):
     ],
 )
 def test_layer_and_solid_refuse(make, words):
-    with pytest.raises(UserError, match=words):
-        make()
+    refused(words, make)
 
 
 # Hertz -------------------------------------------------------------------------------------------------------------
@@ -352,8 +350,7 @@ def test_moduli_of_a_pair():
     ],
 )
 def test_point_contacts_refuse(make, words):
-    with pytest.raises(UserError, match=words):
-        make()
+    refused(words, make)
 
 
 # any round profile -------------------------------------------------------------------------------------------------
@@ -452,15 +449,14 @@ def test_measured_profile_converges_to_the_function():
         (lambda: Profile.power(-1, 1e-6, 1e-3, 2e-3), "is not finite at r = "),
         (lambda: Profile.of_function(lambda r: r, 1e-3, corners=[2e-3]), "corners"),
         (lambda: RoundContact(IRON, IRON, Profile.of_table([0, 1, 2, 3], [0, 2, 0, 4])), "touches in a ring"),
-        (lambda: round_contact("cone").approach(1e9), "needs? a wider one|need a wider one"),
+        (lambda: round_contact("cone").approach(1e9), "a wider one"),
         (lambda: round_contact("cone").force(1.0), "needs a wider one"),
         (lambda: round_contact("cone").approach(-1.0), "must not be negative"),
     ],
 )
 @pytest.mark.filterwarnings("ignore::RuntimeWarning")
 def test_profiles_refuse(make, words):
-    with pytest.raises(UserError, match=words):
-        make()
+    refused(words, make)
 
 
 # partial slip ------------------------------------------------------------------------------------------------------
@@ -702,8 +698,7 @@ GOOD = RIG(np.array([82.5e6, 31.7e6]))
     ],
 )
 def test_resonances_that_tell_nothing_are_refused(resonances, words):
-    with pytest.raises(UserError, match=words):
-        identify(RIG, resonances)
+    refused(words, identify, RIG, resonances)
 
 
 def mass(name: str, normal: float) -> System:

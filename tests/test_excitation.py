@@ -134,8 +134,7 @@ def test_mistakes_are_told() -> None:
         ("24 blades have 0 to 12", lambda: excitation.index_of(13, "forward", 24)),
         ("at most a whole turn", lambda: excitation.magnets(np.zeros(1), 1.0, 7.0, 3)),
     ):
-        with pytest.raises(UserError, match=words):
-            call()
+        refused(words, call)
     loads = (Load("blade", "gas", 1.0, 5), Load("blade", "gas", 1.0, 2))
     (told,) = excitation.unheard(loads, 3)
     assert "harmonic 5" in told and "raise harmonics to 5" in told
@@ -280,12 +279,10 @@ def test_bad_fields_are_refused_in_a_sentence(tmp_path, beam: Component) -> None
         ("", "has no x, y, z, p_real"),
     ):
         path.write_text(text)
-        with pytest.raises(UserError, match=words):
-            pressure.read_field(path, "mm")
+        refused(words, pressure.read_field, path, "mm")
     for name, what in (("a.npz", "cannot be read as an .npz"), ("a.vtu", "is damaged"), ("a.xyz", "not read from")):
         (tmp_path / name).write_bytes(b"PK\x03\x04 damaged")
-        with pytest.raises(UserError, match=what):
-            pressure.read_field(tmp_path / name, "m")
+        refused(what, pressure.read_field, tmp_path / name, "m")
     refused("no such file", pressure.read_field, tmp_path / "nowhere.csv", "m")
     refused("has no face 'tip' with points", pressure.load_face, beam, "tip")
     bare = replace(beam.groups[0].interfaces["contact_left"], shapes=np.zeros((0, 3, 6)))
@@ -412,7 +409,6 @@ def test_bad_aerodynamic_tables_are_refused_in_a_sentence(tmp_path) -> None:
         (head + "0.5,,0,0\n", "a whole number and two numbers"),
     ):
         path.write_text(text)
-        with pytest.raises(UserError, match=words):
-            damping.read_aerodynamics(path, 3)
+        refused(words, damping.read_aerodynamics, path, 3)
     with pytest.raises(UserError, match="there is no such table; correct the name"):
         damping.read_aerodynamics(tmp_path / "nowhere.csv", 3)

@@ -136,8 +136,7 @@ def _other(**changed: object) -> Assembly:
 )
 def test_modal_files_that_do_not_fit(tuned: Tuned, of, words: str) -> None:
     """A body in whose place there is none."""
-    with pytest.raises(UserError, match=words):
-        tuned.check((Scatter("modal_file", others={4: of()}),))
+    refused(words, tuned.check, (Scatter("modal_file", others={4: of()}),))
     refused("sectors 0 to 5", tuned.check, (Scatter("modal_file", others={6: sector()}),))
 
 
@@ -452,8 +451,7 @@ def test_a_case_leaves_its_samples(tmp_path: Path) -> None:
         path.write_text(CASE.format(file=ms.sample(), samples=4, sector=sector))
         if words == "other.h5":
             (tmp_path / "other.h5").unlink()
-        with pytest.raises(UserError, match=words):
-            mistuning_stage(CaseJob(path, files, tmp_path, pictures=False), workers=1)
+        refused(words, mistuning_stage, CaseJob(path, files, tmp_path, pictures=False), workers=1)
     assert (tmp_path / "samples.csv").read_text().splitlines() == rows[8]
 
 
@@ -628,8 +626,7 @@ def test_a_table_tells_its_blades(tmp_path: Path) -> None:
                         ("blade,deviation\n1,0.1\n0,0.2\n", "2 of 4"),
                         ("frequency_Hz\n99\n0\n", "above zero"), ("frequency_Hz\n99\nnan\n", "finite")):  # fmt: skip
         file.write_text(text)
-        with pytest.raises(UserError, match=words):
-            _measured(file, "frequency", 4)
+        refused(words, _measured, file, "frequency", 4)
 
 
 def test_not_every_blade_of_an_odd_ring_is_against_the_next() -> None:

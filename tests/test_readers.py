@@ -149,7 +149,7 @@ SYSTEM = f"    -1\n  2420\n         1\nPart\n         1{{}}         8\nCS1\n{AXE
     ("old", "new", "words"),
     [
         ("       111", "       117", "element 101 is of the I-deas type 117"),
-        ("       111", "       118", r"element 101 has 4 nodes, its type 118 \(tetra10\) 10"),
+        ("       111", "       118", "element 101 has 4 nodes, its type 118 (tetra10) 10"),
         ("       102       111", "       101       111", "element 101 is defined twice"),
         ("  2411", "  2410", "no nodes"),
         ("         5        ", "        77        ", "which the file does not define"),
@@ -160,8 +160,7 @@ def test_universal_files_that_are_wrong(tmp_path: Path, old: str, new: str, word
     whole = unv(tetrahedra())
     assert old in whole
     (tmp_path / "a.unv").write_text(whole.replace(old, new, 1))
-    with pytest.raises(UserError, match=words):
-        read_mesh(tmp_path / "a.unv", "m")
+    refused(words, read_mesh, tmp_path / "a.unv", "m")
 
 
 SOLVED = """    -1
@@ -267,8 +266,8 @@ def test_bulk_data_runs_at_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
     ("old", "new", "words"),
     [
         ("CHEXA          1       1", "CHEXA          2       1", "element 2 is defined twice"),
-        ("CHEXA          1       1       1", "CHEXA          1       1        ", r"1 \(CHEXA\) has 7 nodes; 8 or 20"),
-        ("PSOLID         1       1", "PSOLID         1       3", r"MAT1 3 \(missing\)"),
+        ("CHEXA          1       1       1", "CHEXA          1       1        ", "1 (CHEXA) has 7 nodes; 8 or 20"),
+        ("PSOLID         1       1", "PSOLID         1       3", "MAT1 3 (missing)"),
         ("PSOLID         1 ", "PSOLID         2 ", "no PSOLID defines"),
         ("MAT1  ", "MAT9  ", "MAT9 1"),
         ("   7850.", "        ", "no density"),
@@ -283,8 +282,7 @@ def test_bulk_data_that_is_wrong(tmp_path: Path, old: str, new: str, words: str)
     whole = deck(bulk(meshes.brick("hexahedron", (1, 1, 2), (0.01, 0.012, 0.03))))
     assert old in whole
     (tmp_path / "a.bdf").write_text(whole.replace(old, new, -1 if "GRID" in old else 1))
-    with pytest.raises(UserError, match=words):
-        read_mesh(tmp_path / "a.bdf", "m", "m-kg-s")
+    refused(words, read_mesh, tmp_path / "a.bdf", "m", "m-kg-s")
 
 
 def test_grid_points_in_a_local_system_are_refused(tmp_path: Path) -> None:

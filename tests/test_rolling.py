@@ -251,16 +251,15 @@ def test_the_short_return_is_that_of_the_point_contact() -> None:
 @pytest.mark.parametrize(
     ("wrong", "said"),
     [
-        ({"normal_force": [1e5, -1e5]}, r"normal_force: must be greater than 0 \(entry 2 is -100000\)"),
-        ({"a": 0.0}, r"a: must be greater than 0 \(it is 0\)"), ({"spin": "none"}, "'kalker' or 'book'"),
-        ({"elements": (0, 20)}, "elements: is .* whole numbers"),
-        ({"eta": [0.0] * 3, "xi": [1e-3] * 2}, r"shapes do not go together: xi \(2,\), eta \(3,\)"),
+        ({"normal_force": [1e5, -1e5]}, "normal_force: must be greater than 0 (entry 2 is -100000)"),
+        ({"a": 0.0}, "a: must be greater than 0 (it is 0)"), ({"spin": "none"}, "'kalker' or 'book'"),
+        ({"elements": (0, 20)}, ("elements: is ", " whole numbers")),
+        ({"eta": [0.0] * 3, "xi": [1e-3] * 2}, "shapes do not go together: xi (2,), eta (3,)"),
     ],
 )  # fmt: skip
 def test_states_that_are_none_are_refused(wrong: dict, said: str) -> None:
     for model in (ms.creep_forces, ms.tractions):
-        with pytest.raises(UserError, match=said):
-            model(**{"xi": 1e-3, "eta": 0.0, "phi": 0.1, **PATCH, **wrong})
+        refused(said, model, **{"xi": 1e-3, "eta": 0.0, "phi": 0.1, **PATCH, **wrong})
 
 
 TRACK = {"wheel": ms.circle(0.5), "rail": ms.circle(0.3), "radius": 0.46, "wheel_at": 0.75, "rail_at": 0.75}
@@ -271,8 +270,7 @@ def test_a_read_table_refuses_what_is_no_state() -> None:
     table = ms.creep_table(NU, points=(4,) * 5, elements=(4, 4), checked=1)
     state = {k: v for k, v in STATE.items() if k != "poisson"}
     for key, v in (("friction", -0.3), ("xi", np.nan), ("normal_force", -1.0), ("shear", "x"), ("a", 0.0)):
-        with pytest.raises(UserError, match=key):
-            table.forces(**{**state, key: v})
+        refused(key, table.forces, **{**state, key: v})
     assert np.isfinite(table.forces(**{**state, "friction": 0.0})).all()
 
 

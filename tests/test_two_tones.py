@@ -263,7 +263,7 @@ def alone() -> Any:
         ("second", lambda: ms.two_tones(duffing(), 1.0, 1.0)),
         ("second", lambda: ms.two_tones(duffing(), 1.0, -2.0)),
         ("first", lambda: ms.two_tones(duffing(), 0.0, 1.0)),
-        (r"first: .* \(it is -1\)", lambda: ms.two_tones(duffing(), -1.0, 1.0)),
+        (("first: ", "(it is -1)"), lambda: ms.two_tones(duffing(), -1.0, 1.0)),
         ("two_tones: first: ", lambda: ms.two_tones(duffing(), "a", 1.0)),
         ("second: no load", lambda: ms.integrate(alone(), 1.0, second=0.7)),
         ("second", lambda: ms.two_tones(duffing(), [1.0, 1.1, 1.2], [2.0, 2.1])),
@@ -277,9 +277,8 @@ def alone() -> Any:
         ("pair", lambda: ms.two_tones(duffing(), 1.0, 1.4, harmonics=1).of(1, 1)),
     ],
 )
-def test_refused(key: str, ask: Any) -> None:
-    with pytest.raises(UserError, match=key):
-        ask()
+def test_refused(key: str | tuple[str, ...], ask: Any) -> None:
+    refused(key, ask)
 
 
 def test_faded() -> None:

@@ -219,21 +219,19 @@ def test_a_case_finds_its_body_wherever_it_is_run(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("script", "sentence"),
     [
-        ("import sys; sys.exit('the wall is thicker than the pipe')", "meshing failed.*thicker"),
+        ("import sys; sys.exit('the wall is thicker than the pipe')", ("meshing failed", "thicker")),
         ("import sys; print('wall = 9 is too much', file=sys.stderr); sys.exit(2)", "body.toml: wall = 9 is too much"),
-        ("raise ValueError('odd')", "meshing failed .ValueError: odd."),
+        ("raise ValueError('odd')", ("meshing failed", "ValueError: odd")),
         ("import os, signal; os.kill(os.getpid(), signal.SIGSEGV)", "signal 11"),
-        ("", "meshing failed .no message."),
-        ("raise ModuleNotFoundError(\"No module named 'gmsh'\")", "microslip.fem"),
+        ("", ("meshing failed", "no message")),
+        ("raise ModuleNotFoundError(\"No module named 'gmsh'\")", "microslip[fem]"),
         ("raise OSError('libGLU.so.1: cannot open shared object file')", "libGLU.so.1; type: sudo apt-get install"),
     ],
 )
-def test_a_mesher_that_fails_gives_one_sentence_and_leaves_the_old_mesh(box: Path, script: str, sentence: str) -> None:
+def test_a_mesher_that_fails_leaves_the_old_mesh(box: Path, script: str, sentence: str | tuple[str, ...]) -> None:
     old = (box / MESH).read_bytes()
     (box / "build.py").write_text(script)
-    with pytest.raises(UserError, match=sentence) as caught:
-        run_chain(box)
-    assert "\n" not in str(caught.value)
+    refused(sentence, run_chain, box)
     assert (box / MESH).read_bytes() == old
     assert not list((box / "meshes").glob(".*"))
 
