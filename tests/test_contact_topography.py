@@ -156,13 +156,9 @@ def test_a_wrong_file_is_told_in_a_sentence(tmp_path, text, sentence) -> None:
     refused((sentence, str(path)), read_profile, path, "um")
 
 
-def test_a_missing_file_and_an_unknown_unit_are_told(tmp_path) -> None:
+def test_missing_files_units_and_extras_are_told(tmp_path, monkeypatch) -> None:
     refused("cannot be read", read_profile, tmp_path / "none.txt", "um")
-    with pytest.raises(UserError, match="unknown unit of length 'furlong'"):
-        read_profile(written(tmp_path, lines({})), ("mm", "furlong"))
-
-
-def test_files_of_instruments_without_the_extra(tmp_path, monkeypatch) -> None:
+    refused("unit of length 'furlong'", read_profile, written(tmp_path, lines({})), ("mm", "furlong"))
     monkeypatch.setitem(__import__("sys").modules, "SurfaceTopography", None)
     refused('pip install "microslip[profile]"', read_profile, tmp_path / "disc.sur", "um")
 

@@ -18,7 +18,6 @@ from meshes import body, moved, nearest, rotation_matrix, with_sets
 from refusals import refused
 
 from microslip.data import Mesh
-from microslip.errors import UserError
 from microslip.fem.cyclic import pair_cut_faces
 from microslip.mesh import boundary_facets
 from microslip.modal.compute import modal_basis
@@ -430,10 +429,6 @@ def test_nodal_diameters_asked_for():
         np.testing.assert_allclose(found.groups[0, k].omega, basis().groups[0, k].omega, rtol=1e-10)
 
 
-def test_a_ring_of_another_number_of_sectors_is_refused():
-    refused("cyclic", modal_basis, sector(), settings(7, sector()))
-
-
 def with_line():
     """The sector with the set ``line``: nodes of the bore on one parallel to the axis."""
     mesh, bore = sector(), sector().face_points("bore")
@@ -452,11 +447,6 @@ def test_a_ring_held_where_its_sector_alone_could_turn():
     for k in range(4):
         K, M, _, _ = full.fourier(whole_ring, k)
         np.testing.assert_allclose(found.groups[0, k].omega[:8], rings.spectrum(K, M, 8), rtol=1e-9)
-
-
-def test_a_ring_that_nothing_holds_is_refused():
-    with pytest.raises(UserError, match="nothing holds the body against .*rotation about y"):
-        modal_basis(sector(), settings(6, sector(), supports=[{"face": "bore", "directions": "y"}]))
 
 
 @pytest.mark.parametrize(
@@ -507,17 +497,18 @@ def flipped() -> Mesh:
     return replace(mesh, faces=faces)
 
 
-def test_facets_that_do_not_match_over_nodes_that_do_are_refused():
-    with pytest.raises(UserError, match="cyclic: the nodes .* meet, but not their facets"):
-        modal_basis(flipped(), body(supports=[{"face": "bore"}], cyclic={"sectors": 12}, modes={"count": 4}))
-
-
-def test_faces_that_do_not_match_are_refused():
-    """A point of the right face pushed along it by a hundredth of a cell."""
+def test_faces_that_do_not_match_and_rings_that_nothing_holds_are_refused():
+    """Another number of sectors, a point pushed along its face by a hundredth of a cell, other facets over nodes that
+    meet; and supports along the axis alone."""
     mesh = sector()
     points = mesh.points.copy()
     points[mesh.face_points("cyclic_right")[3]] += [0.0, 2e-4, 0.0]
+    refused("cyclic", modal_basis, mesh, settings(7, mesh))
     refused("cyclic", modal_basis, replace(mesh, points=points), settings(6, mesh))
+    twelve = body(supports=[{"face": "bore"}], cyclic={"sectors": 12}, modes={"count": 4})
+    refused(("cyclic: the nodes ", "meet, but not their facets"), modal_basis, flipped(), twelve)
+    sliding = settings(6, mesh, supports=[{"face": "bore", "directions": "y"}])
+    refused(("nothing holds the body against", "rotation about y"), modal_basis, mesh, sliding)
 
 
 @pytest.mark.parametrize(

@@ -14,7 +14,6 @@ from rings import bladed_sector
 
 from microslip.basis import check_basis, read_basis, write_basis
 from microslip.case import CaseSettings, run_case
-from microslip.errors import UserError
 from microslip.fem.discretise import discretise, free_upper
 from microslip.linalg import eigen
 from microslip.modal.boundary import fixed_dofs
@@ -160,18 +159,17 @@ def test_an_interface_on_the_clamp_is_refused(method):
     assert np.abs(modal_basis(mesh(), rubin).groups[0, 0].interfaces["base"].rows).max() == 0
 
 
-def test_a_patch_whose_roller_holds_one_direction_is_refused_by_name():
+def test_patches_that_cannot_have_coordinates_are_refused():
+    """A roller holds one direction of the patch; more shapes than it has; shapes of a sector."""
+    few = {"supports": [{"face": "x0"}], "modes": {"count": 4}}
     rolling = [{"face": "x0"}, {"face": "y1", "directions": "y"}]
-    settings = body(
-        supports=rolling, interfaces=[{"name": "roll", "face": "y1"}], modes={"count": 4}, reduction="craig-bampton"
-    )
-    refused("roll", modal_basis, mesh(), settings)
-
-
-def test_more_shapes_than_the_patch_has_are_refused():
-    settings = body(supports=[{"face": "x0"}], interfaces=[{**SHAPES, "count": 400}], modes={"count": 4})
-    with pytest.raises(UserError, match="interfaces.right.count: the patch has 75 free displacements"):
-        modal_basis(mesh(), settings)
+    rolls = {"interfaces": [{"name": "roll", "face": "y1"}], "reduction": "craig-bampton", "supports": rolling}
+    refused("roll", modal_basis, mesh(), body(**few | rolls))
+    many = body(**few, interfaces=[{**SHAPES, "count": 400}])
+    refused(("interfaces.right.count", "75 free displacements"), modal_basis, mesh(), many)
+    shapes = {"name": "right", "face": "contact_right", "coordinates": "characteristic", "count": 2}
+    sector = body(**few | {"supports": [{"face": "bore"}]}, cyclic={"sectors": 6}, interfaces=[shapes])
+    refused("interfaces.right.coordinates", modal_basis, bladed_sector(), sector)
 
 
 @pytest.mark.parametrize("wrong", [
@@ -222,12 +220,6 @@ def test_every_method_reduces_a_sector_at_every_nodal_diameter(method):
         scale = np.sqrt(np.diag(g.compliance.static).real)
         error = np.abs(g.compliance.residual / np.outer(scale, scale)).max()
         assert error < 1e-8 or (error > 0.1 and method in ("eigenmodes", "macneal"))
-
-
-def test_characteristic_shapes_of_a_sector_are_refused():
-    shapes = {"name": "right", "face": "contact_right", "coordinates": "characteristic", "count": 2}
-    settings = body(supports=[{"face": "bore"}], cyclic={"sectors": 6}, interfaces=[shapes], modes={"count": 4})
-    refused("interfaces.right.coordinates", modal_basis, bladed_sector(), settings)
 
 
 def test_springs_between_neighbours_refuse_forces_for_coordinates():

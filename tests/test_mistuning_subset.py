@@ -190,11 +190,8 @@ def test_part_of_a_sector():
     assert not np.allclose(up, both, atol=1e-3 * np.abs(both - tuned).max())
 
 
-@pytest.mark.parametrize("deviation", [np.zeros(4), np.full(N, -1.0)])
-def test_deviations_that_are_none(deviation):
-    refused((), mistuned, disc(4), deviation)
-
-
-def test_what_is_not_in_the_file():
+def test_deviations_that_are_none_and_what_is_not_in_the_file_are_refused():
+    for deviation in (np.zeros(4), np.full(N, -1.0)):
+        refused((), mistuned, disc(4), deviation)
     refused((), mistuned, disc(4, gauss=False), np.zeros(N))
     refused((), mistuned, Component("blade", {0: disc(4).groups[0]}), np.zeros(1))

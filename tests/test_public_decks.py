@@ -252,8 +252,7 @@ def test_touching_parts_of_a_deck_become_bodies_in_contact(tmp_path, monkeypatch
         np.testing.assert_allclose(basis.groups[0, 0].frequency[:2], [4294.67, 5245.33], rtol=3e-6)
         assert basis.groups[0, 0].interfaces[other].areas.sum() == pytest.approx(80e-6)
     (tmp_path / "one.inp").write_text(deck(block()))
-    assert main(["import", "one.inp", "--apart"]) == 2
-    assert "is one part: there is nothing to set apart" in capsys.readouterr().err
+    refused_command(["import", "one.inp", "--apart"], capsys, "there is nothing to set apart")
 
 
 FACES = {"SMALL": "a_z1", "LARGE": "b_z0", "SIDE": "b_z1"}
@@ -287,20 +286,8 @@ def test_a_contact_pair_is_the_same_in_either_order(tmp_path, monkeypatch, capsy
         (tmp_path / f"{name}.inp").write_text(paired(plate_and_block(cells), pair))
         assert main(["import", f"{name}.inp"]) == 0
         said.append(capsys.readouterr().out)
-        assert (
-            main(
-                [
-                    "modes",
-                    f"{name}/part-2",
-                    "-q",
-                    "--set",
-                    "modes.solver=superlu",
-                    "--set",
-                    "modes.count=4",
-                ]
-            )
-            == 0
-        )
+        sets = ["--set", "modes.solver=superlu", "--set", "modes.count=4"]
+        assert main(["modes", f"{name}/part-2", "-q", *sets]) == 0
         faces = read_basis(tmp_path / "build" / "part-2" / "basis.h5").groups[0, 0].interfaces
         areas += [(key, face.areas.sum()) for key, face in faces.items()]
         case = tomllib.loads((tmp_path / name / "case.toml").read_text())
@@ -341,13 +328,9 @@ def test_numbers_of_a_deck_that_hold_or_press_nothing_are_told(tmp_path, monkeyp
     text = pair.replace("b_x0, 1, 3", "b_x0, 3, 1") + "\n".join(BOLT) + "\n"
     said = imported(tmp_path, monkeypatch, capsys, "a.inp", text)
     assert "not taken as a support: the line 'b_x0, 3, 1' of *BOUNDARY" in said
-    assert (
-        "the preload -800 N presses nothing together: not used" in said
-        and "preload -800 N\n" not in said
-    )
-    assert tomllib.loads((tmp_path / "body" / "case.toml").read_text())["sweep"][
-        "normal_forces"
-    ] == [1000.0]
+    assert "the preload -800 N presses nothing together: not used" in said
+    case = tomllib.loads((tmp_path / "body" / "case.toml").read_text())
+    assert case["sweep"]["normal_forces"] == [1000.0]
     (tmp_path / "b.inp").write_text(pair.replace("\n0.15\n", "\n-0.15\n"))
     refused_command(["import", "b.inp"], capsys, "*FRICTION has the coefficient -0.15")
     assert not (tmp_path / "b").exists()
@@ -355,10 +338,7 @@ def test_numbers_of_a_deck_that_hold_or_press_nothing_are_told(tmp_path, monkeyp
     (tmp_path / "c.inp").write_text(pair.replace("*FRICTION\n0.15", more))
     assert main(["import", "c.inp"]) == 0
     said = capsys.readouterr().out
-    assert (
-        "of *FRICTION only the first coefficient" in said
-        and "*SURFACE BEHAVIOR is not read" in said
-    )
+    assert "of *FRICTION only the first" in said and "*SURFACE BEHAVIOR is not read" in said
 
 
 def test_left_handed_tetrahedra_and_wedges_are_turned(tmp_path):

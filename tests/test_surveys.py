@@ -294,11 +294,7 @@ def test_respond_over_speeds(tmp_path, monkeypatch, capsys) -> None:
         ('normal_force = "static"', "no closure on interface"),
     ):
         path.write_text(text + change)
-        assert main(["respond", "case.toml", "--over", "speeds"]) == 2
-        assert words in "".join(capsys.readouterr())
-    path.write_text(text.replace("engine_order = 4\n", ""))
-    assert main(["respond", "case.toml", "--over", "speeds"]) == 2
-    assert "no engine order is named" in "".join(capsys.readouterr())
+        refused_command(["respond", "case.toml", "--over", "speeds"], capsys, words)
 
 
 def test_speeds_of_a_body_without_a_range_in_the_books_mode(tmp_path, monkeypatch, capsys) -> None:
