@@ -152,7 +152,7 @@ OF_FILE = f'{BEFORE}file = "contact.toml"\nincludes = "surface"\n{AFTER}'
         (CASE, ['mode="books"'], "mode"),
         (CASE, ['mode="book"', "strips=-1"], "strips"),
         (JENKINS, [], 'case.toml: mode: "book" needs point contacts'),
-        (OF_FILE, [], ("case.toml: contacts.right: book mode: friction StaticSliding", "aft")),
+        (OF_FILE, ['mode="book"'], ("case.toml: contacts.right: book mode: friction StaticSliding", "aft")),
     ],
 )
 def test_modes_that_are_none(folder: Path, text: str, changes: list[str], said: str | tuple[str, ...]) -> None:

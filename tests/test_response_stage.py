@@ -700,27 +700,22 @@ def test_a_modal_file_that_is_not_there(folder: Path, monkeypatch: pytest.Monkey
         for old, new in changes:
             text = text.replace(old, new)
         (folder / "mine/vane.toml").write_text(text)
-        with pytest.raises(UserError) as caught:
-            verb(Path(path), None) if verb is running.respond else verb(Path(path))
-        assert "\n" not in str(caught.value)
-        return str(caught.value)
+        return refused((), verb, Path(path), *([None] if verb is running.respond else []))
 
     assert "is 'vane-eigenmodes' meant?" in said("mine/vane.toml", ("vane-eigenmodes", "vane-eigenmode"))
     assert "the bodies here are vane-eigenmodes" in said("mine/vane.toml", ("vane-eigenmodes", "fan"))
     nowhere = said("mine/vane.toml", ('body = "vane-eigenmodes"', several), ('= "magnet"', '= "vane:magnet"'))
-    assert "no file mine/gone.h5; paths in a case start in the folder of the case" in nowhere
+    assert "no file mine/gone.h5" in nowhere
     monkeypatch.chdir(folder / "mine")
     moved = said("vane.toml")
-    assert f"it is in {folder}: go there (cd {folder}) and give the case as mine/vane.toml" in moved
-    assert str(folder / "mine") in moved.split(";")[0]
+    assert f"cd {folder}" in moved and "mine/vane.toml" in moved and str(folder / "mine") in moved.split(";")[0]
 
 
 def test_a_body_that_can_be_made_is(folder: Path) -> None:
     (folder / "basis.h5").unlink()
     (folder / "geometry/vane-eigenmodes").mkdir(parents=True)
     (folder / "geometry/vane-eigenmodes/body.toml").write_text('name = "vane-eigenmodes"\n')
-    with pytest.raises(UserError, match="no .*basis.h5 .*; microslip run .*case.toml makes it"):
-        running.respond(folder / "case.toml", None)
+    refused(("basis.h5", "microslip run", "case.toml makes it"), running.respond, folder / "case.toml", None)
 
 
 def test_what_jenkins_elements_do_not_follow_is_told(folder: Path) -> None:

@@ -194,7 +194,7 @@ def test_matrices_in_a_file(tmp_path: Path) -> None:
         ('"m2", "m3"', '"m2", "m7"', "no component 'm7'"),
         ('on = "m3"', 'on = "m4"', "no component 'm4'"),
         ("[0.0, 1.0, 0.0]", "[0.0, 0.0, 1.0]", "parallel to the normal"),
-        ('name = "m2"', 'name = "m1"', ("masses: ", "'m1'")),
+        ('name = "m2"', 'name = "m1"', "masses: the name 'm1'"),
         ('name = "m2"', 'name = "m2"\nwheight = 2', "wheight"),
         ("damping_ratio = 0.005", "damping_ratio = true", "damping_ratio"),
         ("damping_ratio = 0.005", "[matrices]\nmass = [[1.0]]\nstiffness = [[1.0]]", "free to move in 3 directions"),
