@@ -247,11 +247,11 @@ def test_scatter_never_makes_friction_negative() -> None:
     assert mu.min() == 0 and mu.max() > 0.3
 
 
-@pytest.mark.parametrize(
-    ("deviation", "memory", "said"), [(-0.1, 1.0, "deviation"), (0.1, 0.0, "memory"), (np.nan, 1.0, "deviation")]
-)
-def test_bad_scatter_is_told_in_a_sentence(deviation, memory, said) -> None:
-    refused(said, scattered, Coulomb(value(0.3)), deviation, memory)
+def test_bad_scatter_and_films_are_told_in_a_sentence() -> None:
+    for deviation, memory, said in ((-0.1, 1.0, "deviation"), (0.1, 0.0, "memory"), (np.nan, 1.0, "deviation")):
+        refused(said, scattered, Coulomb(value(0.3)), deviation, memory)
+    refused("do not touch", lubricated, Polynomial(), [0.5, 0.0], [1.0], 0.1)
+    refused("film", lubricated, Polynomial(), [0.5], [1.0], 0.1, 0.0)
 
 
 def test_scattered_settings_are_leaves() -> None:
@@ -315,11 +315,6 @@ def test_the_fluid_part_diverges_with_the_logarithm_of_the_film(u) -> None:
     slope = np.polyfit(np.log(films), fluid, 1)[0]
     exact = -0.1 * 2.0 * 6 * u * (1 - u) / (u**3 - 0.5 * u**4)
     assert slope == pytest.approx(exact, rel=3e-4)  # next term: film p'(u)
-
-
-def test_lubricated_needs_contact_and_a_film() -> None:
-    refused("do not touch", lubricated, Polynomial(), [0.5, 0.0], [1.0], 0.1)
-    refused("film", lubricated, Polynomial(), [0.5], [1.0], 0.1, 0.0)
 
 
 # smoothed ------------------------------------------------------------------------------------------------------------

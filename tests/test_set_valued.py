@@ -167,10 +167,9 @@ def test_nothing_begins_behind_what_is_rigid() -> None:
     it were not."""
     for gap, start in ((-0.1, "rest"), (-0.1, "static"), (0.1, {"displacement": {0: 0.5}})):
         swing = ms.structure(1.0, 1.0, 0.1, force={0: 0.2}, elements=[ms.stop(math.inf, gap, restitution=0.5)])
-        with pytest.raises(UserError, match="start: begins 0.[14] m behind stop 1"):
-            ms.integrate(swing, 0.2, start=start)
-    with pytest.raises(UserError, match="start: begins 0.4 m behind stop 1"):
-        ms.integrate_many(swing, 0.2, [[0.0], [0.5]], [[0.0], [0.0]])
+        behind = f"start: begins {0.1 if gap < 0 else 0.4} m behind stop 1"
+        refused(behind, ms.integrate, swing, 0.2, start=start)
+    refused("0.4 m behind stop 1", ms.integrate_many, swing, 0.2, [[0.0], [0.5]], [[0.0], [0.0]])
     ms.integrate(swing, 0.2, settle=0, keep=1, start={"displacement": {0: 0.1}})  # where it touches
 
 

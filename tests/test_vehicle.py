@@ -97,6 +97,11 @@ def test_slow_hunting_has_the_wave_of_klingel(vehicle: motion.Vehicle) -> None:
     assert motion.hunting(slow).imag == pytest.approx(wave, rel=0.05)
 
 
+@pytest.fixture(autouse=True)
+def there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+
+
 RATES = jax.jit(motion.rates, static_argnums=1)
 
 
@@ -287,8 +292,7 @@ def asked(*changes: str) -> list[str]:
     return ["roll", str(CASE), *(w for c in (*SHORT, *changes) for w in ("--set", c)), "--no-pictures", "-q"]
 
 
-def test_a_case_from_the_command_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
+def test_a_case_from_the_command_line(tmp_path: Path) -> None:
     assert main(asked()) == 0
     folder = tmp_path / "build" / "unround-wheel"
     rows = list(csv.DictReader((folder / "growth.csv").open()))
@@ -378,22 +382,16 @@ def test_a_groove_is_told_of_the_profile_that_touches(rolling: wearing.Rolling) 
         ("wear.updates=5", "wear.updates"),
     ],
 )
-def test_bad_input(
-    change: str, key: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_bad_input(change: str, key: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """A vehicle that hunts, a wheel that leaves its rail, too few places, a reach beyond the profile, a key
     of rolling cases that wheels out of round have not: exit 2."""
-    monkeypatch.chdir(tmp_path)
     assert main(asked(change)) == 2
     assert key in capsys.readouterr().err and not list((tmp_path / "build" / "unround-wheel").glob("[!.]*"))
 
 
 @pytest.mark.slow
-def test_a_run_that_ends_keeps_what_it_has(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_run_that_ends_keeps_what_it_has(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """The wheel leaves its rail after wear has gone on for a while: exit 1, tables of what was found."""
-    monkeypatch.chdir(tmp_path)
     assert main(asked("wear.coefficient=1e-9", "wear.tolerance=1e-5", "running.turns=1e6")) == 1
     rows = list(csv.DictReader((tmp_path / "build" / "unround-wheel" / "growth.csv").open()))
     assert 1 < len(rows) and float(rows[-1]["total_turns"]) < 1e6
@@ -430,12 +428,9 @@ def written(folder: Path, columns: dict[str, np.ndarray]) -> Path:
     return folder / "case.toml"
 
 
-def test_wear_by_a_file_is_that_of_the_vehicle_that_wrote_it(
-    rolling: wearing.Rolling, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_wear_by_a_file_is_that_of_the_vehicle_that_wrote_it(rolling: wearing.Rolling, tmp_path: Path) -> None:
     """Depth where the contact runs, 1e5 turns of it, profiles kept; its volume is the coefficient times the work."""
     columns, now = table(rolling)
-    monkeypatch.chdir(tmp_path)
     case = written(tmp_path, columns)
     assert main(["roll", str(case), "--set", 'wear.profile="kept"', "--no-pictures", "-q"]) == 0
     rows = list(csv.DictReader((tmp_path / "build" / "given" / "circumference.csv").open()))
@@ -546,10 +541,9 @@ def test_a_place_wears_as_a_wheel_that_runs_everywhere_as_there(rolling: wearing
 
 @pytest.mark.slow
 def test_a_groove_that_splits_the_contact_ends_wear_by_a_file(
-    rolling: wearing.Rolling, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    rolling: wearing.Rolling, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Exit 1, and the tables of what was found."""
-    monkeypatch.chdir(tmp_path)
     case = str(written(tmp_path, table(rolling, 1)[0]))
     changes = ("kinematics.turns=1e6", "kinematics.places=24", "wear.tolerance=1e-6")
     assert main(["roll", case, *(w for c in changes for w in ("--set", c)), "--no-pictures"]) == 1
@@ -590,11 +584,10 @@ def cut(columns: dict[str, np.ndarray], kind: str) -> dict[str, np.ndarray]:
 
 @pytest.mark.parametrize("kind", ["gap", "lateral_m", "normal_force_N", "time_s", "column", "turn", "wheel, rail"])
 def test_kinematics_that_no_wheel_has(
-    kind: str, rolling: wearing.Rolling, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+    kind: str, rolling: wearing.Rolling, tmp_path: Path,
     capsys: pytest.CaptureFixture[str],
 ) -> None:  # fmt: skip
     """One sentence, exit 2, nothing written."""
-    monkeypatch.chdir(tmp_path)
     file = str(written(tmp_path, cut(table(rolling)[0], kind)))
     refused_command(["roll", file, "--no-pictures", "-q"], capsys, kind)
     assert not (tmp_path / "build" / "given" / "circumference.csv").exists()

@@ -13,7 +13,6 @@ from box import edit, write_box
 from refusals import refused
 
 from microslip.basis import read_basis
-from microslip.errors import UserError
 from microslip.files import store
 from microslip.settings.toml import load_toml
 from microslip.stages import meshing, modal, places, response, running
@@ -241,16 +240,14 @@ def test_a_mesher_that_may_not_be_started_is_not_told_as_a_product(
 ) -> None:
     (tmp_path / "python").write_text("")
     monkeypatch.setattr("sys.executable", str(tmp_path / "python"))
-    with pytest.raises(UserError, match="python: cannot be started to draw the body .Permission denied."):
-        meshing.mesh_stage(open_job(box), force=True)
+    refused(("python: cannot be started", "Permission denied"), meshing.mesh_stage, open_job(box), force=True)
 
 
 @pytest.mark.parametrize("key", ["build", "cad", "mesh"])
 def test_a_missing_source_is_named_with_its_key(box: Path, key: str) -> None:
     edit(box / "body.toml", 'build = "build.py"', f'{key} = "gone.step"')
     edit(box / "body.toml", "[geometry.parameters]\nsize = [20.0, 30.0, 120.0]\n", "")
-    with pytest.raises(UserError, match=f"geometry.{key}: there is no file .*gone.step"):
-        run_chain(box)
+    refused((f"geometry.{key}: there is no file ", "gone.step"), run_chain, box)
 
 
 def test_temperatures_of_a_table_reach_the_nodes(box: Path) -> None:
@@ -390,8 +387,7 @@ def test_what_a_path_means(tmp_path, monkeypatch):
     assert places.meant(Path("build/own"), case=True) == Path("own/case.toml")
     assert places.meant(Path("own")) == Path("own") and places.meant(Path("away.toml")) == Path("away.toml")
     refused("is 'blade' meant", places.meant, Path("blad"))
-    with pytest.raises(UserError, match="no case here or of this name; there are blade, rig"):
-        places.meant(Path("geometry"), case=True)
+    refused("no case here or of this name; there are blade, rig", places.meant, Path("geometry"), case=True)
 
 
 FEW = ["sweep.start=350.0", "sweep.stop=420.0", "sweep.points=5", "sweep.normal_forces=[100.0]", "harmonics=1",
