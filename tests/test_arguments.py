@@ -14,6 +14,7 @@ from refusals import refused
 
 import microslip as ms
 from microslip.contact.friction import Coulomb
+from microslip.errors import UserError
 from microslip.rolling.ellipse import Elastic
 
 NAN, INF = math.nan, math.inf
