@@ -15,7 +15,6 @@ from test_neighbours import N, mesh, settings, whole  # noqa: F401 (fixtures)
 
 from microslip.contact.patch import Patch, grid
 from microslip.data import ModalBasis
-from microslip.errors import UserError
 from microslip.harmonic_balance import envelope, identification, response
 from microslip.harmonic_balance import problem as balance
 from microslip.harmonic_balance.envelope import _snake
@@ -201,8 +200,7 @@ def test_combinations_change_one_value_at_a_time() -> None:
     order = list(_snake([[1, 2, 3], [4, 5], [6, 7, 8]]))
     assert len({tuple(x) for x in order}) == 18
     assert all(sum(a != b for a, b in zip(x, y, strict=True)) == 1 for x, y in pairwise(order))
-    with pytest.raises(UserError, match="load: give one or more values"):
-        envelope.envelope(shaken, {"load": ()}, np.array([50.0]))
+    refused("load: give one or more", envelope.envelope, shaken, {"load": ()}, np.array([50.0]))
 
 
 def test_pictures_are_drawn(tmp_path, basis: ModalBasis) -> None:
