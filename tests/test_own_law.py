@@ -92,8 +92,6 @@ def package(tmp_path: Path) -> dict[str, str]:
 TYPED = """
 import json, sys
 from microslip.case import run
-from refusals import refused
-
 from microslip.cli import main
 run._Left.out = lambda *_: []  # no estimate of the error of harmonics
 for words in json.loads(sys.argv[1]):
