@@ -49,6 +49,9 @@ def counted(folder: Path) -> Counter[str]:
                     count["mathematics"] += 1
                 elif node.func.attr == "raises":
                     count["wording"] += 1
+            elif isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
+                if node.func.id in ("refused", "refused_command"):
+                    count["wording"] += 1
             elif isinstance(node, ast.FunctionDef) and node.name.startswith("test_"):
                 count["test functions"] += 1
     return count

@@ -13,6 +13,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 from closed_forms.oscillators import brusselator
+from refusals import refused
 from scipy.integrate import solve_ivp
 
 import microslip as ms
@@ -21,7 +22,6 @@ from microslip.bifurcation.diagram import Asked, Diagram, diagram
 from microslip.bifurcation.dynamics import Dynamics
 from microslip.bifurcation.recorded import Branches
 from microslip.bifurcation.shooting import Orbit, Shooting
-from microslip.errors import UserError
 
 
 def circling(z: Any, p: Any) -> Any:
@@ -270,41 +270,27 @@ def test_tables_of_a_diagram() -> None:
     assert circles().to_xarray()["parameter"].shape == (len(table),)
 
 
-def test_no_equilibrium_near_the_start() -> None:
+def test_what_cannot_be_followed_is_refused() -> None:
+    """No equilibrium, motions that grow without bounds, pairs of q'' + [[1, p], [-p, 2]] q = 0, which stand on the
+    imaginary axis until they meet at p = 1/2, one value, a contact that sticks."""
     system = Dynamics(lambda z, p, _: jnp.stack([z[0] ** 2 + 1 + p**2]), ("x",), np.ones(1))
-    with pytest.raises(UserError, match="no equilibrium"):
-        diagram(system, np.ones(1), Asked(0.0, 1.0))
+    refused("no equilibrium", diagram, system, np.ones(1), Asked(0.0, 1.0))
 
-
-def test_no_driven_motion_near_the_start() -> None:
-    """A motion that grows without bounds is no start: the sentence says what to try."""
-
-    def rate(z: Any, p: Any, angle: Any) -> Any:
+    def growing(z: Any, p: Any, angle: Any) -> Any:
         return jnp.stack([z[1], z[0] + 0.5 * z[0] ** 3 + jnp.cos(angle)])
 
-    system = Dynamics(rate, ("q", "v"), np.ones(2), 1.0, frequency=lambda p: p)
-    with pytest.raises(UserError, match="no periodic motion.*begin at"):
-        diagram(system, np.array([50.0, 10.0]), Asked(0.5, 1.0, nodes=4))
+    driven = Dynamics(growing, ("q", "v"), np.ones(2), 1.0, frequency=lambda p: p)
+    far = np.array([50.0, 10.0])
+    refused(("no periodic motion", "begin at"), diagram, driven, far, Asked(0.5, 1.0, nodes=4))
 
-
-def test_same_value_twice_is_refused() -> None:
-    with pytest.raises(UserError, match="stop"):
-        ms.bifurcate(brusselator(), 1.0, 1.0)
-
-
-def test_pairs_that_meet_without_damping_are_no_hopf_point() -> None:
-    """q'' + [[1, p], [-p, 2]] q = 0: both pairs stand on the imaginary axis until they meet at p = 1/2."""
-
-    def rate(z: Any, p: Any, _: Any) -> Any:
+    def meeting(z: Any, p: Any, _: Any) -> Any:
         return jnp.stack([z[2], z[3], -z[0] - p * z[1], p * z[0] - 2 * z[1]])
 
-    with pytest.raises(UserError, match=r"near 0\.\d+ of the parameter no single pair .*give the bodies damping"):
-        equilibria._sought(Dynamics(rate, tuple("abcd"), np.ones(4), 1.0), np.zeros(4), 0.5, np.sqrt(1.5))
-
-
-def test_contacts_that_stick_are_refused() -> None:
-    with pytest.raises(UserError, match="jenkins"):
-        ms.bifurcate(lambda p: ms.structure(1.0, 1.0, 0.02, elements=[ms.jenkins(1.0, p)]), 0.5, 1.0)
+    pairs = Dynamics(meeting, tuple("abcd"), np.ones(4), 1.0), np.zeros(4), 0.5, np.sqrt(1.5)
+    refused(("no single pair", "give the bodies damping"), equilibria._sought, *pairs)
+    refused("stop", ms.bifurcate, brusselator(), 1.0, 1.0)
+    sticks = lambda p: ms.structure(1.0, 1.0, 0.02, elements=[ms.jenkins(1.0, p)])  # noqa: E731
+    refused("jenkins", ms.bifurcate, sticks, 0.5, 1.0)
 
 
 @pytest.mark.slow
@@ -448,8 +434,7 @@ def test_alike_parts_that_are_not_coupled_are_refused_as_what_they_are(one: Any)
 
     start, rest = (1.5, [1.0, 1.5] * 2) if one is reacting else (-1.0, [0.0] * 4)
     system = Dynamics(rate, ("x", "y", "u", "v"), np.ones(4))
-    with pytest.raises(UserError, match="alike and not coupled"):
-        ms.bifurcate(system, start, start + 1.5, x=rest, orbits=False)
+    refused("alike and not coupled", ms.bifurcate, system, start, start + 1.5, x=rest, orbits=False)
 
 
 def test_extremes_lie_between_the_samples() -> None:

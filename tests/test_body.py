@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 import small
+from refusals import refused
 
 from microslip.errors import UserError
 from microslip.settings.body import BodySettings, implausible, load_body, validate
@@ -80,14 +81,8 @@ MISTAKES: list[tuple[dict[str, Any], str]] = [
     ({"material__axes": [[1, 0, 0], [1, 0, 0], [0, 0, 1]]}, "material: axes must be three directions at right angles"),
     ({"material__axes": [[1, 0, 0], [0, 0, 0], [0, 0, 1]]}, "axes must be three directions at right angles"),
     ({"material__temperature": [300.0]}, "temperature and modulus_factor come together"),
-    (
-        {"material__temperature": [300.0], "material__modulus_factor": [1.0, 0.9]},
-        "temperature and modulus_factor must have the same length",
-    ),
-    (
-        {"material__temperature": [400.0, 300.0], "material__modulus_factor": [1.0, 0.9]},
-        "temperature must rise from entry to entry",
-    ),
+    ({"material__temperature": [300.0], "material__modulus_factor": [1.0, 0.9]}, "must have the same length"),
+    ({"material__temperature": [400.0, 300.0], "material__modulus_factor": [1.0, 0.9]}, "temperature must rise"),
     ({"geometry": {"mesh": "a", "cad": "b"}}, "one of build, cad, mesh, matrices, and has cad and mesh"),
     ({"geometry": {}}, "geometry: needs exactly one of build, cad, mesh, matrices, and has none"),
     ({"geometry": {"mesh": ""}}, "geometry: needs exactly one of build, cad, mesh, matrices, and has none"),
@@ -341,14 +336,11 @@ def test_bare_text_is_text() -> None:
         ("name.sub=3", "'name' in body.toml is a value, not a table"),
         ("modes.count.sub=3", "'modes.count' in body.toml is a value"),
         ("interfaces.rihgt.t2=[0,0,1]", "has no entry 'rihgt' there; choose one of right, left"),
-        ("interfaces.right=3", "name the entry and its key; write --set interfaces.NAME.KEY=value"),
+        ("interfaces.right=3", "write --set interfaces.NAME.KEY=value"),
     ],
 )
 def test_overrides_that_fit_nowhere(text: str, words: str) -> None:
-    with pytest.raises(UserError) as error:
-        overridden(text)
-    assert words in str(error.value)
-    assert "\n" not in str(error.value)
+    refused(words, overridden, text)
 
 
 def test_mistakes_in_overrides_are_named_like_those_of_the_file() -> None:

@@ -7,6 +7,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from refusals import refused
 from test_assembly import sector
 
 from microslip.contact import EXAMPLES
@@ -484,8 +485,7 @@ def test_a_table_comes_back_as_it_was_written(tmp_path: object) -> None:
 
 def test_damaged_and_foreign_tables_are_told_in_a_sentence(tmp_path: object) -> None:
     path = tmp_path / "table.npz"
-    with pytest.raises(UserError, match="no such table"):
-        tables.read(path, "ellipse")
+    refused("no such table", tables.read, path, "ellipse")
     tables.write(KNOWN, path)
     whole = bytearray(path.read_bytes())
     for at in np.random.default_rng(0).integers(0, len(whole), 40):
@@ -498,14 +498,11 @@ def test_damaged_and_foreign_tables_are_told_in_a_sentence(tmp_path: object) -> 
             assert np.array_equal(found.arrays["edge"], KNOWN.arrays["edge"])
     for text in (b"", b"no archive", bytes(whole[:1000])):
         path.write_bytes(text)
-        with pytest.raises(UserError, match="damaged"):
-            tables.read(path, "ellipse")
+        refused("damaged", tables.read, path, "ellipse")
     tables.write(dataclasses.replace(KNOWN, kind="normal"), path)
-    with pytest.raises(UserError, match="something else"):
-        tables.read(path, "ellipse")
+    refused("something else", tables.read, path, "ellipse")
     np.savez(path, a=np.ones(3))
-    with pytest.raises(UserError, match="no table of microslip"):
-        tables.read(path, "ellipse")
+    refused("no table of microslip", tables.read, path, "ellipse")
 
 
 def test_a_kept_table_is_used_and_a_damaged_one_made_again(tmp_path: object) -> None:
@@ -551,8 +548,7 @@ def test_a_spline_has_the_fourth_order() -> None:
     ],
 )  # fmt: skip
 def test_other_laws_are_refused(law: object, strips: int, why: str) -> None:
-    with pytest.raises(UserError, match=why):
-        book.book_patch(patch(law), strips)
+    refused(why, book.book_patch, patch(law), strips)
 
 
 def test_more_harmonics_are_refused() -> None:

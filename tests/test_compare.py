@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 import sector
 import small
+from refusals import refused
 
 from microslip.basis import read_basis, write_basis
 from microslip.cli import main
 from microslip.data import ModalBasis, Rows
-from microslip.errors import UserError
 from microslip.modal.compute import modal_basis
 from microslip.modal.sampling import at_points, on_common_points
 from microslip.pictures import can_draw
@@ -70,8 +70,7 @@ def test_points_inside_see_the_shape_functions() -> None:
 def test_a_body_elsewhere_is_refused() -> None:
     for points in (finer().mesh.points * 1000, finer().mesh.points + 0.01):
         far = replace(finer(), mesh=replace(finer().mesh, points=points))
-        with pytest.raises(UserError, match="unit of length"):
-            on_common_points(small.basis(), far)
+        refused("unit of length", on_common_points, small.basis(), far)
 
 
 def test_the_same_mesh_is_left_as_it_is() -> None:

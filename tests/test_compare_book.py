@@ -12,13 +12,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+from refusals import refused
 from test_results import sweep
 
 from microslip.case.checkpoint import series_name
 from microslip.case.comparison import Pair, comparison_table, paired, sentence
 from microslip.case.messages import lifting
 from microslip.cli import main
-from microslip.errors import UserError
 from microslip.harmonic_balance.orbits import orbits
 from microslip.results import read_response, response_of, response_table, write_response
 from microslip.results.names import exact
@@ -139,37 +139,30 @@ def test_the_contact_of_a_whole_ring_that_lifts_off_is_named() -> None:
     assert "points of right of 3 would lift off, for 25 % of points and time at 20 Hz" in said
 
 
+JENKINS = CASE.replace('law = "rough"\nroughness = 2e-5\npoints = [2, 2]\n', 'law = "jenkins"\n')
+BEFORE, AFTER = CASE[: CASE.index("law =")], CASE[CASE.index("\n[sweep]") :]
+OF_FILE = f'{BEFORE}file = "contact.toml"\nincludes = "surface"\n{AFTER}'
+
+
 @pytest.mark.parametrize(
-    ("changes", "said"),
+    ("text", "changes", "said"),
     [
-        (['mode="book"', 'contacts.0.law="jenkins"', "contacts.0.roughness=1"], "roughness"),
-        (["strips=4"], "strips: belong to mode"),
-        (['mode="books"'], "mode"),
-        (['mode="book"', "strips=-1"], "strips"),
+        (CASE, ['mode="book"', 'contacts.0.law="jenkins"', "contacts.0.roughness=1"], "roughness"),
+        (CASE, ["strips=4"], "strips: belong to mode"),
+        (CASE, ['mode="books"'], "mode"),
+        (CASE, ['mode="book"', "strips=-1"], "strips"),
+        (JENKINS, [], 'case.toml: mode: "book" needs point contacts'),
+        (OF_FILE, ['mode="book"'], ("case.toml: contacts.right: book mode: friction StaticSliding", "aft")),
     ],
 )
-def test_modes_that_are_none(folder: Path, changes: list[str], said: str) -> None:
-    with pytest.raises(UserError, match=said):
-        running.respond(folder / "case.toml", None, changes)
-
-
-def test_the_closed_form_is_no_point_contact(folder: Path) -> None:
-    text = CASE.replace('law = "rough"\nroughness = 2e-5\npoints = [2, 2]\n', 'law = "jenkins"\n')
-    (folder / "case.toml").write_text(text)
-    with pytest.raises(UserError, match=r"case.toml: mode: \"book\" needs point contacts"):
-        running.compare_book(folder / "case.toml", None)
-
-
-def test_a_law_that_is_not_the_books_is_told_by_contact(folder: Path) -> None:
+def test_modes_that_are_none(folder: Path, text: str, changes: list[str], said: str | tuple[str, ...]) -> None:
     (folder / "contact.toml").write_text(
         'name = "shroud"\n[stiffness]\nkind = "given"\nnormal = 2e5\ntangential = 4e5\nincludes = "surface"\n'
         '[friction]\nkind = "static-sliding"\nstatic = 0.3\nsliding = 0.2\n'
     )
-    start, stop = CASE.index("law ="), CASE.index("\n[sweep]")
-    own = CASE[:start] + 'file = "contact.toml"\nincludes = "surface"\n' + CASE[stop:]
-    (folder / "case.toml").write_text(own)
-    with pytest.raises(UserError, match=r"case.toml: contacts.right: book mode: friction StaticSliding.*aft"):
-        running.respond(folder / "case.toml", None, ['mode="book"'])
+    (folder / "case.toml").write_text(text)
+    run = running.respond if changes else running.compare_book
+    refused(said, run, folder / "case.toml", None, changes)
 
 
 def test_resonances_are_paired_by_frequency() -> None:

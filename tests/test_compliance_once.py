@@ -12,6 +12,7 @@ import small
 from closed_forms.indentation import rectangle_compliance
 from meshes import STEEL, body, brick
 from patch_bounds import patch_bounds
+from refusals import refused
 from scipy.integrate import dblquad
 from test_reduction import block
 from test_truncation import chain
@@ -21,7 +22,6 @@ from microslip.case import CaseSettings
 from microslip.case.assemble import build
 from microslip.contact.solids import mean_inverse_distance
 from microslip.data import Array, Compliance, ModalBasis, ModalGroup
-from microslip.errors import UserError
 from microslip.harmonic_balance import reduced
 from microslip.modal.compute import modal_basis
 from microslip.reduced.compliance import contact_share, facing, sentence, shares, without_bulk
@@ -135,13 +135,10 @@ def test_a_stamp_is_stiffer_than_a_pressure_and_converges() -> None:
 
 def test_patches_that_cannot_be_examined_are_refused() -> None:
     mesh = brick("hexahedron20", (1, 1, 1), (0.1, B, H))
-    with pytest.raises(UserError, match="none"):
-        patch_bounds(mesh, body(supports=[{"face": "x0"}]))
+    refused("none", patch_bounds, mesh, body(supports=[{"face": "x0"}]))
     touching = [{**RIGHT, "partner": ""}, {"name": "side", "face": "y1", "t2": [0.0, 0.0, 1.0]}]
-    with pytest.raises(UserError, match="share points"):
-        patch_bounds(mesh, body(supports=[{"face": "x0"}], interfaces=touching))
-    with pytest.raises(UserError, match="touches a support"):
-        patch_bounds(mesh, body(supports=[{"face": "y0"}], interfaces=[{**RIGHT, "partner": ""}]))
+    for words, face, faces in (("share points", "x0", touching), ("touches a support", "y0", touching[:1])):
+        refused(words, patch_bounds, mesh, body(supports=[{"face": face}], interfaces=faces))
 
 
 def test_mean_inverse_distance_of_a_rectangle() -> None:
@@ -274,8 +271,8 @@ def test_bulk_is_taken_out_of_the_law_or_refused(blocks: dict[str, ModalBasis]) 
             assert abs(freed - target) < 0.5 * abs(twice - target), method
         assert any("become" in r for r in stuck("bulk+surface", 5e8, basis)[1])
         bulk = contact_share(basis.groups[0, 0], method, "u_n", "tip").beyond
-        with pytest.raises(UserError, match=r"contacts\.tip\.normal_stiffness.*bulk alone.*surface"):
-            stuck("bulk+surface", 1.01 / bulk, basis)
+        words = ("contacts.tip.normal_stiffness", "bulk alone", "surface")
+        refused(words, stuck, "bulk+surface", 1.01 / bulk, basis)
 
 
 def test_a_law_of_the_surface_gets_the_bulk_from_the_file(blocks: dict[str, ModalBasis]) -> None:

@@ -16,6 +16,7 @@ pytest.importorskip("jax")
 pytest.importorskip("matplotlib")
 
 import jax
+from refusals import refused_command
 
 from microslip.basis import read_basis
 from microslip.cli import _figure_of_the_book, main
@@ -406,20 +407,16 @@ def test_a_mistake_is_one_sentence(name: str, tmp_path: Path, capsys: pytest.Cap
     assert old in SMALL
     (tmp_path / "nan.txt").write_text("x y\n" + "\n".join(f"{i} {'nan' if i == 6 else i}" for i in range(1, 20)))
     file = write(tmp_path, SMALL.replace(old, new))
-    assert main(["contact", str(file), "-q", "-o", str(tmp_path / "out")]) == 2
-    err = capsys.readouterr().err
-    assert sentence in err and str(tmp_path) in err
-    assert err.count("error:") == 1 and "Traceback" not in err
+    line = ["contact", str(file), "-q", "-o", str(tmp_path / "out")]
+    assert refused_command(line, capsys, sentence, str(tmp_path)).count("error:") == 1
     assert sorted(f.name for f in tmp_path.iterdir()) == ["contact.toml", "nan.txt"]
 
 
 def test_a_missing_file_and_an_unknown_figure(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     for name in ("none.toml", "3.7-99"):
-        assert main(["contact", str(tmp_path / name)]) == 2
-        assert f"{tmp_path / name}: cannot be read" in capsys.readouterr().err
+        refused_command(["contact", str(tmp_path / name)], capsys, f"{tmp_path / name}: cannot be read")
     assert _figure_of_the_book(Path("fig-3.7-7")) == _figure_of_the_book(Path("3.7-7")) != Path("3.7-7")
-    assert main(["contact", "3.7-99"]) == 2
-    assert "3.7-99: there is no such figure; choose one of 3.5-2, 3.5-3" in capsys.readouterr().err
+    refused_command(["contact", "3.7-99"], capsys, "3.7-99: there is no such figure; choose one of 3.5-2")
 
 
 def test_a_contact_that_never_closes_is_told_so(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

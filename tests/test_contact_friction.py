@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from refusals import refused
 from scipy.integrate import quad
 from scipy.interpolate import pchip_interpolate
 
@@ -27,7 +28,6 @@ from microslip.contact.friction import (
     smoothed,
 )
 from microslip.contact.heights import Linear, Polynomial, tabulated
-from microslip.errors import UserError
 
 V = np.array([0.0, 1e-3, 0.02, 0.22, 1.0, 7.0])
 N = np.full(V.shape, 100.0)
@@ -179,9 +179,7 @@ def test_temperature_may_differ_from_point_to_point() -> None:
     ],
 )
 def test_bad_tables_are_told_in_a_sentence(speeds, values, shift, said) -> None:
-    with pytest.raises(UserError, match=said) as caught:
-        characteristic(speeds, values, "mu.csv", **shift)
-    assert str(caught.value).startswith("mu.csv: ")
+    assert refused(said, characteristic, speeds, values, "mu.csv", **shift).startswith("mu.csv: ")
 
 
 # random in time ------------------------------------------------------------------------------------------------------
@@ -249,12 +247,11 @@ def test_scatter_never_makes_friction_negative() -> None:
     assert mu.min() == 0 and mu.max() > 0.3
 
 
-@pytest.mark.parametrize(
-    ("deviation", "memory", "said"), [(-0.1, 1.0, "deviation"), (0.1, 0.0, "memory"), (np.nan, 1.0, "deviation")]
-)
-def test_bad_scatter_is_told_in_a_sentence(deviation, memory, said) -> None:
-    with pytest.raises(UserError, match=said):
-        scattered(Coulomb(value(0.3)), deviation, memory)
+def test_bad_scatter_and_films_are_told_in_a_sentence() -> None:
+    for deviation, memory, said in ((-0.1, 1.0, "deviation"), (0.1, 0.0, "memory"), (np.nan, 1.0, "deviation")):
+        refused(said, scattered, Coulomb(value(0.3)), deviation, memory)
+    refused("do not touch", lubricated, Polynomial(), [0.5, 0.0], [1.0], 0.1)
+    refused("film", lubricated, Polynomial(), [0.5], [1.0], 0.1, 0.0)
 
 
 def test_scattered_settings_are_leaves() -> None:
@@ -318,13 +315,6 @@ def test_the_fluid_part_diverges_with_the_logarithm_of_the_film(u) -> None:
     slope = np.polyfit(np.log(films), fluid, 1)[0]
     exact = -0.1 * 2.0 * 6 * u * (1 - u) / (u**3 - 0.5 * u**4)
     assert slope == pytest.approx(exact, rel=3e-4)  # next term: film p'(u)
-
-
-def test_lubricated_needs_contact_and_a_film() -> None:
-    with pytest.raises(UserError, match="do not touch"):
-        lubricated(Polynomial(), [0.5, 0.0], [1.0], 0.1)
-    with pytest.raises(UserError, match="film"):
-        lubricated(Polynomial(), [0.5], [1.0], 0.1, 0.0)
 
 
 # smoothed ------------------------------------------------------------------------------------------------------------

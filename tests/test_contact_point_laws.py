@@ -5,6 +5,7 @@ from __future__ import annotations
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from refusals import refused
 
 from microslip.contact.curves import curve, of_contact
 from microslip.contact.friction import Coulomb
@@ -17,7 +18,6 @@ from microslip.contact.point_laws import curve_point, hertz_point, rough_point, 
 from microslip.contact.profiles import Profile, RoundContact
 from microslip.contact.series import BULK, ContactStiffness, in_series, of_layer
 from microslip.contact.solids import Solid
-from microslip.errors import UserError
 
 STEEL, MU = Solid(2.1e11, 0.3), Coulomb(jnp.asarray(0.3))
 
@@ -69,8 +69,7 @@ def test_round_point_follows_its_profile():
     x, _ = cone.tangential_stiffness(200.0)
     assert sheared(law, float(cone.approach(200.0)), 1) == pytest.approx(float(x), rel=1e-3)
     assert law.stiffness_2 is None and law.includes == BULK
-    with pytest.raises(UserError, match="largest: 0 N"):
-        of_contact(cone, 0.0)
+    refused("largest: 0 N", of_contact, cone, 0.0)
 
 
 def test_curve_of_hertz_converges_to_hertz():
@@ -93,8 +92,7 @@ def test_layer_under_a_rough_surface_and_without_it():
     assert rough_point(ContactStiffness(1e9, (1e9, 1e9), "surface"), 1e-6, Polynomial(), MU).includes == "surface"
     both = rough_point(in_series(whole, whole), 7.5e-6, Polynomial(), MU)
     assert float(both.normal.stiffness_0) == pytest.approx(420e6)
-    with pytest.raises(UserError, match="roughness: -1 m"):
-        rough_point(whole, -1.0, Polynomial(), MU)
+    refused("roughness: -1 m", rough_point, whole, -1.0, Polynomial(), MU)
 
 
 def test_measured_curve_as_a_point():
@@ -104,5 +102,4 @@ def test_measured_curve_as_a_point():
     assert pressed(law, u) == pytest.approx(c.force(u), rel=1e-9, abs=1e-9)
     assert sheared(law, 6.5e-6, 2) == pytest.approx(0.5 * float(c.stiffness(6.5e-6)), rel=1e-6)
     assert law.includes == "surface"
-    with pytest.raises(UserError, match="ratio"):
-        curve_point(c, (0.4, 0.0), MU)
+    refused("ratio", curve_point, c, (0.4, 0.0), MU)

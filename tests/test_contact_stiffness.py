@@ -13,6 +13,7 @@ from closed_forms.bars import rod_frequencies
 from closed_forms.beams import euler_bernoulli
 from closed_forms.joined_beams import hinge_spring, shear_spring
 from meshes import STEEL, body, brick
+from refusals import refused
 from scipy.special import ellipe, ellipk, gamma
 
 from microslip.contact import joined_beams
@@ -128,21 +129,6 @@ def test_yield_check_names_the_overloaded_points_the_worst_first():
     assert calm.elastic and "at most 50 % of the yield limit, at point 2" in calm.sentence()
 
 
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        (([1e8, np.nan], 0.0, 2e8), "pressure: entry 2 is not finite"),
-        (([1e8, -1.0], 0.0, 2e8), "pressure: entry 2 is -1 Pa"),
-        (([1e8, 1e8], [0.0, 1.0, 2.0], 2e8), "shear: 3 entries for 2"),
-        (([1e8], 0.0, 0.0), "yield_shear"),
-        (([1e8, 1e8], 0.0, 2e8, None, ["a"]), "names: 1 entries for 2"),
-    ],
-)
-def test_yield_check_refuses(arguments, words):
-    with pytest.raises(UserError, match=words):
-        Layer(IRON, 0.01).check_yield(*arguments)
-
-
 # frequencies of the layer ------------------------------------------------------------------------------------------
 
 
@@ -189,28 +175,6 @@ def test_the_allowed_frequency_meets_the_tolerance_exactly(tolerance):
     beyond = layer.quasi_static(m.allowed * (1 + 1e-6), tolerance)
     assert not beyond.ok and "must not be used" in beyond.sentence()
     assert "meaningless" in layer.quasi_static(1e5, tolerance).sentence()
-
-
-@pytest.mark.parametrize(
-    ("make", "words"),
-    [
-        (lambda: Layer(IRON, 0.01, "free"), "boundary: 'free' is unknown; choose one of stress-free"),
-        (lambda: Layer(IRON, 0.0), "thickness"),
-        (lambda: Layer(IRON, 0.01, density=-1.0), "density"),
-        (lambda: Layer(Solid(1e6, 0.5), 0.01, "hydrostatic"), "poisson: 0.5"),
-        (lambda: Layer(IRON, 0.01).eigenfrequencies("normal"), "density: not given"),
-        (lambda: Layer(IRON, 0.01, density=1.0).eigenfrequencies("n"), "direction"),
-        (lambda: Layer(IRON, 0.01, density=1.0).quasi_static(-1.0), "frequency"),
-        (lambda: Layer(IRON, 0.01, density=1.0).quasi_static(1.0, 0.0), "tolerance"),
-        (lambda: Solid(0.0, 0.3), "young"),
-        (lambda: Solid(1.0, 0.6), "poisson"),
-        (lambda: Solid(1.0, 0.3, 0.0), "shear"),
-        (lambda: normal_modulus(RIGID, RIGID), "both bodies are rigid"),
-    ],
-)
-def test_layer_and_solid_refuse(make, words):
-    with pytest.raises(UserError, match=words):
-        make()
 
 
 # Hertz -------------------------------------------------------------------------------------------------------------
@@ -322,12 +286,9 @@ def test_half_curvatures_of_turned_cylinders_and_of_a_groove():
     angles = np.linspace(-np.pi / 2, np.pi / 2, 200_001)
     assert gap(turned) == pytest.approx(low) and low == pytest.approx(gap(angles).min(), rel=1e-9)
     assert high == pytest.approx(gap(angles).max(), rel=1e-9)
-    with pytest.raises(UserError, match="do not touch in a point"):
-        half_curvatures((np.inf, 0.02))
-    with pytest.raises(UserError, match="do not touch in a point"):
-        half_curvatures((0.01, 0.01), (np.inf, -0.009))
-    with pytest.raises(UserError, match="radius of curvature is 0"):
-        half_curvatures((0.0, 0.01))
+    refused("do not touch in a point", half_curvatures, (np.inf, 0.02))
+    refused("do not touch in a point", half_curvatures, (0.01, 0.01), (np.inf, -0.009))
+    refused("radius of curvature is 0", half_curvatures, (0.0, 0.01))
 
 
 def test_moduli_of_a_pair():
@@ -338,24 +299,6 @@ def test_moduli_of_a_pair():
     nu = 0.2  # Spence: a stamp that sticks has 4 G a ln(3 - 4 nu)/(1 - 2 nu), a smooth one 4 G a/(1 - nu)
     beta = mismatch(Solid(1e9, nu), RIGID)
     assert np.log((1 + beta) / (1 - beta)) / (2 * beta) == pytest.approx(np.log(3 - 4 * nu) / (1 - 2 * nu) * (1 - nu))
-
-
-@pytest.mark.parametrize(
-    ("make", "words"),
-    [
-        (lambda: Hertz(IRON, BRASS, 0.0, 1.0), "half curvatures"),
-        (lambda: Hertz(IRON, BRASS, np.nan, 1.0), "half curvatures"),
-        (lambda: Hertz.sphere(IRON, BRASS, 0.01).approach(-1.0), "must not be negative"),
-        (lambda: of_point_contact(Hertz.sphere(IRON, BRASS, 0.01), 0.0), "unloaded"),
-        (lambda: PartialSlip(Hertz.sphere(IRON, BRASS, 0.01), 0.0, 0.3), "normal_force"),
-        (lambda: PartialSlip(Hertz.sphere(IRON, BRASS, 0.01), 1.0, 0.0), "friction"),
-        (lambda: PartialSlip(Hertz.sphere(IRON, BRASS, 0.01), 1.0, 0.3, 2), "axis"),
-        (lambda: PartialSlip(Hertz.sphere(IRON, BRASS, 0.01), 1.0, 0.3).displacement(0.4), "more than friction holds"),
-    ],
-)
-def test_point_contacts_refuse(make, words):
-    with pytest.raises(UserError, match=words):
-        make()
 
 
 # any round profile -------------------------------------------------------------------------------------------------
@@ -447,6 +390,31 @@ def test_measured_profile_converges_to_the_function():
 @pytest.mark.parametrize(
     ("make", "words"),
     [
+        (lambda: Layer(IRON, 0.01).check_yield([1e8, np.nan], 0.0, 2e8), "pressure: entry 2 is not finite"),
+        (lambda: Layer(IRON, 0.01).check_yield([1e8, -1.0], 0.0, 2e8), "pressure: entry 2 is -1 Pa"),
+        (lambda: Layer(IRON, 0.01).check_yield([1e8] * 2, [0.0, 1.0, 2.0], 2e8), "shear: 3 entries for 2"),
+        (lambda: Layer(IRON, 0.01).check_yield([1e8], 0.0, 0.0), "yield_shear"),
+        (lambda: Layer(IRON, 0.01).check_yield([1e8] * 2, 0.0, 2e8, None, ["a"]), "names: 1 entries for 2"),
+        (lambda: Layer(IRON, 0.01, "free"), "boundary: 'free' is unknown; choose one of stress-free"),
+        (lambda: Layer(IRON, 0.0), "thickness"),
+        (lambda: Layer(IRON, 0.01, density=-1.0), "density"),
+        (lambda: Layer(Solid(1e6, 0.5), 0.01, "hydrostatic"), "poisson: 0.5"),
+        (lambda: Layer(IRON, 0.01).eigenfrequencies("normal"), "density: not given"),
+        (lambda: Layer(IRON, 0.01, density=1.0).eigenfrequencies("n"), "direction"),
+        (lambda: Layer(IRON, 0.01, density=1.0).quasi_static(-1.0), "frequency"),
+        (lambda: Layer(IRON, 0.01, density=1.0).quasi_static(1.0, 0.0), "tolerance"),
+        (lambda: Solid(0.0, 0.3), "young"),
+        (lambda: Solid(1.0, 0.6), "poisson"),
+        (lambda: Solid(1.0, 0.3, 0.0), "shear"),
+        (lambda: normal_modulus(RIGID, RIGID), "both bodies are rigid"),
+        (lambda: Hertz(IRON, BRASS, 0.0, 1.0), "half curvatures"),
+        (lambda: Hertz(IRON, BRASS, np.nan, 1.0), "half curvatures"),
+        (lambda: Hertz.sphere(IRON, BRASS, 0.01).approach(-1.0), "must not be negative"),
+        (lambda: of_point_contact(Hertz.sphere(IRON, BRASS, 0.01), 0.0), "unloaded"),
+        (lambda: PartialSlip(Hertz.sphere(IRON, BRASS, 0.01), 0.0, 0.3), "normal_force"),
+        (lambda: PartialSlip(Hertz.sphere(IRON, BRASS, 0.01), 1.0, 0.0), "friction"),
+        (lambda: PartialSlip(Hertz.sphere(IRON, BRASS, 0.01), 1.0, 0.3, 2), "axis"),
+        (lambda: PartialSlip(Hertz.sphere(IRON, BRASS, 0.01), 1.0, 0.3).displacement(0.4), "more than friction holds"),
         (lambda: Profile.of_table([0, 1], [0, 1]), "at least three"),
         (lambda: Profile.of_table([0, 1, 2], [0, np.nan, 1], "ball.csv"), "ball.csv: gap: entry 2 is not finite"),
         (lambda: Profile.of_table([0, 2, 1], [0, 1, 2]), "entry 3 does not rise"),
@@ -454,15 +422,14 @@ def test_measured_profile_converges_to_the_function():
         (lambda: Profile.power(-1, 1e-6, 1e-3, 2e-3), "is not finite at r = "),
         (lambda: Profile.of_function(lambda r: r, 1e-3, corners=[2e-3]), "corners"),
         (lambda: RoundContact(IRON, IRON, Profile.of_table([0, 1, 2, 3], [0, 2, 0, 4])), "touches in a ring"),
-        (lambda: round_contact("cone").approach(1e9), "needs? a wider one|need a wider one"),
+        (lambda: round_contact("cone").approach(1e9), "a wider one"),
         (lambda: round_contact("cone").force(1.0), "needs a wider one"),
         (lambda: round_contact("cone").approach(-1.0), "must not be negative"),
     ],
 )
 @pytest.mark.filterwarnings("ignore::RuntimeWarning")
-def test_profiles_refuse(make, words):
-    with pytest.raises(UserError, match=words):
-        make()
+def test_what_stands_for_no_contact_is_refused(make, words):
+    refused(words, make)
 
 
 # partial slip ------------------------------------------------------------------------------------------------------
@@ -531,14 +498,10 @@ def test_two_layers_in_series_are_one_layer_of_both_depths():
     assert both.all == pytest.approx(whole.all, rel=1e-14) and both.includes == BULK
     rigid = in_series(whole, ContactStiffness(np.inf, (np.inf, np.inf), SURFACE))
     assert rigid.all == pytest.approx(whole.all) and rigid.includes == BULK_AND_SURFACE
-    with pytest.raises(UserError, match="counted twice"):
-        in_series(rigid, ContactStiffness(1e9, (1e9, 1e9), SURFACE))
-    with pytest.raises(UserError, match="includes: 'all'"):
-        ContactStiffness(1e9, (1e9, 1e9), "all")
-    with pytest.raises(UserError, match="tangential: 0 N/m"):
-        ContactStiffness(1e9, (0.0, 1e9), SURFACE)
-    with pytest.raises(UserError, match="tangential: nan N/m"):
-        ContactStiffness(1e9, (1e9, np.nan), SURFACE)
+    refused("counted twice", in_series, rigid, ContactStiffness(1e9, (1e9, 1e9), SURFACE))
+    refused("includes: 'all'", ContactStiffness, 1e9, (1e9, 1e9), "all")
+    refused("tangential: 0 N/m", ContactStiffness, 1e9, (0.0, 1e9), SURFACE)
+    refused("tangential: nan N/m", ContactStiffness, 1e9, (1e9, np.nan), SURFACE)
 
 
 def test_two_bodies_of_a_point_contact_are_in_series():
@@ -576,8 +539,7 @@ def test_finite_element_source_is_what_the_eigenmodes_leave():
         found = of_patch(bar(method), method, "right")
         assert found.normal == pytest.approx(1 / left, rel=1e-3), method
         assert found.includes == BULK and min(found.tangential) > 0
-    with pytest.raises(UserError, match="no interface 'left'; the file has right"):
-        of_patch(bar("rubin"), "rubin", "left")
+    refused("no interface 'left'; the file has right", of_patch, bar("rubin"), "rubin", "left")
 
 
 @pytest.mark.parametrize("method", ["eigenmodes", "rubin", "craig-bampton"])
@@ -606,8 +568,7 @@ def test_two_elastic_bodies_are_freed_of_their_bulk_one_after_the_other():
 
 def test_stiffness_that_cannot_count_the_bulk_is_refused():
     stiff = ContactStiffness(1e12, (1e12, 1e12), BULK_AND_SURFACE)
-    with pytest.raises(UserError, match="said to count the bulk"):
-        for_basis(stiff, bar("rubin"), "rubin", "right")
+    refused("said to count the bulk", for_basis, stiff, bar("rubin"), "rubin", "right")
 
 
 # resonances --------------------------------------------------------------------------------------------------------
@@ -710,8 +671,7 @@ GOOD = RIG(np.array([82.5e6, 31.7e6]))
     ],
 )
 def test_resonances_that_tell_nothing_are_refused(resonances, words):
-    with pytest.raises(UserError, match=words):
-        identify(RIG, resonances)
+    refused(words, identify, RIG, resonances)
 
 
 def mass(name: str, normal: float) -> System:
@@ -735,16 +695,11 @@ def test_two_bodies_joined_by_a_contact_in_closed_form():
         identify(joined(one, "face", two, "face"), measured)  # the two modes may change places
     found = identify(joined(one, "face", two, "face"), measured, bounds={"tangential": (1e2, 1e6)})
     assert found.stiffness == pytest.approx([k_n, k_t], rel=1e-7)
-    with pytest.raises(UserError, match="bounds"):
-        identify(joined(one, "face", two, "face"), measured, bounds={"tangential": (1e6, 1e2)})
-    with pytest.raises(UserError, match="mode 1 .* does not move at the contact"):
-        identify(
-            joined(one, "face", two, "face", given={"tangential": k_t}), [MeasuredResonance(f[0], 0.1, 1)], ["normal"]
-        )
-    with pytest.raises(UserError, match="no interface 'side'; the body has face"):
-        joined(one, "side")
-    with pytest.raises(UserError, match="includes must be"):
-        joined(one, "face", includes="all")
+    refused("bounds", identify, joined(one, "face", two, "face"), measured, bounds={"tangential": (1e6, 1e2)})
+    in_phase = joined(one, "face", two, "face", given={"tangential": k_t}), [MeasuredResonance(f[0], 0.1, 1)]
+    refused(("mode 1 ", "does not move at the contact"), identify, *in_phase, ["normal"])
+    refused("no interface 'side'; the body has face", joined, one, "side")
+    refused("includes must be", joined, one, "face", includes="all")
 
 
 def test_joined_bodies_are_those_with_a_link_between_them():
@@ -813,8 +768,8 @@ def test_node_of_a_mode_at_the_contact_is_refused():
     ).basis().groups[0, 0]  # fmt: skip
     model = joined(chain, "face", given={"tangential": 0.0})
     f = model(np.array([1e6]))
-    with pytest.raises(UserError, match="mode 2 .* does not move at the contact"):
-        identify(model, [MeasuredResonance(f[1], 0.1, 2)], ["normal"])
+    second = [MeasuredResonance(f[1], 0.1, 2)]
+    refused(("mode 2 ", "does not move at the contact"), identify, model, second, ["normal"])
     assert identify(model, [MeasuredResonance(f[0], 0.1, 1)], ["normal"]).stiffness == pytest.approx([1e6], rel=1e-8)
 
 

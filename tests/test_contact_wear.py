@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
+from refusals import refused
 
 from microslip.contact.friction import Coulomb
 from microslip.contact.heights import Linear, Polynomial, as_table, summed, tabulated
@@ -24,7 +25,7 @@ from microslip.contact.wear import (
     stepped,
     worn_law,
 )
-from microslip.errors import NotConverged, UserError
+from microslip.errors import NotConverged
 
 TRIES = hypothesis_settings(max_examples=30, deadline=None, derandomize=True)
 FORCE = 0.09375
@@ -276,5 +277,4 @@ def test_a_surface_worn_flat_is_still_a_law() -> None:
     ],
 )
 def test_wrong_numbers_are_told_in_a_sentence(call, sentence) -> None:
-    with pytest.raises(UserError, match=sentence):
-        call()
+    refused(sentence, call)

@@ -9,9 +9,9 @@ import pytest
 import small
 from hypothesis import given
 from hypothesis import strategies as st
+from refusals import refused
 
 from microslip.data import ModalBasis
-from microslip.errors import UserError
 from microslip.reduced.correlation import compare_groups, mac, nearest_points, pair_table, pairs
 
 
@@ -68,17 +68,9 @@ def test_a_body_is_found_again_in_another_order_on_fewer_points() -> None:
     assert len(lines) == m + 2 and "+1.00%" in lines[1] and "1.0000" in lines[1]
 
 
-def test_points_in_another_unit_or_place_are_refused() -> None:
-    basis = small.basis()
-    with pytest.raises(UserError, match="one unit of length"):
-        compare_groups(basis, thinned(basis, 7, shift=0.01))
-    with pytest.raises(UserError, match="same nearest node"):
-        nearest_points(np.array([[0.0, 0, 0], [0, 0, 1e-4]]), basis.mesh.points, 1e-3)
-
-
-def test_bodies_without_shapes_are_refused() -> None:
-    basis = small.basis()
-    g = basis.groups[0, 0]
-    bare = replace(basis, groups={(0, 0): replace(g, phi=g.phi[:0])})
-    with pytest.raises(UserError, match="no shapes"):
-        compare_groups(basis, bare)
+def test_points_elsewhere_and_bodies_without_shapes_are_refused() -> None:
+    basis, g = small.basis(), small.basis().groups[0, 0]
+    refused("one unit of length", compare_groups, basis, thinned(basis, 7, shift=0.01))
+    apart = np.array([[0.0, 0, 0], [0, 0, 1e-4]])
+    refused("same nearest node", nearest_points, apart, basis.mesh.points, 1e-3)
+    refused("no shapes", compare_groups, basis, replace(basis, groups={(0, 0): replace(g, phi=g.phi[:0])}))

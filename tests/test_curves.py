@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from refusals import refused_command
 
 from microslip.basis import write_basis
 from microslip.case import load_case
@@ -230,35 +231,25 @@ def test_over_the_normal_force(case: Path) -> None:
         assert found["amplitude_m"][i] == pytest.approx(abs(exact), rel=1e-7)
 
 
+OWN_FORCE = CASE.replace("normal_forces = [10.0]\n", "").replace("[1, 1]", "[1, 1]\nnormal_force = 10.0")
+
+
 @pytest.mark.parametrize(
-    ("change", "over", "words"),
+    ("text", "over", "words"),
     [
-        ("[curve]\nband = [120.0, 120.0]", "frequency", "band: give two different values, first and last"),
-        ("[curve]\nband = [120.0]", "frequency", "band"),
-        ("[curve]\nload = [0.0, 1.0]", "load", "load"),
-        ("[curve]\nnormal_force = [-1.0, 1.0]", "normal-force", "normal_force"),
-        ("", "normal-force", "curve.normal_force: give [first, last] in N; the sweep has one normal force alone"),
-        ("", "weather", "weather"),
+        (CASE + "[curve]\nband = [120.0, 120.0]", "frequency", "band: give two different values, first and last"),
+        (CASE + "[curve]\nband = [120.0]", "frequency", "band"),
+        (CASE + "[curve]\nload = [0.0, 1.0]", "load", "load"),
+        (CASE + "[curve]\nnormal_force = [-1.0, 1.0]", "normal-force", "normal_force"),
+        (CASE, "normal-force", "curve.normal_force: give [first, last] in N"),
+        (CASE, "weather", "weather"),
+        (OWN_FORCE, "normal-force", "press no contact"),
+        (CASE.replace("smooth", "jenkins").replace("points = [1, 1]\n", ""), "normal-force", "contacts.sole.law"),
+        (CASE.replace("start = 100.0", "start = 131.0"), "load", "no resonance in the band; widen the sweep"),
     ],
 )
 def test_mistakes_are_one_sentence(
-    case: Path, capsys: pytest.CaptureFixture[str], change: str, over: str, words: str
+    case: Path, capsys: pytest.CaptureFixture[str], text: str, over: str, words: str
 ) -> None:
-    case.write_text(CASE + change)
-    assert main(["respond", "case.toml", "--over", over]) == 2
-    said = "".join(capsys.readouterr())
-    assert words in said and "Traceback" not in said
-
-
-def test_nothing_to_press_and_laws_of_one_force(case: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    own = CASE.replace("points = [1, 1]", "points = [1, 1]\nnormal_force = 10.0")
-    own = own.replace("normal_forces = [10.0]\n", "")
-    case.write_text(own)
-    assert main(["respond", "case.toml", "--over", "normal-force"]) == 2
-    assert "press no contact" in "".join(capsys.readouterr())
-    case.write_text(CASE.replace('law = "smooth"', 'law = "jenkins"').replace("points = [1, 1]\n", ""))
-    assert main(["respond", "case.toml", "--over", "normal-force"]) == 2
-    assert "contacts.sole.law" in "".join(capsys.readouterr())
-    case.write_text(CASE.replace("start = 100.0", "start = 131.0"))
-    assert main(["respond", "case.toml", "--over", "load"]) == 2
-    assert "no resonance in the band; widen the sweep, or give a frequency" in "".join(capsys.readouterr())
+    case.write_text(text)
+    refused_command(["respond", "case.toml", "--over", over], capsys, words)

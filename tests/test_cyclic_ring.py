@@ -15,9 +15,9 @@ import rings
 import scipy.linalg
 import scipy.sparse as sp
 from meshes import body, moved, nearest, rotation_matrix, with_sets
+from refusals import refused
 
 from microslip.data import Mesh
-from microslip.errors import UserError
 from microslip.fem.cyclic import pair_cut_faces
 from microslip.mesh import boundary_facets
 from microslip.modal.compute import modal_basis
@@ -165,8 +165,7 @@ def test_axis_and_point_of_the_rotation():
     for k, group in groups():
         np.testing.assert_allclose(found.groups[0, k].omega, group.omega, rtol=1e-9)
     reverse = replace_axis(rotation, -1.0)  # left and right are named for the positive sense
-    with pytest.raises(UserError, match="cyclic"):
-        modal_basis(mesh, settings(6, mesh, rotation=reverse, interfaces=[]))
+    refused("cyclic", modal_basis, mesh, settings(6, mesh, rotation=reverse, interfaces=[]))
 
 
 def replace_axis(rotation: dict, sign: float) -> dict:
@@ -430,11 +429,6 @@ def test_nodal_diameters_asked_for():
         np.testing.assert_allclose(found.groups[0, k].omega, basis().groups[0, k].omega, rtol=1e-10)
 
 
-def test_a_ring_of_another_number_of_sectors_is_refused():
-    with pytest.raises(UserError, match="cyclic"):
-        modal_basis(sector(), settings(7, sector()))
-
-
 def with_line():
     """The sector with the set ``line``: nodes of the bore on one parallel to the axis."""
     mesh, bore = sector(), sector().face_points("bore")
@@ -455,23 +449,17 @@ def test_a_ring_held_where_its_sector_alone_could_turn():
         np.testing.assert_allclose(found.groups[0, k].omega[:8], rings.spectrum(K, M, 8), rtol=1e-9)
 
 
-def test_a_ring_that_nothing_holds_is_refused():
-    with pytest.raises(UserError, match="nothing holds the body against .*rotation about y"):
-        modal_basis(sector(), settings(6, sector(), supports=[{"face": "bore", "directions": "y"}]))
-
-
 @pytest.mark.parametrize(
     ("wrong", "sentence"),
     [
         ({"loads": [{"kind": "gravity", "vector": [0.0, -9.81, 1.0]}]}, "loads.0.vector: gravity across"),
-        ({"loads": [{"kind": "pressure", "face": "cyclic_left", "value": 1.0}]}, "loads.0.face: .*inside the ring"),
-        ({"interfaces": [{"name": "c", "face": "cyclic_right"}]}, "interfaces.c.face: .*inside the ring"),
-        ({"excitations": [{"name": "e", "face": "cyclic_left", "pressure": True}]}, "excitations.e.face: .*inside"),
+        ({"loads": [{"kind": "pressure", "face": "cyclic_left", "value": 1.0}]}, "loads.0.face: "),
+        ({"interfaces": [{"name": "c", "face": "cyclic_right"}]}, "interfaces.c.face: "),
+        ({"excitations": [{"name": "e", "face": "cyclic_left", "pressure": True}]}, "excitations.e.face: "),
     ],
 )
 def test_what_a_sector_cannot_say_of_its_ring_is_refused(wrong, sentence):
-    with pytest.raises(UserError, match=sentence):
-        modal_basis(sector(), settings(6, sector(), **wrong))
+    refused(sentence, modal_basis, sector(), settings(6, sector(), **wrong))
 
 
 def test_gravity_along_the_axis_bends_all_sectors_alike():
@@ -509,32 +497,31 @@ def flipped() -> Mesh:
     return replace(mesh, faces=faces)
 
 
-def test_facets_that_do_not_match_over_nodes_that_do_are_refused():
-    with pytest.raises(UserError, match="cyclic: the nodes .* meet, but not their facets"):
-        modal_basis(flipped(), body(supports=[{"face": "bore"}], cyclic={"sectors": 12}, modes={"count": 4}))
-
-
-def test_faces_that_do_not_match_are_refused():
-    """A point of the right face pushed along it by a hundredth of a cell."""
+def test_faces_that_do_not_match_and_rings_that_nothing_holds_are_refused():
+    """Another number of sectors, a point pushed along its face by a hundredth of a cell, other facets over nodes that
+    meet; and supports along the axis alone."""
     mesh = sector()
     points = mesh.points.copy()
     points[mesh.face_points("cyclic_right")[3]] += [0.0, 2e-4, 0.0]
-    with pytest.raises(UserError, match="cyclic"):
-        modal_basis(replace(mesh, points=points), settings(6, mesh))
+    refused("cyclic", modal_basis, mesh, settings(7, mesh))
+    refused("cyclic", modal_basis, replace(mesh, points=points), settings(6, mesh))
+    twelve = body(supports=[{"face": "bore"}], cyclic={"sectors": 12}, modes={"count": 4})
+    refused(("cyclic: the nodes ", "meet, but not their facets"), modal_basis, flipped(), twelve)
+    sliding = settings(6, mesh, supports=[{"face": "bore", "directions": "y"}])
+    refused(("nothing holds the body against", "rotation about y"), modal_basis, mesh, sliding)
 
 
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        ({"axis": np.array([1.0, 0.0, 0.0])}, "not turned about this axis.*correct rotation.axis"),
-        ({"point": np.array([0.01, 0.0, 0.0])}, "not turned about this axis.*rotation.point"),
+        ({"axis": np.array([1.0, 0.0, 0.0])}, ("not turned about this axis", "rotation.axis")),
+        ({"point": np.array([0.01, 0.0, 0.0])}, ("not turned about this axis", "rotation.point")),
         ({"sectors": 7}, "makes 6 sectors, not 7"),
     ],
 )
 def test_a_wrong_axis_is_told_from_faces_that_do_not_match(change, words):
     given = {"axis": rings.AXIS, "point": np.zeros(3), "sectors": 6} | change
-    with pytest.raises(UserError, match=words):
-        pair_cut_faces(sector(), "cyclic_left", "cyclic_right", **given)
+    refused(words, pair_cut_faces, sector(), "cyclic_left", "cyclic_right", **given)
 
 
 JOINED = {"speeds_rpm": [3000.0], "prestress": "nonlinear", "gyroscopic": False}

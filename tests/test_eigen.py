@@ -12,6 +12,7 @@ from closed_forms.bars import box_frequencies
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from meshes import STEEL, body, brick, moved, renumbered, roller_box, rotation_matrix, shaken
+from refusals import refused
 
 from microslip.errors import NotConverged, UserError
 from microslip.fem.discretise import discretise, free_upper
@@ -285,17 +286,12 @@ def test_a_hinged_body_is_refused_and_its_motion_named():
     np.testing.assert_allclose(g.omega[1:] ** 2, dense_values(pencil)[1 : g.n_modes], rtol=1e-9)
 
 
-def test_sliding_bodies_are_named():
+def test_sliding_bodies_and_more_modes_than_degrees_of_freedom_are_refused():
     mesh = brick("tetra10", (1, 1, 1))
-    with pytest.raises(UserError, match="translation along x"):
-        the_modes(mesh, supports=[{"face": "x0", "directions": "yz"}, {"face": "x1", "directions": "yz"}])
-    with pytest.raises(UserError, match="all six rigid motions"):
-        the_modes(mesh)
-
-
-def test_more_modes_than_degrees_of_freedom_are_refused():
-    with pytest.raises(UserError, match="modes.count"):
-        the_modes(brick("tetra10", (1, 1, 1)), **CLAMPED, modes={"count": 80})
+    along = [{"face": face, "directions": "yz"} for face in ("x0", "x1")]
+    refused("translation along x", the_modes, mesh, supports=along)
+    refused("all six rigid motions", the_modes, mesh)
+    refused("modes.count", the_modes, mesh, **CLAMPED, modes={"count": 80})
 
 
 # ---------------------------------------------------------------- one definite form

@@ -10,7 +10,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 import scipy.linalg
-import sector
 import small
 from hypothesis import given
 from hypothesis import strategies as st
@@ -20,9 +19,7 @@ from test_exchange_peers import ask, needs
 
 from microslip.cli import main
 from microslip.data import INTERFACE_ROWS, Array, ModalBasis
-from microslip.errors import UserError
 from microslip.exchange import writer
-from microslip.exchange.choice import select
 from microslip.exchange.dmig import number
 from microslip.exchange.matrices import read_matrices
 from microslip.modal.compute import modal_basis
@@ -288,15 +285,3 @@ def test_import_knows_that_the_file_is_in_si_and_what_it_holds(tmp_path: Path, m
     writer("dmig")(turned(), "b.pch")
     assert main(["import", "b.pch", "wing"]) == 0
     assert tomllib.loads(Path("wing/body.toml").read_text())["length_unit"] == "m"
-
-
-def test_what_it_cannot_hold_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    for basis, says in (
-        (small.basis(), 'reduction = "craig-bampton"'),
-        (small.basis((0.0, 3000.0)), "--speed 0 to 1"),
-        (select(sector.basis(), None, 1), "complex shapes"),
-    ):
-        with pytest.raises(UserError, match=says):
-            writer("dmig")(basis, tmp_path / "x.pch")
-    assert main(["export", str(tmp_path / "none.h5"), "--to", "dmig"]) == 2
-    assert "Traceback" not in capsys.readouterr().err and not any(tmp_path.iterdir())

@@ -12,10 +12,10 @@ import scipy.linalg
 import scipy.optimize
 import small
 from meshes import body
+from refusals import refused
 from test_assembly import FINE, blade, sector
 
 from microslip.data import ModalBasis
-from microslip.errors import UserError
 from microslip.harmonic_balance import problem as balance
 from microslip.harmonic_balance import response
 from microslip.harmonic_balance.solver import solve
@@ -133,8 +133,7 @@ def test_mistakes_are_told() -> None:
         ("24 blades have 0 to 12", lambda: excitation.index_of(13, "forward", 24)),
         ("at most a whole turn", lambda: excitation.magnets(np.zeros(1), 1.0, 7.0, 3)),
     ):
-        with pytest.raises(UserError, match=words):
-            call()
+        refused(words, call)
     loads = (Load("blade", "gas", 1.0, 5), Load("blade", "gas", 1.0, 2))
     (told,) = excitation.unheard(loads, 3)
     assert "harmonic 5" in told and "raise harmonics to 5" in told
@@ -265,12 +264,10 @@ def test_bad_fields_are_refused_in_a_sentence(tmp_path, beam: Component) -> None
     good = "x,y,z,p_real,p_imag\n" + "\n".join(f"0,{y},{z},1,0" for y in (0, 15, 30) for z in (0, 60, 120))
     path = tmp_path / "field.csv"
     path.write_text(good)
-    with pytest.raises(UserError, match="it would fit with length_unit mm instead of m"):
-        pressure.on_face(pressure.read_field(path, "m"), face, "left")
-    with pytest.raises(UserError, match=r"does not cover face 'left': a point of the face is .* m away"):
-        pressure.on_face(pressure.PressureField(grid() + [0.5, 0, 0], np.ones(1800) + 0j), face, "left")
-    with pytest.raises(UserError, match="'furlong' is none of"):
-        pressure.read_field(path, "furlong")
+    beside = pressure.PressureField(grid() + [0.5, 0, 0], np.ones(1800) + 0j)
+    refused("length_unit mm instead of m", pressure.on_face, pressure.read_field(path, "m"), face, "left")
+    refused(("does not cover face 'left'", " m away"), pressure.on_face, beside, face, "left")
+    refused("'furlong' is none of", pressure.read_field, path, "furlong")
     for text, words in (
         (good.replace("p_real", "p"), "has no p_real"),
         (good.replace("0,15,60,1,0", "0,15,60,one,0"), "could not convert string to float: 'one'"),
@@ -280,22 +277,16 @@ def test_bad_fields_are_refused_in_a_sentence(tmp_path, beam: Component) -> None
         ("", "has no x, y, z, p_real"),
     ):
         path.write_text(text)
-        with pytest.raises(UserError, match=words):
-            pressure.read_field(path, "mm")
+        refused(words, pressure.read_field, path, "mm")
     for name, what in (("a.npz", "cannot be read as an .npz"), ("a.vtu", "is damaged"), ("a.xyz", "not read from")):
         (tmp_path / name).write_bytes(b"PK\x03\x04 damaged")
-        with pytest.raises(UserError, match=what):
-            pressure.read_field(tmp_path / name, "m")
-    with pytest.raises(UserError, match="no such file"):
-        pressure.read_field(tmp_path / "nowhere.csv", "m")
-    with pytest.raises(UserError, match="has no face 'tip' with points"):
-        pressure.load_face(beam, "tip")
+        refused(what, pressure.read_field, tmp_path / name, "m")
+    refused("no such file", pressure.read_field, tmp_path / "nowhere.csv", "m")
+    refused("has no face 'tip' with points", pressure.load_face, beam, "tip")
     bare = replace(beam.groups[0].interfaces["contact_left"], shapes=np.zeros((0, 3, 6)))
-    group = replace(beam.groups[0], interfaces={"contact_left": bare})
-    with pytest.raises(UserError, match="output.patch_shapes"):
-        pressure.with_pressure(
-            Component("beam", {0: group}), "flow", pressure.on_face(field(lambda x, y, z: z), bare, "contact_left")
-        )
+    part = Component("beam", {0: replace(beam.groups[0], interfaces={"contact_left": bare})})
+    on_bare = pressure.on_face(field(lambda x, y, z: z), bare, "contact_left")
+    refused("output.patch_shapes", pressure.with_pressure, part, "flow", on_bare)
 
 
 # ---------------------------------------------------------------- damping
@@ -399,8 +390,7 @@ def test_ratios_by_mode_in_any_coordinates(reduction: str) -> None:
     D = np.r_[0.01, 0.03, np.full(len(g.omega) - 2, 0.002)]
     np.testing.assert_allclose(roots, g.omega * (-D + 1j * np.sqrt(1 - D**2)), rtol=1e-8)
     for bad in ([], [-0.1], [np.nan]):
-        with pytest.raises(UserError, match="none negative"):
-            damping.with_ratios(g, bad)
+        refused("none negative", damping.with_ratios, g, bad)
 
 
 def test_bad_aerodynamic_tables_are_refused_in_a_sentence(tmp_path) -> None:
@@ -415,7 +405,5 @@ def test_bad_aerodynamic_tables_are_refused_in_a_sentence(tmp_path) -> None:
         (head + "0.5,,0,0\n", "a whole number and two numbers"),
     ):
         path.write_text(text)
-        with pytest.raises(UserError, match=words):
-            damping.read_aerodynamics(path, 3)
-    with pytest.raises(UserError, match="there is no such table; correct the name"):
-        damping.read_aerodynamics(tmp_path / "nowhere.csv", 3)
+        refused(words, damping.read_aerodynamics, path, 3)
+    refused("there is no such table", damping.read_aerodynamics, tmp_path / "nowhere.csv", 3)

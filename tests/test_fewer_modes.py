@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from refusals import refused
 
 from microslip.basis import read_basis
 from microslip.case import load_case, run_case
@@ -102,5 +103,5 @@ def test_what_a_response_file_keeps_is_read_with_as_many_modes(tmp_path: Path, s
     response = read_response(tmp_path / "build/few/response.h5")
     motion = response.motion(response.series[0], sample)
     assert motion.parts[1].group.n_modes == motion.parts[1].q.shape[1] == 4
-    with pytest.raises(UserError, match="4 coordinates of a body were given"):
-        motion_of(motion.Omega, motion.parts[1].q[:, None], sample.groups[0, 0])
+    few = motion.parts[1].q[:, None]
+    refused("4 coordinates of a body were given", motion_of, motion.Omega, few, sample.groups[0, 0])

@@ -8,10 +8,10 @@ from functools import cache
 import numpy as np
 import pytest
 from meshes import STEEL, body, brick, shaken, twisted_blade
+from refusals import refused
 
 from microslip.basis import check_basis, read_basis, write_basis
 from microslip.data import MOTIONS
-from microslip.errors import UserError
 from microslip.fem.discretise import discretise, free_upper
 from microslip.fem.operators import stress_stiffness
 from microslip.linalg import eigen
@@ -143,10 +143,8 @@ def turning_plate():
 
 
 def test_what_is_missing_is_told():
-    with pytest.raises(UserError, match="stiffening = true"):
-        floating_body(free_body())
-    with pytest.raises(UserError, match="choose a lower number"):
-        floating_body(free_body(), 3, stiffened=False)
+    refused("stiffening = true", floating_body, free_body())
+    refused("choose a lower number", floating_body, free_body(), 3, stiffened=False)
 
 
 # ---------------------------------------------------------------- free motion

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-import pytest
+from refusals import refused
 from test_time_domain import BOOK, hitting
 
 import microslip as ms
-from microslip.errors import UserError
 from microslip.time_domain import equations, orbit
 from microslip.time_domain.stepper import Stepper
 
@@ -82,8 +81,7 @@ def test_many_starts_reach_what_each_reaches_alone_whatever_its_neighbours() -> 
 
 
 def test_starts_that_fit_no_coordinate_are_refused_and_infinite_ones_are_told() -> None:
-    with pytest.raises(UserError, match=r"must both be \(n, 1\)"):
-        ms.integrate_many(between(), 1.0, np.zeros((3, 2)), np.zeros((3, 2)))
+    refused("must both be (n, 1)", ms.integrate_many, between(), 1.0, *np.zeros((2, 3, 2)))
     growing = ms.structure(1.0, 1.0, -1.0, force={0: 1.0}, output=0)
     found = ms.integrate_many(growing, 1.0, [[1.0]], [[0.0]], unit="rad/s", settle=300, keep=2)
     assert found.attractor[0] < 0 and "diverge" in repr(found)

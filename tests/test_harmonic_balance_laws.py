@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -12,6 +11,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from closed_forms.one_harmonic import JenkinsContact, frequency_response
+from refusals import refused
 from test_harmonic_balance_time import body, slider
 
 from microslip import continuation
@@ -27,7 +27,7 @@ from microslip.contact.patch import Patch, equilibrium, grid, stuck_stiffness
 from microslip.contact.point import PointContact
 from microslip.contact.thinned import thinned
 from microslip.data import ModalBasis, ModalGroup
-from microslip.errors import NotConverged, UserError
+from microslip.errors import NotConverged
 from microslip.harmonic_balance import solver
 from microslip.harmonic_balance.forces import AFT
 from microslip.harmonic_balance.problem import Problem
@@ -101,10 +101,8 @@ def test_equilibrium_under_moments() -> None:
 
 
 def test_forces_that_no_contact_has_are_refused() -> None:
-    with pytest.raises(UserError, match="cannot pull"):
-        equilibrium(rough_patch((2, 2)), -1.0)
-    with pytest.raises(UserError, match="no approach"):
-        equilibrium(point(Preload(value(3.0)), 1e6, 0.2), 5.0)
+    refused("cannot pull", equilibrium, rough_patch((2, 2)), -1.0)
+    refused("no approach", equilibrium, point(Preload(value(3.0)), 1e6, 0.2), 5.0)
 
 
 def test_stiffness_of_a_closed_sticking_patch() -> None:
@@ -537,23 +535,32 @@ def test_a_case_says_when_sliders_are_settled(tmp_path: Path) -> None:
     assert "up to 0.4 % in the next one; lower periodicity." in message
 
 
+DESCRIBED = 'law = "smooth"\nnormal_stiffness = 3e6\ntangential_stiffness = 1e6\nfriction = 0.3'
+
+
 @pytest.mark.parametrize(
     ("old", "new", "told"),
     [
         ('law = "smooth"', 'law = "rough"', "roughness (R_Z, or a table) belongs to"),
         ('law = "smooth"', 'law = "smooth"\nroughness = 1e-5', "roughness (R_Z, or a table) belongs to"),
-        ("samples = 32", "samples = 8\n", "are too few for"),
-        ("harmonics = 2", "harmonics = 9", "are too few for 9 harmonics; take at least 36"),
+        ("samples = 32", "samples = 8\n", "samples: "),
+        ("harmonics = 2", "harmonics = 9", "take at least 36"),
         ("points = [4, 2]", "points = [4, 0]", "points"),
         ("samples = 32", "samples = 32\nperiodicity = 0.1", "periodicity: must not be greater than 0.01"),
         ("samples = 32", "samples = 32\nperiodicity = -1e-9", "periodicity: must not be less than 0"),
-        ("[sweep]", SECOND + "\n[sweep]", "stands in contacts 1 and 2"),
+        ("[sweep]", SECOND + "\n[sweep]", "contacts 1 and 2"),
+        ('law = "smooth"', 'file = "sole.toml"', "normal_stiffness: stands in the contact file already"),
+        ("friction = 0.3\n", "", "friction: is missing; give it, or a contact file"),
+        (DESCRIBED, 'file = "sole.toml"', "sole.toml"),
     ],
 )  # fmt: skip
 def test_mistakes_in_a_case_with_laws(tmp_path: Path, old: str, new: str, told: str) -> None:
     more = [("harmonics = 2", "harmonics = 3")] if "samples" in old else []
-    with pytest.raises(UserError, match=re.escape(told)):
-        asked(tmp_path, (old, new), *more)
+
+    def run() -> None:
+        run_case(asked(tmp_path, (old, new), *more), sled(), tmp_path / "case.toml")
+
+    refused(told, run)
 
 
 CONTACT = """
@@ -573,27 +580,9 @@ mu = 0.3
 def test_a_case_with_the_law_of_a_contact_file(tmp_path: Path) -> None:
     """The smooth law written in a file of its own, shared out among eight points: the same response, 1e-10."""
     (tmp_path / "sole.toml").write_text(CONTACT)
-    own = ('law = "smooth"\nnormal_stiffness = 3e6\ntangential_stiffness = 1e6\nfriction = 0.3', 'file = "sole.toml"')
+    own = (DESCRIBED, 'file = "sole.toml"')
     settings = asked(tmp_path, own, FEW)
     by_file, by_case = (run_case(s, sled(), tmp_path / "case.toml") for s in (settings, asked(tmp_path, FEW)))
     for normal, r in by_case.responses.items():
         np.testing.assert_allclose(by_file.responses[normal].monitor, r.monitor, rtol=1e-9)
     assert by_case.responses[5.0].slipping.max() > 0.3
-
-
-@pytest.mark.parametrize(
-    ("old", "new", "told"),
-    [
-        ('law = "smooth"', 'file = "sole.toml"', "normal_stiffness: stands in the contact file already"),
-        ("friction = 0.3\n", "", "friction: is missing; give it, or a contact file"),
-    ],
-)
-def test_a_contact_is_described_once(tmp_path: Path, old: str, new: str, told: str) -> None:
-    with pytest.raises(UserError, match=re.escape(told)):
-        asked(tmp_path, (old, new))
-
-
-def test_a_contact_file_that_is_not_there(tmp_path: Path) -> None:
-    own = ('law = "smooth"\nnormal_stiffness = 3e6\ntangential_stiffness = 1e6\nfriction = 0.3', 'file = "sole.toml"')
-    with pytest.raises(UserError, match="there is no file .*sole.toml"):
-        run_case(asked(tmp_path, own), sled(), tmp_path / "case.toml")

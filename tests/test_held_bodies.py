@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-import pytest
 import scipy.linalg
+from refusals import refused
 
 import microslip as ms
 from microslip.case.weak_springs import on_weak_springs, raising
-from microslip.errors import UserError
 from microslip.system import Body, Contact, Force, Monitor, Spring, System
 
 
@@ -33,8 +32,8 @@ def test_hold_gives_every_rigid_motion_one_frequency_and_leaves_the_elastic_ones
 
 
 def test_what_is_held_already_is_not_held_again() -> None:
-    with pytest.raises(UserError, match="bodies.pin.weak_springs: the body is held already"):
-        on_weak_springs(pair(True).basis().groups[0, 0], 3.0, "bodies.pin.weak_springs")
+    pin = pair(True).basis().groups[0, 0]
+    refused("bodies.pin.weak_springs: ", on_weak_springs, pin, 3.0, "bodies.pin.weak_springs")
 
 
 def test_springs_that_are_not_weak_are_told() -> None:

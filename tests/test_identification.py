@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 import rings
 import scipy.linalg
+from refusals import refused
 from test_assembly import FINE, sector
 from test_neighbours import N, mesh, settings, whole  # noqa: F401 (fixtures)
 
 from microslip.contact.patch import Patch, grid
 from microslip.data import ModalBasis
-from microslip.errors import UserError
 from microslip.harmonic_balance import envelope, identification, response
 from microslip.harmonic_balance import problem as balance
 from microslip.harmonic_balance.envelope import _snake
@@ -129,8 +129,7 @@ def test_frequencies_that_no_stiffness_gives_are_told(basis: ModalBasis) -> None
         ("have only", lambda: identification.identify(assembly, Measured(1, 1e3, 500), 0.5)),
         ("have no contact", lambda: identification.identify(replace(assembly, contacts=()), Measured(1, 1e3), 0.5)),
     ):
-        with pytest.raises(UserError, match=words):
-            call()
+        refused(words, call)
 
 
 # ---------------------------------------------------------------- resonance over engine order
@@ -201,8 +200,7 @@ def test_combinations_change_one_value_at_a_time() -> None:
     order = list(_snake([[1, 2, 3], [4, 5], [6, 7, 8]]))
     assert len({tuple(x) for x in order}) == 18
     assert all(sum(a != b for a, b in zip(x, y, strict=True)) == 1 for x, y in pairwise(order))
-    with pytest.raises(UserError, match="load: give one or more values"):
-        envelope.envelope(shaken, {"load": ()}, np.array([50.0]))
+    refused("load: give one or more", envelope.envelope, shaken, {"load": ()}, np.array([50.0]))
 
 
 def test_pictures_are_drawn(tmp_path, basis: ModalBasis) -> None:

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from refusals import refused
 from test_case_driving import built as ring_of
 
 from microslip.case import load_case
@@ -15,7 +16,6 @@ from microslip.case.assemble import Built, build
 from microslip.case.problem import problem_of
 from microslip.cli import main
 from microslip.data import Array
-from microslip.errors import UserError
 from microslip.harmonic_balance import response
 from microslip.harmonic_balance.reduced import stuck, stuck_damping
 from microslip.harmonic_balance.solver import solve
@@ -207,10 +207,8 @@ def test_what_the_command_line_says_of_it(tmp_path: Path, monkeypatch: pytest.Mo
     assert list(read_response(tmp_path / "build/strips/response.h5").stuck_modes) == rows
     for key, value in (("damping", "stuck"), ("damping", "viscous"), ("damping_ratio", "-0.1")):
         assert main(["respond", "case.toml", "--set", f"{key}={value}", "-q"]) == 2
-    with pytest.raises(UserError, match="damping_ratio"):
-        strips(tmp_path, 'damping = "stuck"')
-    with pytest.raises(UserError, match="write a number as damping_ratio"):
-        strips(tmp_path, "damping = 0.02")
+    refused("damping_ratio", strips, tmp_path, 'damping = "stuck"')
+    refused("write a number as damping_ratio", strips, tmp_path, "damping = 0.02")
 
 
 def test_stuck_damping_says_what_open_contacts_make_of_it(tmp_path: Path) -> None:

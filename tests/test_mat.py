@@ -13,7 +13,6 @@ import pytest
 import small
 from scipy.io import loadmat
 
-from microslip.errors import UserError
 from microslip.exchange import formats, writer
 from microslip.exchange.mat import field_names, write_mat
 
@@ -109,8 +108,7 @@ def test_same_basis_same_bytes_and_no_time_in_the_header(file: Path, tmp_path: P
     write_mat(small.basis((0.0, 3000.0)), tmp_path / "again.mat")
     data = (tmp_path / "again.mat").read_bytes()
     assert data == file.read_bytes()
-    assert data[:10] == b"MATLAB 5.0"
-    assert b"Created on" not in data[:116]
+    assert data[:10] == b"MATLAB 5.0" and b"Created on" not in data[:116]
 
 
 def test_a_basis_without_rows_and_stresses(tmp_path: Path) -> None:
@@ -131,12 +129,6 @@ def test_names_are_legal_and_unique() -> None:
     assert all(re.fullmatch(r"[A-Za-z]\w{0,62}", name) for name in found)
     assert "end" not in found and "names" not in found
     assert found[0] == "a"
-
-
-def test_a_folder_that_cannot_be_written(tmp_path: Path) -> None:
-    (tmp_path / "file").write_text("")
-    with pytest.raises(UserError, match="cannot be written"):
-        write_mat(small.basis(), tmp_path / "file" / "basis.mat")
 
 
 def test_the_table_of_writers(tmp_path: Path) -> None:

@@ -17,6 +17,7 @@ import scipy.optimize
 import scipy.sparse as sp
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from refusals import refused, refused_command
 
 from microslip.basis import check_basis, read_basis
 from microslip.cli import main
@@ -350,12 +351,9 @@ def test_superelement_whose_interface_does_not_match_is_refused(tmp_path, capsys
     write_body(tmp_path, "se.mat", "se.mat", top, rows=rows.replace('face = "z1"', 'face = "lost"'))
     text = (tmp_path / "body.toml").read_text()
     (tmp_path / "body.toml").write_text(text.replace("z0 = [", f"lost = {lost}\nz0 = [", 1))
-    assert main(["modes", str(tmp_path)]) == 2
-    said = capsys.readouterr().err
-    assert f"node {lost[0]}" in said and "have no rows in the matrices" in said
+    refused_command(["modes", str(tmp_path)], capsys, f"node {lost[0]}", "no rows in the matrices")
     write_body(tmp_path, "se.mat", "se.mat", 'dofs = "rows.txt"\n', rows=rows)
-    assert main(["modes", str(tmp_path)]) == 2
-    assert "gives no node to 8 of the" in capsys.readouterr().err
+    refused_command(["modes", str(tmp_path)], capsys, "gives no node to 8 of the")
 
 
 def chain(folder: Path, more: str = "") -> None:
@@ -533,9 +531,8 @@ def beam_with_rotations(folder: Path, support: str) -> None:
 def test_a_node_held_without_its_rotations_is_told_so_about_all_three_axes(tmp_path, capsys):
     """Nodes on a line do not move when it turns about itself: that rotation must be named all the same."""
     beam_with_rotations(tmp_path, "")
-    assert main(["modes", str(tmp_path)]) == 2
-    said = capsys.readouterr().err
-    assert [a for a in "xyz" if f"rotation about {a} through" in said] == list("xyz") and "rotations = true" in said
+    axes = [f"rotation about {a} through" for a in "xyz"]
+    refused_command(["modes", str(tmp_path)], capsys, *axes, "rotations = true")
 
 
 def test_a_mode_of_rotations_alone_is_not_drawn_from_rounding(tmp_path):
@@ -582,9 +579,7 @@ def lopsided(folder):
 def test_matrices_that_cannot_be_are_refused_in_a_sentence(tmp_path, capsys, spoil, text):
     given_by_market(tmp_path)
     spoil(tmp_path)
-    assert main(["modes", str(tmp_path)]) == 2
-    said = capsys.readouterr().err
-    assert text in said and "Traceback" not in said
+    refused_command(["modes", str(tmp_path)], capsys, text)
 
 
 def test_supports_in_the_matrices_must_be_said(tmp_path, capsys):
@@ -594,8 +589,7 @@ def test_supports_in_the_matrices_must_be_said(tmp_path, capsys):
     (tmp_path / "rows.txt").write_text("".join(f"{beam().node_id[i // 3]}.{i % 3 + 1}\n" for i in free))
     write_nodes(tmp_path)
     write_body(tmp_path, "a.mat", "a.mat", 'dofs = "rows.txt"\n', more="")
-    assert main(["modes", str(tmp_path)]) == 2
-    assert "grounded = true" in capsys.readouterr().err
+    refused_command(["modes", str(tmp_path)], capsys, "grounded = true")
     write_body(tmp_path, "a.mat", "a.mat", 'dofs = "rows.txt"\ngrounded = true\n', more="")
     np.testing.assert_allclose(made(tmp_path)[0].groups[0, 0].omega[:6], own().groups[0, 0].omega[:6], rtol=1e-9)
 
@@ -609,12 +603,10 @@ def test_wrong_units_of_matrices_are_told(tmp_path):
 def test_hdf5_that_leads_out_of_the_file_is_refused(tmp_path):
     with h5py.File(tmp_path / "a.h5", "w") as file:
         file["K"] = h5py.ExternalLink("/etc/passwd", "/K")
-    with pytest.raises(UserError, match="link to another place"):
-        matrix_names(tmp_path / "a.h5")
+    refused("link to another place", matrix_names, tmp_path / "a.h5")
     with h5py.File(tmp_path / "b.h5", "w") as file:
         file.create_dataset("K", (10**6, 10**6), chunks=(1000, 1000))
-    with pytest.raises(UserError, match="claims more data"):
-        matrix_names(tmp_path / "b.h5")
+    refused("claims more data", matrix_names, tmp_path / "b.h5")
 
 
 def small(folder: Path, kind: str) -> str:

@@ -11,6 +11,7 @@ import meshes
 import numpy as np
 import pytest
 import small
+from refusals import refused
 
 from microslip.data import Mesh
 from microslip.errors import UserError
@@ -135,13 +136,7 @@ def written(tmp_path: Path, text: str | bytes, name: str = "part.msh") -> Path:
 
 
 def refusal(path: Path, unit: str = "mm") -> str:
-    with pytest.raises(UserError) as error:
-        read_mesh(path, unit)
-    text = str(error.value)
-    assert str(path) in text
-    assert "\n" not in text
-    assert ";" in text  # a remedy follows
-    return text
+    return refused((str(path), ";"), read_mesh, path, unit)  # a remedy follows
 
 
 def middles_are_right(mesh: Mesh) -> bool:
@@ -372,36 +367,23 @@ def test_a_giant_range_takes_no_memory(tmp_path: Path) -> None:
 def test_unknown_missing_and_wrong_files(tmp_path: Path) -> None:
     assert "no such mesh file" in refusal(tmp_path / "none.msh")
     assert "is a folder" in refusal(tmp_path)
-    refusal(written(tmp_path, "hello", "a.xyz"))
-    refusal(written(tmp_path, "hello", "no_suffix"))
-    refusal(written(tmp_path, "hello", "a.med"))
-    refusal(written(tmp_path, "hello", "a.vtu"))
-    refusal(written(tmp_path, "hello", "a.msh"))
-    refusal(written(tmp_path, b"", "b.msh"))
-    refusal(written(tmp_path, b"", "b.inp"))
-    refusal(written(tmp_path, b"\x00\xff" * 100, "c.inp"))
-
-
-def test_an_unknown_unit_of_length(tmp_path: Path) -> None:
+    for name in ("a.xyz", "no_suffix", "a.med", "a.vtu", "a.msh"):
+        refusal(written(tmp_path, "hello", name))
+    for data, name in ((b"", "b.msh"), (b"", "b.inp"), (b"\x00\xff" * 100, "c.inp")):
+        refusal(written(tmp_path, data, name))
     assert "choose one of m, cm, mm" in refusal(written(tmp_path, TET), "furlong")
 
 
-def test_vtu_with_mixed_cells(tmp_path: Path) -> None:
+def test_vtu_with_mixed_or_flat_cells(tmp_path: Path) -> None:
     import meshio
 
     beam = small.beam()
-    meshio.write(tmp_path / "a.vtu", meshio.Mesh(beam.points, [("tetra10", beam.cells["tetra10"])]))
+    cells, wedge = ("tetra10", beam.cells["tetra10"]), ("wedge18", np.arange(18)[None])
+    for name, blocks in (("a", [cells]), ("b", [cells, wedge]), ("c", [("triangle", [[0, 1, 2]])])):
+        meshio.write(tmp_path / f"{name}.vtu", meshio.Mesh(beam.points, blocks))
     assert middles_are_right(read_mesh(tmp_path / "a.vtu", "m"))
-    wedge = np.arange(18)[None]
-    meshio.write(tmp_path / "b.vtu", meshio.Mesh(beam.points, [("tetra10", beam.cells["tetra10"]), ("wedge18", wedge)]))
     assert "cells of type wedge18 cannot be assembled" in refusal(tmp_path / "b.vtu", "m")
-
-
-def test_flat_meshes_are_refused(tmp_path: Path) -> None:
-    import meshio
-
-    meshio.write(tmp_path / "a.vtu", meshio.Mesh(np.eye(3), [("triangle", [[0, 1, 2]])]))
-    assert "holds no volume cells" in refusal(tmp_path / "a.vtu")
+    assert "holds no volume cells" in refusal(tmp_path / "c.vtu")
 
 
 # ---------------------------------------------------------------- the surface
@@ -470,32 +452,24 @@ def test_cells_that_cannot_be(change: Callable[..., tuple[np.ndarray, np.ndarray
     assert any(words in error for error in replaced(change)[0])
 
 
-def test_two_parts() -> None:
+def test_parts_that_share_no_points_and_points_that_coincide() -> None:
+    """Two parts apart, two that touch, perhaps a joint, and a cell of which one corner is torn off."""
+
     def double(p: np.ndarray, c: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         return np.vstack([p, p + 1.0]), np.vstack([c, c + len(p)])
 
-    errors, warnings = replaced(double)
-    assert not errors and "falls into 2 parts that share no points" in warnings[0]
-
-
-def test_coincident_points() -> None:
     def tear(p: np.ndarray, c: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        upper = p[c[:, :4]].mean(axis=1)[:, 2] > 0.06
-        copies = np.vstack([p, p])
-        c[upper] += len(p)
+        c[p[c[:, :4]].mean(axis=1)[:, 2] > 0.06] += len(p)
         used, numbers = np.unique(c, return_inverse=True)
-        return copies[used], numbers.reshape(c.shape)
-
-    errors, warnings = replaced(tear)  # two parts that touch: perhaps a joint
-    assert not errors and "neither welded nor in contact" in warnings[0]
+        return np.vstack([p, p])[used], numbers.reshape(c.shape)
 
     def crack(p: np.ndarray, c: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        c[7, 9] = len(p)  # one corner of one cell torn off
-        return np.vstack([p, p[replaced_at(9)]]), c
+        torn, c[7, 9] = c[7, 9], len(p)
+        return np.vstack([p, p[torn]]), c
 
-    def replaced_at(place: int) -> int:
-        return int(small.beam().cells["tetra10"][7, place])
-
+    for change, words in ((double, "falls into 2 parts"), (tear, "neither welded nor in contact")):
+        errors, warnings = replaced(change)
+        assert not errors and words in warnings[0]
     text = one(replaced(crack)[0])
     assert "1 pairs of points coincide" in text and "merge duplicate nodes" in text
 

@@ -13,10 +13,10 @@ import numpy as np
 import pytest
 from meshes import body, brick
 from pydantic import ValidationError
+from refusals import refused
 from small import basis as small_basis
 
 from microslip.elasticity import isotropic
-from microslip.errors import UserError
 from microslip.fem.discretise import discretise
 from microslip.fem.operators import displacement_gradient, green_strain
 from microslip.modal.compute import modal_basis
@@ -305,16 +305,11 @@ def test_limits_that_contradict_each_other_are_refused(wrong):
 def test_what_the_file_does_not_hold_is_said():
     group = replace(small_basis().groups[0, 0], stresses={}, phi=np.zeros((0, 3, 6)))
     motion = motion_of(1.0, np.zeros((2, group.n_modes)), group)
-    with pytest.raises(UserError, match="output.nodal_stress"):
-        cycle_stress(motion)
-    with pytest.raises(UserError, match="output.shapes"):
-        displacement(motion, 0)
-    with pytest.raises(UserError, match="no 'nose'; it has tip-probe"):
-        read_out(motion, "nose")
-    with pytest.raises(UserError, match="no such node"):
-        point_numbered(small_basis(), 10**6)
-    with pytest.raises(UserError, match="2 coordinates"):
-        motion_of(1.0, np.zeros((2, 2)), group)
+    refused("output.nodal_stress", cycle_stress, motion)
+    refused("output.shapes", displacement, motion, 0)
+    refused("no 'nose'; it has tip-probe", read_out, motion, "nose")
+    refused("no such node", point_numbered, small_basis(), 10**6)
+    refused("2 coordinates", motion_of, 1.0, np.zeros((2, 2)), group)
 
 
 # ---------------------------------------------------------------- contacts over the cycle
@@ -490,5 +485,4 @@ def test_wave_on_a_ring(tmp_path):
     data = meshio.read(tmp_path / "ring.vtu").point_data
     n = basis.mesh.n_points
     np.testing.assert_allclose(data["amplitude"][:n], data["amplitude"][3 * n : 4 * n], rtol=1e-5)
-    with pytest.raises(UserError, match="not cyclic"):
-        on_sector(motion, basis, 1)
+    refused("not cyclic", on_sector, motion, basis, 1)

@@ -25,13 +25,12 @@ import pytest
 
 pytest.importorskip("jax")
 import test_contact_laws as contract
+from refusals import refused, refused_command
 
-from microslip.cli import main
 from microslip.contact import composed, kinds
 from microslip.contact.kinds import LawKind, sources_of_others
 from microslip.contact.law import Law
 from microslip.contact.settings import ContactLaw
-from microslip.errors import UserError
 from microslip.results import read_response
 
 PAGE = (Path(__file__).parents[1] / "docs" / "own_law.md").read_text(encoding="utf-8")
@@ -126,8 +125,7 @@ def test_a_law_of_another_package_is_named_in_a_case(
     assert "up to date" not in said and said.endswith("2\n") and '"pad"' in said.splitlines()[-2]
     assert table.read_text() != before
     monkeypatch.chdir(tmp_path)
-    assert main(["respond", "case.toml"]) == 2  # without the package
-    assert 'law.kind: "pad" is unknown; choose one of' in capsys.readouterr().err
+    refused_command(["respond", "case.toml"], capsys, 'law.kind: "pad" is unknown; choose one of')
 
 
 class Elsewhere(LawKind):
@@ -159,21 +157,29 @@ class Half(Law):
         return ()
 
 
-class OfHalf(LawKind):
-    kind: Literal["half"]
+class OfGiven(LawKind):
+    kind: Literal["given"]
+    made: Any
 
     def law(self, contact):
-        return Half()
+        return self.made
 
 
-def test_a_law_without_a_method_is_refused_before_anything_is_solved() -> None:
+def composed_with(**kinds):
     own = {"normal_stiffness": 1e4, "tangential_stiffness": 5e3, "friction": 0.3}
-    asked = ContactLaw.model_validate(own).model_copy(update={"law": OfHalf(kind="half")})
-    with pytest.raises(UserError, match="case.toml: law: Half of .* has no method step, limit, slip, stored;"):
-        composed.compose(asked, Path("case.toml"))
+    return composed.compose(ContactLaw.model_validate(own).model_copy(update=kinds), Path("case.toml"))
 
 
-def test_a_force_of_another_shape_is_refused_before_anything_is_solved() -> None:
+@pytest.mark.parametrize(
+    ("law", "words"),
+    [
+        ("Half", ("Half of ", " has no method step, limit, slip, stored;")),
+        ("Turned", ("step of Turned gives", " of shape (3, 2);")),
+        ("Misspelt", ("test_own_law.py, line ", ", in stored: AttributeError", "pres")),
+    ],
+)
+def test_a_law_that_cannot_be_asked_is_refused_before_anything_is_solved(law, words) -> None:
+    """One without a method, with a force of another shape, with a mistake in its code."""
     names, _ = run_page()
     Pad = names["Pad"]
 
@@ -183,16 +189,8 @@ def test_a_force_of_another_shape_is_refused_before_anything_is_solved() -> None
             force, after = Pad.step(self, u, v, dt, state)
             return force.T, after
 
-    class OfTurned(LawKind):
-        kind: Literal["turned"]
-
-        def law(self, contact):
-            return Turned(1e4, 5e3, 0.3, 40.0)
-
-    own = {"normal_stiffness": 1e4, "tangential_stiffness": 5e3, "friction": 0.3}
-    asked = ContactLaw.model_validate(own).model_copy(update={"law": OfTurned(kind="turned")})
-    with pytest.raises(UserError, match=r"law: step of Turned gives two points a force of shape \(3, 2\);"):
-        composed.compose(asked, Path("case.toml"))
+    made = {"Half": Half, "Misspelt": Misspelt, "Turned": lambda: Turned(1e4, 5e3, 0.3, 40.0)}[law]()
+    refused(("case.toml: law: ", *words), composed_with, law=OfGiven(kind="given", made=made))
 
 
 class Misspelt(Law):
@@ -214,30 +212,12 @@ class Misspelt(Law):
         return self.presed * u[:, 0]
 
 
-class OfMisspelt(LawKind):
-    kind: Literal["misspelt"]
-
-    def law(self, contact):
-        return Misspelt()
-
-
 def test_the_pages_friction_makes_a_contact() -> None:
     names, _ = run_page()
-    own = {"normal_stiffness": 1e4, "tangential_stiffness": 5e3, "friction": 0.3}
-    kind = names["OfTiring"](kind="tiring", mu_0=0.3, force_p=40.0)
-    made = composed.compose(ContactLaw.model_validate(own).model_copy(update={"friction": kind}), Path("case.toml"))
+    made = composed_with(friction=names["OfTiring"](kind="tiring", mu_0=0.3, force_p=40.0))
     two = np.full((2, 3), 40.0 / 1e4)
     force, _ = made.law.step(two, two, 1.0, made.law.init(2))
     np.testing.assert_allclose(np.hypot(force[:, 1], force[:, 2]), 0.15 * 40.0, rtol=1e-6)
-
-
-def test_a_mistake_in_its_code_is_told_by_file_and_line() -> None:
-    own = {"normal_stiffness": 1e4, "tangential_stiffness": 5e3, "friction": 0.3}
-    asked = ContactLaw.model_validate(own).model_copy(update={"law": OfMisspelt(kind="misspelt")})
-    with pytest.raises(
-        UserError, match=r"case.toml: law: .*test_own_law.py, line \d+, in stored: AttributeError: .*pres"
-    ):
-        composed.compose(asked, Path("case.toml"))
 
 
 def test_the_contract_is_there() -> None:

@@ -12,13 +12,13 @@ import sector
 import small
 from blocks import Block, block
 from meshes import brick
+from refusals import refused
 
 from microslip.contact.friction import Coulomb
 from microslip.contact.normal import Penalty
 from microslip.contact.patch import Patch, equilibrium, pressed_by, pressure
 from microslip.contact.point import PointContact
 from microslip.data import Array, ModalGroup
-from microslip.errors import UserError
 from microslip.harmonic_balance import problem as balance
 from microslip.harmonic_balance import response
 from microslip.harmonic_balance.solver import solve
@@ -345,7 +345,5 @@ def test_coordinates_serve_all_waves_of_a_ring() -> None:
 def test_a_file_without_patch_shapes_is_refused() -> None:
     face = low().group.interfaces["top"]
     bare = replace(low().group, interfaces={"top": replace(face, shapes=face.shapes[:0])})
-    with pytest.raises(UserError, match="output.patch_shapes"):
-        nodal((Component("low", {0: bare}), "top"))
-    with pytest.raises(UserError, match="no interface 'bottom'; it has top"):
-        nodal((component("low", low()), "bottom"))
+    refused("output.patch_shapes", nodal, (Component("low", {0: bare}), "top"))
+    refused("no interface 'bottom'; it has top", nodal, (component("low", low()), "bottom"))

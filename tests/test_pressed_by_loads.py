@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from refusals import refused
 
 import microslip as ms
 from microslip.case.problem import pressed_by, problem_of
@@ -76,5 +77,4 @@ def test_modes_that_do_not_bend_are_refused() -> None:
         counted_from_1(problem, 1)
     assert counted_from_1(problem, 2) == 1
     for system, mode in ((free, 0), (apart, 1)):
-        with pytest.raises(UserError, match="^mode: "):
-            ms.backbone(system, 1e-3, 1.0, mode=mode)
+        assert refused((), ms.backbone, system, 1e-3, 1.0, mode=mode).startswith("mode: ")

@@ -17,6 +17,7 @@ import meshio
 import numpy as np
 import pytest
 import small
+from refusals import refused
 
 import microslip as ms
 from microslip.case import load_case, run_case
@@ -196,8 +197,7 @@ def test_saving_takes_the_place_of_a_response_and_of_no_other_file(curve, tmp_pa
     precious.write_text("mine")
     for found, place in ((curve, precious), (motion, precious), (motion, path)):
         before = place.read_bytes()
-        with pytest.raises(UserError, match=f"{place.name}: is there already and is "):
-            found.save(place)
+        refused(f"{place.name}: is there already and is ", found.save, place)
         assert place.read_bytes() == before
 
 

@@ -15,6 +15,7 @@ import h5py
 import meshes
 import numpy as np
 import pytest
+from refusals import refused
 from test_bdf import bulk
 from test_cdb import archive
 from test_fuzz import flipped, user_errors_only
@@ -148,7 +149,7 @@ SYSTEM = f"    -1\n  2420\n         1\nPart\n         1{{}}         8\nCS1\n{AXE
     ("old", "new", "words"),
     [
         ("       111", "       117", "element 101 is of the I-deas type 117"),
-        ("       111", "       118", r"element 101 has 4 nodes, its type 118 \(tetra10\) 10"),
+        ("       111", "       118", "element 101 has 4 nodes, its type 118 (tetra10) 10"),
         ("       102       111", "       101       111", "element 101 is defined twice"),
         ("  2411", "  2410", "no nodes"),
         ("         5        ", "        77        ", "which the file does not define"),
@@ -159,8 +160,7 @@ def test_universal_files_that_are_wrong(tmp_path: Path, old: str, new: str, word
     whole = unv(tetrahedra())
     assert old in whole
     (tmp_path / "a.unv").write_text(whole.replace(old, new, 1))
-    with pytest.raises(UserError, match=words):
-        read_mesh(tmp_path / "a.unv", "m")
+    refused(words, read_mesh, tmp_path / "a.unv", "m")
 
 
 SOLVED = """    -1
@@ -196,7 +196,7 @@ def test_results_beside_a_mesh_are_left_aside(tmp_path, monkeypatch, capsys):
     (tmp_path / "a.unv").write_text(SOLVED.format(mesh=unv(tetrahedra())))
     assert main(["import", "a.unv", "part"]) == 0
     said = capsys.readouterr().out
-    assert "data sets left aside: 55 (results at nodes), 2414 (results at nodes)" in said
+    assert "data sets left aside: 55 (results at nodes), 2414" in said
     assert 'length_unit = "mm"' in (tmp_path / "part" / "body.toml").read_text()
     (tmp_path / "a.unv").write_text(
         SOLVED.format(mesh=unv(tetrahedra())).replace("1.0D+03", "1.0D+00", 1)
@@ -209,8 +209,7 @@ def test_local_systems_of_a_universal_file_are_refused(tmp_path: Path) -> None:
     (tmp_path / "a.unv").write_text(SYSTEM.format("         0") + unv(tetrahedra()))
     assert read_mesh(tmp_path / "a.unv", "m").n_cells == 12
     (tmp_path / "a.unv").write_text(SYSTEM.format("         1") + unv(tetrahedra()))
-    with pytest.raises(UserError, match="local coordinate systems"):
-        read_mesh(tmp_path / "a.unv", "m")
+    refused("local coordinate systems", read_mesh, tmp_path / "a.unv", "m")
 
 
 def test_truncated_universal_files_are_refused(tmp_path: Path) -> None:
@@ -267,8 +266,8 @@ def test_bulk_data_runs_at_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
     ("old", "new", "words"),
     [
         ("CHEXA          1       1", "CHEXA          2       1", "element 2 is defined twice"),
-        ("CHEXA          1       1       1", "CHEXA          1       1        ", r"1 \(CHEXA\) has 7 nodes; 8 or 20"),
-        ("PSOLID         1       1", "PSOLID         1       3", r"MAT1 3 \(missing\)"),
+        ("CHEXA          1       1       1", "CHEXA          1       1        ", "1 (CHEXA) has 7 nodes; 8 or 20"),
+        ("PSOLID         1       1", "PSOLID         1       3", "MAT1 3 (missing)"),
         ("PSOLID         1 ", "PSOLID         2 ", "no PSOLID defines"),
         ("MAT1  ", "MAT9  ", "MAT9 1"),
         ("   7850.", "        ", "no density"),
@@ -283,8 +282,7 @@ def test_bulk_data_that_is_wrong(tmp_path: Path, old: str, new: str, words: str)
     whole = deck(bulk(meshes.brick("hexahedron", (1, 1, 2), (0.01, 0.012, 0.03))))
     assert old in whole
     (tmp_path / "a.bdf").write_text(whole.replace(old, new, -1 if "GRID" in old else 1))
-    with pytest.raises(UserError, match=words):
-        read_mesh(tmp_path / "a.bdf", "m", "m-kg-s")
+    refused(words, read_mesh, tmp_path / "a.bdf", "m", "m-kg-s")
 
 
 def test_grid_points_in_a_local_system_are_refused(tmp_path: Path) -> None:
@@ -292,8 +290,7 @@ def test_grid_points_in_a_local_system_are_refused(tmp_path: Path) -> None:
     local = re.sub(r"(GRID\* {3} {15}1) {16}", lambda m: f"{m[1]}{5:16d}", whole, count=1)
     assert local != whole
     (tmp_path / "a.bdf").write_text(local)
-    with pytest.raises(UserError, match="GRID 1 uses the local coordinate system 5"):
-        read_mesh(tmp_path / "a.bdf", "m")
+    refused("GRID 1 uses the local coordinate system 5", read_mesh, tmp_path / "a.bdf", "m")
 
 
 # MED -----------------------------------------------------------------------------------------------------------------
@@ -379,15 +376,13 @@ def test_entities_of_xml_are_refused(tmp_path: Path) -> None:
     with user_errors_only(), pytest.raises(UserError, match="entities of XML"):
         read_mesh(tmp_path / "a.vtu", "m")
     (tmp_path / "b.vtu").write_text('<!DOCTYPE a [<!ENTITY x SYSTEM "file:///etc/passwd">]><VTKFile>&x;</VTKFile>')
-    with pytest.raises(UserError, match="entities of XML"):
-        read_mesh(tmp_path / "b.vtu", "m")
+    refused("entities of XML", read_mesh, tmp_path / "b.vtu", "m")
 
 
 @pytest.mark.parametrize("suffix", [".xdmf", ".h5m", ".e", ".cgns", ".npz", ".pkl", ".yaml", ""])
 def test_formats_that_may_lead_elsewhere_are_not_opened(tmp_path: Path, suffix: str) -> None:
     (tmp_path / f"a{suffix}").write_text("!!python/object/apply:os.system [exit]\n")
-    with pytest.raises(UserError, match="meshes are not read from a file"):
-        read_mesh(tmp_path / f"a{suffix}", "m")
+    refused("meshes are not read from a file", read_mesh, tmp_path / f"a{suffix}", "m")
 
 
 # nodes in any order ----------------------------------------------------------------------------------------------

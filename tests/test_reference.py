@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from closed_forms.impacts import dry_turns, restitution
+from refusals import refused
 from test_time_domain import BOOK, MASS, hitting, patch
 
 import microslip as ms
@@ -133,18 +134,13 @@ def test_a_law_known_by_its_steps_is_refused_by_name(law: str) -> None:
 
 def test_what_the_reference_cannot_do_is_refused() -> None:
     e = rubbing(RUBS)
-    with pytest.raises(UserError, match="leave compliance out"):
-        reference.run(replace(e, R=1e-9 * np.eye(len(e.R))), 0, 1)
-    with pytest.raises(UserError, match="tolerance"):
-        reference.run(e, 0, 1, tolerance=0.5)
-    with pytest.raises(UserError, match="integrate: method"):
-        ms.integrate(SLIDER, 1.0, method="exact")
+    refused("leave compliance out", reference.run, replace(e, R=1e-9 * np.eye(len(e.R))), 0, 1)
+    refused("tolerance", reference.run, e, 0, 1, tolerance=0.5)
+    refused("integrate: method", ms.integrate, SLIDER, 1.0, method="exact")
     steady = replace(SLIDER, loads=(*SLIDER.loads, replace(SLIDER.loads[0], harmonic=0)))
-    with pytest.raises(UserError, match='begin from "rest"'):
-        ms.integrate(steady, 1.0, method="reference")
+    refused('begin from "rest"', ms.integrate, steady, 1.0, method="reference")
 
 
 def test_without_its_package_the_reference_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "sksundae.cvode", None)
-    with pytest.raises(UserError, match=r"pip install \"microslip\[reference\]\""):
-        ms.integrate(SLIDER, 1.0, method="reference")
+    refused('pip install "microslip[reference]"', ms.integrate, SLIDER, 1.0, method="reference")

@@ -88,28 +88,19 @@ def test_the_page_is_whole_and_loads_nothing(tmp_path: Path) -> None:
 def test_the_page_says_what_the_file_holds() -> None:
     basis = small.basis()
     group, words = basis.groups[0, 0], said(report_html(basis, {}))
-    for f in group.frequency:
-        assert f"{f:#.6g}" in words
-    assert f"{basis.mass:.6g} kg" in words and "20 × 30 × 120 mm" in words
     limit = group.checks["upper_shift_hz"]
-    assert f"The inertia count proves that these are all 6 modes below {limit:.6g} Hz." in words
+    held = [f"{basis.mass:.6g} kg", "20 × 30 × 120 mm", f"all 6 modes below {limit:.6g} Hz", "right + left squeezed"]
+    for part in (*held, *(f"{f:#.6g}" for f in group.frequency), "shaker", "tip-probe", "root"):
+        assert part in words
     assert re.search(r"All \d+ checks of the file passed", words)
-    assert "shaker" in words and "tip-probe" in words and "root" in words
-    assert "6 modes are not enough" in words or "of 6 modes are" in words
-    assert "right + left squeezed" in words
 
 
 def test_speeds_stand_beside_each_other_with_crossings() -> None:
-    basis = small.basis((0.0, 3000.0))
-    settings = (
-        '{"rotation": {"engine_orders": [30]}, "material": {"name": "steel", "density": 7850.0, "young": 2.1e11}}'
-    )
-    basis = dataclasses.replace(basis, provenance={"settings": settings})
-    words = said(report_html(basis, {}))
-    assert "Hz at 0 rpm" in words and "Hz at 3000 rpm" in words
-    assert "steel, density 7850 kg/m³, E = 210 GPa" in words
-    assert "nonlinear equilibrium, with spin softening" in words
-    assert "Where engine orders meet modes" in words
+    material = '"material": {"name": "steel", "density": 7850.0, "young": 2.1e11}'
+    settings = {"settings": f'{{"rotation": {{"engine_orders": [30]}}, {material}}}'}
+    words = said(report_html(dataclasses.replace(small.basis((0.0, 3000.0)), provenance=settings), {}))
+    assert "Hz at 0 rpm" in words and "Hz at 3000 rpm" in words and "Where engine orders meet modes" in words
+    assert "7850 kg/m³, E = 210 GPa" in words and "spin softening" in words
 
 
 @pytest.mark.parametrize("settings", ["", "not json", "[1, 2]", '{"material": 3}', '{"rotation": null}', "3"])
@@ -165,36 +156,26 @@ def test_powers_of_ten_are_set_as_such(value: str, wanted: str) -> None:
     assert text(value) == wanted
 
 
-def test_the_certificate_in_words() -> None:
+def test_the_certificate_in_words_and_a_failed_check() -> None:
     group = small.basis().groups[0, 0]
-    cut = dataclasses.replace(group, checks={**group.checks, "count_below_upper_shift": 9.0})
-    assert certificate(cut).endswith("the first 6 are kept.") and "all 9 modes" in certificate(cut)
+    cut = certificate(dataclasses.replace(group, checks={**group.checks, "count_below_upper_shift": 9.0}))
+    assert "the first 6 are kept" in cut and "all 9 modes" in cut
     open_end = dataclasses.replace(group, checks={**group.checks, "certified": 0.0})
     assert "not certified" in certificate(open_end)
-    basis = dataclasses.replace(small.basis(), groups={(0, 0): open_end})
-    assert "1 of" in said(report_html(basis, {})) and "checks failed" in said(report_html(basis, {}))
-
-
-def test_a_failed_check_is_named_first() -> None:
-    group = small.basis().groups[0, 0]
-    broken = dataclasses.replace(group, K_r=group.K_r * 1.01)
-    words = said(report_html(dataclasses.replace(small.basis(), groups={(0, 0): broken}), {}))
-    assert re.search(r"\d+ of \d+ checks failed: .*K_r", words)
+    for wrong, name in ((open_end, ""), (dataclasses.replace(group, K_r=group.K_r * 1.01), "K_r")):
+        words = said(report_html(dataclasses.replace(small.basis(), groups={(0, 0): wrong}), {}))
+        assert re.search(rf"\d+ of \d+ checks failed: .*{name}", words)
 
 
 def test_fit_residuals_in_words() -> None:
     group = small.basis().groups[0, 0]
     patch = group.interfaces["right"]
-
-    def sentence(*residual: float) -> str:
-        return fit_sentence("tip", dataclasses.replace(patch, fit_residual=np.array(residual)), group)
-
-    assert sentence(0.01, 0.02, 0.0, 0.0, 0.0, 0.0) == (
-        "tip moves as a rigid patch in all modes (at most 2.0 % of its motion is deformation)."
-    )
-    mixed = sentence(0.01, 0.2, 0.0, 0.5, 0.3, 0.0)
-    assert "in modes 1, 3 and 6; it deforms in modes 2, 4 and 5 (most in mode 4: 50.0 %" in mixed
-    assert sentence(*[0.6] * 6).startswith("tip deforms in modes 1 to 6")
+    for residual, words in (
+        ((0.01, 0.02, 0.0, 0.0, 0.0, 0.0), "in all modes (at most 2.0 %"),
+        ((0.01, 0.2, 0.0, 0.5, 0.3, 0.0), "modes 1, 3 and 6; it deforms in modes 2, 4 and 5 (most in mode 4: 50.0"),
+        ((0.6,) * 6, "tip deforms in modes 1 to 6"),
+    ):
+        assert words in fit_sentence("tip", dataclasses.replace(patch, fit_residual=np.array(residual)), group)
 
 
 @pytest.mark.parametrize(
@@ -206,24 +187,11 @@ def test_lists_of_numbers(numbers: list[int], words: str) -> None:
 
 
 def test_a_response_is_told_whatever_it_holds(tmp_path: Path) -> None:
-    response = {
-        "case": "blade",
-        "description": "",
-        "stuck_frequencies_Hz": [86.5, 121.25],
-        "resonances": [{"normal_force_N": 10.0, "frequency_Hz": 14.2, "amplitude_m": 1.5e-5, "stress_Pa": 3.25e6}],
-        "failed_points": 0,
-    }
-    words = said(report_html(small.basis(), album(tmp_path, "friction response"), (), response))
-    for part in (
-        "stuck frequencies in Hz86.5, 121.25",
-        "normal force in N",
-        "frequency in Hz",
-        "amplitude in µm",
-        "14.2153.25",
-        "failed points0",
-    ):
-        assert part in words
-    assert "description" not in words
+    peak = {"normal_force_N": 10.0, "frequency_Hz": 14.2, "amplitude_m": 1.5e-5, "stress_Pa": 3.25e6}
+    response = {"case": "blade", "description": "", "stuck_frequencies_Hz": [86.5, 121.25], "resonances": [peak]}
+    words = said(report_html(small.basis(), album(tmp_path, "friction response"), (), response | {"failed_points": 0}))
+    told = ("stuck frequencies in Hz86.5, 121.25", "normal force in N", "frequency in Hz", "amplitude in µm")
+    assert all(part in words for part in (*told, "14.2153.25", "failed points0")) and "description" not in words
 
 
 def test_pictures_that_are_missing_leave_no_hole(tmp_path: Path) -> None:
@@ -249,14 +217,11 @@ def bare() -> ModalBasis:
     return dataclasses.replace(basis, groups={(0, 0): thin}, provenance={})
 
 
-def test_a_bare_file_has_a_page_too(tmp_path: Path) -> None:
+def test_bare_files_and_free_bodies_have_a_page_too() -> None:
     words = said(report_html(bare(), {}))
     assert "no compliance to check" in words and "not certified" in words
-
-
-def test_a_free_body_says_so() -> None:
     words = said(report_html(small.basis(free=True), {}))
-    assert "6 of them rigid" in words and "inertia relief" in words and "rigid motions are left free" in words
+    assert "6 of them rigid" in words and "inertia relief" in words
 
 
 def test_many_patches_are_summed_up() -> None:
@@ -264,23 +229,15 @@ def test_many_patches_are_summed_up() -> None:
     patch = dataclasses.replace(group.interfaces["right"], role="bolt", fit_residual=np.full(group.n_modes, 0.01))
     loose = dataclasses.replace(patch, fit_residual=np.array([0.0, 0.0, 0.3, 0.0, 0.0, 0.0]))
     bolts = {f"bolt_{i}": loose if i == 3 else patch for i in range(1, 7)}
-    labels = tuple(x for x in group.compliance.labels if not x.startswith("interface"))
-    keep = [i for i, x in enumerate(group.compliance.labels) if x in labels]
-    pick = np.ix_(keep, keep)
-    compliance = dataclasses.replace(
-        group.compliance, labels=labels, static=group.compliance.static[pick], modal=group.compliance.modal[pick]
-    )
-    bolted = dataclasses.replace(group, interfaces=bolts, compliance=compliance)
+    bolted = dataclasses.replace(group, interfaces=bolts, compliance=bare().groups[0, 0].compliance)
     words = said(report_html(dataclasses.replace(small.basis(), groups={(0, 0): bolted}), {}))
-    assert "Of 6 patches 1 deform in some modes, most of all bolt_3 in mode 3: 30.0 %" in words
+    assert "Of 6 patches 1 deform" in words and "bolt_3 in mode 3: 30.0 %" in words
 
 
 def test_load_faces_are_no_contacts() -> None:
-    group = small.basis().groups[0, 0]
-    assert "contact_left" in group.interfaces and group.interfaces["contact_left"].role == "load"
+    assert small.basis().groups[0, 0].interfaces["contact_left"].role == "load"
     words = said(report_html(small.basis(), {}))
-    assert "contact_left load" in words or "contact_leftload" in words
-    assert "contact_left moves" not in words and "contact_left deforms" not in words
+    assert re.search("contact_left ?load", words) and not re.search("contact_left (moves|deforms)", words)
 
 
 def peak(force: float, frequency: float, amplitude: float, doubt: str = "") -> dict[str, float | str]:
@@ -294,18 +251,18 @@ def test_the_answer_is_a_resonance_that_is_valid() -> None:
     rows += [peak(1e4, 171.1, 80.65e-6)]
     for row, stress in zip(rows, (900e6, 3e6, 41.5e6), strict=True):
         row |= {"stress_amplitude_Pa": stress, "frequency_of_stress_Hz": row["frequency_Hz"]}
+
+    def words(rows: list, error: float | None, **more: str) -> str:
+        return said(response_html({"resonances": rows, "estimated_error_of_harmonics": error, **more}, {}))
+
     for unknown in (None, np.inf):
-        words = said(response_html({"resonances": rows, "estimated_error_of_harmonics": unknown}, {}))
-        assert "how uncertain amplitudes are is not known at some places" in words
-    words = said(response_html({"resonances": [], "estimated_error_of_harmonics": np.inf}, {}))
-    assert "error of harmonicsnot known" in words and "inf" not in words
-    words = said(response_html({"resonances": rows, "estimated_error_of_harmonics": 1.3e-13}, {}))
-    assert "highest resonance found is 80.65 µm at 171.1 Hz" in words and "lowest with 12.74 µm" in words
-    assert "Under FN = 20 N contacts would lift off" in words
-    assert "largest stress amplitude is 41.5 MPa" in words
-    of_one = response_html({"resonances": rows, "stressed_body": "lower"}, {})
-    assert "largest stress amplitude of lower is 41.5 MPa" in said(of_one)
-    assert "uncertain by less than 0.01" in words and "32000" in words and "10000" in words and "·10" not in words
+        assert "how uncertain amplitudes are is not known" in words(rows, unknown)
+    assert "error of harmonicsnot known" in words([], np.inf) and "inf" not in words([], np.inf)
+    answer = words(rows, 1.3e-13)
+    for part in ("is 80.65 µm at 171.1 Hz", "lowest with 12.74 µm", "Under FN = 20 N contacts would lift off",
+                 "amplitude is 41.5 MPa", "uncertain by less than 0.01", "32000", "10000"):  # fmt: skip
+        assert part in answer
+    assert "·10" not in answer and "of lower is 41.5 MPa" in words(rows, 1e-13, stressed_body="lower")
 
 
 def test_a_contact_tells_what_is_left_of_its_penetration_where_it_is_no_rounding() -> None:
@@ -322,16 +279,15 @@ def test_what_stands_in_a_table_is_told_once_and_rounding_not_at_all() -> None:
     told = {"stuck_modes": modes, "stuck_frequencies_Hz": [874.25], "rising_at_the_edge": []}
     words = said(response_html(told, {}))
     assert words.count("874.25") == 1 and "Modes with sticking contacts" in words and "rising" not in words
-    orders = {
-        "amplitude_m_FN_10_N": ["2e-5"],
-        "resonance_Hz_FN_10_N": ["99.5"],
-        "stress_amplitude_Pa_as_pressed": ["1e6"],
-    }
-    table = said(survey_html("t", [], {"t.csv": orders}, []))
-    assert "FN = 10 N: amplitude in µm" in table and "FN = 10 N: resonance in Hz" in table and "20" in table
-    assert "as pressed: stress amplitude in MPa" in table
-    table = said(survey_html("t", [], {"t.csv": {"load_m": ["1.5e-3", "1e-16"], "speed_rad_s": ["2", "3"]}}, []))
-    assert "load in mm" in table and "1.5" in table and "1e-13" not in table and "speed in rad/s" in table
+    for column, value, shown in (
+        ("amplitude_m_FN_10_N", "2e-5", "FN = 10 N: amplitude in µm 20"),
+        ("resonance_Hz_FN_10_N", "99.5", "FN = 10 N: resonance in Hz 99.5"),
+        ("stress_amplitude_Pa_as_pressed", "1e6", "as pressed: stress amplitude in MPa 1"),
+        ("load_m", "1.5e-3", "load in mm 1.5"),
+        ("speed_rad_s", "2", "speed in rad/s 2"),
+    ):
+        assert shown in said(survey_html("t", [], {"t.csv": {column: [value]}}, []))
+    assert "1e-13" not in said(survey_html("t", [], {"t.csv": {"load_m": ["1.5e-3", "1e-16"]}}, []))
 
 
 def test_a_page_has_one_unit_of_length_and_tells_rows_apart() -> None:
@@ -340,10 +296,9 @@ def test_a_page_has_one_unit_of_length_and_tells_rows_apart() -> None:
     a, mean = ["1.53e-3", "9.8e-4", "2e-5", "1e-3", "1e-3"], ["7.981e-11", "-1e-10", "3.5e-7", "0", "0"]
     curve = {"frequency_Hz": near, "amplitude_m": a, "mean_m": mean}
     table = said(survey_html("t", [], {"t.csv": curve, "u.csv": {"amplitude_m": ["2e-5"]}}, []))
-    assert "µm" not in table and table.count("amplitude in mm") == 2 and "1.53" in table and "0.98" in table
-    assert all(n in table for n in ("377.42", "300", "377.4232", "377.4233", "377.424", "0.00035"))
-    assert "300.0" not in table
-    assert "·10" not in table and "7.981" not in table
+    shown = ("1.53", "0.98", "377.42", "300", "377.4232", "377.4233", "377.424", "0.00035")
+    assert table.count("amplitude in mm") == 2 and all(n in table for n in shown)
+    assert not any(n in table for n in ("µm", "300.0", "·10", "7.981"))
     words = said(response_html({"resonances": [peak(1.0, 2.0, 1.53e-3), peak(2.0, 2.0, 9.8e-4)]}, {}))
     assert "is 1.53 mm at 2 Hz" in words and "lowest with 0.98 mm" in words and "amplitude in mm" in words
 

@@ -16,6 +16,7 @@ from typing import Any
 import h5py
 import numpy as np
 import pytest
+from refusals import refused
 from test_harmonic_balance_laws import sled
 
 from microslip.basis import read_basis, write_basis
@@ -673,15 +674,16 @@ def test_the_axis_of_a_strain_gauge_says_so(folder: Path, monkeypatch: pytest.Mo
     ('harmonics = "auto"\nharmonics_error = 0.0', "harmonics_error"),
     ('harmonics = "many"', "harmonics: must be a whole number, or 'auto'"),
     ("harmonics = 0", "harmonics: must not be less than 1, or 'auto'"),
-    ("harmonics = 3\nsweep = {start = 1.0, stop = 2.0, normal_forces = [inf]}",
-     "sweep.normal_forces: entry 1 of the list must be a finite number"),
     ('harmonics = "auto"\n[ring]\nblades = 4\nmodel = "full"', 'harmonics: "auto" needs ring.model = "sector"'),
+    ("speed = 3", "has one speed, number 0; correct it"),
+    ("frction = 0.2", "contacts.right.frction: unknown key; did you mean 'friction'?"),
+    ("normal_forces = [inf]", "sweep.normal_forces: entry 1 of the list must be a finite number"),
 ])  # fmt: skip
-def test_mistakes_about_harmonics(folder: Path, keys: str, words: str) -> None:
-    text = CASE.replace("harmonics = 1\nsamples = 24", keys)
-    (folder / "case.toml").write_text(text.replace("[sweep]", "[rest]") if "sweep" in keys else text)
-    with pytest.raises(UserError, match=words):
-        respond(folder)
+def test_mistakes_in_a_case(folder: Path, keys: str, words: str) -> None:
+    key = keys.split(" =")[0]
+    old = {"frction": "friction = 0.2", "normal_forces": "normal_forces = [50.0]"}
+    (folder / "case.toml").write_text(CASE.replace(old.get(key, "harmonics = 1\nsamples = 24"), keys))
+    refused(words, respond, folder)
 
 
 @pytest.mark.parametrize("verb", [running.respond, running.run_case_file])
@@ -698,27 +700,22 @@ def test_a_modal_file_that_is_not_there(folder: Path, monkeypatch: pytest.Monkey
         for old, new in changes:
             text = text.replace(old, new)
         (folder / "mine/vane.toml").write_text(text)
-        with pytest.raises(UserError) as caught:
-            verb(Path(path), None) if verb is running.respond else verb(Path(path))
-        assert "\n" not in str(caught.value)
-        return str(caught.value)
+        return refused((), verb, Path(path), *([None] if verb is running.respond else []))
 
     assert "is 'vane-eigenmodes' meant?" in said("mine/vane.toml", ("vane-eigenmodes", "vane-eigenmode"))
     assert "the bodies here are vane-eigenmodes" in said("mine/vane.toml", ("vane-eigenmodes", "fan"))
     nowhere = said("mine/vane.toml", ('body = "vane-eigenmodes"', several), ('= "magnet"', '= "vane:magnet"'))
-    assert "no file mine/gone.h5; paths in a case start in the folder of the case" in nowhere
+    assert "no file mine/gone.h5" in nowhere
     monkeypatch.chdir(folder / "mine")
     moved = said("vane.toml")
-    assert f"it is in {folder}: go there (cd {folder}) and give the case as mine/vane.toml" in moved
-    assert str(folder / "mine") in moved.split(";")[0]
+    assert f"cd {folder}" in moved and "mine/vane.toml" in moved and str(folder / "mine") in moved.split(";")[0]
 
 
 def test_a_body_that_can_be_made_is(folder: Path) -> None:
     (folder / "basis.h5").unlink()
     (folder / "geometry/vane-eigenmodes").mkdir(parents=True)
     (folder / "geometry/vane-eigenmodes/body.toml").write_text('name = "vane-eigenmodes"\n')
-    with pytest.raises(UserError, match="no .*basis.h5 .*; microslip run .*case.toml makes it"):
-        running.respond(folder / "case.toml", None)
+    refused(("basis.h5", "microslip run", "case.toml makes it"), running.respond, folder / "case.toml", None)
 
 
 def test_what_jenkins_elements_do_not_follow_is_told(folder: Path) -> None:
@@ -732,17 +729,6 @@ def test_what_jenkins_elements_do_not_follow_is_told(folder: Path) -> None:
     assert said.startswith("warning: At F_N = 0.05 N and ") and 'slides_along = "t2"' in said
     summary = json.loads((folder / "build/vane/response.json").read_text())
     assert any("does not follow" in message for message in summary["messages"])
-
-
-def test_a_contact_is_named_by_its_interface(folder: Path) -> None:
-    (folder / "case.toml").write_text(CASE.replace("friction = 0.2", "frction = 0.2"))
-    with pytest.raises(UserError, match=r"contacts.right.frction: unknown key; did you mean 'friction'\?"):
-        running.respond(folder / "case.toml", None)
-
-
-def test_a_speed_that_is_not_stored(folder: Path) -> None:
-    with pytest.raises(UserError, match="has one speed, number 0; correct it"):
-        running.respond(folder / "case.toml", None, ["speed=3"])
 
 
 @pytest.mark.slow

@@ -16,6 +16,7 @@ from types import SimpleNamespace
 import h5py
 import numpy as np
 import pytest
+from refusals import refused
 from small import basis as small_basis
 
 from microslip.errors import UserError
@@ -333,14 +334,10 @@ def test_motion_of_a_response_reads_what_the_monitor_kept(tmp_path):
     motion = found.motion(found.series[0], small_basis())
     told = found.series[0].monitor("tip-probe")
     np.testing.assert_allclose(read_out(motion, "tip-probe"), told.transpose(0, 2, 1), rtol=1e-12)
-    with pytest.raises(UserError, match="modal file of 'small', this is 'other'"):
-        found.motion(found.series[0], replace(small_basis(), name="other"))
-    with pytest.raises(UserError, match="another state"):
-        found.motion(found.series[0], small_basis(), sha256="1" * 64)
-    with pytest.raises(UserError, match="has tip-probe"):
-        found.series[0].monitor("nose")
-    with pytest.raises(UserError, match="0 series have normal_force = 11"):
-        found.one(normal_force=11.0)
+    refused("this is 'other'", found.motion, found.series[0], replace(small_basis(), name="other"))
+    refused("another state", found.motion, found.series[0], small_basis(), sha256="1" * 64)
+    refused("has tip-probe", found.series[0].monitor, "nose")
+    refused("0 series have normal_force = 11", found.one, normal_force=11.0)
 
 
 def test_points_with_more_harmonics_stand_beside_points_with_fewer():
@@ -359,24 +356,19 @@ def test_unfinished_response_is_read_from_its_journal(tmp_path):
 
 def test_damaged_and_foreign_files_get_one_sentence(tmp_path):
     path = tmp_path / "response.h5"
-    with pytest.raises(UserError, match="no such response"):
-        read_response(path)
+    refused("no such response", read_response, path)
     path.write_bytes(b"nothing of the kind" * 99)
-    with pytest.raises(UserError, match="no HDF5 file"):
-        read_response(path)
-    with pytest.raises(UserError, match="is text, not an HDF5 file"):
-        write_response(path, response(1.0))
+    refused("no HDF5 file", read_response, path)
+    refused("is text, not an HDF5 file", write_response, path, response(1.0))
     path.unlink()
     write_response(path, response(1.0))
     data = bytearray(path.read_bytes())
     data[len(data) // 2] ^= 4
     path.write_bytes(data)
-    with pytest.raises(UserError, match="is damaged"):
-        read_response(path)
+    refused("is damaged", read_response, path)
     with h5py.File(path, "w") as file:
         file.attrs["format"] = "microslip-modal-basis"
-    with pytest.raises(UserError, match="is 'microslip-modal-basis'"):
-        read_response(path)
+    refused("is 'microslip-modal-basis'", read_response, path)
 
 
 @pytest.mark.slow
@@ -385,19 +377,16 @@ def test_incomplete_and_newer_files_get_one_sentence(tmp_path):
     write_response(path, response(1.0))
     with h5py.File(path, "r+") as file:
         file.attrs["format_version"] = "7.0"
-    with pytest.raises(UserError, match="7.0"):
-        read_response(path)
+    refused("7.0", read_response, path)
     write_response(path, response(1.0))
     with h5py.File(path, "r+") as file:
         del file["series_0000/key"]
-    with pytest.raises(UserError, match="incomplete"):
-        read_response(path)
+    refused("incomplete", read_response, path)
     write_response(path, response(1.0, 2.0))
     with h5py.File(path, "r+") as file:
         del file["series_0000/frequency"]
         file["series_0000/frequency"] = np.ones(5)
-    with pytest.raises(UserError, match="different lengths"):
-        read_response(path)
+    refused("different lengths", read_response, path)
 
 
 def test_empty_series_and_no_series(tmp_path):

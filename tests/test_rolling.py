@@ -13,6 +13,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from closed_forms.no_slip import extrapolated
+from refusals import refused
 from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
@@ -250,16 +251,15 @@ def test_the_short_return_is_that_of_the_point_contact() -> None:
 @pytest.mark.parametrize(
     ("wrong", "said"),
     [
-        ({"normal_force": [1e5, -1e5]}, r"normal_force: must be greater than 0 \(entry 2 is -100000\)"),
-        ({"a": 0.0}, r"a: must be greater than 0 \(it is 0\)"), ({"spin": "none"}, "'kalker' or 'book'"),
-        ({"elements": (0, 20)}, "elements: is .* whole numbers"),
-        ({"eta": [0.0] * 3, "xi": [1e-3] * 2}, r"shapes do not go together: xi \(2,\), eta \(3,\)"),
+        ({"normal_force": [1e5, -1e5]}, "normal_force: must be greater than 0 (entry 2 is -100000)"),
+        ({"a": 0.0}, "a: must be greater than 0 (it is 0)"), ({"spin": "none"}, "'kalker' or 'book'"),
+        ({"elements": (0, 20)}, ("elements: is ", " whole numbers")),
+        ({"eta": [0.0] * 3, "xi": [1e-3] * 2}, "shapes do not go together: xi (2,), eta (3,)"),
     ],
 )  # fmt: skip
 def test_states_that_are_none_are_refused(wrong: dict, said: str) -> None:
     for model in (ms.creep_forces, ms.tractions):
-        with pytest.raises(UserError, match=said):
-            model(**{"xi": 1e-3, "eta": 0.0, "phi": 0.1, **PATCH, **wrong})
+        refused(said, model, **{"xi": 1e-3, "eta": 0.0, "phi": 0.1, **PATCH, **wrong})
 
 
 TRACK = {"wheel": ms.circle(0.5), "rail": ms.circle(0.3), "radius": 0.46, "wheel_at": 0.75, "rail_at": 0.75}
@@ -270,8 +270,7 @@ def test_a_read_table_refuses_what_is_no_state() -> None:
     table = ms.creep_table(NU, points=(4,) * 5, elements=(4, 4), checked=1)
     state = {k: v for k, v in STATE.items() if k != "poisson"}
     for key, v in (("friction", -0.3), ("xi", np.nan), ("normal_force", -1.0), ("shear", "x"), ("a", 0.0)):
-        with pytest.raises(UserError, match=key):
-            table.forces(**{**state, key: v})
+        refused(key, table.forces, **{**state, key: v})
     assert np.isfinite(table.forces(**{**state, "friction": 0.0})).all()
 
 
@@ -299,10 +298,8 @@ def test_a_table_tells_its_error_and_is_read_with_it(tmp_path: Path) -> None:
     assert (table.error[:, 0] < 0.5 * tables[0].error[:, 0]).all()
     one = [float(np.ravel(v)[0]) for v in given]
     np.testing.assert_allclose(table.forces(*one, G), table.forces(*given, G)[:, 0], rtol=1e-12)
-    with pytest.raises(UserError, match="a/b is 6"):
-        table.forces(1e-3, 0, 0, 6e-3, 1e-3, 82e3, MU, G)
-    with pytest.raises(UserError, match="write a table of creep forces"):
-        ms.read_creep_table(CASE)
+    refused("a/b is 6", table.forces, 1e-3, 0, 0, 6e-3, 1e-3, 82e3, MU, G)
+    refused("write a table of creep forces", ms.read_creep_table, CASE)
 
 
 # --- profiles and poses --------------------------------------------------------------------------------------------
@@ -415,8 +412,8 @@ def test_a_wheel_is_in_equilibrium_with_its_friction(side: str, yaw: float) -> N
 
 def test_friction_that_holds_a_wheel_down_is_told() -> None:
     """mu tan(60 degrees) > 1: no normal force lifts a wheel that runs down its flange."""
-    with pytest.raises(UserError, match="friction drags the wheel down"):
-        ms.patches(track(**STEEP), ms.Pose(4.1e-3, -0.02, 0.0, 3.0, 6.6), "right", 1e4, 0.9)
+    pose = ms.Pose(4.1e-3, -0.02, 0.0, 3.0, 6.6)
+    refused("friction drags the wheel down", ms.patches, track(**STEEP), pose, "right", 1e4, 0.9)
 
 
 def test_an_axle_shares_its_load_by_its_roll() -> None:
@@ -491,8 +488,8 @@ def test_a_table_of_contacts_is_read_for_other_loads_and_creepages(contacts: Con
         ({"load": [1e5] * 3}, "load: shapes"),
         ({"lateral": [0.0] * 3, "xi": [0.0] * 2}, "shapes"),
     ):
-        with pytest.raises(UserError, match=said):
-            contacts.forces(**{"lateral": 0.0, "yaw": 0.0, "speed": 20.0, "friction": MU} | wrong)
+        given = {"lateral": 0.0, "yaw": 0.0, "speed": 20.0, "friction": MU} | wrong
+        refused(said, contacts.forces, **given)
 
 
 def test_jumps_are_flagged_and_not_read_across() -> None:
@@ -540,10 +537,8 @@ def test_profiles_of_miniprof(tmp_path: Path) -> None:
     np.testing.assert_allclose(found.height([-0.0185, 0.0205]), np.array([-0.0185, 0.0205]) ** 2 / 0.6, atol=1e-9)
     (tmp_path / "r.ban").write_text(head.replace("0.0000", "1.5") + points)
     (tmp_path / "w.csv").write_text("\n".join(f"{a},{b}" for a, b in zip(y, -(y**2) / 30, strict=True)))
-    with pytest.raises(UserError, match="upside down"):
-        ms.read_profile(tmp_path / "w.csv")
-    with pytest.raises(UserError, match="XOffset"):
-        ms.read_profile(tmp_path / "r.ban")
+    refused("upside down", ms.read_profile, tmp_path / "w.csv")
+    refused("XOffset", ms.read_profile, tmp_path / "r.ban")
 
 
 def test_an_inclined_circle_is_the_same_circle() -> None:
@@ -667,8 +662,8 @@ def test_a_profile_upside_down_is_told_which_mirror_turns_it(mirror: Any, tmp_pa
     up = -1 if mirror else 1
     z = up * np.where(y < 25, 0.0, (y - 25) * -5.0)
     np.savetxt(tmp_path / "p.csv", np.column_stack([y, z]), delimiter=",")
-    with pytest.raises(UserError, match=re.escape(f"set mirror = {'' if mirror else 'z'!r}")):
-        ms.read_profile(tmp_path / "p.csv", mirror=mirror)
+    turns = f"set mirror = {'' if mirror else 'z'!r}"
+    refused(turns, ms.read_profile, tmp_path / "p.csv", mirror=mirror)
 
 
 def test_an_inclined_rail_stands_by_its_highest_point() -> None:
@@ -681,8 +676,7 @@ def test_an_inclined_rail_stands_by_its_highest_point() -> None:
 
 def test_profiles_that_turn_back_are_named(tmp_path: Path) -> None:
     (tmp_path / "p.csv").write_text("\n".join(f"{y},0" for y in (0, 10, 20, 15, 30, 40)))
-    with pytest.raises(UserError, match="turns back or crosses itself at point 4"):
-        ms.read_profile(tmp_path / "p.csv")
+    refused("turns back or crosses itself at point 4", ms.read_profile, tmp_path / "p.csv")
 
 
 def test_what_should_be_doubted_is_told(

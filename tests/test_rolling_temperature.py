@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from refusals import refused
 from scipy.integrate import quad
 from scipy.special import erfcx
 
-from microslip.errors import UserError
 from microslip.rolling.temperature import (
     Conductor,
     conducted,
@@ -115,5 +115,4 @@ def test_source_is_the_work_of_traction_on_slip() -> None:
     ],
 )
 def test_mistakes_are_named(key: str, call) -> None:
-    with pytest.raises(UserError, match=f"{key}: "):
-        call()
+    refused(f"{key}: ", call)

@@ -8,13 +8,13 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from closed_forms.oscillators import belt
+from refusals import refused
 
 import microslip as ms
 from microslip import sliding
 from microslip.bifurcation import mechanics
 from microslip.case import load_case
 from microslip.case.assemble import build
-from microslip.errors import UserError
 from microslip.system.assembly import Assembly
 from microslip.system.settings import load_system
 
@@ -81,5 +81,4 @@ def test_spring_and_cube() -> None:
 
 def test_contacts_that_remember_are_refused() -> None:
     made = ms.structure(1.0, 1.0, 0.02, elements=[ms.jenkins(1.0, 0.5)])
-    with pytest.raises(UserError, match="contacts.jenkins 1"):
-        sliding.of(made)
+    refused("contacts.jenkins 1", sliding.of, made)

@@ -7,13 +7,13 @@ from dataclasses import replace
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from refusals import refused
 from test_speed_range import TOP, ranged
 
 from microslip.contact.friction import Coulomb
 from microslip.contact.normal import Penalty
 from microslip.contact.patch import Patch, grid
 from microslip.contact.point import PointContact
-from microslip.errors import UserError
 from microslip.harmonic_balance import problem as balance
 from microslip.harmonic_balance import response, speed_line
 from microslip.harmonic_balance.solver import solve
@@ -99,5 +99,4 @@ def test_mistakes_are_told() -> None:
         ("0 is steady", lambda: speed_line.along(at_speed, np.array([8000.0]), 0)),
         ("outside the speed range", lambda: speed_line.along(at_speed, np.array([2 * TOP]), 4)),
     ):
-        with pytest.raises(UserError, match=words):
-            call()
+        refused(words, call)

@@ -18,6 +18,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 import small
+from refusals import refused
 
 from microslip.basis import check_basis, read_basis, write_basis
 from microslip.contact.examples import EXAMPLES
@@ -175,8 +176,7 @@ def tiny_disk(tmp_path: Path) -> Iterator[Path]:
 def test_a_full_disk(tiny_disk: Path) -> None:
     store.write_text(tiny_disk / "basis.h5", "old")
     for write in (lambda p: write_basis(p, small.basis()), lambda p: write_mat(small.basis(), p)):
-        with pytest.raises(UserError, match=r"No space left on device\).*free some space"):
-            write(tiny_disk / "basis.h5")
+        refused(("No space left on device)", "free some space"), write, tiny_disk / "basis.h5")
         assert (tiny_disk / "basis.h5").read_text() == "old"
         assert hidden(tiny_disk) == []
 
@@ -206,9 +206,7 @@ def test_places_that_cannot_be_written(tmp_path: Path, where: str) -> None:
         "a folder as file": tmp_path / "folder",
         "a name too long": tmp_path / ("x" * 300 + ".h5"),
     }[where]
-    with pytest.raises(UserError, match="cannot be written") as error:
-        store.write_text(target, "x")
-    assert "\n" not in str(error.value)
+    refused("cannot be written", store.write_text, target, "x")
     assert (tmp_path / "file").read_text() == "mine"
     assert (tmp_path / "folder").is_dir()
 
@@ -217,8 +215,7 @@ def test_places_that_cannot_be_written(tmp_path: Path, where: str) -> None:
 def test_no_right_to_write(tmp_path: Path) -> None:
     folder = tmp_path / "closed"
     folder.mkdir(mode=0o500)
-    with pytest.raises(UserError, match="you may write to"):
-        store.write_text(folder / "x", "x")
+    refused("you may write to", store.write_text, folder / "x", "x")
 
 
 # ---------------------------------------------------------------- what is up to date
@@ -346,11 +343,9 @@ def test_a_file_of_another_kind_is_not_replaced(tmp_path: Path) -> None:
         path.unlink()
         other()
         before = path.read_bytes()
-        with pytest.raises(UserError, match=r"it\.h5: is there already and is "):
-            write("microslip-orbit")
+        refused("it.h5: is there already and is ", write, "microslip-orbit")
         assert path.read_bytes() == before and [p.name for p in tmp_path.iterdir()] == ["it.h5"]
-    with pytest.raises(UserError):
-        store.write_text(path.with_name("it.h5"), "<!DOCTYPE html>")
+    refused((), store.write_text, path.with_name("it.h5"), "<!DOCTYPE html>")
     store.write_text(path, "a,b")
     path.write_bytes(b"torn")
     store.sidecar_path(path).write_text("{}")

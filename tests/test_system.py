@@ -14,6 +14,7 @@ import pytest
 import scipy.linalg
 from box import edit
 from closed_forms.one_harmonic import JenkinsContact, frequency_response, stuck_frequencies
+from refusals import refused, refused_command
 
 from microslip.basis import check_basis, read_basis, write_basis
 from microslip.cli import main
@@ -193,7 +194,7 @@ def test_matrices_in_a_file(tmp_path: Path) -> None:
         ('"m2", "m3"', '"m2", "m7"', "no component 'm7'"),
         ('on = "m3"', 'on = "m4"', "no component 'm4'"),
         ("[0.0, 1.0, 0.0]", "[0.0, 0.0, 1.0]", "parallel to the normal"),
-        ('name = "m2"', 'name = "m1"', "masses: .*'m1'"),
+        ('name = "m2"', 'name = "m1"', "masses: the name 'm1'"),
         ('name = "m2"', 'name = "m2"\nwheight = 2', "wheight"),
         ("damping_ratio = 0.005", "damping_ratio = true", "damping_ratio"),
         ("damping_ratio = 0.005", "[matrices]\nmass = [[1.0]]\nstiffness = [[1.0]]", "free to move in 3 directions"),
@@ -202,9 +203,7 @@ def test_matrices_in_a_file(tmp_path: Path) -> None:
 def test_mistakes_are_named(tmp_path: Path, old: str, new: str, words: str) -> None:
     path = tmp_path / "system.toml"
     path.write_text(THREE.replace(old, new, 1))
-    with pytest.raises(UserError, match=words) as found:
-        system_basis(path)
-    assert str(path) in str(found.value)
+    refused((words, str(path)), system_basis, path)
 
 
 @pytest.mark.parametrize(
@@ -224,9 +223,8 @@ def test_a_name_used_twice_is_refused(
     name = entry.split('"')[1]
     assert f'name = "{name}"' in THREE
     Path("system.toml").write_text(f"{THREE}\n[[{key}]]\n{entry}\n")
-    assert main(["run", "system.toml", "--quiet"]) == 2
-    said = capsys.readouterr().err
-    assert f"system.toml: {key}: " in said and f"'{name}'" in said and not Path("build").exists()
+    refused_command(["run", "system.toml", "--quiet"], capsys, f"system.toml: {key}: ", f"'{name}'")
+    assert not Path("build").exists()
     more = Monitor("end", "m1"), Force("shaker", "m2", (1, 0, 0)), Contact("rub", "m1", normal=(0, 0, 1))
     keys = ("monitors", "forces", "contacts")
     for kind, twice in zip(keys, more, strict=True):
@@ -243,12 +241,10 @@ def test_matrices_that_no_system_has() -> None:
         (np.eye(2), np.full((2, 2), np.nan), "not finite"),
         (np.eye(2), "abc", "lists of 2 numbers"),
     ):
-        with pytest.raises(UserError, match=words):
-            System.of_matrices("s", M, K).basis()
+        refused(words, System.of_matrices("s", M, K).basis)
     with pytest.raises(UserError, match="no spring holds"):
         System("s", [Body("a", 1.0, free="x")], [Damper("ground", "a", 1.0)]).basis()
-    with pytest.raises(UserError, match="Give its axis"):
-        System("s", [Body("a", 1.0)], [Spring("ground", "a", 1.0)]).basis()
+    refused("Give its axis", System("s", [Body("a", 1.0)], [Spring("ground", "a", 1.0)]).basis)
 
 
 def test_a_point_contact_has_the_extents_of_its_case(tmp_path: Path) -> None:
@@ -312,7 +308,7 @@ def test_a_folder_with_a_case_alone_is_run(tmp_path: Path, monkeypatch: pytest.M
     case.write_text(case.read_text() + '[[bodies]]\nname = "masses"\nfile = "masses.h5"\n')
     assert main(["run", "mine", "-q"]) == 0
     assert (tmp_path / "build" / "mine" / "response.csv").is_file()
-    assert main(["modes", "mine"]) == 2 and "microslip run mine" in capsys.readouterr().err
+    refused_command(["modes", "mine"], capsys, "microslip run mine")
 
 
 def test_a_read_out_that_nothing_moves_and_a_case_without_contacts(
@@ -429,9 +425,7 @@ def shaken(**changed):
 )
 def test_nonsense_given_in_python_is_one_sentence(what, given, key) -> None:
     """It ended in a ZeroDivisionError, a LinAlgError, rows of zeros, or in an answer."""
-    with pytest.raises(UserError, match=key) as told:
-        what(**given)
-    assert "\n" not in str(told.value)
+    refused(key, what, **given)
 
 
 def test_what_nothing_drives_stays_where_it_is() -> None:
@@ -491,5 +485,4 @@ def test_a_law_without_a_value_under_its_preload_is_named() -> None:
         def step(self, u, v, dt, state):
             return jnp.sqrt(-u * u - 1), state
 
-    with pytest.raises(UserError, match="Pressed"):
-        rubbed(law=Pressed())
+    refused("Pressed", rubbed, law=Pressed())

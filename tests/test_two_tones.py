@@ -11,12 +11,12 @@ from typing import Any
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from refusals import refused, refused_command
 
 import microslip as ms
 from microslip.case import load_case
 from microslip.cli import main
 from microslip.contact.law import Law, number, settings
-from microslip.errors import UserError
 from microslip.harmonic_balance import tones, two_tone
 from microslip.harmonic_balance.torus import closed, commensurate, pairs_of, with_mean
 
@@ -249,8 +249,7 @@ def test_kept(tmp_path: Path) -> None:
     found.plot(), found.plot(point=0), found.plot_torus()
     other = tmp_path / "response.h5"
     ms.harmonic_response(ms.structure(1.0, 1.0, 0.1, force={0: 1.0}), 0.5, unit="rad/s").save(other)
-    with pytest.raises(UserError, match="response"):
-        found.save(other)
+    refused("response", found.save, other)
 
 
 def alone() -> Any:
@@ -263,7 +262,7 @@ def alone() -> Any:
         ("second", lambda: ms.two_tones(duffing(), 1.0, 1.0)),
         ("second", lambda: ms.two_tones(duffing(), 1.0, -2.0)),
         ("first", lambda: ms.two_tones(duffing(), 0.0, 1.0)),
-        (r"first: .* \(it is -1\)", lambda: ms.two_tones(duffing(), -1.0, 1.0)),
+        (("first: ", "(it is -1)"), lambda: ms.two_tones(duffing(), -1.0, 1.0)),
         ("two_tones: first: ", lambda: ms.two_tones(duffing(), "a", 1.0)),
         ("second: no load", lambda: ms.integrate(alone(), 1.0, second=0.7)),
         ("second", lambda: ms.two_tones(duffing(), [1.0, 1.1, 1.2], [2.0, 2.1])),
@@ -277,15 +276,13 @@ def alone() -> Any:
         ("pair", lambda: ms.two_tones(duffing(), 1.0, 1.4, harmonics=1).of(1, 1)),
     ],
 )
-def test_refused(key: str, ask: Any) -> None:
-    with pytest.raises(UserError, match=key):
-        ask()
+def test_refused(key: str | tuple[str, ...], ask: Any) -> None:
+    refused(key, ask)
 
 
 def test_faded() -> None:
     """Where nothing drives a second tone, none is found: the sentence says so."""
-    with pytest.raises(UserError, match="second"):
-        ms.two_tones(alone(), 1.3, 0.9, free=True, unit="rad/s")
+    refused("second", ms.two_tones, alone(), 1.3, 0.9, free=True, unit="rad/s")
 
 
 def test_page(capsys: pytest.CaptureFixture[str]) -> None:
@@ -375,9 +372,7 @@ def test_case(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.Ca
     system = ms.structure(1.0, 1.0, 0.2, force={0: 0.5}, second_force={0: 0.3}, elements=[ms.jenkins(1.0, 0.3)])
     same = ms.two_tones(system, [0.14, 0.15], 0.1137, harmonics=3)
     np.testing.assert_allclose(np.abs(found.of(1, 0)), np.abs(same.of(1, 0)), rtol=1e-6)
-    capsys.readouterr()
-    assert main(["run", "case.toml", "--set", "excitations.1.tone=1"]) == 2
-    assert "two_tones: second" in capsys.readouterr().err
+    refused_command(["run", "case.toml", "--set", "excitations.1.tone=1"], capsys, "two_tones: second")
 
 
 @pytest.mark.slow
@@ -419,8 +414,8 @@ def test_a_killed_run_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, u
     solved.clear()
     tones_stage(CaseJob(case, files, tmp_path / "a", ["excitations.0.amplitude=0.45"], pictures=False))
     assert solved[0] == pytest.approx(0.14)
-    with pytest.raises(UserError, match="two_tones"):
-        tones_stage(CaseJob(case, files, tmp_path / "c", ["excitations.1.tone=1"], pictures=False))
+    alone = CaseJob(case, files, tmp_path / "c", ["excitations.1.tone=1"], pictures=False)
+    refused("two_tones", tones_stage, alone)
     assert not list((tmp_path / "c").glob("two_tones*"))
 
 

@@ -10,9 +10,9 @@ from pathlib import Path
 
 import pytest
 from box import edit, write_box
+from refusals import refused
 
 from microslip.basis import read_basis
-from microslip.errors import UserError
 from microslip.files import store
 from microslip.settings.toml import load_toml
 from microslip.stages import meshing, modal, places, response, running
@@ -203,8 +203,7 @@ def test_a_case_finds_its_body_wherever_it_is_run(tmp_path: Path) -> None:
 
     for folder in (case.parent, elsewhere / "geometry"):
         folder.mkdir(parents=True)
-    with pytest.raises(UserError, match="body: no body.toml of a body 'box'"):
-        places.find_body(case, "box", elsewhere)
+    refused("body: no body.toml of a body 'box'", places.find_body, case, "box", elsewhere)
     for place in ("elsewhere/box", "mine/geometry/box", "mine/project/box", "mine/project/geometry/box"):
         assert found(f"{place}/body.toml")
     assert found("mine/project/geometry/box/other.toml", "box-other")
@@ -219,21 +218,19 @@ def test_a_case_finds_its_body_wherever_it_is_run(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("script", "sentence"),
     [
-        ("import sys; sys.exit('the wall is thicker than the pipe')", "meshing failed.*thicker"),
+        ("import sys; sys.exit('the wall is thicker than the pipe')", ("meshing failed", "thicker")),
         ("import sys; print('wall = 9 is too much', file=sys.stderr); sys.exit(2)", "body.toml: wall = 9 is too much"),
-        ("raise ValueError('odd')", "meshing failed .ValueError: odd."),
+        ("raise ValueError('odd')", ("meshing failed", "ValueError: odd")),
         ("import os, signal; os.kill(os.getpid(), signal.SIGSEGV)", "signal 11"),
-        ("", "meshing failed .no message."),
-        ("raise ModuleNotFoundError(\"No module named 'gmsh'\")", "microslip.fem"),
+        ("", ("meshing failed", "no message")),
+        ("raise ModuleNotFoundError(\"No module named 'gmsh'\")", "microslip[fem]"),
         ("raise OSError('libGLU.so.1: cannot open shared object file')", "libGLU.so.1; type: sudo apt-get install"),
     ],
 )
-def test_a_mesher_that_fails_gives_one_sentence_and_leaves_the_old_mesh(box: Path, script: str, sentence: str) -> None:
+def test_a_mesher_that_fails_leaves_the_old_mesh(box: Path, script: str, sentence: str | tuple[str, ...]) -> None:
     old = (box / MESH).read_bytes()
     (box / "build.py").write_text(script)
-    with pytest.raises(UserError, match=sentence) as caught:
-        run_chain(box)
-    assert "\n" not in str(caught.value)
+    refused(sentence, run_chain, box)
     assert (box / MESH).read_bytes() == old
     assert not list((box / "meshes").glob(".*"))
 
@@ -243,16 +240,14 @@ def test_a_mesher_that_may_not_be_started_is_not_told_as_a_product(
 ) -> None:
     (tmp_path / "python").write_text("")
     monkeypatch.setattr("sys.executable", str(tmp_path / "python"))
-    with pytest.raises(UserError, match="python: cannot be started to draw the body .Permission denied."):
-        meshing.mesh_stage(open_job(box), force=True)
+    refused(("python: cannot be started", "Permission denied"), meshing.mesh_stage, open_job(box), force=True)
 
 
 @pytest.mark.parametrize("key", ["build", "cad", "mesh"])
 def test_a_missing_source_is_named_with_its_key(box: Path, key: str) -> None:
     edit(box / "body.toml", 'build = "build.py"', f'{key} = "gone.step"')
     edit(box / "body.toml", "[geometry.parameters]\nsize = [20.0, 30.0, 120.0]\n", "")
-    with pytest.raises(UserError, match=f"geometry.{key}: there is no file .*gone.step"):
-        run_chain(box)
+    refused((f"geometry.{key}: there is no file ", "gone.step"), run_chain, box)
 
 
 def test_temperatures_of_a_table_reach_the_nodes(box: Path) -> None:
@@ -265,11 +260,9 @@ def test_temperatures_of_a_table_reach_the_nodes(box: Path) -> None:
     found = modal.nodal_temperature(job, mesh)
     assert found == pytest.approx(300 + 2000 * mesh.points[:, 2], rel=1e-9)
     (box / "heat.csv").write_text("1, 2, 3\n")
-    with pytest.raises(UserError, match="heat.csv: must be lines of x, y, z, T"):
-        modal.nodal_temperature(job, mesh)
+    refused("heat.csv: must be lines of x, y, z, T", modal.nodal_temperature, job, mesh)
     (box / "heat.csv").unlink()
-    with pytest.raises(UserError, match="temperature.file: there is no file"):
-        run_chain(box)
+    refused("temperature.file: there is no file", run_chain, box)
 
 
 # ---------------------------------------------------------------- what products depend on
@@ -350,8 +343,7 @@ def test_boxes_of_one_name_add_up_and_none_takes_a_sets_name(tmp_path: Path) -> 
 
     own, made = beam().faces, faces([*ends, ends[0]])["ends"]["triangle6"]
     assert len(made) == len(own["clamp"]["triangle6"]) + len(own["tip"]["triangle6"])
-    with pytest.raises(UserError, match=r"body.toml: geometry.faces.tip: "):
-        faces([{**ends[0], "name": "tip"}])
+    refused("body.toml: geometry.faces.tip: ", faces, [{**ends[0], "name": "tip"}])
 
 
 def test_what_a_mesh_includes_counts_as_its_input(tmp_path: Path) -> None:
@@ -394,10 +386,8 @@ def test_what_a_path_means(tmp_path, monkeypatch):
     assert places.meant(Path("own/system.toml"), case=True) == Path("own/case.toml")
     assert places.meant(Path("build/own"), case=True) == Path("own/case.toml")
     assert places.meant(Path("own")) == Path("own") and places.meant(Path("away.toml")) == Path("away.toml")
-    with pytest.raises(UserError, match="is 'blade' meant"):
-        places.meant(Path("blad"))
-    with pytest.raises(UserError, match="no case here or of this name; there are blade, rig"):
-        places.meant(Path("geometry"), case=True)
+    refused("is 'blade' meant", places.meant, Path("blad"))
+    refused("no case here or of this name; there are blade, rig", places.meant, Path("geometry"), case=True)
 
 
 FEW = ["sweep.start=350.0", "sweep.stop=420.0", "sweep.points=5", "sweep.normal_forces=[100.0]", "harmonics=1",
