@@ -13,14 +13,17 @@ from ring_study import Highest, amplitudes, frf, highest
 from microslip.case.problem import problem_of
 from microslip.data import Array, ModalBasis
 from microslip.harmonic_balance import response
+from microslip.harmonic_balance.problem import Problem
 from microslip.harmonic_balance.sweeps import brackets
 
 BAND = np.linspace(70.0, 125.0, 56)
-WIDE = np.linspace(90.0, 300.0, 43)
+WIDE = np.concatenate([np.linspace(90, 230, 15), np.linspace(235, 275, 41), np.linspace(280, 300, 5)])
 SHOWN = np.unique(np.concatenate([
     np.linspace(90, 110, 11), np.linspace(110, 122, 49), np.linspace(124, 244, 31), np.linspace(245, 275, 61),
     np.linspace(278, 300, 12),
 ]))  # fmt: skip
+NEAR = np.linspace(248.0, 268.0, 41)
+"""Hz about the resonance with dampers that open, where more harmonics are swept."""
 DAMPER = (0.0, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0)
 """Normal forces of the damper, N."""
 
@@ -33,6 +36,22 @@ class StressedResonance:
     frequency: float
     amplitude: float
     swept: tuple[Array, Array]
+
+
+@dataclass(frozen=True)
+class Dampers:
+    """Over the damper's normal force (N): its highest resonance, and responses (m) upwards and downwards over `SHOWN`,
+    one harmonic; those over `NEAR` with nine."""
+
+    highest: dict[float, Highest]
+    swept: dict[float, tuple[Array, Array]]
+    more: dict[float, tuple[Array, Array]]
+
+    def largest(self, normal: float) -> tuple[float, float]:
+        """Hz and m, the largest of both sweeps with nine harmonics."""
+        size = np.fmax(*self.more[normal])
+        top = int(np.nanargmax(size))
+        return float(NEAR[top]), float(size[top])
 
 
 def over_forces(case: str, forces: Sequence[float], bases: Bases, *changes: str) -> list[StressedResonance]:
@@ -62,29 +81,57 @@ def rig_picture(first: Sequence[StressedResonance], second: Sequence[StressedRes
     right.legend(fontsize=8)
 
 
-def dampers(basis: ModalBasis) -> tuple[list[tuple[float, Highest]], list[tuple[float, Array]]]:
-    """The ring with shrouds and dampers: highest resonances over the damper's force, and three of the responses (m)."""
-    built = opened("multicoupling", lambda _: basis)
-    problems = {normal: problem_of(built, normal) for normal in DAMPER}
-    found = [(normal, highest(p, basis, WIDE)) for normal, p in problems.items()]
-    return found, [(normal, amplitudes(problems[normal], SHOWN)) for normal in (10.0, 30.0, 300.0)]
+def dampers(basis: ModalBasis) -> Dampers:
+    """The ring with shrouds and dampers."""
+
+    def problems(*changes: str) -> dict[float, Problem]:
+        built = opened("multicoupling", lambda _: basis, *changes)
+        return {normal: problem_of(built, normal) for normal in DAMPER}
+
+    one, nine = problems("samples=128"), problems("harmonics=9", "samples=128")
+    return Dampers(
+        {normal: highest(p, basis, WIDE) for normal, p in one.items()},
+        {normal: both_ways(one[normal], SHOWN) for normal in (10.0, 30.0, 300.0)},
+        {normal: both_ways(nine[normal], NEAR) for normal in (10.0, 30.0, 100.0)},
+    )
 
 
-def dampers_picture(
-    found: Sequence[tuple[float, Highest]], curves: Sequence[tuple[float, Array]], without: Array, left: Any, right: Any
-) -> None:  # fmt: skip
+def both_ways(problem: Problem, frequency: Array) -> tuple[Array, Array]:
+    """(f,), (f,) amplitudes (m) swept upwards and downwards over frequency (Hz)."""
+    return amplitudes(problem, frequency), amplitudes(problem, frequency[::-1])[::-1]
+
+
+def dampers_picture(dampers: Dampers, without: Array, left: Any, right: Any) -> None:
     """Figure 5.5-9: responses with (three forces) and without a damper; amplitude and stress over its normal force."""
     left.semilogy(SHOWN, 1e6 * without, color="0.6", lw=1.2, label="no damper")
-    for normal, size in curves:
-        left.semilogy(SHOWN, 1e6 * size, lw=1.4, label=f"{normal:g} N")
+    for normal, (up, down) in dampers.swept.items():
+        (line,) = left.semilogy(SHOWN, 1e6 * up, lw=1.4, label=f"{normal:g} N")
+        left.semilogy(SHOWN, 1e6 * down, "--", lw=1.4, color=line.get_color())
     left.set(xlabel="excitation frequency in Hz", ylabel="amplitude at the accelerometer in µm")
-    left.legend(title="force in the damper", fontsize=8)
-    some = [(n, h) for n, h in found if n]
-    forces = [n for n, _ in some]
-    right.loglog(forces, [1e6 * h.amplitude for _, h in some], "o-", ms=4, label="amplitude in µm")
-    right.loglog(forces, [1e-6 * h.stress for _, h in some], "s-", ms=4, label="stress at the foot in MPa")
+    left.legend(title="force in the damper\n(dashed: downwards)", fontsize=8)
+    some = {n: h for n, h in dampers.highest.items() if n}
+    amplitude, stress = (1e6 * h.amplitude for h in some.values()), (1e-6 * h.stress for h in some.values())
+    right.loglog(list(some), list(amplitude), "o-", ms=4, label="amplitude in µm")
+    right.loglog(list(some), list(stress), "s-", ms=4, label="stress at the foot in MPa")
+    more = {n: 1e6 * dampers.largest(n)[1] for n in dampers.more}
+    right.loglog(list(more), list(more.values()), "o", mfc="none", color="C0", label="amplitude, nine harmonics")
     right.set(xlabel="normal force in the damper in N", ylabel="highest resonance", ylim=(1.0, 20.0))
     right.legend(fontsize=8)
+
+
+def rows(without: Highest, dampers: Dampers) -> list[list[str]]:
+    """The page's table."""
+    return [
+        [*row("no damper", without), ""],
+        *([*row(f"{n:g}", h), _finer(dampers, n)] for n, h in dampers.highest.items()),
+    ]
+
+
+def _finer(dampers: Dampers, normal: float) -> str:
+    if normal not in dampers.more:
+        return ""
+    frequency, amplitude = dampers.largest(normal)
+    return f"{1e6 * amplitude:.3g} um at {frequency:.1f} Hz"
 
 
 def row(words: str, h: Highest) -> list[str]:
