@@ -36,7 +36,8 @@ back in the band."""
 DOWN, UP, REST = "downwards", "upwards", "from rest"
 
 SHARES = {DOWN: 0.5, UP: 0.85, REST: 1.0}
-"""Of the time that motions may take, until which each of the ways goes on."""
+"""Of the time that motions may take, until which each of the ways goes on. Half or twice of them
+cuts a sweep elsewhere, and what is found in all of its time is the same."""
 
 WITHIN, STEPS = 30, 80
 """Frequencies of a sweep in time within a gap, and of all of it, at most."""
@@ -53,7 +54,7 @@ come back to it."""
 
 SAME = 0.05
 """Share by which a motion may differ from the harmonic balance's that leads it on to the next
-frequency."""
+frequency. Half and twice of it give the quick tests the same answers."""
 
 
 class Motions(NamedTuple):
