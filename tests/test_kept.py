@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -12,9 +14,14 @@ import numpy as np
 import pytest
 from small import beam, table
 from test_assembly import FINE, sector
+from test_curves import CASE, lifting
 from test_harmonic_balance_time import Cubic, cantilever, group, held
+from test_refinement import ONE, Brittle, spring
 
+from microslip.case import load_case
+from microslip.case.assemble import build
 from microslip.case.edges import rising
+from microslip.case.problem import problem_of
 from microslip.contact.friction import Coulomb
 from microslip.contact.normal import Preload
 from microslip.contact.patch import Patch
@@ -89,6 +96,59 @@ def test_an_interrupted_sweep_goes_on_where_it_was(problem: balance.Problem, tmp
         np.testing.assert_allclose(a, b, rtol=0, atol=1e-7 * np.abs(b).max(), err_msg=name)
     np.testing.assert_allclose(pairs(peaks), pairs(response.refined_peaks(problem, whole)), rtol=1e-6)
     assert found.converged.all() and len(peaks) == 1 and found.slipping.max() > 0.2
+
+
+def block(folder: Path) -> balance.Problem:
+    """A block that is shaken off the ground, with a quarter of the samples that its landing needs:
+    the balance holds at points whose energy does not."""
+    (folder / "case.toml").write_text(CASE)
+    more = ["harmonics=3", "samples=16", "amplitude=1.0"]
+    settings, _ = load_case(folder / "case.toml", more)
+    built = build(settings, {"lifting": lifting()}, folder / "case.toml")
+    return problem_of(built, 10.0)
+
+
+def brittle(_: Path) -> balance.Problem:
+    """An oscillator whose law has no value where it swings by more than a metre."""
+    return spring(Brittle(jnp.asarray(0.0)))
+
+
+@pytest.mark.parametrize(
+    ("made", "frequency"),
+    [
+        (block, np.linspace(90.0, 140.0, 11)),
+        pytest.param(brittle, np.linspace(1.1, 1.4, 4) / (2 * np.pi), marks=pytest.mark.slow),
+    ],
+)
+def test_a_sweep_with_points_that_fail_is_the_same_bit_by_bit_after_interrupts(
+    made: Callable[[Path], balance.Problem], frequency: np.ndarray, tmp_path: Path
+) -> None:
+    """Stopped after every point and every search, some points without a solution, some that fail
+    their checks: what a point begins with, and what follows from it, is what it is in one go."""
+    problem, known, runs = made(tmp_path), set[str](), 0
+
+    def impatient(text: str) -> None:
+        if text not in known and known - before:
+            raise Stop
+        known.add(text)
+
+    def answer(name: str, report: Callable[[str], None]) -> tuple[Any, ...]:
+        with open_journal(tmp_path / name, "abc", HEAD) as journal:
+            found, peaks = resumed_response(problem, frequency, ONE, journal, SERIES, report)
+            return found, peaks, journal.of(SERIES)
+
+    whole, tops, rows = answer("whole", lambda _: None)
+    assert 0 < np.count_nonzero(~whole.converged) < len(whole.frequency)
+    while runs < 60:
+        before, runs = frozenset(known), runs + 1
+        with contextlib.suppress(Stop):
+            found, peaks, again = answer("points", impatient)
+            break
+    assert runs > 5
+    for name, value in vars(whole).items():
+        np.testing.assert_array_equal(getattr(found, name), value, err_msg=name)
+    np.testing.assert_equal([p._asdict() for p in peaks], [p._asdict() for p in tops])
+    np.testing.assert_equal(again, rows)
 
 
 def test_nothing_is_computed_twice(tmp_path: Path) -> None:

@@ -180,9 +180,13 @@ def _of_contact(name: str, relative: Array, force: Array, cycle: Cycle) -> dict[
 
 
 def restored(problem: Problem, row: dict[str, Any]) -> tuple[Point, Operating]:
-    """A point and what belongs to it, from what a journal kept; of the cycles sums and means alone."""
+    """A point and what belongs to it, from what a journal kept; of the cycles sums and means alone.
+
+    The point is that of the solver, before it was judged: its neighbours began at it, whatever its checks say."""
+    checks = Checks(**{f.name: row[f"checks/{f.name}"] for f in fields(Checks)})
+    status = CONVERGED if row["status"] == checks.failure else row["status"]
     point = Point(
-        2 * np.pi * row["frequency"], row["x"], row["status"], row["error"], int(row["iterations"]),
+        2 * np.pi * row["frequency"], row["x"], status, row["error"], int(row["iterations"]),
         history=tuple(row["history"]),
     )  # fmt: skip
     names = [c.name for c in problem.assembly.contacts]
@@ -203,7 +207,7 @@ def restored(problem: Problem, row: dict[str, Any]) -> tuple[Point, Operating]:
         row["exchanged"],
         row["kinetic"],
         cycles,
-        Checks(**{f.name: row[f"checks/{f.name}"] for f in fields(Checks)}),
+        checks,
     )
     return point, found
 
