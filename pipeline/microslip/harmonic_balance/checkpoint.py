@@ -13,7 +13,7 @@ from ..continuation import Branch, Settings, State
 from ..continuation.newton import Scaled
 from ..data import Array, ComplexArray
 from ..results.checks import Checks
-from ..results.journal import Journal
+from ..results.journal import Journal, once
 from ..system.assembly import Assembly, Output
 from ..system.component import Component
 from .checks import forces_on, judged
@@ -35,13 +35,14 @@ def resumed_response(
 
     Args:
         frequency: Hz. limit: (patches,) friction limits, N, for reports. series: its name. Peaks are kept as well, with
-            ``peak`` = the frequency, Hz, of the point that they were searched from.
+            ``peak`` = the frequency, Hz, of the point that they were searched from, and what searches gave in a
+            series of its own.
 
     Returns:
         The response and its resonances: of the maxima of one plateau the highest.
     """
-    rows = journal.of(series)  # a peak on a point of the sweep stands in its place
-    held = {key: restored(problem, row) for key, row in rows.items() if row["peak"] in (0.0, key)}
+    rows = journal.of(series)
+    held = {key: restored(problem, row) for key, row in rows.items() if not row["peak"] or _same(row["peak"], key)}
 
     def keep(f: float, solved: Solved, added: bool) -> None:
         journal.keep(series, f, record(problem, *solved) | {"frequency": f, "added": int(added)})
@@ -57,18 +58,26 @@ def _peak(
 ) -> Resonance | None:  # fmt: skip
     """The peak beside a point of a sweep, if there is one, kept before or searched for now."""
     beside = float(response.frequency[bracket[1]])
-    for key, row in journal.of(series).items():
-        if row["peak"] == beside:
-            return Resonance(key, float(abs(restored(problem, row)[1].outputs[0, 1])), row["x"])
-    report(f"peak near {beside:.6g} Hz")
-    found = highest(problem, response, bracket)
-    if found is None:
-        return None
-    point, amplitude = found
-    f = point.Omega / (2 * np.pi)
-    kept = record(problem, point, operating(problem, point))
-    journal.keep(series, f, kept | {"peak": beside})
-    return Resonance(f, amplitude, point.x)
+
+    def searched() -> dict[str, Any]:
+        report(f"peak near {beside:.6g} Hz")
+        found = highest(problem, response, bracket)
+        if found is None:
+            return {}
+        point, amplitude = found
+        f, rows = point.Omega / (2 * np.pi), journal.of(series)
+        f = next((key for key in rows if _same(key, f)), f)  # a point of the sweep stays what it is
+        kept = rows.get(f) or record(problem, point, operating(problem, point))
+        journal.keep(series, f, kept | {"peak": beside})
+        return {"frequency": f, "amplitude": amplitude, "x": point.x}
+
+    row = once(journal, f"{series}, searches for peaks", beside, searched)
+    return Resonance(**row) if row else None
+
+
+def _same(frequency: float, other: float) -> bool:
+    """Whether two frequencies are one but for rounding."""
+    return abs(frequency - other) <= 1e-12 * other
 
 
 # curves ------------------------------------------------------------------------------------------------------------
