@@ -27,7 +27,7 @@ from microslip.cli import main
 from microslip.harmonic_balance import FrequencyResponse
 from microslip.harmonic_balance.families import followed, of_frequency
 from microslip.harmonic_balance.response import operating
-from microslip.harmonic_balance.solver import solve
+from microslip.harmonic_balance.solver import solve, sweep
 from microslip.harmonic_balance.sweeps import ends, gaps
 from microslip.results import Journal, open_journal, read_response
 from microslip.stages.places import modal_files
@@ -251,6 +251,24 @@ def test_a_curve_begins_on_the_solution_of_the_sweep(case: Path) -> None:
             begins[known is None] = np.abs(x).max()
         assert begins[True] == pytest.approx(np.abs(low.x).max(), rel=0.1)
         assert begins[False] == pytest.approx(np.abs(high).max(), rel=0.1)
+
+
+@pytest.mark.slow
+def test_a_curve_with_more_harmonics_begins_on_the_motion_that_fewer_tell(case: Path) -> None:
+    """At 96 Hz Newton's method leaps from the upper motion of one harmonic to the closed one, a
+    thirtieth as high; admitted little by little, more harmonics change it by a few hundredths, as
+    they do at 100 Hz, where Newton's method stays."""
+    settings, path = load_case(case, ["amplitude=0.5"])[0], {"lifting": lifting()}
+    one, more = (problem_of(build(settings, path, case), 10.0, harmonics=n) for n in (1, 7))
+    known = {round(p.Omega / (2 * np.pi)): p for p in sweep(one, np.arange(150.0, 94.0, -2.0))}
+    size = lambda x: np.abs(x).max()  # noqa: E731
+    high, at = known[96].x, 2 * np.pi * 96.0
+    guess = np.concatenate([high, np.zeros(more.size - len(high))])
+    assert size(solve(more, at, [guess]).x) < 0.1 * size(high)
+    for f in (96, 100):
+        family = replace(of_frequency(more, f, f + 1.0), known=known[f].x)
+        begins = followed(family, settings={"points": 2}).points[0].x
+        assert size(begins) == pytest.approx(size(known[f].x), rel=0.05)
 
 
 @pytest.mark.slow
