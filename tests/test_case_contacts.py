@@ -150,7 +150,7 @@ def test_patches_that_deform_between_two_beams() -> None:
 def test_a_held_face_is_refused_before_any_contact_is_made(monkeypatch: pytest.MonkeyPatch) -> None:
     """Also where it is that of the last contact: the others take seconds to compile."""
     raw = two()
-    raw["contacts"] = [raw["contacts"][0], {"interface": "a:left", **STIFF}]
+    raw["contacts"] = [raw["contacts"][0], {"interface": "a:left", "friction": 0.2, **STIFF}]
     own = small.table(supports=[{"face": "clamped"}])
     mesh = small.beam()
     at = mesh.points[:, 0] < 1e-9

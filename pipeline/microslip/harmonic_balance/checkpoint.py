@@ -3,6 +3,8 @@ was."""
 
 from __future__ import annotations
 
+import time
+from collections.abc import Callable
 from dataclasses import fields
 from typing import Any
 
@@ -86,18 +88,33 @@ OF_THE_WAY = "curve/"
 """Names, in a point of a curve, of what it takes to go on from there."""
 
 
+Spend = Callable[[float], bool]
+"""Is told CPU time (s) as it is spent, and says whether there is more of it."""
+
+
 def resumed_curve(
-    family: Family, journal: Journal, series: str, report: Report = lambda _: None, settings: Settings | None = None
+    family: Family,
+    journal: Journal,
+    series: str,
+    report: Report = lambda _: None,
+    settings: Settings | None = None,
+    spend: Spend = lambda _: True,
 ) -> tuple[Branch, list[dict[str, Any]]]:
     """The curve of a family, from where a series of the journal ends, and its points as `points_of_curve` tells them.
 
     A point of a curve has beside what other points have: ``parameter`` in the family's unit, ``fold`` and ``arclength``
-    (scaled); its key is its place along the curve.
+    (scaled); its key is its place along the curve. spend: limits it, the time of an earlier run counted, but not the
+    first step of a run, which compiles.
     """
     settings = family.settings(settings)
     rows = points_of_curve(journal, series)
+    more, began = spend(sum(row["curve/took"] for row in rows)), None
 
     def keep(state: State) -> None:
+        nonlocal more, began
+        now = time.process_time()
+        took, began = 0.0 if began is None else now - began, now
+        more = spend(took)
         last = len(state.found) - 1
         for i, p in enumerate(state.found):
             problem, Omega = family.problem(p.lam), family.Omega(p.lam)
@@ -106,11 +123,12 @@ def resumed_curve(
                 record(problem, point, operating(problem, point))
                 | {"parameter": p.lam / family.unit, "fold": int(p.kind == "fold"), "arclength": p.arclength}
                 | _way(p, state, state.status if i == last else "")
+                | {"curve/took": took if i == last else 0.0}
             )
             journal.keep(series, len(rows), row)
             rows.append(row)
 
-    return followed(family, report, settings, _begun(family, rows, settings), keep), rows
+    return followed(family, report, settings, _begun(family, rows, settings), keep, lambda: more), rows
 
 
 def points_of_curve(journal: Journal, series: str) -> list[dict[str, Any]]:

@@ -204,11 +204,13 @@ def followed(
     settings: Settings | Mapping[str, Any] | None = None,
     begun: Branch | None = None,
     keep: Callable[[State], None] = lambda _: None,
+    goes_on: Callable[[], bool] = lambda: True,
 ) -> Branch:
     """The curve from a solution at its beginning; without one a branch that says so.
 
     Args:
         begun: goes on from its state. keep: told of every state as it is found, with the points that are new.
+            goes_on: asked before every step; a curve that does not has no status.
     """
     settings, equations = family.settings(settings), _Noted(family)
     if begun is None or begun.state is None:
@@ -221,7 +223,7 @@ def followed(
     else:
         state, points = begun.state, list(begun.points)
     far = 0
-    while not state.status:
+    while not state.status and goes_on():
         state = equations.told(family.advanced(equations, state, settings))
         keep(state)
         points += state.found
