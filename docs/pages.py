@@ -531,8 +531,9 @@ MEANING_CASE: dict[str, tuple[str, str]] = {
     "sweep.start": ("Hz", "first frequency"),
     "sweep.stop": ("Hz", "last one"),
     "sweep.points": ("", "equally spaced"),
-    "sweep.patience": ("s", "CPU time of motions in time, for each place where the sweep jumps or has no "
-                            "solution; 0: none"),
+    "sweep.patience": ("s", "CPU time for each place where the sweep jumps or has no solution, of motions in "
+                            "time (seven tenths of it), the curve about it and its stability; what compiles is not "
+                            "counted; 0: none of these"),
     "sweep.normal_forces": ("N", "to compare, in every contact that nothing else presses; `static`: of the body's "
                             "closures"),
     "material_limits.fatigue_strength": ("Pa", "amplitude that is endured about a zero mean"),

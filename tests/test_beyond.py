@@ -6,7 +6,8 @@ import csv
 import json
 import subprocess
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -20,14 +21,17 @@ import microslip as ms
 from microslip.basis import read_basis, write_basis
 from microslip.case import load_case
 from microslip.case.assemble import build
-from microslip.case.beyond import Beyond
-from microslip.case.messages import what_moves
+from microslip.case.beyond import Beyond, with_curve
+from microslip.case.messages import CUT, what_moves
 from microslip.case.problem import problem_of
 from microslip.cli import main
+from microslip.continuation import Branch, Settings
 from microslip.harmonic_balance import FrequencyResponse
+from microslip.harmonic_balance.checkpoint import resumed_curve
 from microslip.harmonic_balance.families import followed, of_frequency
+from microslip.harmonic_balance.refinement import filled_response
 from microslip.harmonic_balance.response import operating
-from microslip.harmonic_balance.solver import solve
+from microslip.harmonic_balance.solver import solve, sweep
 from microslip.harmonic_balance.sweeps import ends, gaps
 from microslip.results import Journal, open_journal, read_response
 from microslip.stages.places import modal_files
@@ -254,6 +258,24 @@ def test_a_curve_begins_on_the_solution_of_the_sweep(case: Path) -> None:
 
 
 @pytest.mark.slow
+def test_a_curve_with_more_harmonics_begins_on_the_motion_that_fewer_tell(case: Path) -> None:
+    """At 96 Hz Newton's method leaps from the upper motion of one harmonic to the closed one, a
+    thirtieth as high; admitted little by little, more harmonics change it by a few hundredths, as
+    they do at 100 Hz, where Newton's method stays."""
+    settings, path = load_case(case, ["amplitude=0.5"])[0], {"lifting": lifting()}
+    one, more = (problem_of(build(settings, path, case), 10.0, harmonics=n) for n in (1, 7))
+    known = {round(p.Omega / (2 * np.pi)): p for p in sweep(one, np.arange(150.0, 94.0, -2.0))}
+    size = lambda x: np.abs(x).max()  # noqa: E731
+    high, at = known[96].x, 2 * np.pi * 96.0
+    guess = np.concatenate([high, np.zeros(more.size - len(high))])
+    assert size(solve(more, at, [guess]).x) < 0.1 * size(high)
+    for f in (96, 100):
+        family = replace(of_frequency(more, f, f + 1.0), known=known[f].x)
+        begins = followed(family, settings={"points": 2}).points[0].x
+        assert size(begins) == pytest.approx(size(known[f].x), rel=0.05)
+
+
+@pytest.mark.slow
 def test_patience_that_ends_is_told_and_more_of_it_goes_on(
     case: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -266,7 +288,7 @@ def test_patience_that_ends_is_told_and_more_of_it_goes_on(
         return capsys.readouterr().err, rows, json.loads(Path("build/lifting/response.json").read_text())
 
     said, rows, summary = run(1e-3)
-    ends = "Motions in time ended after 0.001 s, downwards before "
+    ends = "Motions in time ended with their share of 0.001 s, downwards before "
     assert ends in said and "--set sweep.patience=0.002, which goes on from there" in said
     assert len(rows) == 2 and "known in part" in summary["beyond"][0] and summary["resonances"]
     begun = said.count("motion in time, ")
@@ -274,6 +296,61 @@ def test_patience_that_ends_is_told_and_more_of_it_goes_on(
     assert begun == 2 and more.count("motion in time, ") >= len(further) - 2 > 0
     assert all(row in further for row in rows) and f"{ends[:-11]}" not in more
     assert after["resonances"] == summary["resonances"]
+
+
+def test_a_curve_whose_time_is_over_goes_on_with_more_of_it(case: Path) -> None:
+    """Cut by what its steps really took; gone on with the time is counted from there, and all its
+    points are those of one go."""
+    family, steps = of_frequency(problem(case), 126.0, 122.0), Settings(points=40)
+
+    def curve(name: str, seconds: float) -> tuple[Branch, list[dict], list[float]]:
+        told = list[float]()
+
+        def spend(took: float) -> bool:
+            told.append(took)
+            return sum(told) <= seconds
+
+        with open_journal(case.parent / name, "same", {}) as journal:
+            return *resumed_curve(family, journal, "one", settings=steps, spend=spend), told
+
+    whole, rows, took = curve("whole", np.inf)
+    part, some, told = curve("part", 1e-9)
+    assert whole.status and not part.status and 2 <= len(some) < len(rows)
+    assert took[0] == took[1] == told[1] == 0 < told[-1]  # the first step compiles
+    assert curve("part", 1e-9)[2] == [sum(told)] and len(curve("part", 1e-9)[1]) == len(some)
+    after, more, _ = curve("part", np.inf)
+    assert after.status == whole.status
+    for one, other in zip(more, rows, strict=True):  # scaled and back, which rounds
+        assert one["parameter"] == pytest.approx(other["parameter"], rel=1e-12)
+        np.testing.assert_allclose(one["x"], other["x"], rtol=0, atol=1e-9 * np.abs(other["x"]).max())
+
+
+@pytest.mark.slow
+def test_the_curve_and_its_stability_end_with_the_time_of_their_place(case: Path) -> None:
+    """Motions have spent all but 10 ms: the curve from above has a few points, that from below is
+    not begun, nothing is looked at, and the page says how to go on; which does."""
+    settings, _ = load_case(case, [])
+    lies = {"lifting": lifting()}
+    f, p = np.linspace(118.0, 126.0, 5), problem(case)
+    found = filled_response(p, f, np.ones(1))
+    low, high = [motion(x, 1) for x in f], [motion(x, 10) for x in f]
+
+    @contextmanager
+    def keep(_: object) -> Iterator[Journal]:
+        with open_journal(case.parent / "curve.points", "same", {}) as journal:
+            yield journal
+
+    def asked(patience: float) -> Beyond:
+        one = Beyond(10.0, (119.0, 125.0), low, high, patience=patience, spent=100.0)
+        return with_curve(one, found, settings, lies, case, keep, lambda _: None)
+
+    cut, whole = asked(100.01), asked(1e3)
+    (one,) = cut.curves
+    assert one.status == CUT and 0 < len(one.rows) < len(whole.curves[0].rows)
+    assert cut.stability == [{}] and any(whole.stability)
+    assert "sweep.patience=200.02, which goes on from there" in " ".join(what_moves(cut))
+    assert not any("goes on from there" in words for words in what_moves(whole))
+    np.testing.assert_array_equal(whole.curves[0].parameter[: len(one.rows)], one.parameter)
 
 
 @pytest.mark.slow

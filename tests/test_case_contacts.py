@@ -20,7 +20,7 @@ from attack import toml
 from refusals import refused, refused_command
 
 from microslip.basis import write_basis
-from microslip.case import CaseSettings, run_case
+from microslip.case import CaseSettings, assemble, run_case
 from microslip.case.assemble import build
 from microslip.case.checkpoint import files_of, of_points
 from microslip.case.contacts import memory_of
@@ -145,6 +145,24 @@ def test_patches_that_deform_between_two_beams() -> None:
     p = pressure(contact.patch, contact.offset)
     assert p @ contact.patch.areas == pytest.approx(200.0, rel=1e-9)
     assert contact.first.rows is not None and contact.second is not None and contact.second.rows is not None
+
+
+def test_a_held_face_is_refused_before_any_contact_is_made(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Also where it is that of the last contact: the others take seconds to compile."""
+    raw = two()
+    raw["contacts"] = [raw["contacts"][0], {"interface": "a:left", "friction": 0.2, **STIFF}]
+    own = small.table(supports=[{"face": "clamped"}])
+    mesh = small.beam()
+    at = mesh.points[:, 0] < 1e-9
+    mesh = dataclasses.replace(mesh, point_sets=dict(mesh.point_sets) | {"clamped": np.flatnonzero(at)})
+    bases = {"a": modal_basis(mesh, BodySettings.model_validate(own)), "b": small.basis()}
+
+    def made_too_early(*_: object) -> None:
+        raise AssertionError("a contact was made")
+
+    monkeypatch.setattr(assemble, "springs_of", made_too_early)
+    with pytest.raises(UserError, match="hold the face 'left'"):
+        build(made(raw), bases, PATH)
 
 
 def test_faces_are_set_against_each_other_by_their_places() -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -12,14 +14,19 @@ import numpy as np
 import pytest
 from small import beam, table
 from test_assembly import FINE, sector
+from test_curves import CASE, lifting
 from test_harmonic_balance_time import Cubic, cantilever, group, held
+from test_refinement import ONE, Brittle, spring
 
+from microslip.case import load_case
+from microslip.case.assemble import build
 from microslip.case.edges import rising
+from microslip.case.problem import problem_of
 from microslip.contact.friction import Coulomb
 from microslip.contact.normal import Preload
 from microslip.contact.patch import Patch
 from microslip.contact.point import PointContact
-from microslip.harmonic_balance import checkpoint, refinement, response
+from microslip.harmonic_balance import accuracy, checkpoint, refinement, response
 from microslip.harmonic_balance import problem as balance
 from microslip.harmonic_balance.accuracy import judged
 from microslip.harmonic_balance.checkpoint import labels, record, restored, resumed_response
@@ -31,7 +38,7 @@ from microslip.operating import motion_of
 from microslip.operating.motion import displacement, nearest_point
 from microslip.reduced.compliance import has_residual
 from microslip.reduced.coordinates import in_modes
-from microslip.results import open_journal, response_of
+from microslip.results import open_journal, read_response, response_of
 from microslip.settings.body import BodySettings
 from microslip.system import Body, Contact, Force, Monitor, Spring, System
 from microslip.system.assembly import Assembly, ContactFace, Load, Output, preloaded_contact
@@ -91,6 +98,59 @@ def test_an_interrupted_sweep_goes_on_where_it_was(problem: balance.Problem, tmp
     assert found.converged.all() and len(peaks) == 1 and found.slipping.max() > 0.2
 
 
+def block(folder: Path) -> balance.Problem:
+    """A block that is shaken off the ground, with a quarter of the samples that its landing needs:
+    the balance holds at points whose energy does not."""
+    (folder / "case.toml").write_text(CASE)
+    more = ["harmonics=3", "samples=16", "amplitude=1.0"]
+    settings, _ = load_case(folder / "case.toml", more)
+    built = build(settings, {"lifting": lifting()}, folder / "case.toml")
+    return problem_of(built, 10.0)
+
+
+def brittle(_: Path) -> balance.Problem:
+    """An oscillator whose law has no value where it swings by more than a metre."""
+    return spring(Brittle(jnp.asarray(0.0)))
+
+
+@pytest.mark.parametrize(
+    ("made", "frequency"),
+    [
+        (block, np.linspace(90.0, 140.0, 11)),
+        pytest.param(brittle, np.linspace(1.1, 1.4, 4) / (2 * np.pi), marks=pytest.mark.slow),
+    ],
+)
+def test_a_sweep_with_points_that_fail_is_the_same_bit_by_bit_after_interrupts(
+    made: Callable[[Path], balance.Problem], frequency: np.ndarray, tmp_path: Path
+) -> None:
+    """Stopped after every point and every search, some points without a solution, some that fail
+    their checks: what a point begins with, and what follows from it, is what it is in one go."""
+    problem, known, runs = made(tmp_path), set[str](), 0
+
+    def impatient(text: str) -> None:
+        if text not in known and known - before:
+            raise Stop
+        known.add(text)
+
+    def answer(name: str, report: Callable[[str], None]) -> tuple[Any, ...]:
+        with open_journal(tmp_path / name, "abc", HEAD) as journal:
+            found, peaks = resumed_response(problem, frequency, ONE, journal, SERIES, report)
+            return found, peaks, journal.of(SERIES)
+
+    whole, tops, rows = answer("whole", lambda _: None)
+    assert 0 < np.count_nonzero(~whole.converged) < len(whole.frequency)
+    while runs < 60:
+        before, runs = frozenset(known), runs + 1
+        with contextlib.suppress(Stop):
+            found, peaks, again = answer("points", impatient)
+            break
+    assert runs > 5
+    for name, value in vars(whole).items():
+        np.testing.assert_array_equal(getattr(found, name), value, err_msg=name)
+    np.testing.assert_equal([p._asdict() for p in peaks], [p._asdict() for p in tops])
+    np.testing.assert_equal(again, rows)
+
+
 def test_nothing_is_computed_twice(tmp_path: Path) -> None:
     problem, told = balance.of(cantilever(), 1, 64, length=0.0125), list[str]()
     for series in (SERIES, SERIES, "normal force 30 N"):
@@ -128,6 +188,17 @@ def test_a_resonance_beside_the_end_of_a_sweep_is_found(frequency: np.ndarray, t
     assert len([t for t in told if "peak near" in t]) == 1
     alone = response.harmonic_response(problem, frequency, np.ones(0))
     assert rising({1.0: found}, {1.0: pairs(peaks)}) == [] and len(rising({1.0: alone}, {1.0: []})) == 1
+
+
+def test_a_search_that_found_no_peak_is_not_made_again(tmp_path: Path) -> None:
+    """The flank of 2.2 Hz at the end of the band."""
+    problem, told = balance.of(free(2.2), 1, 16, length=0.01), list[str]()
+    for _ in range(2):
+        with open_journal(tmp_path / "points", "abc", HEAD) as journal:
+            frequency = np.array([1.0, 1.5, 2.0])
+            found = resumed_response(problem, frequency, np.ones(0), journal, SERIES, told.append)
+            assert found[1] == []
+    assert len([t for t in told if t == "peak near 2 Hz"]) == 1
 
 
 def softening(harmonics: int) -> balance.Problem:
@@ -220,7 +291,7 @@ def test_directions_of_a_monitor_that_are_not_neighbours(tmp_path: Path) -> None
     for count in (2, 4):
         with open_journal(tmp_path / "points", "abc", head) as journal:
             found, _ = resumed_response(problem, np.linspace(9.0, 12.0, count), np.ones(1), journal, SERIES)
-            told = response_of(journal.head, journal.series)
+        told = read_response(tmp_path / "points")
     assert told.labels == {"monitors/p0": ("u_x", "u_y"), "monitors/p1": ("u_x",)}
     for f, watched in zip(found.frequency, found.outputs, strict=True):
         Omega = 2 * np.pi * f
@@ -259,3 +330,34 @@ def test_the_error_of_an_overhanging_resonance_is_that_of_its_own_motion() -> No
     assert e.amplitude == pytest.approx(peak.amplitude, rel=1e-6) and 0 < share < 0.1
     another = peak._replace(amplitude=0.5 * peak.amplitude)
     assert 2 * np.pi * peak.frequency not in {one.point.Omega for one in judged(problem, found, [another])}
+
+
+def test_estimates_of_errors_are_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Stopped before each of them and asked once more: each is computed once, and bit by bit what
+    it is without a journal; also that of a peak that is not found again."""
+    problem = softening(1)
+    found = response.harmonic_response(problem, np.linspace(0.6, 1.1, 13) / (2 * np.pi), np.ones(1))
+    (peak,) = response.refined_peaks(problem, found)
+    lost = peak._replace(frequency=0.999 * peak.frequency, x=np.full_like(peak.x, np.nan))
+    whole, calls = judged(problem, found, [peak, lost]), list[str]()
+    for name in ("left_out", "_estimated"):
+        kept = getattr(accuracy, name)
+
+        def once_a_run(*given: Any, name: str = name, kept: Any = kept) -> Any:
+            if calls and calls[-1] != "again":
+                raise Stop
+            calls.append(name)
+            return kept(*given)
+
+        monkeypatch.setattr(accuracy, name, once_a_run)
+    for _ in range(40):
+        calls.append("again")
+        with contextlib.suppress(Stop), open_journal(tmp_path / "points", "abc", HEAD) as journal:
+            again = judged(problem, found, [peak, lost], journal, SERIES)
+            break
+    assert calls.count("left_out") == 13 and 3 <= calls.count("_estimated") <= 5
+    for one, other in zip(again, whole, strict=True):
+        np.testing.assert_equal(
+            [vars(one.point), vars(one.error), one[2:]],
+            [vars(other.point) | {"slope": None, "history": ()}, vars(other.error), other[2:]],
+        )

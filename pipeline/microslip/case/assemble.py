@@ -19,7 +19,7 @@ from ..system.assembly import Assembly, Contact, Load, Output
 from ..system.component import Component, Ring
 from ..system.spin import Spin, turned
 from .compliance import Springs, residual_share
-from .contacts import contact_at, described, of_force, springs_of, swept
+from .contacts import contact_at, described, of_force, sides, springs_of, swept
 from .driving import as_asked, flow_of, loads_of, messages_of, with_field
 from .loaded import Loaded, axis_of, body_of, load_bodies, place_of
 from .points import (
@@ -96,6 +96,8 @@ def build(settings: CaseSettings, bases: Mapping[str, ModalBasis], path: Path | 
     prepare()
     settings = settings.model_copy(update={"contacts": tuple(described(c, path) for c in settings.contacts)})
     bodies = load_bodies(settings, bases, path)
+    for c in settings.contacts:  # before any of them is made, which compiles
+        sides(settings, bodies, c, path)
     settings = thrown(settings, {name: b.basis for name, b in bodies.items()}, path)
     components = _spun({name: _component(settings, b) for name, b in bodies.items()}, settings, bodies, path)
     contacts, springs, made, messages = [], [], [], list[str]()

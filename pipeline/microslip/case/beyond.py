@@ -17,13 +17,14 @@ import numpy as np
 
 from ..data import Array
 from ..errors import NotConverged, UserError
+from ..harmonic_balance.checkpoint import Spend
 from ..harmonic_balance.problem import Problem
 from ..harmonic_balance.response import HarmonicResponse
 from ..harmonic_balance.stability import Settings as Multipliers
 from ..harmonic_balance.stability import Stability, orbit, stability
 from ..results import Journal
 from ..time_domain.stepped import Settled
-from ..time_domain.swept import DOWN, LONG, REST, UP, Sweeps, on_two_motions
+from ..time_domain.swept import DOWN, REST, UP, Sweeps, on_two_motions
 from ..units import Quantity, percent
 from .assemble import build
 from .curves import Followed, Keep, curves
@@ -42,8 +43,9 @@ class Beyond:
     Attributes:
         normal: N. gap: Hz, Hz, where it is looked. up, down: swept upwards and downwards, in that order. rest: each
             from rest. quantity: what is read. why: why there are none. cut, patience: the way and
-            the frequency (Hz) before which the CPU time (s) was over. curves: of periodic motions,
-            with so many samples of a cycle. stability: of each of them some points, by their place.
+            the frequency (Hz) before which motions had their share of the CPU time (s). spent: s of
+            it, by motions. curves: of periodic motions, with so many samples of a cycle. stability:
+            of each of them some points, by their place.
     """
 
     normal: float
@@ -55,6 +57,7 @@ class Beyond:
     why: str = ""
     cut: tuple[str, float] | None = None
     patience: float = 0.0
+    spent: float = 0.0
     curves: Sequence[Followed] = ()
     samples: int = 0
     stability: Sequence[Mapping[int, Stability]] = ()
@@ -129,12 +132,20 @@ def with_curve(
     """The same with the curve of periodic motions from either end of what was looked at, begun on the
     solutions of the sweep where it has some there, as fine as open contacts need, and the stability
     of some of its points; without it where there are no motions in time to hold it against, or only
-    one that is regular, which then say all there is."""
+    one that is regular, which then say all there is. It takes what the motions have left of the
+    time at the place."""
     if one.why or one.cut or not (one.two or one.irregular):
         return one
     low, high = one.band
     good = found.converged
     known = dict(zip(found.frequency[good].tolist(), found.x[good], strict=True))
+    spent = one.spent
+
+    def spend(seconds: float) -> bool:
+        nonlocal spent
+        spent += seconds
+        return spent <= one.patience
+
     harmonics, samples = max(HARMONICS, settings.balanced), max(FINER, settings.sampled)
     while True:
         curve = CurveOfCase(band=(low, high), points=POINTS)
@@ -142,9 +153,9 @@ def with_curve(
         if settings.sweep.normal_forces is not None:
             asked["sweep"] = settings.sweep.model_copy(update={"normal_forces": (one.normal,)})
         finer = settings.model_copy(update=asked)
-        both = _both_ways(finer, bases, path, keep, report, known)
+        both = _both_ways(finer, bases, path, keep, report, known, spend)
         failed = 1 - float(np.mean(np.concatenate([f.converged for f in both]))) if both else 0.0
-        if failed <= COARSE or 2 * samples > FINEST:
+        if failed <= COARSE or 2 * samples > FINEST or not spend(0.0):
             break
         samples *= 2
         report(
@@ -152,7 +163,7 @@ def with_curve(
         )
     built = build(finer, bases, path)
     problem = problem_of(built, one.normal if settings.sweep.normal_forces is not None else None)
-    each = [_looked_at(problem, f, max(LOOKED_AT // len(both), 1), report) for f in both]
+    each = [_looked_at(problem, f, max(LOOKED_AT // len(both), 1), report, spend) for f in both]
     return replace(one, curves=both, samples=samples, stability=each)
 
 
@@ -163,16 +174,17 @@ def _both_ways(
     keep: Keep,
     report: Report,
     known: Mapping[float, Array],
+    spend: Spend,
 ) -> list[Followed]:
-    """The curve from the upper end, and from the lower one where the first does not arrive there."""
+    """The curve from the upper end, and from the lower one where the first does not arrive there and there is time."""
     assert settings.curve is not None and settings.curve.band is not None
     found = list[Followed]()
     for band in (settings.curve.band[::-1], settings.curve.band):
-        if found and found[0].complete:
+        if found and (found[0].complete or not spend(0.0)):
             break
         way = settings.curve.model_copy(update={"band": band})
         some, whole = curves(
-            settings.model_copy(update={"curve": way}), bases, path, "frequency", keep, report, known
+            settings.model_copy(update={"curve": way}), bases, path, "frequency", keep, report, known, spend
         )
         if not whole:
             raise KeyboardInterrupt
@@ -180,22 +192,27 @@ def _both_ways(
     return found
 
 
-def _looked_at(problem: Problem, one: Followed, count: int, report: Report) -> dict[int, Stability]:
+def _looked_at(
+    problem: Problem,
+    one: Followed,
+    count: int,
+    report: Report,
+    spend: Spend,
+) -> dict[int, Stability]:
     """Place -> stability of some of a curve's points that pass their checks; none where it cannot be told."""
     good, found = np.flatnonzero(one.converged), dict[int, Stability]()
     chosen = np.linspace(0, len(good) - 1, min(count, len(good))).round().astype(int)
-    began = time.process_time()
     for i in good[np.unique(chosen)].tolist():
-        f = float(one.parameter[i])
+        if not spend(0.0):
+            break
+        began, f = time.process_time(), float(one.parameter[i])
         report(f"stability of the curve, {one.label}: {f:.6g} Hz")
         try:
             motion = orbit(problem, one.rows[i]["x"], 2 * np.pi * f)
         except UserError:
             return {}
         found[i] = stability(motion, Multipliers(steps=128))
-        began = began if len(found) > 1 else time.process_time()  # the first one compiles
-        if time.process_time() - began > LONG:
-            break
+        spend(time.process_time() - began if len(found) > 1 else 0.0)  # the first one compiles
     return found
 
 
@@ -217,4 +234,4 @@ def beyond(
         m = Sweeps(problem, found, gap, normal, report, patience, journal).motions()
     except (UserError, NotConverged) as error:
         return Beyond(normal, gap, why=str(error))
-    return Beyond(normal, gap, m.up, m.down, m.rest, of, cut=m.cut, patience=patience)
+    return Beyond(normal, gap, m.up, m.down, m.rest, of, cut=m.cut, patience=patience, spent=m.spent)

@@ -53,7 +53,7 @@ def springs_of(
     settings: CaseSettings, bodies: Mapping[str, Loaded], c: ContactSettings, load: float | None, path: Path | str
 ) -> tuple[ContactSettings, Springs, list[str]]:
     """A contact's settings with the size of its patch, its springs (of a curved one at a load, N), and messages."""
-    loaded, faces = _sides(settings, bodies, c, path)
+    loaded, faces = sides(settings, bodies, c, path)
     own = sized(c, faces[0], path)
     if c.is_curved:
         springs, message = _in_contact(path, c, lambda: curved_springs(own, load))
@@ -68,10 +68,14 @@ def springs_of(
     return own, springs, [words for words in said if words]
 
 
-def _sides(
+def sides(
     settings: CaseSettings, bodies: Mapping[str, Loaded], c: ContactSettings, path: Path | str
 ) -> tuple[list[Loaded], list[Interface]]:
-    """The one or two bodies of a contact and their interfaces."""
+    """The one or two bodies of a contact and their interfaces.
+
+    Raises:
+        UserError: one that is not there, or that supports hold.
+    """
     ends = settings.ends(c)
     loaded = [body_of(bodies, body, path, f"contacts.{c.interface}") for body, _ in ends]
     faces = [b.face(name, path, "contacts") for b, (_, name) in zip(loaded, ends, strict=True)]
@@ -97,7 +101,7 @@ def contact_at(
 ) -> tuple[At, list[str]]:  # fmt: skip
     """A contact for any load, and messages. springs: of one that is not curved."""
     ends = settings.ends(c)
-    loaded, faces = _sides(settings, bodies, c, path)
+    loaded, faces = sides(settings, bodies, c, path)
     first, second, met = ContactFace(*ends[0]), None, None
     if len(ends) == 2:
         met = _in_contact(path, c, lambda: _met(settings, c, loaded, faces))

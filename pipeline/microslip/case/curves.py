@@ -17,7 +17,7 @@ from ..data import Array
 from ..errors import UserError
 from ..harmonic_balance import families
 from ..harmonic_balance.accuracy import Error
-from ..harmonic_balance.checkpoint import labels, points_of_curve, resumed_curve
+from ..harmonic_balance.checkpoint import Spend, labels, points_of_curve, resumed_curve
 from ..harmonic_balance.envelope import largest
 from ..harmonic_balance.families import Family
 from ..harmonic_balance.growing import verdict
@@ -30,6 +30,7 @@ from ..units import METRES, Quantity
 from . import headline
 from .assemble import Built, build
 from .contacts import swept
+from .messages import CUT
 from .problem import normal_forces, pressed_by, problem_of
 from .questions import CurveOfCase
 from .settings import CaseSettings
@@ -108,7 +109,7 @@ class Followed:
     @property
     def leaves_out(self) -> bool:
         """Whether another curve is to be begun at the other end; one that has too few points goes on instead."""
-        return self.legs is None and not self.complete and not self.status.startswith("points")
+        return self.legs is None and not self.complete and not self.status.startswith(("points", CUT))
 
     @property
     def turned(self) -> Followed:
@@ -195,6 +196,7 @@ def curves(
     keep: Keep,
     report: Report,
     known: Mapping[float, Array] = MappingProxyType({}),
+    spend: Spend = lambda _: True,
 ) -> tuple[list[Followed], bool]:
     """The curves of a case, one for each normal force of its sweep; a second one from the other end where the first
     does not arrive there.
@@ -202,7 +204,7 @@ def curves(
     Args:
         over: of `OVER`. keep: opens the journal of an assembly, in which points are kept as they are found.
         known: Hz -> unknowns of a solution there, with as many harmonics or fewer, on which a curve
-            over the frequency begins.
+            over the frequency begins. spend: limits the CPU time.
 
     Returns:
         The curves, and whether nobody interrupted: after Ctrl-C what was found until then.
@@ -227,10 +229,11 @@ def curves(
                 family = _family(built, problem, one)
                 if over == "frequency":
                     family = replace(family, known=known.get(ends[0]))
-                found.append(_followed(family, problem, one, pressed, journal, report, how))
+                found.append(_followed(family, problem, one, pressed, journal, report, how, spend))
                 if found[-1].leaves_out:
                     one = found[-1].turned
-                    found.append(_followed(_family(built, problem, one), problem, one, pressed, journal, report, how))
+                    family = _family(built, problem, one)
+                    found.append(_followed(family, problem, one, pressed, journal, report, how, spend))
             except KeyboardInterrupt:
                 return [*found, replace(one, rows=points_of_curve(journal, one.name))], False
     return found, True
@@ -259,14 +262,21 @@ def _begun_under(built: Built, one: Followed) -> float | None:
 
 
 def _followed(
-    family: Family, problem: Problem, one: Followed, normal: float, journal: Journal, report: Report, how: Settings,
-) -> Followed:  # fmt: skip
+    family: Family,
+    problem: Problem,
+    one: Followed,
+    normal: float,
+    journal: Journal,
+    report: Report,
+    how: Settings,
+    spend: Spend,
+) -> Followed:
     """A curve with its points, kept in a series of the journal."""
     told = {**journal.head.get("parameters", {}), one.name: {"normal_force": normal}}
     journal.say({**journal.head, "parameters": told, "labels": labels(problem), "over": OF_SERIES[one.over]})
     report(f"curve over the {one.over.replace('_', ' ')}, {one.label}")
-    branch, rows = resumed_curve(family, journal, one.name, report, how)
-    return replace(one, rows=rows, status=branch.status)
+    branch, rows = resumed_curve(family, journal, one.name, report, how, spend)
+    return replace(one, rows=rows, status=branch.status or CUT)
 
 
 def _ends(built: Built, asked: CurveOfCase, over: str, path: Path | str) -> tuple[float, float]:

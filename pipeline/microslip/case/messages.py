@@ -30,6 +30,9 @@ if TYPE_CHECKING:
     from .beyond import Beyond
     from .curves import Followed
 
+CUT = "the time is over"
+"""Status of a curve whose time was over before it ended."""
+
 OPEN = 0.01
 """Share of points and time that may be open in the book's mode before a message is made."""
 
@@ -297,7 +300,7 @@ def _some(names: Sequence[str], unit: str, between: str = ", ", what: str = "") 
 def what_moves(b: Beyond) -> list[str]:
     """Which motion is reached from rest, which other ones there are, how high, and how they are
     reached; what the curve of periodic motions is and whether it is stable."""
-    return [*_in_time(b), *map(_of_curve, b.curves), *_stable(b)]
+    return [*_in_time(b), *(_of_curve(one, b.patience) for one in b.curves), *_stable(b)]
 
 
 def _in_time(b: Beyond) -> list[str]:
@@ -339,8 +342,8 @@ def _cut(b: Beyond) -> list[str]:
         return []
     way, f = b.cut
     return [
-        f"Motions in time ended after {b.patience:g} s, {way} before {f:.5g} Hz: what comes then is not known; run "
-        f"again with --set sweep.patience={2 * b.patience:g}, which goes on from there."
+        f"Motions in time ended with their share of {b.patience:g} s, {way} before {f:.5g} Hz: what comes then is not "
+        f"known; run again with --set sweep.patience={2 * b.patience:g}, which goes on from there."
     ]
 
 
@@ -386,11 +389,14 @@ def _wild(b: Beyond) -> list[str]:
     return [f"Motions are irregular, without a period, {span}, with swings of up to {top}."]
 
 
-def _of_curve(one: Followed) -> str:
-    """A curve in a sentence."""
+def _of_curve(one: Followed, patience: float) -> str:
+    """A curve in a sentence; patience: s after which it was cut, if it was."""
     said = f"Curve of periodic motions, {one.sentences()[0]}"
     more = f"; it goes on from {one.parameter[-1]:.5g} Hz (respond --over frequency)."
-    return said if not one.status.startswith("points") else said.removesuffix(".") + more
+    if one.status == CUT and one.rows:
+        more = f"; after {patience:g} s it is left at {one.parameter[-1]:.5g} Hz, run again with --set "
+        more += f"sweep.patience={2 * patience:g}, which goes on from there."
+    return said.removesuffix(".") + more if one.status.startswith(("points", CUT)) else said
 
 
 def _stable(b: Beyond) -> list[str]:

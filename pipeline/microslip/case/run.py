@@ -231,7 +231,7 @@ def _answered(
         messages += say.not_periodic(key, found.unsteady, built.settings)
         messages += say.lifting(built, problem, found, key) + say.pulling(built, found, key)
         messages += say.across(problem, found, key) + _verdict(problem, found, key)
-        messages += [] if still(found) else left.out(problem, found, peaks, key)
+        messages += [] if still(found) else left.out(problem, found, peaks, key, journal)
         if key == max(responses):
             stiff = _stuck(problem.assembly)
     return responses, resonances, folds, stiff, messages
@@ -360,7 +360,14 @@ class _Left:
 
     most: float | None
 
-    def out(self, problem: Problem, found: HarmonicResponse, peaks: list[Resonance], normal: float) -> list[str]:
+    def out(
+        self,
+        problem: Problem,
+        found: HarmonicResponse,
+        peaks: list[Resonance],
+        normal: float,
+        journal: Journal | None = None,
+    ) -> list[str]:
         """A message where harmonics or samples are too few at a place that is judged (`accuracy.judged`).
 
         The book's mode is one harmonic by what it is, and of a whole ring its sector says the same: neither is judged.
@@ -371,7 +378,7 @@ class _Left:
 
         if not headline.is_estimated(self.built, problem, ring=self.tolerance is not None):
             return []
-        looked_at = judged(problem, found, peaks)
+        looked_at = judged(problem, found, peaks, journal, series_name(normal))
         for point, estimate, share, _ in looked_at if self.tolerance is not None else ():
             self._enough(problem, found, point, estimate, share, normal)
         if not looked_at:

@@ -258,7 +258,7 @@ class Sweep(Model):
     stop: Positive
     points: Annotated[int, Field(ge=2, le=200000)] = 600
     normal_forces: Literal["static"] | Numbers | None = None
-    patience: NotNegative = 120.0
+    patience: NotNegative = 180.0
 
     @model_validator(mode="after")
     def _rising(self) -> Sweep:

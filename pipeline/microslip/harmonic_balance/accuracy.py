@@ -16,18 +16,20 @@ contact sticks, the derivative of its force is zero, and such a step sees no cha
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
-from typing import NamedTuple
+from dataclasses import dataclass, fields, replace
+from functools import partial
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ..data import Array
+from ..results.journal import Journal, once
 from . import problem as balance
 from .forces import AFT
 from .problem import Problem
 from .readout import amplitude
 from .response import HarmonicResponse, Resonance
-from .solver import Point, newton, solve
+from .solver import CONVERGED, Point, newton, solve
 
 PER_HARMONIC = 8
 """Samples a harmonic needs at least: two carry it, the kinks of a contact force need more."""
@@ -211,10 +213,19 @@ class Judged(NamedTuple):
     likely: float
 
 
-def judged(problem: Problem, response: HarmonicResponse, peaks: Sequence[Resonance]) -> list[Judged]:
+def judged(
+    problem: Problem,
+    response: HarmonicResponse,
+    peaks: Sequence[Resonance],
+    journal: Journal | None = None,
+    series: str = "",
+) -> list[Judged]:
     """Errors at the resonances of a sweep, at its highest point and where most is left out, see `left_out`.
 
     A resonance whose solution cannot be found again, but another motion at its frequency, is left out.
+
+    Args:
+        journal: keeps each estimate beside the series of the sweep; what it holds is not computed.
     """
     good = np.flatnonzero(response.converged)
     if not len(good):
@@ -223,18 +234,41 @@ def judged(problem: Problem, response: HarmonicResponse, peaks: Sequence[Resonan
     top = int(good[np.argmax(size[good])])
     asked = np.flatnonzero(response.converged & response.asked)  # at a fold the least error is a jump
     some = asked[np.unique(np.linspace(0, len(asked) - 1, min(LOOKED_AT, len(asked))).round().astype(int))]
-    left = [left_out(problem, response.x[i], 2 * np.pi * float(response.frequency[i])) for i in some]
+    left = [_kept_left_out(problem, response, i, journal, series) for i in some]
     worst = some[np.argsort(left)[-2:]]
     places = {float(response.frequency[i]): (float(size[i]), response.x[i]) for i in (top, *worst)}
     places |= {peak.frequency: (peak.amplitude, peak.x) for peak in peaks}
     found = []
     for f, (height, x) in sorted(places.items(), key=lambda place: place[0]):
-        point = solve(problem, 2 * np.pi * f, [x])
-        e = error(problem, point.x, point.Omega) if point.converged else None
-        if e and np.isclose(e.amplitude, height, rtol=1e-3, atol=0):
-            floor = FLOOR * float(size[top])
+        row = once(journal, f"{series}, errors", f, partial(_estimated, problem, f, x))
+        if row and np.isclose(row["amplitude"], height, rtol=1e-3, atol=0):
+            point = Point(2 * np.pi * f, row["solution"], CONVERGED, row["residual"], row["steps"])
+            e, floor = Error(**{one.name: row[one.name] for one in fields(Error)}), FLOOR * float(size[top])
             found.append(Judged(point, e, e.over(floor), e.likely(floor)))
     return found
+
+
+def _kept_left_out(
+    problem: Problem,
+    response: HarmonicResponse,
+    i: int,
+    journal: Journal | None,
+    series: str,
+) -> float:
+    """`left_out` at a point of a sweep, kept before or computed now."""
+    f, x = float(response.frequency[i]), response.x[i]
+    looked = once(journal, f"{series}, left out", f, lambda: {"share": left_out(problem, x, 2 * np.pi * f)})
+    return float(looked["share"])
+
+
+def _estimated(problem: Problem, frequency: float, x: Array) -> dict[str, Any]:
+    """The solution at a frequency (Hz), begun at x (size,), and its `Error`, as a journal keeps them; empty where
+    there is none."""
+    point = solve(problem, 2 * np.pi * frequency, [x])
+    if not point.converged:
+        return {}
+    told = {"solution": point.x, "residual": point.error, "steps": point.iterations}
+    return told | vars(error(problem, point.x, point.Omega))
 
 
 @dataclass(frozen=True)

@@ -3,6 +3,8 @@ was."""
 
 from __future__ import annotations
 
+import time
+from collections.abc import Callable
 from dataclasses import fields
 from typing import Any
 
@@ -13,7 +15,7 @@ from ..continuation import Branch, Settings, State
 from ..continuation.newton import Scaled
 from ..data import Array, ComplexArray
 from ..results.checks import Checks
-from ..results.journal import Journal
+from ..results.journal import Journal, once
 from ..system.assembly import Assembly, Output
 from ..system.component import Component
 from .checks import forces_on, judged
@@ -35,13 +37,14 @@ def resumed_response(
 
     Args:
         frequency: Hz. limit: (patches,) friction limits, N, for reports. series: its name. Peaks are kept as well, with
-            ``peak`` = the frequency, Hz, of the point that they were searched from.
+            ``peak`` = the frequency, Hz, of the point that they were searched from, and what searches gave in a
+            series of its own.
 
     Returns:
         The response and its resonances: of the maxima of one plateau the highest.
     """
-    rows = journal.of(series)  # a peak on a point of the sweep stands in its place
-    held = {key: restored(problem, row) for key, row in rows.items() if row["peak"] in (0.0, key)}
+    rows = journal.of(series)
+    held = {key: restored(problem, row) for key, row in rows.items() if not row["peak"] or _same(row["peak"], key)}
 
     def keep(f: float, solved: Solved, added: bool) -> None:
         journal.keep(series, f, record(problem, *solved) | {"frequency": f, "added": int(added)})
@@ -57,18 +60,26 @@ def _peak(
 ) -> Resonance | None:  # fmt: skip
     """The peak beside a point of a sweep, if there is one, kept before or searched for now."""
     beside = float(response.frequency[bracket[1]])
-    for key, row in journal.of(series).items():
-        if row["peak"] == beside:
-            return Resonance(key, float(abs(restored(problem, row)[1].outputs[0, 1])), row["x"])
-    report(f"peak near {beside:.6g} Hz")
-    found = highest(problem, response, bracket)
-    if found is None:
-        return None
-    point, amplitude = found
-    f = point.Omega / (2 * np.pi)
-    kept = record(problem, point, operating(problem, point))
-    journal.keep(series, f, kept | {"peak": beside})
-    return Resonance(f, amplitude, point.x)
+
+    def searched() -> dict[str, Any]:
+        report(f"peak near {beside:.6g} Hz")
+        found = highest(problem, response, bracket)
+        if found is None:
+            return {}
+        point, amplitude = found
+        f, rows = point.Omega / (2 * np.pi), journal.of(series)
+        f = next((key for key in rows if _same(key, f)), f)  # a point of the sweep stays what it is
+        kept = rows.get(f) or record(problem, point, operating(problem, point))
+        journal.keep(series, f, kept | {"peak": beside})
+        return {"frequency": f, "amplitude": amplitude, "x": point.x}
+
+    row = once(journal, f"{series}, searches for peaks", beside, searched)
+    return Resonance(**row) if row else None
+
+
+def _same(frequency: float, other: float) -> bool:
+    """Whether two frequencies are one but for rounding."""
+    return abs(frequency - other) <= 1e-12 * other
 
 
 # curves ------------------------------------------------------------------------------------------------------------
@@ -77,18 +88,33 @@ OF_THE_WAY = "curve/"
 """Names, in a point of a curve, of what it takes to go on from there."""
 
 
+Spend = Callable[[float], bool]
+"""Is told CPU time (s) as it is spent, and says whether there is more of it."""
+
+
 def resumed_curve(
-    family: Family, journal: Journal, series: str, report: Report = lambda _: None, settings: Settings | None = None
+    family: Family,
+    journal: Journal,
+    series: str,
+    report: Report = lambda _: None,
+    settings: Settings | None = None,
+    spend: Spend = lambda _: True,
 ) -> tuple[Branch, list[dict[str, Any]]]:
     """The curve of a family, from where a series of the journal ends, and its points as `points_of_curve` tells them.
 
     A point of a curve has beside what other points have: ``parameter`` in the family's unit, ``fold`` and ``arclength``
-    (scaled); its key is its place along the curve.
+    (scaled); its key is its place along the curve. spend: limits it, the time of an earlier run counted, but not the
+    first step of a run, which compiles.
     """
     settings = family.settings(settings)
     rows = points_of_curve(journal, series)
+    more, began = spend(sum(row["curve/took"] for row in rows)), None
 
     def keep(state: State) -> None:
+        nonlocal more, began
+        now = time.process_time()
+        took, began = 0.0 if began is None else now - began, now
+        more = spend(took)
         last = len(state.found) - 1
         for i, p in enumerate(state.found):
             problem, Omega = family.problem(p.lam), family.Omega(p.lam)
@@ -97,11 +123,12 @@ def resumed_curve(
                 record(problem, point, operating(problem, point))
                 | {"parameter": p.lam / family.unit, "fold": int(p.kind == "fold"), "arclength": p.arclength}
                 | _way(p, state, state.status if i == last else "")
+                | {"curve/took": took if i == last else 0.0}
             )
             journal.keep(series, len(rows), row)
             rows.append(row)
 
-    return followed(family, report, settings, _begun(family, rows, settings), keep), rows
+    return followed(family, report, settings, _begun(family, rows, settings), keep, lambda: more), rows
 
 
 def points_of_curve(journal: Journal, series: str) -> list[dict[str, Any]]:
@@ -180,9 +207,13 @@ def _of_contact(name: str, relative: Array, force: Array, cycle: Cycle) -> dict[
 
 
 def restored(problem: Problem, row: dict[str, Any]) -> tuple[Point, Operating]:
-    """A point and what belongs to it, from what a journal kept; of the cycles sums and means alone."""
+    """A point and what belongs to it, from what a journal kept; of the cycles sums and means alone.
+
+    The point is that of the solver, before it was judged: its neighbours began at it, whatever its checks say."""
+    checks = Checks(**{f.name: row[f"checks/{f.name}"] for f in fields(Checks)})
+    status = CONVERGED if row["status"] == checks.failure else row["status"]
     point = Point(
-        2 * np.pi * row["frequency"], row["x"], row["status"], row["error"], int(row["iterations"]),
+        2 * np.pi * row["frequency"], row["x"], status, row["error"], int(row["iterations"]),
         history=tuple(row["history"]),
     )  # fmt: skip
     names = [c.name for c in problem.assembly.contacts]
@@ -203,7 +234,7 @@ def restored(problem: Problem, row: dict[str, Any]) -> tuple[Point, Operating]:
         row["exchanged"],
         row["kinetic"],
         cycles,
-        Checks(**{f.name: row[f"checks/{f.name}"] for f in fields(Checks)}),
+        checks,
     )
     return point, found
 

@@ -204,11 +204,13 @@ def followed(
     settings: Settings | Mapping[str, Any] | None = None,
     begun: Branch | None = None,
     keep: Callable[[State], None] = lambda _: None,
+    goes_on: Callable[[], bool] = lambda: True,
 ) -> Branch:
     """The curve from a solution at its beginning; without one a branch that says so.
 
     Args:
         begun: goes on from its state. keep: told of every state as it is found, with the points that are new.
+            goes_on: asked before every step; a curve that does not has no status.
     """
     settings, equations = family.settings(settings), _Noted(family)
     if begun is None or begun.state is None:
@@ -221,7 +223,7 @@ def followed(
     else:
         state, points = begun.state, list(begun.points)
     far = 0
-    while not state.status:
+    while not state.status and goes_on():
         state = equations.told(family.advanced(equations, state, settings))
         keep(state)
         points += state.found
@@ -239,12 +241,40 @@ def _begun(family: Family, equations: _Noted, settings: Settings) -> State | str
         state = continuation.start(equations, problem.at(Omega).reference, family.begin, settings)
         if not state.status:
             return state
-    known = np.zeros(0) if family.known is None else family.known
-    guess = np.concatenate([known, np.zeros(problem.size - len(known))])
-    first = solve(problem, Omega, [guess] if len(known) else [])
+    first = solve(problem, Omega, []) if family.known is None else _own(problem, Omega, family.known)
     if not first.converged:
         return first.status
     return equations.told(continuation.start(equations, first.x, family.begin, settings))
+
+
+@dataclass(frozen=True, eq=False)
+class Eased:
+    """R(x) - (1 - s) R(x_0), which x_0 solves at s = 0, and what solves the balance at s = 1, for `continuation`.
+
+    Attributes:
+        at: the balance at a frequency. left: (k,) R(x_0). x_scale, lam_scale: see `continuation.Equations`.
+    """
+
+    at: AtFrequency
+    left: Array
+    x_scale: float
+    lam_scale: float = 1.0
+
+    def evaluate(self, x: Array, s: float) -> tuple[Array, Array, Array]:
+        """R - (1 - s) R(x_0), its derivatives by x and by s."""
+        R, J, _ = self.at.evaluate(x)
+        return R - (1 - s) * self.left, J, self.left
+
+
+def _own(problem: Problem, Omega: float, known: Array) -> Point:
+    """The solution (Omega in rad/s) into which one with fewer harmonics grows: what they leave out is admitted little
+    by little. From afar Newton's method comes to any of several motions, and it is the last resort."""
+    at, guess = problem.at(Omega), np.concatenate([known, np.zeros(problem.size - len(known))])
+    eased = Eased(at, at.residual(guess), problem.x_scale)
+    settings = Settings(low=0.0, high=1.0, points=150, step=0.05, step_max=0.3, branch_points=False)
+    branch = continuation.trace(eased, guess, 0.0, settings)
+    last = branch.points[-1] if branch.points else None
+    return solve(problem, Omega, [last.x, guess] if last and last.lam == 1.0 else [guess])
 
 
 def from_both_ends(

@@ -32,6 +32,7 @@ def filled_response(
     asked, solved = [float(f) for f in frequency], dict(known or {})
 
     def take(f: float, point: Point, added: bool) -> None:
+        point = replace(point, Omega=2 * np.pi * f, slope=None)  # as it comes back from where it is kept
         solved[f] = point, operating(problem, point)
         keep(f, solved[f], added)
 

@@ -23,6 +23,7 @@ from .problem import AWAY, NO_NUMBER, AtFrequency, Problem, Tried
 Report = Callable[[str], None]
 CONVERGED = "converged"
 TURNS = "turns back"
+FROM_ABOVE = "nor from the frequency above"
 
 
 @dataclass(frozen=True)
@@ -32,7 +33,7 @@ class Point:
     Attributes:
         Omega: rad/s. x: see `Problem`. status: `CONVERGED`, or what went wrong, the cause before a colon.
         error: largest entry of R over the largest of x. iterations: Newton steps, all attempts together.
-        slope: the last derivative of the contact forces, if it is kept. history: `error` before every Newton step,
+        slope: the last derivative of the contact forces. history: `error` before every Newton step,
             attempt after attempt.
     """
 
@@ -52,6 +53,11 @@ class Point:
     def away(self) -> bool:
         """Whether a body slides away, so that there is no periodic motion to be found."""
         return AWAY in self.status
+
+    @property
+    def walked(self) -> bool:
+        """Whether it was tried from the frequency above as well, without a solution."""
+        return FROM_ABOVE in self.status
 
     @property
     def undefined(self) -> bool:
@@ -153,11 +159,6 @@ def _contraction(problem: Problem) -> float:
     """`CONTRACTION` or `OF_MANY`."""
     many = any(isinstance(g.model, AFT) and g.model.many for g in problem.groups)
     return OF_MANY if many and len(problem.slices) == 1 else CONTRACTION
-
-
-def _by_few(problem: Problem) -> bool:
-    """Whether the derivatives of all contacts are those of few points, and cost as little as a step."""
-    return all(isinstance(g.model, AFT) and g.model.few is not g.model for g in problem.groups)
 
 
 def _shortened(
@@ -368,7 +369,9 @@ def sweep(
 ) -> list[Point]:  # fmt: skip
     """Solutions at frequencies (Hz) in the given order, each started from its neighbours. A failure is recorded.
 
-    What failed is tried again from the neighbour behind it, where that one has a solution.
+    What failed is tried again from the neighbour behind it, where that one has a solution. A point depends on what
+    those before it are, and on nothing else of how they were found, so that a sweep goes on as if nobody had stopped
+    it.
 
     Args:
         start: (k,) where the first point starts; the sticking contact if None. known: Hz -> point that was found
@@ -381,7 +384,7 @@ def sweep(
         raise UserError("frequency: a sweep needs one or more, Hz")
     bounded("frequency", frequency, gt=0)
     done: list[Point] = []
-    slope, solved = None, 0
+    solved = 0
     known = known or {}
     for i, f in enumerate(frequency):
         if float(f) in known:
@@ -395,8 +398,7 @@ def sweep(
         if good:
             starts = [_ahead(good, 2 * np.pi * f), good[-1].x] if len(good) > 1 else [good[-1].x]
         began = time.perf_counter()
-        point = solve(problem, 2 * np.pi * float(f), starts, slope, report=partial(_also, report, told))
-        slope = None if _by_few(problem) else point.slope
+        point = solve(problem, 2 * np.pi * float(f), starts, report=partial(_also, report, told))
         done.append(replace(point, slope=None))
         keep(done[-1])
         solved += 1
@@ -404,7 +406,7 @@ def sweep(
         if solved == TIMED and (said := _long(time.perf_counter() - began, left)):
             report(said)
     for i in range(len(done) - 2, -1, -1):  # from the other side, along which there may be a way
-        if not done[i].converged and not done[i].away and done[i + 1].converged:
+        if not (done[i].converged or done[i].away or done[i].walked) and done[i + 1].converged:
             report(f"{i + 1} of {len(frequency)} frequencies: {hertz(frequency[i])} once more, from above")
             done[i] = _walked(problem, done[i + 1], done[i])
             keep(done[i])
@@ -443,7 +445,7 @@ def _walked(problem: Problem, known: Point, failed: Point) -> Point:
             return replace(point, iterations=spent)
         else:
             last = point
-    return replace(failed, iterations=spent)
+    return replace(failed, status=f"{failed.status}, {FROM_ABOVE}", iterations=spent)
 
 
 MOST = 5

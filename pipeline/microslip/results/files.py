@@ -21,7 +21,7 @@ from ..files.store import json_text, ordinary
 from ..operating.motion import Motion, motion_of
 from ..reduced.coordinates import first_modes, in_modes
 from ..settings.arguments import checked
-from .journal import is_journal, read_journal
+from .journal import answers, is_journal, read_journal
 from .series import Series
 
 FORMAT = "microslip-response"
@@ -253,7 +253,7 @@ _TRIAL = "from microslip.results.files import _read; _read(path)"
 def _from_journal(path: Path) -> Response:
     head, series = read_journal(path)
     try:
-        return response_of(head, series)
+        return response_of(head, answers(head, series))
     except DAMAGE as error:
         raise UserError(f"{path}: is damaged or incomplete ({short(error)}); run the case again") from error
 

@@ -12,7 +12,7 @@ import os
 import struct
 import time
 import zlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -40,7 +40,8 @@ Point = Mapping[str, Any]
 
 @dataclass
 class Journal:
-    """An open journal. `head` says what the points are of; `series` holds them: name -> key -> point.
+    """An open journal. `head` says what the points are of; `series` holds them: name -> key -> point. Those whose
+    parameters the head names are answers, others what was found on the way to them (`answers`).
 
     Keys are numbers by which the points of a series are in order: frequencies, or places along a curve.
     """
@@ -83,6 +84,21 @@ class Journal:
             with contextlib.suppress(OSError):
                 os.ftruncate(self._file, whole)
             raise UserError(refused(self.path, error)) from error
+
+
+def once(
+    journal: Journal | None,
+    series: str,
+    key: float,
+    made: Callable[[], Point],
+) -> dict[str, Any]:
+    """A point that a journal keeps under a key of a series, or that is made now and kept; without a
+    journal it is made."""
+    if journal is None:
+        return dict(made())
+    if key not in journal.series.get(series, {}):
+        journal.keep(series, key, made())
+    return journal.series[series][key]
 
 
 @contextlib.contextmanager
@@ -133,6 +149,13 @@ def read_journal(path: Path | str) -> tuple[dict[str, Any], dict[str, dict[float
     except OSError as error:
         raise UserError(f"{path}: cannot be read ({error.strerror}); correct the path or its rights") from error
     return _parsed(data, Path(path))[:2]
+
+
+def answers(
+    head: Mapping[str, Any], series: Mapping[str, dict[float, dict[str, Any]]]
+) -> dict[str, dict[float, dict[str, Any]]]:
+    """The series whose parameters a head names: without those that hold searches and estimates."""
+    return {name: series[name] for name in head.get("parameters", {}) if name in series}
 
 
 def is_journal(path: Path | str) -> bool:

@@ -14,6 +14,7 @@ from ..contact.kinds import sources_of_others
 from ..errors import UserError
 from ..files import store
 from ..results import Journal, open_journal, read_journal
+from ..results.journal import answers
 from ..units import counted
 from .stage import hash_of_code
 
@@ -86,7 +87,7 @@ class Checkpoint:
             return
         with contextlib.suppress(UserError):  # none is there
             head, series = read_journal(self.file)
-            known, count = head.get("made_of", {}), sum(map(len, series.values()))
+            known, count = head.get("made_of", {}), sum(map(len, answers(head, series).values()))
             changed = [name for name in {**parts, **known} if parts.get(name) != known.get(name)]
             if known and count and changed:
                 why = f"changed since: {', '.join(changed)}"
