@@ -30,6 +30,7 @@ from microslip.cli import main
 from microslip.contact.curved import Line, foundation_of_line
 from microslip.contact.patch import pressure
 from microslip.contact.solids import Solid
+from microslip.errors import UserError
 from microslip.files import store
 from microslip.harmonic_balance.accuracy import more
 from microslip.harmonic_balance.cost import aft_bytes

@@ -18,6 +18,7 @@ from microslip.case import load_case, run_case
 from microslip.case.loaded import Loaded
 from microslip.case.problem import problem_of
 from microslip.cli import main
+from microslip.errors import UserError
 from microslip.harmonic_balance import nonlinear_modes, peak, reduced
 from microslip.stages import following
 from microslip.units import METRES

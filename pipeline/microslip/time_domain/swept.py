@@ -35,8 +35,8 @@ back in the band."""
 DOWN, UP, REST = "downwards", "upwards", "from rest"
 
 SHARES = {DOWN: 0.35, UP: 0.6, REST: 0.7}
-"""Of the time at a place, until which each of the ways goes on; the rest is for the curve. Half or twice of them cuts a sweep
-elsewhere, and what is found in all of its time is the same."""
+"""Of the time at a place, until which each of the ways goes on; the rest is for the curve. Half or
+twice of them cuts a sweep elsewhere, and what is found in all of its time is the same."""
 
 WITHIN, STEPS = 30, 80
 """Frequencies of a sweep in time within a gap, and of all of it, at most."""
