@@ -206,17 +206,18 @@ def assumptions(r: Ring, other: dict[str, ModalBasis]) -> list[list[str]]:
     def changed(**updates: Any) -> Ring:
         return replace(r, settings=r.settings.model_copy(update=updates))
 
-    def contacts(**updates: Any) -> Ring:
-        return changed(contacts=tuple(c.model_copy(update=updates) for c in r.settings.contacts))
+    def contacts(change: str) -> Ring:
+        coarse = f"contacts.0.points={list(COARSE)}"
+        return changed(contacts=load_case(CASE, [coarse, f"contacts.0.{change}"])[0].contacts)
 
     cases: list[tuple[str, Ring, dict[str, Any], float]] = [
         ("as in the case file, 12 x 2 points", r, {}, 1.0),
-        ("36 x 5 points", contacts(points=(36, 5)), {}, 1.0),
+        ("36 x 5 points", contacts("points=[36,5]"), {}, 1.0),
         ("three harmonics, 64 samples", r, {"harmonics": 3, "samples": 64}, 1.0),
         ("excited by 0.4 N", changed(amplitude=0.4), {}, 0.4),
         ("excited by 2 N", changed(amplitude=2.0), {}, 2.0),
-        ("friction coefficient 0.3", contacts(friction=0.3), {}, 2 / 3),
-        ("half of the roughness", contacts(roughness=3.75e-6), {}, 1.0),
+        ("friction coefficient 0.3", contacts("friction=0.3"), {}, 2 / 3),
+        ("half of the roughness", contacts("roughness=3.75e-6"), {}, 1.0),
         *((words, replace(r, basis=b), {}, 1.0) for words, b in other.items()),
     ]
     rows = []
