@@ -647,7 +647,8 @@ def sensitivity() -> None:
 
 def with_contacts(settings: CaseSettings, change: Any) -> CaseSettings:
     """The case with every contact changed by what `change` (contact -> keys) says."""
-    return settings.model_copy(update={"contacts": tuple(c.model_copy(update=change(c)) for c in settings.contacts)})
+    contacts = (type(c).model_validate(c.model_dump(exclude_unset=True) | change(c)) for c in settings.contacts)
+    return settings.model_copy(update={"contacts": tuple(contacts)})
 
 
 def amplitudes(basis: ModalBasis, settings: CaseSettings) -> None:
