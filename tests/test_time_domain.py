@@ -220,6 +220,11 @@ def test_a_motion_that_settles_from_side_to_side_comes_back_after_its_own_period
     k = np.arange(30)
     after = np.where(k % 2, 1.0, -1.0) + 1e-3 * (-0.85) ** (k // 2)
     assert orbit.comes_back(after[None], 1.0) == 2
+    k = np.arange(61)
+    slow = 1e-3 * (-0.98) ** k  # misses 2e-3 to 6e-4 after a period, and after two no more than 1e-4
+    assert orbit.comes_back(slow[None], 0.5) == 1
+    doubled = 1e-3 * (-1.0) ** k + slow
+    assert orbit.comes_back(doubled[None], 0.5) == 2
 
 
 def test_the_legend_of_a_phase_portrait_says_what_its_dots_are() -> None:

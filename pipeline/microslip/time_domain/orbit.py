@@ -79,6 +79,9 @@ STILL = 1e-6
 REPEATS = 1e-3
 """Share of the size of a motion within which it counts as having come back."""
 
+SETTLES = 0.9
+"""Share to which what a period misses falls in two thirds of the last half of a motion that is not at rest yet."""
+
 
 @dataclass(frozen=True, eq=False)
 class Orbit:
@@ -427,12 +430,24 @@ def else_comes_back(after: Array, size: float, omega2: Array, Omega: float) -> i
 def comes_back(after: Array, size: float) -> int:
     """See `Orbit.repeats`. The last half, where the start is forgotten best, is held against what was p periods before:
     in a multiple of p less of a start may show, and it would be found first."""
-    count = after.shape[1]
-    half = count // 2
+    half = after.shape[1] // 2
     for p in range(1, half + 1):
-        if np.abs(after[:, half:] - after[:, half - p : count - p]).max(initial=0.0) <= REPEATS * size:
-            return p
+        if _missed(after, p).max(initial=0.0) <= REPEATS * size:
+            return next((d for d in range(1, p) if p % d == 0 and _settles(_missed(after, d), p)), p)
     return 0
+
+
+def _missed(after: Array, p: int) -> Array:
+    """(half,) by how much states (n, count) of the last half miss those p periods before."""
+    count = after.shape[1]
+    return np.abs(after[:, count // 2 :] - after[:, count // 2 - p : count - p]).max(axis=0, initial=0.0)
+
+
+def _settles(missed: Array, p: int) -> bool:
+    """Whether what is missed falls: a motion that comes in alternately, from one side and from the other, has not twice
+    the period. Of thirds of the last half, each of them p periods long at least."""
+    third = len(missed) // 3
+    return third >= p and missed[-third:].max() < SETTLES * missed[:third].max()
 
 
 def told_of(exponent: Exponent | None) -> dict[str, Any]:
