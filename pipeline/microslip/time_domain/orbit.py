@@ -79,9 +79,6 @@ STILL = 1e-6
 REPEATS = 1e-3
 """Share of the size of a motion within which it counts as having come back."""
 
-SETTLES = 0.9
-"""Share to which what a period misses falls in two thirds of the last half of a motion that is not at rest yet."""
-
 
 @dataclass(frozen=True, eq=False)
 class Orbit:
@@ -429,11 +426,12 @@ def else_comes_back(after: Array, size: float, omega2: Array, Omega: float) -> i
 
 def comes_back(after: Array, size: float) -> int:
     """See `Orbit.repeats`. The last half, where the start is forgotten best, is held against what was p periods before:
-    in a multiple of p less of a start may show, and it would be found first."""
+    in a multiple of p less of a start may show, and it would be found first. A motion that comes in from one side and
+    from the other in turn has not twice its period."""
     half = after.shape[1] // 2
     for p in range(1, half + 1):
         if _missed(after, p).max(initial=0.0) <= REPEATS * size:
-            return next((d for d in range(1, p) if p % d == 0 and _settles(_missed(after, d), p)), p)
+            return next((d for d in range(1, p) if p % d == 0 and _left(_missed(after, d), p) <= REPEATS * size), p)
     return 0
 
 
@@ -443,11 +441,14 @@ def _missed(after: Array, p: int) -> Array:
     return np.abs(after[:, count // 2 :] - after[:, count // 2 - p : count - p]).max(axis=0, initial=0.0)
 
 
-def _settles(missed: Array, p: int) -> bool:
-    """Whether what is missed falls: a motion that comes in alternately, from one side and from the other, has not twice
-    the period. Of thirds of the last half, each of them p periods long at least."""
+def _left(missed: Array, p: int) -> float:
+    """What is missed in the end, if it falls geometrically: by thirds of the last half, each of p periods at least."""
     third = len(missed) // 3
-    return third >= p and missed[-third:].max() < SETTLES * missed[:third].max()
+    if third < p:
+        return math.inf
+    first, second, last = (part.max() for part in np.split(missed[-3 * third :], 3))
+    falls, less = first - second, second - last
+    return last - less**2 / (falls - less) if falls > less > 0 else last
 
 
 def told_of(exponent: Exponent | None) -> dict[str, Any]:
