@@ -442,11 +442,11 @@ def _missed(after: Array, p: int) -> Array:
 
 
 def _left(missed: Array, p: int) -> float:
-    """What is missed in the end, if it falls geometrically: by thirds of the last half, each of p periods at least."""
-    third = len(missed) // 3
-    if third < p:
+    """What is missed in the end, if it falls geometrically: by three parts of the last half, each of some times p."""
+    part = len(missed) // 3 // p * p
+    if not part:
         return math.inf
-    first, second, last = (part.max() for part in np.split(missed[-3 * third :], 3))
+    first, second, last = missed[-3 * part :].reshape(3, part).max(axis=1)
     falls, less = first - second, second - last
     return last - less**2 / (falls - less) if falls > less > 0 else last
 
