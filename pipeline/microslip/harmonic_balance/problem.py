@@ -420,7 +420,8 @@ class AtFrequency:
             return (
                 f"no balance: a body {AWAY}: nothing balances the steady forces on it; give it weak_springs or a spring"
             )
-        return f"resonance: nothing limits a motion at {h * f:.6g} Hz; give its mode some damping"
+        of = f", harmonic {h} of {f:.6g} Hz" if h > 1 else ""
+        return f"resonance: nothing limits a motion at {h * f:.6g} Hz{of}; give its mode some damping"
 
     @cached_property
     def rounding(self) -> float:
