@@ -508,6 +508,31 @@ def test_progress_in_a_log_shows_small_steps_only_after_silence(
     assert "eigenmodes" in shown and "8 of 80" in shown and "4 of 80" not in shown
 
 
+def test_what_is_counted_one_by_one_says_what_is_left(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
+) -> None:
+    """At the speed since the first, in which programs are compiled; other lines between do not stop the clock, and
+    a run that goes on counts from where it does."""
+    from microslip import progress
+
+    clock = [0.0]
+    monkeypatch.setattr(progress.time, "perf_counter", lambda: clock[0])
+    monkeypatch.setattr(progress, "SILENCE", 0.0)
+    with progress.progress("orbit box") as report:
+        for at, text in (
+            (1.0, "400 of 500 periods"), (61.0, "401 of 500 periods"), (62.0, "402 of 500 periods"),
+            (62.5, "a line"), (63.0, "403 of 500 periods"), (70.0, "1 of 3 speeds"), (80.0, "2 of 3 speeds"),
+        ):  # fmt: skip
+            clock[0] = at
+            report(text)
+        clock[0] = 90.0
+        report("3 of 3 speeds")
+    shown = said(capsys)[1]
+    assert "402 of 500 periods, about 98 s left" in shown and "403 of 500 periods, about 97 s left" in shown
+    assert "401 of 500 periods\n" in shown and "2 of 3 speeds, about 10 s left" in shown
+    assert "3 of 3 speeds\n" in shown
+
+
 @pytest.fixture
 def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))

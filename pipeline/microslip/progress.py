@@ -11,7 +11,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from .interrupts import look
 
@@ -83,7 +83,7 @@ SILENCE, BEAT = 5.0, 15.0
 @contextlib.contextmanager
 def _lines(title: str) -> Iterator[Report]:
     began = last = time.perf_counter()
-    step = (0.0, began)  # how many were done when it was first told, and when
+    step = Step(0.0, 0.0, began, True)
     present, counted, shown, seen = title, "", "", False
     ended, lock = threading.Event(), threading.Lock()
 
@@ -107,8 +107,8 @@ def _lines(title: str) -> Iterator[Report]:
                 close()
                 counted, seen = "", False
             now = time.perf_counter()
-            if total is None or done <= step[0] + 1:
-                step = done, now
+            if total is not None:
+                step = step.seen(total, done, now)
             present, counted = text, text if total is not None else ""
             if total is None or now - last > SILENCE:
                 shown, seen = text, total is not None
@@ -160,12 +160,32 @@ def _bar(title: str) -> Iterator[Report]:
         finish()
 
 
-def _left(step: tuple[float, float], now: float, total: float | None, done: float) -> str:
+class Step(NamedTuple):
+    """Something that is counted: of how many, the count from which on it is timed, when (s) that was, and whether that
+    is the first one; of many the time of the first is left out, in which programs are compiled."""
+
+    total: float
+    first: float
+    began: float
+    warm: bool
+
+    def seen(self, total: float, done: float, now: float) -> Step:
+        """The same, or what another total, or fewer of it, begin."""
+        if total != self.total or done < self.first:
+            return Step(total, done, now, total <= MANY)
+        if done > self.first and not self.warm:
+            return Step(total, done, now, True)
+        return self
+
+
+MANY = 10
+
+
+def _left(step: Step, now: float, total: float | None, done: float) -> str:
     """The time that is left of a step at the speed it had so far, in words; nothing where that is not known."""
-    first, began = step
-    if total is None or done <= first:
+    if total is None or not step.first < done < total:
         return ""
-    return f", about {_duration((now - began) * (total - done) / (done - first))} left"
+    return f", about {_duration((now - step.began) * (total - done) / (done - step.first))} left"
 
 
 def _fraction(text: str) -> tuple[float | None, float]:

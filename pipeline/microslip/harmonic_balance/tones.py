@@ -180,7 +180,7 @@ def swept(
         balances.append(here)
         if found.status == CONVERGED:
             known.append(found.x)
-        report(f"point {i + 1} of {len(first)}, {one / (2 * np.pi):.6g} and {found.second / (2 * np.pi):.6g} Hz")
+        report(f"{i + 1} of {len(first)} points, {one / (2 * np.pi):.6g} and {found.second / (2 * np.pi):.6g} Hz")
     return of_points(points, balances)
 
 
