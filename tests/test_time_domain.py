@@ -788,7 +788,9 @@ def test_a_run_that_is_ended_goes_on_with_the_same_bits(
     assert not any(text.endswith("first") or text.startswith(f"{at} of ") for text in told)
     periods: list[str] = []
     whole = orbit.run(e, 16, 14, 64, 1024, report=periods.append)
-    assert [text for text in told if text.startswith("30 of")] in ([], [f"{periods[-1]}, second"]), "events are counted on"
+    assert [text for text in told if text.startswith("30 of")] in ([], [f"{periods[-1]}, second"]), (
+        "events are counted on"
+    )
     for one in found:
         same(whole, one)
     assert [p.name for p in tmp_path.iterdir()] == ["orbit.h5"] and ms.read_orbits(tmp_path / "orbit.h5")[1].error > 0

@@ -10,6 +10,7 @@ import tempfile
 import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -158,6 +159,24 @@ def _bar(title: str) -> Iterator[Report]:
         task = bar.add_task(title, total=None)
         yield report
         finish()
+
+
+@dataclass
+class Whole:
+    """A `Report` of parts, which says before each text how many parts of the whole are done.
+
+    Attributes:
+        report: is told. total: number of parts. parts: what they are.
+    """
+
+    report: Report
+    total: int
+    parts: str
+    done: int = 0
+
+    def __call__(self, text: str) -> None:
+        here = f"{self.done} of {self.total} {self.parts}; " if self.total > 1 else ""
+        self.report(text if text.startswith("warning:") else f"{here}{text}")
 
 
 class Step(NamedTuple):
