@@ -534,6 +534,27 @@ def test_what_is_counted_one_by_one_says_what_is_left(
     assert "3 of 3 speeds\n" in shown
 
 
+def test_a_part_is_told_with_what_is_left_of_the_whole(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
+) -> None:
+    """Its steps are lines, its counts are not; a warning stands for itself."""
+    from microslip import progress
+
+    clock = [0.0]
+    monkeypatch.setattr(progress.time, "perf_counter", lambda: clock[0])
+    with progress.progress("modes box") as report:
+        whole = progress.Whole(report, 4, "speeds")
+        for part in range(4):
+            whole("eigenmodes")
+            whole(f"{part} of 80 vectors")
+            clock[0] += 3.0
+            whole.done += 1
+        whole("warning: odd")
+    lines = [line.split(" s  ", 1)[-1] for line in said(capsys)[1].splitlines()[1:]]
+    left = ["", ", about 9 s left", ", about 6 s left", ", about 3 s left"]
+    assert [*(f"{n} of 4 speeds | eigenmodes{left[n]}" for n in range(4)), "warning: odd"] == lines[:4] + lines[-1:]
+
+
 @pytest.fixture
 def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))

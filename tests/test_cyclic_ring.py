@@ -609,7 +609,7 @@ def test_what_is_left_is_that_of_all_speeds_and_nodal_diameters() -> None:
     own = sector_of_tests.settings(6).model_dump(exclude_unset=True)
     own["rotation"] |= {"speeds_rpm": [0.0, 600.0]}
     modal_basis(sector_of_tests.mesh(divisions=(2, 1, 1)), BodySettings.model_validate(own), report=told.append)
-    counted = [text for text in told if "nodal diameters at all speeds; " in text]
+    counted = [text for text in told if "nodal diameters at all speeds | " in text]
     done = [int(text.split(" of 8 ")[0]) for text in counted]
     assert done == sorted(done) and {0, 1, 4, 5, 8} <= {*done} and counted[0].endswith("speed 1 of 2: 0 rpm")
     assert not [text for text in told[told.index(counted[0]) :] if text not in counted]

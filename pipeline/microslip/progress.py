@@ -133,7 +133,8 @@ def _lines(title: str) -> Iterator[Report]:
             if total is not None:
                 step = step.seen(total, done, now)
             present, counted = text, text if total is not None else ""
-            if total is None or now - last > SILENCE:
+            small = _fraction(text.rpartition(PART)[2])[0] is not None
+            if not small or now - last > SILENCE:
                 shown, seen = text, total is not None
                 line(f"{text}{_left(step, now, total, done)}")
 
@@ -183,6 +184,10 @@ def _bar(title: str) -> Iterator[Report]:
         finish()
 
 
+PART = " | "
+"""Between how much of the whole is done and what is said of a part."""
+
+
 @dataclass
 class Whole:
     """A `Report` of parts, which says before each text how many parts of the whole are done.
@@ -197,7 +202,7 @@ class Whole:
     done: int = 0
 
     def __call__(self, text: str) -> None:
-        here = f"{self.done} of {self.total} {self.parts}; " if self.total > 1 else ""
+        here = f"{self.done} of {self.total} {self.parts}{PART}" if self.total > 1 else ""
         self.report(text if text.startswith("warning:") else f"{here}{text}")
 
 
