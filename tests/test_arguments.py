@@ -3,6 +3,7 @@ and names the argument."""
 
 from __future__ import annotations
 
+import inspect
 import math
 import re
 import warnings
@@ -289,3 +290,56 @@ def test_sentences_speak_in_the_unit_that_is_asked_for() -> None:
         said += [rising.run_up, *(str(w.message) for w in warned)]
     assert len([one for one in said if "rad/s" in one]) >= 5 and not [one for one in said if "Hz" in one]
     assert "0.0477465 Hz" in ms.run_up(undamped, 0.3 / (2 * np.pi), 0.5, 5.0, samples=32).run_up
+
+
+@pytest.mark.parametrize("function", [f for f, *_ in CALLS], ids=lambda f: f.__name__)
+def test_what_is_missing_is_named_after_what_is_wrong(function) -> None:
+    """One sentence names all that has no default, and another what is given and wrong; both are of the function."""
+    wanted = [p.name for p in inspect.signature(function).parameters.values()
+              if p.default is p.empty and p.kind is not p.VAR_KEYWORD]  # fmt: skip
+    if not wanted:
+        return
+    with pytest.raises(UserError) as caught:
+        function()
+    assert str(caught.value).startswith(f"{function.__name__}: ") and "missing" in str(caught.value)
+    assert all(re.search(rf"\b{name}\b", str(caught.value)) for name in wanted)
+
+
+def test_a_wrong_value_is_told_though_others_are_missing() -> None:
+    for call, said in (
+        (
+            lambda: ms.ellipses(A=-1),
+            ["ellipses: A: must be greater than 0", "B, force, modulus: are missing"],
+        ),
+        (lambda: ms.fastsim(mu=-0.3), ["'mu'", "friction"]),
+        (lambda: ms.Dynamics(rate, 1.0), ["Dynamics: labels: ", "Dynamics: scale: is missing; give it"]),
+        (lambda: ms.Track(radius=-1.0), ["Track: radius: must be greater than 0", "wheel, rail, wheel_at"]),
+        (lambda: ms.stop(1.0, 2.0, 3.0, 4.0, False, "x", 0.0, 1.0), ["stop: ", "positional"]),
+    ):
+        with pytest.raises(UserError) as caught:
+            call()
+        assert all(one in str(caught.value) for one in said), str(caught.value)
+
+
+def test_matrices_of_other_kinds_say_what_makes_them_fit() -> None:
+    for call, said in (
+        (
+            lambda: ms.structure(sp.eye(2, format="csr"), np.eye(2)),
+            "M: is a sparse matrix and must be an array, .toarray()",
+        ),
+        (lambda: ms.structure(np.eye(2), np.eye(2) * (1 + 0j)), "K: is complex and must be real, as its .real is"),
+        (lambda: ms.structure(1.0, 1.0 + 0.1j), "K: is complex and must be real; "),
+    ):
+        with pytest.raises(UserError, match=re.escape(said)):
+            call()
+
+
+def test_a_slider_that_holds_nothing_is_no_slider() -> None:
+    """Nor is one refused for a length that nobody gave: far from 1 N and 1 N/m it has one."""
+    free = ms.structure(1.0, 1.0, 0.1, force={0: 1.0})
+    loose = ms.structure(1.0, 1.0, 0.1, force={0: 1.0}, elements=[ms.jenkins(1.0, 0.0)])
+    found = [ms.harmonic_response(one, [0.1, 0.2]) for one in (free, loose)]
+    np.testing.assert_allclose(found[1].amplitude, found[0].amplitude, rtol=1e-9)
+    assert found[1].converged.all()
+    for stiffness, limit in ((1e-20, 1e20), (1e20, 1e-20)):
+        ms.jenkins(stiffness, limit)

@@ -18,6 +18,7 @@ import pytest
 from processes import run
 
 from microslip.basis.integrals import cell_volumes
+from microslip.cli import main
 from microslip.mesh import mesh_problems, read_mesh
 from microslip.stages import importing
 
@@ -380,6 +381,33 @@ def test_rule_without_surface(parts: Path, tmp_path: Path, rule: dict) -> None:
     faces = [{"name": "clamp", **rule}]
     words = ["'clamp'", next(iter(rule)), "10 surfaces", "microslip info"]
     refused(parts / "painted.step", tmp_path / "a.msh", *words, faces=faces, size=8)
+
+
+@pytest.mark.parametrize(
+    ("lines", "said"),
+    [
+        ("def draw(parameters):\n    pass\n\n\nrun(draw)\n", ["build.py, line 5: draw", "draw(parameters, mesh)"]),
+        (
+            "def draw(parameters, mesh):\n    open('blade.csv')\n\n\nrun(draw)\n",
+            ["build.py, line 6: blade.csv: No such file", "Path(__file__).parent / "],
+        ),
+        ("def draw(parameters, mesh):\n    return 1 / 0\n\n\nrun(draw)\n", ["build.py, line 6: ZeroDivisionError"]),
+        ("import numpyy\n", ["build.py, line 5: ModuleNotFoundError: No module named 'numpyy'"]),
+        ("def draw(parameters, mesh)\n", ["build.py, line 5: SyntaxError: expected ':'"]),
+    ],
+)
+def test_what_fails_in_a_build_file_is_told_with_its_line(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], lines: str, said: list[str]
+) -> None:
+    """File, line and what is expected, and no traceback."""
+    (tmp_path / "build.py").write_text(f'"""A body."""\n\nfrom microslip.cad import run\n\n{lines}')
+    (tmp_path / "body.toml").write_text(
+        'name = "box"\nlength_unit = "mm"\n[geometry]\nbuild = "build.py"\n[mesh]\nsize = 20.0\n'
+        "[material]\ndensity = 7850.0\nyoung = 2.1e11\npoisson = 0.3\n"
+    )
+    assert main(["mesh", str(tmp_path), "-q"]) == 2
+    told = capsys.readouterr().err
+    assert all(one in told for one in ["body.toml", *said]) and "Traceback" not in told, told
 
 
 def test_unwritable(parts: Path, tmp_path: Path) -> None:

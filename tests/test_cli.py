@@ -22,6 +22,7 @@ from refusals import refused_command
 from microslip.basis import read_basis, write_basis
 from microslip.case import CaseResult, run_case
 from microslip.cli import app, main
+from microslip.errors import UserError
 
 ROOT = Path(__file__).resolve().parents[1]
 POSIX = pytest.mark.skipif(os.name != "posix", reason="signals of POSIX systems")
@@ -504,6 +505,52 @@ def test_progress_in_a_log_shows_small_steps_only_after_silence(
     assert "eigenmodes" in shown and "8 of 80" in shown and "4 of 80" not in shown
 
 
+def test_what_is_counted_one_by_one_says_what_is_left(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
+) -> None:
+    """At the speed since the first, in which programs are compiled; other lines between do not stop the clock, and
+    a run that goes on counts from where it does."""
+    from microslip import progress
+
+    clock = [0.0]
+    monkeypatch.setattr(progress.time, "perf_counter", lambda: clock[0])
+    monkeypatch.setattr(progress, "SILENCE", 0.0)
+    with progress.progress("orbit box") as report:
+        for at, text in (
+            (1.0, "400 of 500 periods"), (61.0, "401 of 500 periods"), (62.0, "402 of 500 periods"),
+            (62.5, "a line"), (63.0, "403 of 500 periods"), (70.0, "1 of 3 speeds"), (80.0, "2 of 3 speeds"),
+        ):  # fmt: skip
+            clock[0] = at
+            report(text)
+        clock[0] = 90.0
+        report("3 of 3 speeds")
+    shown = said(capsys)[1]
+    assert "402 of 500 periods, about 98 s left" in shown and "403 of 500 periods, about 97 s left" in shown
+    assert "401 of 500 periods\n" in shown and "2 of 3 speeds, about 10 s left" in shown
+    assert "3 of 3 speeds\n" in shown
+
+
+def test_a_part_is_told_with_what_is_left_of_the_whole(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
+) -> None:
+    """Its steps are lines, its counts are not; a warning stands for itself."""
+    from microslip import progress
+
+    clock = [0.0]
+    monkeypatch.setattr(progress.time, "perf_counter", lambda: clock[0])
+    with progress.progress("modes box") as report:
+        whole = progress.Whole(report, 4, "speeds")
+        for part in range(4):
+            whole("eigenmodes")
+            whole(f"{part} of 80 vectors")
+            clock[0] += 3.0
+            whole.done += 1
+        whole("warning: odd")
+    lines = [line.split(" s  ", 1)[-1] for line in said(capsys)[1].splitlines()[1:]]
+    left = ["", ", about 9 s left", ", about 6 s left", ", about 3 s left"]
+    assert [*(f"{n} of 4 speeds | eigenmodes{left[n]}" for n in range(4)), "warning: odd"] == lines[:4] + lines[-1:]
+
+
 @pytest.fixture
 def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
@@ -538,6 +585,66 @@ def test_a_run_says_what_it_will_do_and_how_long_it_took_here(
     assert " s" not in first("mesh box").replace("mesh", "")
     cache.write_text("damaged")
     assert "not timed on this machine yet" in first("run box")
+
+
+def ring_with_case(folder: Path) -> None:
+    """A body of a sector, and a case beside it."""
+    (folder / "ring").mkdir()
+    (folder / "ring" / "body.toml").write_text(
+        'name = "ring"\n[geometry]\nbuild = "build.py"\n[cyclic]\nsectors = 24\n'
+        "[rotation]\nspeeds_rpm = [0.0, 2250.0, 4500.0]\n"
+    )
+    (folder / "ring" / "case.toml").write_text('body = "ring"\n[sweep]\npoints = 200\nnormal_forces = [1.0, 2.0]\n')
+
+
+def test_a_time_is_said_by_how_much_is_asked_for(
+    cache: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Speeds, nodal diameters, mesh, points and forces count, and how fast this machine was with others."""
+    from microslip import progress
+    from microslip.settings.amount import START, expected
+
+    monkeypatch.chdir(cache.parent.parent)
+    cache.parent.mkdir()
+    ring_with_case(Path())
+    one, many = (expected(["modes", "ring", *s]) for s in (["--set", "rotation.speeds_rpm=[0]"], []))
+    assert many - START == pytest.approx(3 * (one - START)) and many > 120
+    alone = expected(["modes", "ring", "--set=cyclic.nodal_diameters=[2]", "--set", "rotation.speeds_rpm=[0]"])
+    assert one - START == pytest.approx(13 * (alone - START))
+    Path("meshes").mkdir()
+    Path("meshes/ring.msh").write_bytes(bytes(6_000_000))
+    assert expected(["modes", "ring"]) - START == pytest.approx(2 * (many - START)), "twice as large as is supposed"
+    respond = expected(["respond", "ring"])
+    assert expected(["run", "ring"]) == pytest.approx(respond + expected(["modes", "ring"]))
+    less = expected(["respond", "ring", "--set", "sweep.points=8"])
+    assert less - START == pytest.approx((respond - START) * 8 / 200)
+    with pytest.raises(UserError, match="there is no body or case here or of this name"):
+        expected(["run", "nonesuch"])
+
+    assert many == pytest.approx(209, abs=1), "which is what the next lines say"
+    first = "not timed on this machine yet, such runs take 104 s to 7 min"
+    assert progress.planned("modes ring", many).endswith(first)
+    progress.keep("modes other", 60.0, 20.0)  # a slow machine
+    slow = "5 min to 21 min, by others on this machine"
+    assert progress.planned("modes ring", many).endswith(slow)
+    progress.keep("respond ring", 80.0, 10.0)
+    assert progress.planned("respond ring", 10.0).endswith("at most about 80 s, as before")
+    assert progress.planned("respond ring", 5.0).endswith("at most about 40 s, by what it took for another amount")
+    assert progress.planned("modes ring", many).endswith(slow), "those of the same verb tell most"
+
+
+def test_nothing_is_promised_of_what_is_not_there(
+    cache: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    from microslip import progress
+    from microslip.settings.amount import expected
+
+    monkeypatch.setattr(progress, "LOADING", 0.01)
+    blade = str(Path(__file__).parents[1] / "geometry" / "blade")
+    for words, said_first in ((["run", "nonesuch"], False), (["mesh", "nonesuch"], False), (["mesh", blade], True)):
+        with progress.announced(words, expected):
+            time.sleep(0.3)
+        assert bool(said(capsys)[1]) == said_first
 
 
 def test_what_will_be_done_is_said_before_what_does_it_is_loaded(

@@ -14,6 +14,7 @@ import pytest
 import rings
 import scipy.linalg
 import scipy.sparse as sp
+import sector as sector_of_tests
 from meshes import body, moved, nearest, rotation_matrix, with_sets
 from refusals import refused
 
@@ -23,6 +24,7 @@ from microslip.mesh import boundary_facets
 from microslip.modal.compute import modal_basis
 from microslip.modal.rows import patch
 from microslip.modal.stress import gauss_set, nodal_set
+from microslip.settings.body import BodySettings
 
 SPEED = 600.0  # rad/s; the equilibrium moves by 1 mm, frequencies by up to a tenth
 RPM = SPEED * 30 / np.pi
@@ -586,3 +588,16 @@ def test_reductions_keep_the_coupling_of_closed_shrouds(method):
         static = reduced.groups[key].compliance
         assert abs(static.residual[:3, :3]).max() < 1e-8 * abs(static.static[:3, :3]).max()
         np.testing.assert_allclose(reduced.groups[key].frequency[:2], g.frequency[:2], rtol=1e-3)
+
+
+def test_what_is_left_is_that_of_all_speeds_and_nodal_diameters() -> None:
+    """Whatever is said of a part begins with how much of the whole is done, which never falls."""
+    told: list[str] = []
+    own = sector_of_tests.settings(6).model_dump(exclude_unset=True)
+    own["rotation"] |= {"speeds_rpm": [0.0, 600.0]}
+    modal_basis(sector_of_tests.mesh(divisions=(2, 1, 1)), BodySettings.model_validate(own), report=told.append)
+    counted = [text for text in told if "nodal diameters at all speeds | " in text]
+    done = [int(text.split(" of 8 ")[0]) for text in counted]
+    assert done == sorted(done) and {0, 1, 4, 5, 8} <= {*done} and counted[0].endswith("speed 1 of 2: 0 rpm")
+    assert not [text for text in told[told.index(counted[0]) :] if text not in counted]
+    assert any(text.startswith("5 of 8 ") and text.endswith("eigenmodes: nodal diameter 1") for text in counted)

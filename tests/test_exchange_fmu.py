@@ -42,7 +42,7 @@ CALLBACKS = type("Callbacks", (ctypes.Structure,), {"_fields_": [(n, ctypes.c_vo
 class Master:
     """One instance of a unit through its C functions, with the names and references of its description."""
 
-    def __init__(self, path: Path, folder: Path) -> None:
+    def __init__(self, path: Path, folder: Path, logger: object = None) -> None:
         if not folder.exists():  # a library that is loaded must not be written again
             with zipfile.ZipFile(path) as archive:
                 archive.extractall(folder)
@@ -56,7 +56,8 @@ class Master:
         make.argtypes = [ctypes.c_char_p, ctypes.c_int, *[ctypes.c_char_p] * 2, ctypes.c_void_p, *[ctypes.c_int] * 2]
         guid = root.get("guid", "").encode()
         assert make(b"body", 1, b"another", b"", None, 0, 0) is None
-        self.one = make(b"body", 1, guid, b"", ctypes.byref(CALLBACKS()), 0, 0)
+        calls = CALLBACKS(ctypes.cast(logger, ctypes.c_void_p) if logger else None)
+        self.one = make(b"body", 1, guid, b"", ctypes.byref(calls), 0, 0)
         assert self.one
         self.modes = sum(n.startswith("modal.q[") for n in self.at)
 
@@ -317,6 +318,18 @@ def test_what_cannot_be_is_an_error_of_the_unit(run: Callable[[ModalBasis], Mast
 
 
 @LINUX
+def test_a_logger_that_does_not_format_gets_the_whole_sentence(tmp_path: Path) -> None:
+    said: list[str] = []
+    logger = ctypes.CFUNCTYPE(None, *[ctypes.c_void_p, ctypes.c_char_p, ctypes.c_int, *[ctypes.c_char_p] * 2])(
+        lambda *words: said.append(words[-1].decode())
+    )
+    writer("fmu")(plain(), tmp_path / "b.fmu")
+    one = Master(tmp_path / "b.fmu", tmp_path / "b", logger)
+    one.call("GetInteger", (ctypes.c_uint * 1)(), ctypes.c_size_t(1), (ctypes.c_int * 1)(), returns=3)
+    assert said == ["every variable is a real one"]
+
+
+@LINUX
 def test_no_number_that_is_not_finite_enters_the_unit_by_any_door(run: Callable[[ModalBasis], Master]) -> None:
     """Nor does a force beyond all numbers leave one: the state stays what it was, and goes on."""
     one = run(plain())
@@ -333,6 +346,10 @@ def test_no_number_that_is_not_finite_enters_the_unit_by_any_door(run: Callable[
         one.call("SetTime", ctypes.c_double(bad), returns=3)
         one.call("SetupExperiment", 0, ctypes.c_double(0.0), ctypes.c_double(bad), 0, ctypes.c_double(1.0), returns=3)
         one.call("DoStep", ctypes.c_double(bad), ctypes.c_double(1e-4), 0, returns=3)
+        for known, tolerance, ends, stop in ((1, bad, 0, 1.0), (1, 1e-6, 1, bad)):
+            words = known, ctypes.c_double(tolerance), ctypes.c_double(0.0), ends, ctypes.c_double(stop)
+            one.call("SetupExperiment", *words, returns=3)
+        one.call("SetupExperiment", 0, ctypes.c_double(bad), ctypes.c_double(0.0), 0, ctypes.c_double(bad))
     assert np.array_equal(before, one.get("modal.q[1]", "modal.v[1]", force))
     one.set({force: 1e308})
     one.call("DoStep", ctypes.c_double(1e-4), ctypes.c_double(0.1), 0, returns=3)

@@ -765,7 +765,7 @@ def test_a_run_that_is_ended_goes_on_with_the_same_bits(
 
     def killing(text: str) -> None:
         seen.append(text)
-        if text.startswith(f"second: period {at} "):
+        if text.startswith(f"{at} of 30 periods, ") and text.endswith(", second"):
             raise Killed
 
     with pytest.raises(Killed):
@@ -773,8 +773,12 @@ def test_a_run_that_is_ended_goes_on_with_the_same_bits(
     assert not (tmp_path / "orbit.h5").exists()
     told: list[str] = []
     found = recorded.run(tmp_path / "orbit.h5", asked, report=told.append)
-    assert not any(text.startswith("first") or f"period {at} " in text for text in told)
-    whole = orbit.run(e, 16, 14, 64, 1024)
+    assert not any(text.endswith("first") or text.startswith(f"{at} of ") for text in told)
+    periods: list[str] = []
+    whole = orbit.run(e, 16, 14, 64, 1024, report=periods.append)
+    assert [text for text in told if text.startswith("30 of")] in ([], [f"{periods[-1]}, second"]), (
+        "events are counted on"
+    )
     for one in found:
         same(whole, one)
     assert [p.name for p in tmp_path.iterdir()] == ["orbit.h5"] and ms.read_orbits(tmp_path / "orbit.h5")[1].error > 0
@@ -859,7 +863,7 @@ def test_a_killed_process_leaves_what_the_next_one_goes_on_with(tmp_path: Path) 
         with subprocess.Popen(words, stdout=subprocess.PIPE, text=True) as process:
             assert process.stdout is not None
             assert ("goes on from" in next(process.stdout)) == (period > 100)
-            assert any(f"period {period} " in text for text in process.stdout)
+            assert any(text.startswith(f"{period} of ") for text in process.stdout)
             process.kill()
         assert not (tmp_path / "orbit.h5").exists()
     e, told = equations.of(system("slider")[0], 0.8), list[str]()

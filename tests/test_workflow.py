@@ -220,7 +220,7 @@ def test_a_case_finds_its_body_wherever_it_is_run(tmp_path: Path) -> None:
     [
         ("import sys; sys.exit('the wall is thicker than the pipe')", ("meshing failed", "thicker")),
         ("import sys; print('wall = 9 is too much', file=sys.stderr); sys.exit(2)", "body.toml: wall = 9 is too much"),
-        ("raise ValueError('odd')", ("meshing failed", "ValueError: odd")),
+        ("raise ValueError('odd')", "body.toml: build.py, line 1: ValueError: odd; correct it"),
         ("import os, signal; os.kill(os.getpid(), signal.SIGSEGV)", "signal 11"),
         ("", ("meshing failed", "no message")),
         ("raise ModuleNotFoundError(\"No module named 'gmsh'\")", "microslip[fem]"),

@@ -989,12 +989,19 @@ def _warn(warnings: list[str]) -> None:
         print(f"warning: {warning}", file=sys.stderr)
 
 
+def _expected(words: Sequence[str]) -> float | None:
+    """See `settings.amount`, which is not loaded at once: it loads numpy."""
+    from .settings.amount import expected
+
+    return expected(words)
+
+
 def main(words: list[str] | None = None) -> int:
     """Run the command line and return the exit code: 0, 1, 2 or 130, see the top of this file."""
     _plain_where_needed()
     logging.getLogger("matplotlib").setLevel(logging.ERROR)  # it warns of a home without a place for its fonts
     try:
-        with announced(sys.argv[1:] if words is None else words):
+        with announced(sys.argv[1:] if words is None else words, _expected):
             app(words, exit_on_error=False, print_error=False, result_action="return_value")
         sys.stdout.flush()
         return 0

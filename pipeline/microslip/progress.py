@@ -5,14 +5,17 @@ from __future__ import annotations
 import contextlib
 import json
 import os
+import statistics
 import sys
 import tempfile
 import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
+from .errors import UserError
 from .interrupts import look
 
 Report = Callable[[str], None]
@@ -35,27 +38,47 @@ def progress(title: str, quiet: bool = False) -> Iterator[Report]:
         _say_first(title, typed)
         with (_bar if sys.stderr.isatty() else _lines)(title) as report:
             yield report
-    keep(typed, time.perf_counter() - began)
+    keep(typed, time.perf_counter() - began, _asked())
 
 
 LOADING = 1.0
 """s after which what will be done is said, though what does it is still being loaded."""
 
+Expected = Callable[[Sequence[str]], float | None]
+"""s that what some words ask for takes on the core of `PLANS`, None where that is not known; a `UserError` where there
+is nothing of it."""
+
+WRONG = (UserError, OSError, ValueError, ArithmeticError)
+"""In what is asked for: who does it tells what."""
+
 _typed, _first = "", threading.Lock()
+_asked: Callable[[], float | None] = lambda: None  # noqa: E731
 _told_first = False
 
 
 @contextlib.contextmanager
-def announced(words: Sequence[str]) -> Iterator[None]:
+def announced(words: Sequence[str], expected: Expected = lambda _: None) -> Iterator[None]:
     """While the command line does what these words say: `progress` says first what will be done, or, where that takes
-    longer than `LOADING`, it is said before."""
-    global _typed, _told_first
+    longer than `LOADING`, it is said before, unless there is nothing of it."""
+    global _typed, _told_first, _asked
     verb, *others = [word for word in words if not word.startswith("-")][:2] or [""]
     title, over = " ".join([verb, *others]), any(word.split("=")[0] == "--over" for word in words)
     if verb == "respond" and over:  # another work, which takes another time
         verb = "respond--over"
     _typed, _told_first = " ".join([verb, *others]), False
-    timer = threading.Timer(LOADING, _say_first, (title, _typed))
+
+    def asked() -> float | None:
+        with contextlib.suppress(*WRONG):
+            return expected(words)
+        return None
+
+    def early() -> None:
+        with contextlib.suppress(*WRONG):
+            expected(words)
+            _say_first(title, _typed)
+
+    _asked = asked
+    timer = threading.Timer(LOADING, early)
     timer.daemon = True
     if verb in PLANS and others and not {"-q", "--quiet", "-h", "--help"} & set(words):
         timer.start()
@@ -63,7 +86,7 @@ def announced(words: Sequence[str]) -> Iterator[None]:
         yield
     finally:
         timer.cancel()
-        _typed = ""
+        _typed, _asked = "", lambda: None
 
 
 def _say_first(title: str, typed: str) -> None:
@@ -71,7 +94,7 @@ def _say_first(title: str, typed: str) -> None:
     global _told_first
     with _first:
         if not (_typed and _told_first):
-            plan = planned(typed)
+            plan = planned(typed, _asked())
             print(f"{title}{': ' * bool(plan)}{plan}", file=sys.stderr, flush=True)
         _told_first = True
 
@@ -83,7 +106,7 @@ SILENCE, BEAT = 5.0, 15.0
 @contextlib.contextmanager
 def _lines(title: str) -> Iterator[Report]:
     began = last = time.perf_counter()
-    step = (0.0, began)  # how many were done when it was first told, and when
+    step = Step(0.0, 0.0, began, True)
     present, counted, shown, seen = title, "", "", False
     ended, lock = threading.Event(), threading.Lock()
 
@@ -107,10 +130,11 @@ def _lines(title: str) -> Iterator[Report]:
                 close()
                 counted, seen = "", False
             now = time.perf_counter()
-            if total is None or done <= step[0] + 1:
-                step = done, now
+            if total is not None:
+                step = step.seen(total, done, now)
             present, counted = text, text if total is not None else ""
-            if total is None or now - last > SILENCE:
+            small = _fraction(text.rpartition(PART)[2])[0] is not None
+            if not small or now - last > SILENCE:
                 shown, seen = text, total is not None
                 line(f"{text}{_left(step, now, total, done)}")
 
@@ -160,12 +184,54 @@ def _bar(title: str) -> Iterator[Report]:
         finish()
 
 
-def _left(step: tuple[float, float], now: float, total: float | None, done: float) -> str:
+PART = " | "
+"""Between how much of the whole is done and what is said of a part."""
+
+
+@dataclass
+class Whole:
+    """A `Report` of parts, which says before each text how many parts of the whole are done.
+
+    Attributes:
+        report: is told. total: number of parts. parts: what they are.
+    """
+
+    report: Report
+    total: int
+    parts: str
+    done: int = 0
+
+    def __call__(self, text: str) -> None:
+        here = f"{self.done} of {self.total} {self.parts}{PART}" if self.total > 1 else ""
+        self.report(text if text.startswith("warning:") else f"{here}{text}")
+
+
+class Step(NamedTuple):
+    """Something that is counted: of how many, the count from which on it is timed, when (s) that was, and whether that
+    is the first one; of many the time of the first is left out, in which programs are compiled."""
+
+    total: float
+    first: float
+    began: float
+    warm: bool
+
+    def seen(self, total: float, done: float, now: float) -> Step:
+        """The same, or what another total, or fewer of it, begin."""
+        if total != self.total or done < self.first:
+            return Step(total, done, now, total <= MANY)
+        if done > self.first and not self.warm:
+            return Step(total, done, now, True)
+        return self
+
+
+MANY = 10
+
+
+def _left(step: Step, now: float, total: float | None, done: float) -> str:
     """The time that is left of a step at the speed it had so far, in words; nothing where that is not known."""
-    first, began = step
-    if total is None or done <= first:
+    if total is None or not step.first < done < total:
         return ""
-    return f", about {_duration((now - began) * (total - done) / (done - first))} left"
+    return f", about {_duration((now - step.began) * (total - done) / (done - step.first))} left"
 
 
 def _fraction(text: str) -> tuple[float | None, float]:
@@ -178,7 +244,7 @@ def _fraction(text: str) -> tuple[float | None, float]:
 
 # how long it takes here ----------------------------------------------------------------------------------------------
 
-PLANS = {
+PLANS: dict[str, tuple[str, float, float]] = {
     "run": ("mesh, modal file, what the case asks for, pictures and page, each where it is not up to date", 30, 300),
     "mesh": ("the mesh, if it is not up to date", 1, 30),
     "modes": ("mesh, assembly, eigenmodes, rows and stresses, each if it is not up to date", 5, 120),
@@ -217,28 +283,49 @@ RUNS, TITLES = 5, 300
 """That are kept, of each and in all."""
 
 
-def planned(title: str) -> str:
-    """What will be done, and about how long it takes: as runs of the same took on this machine, or
-    as long as such runs take, those of what has its name in another folder with them; "" where that
-    is soon."""
+def planned(title: str, expected: float | None = None) -> str:
+    """What will be done, and about how long it takes: as runs of the same took on this machine, for as much as is asked
+    now; or as `expected`, or else as such runs take, at the speed of this machine, those of what has its name in
+    another folder with them; "" where that is soon.
+
+    Args:
+        expected: s on the core of `PLANS`; None: not known.
+    """
     known, place = _durations(), _key(title)
     words, low, high = PLANS.get(title.split()[0], ("", SHORT, 300))
     if took := known.get(place):
-        return f"{words}{'; ' * bool(words)}at most about {_duration(max(took))}, as before" * (max(took) > SHORT)
-    if took := [s for key, more in known.items() if _named(key) == _named(place) for s in more]:
-        usual = f"{_duration(min(low, *took))} to {_duration(max(high, *took))}"
-        elsewhere = f"one of that name in another folder took {_duration(max(took))}"
-        return f"{words}{'; ' * bool(words)}{usual}; {elsewhere}"
-    usual = f"not timed on this machine yet, such runs take {_duration(low)} to {_duration(high)}"
+        shares = [expected / then if expected and then else 1.0 for _, then in took]
+        longest = max(s * share for (s, _), share in zip(took, shares, strict=True))
+        source = "as before" if max(shares) == min(shares) == 1 else "by what it took for another amount"
+        return f"{words}{'; ' * bool(words)}at most about {_duration(longest)}, {source}" * (longest > SHORT)
+    speed = _speed(known, title.split()[0])
+    usually = (expected / 2, 2 * expected) if expected else (low, high)
+    low, high = (bound * (speed or 1.0) for bound in usually)
+    if took := [one for key, more in known.items() if _named(key) == _named(place) for one in more]:
+        own = [s for s, _ in took]
+        usual = f"{_duration(min(low, *own))} to {_duration(max(high, *own))}"
+        return f"{words}{'; ' * bool(words)}{usual}; one of that name in another folder took {_duration(max(own))}"
+    source = "by others on this machine" if speed else "not timed on this machine yet, such runs take"
+    usual = f"{_duration(low)} to {_duration(high)}"
+    usual = f"{usual}, {source}" if speed else f"{source} {usual}"
     return f"{words}{'; ' * bool(words)}{usual}" * (high > SHORT)
 
 
-def keep(title: str, seconds: float) -> None:
-    """How long a run took, for the next one; where there is no place to write to, nothing is kept."""
+def _speed(known: Durations, verb: str) -> float | None:
+    """Of this machine, how many times longer runs took than was expected of them: those of the same verb, or all; None
+    where none is known."""
+    took = [(key.split()[0], s / expected) for key, more in known.items() for s, expected in more if expected]
+    ratios = [ratio for of, ratio in took if of == verb] or [ratio for _, ratio in took]
+    return statistics.median(ratios) if ratios else None
+
+
+def keep(title: str, seconds: float, expected: float | None = None) -> None:
+    """How long a run took, and was expected to, for the next one; where there is no place to write to, nothing is
+    kept."""
     if seconds < WORTH or (place := _place()) is None:
         return
     known, key = _durations(), _key(title)
-    took = [*known.pop(key, []), round(seconds, 1)][-RUNS:]
+    took = [*known.pop(key, []), (round(seconds, 1), expected and round(expected, 2))][-RUNS:]
     with contextlib.suppress(OSError):
         place.parent.mkdir(parents=True, exist_ok=True)
         handle, name = tempfile.mkstemp(dir=place.parent, prefix=".durations.")
@@ -269,13 +356,22 @@ def _place() -> Path | None:
     return None
 
 
-def _durations() -> dict[str, list[float]]:
-    """Title and folder -> s that its last runs took; nothing of what is no such file."""
+Durations = dict[str, list[tuple[float, float | None]]]
+
+
+def _durations() -> Durations:
+    """Title and folder -> s that its last runs took, and were expected to; nothing of what is no such file."""
     try:
         found: Any = json.loads((_place() or Path(os.devnull)).read_text(encoding="utf-8"))
-        return {str(k): [float(s) for s in v] for k, v in found.items() if v}
+        return {str(k): [_took(one) for one in v] for k, v in found.items() if v}
     except (OSError, ValueError, TypeError, AttributeError):
         return {}
+
+
+def _took(one: Any) -> tuple[float, float | None]:
+    """Of a file, of an older version too, which told how long a run took alone."""
+    seconds, expected = one if isinstance(one, list) else (one, None)
+    return float(seconds), float(expected) if expected else None
 
 
 def _duration(seconds: float) -> str:

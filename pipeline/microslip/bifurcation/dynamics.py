@@ -15,7 +15,7 @@ from pydantic import Field
 from ..data import Array
 from ..errors import UserError
 from ..process import prepare
-from ..settings.arguments import check_fields, numbers
+from ..settings.arguments import checked_fields, numbers
 from ..settings.numbers import Positive
 from ..units import Quantity
 
@@ -23,6 +23,7 @@ Rate = Callable[[Any, Any, Any], Any]
 """f of x (n,), the parameter p and the angle (rad) of what drives it, in jax: (n,)."""
 
 
+@checked_fields
 @dataclass(frozen=True, eq=False)
 class Dynamics:
     """A system x' = f(x, p, angle).
@@ -47,7 +48,6 @@ class Dynamics:
     bends: Annotated[Any, numbers(2)] | None = None
 
     def __post_init__(self) -> None:
-        check_fields(self)
         if len(self.scale) != self.count:
             raise UserError(f"Dynamics: scale: has {len(self.scale)} numbers; there are {self.count} labels")
         if self.bends is not None and len(self.bends) != self.count:

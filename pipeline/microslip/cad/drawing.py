@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import inspect
 import json
 import math
 import os
@@ -11,6 +12,7 @@ import signal
 import sys
 import threading
 import tomllib
+import traceback
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
@@ -33,6 +35,14 @@ def run(draw: Callable[[dict[str, Any], dict[str, Any]], None]) -> None:
 
     def work() -> None:
         settings = read_settings(sys.argv[1])
+        try:
+            inspect.signature(draw).bind({}, {})
+        except TypeError:
+            line = f"{Path(draw.__code__.co_filename).name}, line {draw.__code__.co_firstlineno}"
+            raise UserError(
+                f"{line}: {draw.__name__}{inspect.signature(draw)} does not take two arguments; write "
+                f"{draw.__name__}(parameters, mesh), the tables [geometry.parameters] and [mesh]"
+            ) from None
         mesh = dict(settings.get("mesh", {}))
         draw(dict(settings.get("geometry", {}).get("parameters", {})), mesh)
         finish(mesh, sys.argv[2])
@@ -52,13 +62,29 @@ def guarded(work: Callable[[], None], source: str) -> None:
         work()
         print("".join(f"warning: {text}\n" for text in warnings), end="", file=sys.stderr)
     except Exception as error:  # gmsh raises plain Exception
-        known = isinstance(error, UserError | OSError) or type(error) is Exception
-        text = str(error) if known else f"{type(error).__name__}: {error}"
+        text = _told(error)
         prefix = "" if source.endswith(".json") else f"{Path(source).name}: "  # whoever wrote the .json names the body
         print(prefix + " ".join(text.split()), file=sys.stderr)
         sys.exit(2)
     finally:
         gmsh.finalize()
+
+
+def _told(error: Exception) -> str:
+    """What failed in a sentence, which begins with the line of the build file, or of a file beside it, that failed."""
+    if isinstance(error, UserError):
+        return str(error)
+    folder = Path(sys.argv[0]).resolve().parent
+    trace = traceback.extract_tb(error.__traceback__) if folder != Path(__file__).resolve().parent else []
+    lines = [
+        f"{Path(f.filename).name}, line {f.lineno}: " for f in trace if Path(f.filename).resolve().parent == folder
+    ]
+    at = lines[-1] if lines else ""
+    if isinstance(error, OSError) and error.filename and at:
+        begins = '; write Path(__file__).parent / "name" of a file beside the build file'
+        return f"{at}{error.filename}: {error.strerror}{begins * isinstance(error, FileNotFoundError)}"
+    known = isinstance(error, OSError) or type(error) is Exception
+    return at + (str(error) if known else f"{type(error).__name__}: {error}")
 
 
 def _audible(read: Callable[..., Any]) -> Callable[..., Any]:

@@ -22,7 +22,7 @@ import numpy as np
 import scipy.optimize
 
 from ..data import Array
-from ..settings.arguments import Count, check_fields
+from ..settings.arguments import Count, checked_fields
 from ..settings.numbers import NotNegative, Positive
 from .newton import Corrected, Equations, NewtonSettings, Scaled, correct, norm, tangent, unit
 
@@ -35,6 +35,7 @@ REACH = 2.0
 Kind = Literal["start", "regular", "fold", "branch point", "target", "bound"]
 
 
+@checked_fields
 @dataclass(frozen=True)
 class Settings:
     """How a curve is followed. Lengths are in scaled units, see `Equations`.
@@ -66,9 +67,6 @@ class Settings:
     branch_points: bool = True
     resolution: Positive = 1e-6
     newton: NewtonSettings = NewtonSettings(iterations=10, halvings=3, forced=2, last_resort=False)
-
-    def __post_init__(self) -> None:
-        check_fields(self)
 
 
 @dataclass(frozen=True)

@@ -181,7 +181,7 @@ def swept(
         balances.append(here)
         if found.status == CONVERGED:
             known.append(found.x)
-        report(f"point {i + 1} of {len(first)}, {hertz(one / (2 * np.pi))} and {hertz(found.second / (2 * np.pi))}")
+        report(f"{i + 1} of {len(first)} points, {hertz(one / (2 * np.pi))} and {hertz(found.second / (2 * np.pi))}")
     return of_points(points, balances)
 
 

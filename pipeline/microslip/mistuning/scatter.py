@@ -12,7 +12,7 @@ from scipy.special import ndtr
 
 from ..data import Array
 from ..errors import UserError
-from ..settings.arguments import Text, check_fields
+from ..settings.arguments import Text, checked_fields
 from ..settings.numbers import NotNegative, Number
 
 OF_BLADES = {
@@ -42,6 +42,7 @@ DISTRIBUTIONS = "normal", "lognormal", "uniform"
 ARRANGEMENTS = "given", "shuffled", "drawn"
 
 
+@checked_fields
 @dataclass(frozen=True)
 class Scatter:
     """One thing that differs from sector to sector of a ring.
@@ -70,7 +71,6 @@ class Scatter:
     neighbours: Annotated[float, Field(ge=-1, le=1)] = 0.0
 
     def __post_init__(self) -> None:
-        check_fields(self)
         known = {**OF_BLADES, **OF_CONTACTS}
         if self.of not in known:
             raise UserError(f"of: '{self.of}' is none of {', '.join(known)}")

@@ -15,6 +15,7 @@ from ..fem.discretise import REDUCED, discretise, whole
 from ..fem.operators import spin_projector
 from ..fem.tied import Tied, tied_upper
 from ..linalg import eigen
+from ..progress import Whole
 from ..settings.body import BodySettings
 from ..units import from_rpm
 from . import rigid
@@ -163,6 +164,8 @@ def _at_speeds(
     ends: dict[float, Mapping[int, Searched]] = {}
     state: StaticState | None = None
     before = 0.0
+    waves = 1 if b.sector is None else len(b.sector.harmonics)
+    report = Whole(report, len(speeds) * waves, "speeds" if waves == 1 else "nodal diameters at all speeds")
     for number, rpm in enumerate(speeds):
         speed = from_rpm(rpm)
         if len(speeds) > 1 or speed:
@@ -184,6 +187,7 @@ def _at_speeds(
         if end:
             ends[speed] = found
             found = {k: without_spares(s, settings.modes.count) for k, s in found.items()}
+        report.done = (number + 1) * waves
         made = _groups(b.model, settings, state, speed, b.rows, found, report)
         groups |= {(number, k): group for k, group in made.items()}
     return groups, settled, ends

@@ -26,6 +26,7 @@ from ..fem.cyclic import (
 from ..fem.discretise import Discretisation
 from ..linalg import eigen
 from ..linalg.condensed import Condensed, HarmonicSolver, as_complex, as_real, new_condensed
+from ..progress import Whole
 from ..settings.body import BodySettings
 from . import rigid
 from .body_rows import BodyRows
@@ -100,6 +101,8 @@ class Sector:
             own = rigid.of_nodal_diameter(motions, self.unknowns.cut.rotation, self.unknowns.cut.sectors, k)
             pencil, R, floating = floated(model, state, speed, pencil, unknowns, own)
             found.append(search(model, settings, pencil, unknowns, speed, R, rows, f"nodal diameter {k}", floating))
+            if isinstance(report, Whole):
+                report.done += 1
         if settings.modes.certify:
             report("certifying the spectra by the inertia count")
             found = certified(found)

@@ -16,11 +16,12 @@ from pydantic import Field
 
 from ..data import Array
 from ..errors import UserError
-from ..settings.arguments import check_fields, checked, numbers
+from ..settings.arguments import checked, checked_fields, numbers
 from ..settings.numbers import NotNegative, Positive
 from .arguments import NotNegatives, Reals, joined
 
 
+@checked_fields
 @dataclass(frozen=True)
 class Brush:
     """Attributes:
@@ -44,7 +45,6 @@ class Brush:
     under: Positive | None = None
 
     def __post_init__(self) -> None:
-        check_fields(self)
         if not abs(np.sum(self.share) - 1) < 1e-9:
             raise UserError(f"Brush: share: must have the sum 1, and has {np.sum(self.share):g}; correct it")
 

@@ -12,11 +12,12 @@ from numpy.typing import ArrayLike
 from ..contact.hertz import axis_ratio, ellipse_integrals
 from ..contact.solids import Solid, normal_modulus
 from ..data import Array
-from ..settings.arguments import check_fields, checked
+from ..settings.arguments import checked, checked_fields
 from ..settings.numbers import Positive
 from .arguments import NotNegatives, Poisson, Positives, joined
 
 
+@checked_fields
 @dataclass(frozen=True)
 class Elastic:
     """Both bodies as one. Attributes: modulus: E*, Pa. shear: G, Pa. poisson: nu."""
@@ -24,9 +25,6 @@ class Elastic:
     modulus: Positive
     shear: Positive
     poisson: Poisson
-
-    def __post_init__(self) -> None:
-        check_fields(self)
 
 
 def combined(first: Solid, second: Solid) -> Elastic:

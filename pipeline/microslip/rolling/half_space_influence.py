@@ -21,10 +21,11 @@ from scipy import fft
 from ..contact.solids import Solid
 from ..data import Array
 from ..errors import UserError
-from ..settings.arguments import Count, check_fields
+from ..settings.arguments import Count, checked_fields
 from ..settings.numbers import Component, Positive
 
 
+@checked_fields
 @dataclass(frozen=True)
 class Pair:
     """Two half-spaces as one: 1/G = (1/G1 + 1/G2)/2, nu/G = (nu1/G1 + nu2/G2)/2 (Kalker 1990, 1.6).
@@ -41,9 +42,6 @@ class Pair:
     poisson: Annotated[float, Field(gt=-1, le=0.5)]
     mismatch: Component = 0.0
 
-    def __post_init__(self) -> None:
-        check_fields(self)
-
     @staticmethod
     def of(first: Solid, second: Solid) -> Pair:
         """The pair of an upper and a lower body; one of them may be rigid."""
@@ -55,6 +53,7 @@ class Pair:
         return Pair(G, G * (nu1 * soft1 + nu2 * soft2) / 2, G * ((1 - 2 * nu1) * soft1 - (1 - 2 * nu2) * soft2) / 4)
 
 
+@checked_fields
 @dataclass(frozen=True)
 class Grid:
     """Rectangles of equal size; fields on it have shape (nx, ny), x along rolling.
@@ -72,9 +71,6 @@ class Grid:
     dy: Positive
     x0: Component = 0.0
     y0: Component = 0.0
-
-    def __post_init__(self) -> None:
-        check_fields(self)
 
     @staticmethod
     def around(a: float, b: float, nx: int, ny: int) -> Grid:

@@ -15,13 +15,14 @@ from scipy.special import erfc
 
 from ..data import Array
 from ..errors import UserError
-from ..settings.arguments import Rows, check_fields, checked
+from ..settings.arguments import Rows, checked, checked_fields
 from ..settings.numbers import NotNegative, Positive
 
 ITERATIONS = 200
 HISTORY = 6
 
 
+@checked_fields
 @dataclass(frozen=True)
 class Conductor:
     """What conducts the heat.
@@ -36,9 +37,6 @@ class Conductor:
     conductivity: Positive
     density: Positive
     heat_capacity: Positive
-
-    def __post_init__(self) -> None:
-        check_fields(self)
 
     @property
     def diffusivity(self) -> float:

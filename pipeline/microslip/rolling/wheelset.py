@@ -17,7 +17,7 @@ from scipy.optimize import brentq
 
 from ..data import Array
 from ..errors import UserError
-from ..settings.arguments import check_fields, checked
+from ..settings.arguments import checked, checked_fields
 from ..settings.numbers import Coefficient, Component, NotNegative, Positive
 from .arguments import Angle
 from .ellipse import Elastic, ellipses, half_width
@@ -25,6 +25,7 @@ from .profiles import Profile
 from .strips import creep_forces
 
 
+@checked_fields
 @dataclass(frozen=True)
 class Track:
     """Wheels on an axle and the rails below them.
@@ -42,10 +43,8 @@ class Track:
     rail_at: Positive
     elastic: Elastic
 
-    def __post_init__(self) -> None:
-        check_fields(self)
 
-
+@checked_fields
 @dataclass(frozen=True)
 class Pose:
     """Of a wheelset. Attributes: lateral: to the right, m. yaw: about z, roll: about x, rad. speed: m/s, forward.
@@ -56,9 +55,6 @@ class Pose:
     roll: Angle = 0.0
     speed: Positive = 1.0
     turning: NotNegative | None = None
-
-    def __post_init__(self) -> None:
-        check_fields(self)
 
     def mirrored(self) -> Pose:
         return replace(self, lateral=-self.lateral, yaw=-self.yaw, roll=-self.roll)

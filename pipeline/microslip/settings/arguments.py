@@ -16,11 +16,13 @@ from typing import Annotated, Any, Literal, ParamSpec, TypeVar, Union, get_args,
 import numpy as np
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, InstanceOf, create_model
 
+from ..errors import UserError
 from ..units import frequencies_in
 from .mistakes import unfit, validate
 
 P = ParamSpec("P")
 R = TypeVar("R")
+T = TypeVar("T")
 
 Count = Annotated[int, Field(ge=1)]
 Index = Annotated[int, Field(ge=0)]
@@ -79,10 +81,7 @@ def checked(function: Callable[P, R]) -> Callable[P, R]:
 
     @wraps(function)
     def call(*args: P.args, **kwargs: P.kwargs) -> R:
-        try:
-            given = signature.bind(*args, **kwargs)
-        except TypeError as error:
-            raise TypeError(f"{function.__name__}() {error}") from None
+        given = _bound(function, signature, args, kwargs)
         check(function, given.arguments)
         with frequencies_in(given.arguments.get("unit")):
             return function(*args, **kwargs)
@@ -90,9 +89,44 @@ def checked(function: Callable[P, R]) -> Callable[P, R]:
     return call
 
 
-def check_fields(made: Any) -> None:
-    """The same of what a dataclass is made from."""
-    check(type(made), vars(made))
+def checked_fields(of: type[T]) -> type[T]:
+    """The same of a dataclass and what it is made from."""
+    make, signature = of.__init__, inspect.signature(of)
+
+    @wraps(make)
+    def init(made: T, *args: Any, **kwargs: Any) -> None:
+        check(of, _bound(of, signature, args, kwargs).arguments)
+        make(made, *args, **kwargs)
+
+    of.__init__ = init  # type: ignore[method-assign, assignment]
+    return of
+
+
+def _bound(
+    of: Callable[..., Any], signature: inspect.Signature, args: tuple[Any, ...], kwargs: dict[str, Any]
+) -> inspect.BoundArguments:
+    """The arguments of a call by their names.
+
+    Raises:
+        UserError: one that there is not, or that is missing; what does not fit of those that are given is told too.
+    """
+    name, known = of.__name__, signature.parameters.values()
+    try:
+        given = signature.bind_partial(*args, **kwargs)
+    except TypeError as error:
+        raise UserError(f"{name}: {error}; it takes {', '.join(signature.parameters)}") from None
+    some = inspect.Parameter.VAR_POSITIONAL, inspect.Parameter.VAR_KEYWORD
+    if missing := [
+        p.name for p in known if p.default is p.empty and p.kind not in some and p.name not in given.arguments
+    ]:
+        one = len(missing) == 1
+        said = f"{name}: {', '.join(missing)}: {'is missing; give it' if one else 'are missing; give them'}"
+        try:
+            check(of, given.arguments)
+        except UserError as error:
+            said = f"{error}\n{said}"
+        raise UserError(said)
+    return given
 
 
 def check(of: Callable[..., Any], given: dict[str, Any]) -> None:

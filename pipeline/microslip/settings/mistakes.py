@@ -69,7 +69,11 @@ def bounded(what: str, value: Any, gt: float | None = None, ge: float | None = N
 
 def unfit(value: Any, gt: float | None = None, ge: float | None = None, le: float | None = None) -> str:
     """What is wrong with a number, or an array of them; nothing if it is finite and in its bounds."""
+    if hasattr(value, "toarray"):
+        return "is a sparse matrix and must be an array, .toarray() of it"
     try:
+        if np.iscomplexobj(value) and np.size(value):
+            return "is complex and must be real" + ", as its .real is" * (not np.any(np.imag(value)))
         if np.asarray(value).dtype.kind not in "iufO":  # of texts and truths numpy makes numbers too
             raise TypeError
         at = np.asarray(value, dtype=float)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import json
 import os
+import re
 import subprocess
 import sys
 import tempfile
@@ -120,9 +121,7 @@ def _run_mesher(job: Job, source: Path, product: Path) -> tuple[list[str], list[
     return [line for line in done.stderr.splitlines() if line.startswith("warning:")], opened
 
 
-def run_apart(
-    words: list[str], scratch: str, limit: float | None = None
-) -> subprocess.CompletedProcess[str]:
+def run_apart(words: list[str], scratch: str, limit: float | None = None) -> subprocess.CompletedProcess[str]:
     """Run a Python file, or -m and a module, in a process of its own, as gmsh is.
 
     It ends when this process does, however that ends, and then removes the folder `scratch`. There it leaves a list of
@@ -219,6 +218,10 @@ def _mesher_failure(job: Job, done: subprocess.CompletedProcess[str]) -> str:
     if done.returncode == 2 and text:
         return text if str(job.path) in text else f"{job.path}: {text}"
     last = text.splitlines()[-1] if text else "no message"
+    folder, built = str(job.folder.resolve()), job.settings.geometry.build
+    lines = re.findall(rf'File "{re.escape(folder)}[/\\]([^"/\\]+)", line (\d+)', text)
+    if built and lines:  # it ends before it draws
+        return f"{job.path}: {lines[-1][0]}, line {lines[-1][1]}: {last}; correct it"
     return f"{job.path}: meshing failed ({last}); check [geometry] and [mesh]"
 
 
@@ -375,8 +378,5 @@ def _other_mesh(job: Job, name: str, place: str) -> Mesh:
         return mesh
     others = [part for part in with_parts(mesh).instances if part not in instances]
     if not instances or not others:
-        raise UserError(
-            f"{place}: touching: names the body's own mesh, of which geometry.instances leaves "
-            "nothing out"
-        )
+        raise UserError(f"{place}: touching: names the body's own mesh, of which geometry.instances leaves nothing out")
     return of_instances(mesh, others)

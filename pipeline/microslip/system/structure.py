@@ -26,9 +26,9 @@ from ..contact.patch import Patch
 from ..contact.set_valued import SetValued
 from ..data import Array, Compliance, ModalGroup, Rows
 from ..errors import UserError
-from ..settings.arguments import Text, check_fields, checked, numbers
+from ..settings.arguments import Text, checked, checked_fields, numbers
 from ..settings.mistakes import bounded, unfit
-from ..settings.numbers import NotNegative, Number, Positive
+from ..settings.numbers import BEYOND, NotNegative, Number, Positive
 from .assembly import Assembly, Contact, ContactFace, Load, Output
 from .component import Component
 from .ground import Ground
@@ -102,6 +102,7 @@ def _elements(elements: Any) -> Any:
     return elements
 
 
+@checked_fields
 @dataclass(frozen=True, eq=False)
 class Element:
     """A law that acts along one coordinate of a structure.
@@ -123,7 +124,6 @@ class Element:
     velocity: Number = 0.0
 
     def __post_init__(self) -> None:
-        check_fields(self)
         if self.velocity and (self.to is not None or self.along == "n"):
             raise UserError("element: velocity: is that of the ground along t1 or t2; leave out to, or velocity")
 
@@ -188,7 +188,8 @@ def jenkins(
         UserError: a stiffness that is not positive, or a negative limit.
     """
     law = Jenkins(*_numbers(0.0, stiffness, 0.0, limit))
-    return Element(law, at, to, name=name, length=limit / stiffness)
+    length = limit / stiffness  # nothing, or beyond all bounds: the element is the slider or the spring alone
+    return Element(law, at, to, name=name, length=length if 1 / BEYOND <= length <= BEYOND else None)
 
 
 @checked

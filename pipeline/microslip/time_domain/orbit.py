@@ -502,7 +502,7 @@ def march(
     stepper = Stepper(equations, 2 * np.pi / equations.Omega / (each * samples))
     first = on_its_way(stepper, start) if isinstance(start, Periodic) else stepper.start(*begun(equations, start))
     (now, hardest), done = kept.begun((first, Hardest(-1.0, 0.0)))
-    many, happened, reported = 1, 0, time.monotonic()
+    many, reported = 1, time.monotonic()
     while done < settle + keep:
         look()
         before, dense = now, done >= settle
@@ -512,7 +512,7 @@ def march(
         if dense:
             among = Hardest(float(now.missed) - float(before.missed), float(before.time))
         hardest = max(hardest, among, key=lambda one: float(one.missed))
-        done, happened = done + ahead, happened + count
+        done, kept.met = done + ahead, kept.met + count
         if not np.isfinite(seen.mechanical[-1]):
             when, why = _divergence(stepper, before, seen, kept if dense else None)
             return Ended(each * samples, diverged=when, messages=(why,))
@@ -520,8 +520,8 @@ def march(
             kept.keep(kept_samples.of_period(equations, seen), listed, count - len(listed))
         kept.mark((now, hardest), done)
         if time.monotonic() - reported >= PAUSE or done in (settle, settle + keep):
-            met = counted(happened, "event")
-            report(f"period {done} of {settle + keep}, {float(now.time):.6g} s, {met}")
+            met = counted(kept.met, "event")
+            report(f"{done} of {settle + keep} periods, {float(now.time):.6g} s, {met}")
             reported = time.monotonic()
         took = max(time.monotonic() - began, 1e-6)
         many = int(np.clip(0.5 * PAUSE / took * ahead, 1, FURTHER * ahead))

@@ -147,7 +147,7 @@ def run(
             kept = file.motion(number)
 
             def tell(text: str, name: str = a.name) -> None:
-                report(f"{name}: {text}")
+                report(f"{text}, {name}")
 
             ended = orbit.march(a.equations, a.settle, a.keep, a.samples, a.steps, a.start, tell, kept)
             kept.end(

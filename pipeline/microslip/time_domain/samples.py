@@ -140,6 +140,8 @@ class Kept(Protocol):
     """m, the largest motion of the contacts so far."""
     missed: int
     """Events that there was no room for."""
+    met: int
+    """Events since the start, those while it settles among them."""
 
     def begun(self, where: Where) -> tuple[Where, int]:
         """Where to go on, and how many periods are done."""
@@ -164,6 +166,7 @@ class InMemory:
 
     widest: float = 0.0
     missed: int = 0
+    met: int = 0
     parts: list[Mapping[str, Array]] = field(default_factory=list)
     events: list[Array] = field(default_factory=list)
 
@@ -213,6 +216,7 @@ class InFile:
     number: int
     widest: float = 0.0
     missed: int = 0
+    met: int = 0
     filled: int = 0
     happened: int = 0
 
@@ -224,6 +228,7 @@ class InFile:
         if told.get("motion") != self.number or len(leaves) != len(first):  # or left by another version
             return where, 0
         self.widest, self.missed, self.filled, self.happened = (told[k] for k in _COUNTS)
+        self.met = int(told.get("met", 0))
         return jax.tree_util.tree_unflatten(tree, leaves), int(told["done"])
 
     def keep(self, rows: Mapping[str, Array], events: Array, missed: int) -> None:
@@ -276,7 +281,7 @@ class Recording:
         return InFile(self, self.file[f"motion_{number + 1}"], number)
 
     def mark(self, of: InFile, where: Where, done: int) -> None:
-        self.latest = {"motion": of.number, "done": done, **{k: getattr(of, k) for k in _COUNTS}}, where
+        self.latest = {"motion": of.number, "done": done, "met": of.met, **{k: getattr(of, k) for k in _COUNTS}}, where
         if time.monotonic() - self.marked >= PAUSE:
             self.keep_latest()
 

@@ -59,7 +59,7 @@ enum { U = F + INPUTS, W = U + OUTPUTS, END = W + OUTPUTS };
 static fmi2Status refuse(Body *b, const char *why)
 {
     if (b->call.logger)
-        b->call.logger(b->call.componentEnvironment, b->name, fmi2Error, "error", "%s", why);
+        b->call.logger(b->call.componentEnvironment, b->name, fmi2Error, "error", why); /* no % in it */
     return fmi2Error;
 }
 
@@ -201,7 +201,8 @@ CALL fmi2SetDebugLogging(fmi2Component c, fmi2Boolean on, size_t n, const fmi2St
 CALL fmi2SetupExperiment(fmi2Component c, fmi2Boolean known, fmi2Real tolerance, fmi2Real start, fmi2Boolean ends,
                          fmi2Real stop)
 {
-    return FINITE("fmi2SetupExperiment", &start, 1) ? (STATE->time = start, fmi2OK) : fmi2Error;
+    const fmi2Real given[] = {start, known ? tolerance : 0, ends ? stop : 0};
+    return FINITE("fmi2SetupExperiment", given, 3) ? (STATE->time = start, fmi2OK) : fmi2Error;
 }
 CALL fmi2EnterInitializationMode(fmi2Component c) READY
 CALL fmi2ExitInitializationMode(fmi2Component c) READY
