@@ -55,7 +55,7 @@ def outline_error(mesh: Mesh, item: Interface, face: Mapping[str, Indices]) -> f
     if face:
         nodes = mesh.points[np.unique(np.concatenate([f.ravel() for f in face.values()]))]
     flat = nodes @ item.rotation[1:].T
-    size = np.ptp(flat, axis=0).max()
+    size = max(np.ptp(flat, axis=0).max(), 1e-300)  # one point has none
     wrong = float(np.abs(np.ptp(flat, axis=0) - item.extent).max() / size)
     if not len(item.polygon):
         return wrong

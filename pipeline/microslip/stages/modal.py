@@ -59,8 +59,19 @@ def modes_stage(
         warnings.extend(told)
         return Made(note={"warnings": warnings})
 
-    stage.make(inputs, work)
+    if not stage.make(inputs, work):
+        warnings = warnings_of(stage.product)
+        for text in warnings:
+            report(f"warning: {text}")
     return stage.product, warnings
+
+
+def warnings_of(basis_file: Path) -> list[str]:
+    """What was warned of when a modal file was made, which stays true while it is up to date."""
+    try:
+        return list(json.loads(store.sidecar_path(basis_file).read_text()).get("warnings", []))
+    except (OSError, ValueError):
+        return []
 
 
 def held_faces(basis: ModalBasis) -> list[str]:
