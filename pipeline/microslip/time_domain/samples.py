@@ -2,7 +2,8 @@
 
 ``orbit.h5`` (docs/time_domain.md) holds several motions. While they are computed, ``orbit.h5.part`` beside it has a
 place for every sample from the beginning: nothing but numbers is written from then on, so a process killed at any
-instant leaves a file that can be read. It takes room on the disk only as it is filled. ``orbit.h5.state``, complete or absent, says how far it is filled, and where the motion was.
+instant leaves a file that can be read. It takes room on the disk only as it is filled. ``orbit.h5.state``, complete or
+absent, says how far it is filled, and where the motion was.
 """
 
 from __future__ import annotations
