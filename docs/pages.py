@@ -125,7 +125,7 @@ def typed(line: str, folder: Path) -> str:
 
 MEANING: dict[str, tuple[str, str]] = {
     # key: (unit, meaning); "*" stands for the unit of the file's lengths
-    "name": ("", "names the products: `meshes/NAME.msh`, `build/NAME/`; another body of the name does not overwrite them"),
+    "name": ("", "names the products: `meshes/NAME.msh`, `build/NAME/`, of no other body of the name"),
     "description": ("", "one line for the report"),
     "length_unit": ("", "unit of every length in this file and of the mesh or CAD file"),
     "reduction": ("", "method of reduction, see reduction.md"),

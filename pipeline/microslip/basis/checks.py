@@ -295,6 +295,8 @@ def _invariant_checks(basis: ModalBasis, g: ModalGroup, v: Invariants) -> _Findi
         turn = np.array([[0, -n[2], n[1]], [n[2], 0, -n[0]], [-n[1], n[0], 0]])
         N = np.einsum("ab,abij->ij", turn, v.shape_shape)
         found.append(("invariants: shape_shape gives N", _largest(N - g.run_up.N), 1e-9, ""))
+        P = np.einsum("ab,abij->ij", np.eye(3) - np.outer(n, n), v.shape_shape)
+        found.append(("invariants: shape_shape gives P", _largest(P - g.run_up.P), 1e-8, ""))
     return found
 
 
