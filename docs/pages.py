@@ -125,7 +125,7 @@ def typed(line: str, folder: Path) -> str:
 
 MEANING: dict[str, tuple[str, str]] = {
     # key: (unit, meaning); "*" stands for the unit of the file's lengths
-    "name": ("", "names the products: `meshes/NAME.msh`, `build/NAME/`"),
+    "name": ("", "names the products: `meshes/NAME.msh`, `build/NAME/`, of no other body of the name"),
     "description": ("", "one line for the report"),
     "length_unit": ("", "unit of every length in this file and of the mesh or CAD file"),
     "reduction": ("", "method of reduction, see reduction.md"),
@@ -146,7 +146,7 @@ MEANING: dict[str, tuple[str, str]] = {
     "stability.accuracy": ("", "relative, of the matrices' entries: decides which growth rates are neutral"),
     "stability.neutral": ("1/s", "growth rates below it are neutral whatever the accuracy"),
     "stability.certify": ("", "count the roots by the argument principle"),
-    "note": ("", "a remark the report repeats"),
+    "note": ("", "a remark that `modes` and the report repeat; `import` says here what it left out of a mesh file"),
     "geometry.build": (
         "",
         "a Python file that draws the body with gmsh; one outside its folder, by a path or a link, is refused",

@@ -53,6 +53,17 @@ def test_ctrl_c_at_random_moments_of_a_motion_ends_it_and_loses_nothing(
     assert all(np.array_equal(whole.array(name), found.array(name)) for name in samples.UNITS)
 
 
+def test_how_large_a_file_of_motions_will_be_is_told(tmp_path, monkeypatch):
+    """Of a large one, before its first sample: what all of its arrays take, events left out."""
+    told, asked = list[str](), recorded.Asked("it", slider(), 0, 100, 16, 512)
+    for announced in (samples.ANNOUNCED, 1e3):
+        monkeypatch.setattr(samples, "ANNOUNCED", announced)
+        found = recorded.run(tmp_path / "orbit.h5", [asked], fresh=True, report=told.append)[0]
+    size = sum(found.array(name).nbytes for name in samples.UNITS)
+    (said,) = [text for text in told if " MB" in text]
+    assert float(said.split("about ")[1].split(" MB")[0]) == pytest.approx(1e-6 * size, rel=0.01)
+
+
 def test_no_period_of_a_motion_is_computed_twice(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Ended at the 20th of 60 periods, far within the second between two states that are kept: 41 are left."""
     looks, asked = list[int](), recorded.Asked("it", slider(), 0, 60, 16, 512)

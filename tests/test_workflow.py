@@ -8,11 +8,14 @@ import os
 import shutil
 from pathlib import Path
 
+import numpy as np
 import pytest
 from box import edit, write_box
 from refusals import refused
 
 from microslip.basis import read_basis
+from microslip.case import load_case
+from microslip.errors import UserError
 from microslip.files import store
 from microslip.settings.toml import load_toml
 from microslip.stages import meshing, modal, places, response, running
@@ -450,3 +453,53 @@ def test_what_a_build_file_imports_or_reads_is_an_input_of_the_mesh(
     for file in (body / "sizes.py", tmp_path / "table.csv", body / "point.geo"):
         file.write_text(file.read_text() + "\n")
         assert made() and not made(), file
+
+
+def test_a_mesh_counts_for_the_folder_it_was_drawn_in(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The same body.toml and build.py beside another table draw another body: 33 mm, not 11 mm."""
+    monkeypatch.chdir(tmp_path)
+    body = write_box(tmp_path / "box", case=False)
+    table = "float(open(__file__.replace('build.py', 'width.txt')).read())"
+    build = (body / "build.py").read_text()
+    build = build.replace("length, width, height =", f"length, width, height = {table}, 20, 120 #", 1)
+    (body / "build.py").write_text(build)
+    (body / "width.txt").write_text("11")
+    thick = tmp_path / "thick"
+    shutil.copytree(body, thick)
+    (thick / "width.txt").write_text("33")
+
+    def width(of: Path) -> float:
+        mesh, _ = meshing.load_mesh(open_job(of), meshing.mesh_stage(open_job(of)))
+        return float(np.ptp(mesh.points[:, 0]))
+
+    assert width(body) == pytest.approx(0.011)
+    edit(body / "body.toml", 'name = "box"', 'name = "slender"')  # so that both may be called box
+    assert width(thick) == pytest.approx(0.033)
+
+
+def test_bodies_of_one_name_do_not_overwrite_each_other(
+    box: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Mesh and modal file are of one body.toml: another one is refused until the first is gone or is
+    called otherwise; what was moved as a whole still is its own."""
+    monkeypatch.chdir(box)
+    other = shutil.copytree(box, tmp_path / "other", ignore=shutil.ignore_patterns("build", "meshes"))
+    (other / "body.toml").write_text((other / "body.toml").read_text().replace("2.1e11", "7e10"))
+    kept = {p: (box / p).read_bytes() for p in (MESH, BASIS)}
+    first = read_basis(BASIS).groups[0, 0].omega[0]
+    assert run_chain(box) == set()
+    for force in (False, True):
+        with pytest.raises(UserError, match=r"name: \S*box.msh is made of body.toml, which has the same"):
+            modal.modes_stage(open_job(other), force=force)
+    assert kept == {p: (box / p).read_bytes() for p in (MESH, BASIS)}
+    aluminium = meshing.mesh_stage(open_job(other, ['name="aluminium"']))
+    assert aluminium == Path("meshes/aluminium.msh")
+    case = (box / "case.toml").rename(other / "case.toml")
+    with pytest.raises(UserError, match=r"bodies.box: means \S*other/body.toml, but .* is made of b"):
+        places.existing_files(load_case(case)[0], case, None, Path())
+    edit(box / "body.toml", 'name = "box"', 'name = "steel"')
+    again, _ = modal.modes_stage(open_job(other))
+    assert again == Path(BASIS) and read_basis(again).groups[0, 0].omega[0] < 0.6 * first
+    assert places.existing_files(load_case(case)[0], case, None, Path()) == {"box": Path(BASIS)}

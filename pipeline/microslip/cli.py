@@ -201,9 +201,11 @@ def modes(body: Path, /, *, output: Output = None, set_: Set = (), force: Force 
         return
     job = open_job(body, list(set_))
     with progress(f"modes of {job.settings.name}", quiet) as report:
-        path, _ = modes_stage(job, output, force, report)
+        path, warnings = modes_stage(job, output, force, report)
     if not quiet:
-        print("\n".join(basis_summary(read_basis(path))))
+        noted = [f"note of {job.path}: {job.settings.note}"] * bool(job.settings.note)
+        said = [*noted, *(f"warning: {text}" for text in warnings)]
+        print("\n".join([*basis_summary(read_basis(path)), *said]))
     _say(path, quiet)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Any
 
@@ -19,6 +19,7 @@ from ..data import (
     Mesh,
     ModalBasis,
     ModalGroup,
+    Rows,
     RunUp,
     SpeedRange,
 )
@@ -27,6 +28,7 @@ from ..linalg.gyroscopic import stability_sentence
 from ..modal.range_basis import Interpolant, frequencies, largest_difference
 from ..reduced.coordinates import compliance_row, held, in_modes, own_stiffness
 from .integrals import cell_volumes, face_mean, modal_mass
+from .places import Places, face_of, misfit_error, normals_error, outline_error, set_error
 from .strains import allowed, stiffness_error, strain_error, stress_error
 
 TOLERANCES = {
@@ -70,8 +72,9 @@ def check_basis(basis: ModalBasis) -> list[Check]:
     Without the full K this covers: shapes and sizes; finite numbers; the mesh's volume, mass-orthogonality of the
     shapes recomputed from the mesh (a file whose shapes stand in another node order fails here), to the digits that its
     solver claims; of a body at rest their stiffness-orthogonality, with strains and stresses; ascending frequencies;
-    M_r = 1 and K_r = diag(omega^2) for normal modes; C_r; skew G_r; orthonormal right-handed frames; interface rows
-    against the patch's shapes and against phi; modal compliance against the rows; static not below modal compliance;
+    M_r = 1 and K_r = diag(omega^2) for normal modes; C_r; skew G_r; orthonormal right-handed frames; normals and
+    outlines of patches against facets; interface rows against the patch's shapes and against phi; loads, monitors and
+    gauges against phi where they say they are; modal compliance against the rows; static not below modal compliance;
     the solver's certificate, orthogonality and backward error.
     """
     with np.errstate(all="ignore"):  # absurd numbers are findings, not warnings
@@ -157,6 +160,9 @@ def _group_checks(basis: ModalBasis, g: ModalGroup, mesh_is_sound: bool) -> _Fin
         found += _shape_checks(basis, g, kept)
         if g.invariants is not None:
             found += _moment_checks(basis, g, g.invariants)
+        if g.run_up is not None and g.harmonic == 0:
+            found += _inertia_load_checks(basis, g, g.run_up)
+        found += _place_of_rows_checks(basis, kept)
     for name, item in g.interfaces.items():
         found += _interface_checks(basis, g, name, item, mesh_is_sound)
     for key in ("orthogonality", "backward_error", "mass_error"):
@@ -282,11 +288,15 @@ def _invariant_checks(basis: ModalBasis, g: ModalGroup, v: Invariants) -> _Findi
         ]
     mirrored = v.shape_shape.transpose(1, 0, 3, 2).conj()
     found.append(("invariants: shape_shape is symmetric", _largest(v.shape_shape - mirrored), 1e-9, ""))
+    whole = np.einsum("aaij->ij", v.shape_shape)
+    found.append(("invariants: shape_shape adds up to M_r", _largest(whole - g.M_r), 1e-8, ""))
     if g.run_up is not None:
         n = basis.rotation_axis
         turn = np.array([[0, -n[2], n[1]], [n[2], 0, -n[0]], [-n[1], n[0], 0]])
         N = np.einsum("ab,abij->ij", turn, v.shape_shape)
         found.append(("invariants: shape_shape gives N", _largest(N - g.run_up.N), 1e-9, ""))
+        P = np.einsum("ab,abij->ij", np.eye(3) - np.outer(n, n), v.shape_shape)
+        found.append(("invariants: shape_shape gives P", _largest(P - g.run_up.P), 1e-8, ""))
     return found
 
 
@@ -310,6 +320,18 @@ def _moment_checks(basis: ModalBasis, g: ModalGroup, v: Invariants) -> _Findings
         ("invariants: shape", _largest(v.shape @ w - gram[3, 4:]) / moving, 1e-9, ""),
         ("invariants: position_shape", _largest(v.position_shape @ w - gram[:3, 4:]) / (moving * size), 1e-9, ""),
     ]
+
+
+def _inertia_load_checks(basis: ModalBasis, g: ModalGroup, run_up: RunUp) -> _Findings:
+    """Euler and centrifugal loads over the file's own mesh, of one mixture of all shapes (`_moment_checks`)."""
+    w, n = np.cos(1.0 + np.arange(g.phi.shape[2])), basis.rotation_axis
+    r = basis.mesh.points + g.u_static - basis.rotation_point
+    fields = np.stack([g.phi @ w, -np.cross(n, r), r - np.outer(r @ n, n)], axis=2)
+    gram, weight = modal_mass(basis.mesh, fields)
+    gram = gram * (np.float64(basis.mass) / weight)
+    top = np.sqrt(np.float64(gram[0, 0].real) * max(gram[1, 1].real, gram[2, 2].real))
+    loads = (("Euler", run_up.euler, gram[0, 1]), ("centrifugal", run_up.centrifugal, gram[0, 2]))
+    return [(f"run-up: {name} load", abs(w @ load - exact) / top, 1e-8, "") for name, load, exact in loads]
 
 
 def _gyroscopic_checks(g: ModalGroup, y: GyroscopicModes) -> _Findings:
@@ -346,6 +368,7 @@ def _shape_checks(basis: ModalBasis, g: ModalGroup, kept: ModalGroup) -> _Findin
     for name, s in kept.stresses.items():
         if (strained := strain_error(basis, kept, s)) is not None:
             found.append((f"strains of {name} follow from the shapes", strained, allowed(basis), ""))
+        found.append((f"places of stress set {name}", set_error(basis.mesh, s), 1e-9, ""))
         found.append((f"volume of stress set {name}", abs(float(s.weights.sum()) / volume - 1), 1e-9, ""))
     return found
 
@@ -390,14 +413,36 @@ def _interface_checks(basis: ModalBasis, g: ModalGroup, name: str, item: Interfa
         mean = R @ np.einsum("p,pim->im", item.areas, item.shapes) / item.areas.sum()
         error = _largest(mean - item.rows[:3]) / top
         found.append((f"interface {name}: rows agree with the patch's shapes", error, 1e-9, ""))
-    if mesh_is_sound and g.phi.shape[0]:
-        for face in basis.mesh.faces.values():
-            area, centre, mean = face_mean(basis.mesh.points, face, g.phi)
-            same = abs(area / item.areas.sum() - 1) < 1e-9 and _largest(centre - item.origin) < 1e-9 * np.sqrt(area)
-            if same:
-                error = _largest(R @ mean - item.rows[:3]) / top
-                found.append((f"interface {name}: rows agree with phi on its face", error, 1e-8, ""))
-                break
+    if not (mesh_is_sound and len(item.areas)):
+        return found
+    face = face_of(basis.mesh, item)
+    found.append((f"interface {name}: normals are outward", normals_error(basis.mesh, item, face), 1e-9, ""))
+    found.append((f"interface {name}: outline is that of its face", outline_error(basis.mesh, item, face), 1e-8, ""))
+    if face and g.phi.shape[0]:
+        mean = face_mean(basis.mesh.points, face, g.phi)[2]
+        error = _largest(R @ mean - item.rows[:3]) / top
+        found.append((f"interface {name}: rows agree with phi on its face", error, 1e-8, ""))
+    return found
+
+
+def _place_of_rows_checks(basis: ModalBasis, g: ModalGroup) -> _Findings:
+    """Loads, monitors and gauges against the shapes where they stand, and what patches say of their fit."""
+    places = Places(basis)
+
+    def error(of: Callable[[ModalGroup, Rows], float], rows: Rows) -> float:
+        try:
+            return of(g, rows)
+        except (np.linalg.LinAlgError, ValueError):  # numbers that no body has
+            return np.inf
+
+    found: _Findings = []
+    for kind, named, of, limit in (
+        ("excitation", g.excitations, places.load_error, 1e-7),
+        ("monitor", g.monitors, places.monitor_error, 1e-7),
+        ("gauge", g.gauges, places.gauge_error, 1e-6),
+    ):
+        found += [(f"{kind} {n}: is where it says", error(of, r), limit, "") for n, r in named.items()]
+    found += [(f"interface {n}: rigid fit", misfit_error(i), 1e-8, "") for n, i in g.interfaces.items()]
     return found
 
 

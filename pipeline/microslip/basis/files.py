@@ -53,7 +53,7 @@ from ..files.declared import (
     write,
     write_each,
 )
-from ..files.hdf5 import put, put_scale, sealed
+from ..files.hdf5 import ANNOUNCED, put, put_scale, sealed
 from ..files.hostile import DAMAGE, inspect, refuse_damaged, short
 from ..files.store import ordinary
 from ..settings.arguments import checked
@@ -115,10 +115,6 @@ def size_in_words(basis: ModalBasis) -> str:
             "stress modes (output.gauss, output.nodal_stress)": sets_bytes}  # fmt: skip
     told = ", ".join(f"{1e-6 * size:.0f} MB of {name}" for name, size in each.items() if size > 0.1 * whole)
     return f"about {1e-6 * whole:.0f} MB: {told}"
-
-
-ANNOUNCED = 2e7
-"""Bytes of a file from which on its size is told before it is written."""
 
 
 def _write(file: h5py.File, basis: ModalBasis) -> None:

@@ -91,10 +91,21 @@ def tables(cell_type: str) -> tuple[Array, Array, Array]:
     if cell_type in elements.TYPES:
         points, weights = elements.rule(cell_type)
         return *elements.shape_functions(cell_type, points), weights
-    exponents = _EXPONENTS[cell_type]
     at, weights = _rule(cell_type)
-    coefficients = np.linalg.inv(_monomials(exponents, _nodes(cell_type)))
-    return _monomials(exponents, at) @ coefficients, _slopes(exponents, at) @ coefficients, weights
+    return *shape_functions(cell_type, at), weights
+
+
+def shape_functions(cell_type: str, at: Array) -> tuple[Array, Array]:
+    """Shape functions (q, k) and reference gradients (q, d, k) at points (q, d) of the reference cell or facet."""
+    if cell_type in elements.TYPES:
+        return elements.shape_functions(cell_type, at)
+    exponents, coefficients = _EXPONENTS[cell_type], _coefficients(cell_type)
+    return _monomials(exponents, at) @ coefficients, _slopes(exponents, at) @ coefficients
+
+
+@cache
+def _coefficients(cell_type: str) -> Array:
+    return np.linalg.inv(_monomials(_EXPONENTS[cell_type], _nodes(cell_type)))
 
 
 def modal_mass(mesh: Mesh, phi: Array) -> tuple[Array, float]:

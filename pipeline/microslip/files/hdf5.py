@@ -21,6 +21,8 @@ from ..interrupts import deferred
 from .store import complete_or_absent, refuse_other
 
 _SEAL = b"\nmicroslip seal, sha256 of all bytes before this line: "
+ANNOUNCED = 2e7
+"""Bytes of a file from which on its size is told before it is written."""
 IMAGINARY = "_imag"
 """Ends the name of the dataset that holds the imaginary part of the dataset beside it."""
 _SEAL_LENGTH = len(_SEAL) + 64 + 1

@@ -479,7 +479,7 @@ def note_product(
         "inputs": hash_settings(inputs),
         "product": hash_file(product),
         "files": {str(file.relative_to(product.parent)): hash_file(file) for file in sorted(set(files))},
-        "opened": {os.path.relpath(file, product.parent): hash_file(file) for file in sorted(set(opened))},
+        "opened": {os.path.relpath(file, product.parent.resolve()): hash_file(file) for file in sorted(set(opened))},
         "written": datetime.now(UTC).isoformat(timespec="seconds"),
         **git_state(Path(__file__).parent),
         **more,

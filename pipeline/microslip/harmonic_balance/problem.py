@@ -421,8 +421,8 @@ class AtFrequency:
             return (
                 f"no balance: a body {AWAY}: nothing balances the steady forces on it; give it weak_springs or a spring"
             )
-            of = f", harmonic {h} of {hertz(f)}" if h > 1 else ""
-            return f"resonance: nothing limits a motion at {hertz(h * f)}{of}; give its mode some damping"
+        of = f", harmonic {h} of {hertz(f)}" if h > 1 else ""
+        return f"resonance: nothing limits a motion at {hertz(h * f)}{of}; give its mode some damping"
 
     @cached_property
     def rounding(self) -> tuple[float, float]:

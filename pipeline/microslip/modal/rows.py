@@ -6,7 +6,7 @@ A row set is a sparse matrix B (r, 3n) on u = (u_x1, u_y1, u_z1, u_x2, ...): ``B
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -231,6 +231,7 @@ class Locator:
     """Finds the cell and reference coordinates of points (Newton on the curved map, nearest boxes first)."""
 
     mesh: Mesh
+    shapes: Callable[[str, Array], tuple[Array, Array]] = shape_functions
     _first: list[int] = field(default_factory=list)  # number of the first cell of each type
     _low: Array = field(default_factory=lambda: np.zeros((0, 3)))
     _high: Array = field(default_factory=lambda: np.zeros((0, 3)))
@@ -246,6 +247,13 @@ class Locator:
             low.append(first - bulge)
             high.append(last + bulge)
         self._low, self._high = np.concatenate(low), np.concatenate(high)
+
+    def around(self, point: Array) -> list[Location]:
+        """The point in every cell that holds it: several where it lies on a side."""
+        near = 1e-9 * np.ptp(self.mesh.points, axis=0).max()
+        boxed = ((self._low - near <= point) & (point <= self._high + near)).all(axis=1)
+        places = [self._in_cell(*self._cell(int(i)), point) for i in np.flatnonzero(boxed)]
+        return [place for place in places if place.distance <= near]
 
     def find(self, point: Array, what: str) -> Location:
         """Locate a point; if it is outside, the nearest place of the body.
@@ -284,13 +292,13 @@ class Locator:
         x = self.mesh.points[nodes]
         xi = kind.reference[: kind.corners].mean(axis=0)
         for _ in range(25):
-            N, dN = shape_functions(cell_type, xi[None])
+            N, dN = self.shapes(cell_type, xi[None])
             J = (dN[0] @ x).T
             before = xi
             xi = _into_cell(J, xi + np.linalg.lstsq(J, point - N[0] @ x, rcond=None)[0], kind)
             if np.abs(xi - before).max() < 1e-13:
                 break
-        N, dN = shape_functions(cell_type, xi[None])
+        N, dN = self.shapes(cell_type, xi[None])
         place = N[0] @ x
         distance = float(np.linalg.norm(point - place))
         if distance < 1e-9 * np.ptp(x, axis=0).max():

@@ -51,7 +51,7 @@ def in_coordinates(g: ModalGroup, V: Array) -> ModalGroup:
     def face(i: Interface) -> Interface:
         shapes = i.shapes @ V
         more = i.characteristic @ V if len(i.characteristic) else np.zeros((0, V.shape[1]))
-        fit = _fit_residual(i, shapes, i.rows @ V)
+        fit = fit_residual(i, shapes, i.rows @ V)
         return replace(i, rows=i.rows @ V, shapes=shapes, fit_residual=fit, characteristic=more)
 
     def rows(named: Rows) -> Rows:
@@ -228,7 +228,7 @@ def basis_in_modes(basis: ModalBasis) -> ModalBasis:
     return replace(basis, groups={key: in_modes(g) for key, g in basis.groups.items()})
 
 
-def _fit_residual(i: Interface, shapes: Array, rows: Array) -> Array:
+def fit_residual(i: Interface, shapes: Array, rows: Array) -> Array:
     """(m,) share of the patch's motion that no rigid motion explains; NaN-free zeros where shapes are not stored."""
     if not shapes.shape[0]:
         return np.zeros(rows.shape[1])

@@ -331,7 +331,8 @@ def _mesh(file: Path, folder: Path, unit: str, instances: Sequence[str] = ()) ->
     mesh, ties = _tied(file, mesh)
     kinds = ", ".join(f"{len(c)} {t}" for t, c in mesh.cells.items())
     told.insert(0, f"{file}: {mesh.n_points} points, {kinds}")
-    told += [f"warning: {text}" for texts in mesh_problems(mesh) for text in texts]
+    again = [f"warning: {text}" for texts in mesh_problems(mesh) for text in texts]
+    told += again
     told += [f"note: {text}" for text in mesh.remarks]
     told += [*ties, *((*joints, *_pressed(mesh)) if not instances else ())]
     held, said = _supports(mesh)
@@ -354,7 +355,15 @@ def _mesh(file: Path, folder: Path, unit: str, instances: Sequence[str] = ()) ->
     count = _count(mesh, "[[supports]]" in held)
     if count < USUAL:
         told.append(f"modes: {count} asked for, the body has few degrees of freedom")
+    lines = [*_noted([text for text in told if text not in again]), *lines]
     return [*lines, *hot, *ring, *held, *_sets(mesh, bool(held)), *_end(count)], told
+
+
+def _noted(told: Sequence[str]) -> list[str]:
+    """The key of a body.toml that says what of the file is left out, which modes and the report repeat."""
+    texts = [text.removeprefix("warning: ") for text in told if text.startswith("warning: ")]
+    line = f"note = {json.dumps('; '.join(texts), ensure_ascii=False)}"
+    return [f"{line}   # said by modes: take it out when it is mended"] * bool(texts)
 
 
 def _temperatures(mesh: Mesh) -> tuple[list[str], list[str]]:

@@ -26,7 +26,7 @@ from ..mesh.raw import in_file
 from ..settings.body import FaceRule, MaterialSettings, implausible
 from ..units import SYSTEMS, usual_system
 from .job import Job
-from .stage import PACKAGE, Made, Report, Stage
+from .stage import PACKAGE, Made, Report, Stage, seen_from
 
 
 def mesh_stage(job: Job, output: Path | None = None, force: bool = False, report: Report = lambda _: None) -> Path:
@@ -61,6 +61,7 @@ def mesh_stage(job: Job, output: Path | None = None, force: bool = False, report
         "mesh": job.raw.get("mesh", {}),
         "unit": job.settings.length_unit,
         "source": store.hash_file(source),
+        "folder": seen_from(product, job.folder),  # where what it opens is looked for
     }
     if touched := touched_files(job):
         inputs["touched"] = [store.hash_file(f) for f in touched]
@@ -72,7 +73,8 @@ def mesh_stage(job: Job, output: Path | None = None, force: bool = False, report
             report(line)
         return Made(opened=opened)
 
-    Stage(product, ("cad",), force, report).make(inputs, work)
+    origin = None if output else job.path
+    Stage(product, ("cad",), force, report, origin).make(inputs, work)
     return product
 
 

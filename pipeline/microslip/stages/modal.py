@@ -45,7 +45,8 @@ def modes_stage(
         inputs = modes_inputs(job, mesh_file)
     else:
         inputs, code = matrices_inputs(job, matrices), (*_CODE, "exchange.matrices")
-    stage, warnings = Stage(output or job.basis_file, code, force, report), list[str]()
+    origin, warnings = None if output else job.path, list[str]()
+    stage = Stage(output or job.basis_file, code, force, report, origin)
 
     def work() -> Made:
         basis, told = basis_of(job, mesh_file, report) if matrices is None else _from_matrices(job, matrices, report)
@@ -58,8 +59,19 @@ def modes_stage(
         warnings.extend(told)
         return Made(note={"warnings": warnings})
 
-    stage.make(inputs, work)
+    if not stage.make(inputs, work):
+        warnings = warnings_of(stage.product)
+        for text in warnings:
+            report(f"warning: {text}")
     return stage.product, warnings
+
+
+def warnings_of(basis_file: Path) -> list[str]:
+    """What was warned of when a modal file was made, which stays true while it is up to date."""
+    try:
+        return list(json.loads(store.sidecar_path(basis_file).read_text()).get("warnings", []))
+    except (OSError, ValueError):
+        return []
 
 
 def held_faces(basis: ModalBasis) -> list[str]:
@@ -229,7 +241,9 @@ def system_stage(
     from ..system import load_system, system_basis
 
     system = load_system(path, assignments)
-    stage = Stage(output or root / "build" / system.name / "basis.h5", ("system.settings", "basis"), force, report)
+    product = output or root / "build" / system.name / "basis.h5"
+    origin = None if output else path
+    stage = Stage(product, ("system.settings", "basis"), force, report, origin)
 
     def work() -> Made:
         write_basis(stage.product, system_basis(path, assignments))

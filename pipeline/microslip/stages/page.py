@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -12,6 +11,7 @@ from ..data import ModalBasis
 from ..files import store
 from ..ring.resonances import resonance_csv, resonances, speeds_of
 from .job import Job
+from .modal import warnings_of
 from .stage import Made, Report, Stage
 
 
@@ -68,9 +68,4 @@ def _drawn(
 
 
 def _messages(job: Job) -> list[str]:
-    messages = [job.settings.note] if job.settings.note else []
-    try:
-        messages += json.loads(store.sidecar_path(job.basis_file).read_text()).get("warnings", [])
-    except (OSError, ValueError):
-        pass
-    return messages
+    return [*([job.settings.note] if job.settings.note else []), *warnings_of(job.basis_file)]

@@ -17,7 +17,7 @@ from ..settings.meant import meant as meant
 from ..settings.toml import load_toml
 from .job import ASKED, bodies_of, open_job, system_file
 from .modal import modes_stage, system_stage
-from .stage import Report
+from .stage import Report, is_same, origin_of
 
 
 def _keys(path: Path) -> set[str]:
@@ -99,7 +99,22 @@ def existing_files(case: CaseSettings, path: Path, basis_file: Path | None, root
         if not found[b.name].is_file():
             own = [beside] if len(case.components) == 1 else []
             raise UserError(_nowhere(case, path, b, [*own, found[b.name]], root))
+        if b.file is None:
+            _refuse_another(path, b, found[b.name], root)
     return found
+
+
+def _refuse_another(path: Path, b: BodyOfCase, file: Path, root: Path) -> None:
+    """Refuse a modal file that is made of another body of the name which the case means."""
+    made_of, meant = origin_of(file), lumped(path, b.body or b.name)
+    with contextlib.suppress(UserError):  # a modal file alone will do
+        meant = meant or find_body(path, b.body or b.name, root)
+    if made_of is not None and meant is not None and not is_same(made_of, meant):
+        raise UserError(
+            f"{path}: bodies.{b.name}: means {meant}, but {file} is made of {made_of}, which has the "
+            "same name; give one of them another name and type: microslip modes "
+            f"{shlex.quote(str(meant))}"
+        )
 
 
 def _beside(case: CaseSettings, path: Path) -> dict[str, Path]:

@@ -5,6 +5,8 @@
 
 from __future__ import annotations
 
+import json
+import os
 import re
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import AbstractContextManager
@@ -13,7 +15,9 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+from ..errors import UserError
 from ..files import store
+from ..settings.toml import load_toml
 
 Report = Callable[[str], None]
 PACKAGE = Path(__file__).parents[1]
@@ -42,12 +46,15 @@ class Stage:
         product: the file by which it is known; its sidecar and its lock stand beside it.
         code: modules that make it; the source of all that they import counts as an input.
         force: work even if there is nothing to do. report: is told what is being done.
+        origin: the settings file by whose name the product is called: that of another file, which
+            still has this name, is not overwritten. None: the place was asked for.
     """
 
     product: Path
     code: tuple[str, ...]
     force: bool = False
     report: Report = lambda _: None
+    origin: Path | None = None
 
     def make(self, inputs: Mapping[str, Any], work: Callable[[], Made]) -> bool:
         """Do the work unless the product is up to date. Returns whether it was done.
@@ -55,17 +62,39 @@ class Stage:
         Args:
             inputs: settings, and hashes of files, that the product depends on.
             work: writes the product. It calls `begin` before the first of several files.
+
+        Raises:
+            UserError: it would take the place of another settings file's product.
         """
         with self.making():
             all_inputs = {**inputs, "code": hash_of_code(self.code)}
             if store.nothing_to_do(self.product, all_inputs, self.force, self.report):
                 return False
+            self._refuse_another()
             made = work()
             if made.whole:
                 files = [*made.files]
                 self.clear([self.product, *files])
-                store.note_product(self.product, all_inputs, files, made.opened, **made.note)
+                note = {**made.note, **self._origin_noted()}
+                store.note_product(self.product, all_inputs, files, made.opened, **note)
             return True
+
+    def _refuse_another(self) -> None:
+        other = None if self.origin is None else origin_of(self.product)
+        if other is not None and self.origin is not None and not is_same(other, self.origin):
+            raise UserError(
+                f"{self.origin}: name: {self.product} is made of {other}, which has the same name; "
+                "give one of them another name (for one run: --set name=NAME)"
+            )
+
+    def _origin_noted(self) -> dict[str, Any]:
+        """Where the settings file stands, seen from the product, so that both can be moved together."""
+        if self.origin is None or not self.origin.is_file():
+            return {}
+        return {
+            "origin": seen_from(self.product, self.origin),
+            "name": load_toml(self.origin).get("name"),
+        }
 
     def is_made(self, inputs: Mapping[str, Any]) -> bool:
         """Whether the product is up to date, and not to be made all the same."""
@@ -87,6 +116,28 @@ class Stage:
     def clear(self, keep: Iterable[Path] = ()) -> None:
         """What a former run has left goes, but files to `keep`, of this one. See `store.clear_former`."""
         store.clear_former(self.product, keep)
+
+
+def seen_from(product: Path, file: Path) -> str:
+    """The path of a file or folder from the folder of a product; what is a link keeps its name."""
+    return os.path.relpath(file.parent.resolve() / file.name, product.parent.resolve())
+
+
+def is_same(file: Path, other: Path) -> bool:
+    """Whether two paths name one entry of one folder."""
+    return file.name == other.name and file.parent.resolve() == other.parent.resolve()
+
+
+def origin_of(product: Path) -> Path | None:
+    """The settings file that a product is made of, or None where that is not known, or the file is
+    gone or has another name by now."""
+    try:
+        note = json.loads(store.ordinary(store.sidecar_path(product)).read_text())
+        file = Path(os.path.relpath(product.parent.resolve() / note["origin"]))
+        named = file.is_file() and load_toml(file).get("name") == note["name"]
+    except (OSError, ValueError, KeyError, TypeError, UserError):
+        return None
+    return file if named else None
 
 
 @cache

@@ -1,8 +1,9 @@
 """What is kept of a motion: its samples, a period at a time, in memory or in a file that is there before they are.
 
-``orbit.h5`` (docs/time_domain.md) holds several motions. While they are computed, ``orbit.h5.part`` beside it has room
-for all samples, reserved once: nothing but numbers is written from then on, so a process killed at any instant leaves a
-file that can be read. ``orbit.h5.state``, complete or absent, says how far it is filled, and where the motion was.
+``orbit.h5`` (docs/time_domain.md) holds several motions. While they are computed, ``orbit.h5.part`` beside it has a
+place for every sample from the beginning: nothing but numbers is written from then on, so a process killed at any
+instant leaves a file that can be read. It takes room on the disk only as it is filled. ``orbit.h5.state``, complete or
+absent, says how far it is filled, and where the motion was.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ from ..contact.elements import Spring
 from ..contact.patch import Patch
 from ..data import Array
 from ..errors import UserError
-from ..files.hdf5 import create, put, seal, seal_state
+from ..files.hdf5 import ANNOUNCED, create, put, seal, seal_state
 from ..files.hostile import DAMAGE, inspect, refuse_damaged, short
 from ..files.store import complete_or_absent, ordinary, put_in_place, refused
 from ..harmonic_balance.readout import measured
@@ -332,7 +333,9 @@ def recording(
     if not told:
         _state(path).unlink(missing_ok=True)
         with complete_or_absent(_part(path)) as temporary, create(temporary) as file:
-            _reserve(file, plan)
+            size = _reserve(file, plan)
+        if size >= ANNOUNCED:
+            report(f"{path.name} will have about {1e-6 * size:.3g} MB: orbit.keep periods of orbit.samples each")
     else:
         report(f"goes on from what {_part(path).name} holds")
     ended = {int(k): v for k, v in told.pop("ended", {}).items()}
@@ -369,9 +372,11 @@ def _left(path: Path, inputs: str) -> tuple[dict[str, Any], list[Array]]:
         return {}, []
 
 
-def _reserve(file: h5py.File, plan: Sequence[Planned]) -> None:
-    """Room for all samples, and for events; it takes space on the disk as it is filled."""
+def _reserve(file: h5py.File, plan: Sequence[Planned]) -> int:
+    """Places for all samples, whose bytes are returned, and for events; they take room on the disk as they are
+    filled."""
     head(file)
+    size = 0
     for i, one in enumerate(plan, 1):
         group, s = file.create_group(f"motion_{i}"), one.samples * one.keep
         e = one.equations
@@ -379,12 +384,14 @@ def _reserve(file: h5py.File, plan: Sequence[Planned]) -> None:
         rows = sizes(one.equations)
         for name, unit in units_with(units_of(e)).items():
             _room(group, name, (rows[name], s) if name in rows else (s,), unit)
+            size += group[name].nbytes
         most = one.keep * (one.samples + EVENTS_OF_CONTACT * len(one.equations.contacts))
         _room(group, "event", (most, 3), "", along=0)
+    return size
 
 
 def _room(group: h5py.Group, name: str, shape: tuple[int, ...], unit: str, along: int = -1) -> None:
-    """A dataset that can be made shorter, all of it reserved now and not filled with anything."""
+    """A dataset that can be made shorter, whose chunks have their places in the file now and are not filled."""
     if not np.prod(shape, dtype=float):
         put(group, name, np.zeros(shape), unit)
         return
