@@ -28,7 +28,7 @@ from ..linalg.gyroscopic import stability_sentence
 from ..modal.range_basis import Interpolant, frequencies, largest_difference
 from ..reduced.coordinates import compliance_row, held, in_modes, own_stiffness
 from .integrals import cell_volumes, face_mean, modal_mass
-from .places import Places, face_of, misfit_error, normals_error, outline_error, set_error
+from .places import Places, face_of, misfit_error, normals_error, outline_error, set_error, turning_error
 from .strains import allowed, stiffness_error, strain_error, stress_error
 
 TOLERANCES = {
@@ -442,7 +442,9 @@ def _place_of_rows_checks(basis: ModalBasis, g: ModalGroup) -> _Findings:
         ("gauge", g.gauges, places.gauge_error, 1e-6),
     ):
         found += [(f"{kind} {n}: is where it says", error(of, r), limit, "") for n, r in named.items()]
-    found += [(f"interface {n}: rigid fit", misfit_error(i), 1e-8, "") for n, i in g.interfaces.items()]
+    for n, i in g.interfaces.items():
+        found += [(f"interface {n}: rigid fit", misfit_error(i), 1e-8, "")]
+        found += [(f"interface {n}: rotations of the fit", turning_error(i), 1e-8, "")]
     return found
 
 

@@ -77,6 +77,19 @@ def misfit_error(item: Interface) -> float:
     return float(np.abs(share - item.fit_residual).max(initial=0.0))
 
 
+def turning_error(item: Interface) -> float:
+    """Largest error of the three rotations of a patch against the best rigid fit of its shapes, over
+    the largest; 0 where they are not kept, or its points lie on a line."""
+    r = item.points - item.origin
+    second = np.einsum("p,pi,pj->ij", item.areas, r, r)
+    J = np.trace(second) * np.eye(3) - second
+    if not len(item.shapes) or np.linalg.cond(J) > 1e9:
+        return 0.0
+    turned = np.cross(r[:, :, None], item.shapes, axis=1)
+    fit = item.rotation @ np.linalg.solve(J, np.tensordot(item.areas, turned, axes=1))
+    return float(np.abs(fit - item.rows[3:]).max() / max(float(np.abs(fit).max()), 1e-300))
+
+
 def set_error(mesh: Mesh, places: StressSet) -> float:
     """How far places of strains are from points of the cells' rules, or from nodes, over the size of the body."""
     points = [mesh.points]
