@@ -11,12 +11,14 @@ from typing import Any
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from jax.experimental.compilation_cache import compilation_cache
 
 import microslip as ms
 from microslip import programs
 from microslip.contact import jenkins, patch
 from microslip.contact.law import Law, settings
 
+DIR, LEAST = "jax_compilation_cache_dir", "jax_persistent_cache_min_compile_time_secs"
 PLACES = np.zeros((2, 1, 3)) + np.array([1e-6, 0.0, 0.0])
 
 
@@ -59,6 +61,19 @@ def test_what_is_damaged_is_made_again(folder: Path, law: Law) -> None:
     assert [file.stat().st_size > 1000 for file in kept(folder)] == [True]
 
 
+def test_what_lacks_a_part_is_made_again(folder: Path, law: Law, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The compiler reads it without a word and says so when it is run."""
+
+    def lacking(*_: Any, **__: Any) -> Any:
+        raise programs.jax.errors.JaxRuntimeError("NOT_FOUND: Function not found")
+
+    first = again(law)
+    with monkeypatch.context() as patched:
+        patched.setattr(programs, "_read", lambda *_: lacking)
+        np.testing.assert_array_equal(again(law), first)
+    np.testing.assert_array_equal(again(law), first)
+
+
 def test_a_replaced_constant_or_function_makes_another_program(
     folder: Path, law: Law, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -94,6 +109,31 @@ def test_what_is_not_of_this_package_is_not_kept(folder: Path, law: Law) -> None
 def _asked(law: Law) -> tuple[Any, Any, Any]:
     leaves, tree = programs.jax.tree_util.tree_flatten(((law, PLACES), {}))
     return tree, tuple(map(programs._type, leaves)), ()
+
+
+def test_what_jax_had_kept_is_not_written_again(
+    folder: Path, law: Law, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """It lacks parts that are missed when it is run."""
+    jax, kept_by_jax = programs.jax, tmp_path / "jax"
+    monkeypatch.setattr(programs, "_READ", set())
+    before = {name: getattr(jax.config, name) for name in (DIR, LEAST)}
+    compilation_cache.reset_cache()
+    jax.config.update(DIR, str(kept_by_jax))
+    jax.config.update(LEAST, 0.0)
+    try:
+        for _ in range(2):
+            jax.clear_caches()
+            first = np.asarray(patch._tangents.traced(law, PLACES))
+        assert list(kept_by_jax.glob("jit__tangents-*"))
+        jax.clear_caches()
+        np.testing.assert_array_equal(again(law), first)
+        np.testing.assert_array_equal(again(law), first)
+        assert not kept(folder) and programs._READ
+    finally:
+        for name, value in before.items():
+            jax.config.update(name, value)
+        compilation_cache.reset_cache()
 
 
 @pytest.mark.slow

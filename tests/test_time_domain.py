@@ -687,7 +687,7 @@ def test_a_case_runs_up_into_its_stop(hammer: Path, capsys: pytest.CaptureFixtur
     found = ms.load(hammer / "build" / "hammer" / "orbit.h5")
     assert found.frequency[0] == pytest.approx(3.0, abs=0.01) and found.frequency[-1] == pytest.approx(8.0, abs=1e-9)
     assert found.said in (hammer / "build" / "hammer" / "orbit.html").read_text(encoding="utf-8")
-    assert found.said.startswith("run-up from 3 to 8 Hz, largest at ")
+    assert found.said.startswith("run-up from 3 Hz to 8 Hz, largest at ")
     assert found.count("closes") > 5 and found.balance < 1e-8 and found.drift < 1e-2
     assert found.cycles == pytest.approx(16.5, rel=2e-3)  # by its phase, where the highest frequency has 24 periods
     assert found.impacts == found.count("closes") / found.cycles

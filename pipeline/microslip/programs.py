@@ -16,6 +16,7 @@ import platform
 import sys
 import tempfile
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from functools import cache, partial, update_wrapper
 from io import BytesIO
 from pathlib import Path
@@ -34,7 +35,12 @@ PACKAGE = __name__.partition(".")[0]
 NAMED = {PACKAGE, "numpy", "jax", "jaxlib", "builtins", "collections", "functools", "copyreg", "pathlib"}
 """Packages whose classes and functions a kept program may name."""
 
+Given = tuple[tuple[Any, ...], dict[str, Any]]
+"""Arguments by their places and by their names."""
+
 _ALL: WeakSet[Program] = WeakSet()
+_READ = set[str]()
+"""Programs that this process has from what jax keeps."""
 
 
 class Program:
@@ -79,10 +85,15 @@ class Program:
         if None in types:  # part of another program
             return self.traced(*args, **kwargs)
         asked = tree, types, static
-        if (made := self.made.get(asked)) is None:
-            file = self._file(asked)
-            made = self.made[asked] = _read(file, tree) or _compiled(file, self.traced.lower(*args, **kwargs), tree)
-        return made(*given[0], **given[1])
+        if (made := self.made.get(asked)) is not None:
+            return made(*given[0], **given[1])
+        file = self._file(asked)
+        read = _read(file, tree)
+        if read is not None and (out := _run(read, given)):
+            self.made[asked] = read
+        else:
+            self.made[asked], out = _compiled(file, self.traced.lower(*args, **kwargs), given)
+        return out[0]
 
     def _file(self, asked: tuple[Any, Any, Any]) -> Path | None:
         """Where a program is kept; None if it hangs on what has no name, or nothing is kept."""
@@ -237,36 +248,77 @@ def _read(file: Path | None, tree: Any) -> Callable[..., Any] | None:
         return None
 
 
-def _compiled(file: Path | None, lowered: Any, tree: Any) -> Callable[..., Any]:
-    """A program, compiled and kept, unless one that reads the same for the compiler was kept when sources differed."""
+def _run(read: Callable[..., Any] | None, given: Given) -> list[Any]:
+    """What a program that was read finds; nothing if it is not whole, which it says when it is run."""
+    if read is None:
+        return []
+    try:
+        return [jax.block_until_ready(read(*given[0], **given[1]))]
+    except jax.errors.JaxRuntimeError:
+        return []
+
+
+def _compiled(file: Path | None, lowered: Any, given: Given) -> tuple[Callable[..., Any], list[Any]]:
+    """A program and what it finds: compiled and kept, unless one that reads the same for the compiler was kept when
+    sources differed."""
+    made, same, found = None, _alike(file, lowered), list[Any]()
+    if same is not None and not (found := _run(made := _read(same, jax.tree_util.tree_structure(given)), given)):
+        made, ours = _once(lowered)
+        _READ.update([] if ours else [same.name])
+        same = same if ours and _keep(same, made, lowered.out_tree) else None
+    if file is not None and same is not None:
+        with suppress(OSError):
+            file.unlink(missing_ok=True)
+            os.link(same, file)
+    made = made or lowered.compile()
+    return made, found or [made(*given[0], **given[1])]
+
+
+def _alike(file: Path | None, lowered: Any) -> Path | None:
+    """Where a program is kept by what the compiler reads; None if it is not to be kept."""
     if file is None:
-        return lowered.compile()
+        return None
+    try:
+        (said := _Said()).dump((lowered.as_text(), _numbered(lowered.out_tree), _machine()))
+    except (UserError, pickle.PicklingError):  # a class of another package
+        return None
+    same = file.with_name(f"{hashlib.sha256(said.text).hexdigest()}-compiled")
+    return None if same.name in _READ else same
+
+
+def _numbered(tree: Any) -> Any:
+    """Something with this structure."""
+    return jax.tree_util.tree_unflatten(tree, range(tree.num_leaves))
+
+
+def _keep(same: Path, made: Any, out: Any) -> bool:
+    """Whether a program could be written, whole or not at all."""
     from jax.experimental.serialize_executable import serialize
 
-    out = lowered.out_tree
-    found = jax.tree_util.tree_unflatten(out, range(out.num_leaves))
     try:
-        (said := _Said()).dump((lowered.as_text(), found, _machine()))
-        same = file.with_name(f"{hashlib.sha256(said.text).hexdigest()}-compiled")
-        if (made := _read(same, tree)) is None:
-            made = _once(lowered)
-            (said := _Said()).dump((serialize(made)[0], found))
-            with tempfile.NamedTemporaryFile(dir=file.parent, delete=False) as part:
-                part.write(said.text)
-            os.replace(part.name, same)
-        file.unlink(missing_ok=True)
-        os.link(same, file)
-    except (OSError, ValueError, pickle.PicklingError, UserError, NotImplementedError):  # no place, or no name
-        return lowered.compile()
-    return made
+        (said := _Said()).dump((serialize(made)[0], _numbered(out)))
+        with tempfile.NamedTemporaryFile(dir=same.parent, delete=False) as part:
+            part.write(said.text)
+        os.replace(part.name, same)
+    except (OSError, ValueError, NotImplementedError):  # no place, or constants beside the program
+        return False
+    return True
 
 
-def _once(lowered: Any) -> Any:
-    """Compiled, and not kept by jax too: what that reads again could not be written here."""
-    name = "jax_persistent_cache_min_compile_time_secs"
+def _once(lowered: Any) -> tuple[Any, bool]:
+    """Compiled, and not kept by jax too; and whether it was compiled here: what jax had kept cannot be written again,
+    though nothing says so before it is read and run."""
+    name, read = "jax_persistent_cache_min_compile_time_secs", list[str]()
+
+    def heard(event: str, **_: Any) -> None:
+        if event == "/jax/compilation_cache/cache_hits":
+            read.append(event)
+
     least = getattr(jax.config, name)
     jax.config.update(name, np.inf)
+    jax.monitoring.register_event_listener(heard)
     try:
-        return lowered.compile()
+        return lowered.compile(), not read
     finally:
         jax.config.update(name, least)
+        jax.monitoring.unregister_event_listener(heard)

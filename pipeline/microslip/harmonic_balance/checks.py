@@ -42,13 +42,14 @@ def _apart(problem: Problem, found: Operating) -> float:
         seen = np.column_stack([u[:, 0] - contact.offset, u[:, 1::2] - 1j * u[:, 2::2]])
         (first, most), (second, other) = sides[i, 0], sides.get((i, 1), (0.0, 0.0))
         away = max(away, float(np.abs(G @ (first - second - seen)).max(initial=0.0)))
-        could = float((np.abs(G) @ (most + other)).max(initial=0.0))
+        could = float((np.abs(G) @ (most + other + np.abs(contact.offset))).max(initial=0.0))
         largest = max(largest, float(np.abs(G @ seen).max(initial=0.0)), LEFT / MOTION * could)
     return away / largest if largest else 0.0
 
 
 LEFT = 1e-12
-"""Of the motion that coordinates as large could make of a contact's sides, what rounding may leave of the relative one:
+"""Of the motion that coordinates as large could make of a contact's sides, and of where it is pressed to, what rounding
+may leave of the relative one:
 two masses that 1e12 N/m join move alike to twelve digits. Springs of 1e12 and 1e15 N/m leave 1e-14 of it."""
 
 

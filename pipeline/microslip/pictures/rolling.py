@@ -55,8 +55,8 @@ def traction_picture(found: Studied, path: Path, title: str) -> Path:
     pick = np.s_[step[0] // 2 :: step[0], step[1] // 2 :: step[1]]
     left.quiver(1e3 * t.x[pick], 1e3 * t.y[pick], t.traction_x[pick], t.traction_y[pick], color="white", width=0.004)
     stretch = stretched(np.ptp(_corners(t), axis=(0, 1)))
-    x_said, y_said = (f" ({k:.2g} times as wide)" if k > 1 else "" for k in (1 / stretch, stretch))
-    left.set(xlabel=f"x in mm{x_said}, rolling to the right", ylabel=f"y in mm{y_said}", title="traction in MPa")
+    said = "traction in MPa" if stretch == 1.0 else "traction in MPa, x and y to scales of their own"
+    left.set(xlabel="x in mm, rolling to the right", ylabel="y in mm", title=said)
     left.set_aspect(stretch)
     figure.colorbar(image, ax=left, shrink=0.85)
     row = t.x.shape[0] // 2

@@ -20,6 +20,7 @@ from ..harmonic_balance.nonlinear_modes import Backbone
 from ..results.series import Series
 from ..results.tones import TwoTones, is_of_tones, read_tones
 from ..settings.arguments import checked
+from ..units import UNIT_OF_FREQUENCY
 from . import orbit, samples
 from .equations import Equations
 from .orbit import Orbit, Start
@@ -47,7 +48,7 @@ class Recorded(Orbit):
             "samples": int(told["samples_per_period"]), "steps": int(told["steps_per_period"]),
             "missed": int(told["missed_events"]), "error": float(told["error"]), "diverged": float(told["diverged"]),
             "messages": tuple(json.loads(told["messages"])), "exponent": orbit.exponent_of(told),
-            "_omega": float(told["Omega"]),
+            "_omega": float(told["Omega"]), "shown": UNIT_OF_FREQUENCY.get(),
             "_omega2": group["omega2"][()], "_touching": samples.touches_of(told), "_equations": equations,
         }  # fmt: skip
         self.__dict__.update(own)
