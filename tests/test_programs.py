@@ -34,6 +34,10 @@ def law() -> Law:
     return ms.jenkins(1e5, 10.0).law
 
 
+def _unread(idle: Any, x: Any) -> Any:
+    return 2 * x
+
+
 def again(law: Any) -> np.ndarray:
     """As a process that begins."""
     patch._tangents.made.clear()
@@ -109,6 +113,17 @@ def test_what_is_not_of_this_package_is_not_kept(folder: Path, law: Law) -> None
 def _asked(law: Law) -> tuple[Any, Any, Any]:
     leaves, tree = programs.jax.tree_util.tree_flatten(((law, PLACES), {}))
     return tree, tuple(map(programs._type, leaves)), ()
+
+
+def test_arguments_that_a_program_does_not_need_are_part_of_it(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The compiler does not read them; a program is called with arguments of its own shapes alone."""
+    unread = programs.Program(_unread, None)
+    monkeypatch.setattr(programs, "PACKAGE", __name__)
+    monkeypatch.setattr(programs, "_run", lambda made, given: [made(*given[0], **given[1])] if made else [])
+    for n in (1, 4, 1):
+        unread.made.clear()
+        assert float(unread(np.zeros(n), 2.0)) == 4.0
+    assert len(kept(folder)) == 2
 
 
 def test_what_jax_had_kept_is_not_written_again(

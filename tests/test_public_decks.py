@@ -279,9 +279,9 @@ def test_a_contact_pair_is_the_same_in_either_order(tmp_path, capsys, cells):
         (tmp_path / f"{name}.inp").write_text(paired(plate_and_block(cells), pair))
         assert main(["import", f"{name}.inp"]) == 0
         said.append(capsys.readouterr().out)
-        sets = ["--set", "modes.solver=superlu", "--set", "modes.count=4"]
+        sets = ["--set", "modes.solver=superlu", "--set", "modes.count=4", "--set", f"name={name}"]
         assert main(["modes", f"{name}/part-2", "-q", *sets]) == 0
-        faces = read_basis(tmp_path / "build" / "part-2" / "basis.h5").groups[0, 0].interfaces
+        faces = read_basis(tmp_path / "build" / name / "basis.h5").groups[0, 0].interfaces
         areas += [(key, face.areas.sum()) for key, face in faces.items()]
         case = tomllib.loads((tmp_path / name / "case.toml").read_text())
         assert case["contacts"][0]["normal_stiffness"] == pytest.approx(4e11 * 80e-6)

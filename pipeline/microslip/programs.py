@@ -101,7 +101,7 @@ class Program:
         if folder is None or jax.default_backend() != "cpu":
             return None
         name, arguments = self.function.__qualname__, jax.tree_util.tree_unflatten(tree, range(len(types)))
-        if "<" in name:  # made while running
+        if "<" in name or self.function.__module__.partition(".")[0] != PACKAGE:  # made while running, or elsewhere
             return None
         try:
             said = _Said(self.function.__module__)
@@ -254,14 +254,14 @@ def _run(read: Callable[..., Any] | None, given: Given) -> list[Any]:
         return []
     try:
         return [jax.block_until_ready(read(*given[0], **given[1]))]
-    except jax.errors.JaxRuntimeError:
+    except (jax.errors.JaxRuntimeError, TypeError):
         return []
 
 
 def _compiled(file: Path | None, lowered: Any, given: Given) -> tuple[Callable[..., Any], list[Any]]:
     """A program and what it finds: compiled and kept, unless one that reads the same for the compiler was kept when
     sources differed."""
-    made, same, found = None, _alike(file, lowered), list[Any]()
+    made, same, found = None, _alike(file, lowered, given), list[Any]()
     if same is not None and not (found := _run(made := _read(same, jax.tree_util.tree_structure(given)), given)):
         made, ours = _once(lowered)
         _READ.update([] if ours else [same.name])
@@ -274,12 +274,15 @@ def _compiled(file: Path | None, lowered: Any, given: Given) -> tuple[Callable[.
     return made, found or [made(*given[0], **given[1])]
 
 
-def _alike(file: Path | None, lowered: Any) -> Path | None:
-    """Where a program is kept by what the compiler reads; None if it is not to be kept."""
+def _alike(file: Path | None, lowered: Any, given: Given) -> Path | None:
+    """Where a program is kept by what the compiler reads, which leaves out arguments that it does not need, and by its
+    arguments; None if it is not to be kept."""
     if file is None:
         return None
     try:
-        (said := _Said()).dump((lowered.as_text(), _numbered(lowered.out_tree), _machine()))
+        leaves, tree = jax.tree_util.tree_flatten(given)
+        trees = _numbered(tree), _numbered(lowered.out_tree)
+        (said := _Said()).dump((lowered.as_text(), trees, tuple(map(_type, leaves)), _machine()))
     except (UserError, pickle.PicklingError):  # a class of another package
         return None
     same = file.with_name(f"{hashlib.sha256(said.text).hexdigest()}-compiled")
