@@ -314,7 +314,8 @@ def planned(title: str, expected: float | None = None) -> str:
 def _speed(known: Durations, verb: str) -> float | None:
     """Of this machine, how many times longer runs took than was expected of them: those of the same verb, or all; None
     where none is known."""
-    took = [(key.split()[0], s / expected) for key, more in known.items() for s, expected in more if expected]
+    long = [(key.split()[0], s, expected) for key, more in known.items() for s, expected in more if s >= SHORT]
+    took = [(of, s / expected) for of, s, expected in long if expected]  # a short one is the start of its process
     ratios = [ratio for of, ratio in took if of == verb] or [ratio for _, ratio in took]
     return statistics.median(ratios) if ratios else None
 
