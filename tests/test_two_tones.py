@@ -395,7 +395,7 @@ def test_a_killed_run_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, u
         return solve(b, first, *rest)
 
     def killed(said: str) -> None:
-        if said.startswith("point 2"):
+        if said.startswith("2 of"):
             raise KeyboardInterrupt
 
     monkeypatch.setattr(tones, "solve", counted)
