@@ -17,6 +17,7 @@ from microslip.basis import read_basis
 from microslip.case import load_case
 from microslip.errors import UserError
 from microslip.files import store
+from microslip.settings.meant import meant
 from microslip.settings.toml import load_toml
 from microslip.stages import meshing, modal, places, response, running
 from microslip.stages.job import Job, open_job
@@ -377,20 +378,20 @@ def test_what_a_path_means(tmp_path, monkeypatch):
         (tmp_path / name).write_text("", encoding="utf-8")
     (tmp_path / "build" / "rig").mkdir(parents=True)
     case, body = Path("pipeline/cases/blade.toml"), Path("geometry/blade/body.toml")
-    assert places.meant(Path("blade")) == body and places.meant(Path("blade"), case=True) == case
-    assert places.meant(Path("geometry/blade")) == Path("geometry/blade")
-    assert places.meant(Path("geometry/blade"), case=True) == case
+    assert meant(Path("blade")) == body and meant(Path("blade"), case=True) == case
+    assert meant(Path("geometry/blade")) == Path("geometry/blade")
+    assert meant(Path("geometry/blade"), case=True) == case
     assert (
-        places.meant(Path("build/rig/response.h5"))
-        == places.meant(Path("build/rig"))
+        meant(Path("build/rig/response.h5"))
+        == meant(Path("build/rig"))
         == Path("pipeline/cases/rig.toml")
     )
     (tmp_path / "build" / "own").mkdir()
-    assert places.meant(Path("own/system.toml"), case=True) == Path("own/case.toml")
-    assert places.meant(Path("build/own"), case=True) == Path("own/case.toml")
-    assert places.meant(Path("own")) == Path("own") and places.meant(Path("away.toml")) == Path("away.toml")
-    refused("is 'blade' meant", places.meant, Path("blad"))
-    refused("no case here or of this name; there are blade, rig", places.meant, Path("geometry"), case=True)
+    assert meant(Path("own/system.toml"), case=True) == Path("own/case.toml")
+    assert meant(Path("build/own"), case=True) == Path("own/case.toml")
+    assert meant(Path("own")) == Path("own") and meant(Path("away.toml")) == Path("away.toml")
+    refused("is 'blade' meant", meant, Path("blad"))
+    refused("no case here or of this name; there are blade, rig", meant, Path("geometry"), case=True)
 
 
 FEW = ["sweep.start=350.0", "sweep.stop=420.0", "sweep.points=5", "sweep.normal_forces=[100.0]", "harmonics=1",

@@ -221,8 +221,9 @@ def run(
             folder or file of products; or the word sample, as respond has it.
     """
     from .basis import read_basis
+    from .settings.meant import meant
     from .stages.job import holds_a_case_alone, open_job, system_file
-    from .stages.places import is_case, is_rolling, is_tyre, meant
+    from .stages.places import is_case, is_rolling, is_tyre
     from .stages.response import Wanted
     from .stages.running import run_body, run_case_file, run_system, unsolved
     from .stages.summary import frequency_lines
@@ -539,7 +540,8 @@ def stability(
             whose contacts slide, with [stability].
         speed: of a modal file, or a body with a mesh: which of its speeds, counted from 0; the first if not given.
     """
-    from .stages.places import is_case, meant
+    from .settings.meant import meant
+    from .stages.places import is_case
     from .stages.squeal import squeal_stage
     from .stages.stability import stability_stage
 
@@ -626,7 +628,7 @@ def optimum(
 
 def _case_file(case: Path) -> Path:
     """A case.toml, the one in a folder, of a name or of products, or the one that travels with the package."""
-    from .stages.places import meant
+    from .settings.meant import meant
 
     if str(case) == "sample" and not case.exists():
         return PACKAGE / "samples" / "case.toml"

@@ -13,7 +13,6 @@ from ..case import CaseSettings
 from ..case.settings import BodyOfCase
 from ..errors import UserError
 from ..files import store
-from ..settings.meant import meant as meant
 from ..settings.toml import load_toml
 from .job import ASKED, bodies_of, open_job, system_file
 from .modal import modes_stage, system_stage
