@@ -38,6 +38,10 @@ def _unread(idle: Any, x: Any) -> Any:
     return 2 * x
 
 
+def _solved(A: Any, b: Any) -> Any:
+    return jnp.linalg.solve(A, b)
+
+
 def again(law: Any) -> np.ndarray:
     """As a process that begins."""
     patch._tangents.made.clear()
@@ -165,3 +169,20 @@ def test_another_process_finds_them(tmp_path: Path) -> None:
         said.append(found.stdout)
         held.append(kept(tmp_path))
     assert said[0] == said[1] and held[0] == held[1] and held[0]
+
+
+def test_a_process_that_has_lowered_nothing_finds_lapack(tmp_path: Path) -> None:
+    """It called what nobody had looked for, and ended."""
+    solve = f"""
+import sys
+sys.path.append({str(Path(__file__).parent)!r})
+import test_programs as t
+t.programs.PACKAGE = t.__name__
+t.programs.kept_in = lambda: t.Path({str(tmp_path)!r})
+if t.kept(t.programs.kept_in()):
+    t.programs._compiled = None
+print(t.programs.Program(t._solved, None)(2 * t.np.eye(2), t.np.ones(2)).tolist())
+"""
+    for _ in range(2):
+        assert subprocess.check_output([sys.executable, "-c", solve], text=True).strip() == "[0.5, 0.5]"
+        assert len(kept(tmp_path)) == 1

@@ -25,6 +25,7 @@ from typing import Any
 from weakref import WeakSet
 
 import jax
+import jax.numpy as jnp
 import numpy as np
 
 from .errors import UserError
@@ -248,9 +249,18 @@ def _read(file: Path | None, tree: Any) -> Callable[..., Any] | None:
     try:
         compiled, found = pickle.loads(file.read_bytes())
         os.utime(file)
+        if b"lapack_" in compiled:
+            _find_lapack()
         return deserialize_and_load(compiled, tree, jax.tree_util.tree_structure(found))
     except Exception:  # whatever damage does; it is compiled again, and kept anew
         return None
+
+
+@cache
+def _find_lapack() -> None:
+    """jax looks for LAPACK where it lowers a call of it; a program that was read calls what nobody looked for, and the
+    process ends."""
+    jax.jit(jnp.linalg.inv).lower(np.eye(1))
 
 
 def _run(read: Callable[..., Any] | None, given: Given) -> list[Any]:
