@@ -13,6 +13,7 @@ import sys
 import time
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -1140,9 +1141,12 @@ def two_tones() -> None:
     """Duffing's oscillator under two forces, and how a slider's amplitudes converge to those of motions in time."""
     import tones_study as study
 
-    from microslip.pictures.tones import point_picture
+    from microslip.analysis import Diagram
+    from microslip.stages.analysing import drawn
+    from microslip.verbs.two_tones import draw_point
 
-    save(from_file(point_picture(study.duffing(), 0, BUILD / "two_tones.png", "")), "two_tones")
+    point = Diagram(partial(draw_point, study.duffing(), 0), size=(9.0, 6.4))
+    save(from_file(drawn(point, BUILD / "two_tones.png")), "two_tones")
     fill("two_tones.md", "slider", table(*study.slider()))
 
 

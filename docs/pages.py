@@ -21,7 +21,7 @@ from typing import Any
 
 import microslip
 from microslip.case.driving import GroundOfCase
-from microslip.case.settings import CaseSettings, ContactSettings
+from microslip.case.settings import ContactSettings, case_model
 from microslip.contact.settings import ContactFile
 from microslip.data import (
     Compliance,
@@ -698,7 +698,7 @@ def contact_reference() -> str:
 
 def case_reference() -> str:
     """Tables of every key of case.toml, likewise."""
-    return _reference(CaseSettings, MEANING_CASE, "case.toml")
+    return _reference(case_model(), MEANING_CASE, "case.toml")
 
 
 STORED: tuple[tuple[str, type], ...] = (

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ..case import CaseSettings
 from ..case.assemble import Built, build
+from ..case.settings import case_model
 from ..data import ModalBasis
 from ..errors import UserError
 from ..settings.mistakes import validate
@@ -45,7 +45,7 @@ class Varied:
         others = [f"{k.removeprefix(OF_SYSTEM)}={v!r}" for k, v in values.items() if k.startswith(OF_SYSTEM)]
         where = f"{self.path}: {where}" if where else str(self.path)
         try:
-            settings = validate(CaseSettings, override(raw, own, self.path), self.path)
+            settings = validate(case_model(), override(raw, own, self.path), self.path)
             return build(settings, self._systems(others, where) if others else self.bases, self.path)
         except UserError as error:
             text = str(error).removeprefix("--set ").removeprefix(f"{self.path}: ")
