@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import ast
 import pkgutil
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
@@ -105,15 +106,25 @@ def places() -> dict[str, str]:
     """Name of every analysis -> its module, which is not loaded."""
     verbs = Path(__file__).parent / "verbs"
     here = {m.name: f"{__package__}.verbs.{m.name}" for m in pkgutil.iter_modules([str(verbs)])}
-    return here | {point.name: point.value.partition(":")[0] for point in entry_points(group=GROUP)}
+    return {point.name: point.value.partition(":")[0] for point in entry_points(group=GROUP)} | here
 
 
 @cache
-def analysis(name: str) -> Analysis:
-    """The analysis of a name."""
-    found = import_module(places()[name]).ANALYSIS
-    assert isinstance(found, Analysis) and found.name == name
-    return found
+def analyses() -> dict[str, Analysis]:
+    """All by name; one of another package that cannot be loaded is left out with a warning."""
+    loaded = {}
+    for name, module in places().items():
+        try:
+            one = import_module(module).ANALYSIS
+            if one.name != name:
+                raise ValueError(f"its name is {one.name!r}")
+            loaded[name] = one
+        except Exception as error:
+            if module.partition(".")[0] == __package__:
+                raise
+            said = f"{GROUP}: {name}, {module}, cannot be loaded ({error})"
+            warnings.warn(f"{said}; it is left out: mend or remove its package", stacklevel=2)
+    return loaded
 
 
 def file_of(name: str) -> Path:

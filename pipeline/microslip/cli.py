@@ -995,13 +995,13 @@ def _verb(name: str, said: str) -> Callable[..., None]:
         case: Path, basis: Path | None = None, /, *, no_pictures: NoPictures = False, set_: Set = (),
         force: Force = False, quiet: Quiet = False,
     ) -> None:  # fmt: skip
-        from .analysis import analysis
+        from .analysis import analyses
         from .stages.analysing import analysed
 
         case = _case_file(case)
         with progress(f"{name.replace('_', ' ')} of {case}", quiet) as report:
             found = analysed(name, _case_job(case, set_, force, report, no_pictures, basis))
-        _tell(found, quiet, f"{analysis(name).lost}; {{page}} says which and why")
+        _tell(found, quiet, f"{analyses()[name].lost}; {{page}} says which and why")
 
     verb.__doc__ = f"{said}\n\n{_ARGUMENTS}"
     return verb

@@ -10,10 +10,11 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, create_model, model_validator
 
-from ..analysis import analysis, places
+from ..analysis import GROUP, analyses
 from ..contact.friction import OfCoulomb
 from ..contact.point import OfPoint
 from ..contact.settings import ContactLaw
+from ..errors import UserError
 from ..operating.fatigue import MaterialLimits
 from ..reduced.compliance import BULK_AND_SURFACE
 from ..settings.mistakes import too_few
@@ -353,7 +354,7 @@ class CaseSettings(Model):
     @property
     def asked(self) -> dict[str, Model]:
         """Analysis -> its keys, of those in whose tables the case asks for something."""
-        return {name: keys for name in places() if (keys := getattr(self, name, None)) is not None}
+        return {name: keys for name in analyses() if (keys := getattr(self, name, None)) is not None}
 
     @property
     def is_only_followed(self) -> bool:
@@ -607,11 +608,17 @@ def load_case(path: Path | str, assignments: Sequence[str] | None = None) -> tup
 
 @cache
 def case_model() -> type[CaseSettings]:
-    """`CaseSettings` with the tables of all analyses."""
-    tables: dict[str, Any] = {name: (analysis(name).asks | None, None) for name in places()}
+    """`CaseSettings` with the tables of all analyses.
+
+    Raises:
+        UserError: the table of one has the name of another key.
+    """
+    tables: dict[str, Any] = {name: (one.asks | None, None) for name, one in analyses().items()}
+    if taken := sorted(set(tables) & set(CaseSettings.model_fields)):
+        raise UserError(f"{GROUP}: '{taken[0]}' is a key of every case already; remove its package or rename it there")
     return create_model("CaseSettings", __base__=CaseSettings, __doc__=CaseSettings.__doc__, **tables)
 
 
 def _unswept() -> set[str]:
     """Analyses that need no sweep."""
-    return {name for name in places() if not analysis(name).swept}
+    return {name for name, one in analyses().items() if not one.swept}

@@ -26,7 +26,7 @@ def analysed(name: str, case: CaseJob) -> Written:
     Raises:
         UserError: the case asks for nothing, or for what cannot be.
     """
-    one = analysis.analysis(name)
+    one = analysis.analyses()[name]
     asked = case.settings.asked.get(name)
     if asked is None and one.needed:
         raise UserError(f"{case.path}: {name}: is missing; add [{name}] with {one.needed}")
