@@ -578,6 +578,9 @@ MEANING_CASE: dict[str, tuple[str, str]] = {
     "orbit.release.mode": ("", "or a mode of the bodies without their contacts, by its number from 1"),
     "orbit.release.amplitude": ("m", "of the first monitor in that mode"),
     "orbit.normal_force": ("N", "of the contacts that the sweep presses"),
+    "map.low": ("N", "the first normal force; the smallest above 0 of the sweep if not given"),
+    "map.high": ("N", "the last; the largest of the sweep if not given"),
+    "map.forces": ("", "how many, in equal ratios; more are added beside the lowest resonance"),
     "ring_down.frequency": ("Hz", "at which the case is driven until its loads are taken off; the highest resonance if "
                             "not given"),
     "ring_down.amplitude": ("m", "of the first read-out: the motion begins in the nonlinear mode instead"),
