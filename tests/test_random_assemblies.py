@@ -329,7 +329,7 @@ CHANGES: dict[str, Callable[[dict[str, Any]], Any]] = {
     "interference": pressed(1, interference=1e-5),
     "contacts in another order": lambda raw: raw["contacts"].reverse(),
     "normal forces": larger("sweep", "normal_forces", 0),
-    "more normal forces": lambda raw: raw["sweep"]["normal_forces"].insert(0, 60.0),
+    "more normal forces": lambda raw: raw["sweep"]["normal_forces"].insert(0, 42.0),
     "start": larger("sweep", "start"),
     "stop": larger("sweep", "stop"),
     "points": put("sweep", "points", 4),
