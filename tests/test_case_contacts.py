@@ -121,12 +121,6 @@ def built(raw: dict[str, Any]) -> Any:
     return build(settings, {b.name: small.basis() for b in settings.components}, PATH)
 
 
-@pytest.fixture
-def unestimated(monkeypatch: pytest.MonkeyPatch) -> None:
-    """What harmonics leave is not estimated where the balance alone is looked at."""
-    monkeypatch.setattr(_Left, "out", lambda *_: [])
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("patch", ["nodal", "rigid"])
 def test_a_beam_whose_patch_deforms_on_the_ground(patch: str, request: Any) -> None:

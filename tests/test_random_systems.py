@@ -24,7 +24,7 @@ ALONE = (1, 16, 18, 23, 29)
 """Of them, those whose contacts are sliders on a line: nothing is compiled for these."""
 
 SOON = 27.0
-"""Periods in which free vibrations of those that are integrated die out: half of all, contacts of each kind."""
+"""Periods in which free vibrations of those that are integrated die out: most of them, contacts of each kind."""
 
 BETWEEN = 49
 """A slider that, of 64 samples, turns less than a quarter of a step beside one, where twice as many miss as much: its
@@ -46,7 +46,7 @@ def test_random_systems_are_within_their_estimate_of_a_dense_balance() -> None:
     for one in found:
         agree(one)
     shares = [one.off / one.estimate for one in found if one.off > 1e-6]
-    assert len(shares) > 0.7 * COUNT and 0.2 < np.median(shares) < 0.5
+    assert len(found) == 24 and len(shares) > 16 and 0.2 < np.median(shares) < 0.5
     assert np.median([one.own / one.off for one in found if one.off > 1e-6]) < 0.1
 
 
@@ -74,7 +74,7 @@ def test_sliders_on_a_line_are_within_their_estimate_of_integration_in_time(seed
 def test_random_systems_are_within_their_estimate_of_integration_in_time() -> None:
     """Two bodies, four modes, points that lift off among them; second order in the step, as the sliders allow."""
     short = [seed for seed in at_home(COUNT) if lasts(drawn(seed)) < SOON]
-    assert len(short) > COUNT / 2 and {t.kind for seed in short for t in drawn(seed).touches} == {"jenkins", *AT_HOME}
+    assert len(short) == 15 and {t.kind for seed in short for t in drawn(seed).touches} == {"jenkins", *AT_HOME}
     for seed, (off, estimate, own) in zip(short, map(integrated, short), strict=True):
         assert off <= estimate + own and own < 2e-3, seed
 

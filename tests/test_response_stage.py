@@ -416,6 +416,7 @@ SLIDES = ("amplitude=20.0", "sweep.points=5", "sweep.normal_forces=[500.0]")
     "more",
     [*(pytest.param(m, marks=pytest.mark.slow) for m in (('mode="book"',), ("harmonics=3",))), ()],
 )
+@pytest.mark.usefixtures("unestimated")
 def test_the_energy_on_a_contact_map_is_that_of_the_response(folder: Path, more: tuple[str, ...]) -> None:
     """What the mode found, whatever it leaves out: the VTU's J/m2 times areas against the file's J per cycle, single
     precision. The full law marched along the book's motion, or with other samples, takes more or less."""
@@ -516,6 +517,7 @@ normal_forces = [60.0]
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("unestimated")
 def test_coordinates_of_a_cyclic_sector_read_in_their_own_waves(folder: Path) -> None:
     """Engine order 5 on six sectors is nodal diameter 1 the other way round, its third harmonic 3: 1e-9 of the monitor.
 
