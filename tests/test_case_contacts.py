@@ -25,14 +25,12 @@ from microslip.case.assemble import build
 from microslip.case.checkpoint import files_of, of_points
 from microslip.case.contacts import memory_of
 from microslip.case.curves import curves
-from microslip.case.run import _Left
 from microslip.cli import main
 from microslip.contact.curved import Line, foundation_of_line
 from microslip.contact.patch import pressure
 from microslip.contact.solids import Solid
 from microslip.errors import UserError
 from microslip.files import store
-from microslip.harmonic_balance.accuracy import more
 from microslip.harmonic_balance.cost import aft_bytes
 from microslip.modal.compute import modal_basis
 from microslip.settings.body import BodySettings, validate
