@@ -14,7 +14,7 @@ import os
 import re
 import subprocess
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -88,10 +88,12 @@ def steps(page: str) -> Iterator[Step]:
         yield Step(more if kind == "file" else "", text)
 
 
-def play(page: str, folder: Path, more: Mapping[str, str] | None = None) -> str:
+def play(
+    page: str, folder: Path, more: Mapping[str, str] | None = None, type_in: Callable[[str, Path], str] | None = None
+) -> str:
     """Do what a page says in an empty folder, with this Python's `microslip`; returns what the commands printed.
 
-    more: words to add to lines that begin so.
+    more: words to add to lines that begin so. type_in: runs a line in the folder, `typed` if not given.
 
     Raises:
         RuntimeError: a command failed.
@@ -103,7 +105,7 @@ def play(page: str, folder: Path, more: Mapping[str, str] | None = None) -> str:
             (folder / step.path).write_text(step.text, encoding="utf-8")
         else:
             lines = [line for line in step.text.splitlines() if line and not line.startswith("#")]
-            shown += [typed(" ".join([line, *added(line, more or {})]), folder) for line in lines]
+            shown += [(type_in or typed)(" ".join([line, *added(line, more or {})]), folder) for line in lines]
     return "\n".join(shown)
 
 

@@ -156,6 +156,12 @@ unjudged_file = pytest.fixture(_unjudged, scope="module", name="unjudged_file")
 
 
 @pytest.fixture
+def unestimated(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A slow test whose subject is not the error that harmonics leave does without its estimate as well."""
+    monkeypatch.setattr("microslip.case.headline.is_estimated", lambda *_, **__: False)
+
+
+@pytest.fixture
 def compiled_for_users(monkeypatch: pytest.MonkeyPatch) -> None:
     """Processes that a test starts compile as a user's do, where time or memory is what is tested."""
     if os.environ.get("XLA_FLAGS", "").startswith(QUICK):  # the package adds to them when it is loaded
