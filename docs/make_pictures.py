@@ -1150,6 +1150,17 @@ def two_tones() -> None:
     fill("two_tones.md", "slider", table(*study.slider()))
 
 
+def ring_down() -> None:
+    """The sample vane whose loads are taken off at its resonance, and the map of its amplitudes."""
+    BUILD.mkdir(parents=True, exist_ok=True)
+    with contextlib.chdir(BUILD):
+        typed(["ring-down", "sample", "--set", "ring_down.normal_force=20.0", "--set", "ring_down.down_to=0.05"])
+        band = [f"--set=sweep.{key}={value}" for key, value in (("start", 330), ("stop", 410), ("points", 121))]
+        typed(["map", "sample", "--set", "map.low=2.0", "--set", "map.high=200.0", *band])
+    for name in ("ring_down", "map"):
+        save(from_file(BUILD / "build" / "sample" / "pictures" / f"{name}.png"), name)
+
+
 def mistuning() -> None:
     """The mistuned ring with friction: amplification, envelopes beside first order, the worst sample, and a table."""
     import mistuning_study as study
@@ -1627,6 +1638,7 @@ STUDIES = {
         reference,
         python,
         two_tones,
+        ring_down,
         mistuning,
         identification,
         stability,

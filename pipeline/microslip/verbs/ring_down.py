@@ -26,7 +26,7 @@ from ..harmonic_balance.problem import Problem
 from ..harmonic_balance.readout import measured
 from ..harmonic_balance.response import operating
 from ..harmonic_balance.solver import Point, sweep
-from ..pictures.plots import COLOURS, plain_axes
+from ..pictures.plots import COLOURS, plain_axes, plain_numbers
 from ..results.dataset import Dataset, Variable
 from ..results.journal import once
 from ..settings.numbers import Model, NotNegative, Positive
@@ -163,6 +163,7 @@ def draw(decay: Dataset, motion: Dataset, of: Quantity, figure: Figure) -> None:
     panels["motion"].legend(fontsize=8, frameon=False)
     for name, says in (("frequency", "frequency in Hz"), ("damping_ratio", "damping ratio in %")):
         panels[name].set(xscale="log", xlabel=f"amplitude in {unit}", ylabel=says)
+        plain_numbers(panels[name].xaxis, (1.0, 2.0, 5.0))
     panels["damping_ratio"].set_ylim(bottom=0)
     panels["frequency"].set_title("points: the motion; broad lines: the nonlinear mode", fontsize=9)
 
