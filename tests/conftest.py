@@ -25,6 +25,7 @@ settings.load_profile("microslip")
 
 PROGRAMS = Path(__file__).resolve().parents[1] / "build/programs-of-tests"
 os.environ.setdefault("JAX_COMPILATION_CACHE_DIR", str(PROGRAMS))  # kept between runs, shared by workers
+os.environ["XDG_CACHE_HOME"] = str(PROGRAMS.with_name("cache-of-tests"))  # a user's has the durations of their own runs
 
 if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:  # as in a shell's background job: children would inherit it
     signal.signal(signal.SIGINT, signal.default_int_handler)

@@ -557,6 +557,13 @@ def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path / "microslip" / "durations.json"
 
 
+def test_durations_of_tests_are_not_kept_with_those_of_the_user() -> None:
+    from microslip import progress
+
+    where = progress._place()
+    assert where is not None and Path(__file__).parents[1] / "build" in where.parents
+
+
 def test_a_run_says_what_it_will_do_and_how_long_it_took_here(
     cache: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

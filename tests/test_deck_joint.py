@@ -91,7 +91,7 @@ def modes(folder: Path, name: str) -> np.ndarray:
     """Hz, of a body of the joint, motions without stiffness left out."""
     with contextlib.chdir(folder):
         assert main(["modes", f"bolted/{name}", "-q"]) == 0
-    omega = read_basis(folder / "build" / name / "basis.h5").groups[0, 0].omega
+    omega = read_basis(folder / "build" / f"bolted-{name}" / "basis.h5").groups[0, 0].omega
     return omega[omega > 0] / 2 / np.pi
 
 

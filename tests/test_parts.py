@@ -7,6 +7,7 @@ import json
 import subprocess
 import sys
 import tomllib
+from pathlib import Path
 
 import decks
 import meshes
@@ -70,10 +71,13 @@ def test_two_decks_that_touch_are_an_assembly_that_runs(decks_of_plates, capsys)
     quick += ["--set", "amplitude=1e-4", "--set", "contacts.lower:upper.points=[2,2]"]  # which sticks
     assert main(["run", "joint", "-q", *quick]) == 0
     for name, other in (("lower", "upper"), ("upper", "lower")):
-        group = read_basis(f"build/{name}/basis.h5").groups[0, 0]
+        group = read_basis(f"build/joint-{name}/basis.h5").groups[0, 0]
         assert group.interfaces[other].areas.sum() == pytest.approx(6e-4, rel=1e-9)
-    assert "shaker" in read_basis("build/lower/basis.h5").groups[0, 0].excitations
+    assert "shaker" in read_basis("build/joint-lower/basis.h5").groups[0, 0].excitations
     assert all(s.converged.all() for s in read_response("build/joint/response.h5").series)
+    assert main(["import", "lower.inp", "upper.inp", "again"]) == 0  # parts of the same names
+    assert main(["modes", "again/lower", "-q"]) == 0 and Path("build/again-lower/basis.h5").is_file()
+    assert [b.body for b in load_case("again/case.toml")[0].components] == ["again-lower", "again-upper"]
 
 
 def test_bodies_that_are_there_get_their_lines_at_the_end(decks_of_plates, capsys):
@@ -162,7 +166,7 @@ def test_solids_of_one_file_are_set_apart_and_run(drawn, capsys, monkeypatch):
     assert "surface kind" not in said and "surface kind" in (drawn / "three" / "part-1" / "body.toml").read_text()
     sticking = ["--set", "amplitude=1e-4", "--set", "harmonics=1", "--set", "sweep.points=2"]
     assert main(["run", "three", "-q", "--no-stress", "--no-pictures", *sticking]) == 0
-    areas = [p.areas.sum() for p in read_basis("build/part-1/basis.h5").groups[0, 0].interfaces.values()]
+    areas = [p.areas.sum() for p in read_basis("build/three-part-1/basis.h5").groups[0, 0].interfaces.values()]
     assert areas == pytest.approx([6e-4, 25e-6 * np.pi], rel=0.03)  # chords
     refused_command(["import", "lower.step", "other", "--apart"], capsys, "nothing to set apart")
 
@@ -174,5 +178,5 @@ def test_one_of_two_patches_is_picked_by_its_box(drawn):
     case, _ = load_case("held/case.toml")
     assert [(c.interface, c.against) for c in case.contacts] == [("plate:pin-2", "pin:plate-2")]
     assert main(["modes", "held/plate", "-q"]) == 0
-    area = read_basis("build/plate/basis.h5").groups[0, 0].interfaces["pin-2"].areas.sum()
+    area = read_basis("build/held-plate/basis.h5").groups[0, 0].interfaces["pin-2"].areas.sum()
     assert area == pytest.approx(39e-6 * np.pi, rel=0.03)

@@ -319,9 +319,29 @@ def test_what_cannot_be_is_refused_in_a_sentence(
 ) -> None:
     whole = belt.read_text()
     assert text in whole
+    if key == "lifts off":  # whose map follows normal_force, which this case has no more
+        whole = whole[: whole.index("[[stability.over]]")]
     belt.write_text(whole.replace(text, wrong, 1))
     refused_command(["stability", str(belt), "--quiet"], capsys, key)
     assert not Path("build/belt/stability.csv").exists()
+
+
+@pytest.mark.parametrize(
+    "keys", ["[stability.cycle]\n{}", "[stability.cycle]\n{}[stability.cycle.across]\n{}", "[stability]\nfull = 2\n"]
+)
+def test_ranges_are_tried_before_anything_is_computed(
+    belt: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, keys: str
+) -> None:
+    """A limit cycle's key, or a body without a mesh, was told when the roots and the map were there."""
+    good = 'parameter = "load"\nkeys = {"contacts.sole-1.normal_force" = 1.0}\nstart = 1.0\nstop = 9.0\n'
+    ranges = [good] * (keys.count("{}") - 1) + [good.replace("sole-1", "sole-9")]
+    text = belt.read_text()
+    if "full" in keys:
+        belt.write_text(text.replace("[stability]\n", keys, 1))
+    else:
+        belt.write_text(text + keys.format(*ranges))
+    monkeypatch.setattr("microslip.stages.squeal.state_of", pytest.fail)
+    refused_command(["stability", str(belt), "-q"], capsys, "mesh" if "full" in keys else "sole-9")
 
 
 def test_a_case_that_does_not_ask_is_refused(belt: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -6,22 +6,24 @@ import ast
 import json
 import os
 import shutil
+import tomllib
 from pathlib import Path
 
 import numpy as np
 import pytest
 from box import edit, write_box
-from refusals import refused
+from refusals import refused, refused_command
 
+import microslip
 from microslip.basis import read_basis
 from microslip.case import load_case
 from microslip.errors import UserError
 from microslip.files import store
 from microslip.settings.meant import meant
 from microslip.settings.toml import load_toml
-from microslip.stages import meshing, modal, places, response, running
+from microslip.stages import following, meshing, modal, places, response, running
 from microslip.stages.job import Job, open_job
-from microslip.stages.stage import PACKAGE, _imported, hash_of_code
+from microslip.stages.stage import PACKAGE, Made, Stage, _imported, folder_of_case, hash_of_code
 
 pytestmark = pytest.mark.usefixtures("undrawn", "unjudged")
 
@@ -381,11 +383,7 @@ def test_what_a_path_means(tmp_path, monkeypatch):
     assert meant(Path("blade")) == body and meant(Path("blade"), case=True) == case
     assert meant(Path("geometry/blade")) == Path("geometry/blade")
     assert meant(Path("geometry/blade"), case=True) == case
-    assert (
-        meant(Path("build/rig/response.h5"))
-        == meant(Path("build/rig"))
-        == Path("pipeline/cases/rig.toml")
-    )
+    assert meant(Path("build/rig/response.h5")) == meant(Path("build/rig")) == Path("pipeline/cases/rig.toml")
     (tmp_path / "build" / "own").mkdir()
     assert meant(Path("own/system.toml"), case=True) == Path("own/case.toml")
     assert meant(Path("build/own"), case=True) == Path("own/case.toml")
@@ -456,9 +454,7 @@ def test_what_a_build_file_imports_or_reads_is_an_input_of_the_mesh(
         assert made() and not made(), file
 
 
-def test_a_mesh_counts_for_the_folder_it_was_drawn_in(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_mesh_counts_for_the_folder_it_was_drawn_in(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The same body.toml and build.py beside another table draw another body: 33 mm, not 11 mm."""
     monkeypatch.chdir(tmp_path)
     body = write_box(tmp_path / "box", case=False)
@@ -504,3 +500,68 @@ def test_bodies_of_one_name_do_not_overwrite_each_other(
     again, _ = modal.modes_stage(open_job(other))
     assert again == Path(BASIS) and read_basis(again).groups[0, 0].omega[0] < 0.6 * first
     assert places.existing_files(load_case(case)[0], case, None, Path()) == {"box": Path(BASIS)}
+
+
+CASES = Path(__file__).parents[1] / "pipeline" / "cases"
+SAMPLE = Path(microslip.__file__).parent / "samples" / "case.toml"
+VERBS = [
+    (SAMPLE, verb)
+    for verb in ("respond", "respond --over frequency", "respond --stability", "respond --compare-book", "run", "orbit")
+] + [
+    (SAMPLE, "backbone"),
+    (SAMPLE, "optimum"),
+    (SAMPLE, "identify"),
+    (SAMPLE, "two-tones"),
+    (SAMPLE, "mistune"),
+    (CASES / "belt.toml", "bifurcate"),
+    (CASES / "squeal.toml", "stability"),
+    (CASES / "wheel-rail.toml", "roll"),
+    (CASES / "unround-wheel.toml", "roll"),
+    (CASES / "slip-jump.toml", "roll"),
+]
+
+
+def test_no_verb_overwrites_another_case_of_one_name(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """What a case has left in build/NAME stays, whatever is asked of another case of that name, until one of them has
+    another name or the first one's folder is gone; of the same case nothing is refused."""
+    monkeypatch.chdir(tmp_path)
+    for number, (file, verb) in enumerate(VERBS):
+        first, second = (Path(f"{number}{side}") / "case.toml" for side in "ab")
+        for copy in (first, second):
+            copy.parent.mkdir()
+            shutil.copyfile(file, copy)
+        name = tomllib.loads(file.read_text())["name"]
+        folder = folder_of_case(first, name)
+        product = folder / "orders.txt"  # of whichever verb
+
+        def work(product: Path = product) -> Made:
+            store.write_text(product, "of the first case")
+            return Made()
+
+        Stage(product, (), case=first).make({}, work)
+        with monkeypatch.context() as few:  # nothing is looked for, and nothing computed, before
+            few.setattr(places, "find_body", pytest.fail)
+            few.setattr(places, "existing_files", pytest.fail)
+            refused_command([*verb.split(), str(second)], capsys, f"{second}: name", str(first), f"delete {folder}")
+        assert {p.name for p in folder.iterdir()} == {"orders.txt", "orders.txt.json"}
+        assert folder_of_case(first, name) == folder
+        shutil.rmtree("build")
+
+
+def test_a_case_that_is_moved_or_renamed_gives_way(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What is followed from a case is of that case too. Moved with its products it is the same."""
+    first, moved = tmp_path / "first" / "case.toml", tmp_path / "moved"
+    first.parent.mkdir()
+    shutil.copyfile(SAMPLE, first)
+    shutil.copytree(first.parent, tmp_path / "second")
+    monkeypatch.chdir(first.parent)
+    folder = folder_of_case(Path("case.toml"), "sample")
+    following.Case(Path("case.toml"), {}, {}, folder).table("backbone.csv", ["a"], [])
+    shutil.move(first.parent, moved)
+    monkeypatch.chdir(moved)
+    assert folder_of_case(Path("case.toml"), "sample") == folder
+    refused(str(folder), folder_of_case, Path("../second/case.toml"), "sample")
+    edit(Path("case.toml"), 'name = "sample"', 'name = "other"')
+    assert folder_of_case(Path("../second/case.toml"), "sample") == folder

@@ -331,6 +331,7 @@ def respond(
     from .case.comparison import sentence
     from .stages import running
     from .stages.response import Wanted, response_of_case
+    from .stages.stage import folder_of_case
 
     case = _case_file(case)
     if over is not None:
@@ -338,7 +339,7 @@ def respond(
         return
     with (
         progress(f"respond {case}", quiet) as report,
-        response_of_case(Path("build") / load_case(case, list(set_))[0].name, report=report).making(),
+        response_of_case(folder_of_case(case, load_case(case, list(set_))[0].name), report=report).making(),
     ):
         if compare_book:
             table, pairs, converged = running.compare_book(case, basis, list(set_), force, report, log=log)
@@ -411,13 +412,15 @@ def _case_job(
     from .case import load_case
     from .stages.answer import CaseJob
     from .stages.places import existing_files, modal_files
+    from .stages.stage import folder_of_case
 
     settings, _ = load_case(case, list(set_))
+    folder = folder_of_case(case, settings.name)
     if basis is not None:
         files = existing_files(settings, case, basis, Path("."))
     else:
         files = modal_files(settings, case, Path("."), report)
-    return CaseJob(case, files, Path("build") / settings.name, set_, force, report, not no_pictures)
+    return CaseJob(case, files, folder, set_, force, report, not no_pictures)
 
 
 def _tell(found: Written, quiet: bool, lost: str) -> None:
@@ -623,10 +626,12 @@ def _followed(case: Path, basis: Path | None, assignments: Sequence[str]) -> Cas
     from .case import load_case
     from .stages.following import open_case
     from .stages.places import existing_files
+    from .stages.stage import folder_of_case
 
     settings, _ = load_case(case, list(assignments))
+    folder = folder_of_case(case, settings.name)
     files = existing_files(settings, case, basis, Path("."))
-    return open_case(case, files, Path("build") / settings.name, assignments)
+    return open_case(case, files, folder, assignments)
 
 
 @app.command

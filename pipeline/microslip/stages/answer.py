@@ -15,7 +15,7 @@ from ..case.assemble import Built, build
 from ..data import ModalBasis
 from ..files import store
 from .checkpoint import inputs_of
-from .stage import Made, Report, Stage, hash_of_code
+from .stage import Made, Report, Stage, folder_of_case, hash_of_code
 
 
 class Written(NamedTuple):
@@ -99,7 +99,8 @@ class CaseJob:
 
         What `work` keeps in ``name.points`` until then is removed.
         """
-        stage = Stage(self.folder / f"{name}.json", (module,), self.force, self.report)
+        product = self.folder / f"{name}.json"
+        stage = Stage(product, (module,), self.force, self.report, case=self.path)
         found = answered(stage, {**self.inputs, "pictures": self.pictures}, lambda: work(stage, self))
         stage.product.with_suffix(".points").unlink(missing_ok=True)
         return found
@@ -122,7 +123,8 @@ class RollJob:
 
     def stage(self, case: str, name: str, module: str) -> Stage:
         """The stage whose product is ``name.json``, made by a module."""
-        return Stage(self.root / case / f"{name}.json", (module,), self.force, self.report)
+        product = folder_of_case(self.path, case, self.root) / f"{name}.json"
+        return Stage(product, (module,), self.force, self.report, case=self.path)
 
     def inputs(self, raw: Mapping[str, Any], files: Iterable[Path | str]) -> dict[str, Any]:
         """What the answer depends on: the case as a table, files that it names (what is missing is told where it is

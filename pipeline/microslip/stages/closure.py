@@ -13,7 +13,7 @@ from ..units import from_rpm
 from .job import Job
 from .meshing import load_mesh, mesh_stage
 from .modal import with_temperature
-from .stage import Report
+from .stage import Made, Report, Stage
 
 
 def closure_stage(
@@ -40,12 +40,18 @@ def closure_stage(
     mesh, warnings = load_mesh(job, mesh_stage(job, report=report))
     for warning in warnings:
         report(f"warning: {warning}")
-    with told_of(job.path):
-        settings, temperature = with_temperature(job, mesh)
-        levels = np.linspace(low, high, points) * scale
-        curve = closure_curve(mesh, settings, chosen, levels, from_rpm(rpm), temperature, report)
     folder = output or job.basis_file.parent
     table, picture = folder / f"closure_{chosen}.csv", folder / f"closure_{chosen}.png"
-    with store.making(table, report):
+
+    def work() -> Made:
+        with told_of(job.path):
+            settings, temperature = with_temperature(job, mesh)
+            levels = np.linspace(low, high, points) * scale
+            curve = closure_curve(mesh, settings, chosen, levels, from_rpm(rpm), temperature, report)
         store.write_text(table, curve.table())
-        return [table, closure_curve_plot(curve, f"{job.settings.name}: closure '{chosen}' at {rpm:g} rpm", picture)]
+        title = f"{job.settings.name}: closure '{chosen}' at {rpm:g} rpm"
+        return Made([closure_curve_plot(curve, title, picture)])
+
+    origin = None if output else job.path
+    Stage(table, ("modal.closures",), True, report, origin).make({}, work)
+    return [table, picture]

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from ..files import store
 from ..files.tables import rows_csv, write_tables
-from .stage import Report
+from .stage import Made, Report, Stage
 
 
 def contact_stage(
@@ -30,10 +30,15 @@ def contact_stage(
     summary = folder / "summary.csv"
     rows = [*found.told, *(("judgement", s) for s in found.sentences)]
     report("pictures and tables")
-    with store.making(summary, report):
-        tables = write_tables(folder, {f"{name}.csv": columns for name, columns in found.tables.items()}, 10)
-        files = [*draw(found, folder), *tables, summary]
+
+    def work() -> Made:
+        named = {f"{name}.csv": columns for name, columns in found.tables.items()}
+        files.extend([*write_tables(folder, named, 10), *draw(found, folder)])
         store.write_text(summary, rows_csv(("what", "value"), rows))
+        return Made(files)
+
+    files, origin = list[Path](), None if output else path
+    Stage(summary, ("contact.study",), True, report, origin).make({}, work)
     width = max(len(what) for what, _ in found.told)
     lines = [f"{what:{width}}  {value}" for what, value in found.told]
-    return [*lines, *found.sentences, *map(str, sorted(files))]
+    return [*lines, *found.sentences, *map(str, sorted([*files, summary]))]

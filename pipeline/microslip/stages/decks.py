@@ -113,7 +113,8 @@ def _assembly(
     refuse_taken(home / "case.toml", *(part.body for part in parts))
     told: list[str] = []
     for number, (part, group) in enumerate(zip(parts, groups, strict=True)):
-        told += import_file(file, part.body.parent, unit, group).told[:-1]
+        new = import_file(file, part.body.parent, unit, group, name=part.new_name)
+        told += new.told[:-1]
         add_lines(part, joint_lines(parts, number, patches, unit))
     flat = [patch for patch in patches if patch.normal is not None]
     if not flat:

@@ -34,7 +34,7 @@ from ..harmonic_balance.solver import CONVERGED
 from ..results import read_response
 from ..results.checks import checked, largest
 from ..units import METRES, Quantity, percent
-from .stage import Report
+from .stage import Report, Stage
 from .varied import Varied
 
 if TYPE_CHECKING:
@@ -89,8 +89,10 @@ class Case(Varied):
         stem = name.removesuffix(".csv")
         for former in (f"{stem}.html", f"pictures/{stem}.png"):
             (self.folder / former).unlink(missing_ok=True)
-        store.write_text(self.folder / name, rows_csv(head, rows))
-        return self.folder / name
+        file = self.folder / name
+        store.write_text(file, rows_csv(head, rows))
+        store.write_json(store.sidecar_path(file), Stage(file, (), case=self.path).origin_noted())
+        return file
 
 
 def open_case(path: Path, files: Mapping[str, Path], folder: Path, assignments: Sequence[str] = ()) -> Case:

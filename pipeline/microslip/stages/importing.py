@@ -49,15 +49,15 @@ class Imported:
 
 def import_file(
     file: Path, folder: Path | None, unit: str | None = None, instances: Sequence[str] = (),
-    report: Report = lambda _: None,
+    report: Report = lambda _: None, name: str = "",
 ) -> Imported:
     """Write a body.toml around a CAD file, a mesh or matrices; nothing is copied, the file is named where it lies.
 
     Args:
         file: a CAD file, a mesh with or without materials, or the stiffness matrix of a pair. folder: of the new
-            body.toml, and the body's name; by default one of the file's name here. unit: of its
-            lengths; None: that which the file tells, else mm.
-        instances: those of a deck that are the body, all if none.
+            body.toml; by default one of the file's name here. unit: of its lengths; None: that which
+            the file tells, else mm. instances: those of a deck that are the body, all if none.
+        name: of the body; the folder's if not given.
 
     Raises:
         UserError: unreadable, or there is a body.toml already.
@@ -65,7 +65,7 @@ def import_file(
     if not ordinary(file).is_file():
         raise UserError(f"{file}: there is no such file; correct the path")
     unit = length_unit(unit, file)
-    name = body_name((folder.resolve().name if folder else "") or file.stem)
+    name = name or body_name((folder.resolve().name if folder else "") or file.stem)
     if file.suffix.lower() in _UNIVERSAL and _holds_modes(file):
         return _measured(file, (folder or Path(name)) / "basis.h5", unit, name)
     target = (folder or Path(name)) / "body.toml"

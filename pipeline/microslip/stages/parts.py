@@ -42,7 +42,8 @@ STEEL = 5170.0
 
 @dataclass(frozen=True)
 class Part:
-    """One part of an assembly: its file, its name, and the body.toml around it; there: before anything is written."""
+    """One part of an assembly: its file, its name there, and the body.toml around it; there: before
+    anything is written."""
 
     file: Path
     name: str
@@ -53,6 +54,13 @@ class Part:
     def keys(self) -> dict[str, Any]:
         """The keys of the body.toml."""
         return tomllib.loads(self.body.read_text(encoding="utf-8"))
+
+    @property
+    def new_name(self) -> str:
+        """Of the body that is written: with that of the assembly's folder, so that parts of one name
+        in two assemblies are two bodies; that of the part alone if it would be too long."""
+        both = f"{body_name(self.body.parent.parent.resolve().name)}-{self.name}"
+        return both if len(both) <= 64 else self.name
 
 
 @dataclass(frozen=True)
@@ -109,7 +117,9 @@ def import_parts(
     told: list[str] = []
     for number, part in enumerate(parts):
         if not part.there:
-            written = import_file(part.file, part.body.parent, unit, report=report).told[:-1]
+            written = import_file(
+                part.file, part.body.parent, unit, report=report, name=part.new_name
+            ).told[:-1]
             told += [text.splitlines()[0] for text in written]  # a table of surfaces stands in the body.toml as well
         add_lines(part, joint_lines(parts, number, patches, unit))
     told += [sentence(parts, patch, unit) for patch in patches]
@@ -345,7 +355,9 @@ def case_lines(
     axis = "xyz"[int(np.abs(n).argmax())] if n is not None else "x"
     low, high = _band(shapes, UNITS[unit])
     springs = [f", weak_springs = {low / 100:.2g}" * bool(part.keys.get("free")) for part in parts]
-    bodies = ",\n".join(f'    {{ name = "{part.name}"{s} }}' for part, s in zip(parts, springs, strict=True))
+    called = [(part.name, str(part.keys["name"])) for part in parts]
+    named = [f'name = "{n}"' + f', body = "{own}"' * (own != n) for n, own in called]
+    bodies = ",\n".join(f"    {{ {n}{s} }}" for n, s in zip(named, springs, strict=True))
     lines = [
         f'name = "{body_name(home.resolve().name)}"',
         f'excitation = "{driven}:{rows[0]}"   # move it and the monitor, in its body.toml, when you clamp there',

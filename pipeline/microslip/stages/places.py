@@ -170,10 +170,10 @@ def _elsewhere(path: Path, name: str, root: Path) -> str:
 def find_body(case_path: Path, name: str, root: Path) -> Path:
     """The body file of a name that a case gives.
 
-    It stands beside the case, in any file, or in NAME/ or geometry/ of the case's folder, of one above it, or of
-    `root`, the nearest first, so that a case means the same body wherever it is run. In geometry/ it is
-    geometry/NAME/body.toml, or any file of geometry/*/ that says that name (a body's second arrangement, the other side
-    of a rig).
+    It stands beside the case, in any file, in body.toml of a folder there, or in NAME/ or
+    geometry/ of the case's folder, of one above it, or of `root`, the nearest first, so that a case
+    means the same body wherever it is run. In geometry/ it is geometry/NAME/body.toml, or any file
+    of geometry/*/ that says that name (a body's second arrangement, the other side of a rig).
 
     Raises:
         UserError: if there is none.
@@ -181,6 +181,7 @@ def find_body(case_path: Path, name: str, root: Path) -> Path:
     for number, folder in enumerate((*_above(case_path.parent, root), root)):
         beside = [folder / "body.toml", *bodies_of(folder)] if number == 0 else []
         usual = [*beside, folder / "geometry" / name / "body.toml", folder / name / "body.toml"]
+        usual += sorted(folder.glob("*/body.toml")) if number == 0 else []  # as `import` writes them
         for file in (*filter(Path.is_file, usual), *sorted((folder / "geometry").glob("*/*.toml"))):
             if load_toml(file).get("name") == name:
                 return file

@@ -71,7 +71,7 @@ def response_stage(
     Returns:
         The summary, and whether every point converged.
     """
-    stage = response_of_case(folder, force, report)
+    stage = response_of_case(folder, force, report, case_path)
     with stage.making():
         settings, raw = load_case(case_path, assignments)
         inputs = inputs_of(raw, settings, case_path, files)
@@ -87,9 +87,11 @@ def response_stage(
         return summary, summary["failed_points"] == 0
 
 
-def response_of_case(folder: Path, force: bool = False, report: Report = lambda _: None) -> Stage:
+def response_of_case(
+    folder: Path, force: bool = False, report: Report = lambda _: None, case: Path | None = None
+) -> Stage:
     """The stage whose product is the summary of a response, known by ``response.json``."""
-    return Stage(folder / "response.json", ("stages.response",), force, report)
+    return Stage(folder / "response.json", ("stages.response",), force, report, case=case)
 
 
 def _work(
@@ -114,8 +116,7 @@ def _work(
             known = _finished(points, so_far, Wanted("none", pictures=False), stage.report)
             stage.clear(folder / name for name in known["files"])
             stage.report(
-                f"{folder / 'response.html'} has what is known so far; {at}: dozens of motions in "
-                "time, of seconds each"
+                f"{folder / 'response.html'} has what is known so far; {at}: dozens of motions in time, of seconds each"
             )
         motions = Checkpoint(folder / "motions.points", raw, files, stage.force, stage.begin, True)
         result = with_motions(result, stage.report, motions.journal)

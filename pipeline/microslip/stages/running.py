@@ -31,7 +31,7 @@ from .page import report_stage
 from .places import existing_files, find_body, modal_files
 from .response import ALL, Wanted, response_of_case, response_stage
 from .squeal import squeal_stage
-from .stage import Report
+from .stage import Report, folder_of_case
 
 
 def run_body(
@@ -50,6 +50,7 @@ def run_body(
                 f"{job.case_file}: body: it names '{case.components[0].name}', but the body beside it is "
                 f"'{job.settings.name}'; make them agree"
             )
+        folder_of_case(job.case_file, job.settings.name, job.root / "build")
     modes_stage(job, force=force, report=report)
     if job.case_file is not None:
         files = {b.name: job.basis_file for b in case.components if (b.body or b.name) == job.settings.name}
@@ -89,13 +90,13 @@ def run_case_file(
         The report's path (the table's, for a case that has its own folder), and whether every point converged.
     """
     case, _ = load_case(path, assignments)
+    folder = folder_of_case(path, case.name)
     files = modal_files(case, path, Path("."), report)
     if case.body is not None and case.body == case.name:
         job = open_job(find_body(path, case.body, Path(".")))
         with response_of_case(job.build_folder, report=report).making():
             response, converged = _answered(path, case, files, job.build_folder, assignments, force, report, wanted)
             return report_stage(job, response, force, report, wanted.pictures), converged
-    folder = Path(".") / "build" / case.name
     _, converged = _answered(path, case, files, folder, assignments, force, report, wanted)
     page = "orbit.html" if case.is_only_in_time else "response.csv"
     if case.mistuning:
@@ -146,7 +147,7 @@ def respond(
             raise UserError(
                 f"{case_path}: body: it names '{b.body or b.name}', but {files[b.name]} holds '{name}'; make them agree"
             )
-    folder = root / "build" / case.name
+    folder = folder_of_case(case_path, case.name, root / "build")
     summary, converged = response_stage(case_path, files, folder, assignments, force, report, log, wanted)
     _tell(summary, report)
     return folder / "response.csv", converged
@@ -194,7 +195,7 @@ def compare_book(
     case, _ = load_case(case_path, [*given, 'mode="aft"', "strips=0"])
     strips = load_case(case_path, [*given, 'mode="book"'])[0].strips
     files = existing_files(case, case_path, basis_file, root)
-    folder = root / "build" / case.name
+    folder = folder_of_case(case_path, case.name, root / "build")
     folders = {mode: folder if mode == own.mode else folder / mode for mode in ("aft", "book")}
     ways = {
         "aft": (folders["aft"], [*given, 'mode="aft"', "strips=0"]),

@@ -31,7 +31,7 @@ from ..sliding import Sliding, Tangent
 from ..system.assembly import Assembly
 from .answer import CaseJob, Written
 from .cycles import Born, born, sentence_of_relief, sentences_of
-from .job import open_job
+from .job import Job, open_job
 from .meshing import load_mesh, mesh_stage
 from .moving import moving_shape
 from .places import find_body, lumped
@@ -94,15 +94,17 @@ def _work(stage: Stage, case: CaseJob) -> Written:
     settings, asked, folder = case.settings, case.settings.stability, case.folder
     assert asked is not None
     varied = Varied(case.path, case.raw, case.bases)
+    axes = _map_of(varied, asked) if asked.over else None
+    _try_ends(varied, asked)
+    jobs = {b.name: _meshed(b.body or b.name, case.path) for b in settings.components if asked.full}
     state = state_of(varied, {}, case.path)
     found = spectrum(state.matrices, window_of(asked), accuracy=asked.accuracy, neutral=asked.neutral)
-    axes = _map_of(varied, asked) if asked.over else None
     points = folder / "stability.points"
     over, full, cycles = None, list[Compared](), Born((), ())
     with open_journal(points, case.made_by(stage), {"case": settings.name}, case.force) as journal:
         if axes is not None:
             over = over_map(*axes, window_of(asked), asked.neutral, case.report, journal)
-            full = _in_full(varied, asked, over, settings, case.path, case.report, journal) if asked.full else []
+            full = _in_full(varied, asked, over, jobs, case.path, case.report, journal) if asked.full else []
         if asked.cycle:
             cycles = born(varied, asked.cycle, window_of(asked).omega, journal, case.report)
     stage.begin()
@@ -195,15 +197,29 @@ def pressed(state: State) -> list[str]:
 
 
 def _map_of(varied: Varied, asked: StabilityOfCase) -> tuple[Any, Axis, Axis]:
-    """What makes the assemblies of the map, and its axes; both keys are tried at the corners first."""
+    """What makes the assemblies of the map, and its axes."""
     x, y = (Axis(o.parameter, o.unit, np.linspace(o.start, o.stop, o.points), o.keys) for o in asked.over)
 
     def make(values: dict[str, float]) -> Assembly:
         return varied.under(values, "stability.over.keys")
 
-    for a, b in ((0, 0), (-1, -1)):
-        make({**x.at(x.values[a]), **y.at(y.values[b])})
     return make, x, y
+
+
+def _try_ends(varied: Varied, asked: StabilityOfCase) -> None:
+    """The case with all keys that follow a parameter, at the ends of its range: what is wrong with them is said before
+    anything is computed.
+
+    Raises:
+        UserError: see `Varied.built`.
+    """
+    cycle = asked.cycle
+    ranges = [("stability.over.keys", over) for over in asked.over]
+    ranges += [("stability.cycle.keys", cycle)] if cycle else []
+    ranges += [("stability.cycle.across.keys", cycle.across)] if cycle and cycle.across else []
+    for where, over in ranges:
+        for value in (over.start, over.stop):
+            varied.under({key: factor * value for key, factor in over.keys.items()}, where)
 
 
 FULL = "states in unreduced matrices"
@@ -211,11 +227,11 @@ FULL = "states in unreduced matrices"
 
 
 def _in_full(
-    varied: Varied, asked: StabilityOfCase, over: Map, settings: CaseSettings, path: Path, report: Report,
+    varied: Varied, asked: StabilityOfCase, over: Map, jobs: Mapping[str, Job], path: Path, report: Report,
     journal: Journal,
 ) -> list[Compared]:  # fmt: skip
     """States of the map, evenly spread over it, in unreduced matrices."""
-    bodies = {b.name: unreduced_body(b.body or b.name, path) for b in settings.components}
+    bodies = {name: _unreduced(job) for name, job in jobs.items()}
     for n in range(asked.full):
         if n not in journal.of(FULL):
             report(f"unreduced, state {n + 1} of {asked.full}")
@@ -244,10 +260,23 @@ def unreduced_body(name: str, path: Path) -> Unreduced:
     Raises:
         UserError: it has no mesh; see `modal.unreduced`.
     """
+    return _unreduced(_meshed(name, path))
+
+
+def _unreduced(job: Job) -> Unreduced:
+    return unreduced(load_mesh(job, mesh_stage(job))[0], job.settings)
+
+
+def _meshed(name: str, path: Path) -> Job:
+    """A body that a case names, which has a mesh.
+
+    Raises:
+        UserError: it has none.
+    """
     job = None if lumped(path, name) else open_job(find_body(path, name, Path(".")))
     if job is None or job.settings.geometry.matrices is not None:
         raise UserError(f"{path}: stability.full: '{name}' has no mesh, so there is nothing unreduced; leave full out")
-    return unreduced(load_mesh(job, mesh_stage(job))[0], job.settings)
+    return job
 
 
 def _told(full: Sequence[Compared]) -> list[str]:

@@ -72,7 +72,8 @@ def stability_stage(
         UserError: no window, a parameter that there is not, a case.
     """
     q = question(path, assignments, report, speed)
-    stage = Stage(q.folder / "stability.json", ("stages.stability",), force, report)
+    origin = None if q.where.suffix == ".h5" else q.where
+    stage = Stage(q.folder / "stability.json", ("stages.stability",), force, report, origin)
     return answered(stage, {**q.inputs, "pictures": pictures}, lambda: _work(stage, q, pictures))
 
 

@@ -49,6 +49,7 @@ class Stage:
         force: work even if there is nothing to do. report: is told what is being done.
         origin: the settings file by whose name the product is called: that of another file, which
             still has this name, is not overwritten. None: the place was asked for.
+        case: the case file by whose name the folder is called, see `folder_of_case`.
     """
 
     product: Path
@@ -56,6 +57,7 @@ class Stage:
     force: bool = False
     report: Report = lambda _: None
     origin: Path | None = None
+    case: Path | None = None
 
     def make(self, inputs: Mapping[str, Any], work: Callable[[], Made]) -> bool:
         """Do the work unless the product is up to date. Returns whether it was done.
@@ -76,26 +78,21 @@ class Stage:
             if made.whole:
                 files = [*made.files]
                 self.clear([self.product, *files])
-                note = {**made.note, **self._origin_noted()}
+                note = {**made.note, **self.origin_noted()}
                 store.note_product(self.product, all_inputs, files, made.opened, **note)
             return True
 
     def _refuse_another(self) -> None:
-        other = None if self.origin is None else origin_of(self.product)
-        if other is not None and self.origin is not None and not is_same(other, self.origin):
-            raise UserError(
-                f"{self.origin}: name: {self.product} is made of {other}, which has the same name; "
-                "give one of them another name (for one run: --set name=NAME)"
-            )
+        if self.origin is not None:
+            refuse_another(self.origin, self.product, origin_of(self.product))
 
-    def _origin_noted(self) -> dict[str, Any]:
+    def origin_noted(self) -> dict[str, Any]:
         """Where the settings file stands, seen from the product, so that both can be moved together."""
-        if self.origin is None or not self.origin.is_file():
+        file = self.case or self.origin
+        if file is None or not file.is_file():
             return {}
-        return {
-            "origin": seen_from(self.product, self.origin),
-            "name": load_toml(self.origin).get("name"),
-        }
+        key = "origin" if self.case is None else "case"
+        return {key: seen_from(self.product, file), "name": load_toml(file).get("name")}
 
     def is_made(self, inputs: Mapping[str, Any]) -> bool:
         """Whether the product is up to date, and not to be made all the same."""
@@ -132,9 +129,43 @@ def is_same(file: Path, other: Path) -> bool:
 def origin_of(product: Path) -> Path | None:
     """The settings file that a product is made of, or None where that is not known, or the file is
     gone or has another name by now."""
+    return _noted_in(store.sidecar_path(product), "origin") if product.is_file() else None
+
+
+def folder_of_case(path: Path, name: str, root: Path = Path("build")) -> Path:
+    """Where the products of a case stand: the folder of its name.
+
+    Raises:
+        UserError: those of another case stand there, which still has this name.
+    """
+    folder = root / name
+    for sidecar in sorted(folder.glob("*.json")):
+        refuse_another(path, folder, _noted_in(sidecar, "case"))
+    return folder
+
+
+def refuse_another(file: Path, product: Path, other: Path | None) -> None:
+    """Refuse to put what is made of a settings file in the place of what is made of another one.
+
+    Args:
+        product: a file, or a folder of products. other: the settings file it is made of.
+
+    Raises:
+        UserError: the files are not the same.
+    """
+    if other is not None and not is_same(other, file):
+        gone = product if product.is_dir() or product.suffix == ".msh" else product.parent
+        raise UserError(
+            f"{file}: name: {product} is made of {other}, which has the same name; give one of "
+            f"them another name (for one run: --set name=NAME), or delete {gone} if {other} is a copy"
+        )
+
+
+def _noted_in(sidecar: Path, key: str) -> Path | None:
+    """The settings file that a sidecar names, if it is there and is called as it was."""
     try:
-        note = json.loads(store.ordinary(store.sidecar_path(product)).read_text())
-        file = Path(os.path.relpath(product.parent.resolve() / note["origin"]))
+        note = json.loads(store.ordinary(sidecar).read_text())
+        file = Path(os.path.relpath(sidecar.parent.resolve() / note[key]))
         named = file.is_file() and load_toml(file).get("name") == note["name"]
     except (OSError, ValueError, KeyError, TypeError, UserError):
         return None

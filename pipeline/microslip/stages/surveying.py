@@ -27,7 +27,7 @@ from ..results.checks import sentence
 from ..units import counted
 from .checkpoint import Checkpoint, inputs_of
 from .places import existing_files
-from .stage import Made, Report, Stage
+from .stage import Made, Report, Stage, folder_of_case
 
 if TYPE_CHECKING:
     from ..harmonic_balance.envelope import Envelope, OverOrders
@@ -79,9 +79,9 @@ def survey_stage(
         KeyboardInterrupt: after what a curve has found until then is written.
     """
     settings, raw = load_case(case_path, assignments)
+    folder = folder_of_case(case_path, settings.name)
     files = existing_files(settings, case_path, basis_file, Path("."))
-    folder = Path("build") / settings.name
-    stage = Stage(folder / f"{kind}.txt", ("stages.surveying",), force, report)
+    stage = Stage(folder / f"{kind}.txt", ("stages.surveying",), force, report, case=case_path)
     with stage.making():
         settings = settings if kind == "identification" else checkpoint.as_found(settings, folder, case_path)
         if raw.get("harmonics") == "auto":

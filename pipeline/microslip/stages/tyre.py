@@ -25,8 +25,8 @@ def tyre_stage(job: RollJob) -> Written:
         UserError: mistakes of the case or its body.
     """
     case, raw = load_tyre(job.path, list(job.assignments))
-    basis, _ = modes_stage(open_job(find_body(job.path, case.tyre.body, Path("."))), report=job.report)
     stage = job.stage(case.name, "tyre", "stages.tyre")
+    basis, _ = modes_stage(open_job(find_body(job.path, case.tyre.body, Path("."))), report=job.report)
     return answered(stage, job.inputs(raw, [basis.resolve()]), lambda: _work(stage, case, job, basis))
 
 
