@@ -85,6 +85,7 @@ def test_programs_that_were_not_used_for_longest_are_forgotten(tmp_path: Path) -
     def kept() -> list[str]:
         return sorted(p.name for p in tmp_path.glob("*-cache"))
 
+    os.link(tmp_path / "0-cache", tmp_path / "0-again")  # a second name takes no room
     forget(tmp_path, most=10_000)
     forget(tmp_path, most=5_000)
     assert len(kept()) == 10

@@ -130,6 +130,21 @@ def test_arguments_that_a_program_does_not_need_are_part_of_it(folder: Path, mon
     assert len(kept(folder)) == 2
 
 
+def test_options_of_the_compiler_are_part_of_it(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What the compiler reads is the same; what is kept for hundreds of points is not read for a few."""
+    monkeypatch.setattr(programs, "PACKAGE", __name__)
+    for options in (None, {"xla_cpu_prefer_vector_width": 512}):
+        assert float(programs.Program(_unread, options)(np.zeros(3), 2.0)) == 4.0
+    assert len(kept(folder)) == len(set(folder.glob("*-compiled"))) == 2
+
+
+def test_names_of_sources_are_not_kept(folder: Path, law: Law) -> None:
+    again(law)
+    (program,) = kept(folder)
+    assert program.read_bytes().count(b"while") and not program.read_bytes().count(b"programs.py")
+    assert not program.read_bytes().count(b"jit(_tangents)/")
+
+
 def test_what_jax_had_kept_is_not_written_again(
     folder: Path, law: Law, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:

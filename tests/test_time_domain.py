@@ -614,9 +614,14 @@ def test_what_runs_first_is_compiled_once() -> None:
     e = equations.of(hitting(SLIPS, normal=0.5), 300.0)
     s = Stepper(e, 2 * np.pi / 300.0 / 1024)
     begun = s.start(np.zeros(3), np.zeros(3))
-    now, *_ = s.run(begun, np.full(64, 16))
+    now, seen, *_ = s.run(begun, np.full(64, 16))
     assert not any(x.weak_type for x in jax.tree_util.tree_leaves(begun))
     assert jax.tree.map(jax.typeof, begun) == jax.tree.map(jax.typeof, now)
+    made = len(loop.run.made)
+    fewer = s.run(begun, np.full(10, 64), rows=16)[1]  # the first six again after the last of ten
+    assert len(loop.run.made) == made and len(fewer.time) == 10
+    np.testing.assert_allclose(fewer.time, seen.time[27::4], rtol=1e-12)
+    np.testing.assert_allclose(fewer.q, seen.q[27::4], rtol=0, atol=1e-12 * np.abs(seen.q).max())
 
 
 @pytest.mark.slow

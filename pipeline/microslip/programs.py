@@ -324,9 +324,7 @@ def _run(read: Callable[..., Any] | None, given: Given) -> list[Any]:
         return []
 
 
-def _compiled(
-    file: Path | None, lowered: Any, options: Any, given: Given
-) -> tuple[Callable[..., Any], list[Any]]:
+def _compiled(file: Path | None, lowered: Any, options: Any, given: Given) -> tuple[Callable[..., Any], list[Any]]:
     """A program and what it finds: compiled and kept, unless one that reads the same for the compiler was kept when
     sources differed."""
     made, same, found = None, _alike(file, lowered, options, given), list[Any]()

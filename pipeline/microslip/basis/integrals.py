@@ -43,18 +43,14 @@ def _nodes(cell_type: str) -> Array:
 
 
 def _monomials(exponents: list[tuple[int, ...]], x: Array) -> Array:
-    return np.stack([np.prod(x ** np.array(e), axis=1) for e in exponents], axis=1)
+    return np.prod(x[:, None] ** np.array(exponents), axis=2)
 
 
 def _slopes(exponents: list[tuple[int, ...]], x: Array) -> Array:
     """(q, d, k) derivatives of the monomials."""
-    out = np.zeros((len(x), x.shape[1], len(exponents)))
-    for k, e in enumerate(exponents):
-        for d in range(x.shape[1]):
-            if e[d]:
-                lower = np.array(e) - np.eye(len(e), dtype=int)[d]
-                out[:, d, k] = e[d] * np.prod(x**lower, axis=1)
-    return out
+    e, d = np.array(exponents), x.shape[1]
+    lower = np.maximum(e - np.eye(d, dtype=int)[:, None], 0)
+    return np.where(e.T > 0, e.T * np.prod(x[:, None, None] ** lower, axis=3), 0.0)
 
 
 def _rule(cell_type: str) -> tuple[Array, Array]:

@@ -49,19 +49,20 @@ def typed(traced: Any) -> Any:
 
 @partial(program, static_argnums=(0, 1))
 def run(
-    options: Options, events: int, groups: tuple[Group, ...], B: Bodies, now: Now, each: Any, rows: Any, steps: Any
-) -> tuple[Now, Listed, Seen, Any, Hardest]:
-    """Rows of so many steps each, of which each (s,) is a sample, the first again after the last; as many as are
-    asked for, or until numbers are infinite.
+    options: Options, events: int, groups: tuple[Group, ...], B: Bodies, now: Now, each: Any, s: Any, rows: Any,
+    steps: Any,
+) -> tuple[Now, Listed, Seen, Any, Hardest]:  # fmt: skip
+    """Rows of so many steps each, of which each (room,) is a sample, the first again after the last of s; as many as
+    are asked for, or until numbers are infinite.
 
     Args:
         steps: done so far, all told. events: that are listed.
 
     Returns:
-        Where the motion is; the events; the last s samples, row i at i modulo s; how many rows there were;
-        the row in which steps missed most.
+        Where the motion is; the events; the last s samples, row i at i modulo s of (room, ...); how many rows there
+        were; the row in which steps missed most.
     """
-    p, s = B.omega2.shape[1], len(each)
+    p = B.omega2.shape[1]
     step = partial(one_step, options, groups, B)
 
     def on(carried: tuple) -> tuple:
@@ -89,7 +90,7 @@ def run(
         return i + 1, steps, jnp.isfinite(found.mechanical), now, listed, kept, hardest
 
     listed = Listed(jnp.zeros((), int), jnp.zeros((events, 3)))
-    seen = jax.tree_util.tree_map(lambda one: jnp.zeros((s, *one.shape)), look(now))
+    seen = jax.tree_util.tree_map(lambda one: jnp.zeros((len(each), *one.shape)), look(now))
     first = jnp.zeros((), int), steps, jnp.ones((), bool), now, listed, seen, Hardest(-jnp.ones(()), now.time)
     i, _, _, now, listed, seen, hardest = jax.lax.while_loop(lambda c: (c[0] < rows) & c[2], row, first)
     return now, listed, seen, i, hardest

@@ -35,6 +35,9 @@ from .spots import Spots, spots
 EVENTS = 8192
 """Events that one call of the loop keeps; of more, only their number is known."""
 
+FEWEST = 64
+"""Samples that one call of the loop has room for; of more, a power of two: one program serves many numbers of them."""
+
 DOUBLINGS = 16
 """Of the step, for leaps: their number is a multiple of it, so that one program serves steps of many lengths."""
 
@@ -238,7 +241,8 @@ class Stepper:
         self, now: Now, steps: Array, rows: int | None = None, events: int = EVENTS
     ) -> tuple[Now, Seen, Array, int, Hardest]:
         """So many rows further, all samples if it is not said, the i-th after steps[i modulo s] of tau, (s,); compiled
-        anew for another s alone. It ends early where numbers become infinite, in the last sample then.
+        anew for another power of two above s alone. It ends early where numbers become infinite, in the last sample
+        then.
 
         Returns:
             Where the motion is; the samples, the last s of more; (e, 3) events: time in s, contact, kind, an index of
@@ -247,10 +251,11 @@ class Stepper:
         s = len(steps)
         done = int(np.rint(float(now.time) / self.tau))  # or the last digits would hang on how much is done in a call
         fine = 2**self.options.halvings
+        each = np.zeros(max(FEWEST, 1 << (s - 1).bit_length()), int)
+        each[:s] = fine * np.asarray(steps)
         now, listed, seen, i, hardest = loop.run(
-            self.options, events, self.groups, self.bodies, now, fine * np.asarray(steps), s if rows is None else rows,
-            fine * done,
-        )  # fmt: skip
+            self.options, events, self.groups, self.bodies, now, each, s, s if rows is None else rows, fine * done
+        )
         count, back = int(listed.count), np.argsort(self.rows)
         told = np.array(np.asarray(listed.rows)[: min(count, events)])
         told[:, 1] = self.numbers[told[:, 1].astype(int)] if len(told) else 0
