@@ -625,6 +625,12 @@ def test_a_time_is_said_by_how_much_is_asked_for(
     assert expected(["run", "ring"]) == pytest.approx(respond + expected(["modes", "ring"]))
     less = expected(["respond", "ring", "--set", "sweep.points=8"])
     assert less - START == pytest.approx((respond - START) * 8 / 200)
+    rough = Path(__file__).parents[1] / "pipeline" / "cases" / "blade-rough.toml"
+    few = [f"--set=contacts.{i}.points=[12,2]" for i in range(2)]
+    whole = expected(["respond", str(rough)])
+    assert 250 < whole < 1000, "490 s of one core"
+    assert expected(["respond", str(rough), *few]) < whole / 4
+    assert expected(["respond", str(rough), "--set=mode='book'"]) < whole / 4, "its tables are read"
     with pytest.raises(UserError, match="there is no body or case here or of this name"):
         expected(["run", "nonesuch"])
 
