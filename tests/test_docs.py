@@ -388,15 +388,13 @@ def test_platforms_page() -> None:
 
 
 @pytest.mark.slow
-def test_own_model_page(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_own_model_page(tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
     """Everything the page says to type, pictures and friction response as well; the frequency it shows. Where its
     assemblies jump they are not followed in time, which takes up to `sweep.patience` at every place; they have
-    contacts of nine points, and share what is compiled for them."""
-    still = "--set sweep.patience=0"
-    more = {f"microslip run {case} ": still for case in ("joint", "bolted")}
-    more["microslip run lap "] = f"{still} --set contacts.0.points=[3,3]"
+    few frequencies, and contacts of nine points, which share what is compiled for them."""
+    still, points = "--set sweep.patience=0 --set sweep.points=", {"joint": 7, "bolted": 6, "lap": 12}
+    more = {f"microslip run {case} ": f"{still}{n}" for case, n in points.items()}
+    more["microslip run lap "] += " --set contacts.0.points=[3,3]"
     monkeypatch.chdir(tmp_path)
 
     def type_in(line: str, folder: Path) -> str:
