@@ -416,8 +416,21 @@ UNGUARDED = {
     "StressSet.singular": "where pictures and fatigue do not look: a choice, of the settings",
     "Interface.characteristic": MATRICES, "Interface.pattern": MATRICES, "Invariants.stiffening": MATRICES,
     "ModalGroup.to_diagonal": MATRICES, "ModalGroup.N_r": MATRICES, "Residual.phi": MATRICES,
-    **{f"ContactState.{f}": CLOSED for f in declared(ContactState)},
-    **{f"SpeedRange.{f}": RANGE for f in declared(SpeedRange)},
+    **dict.fromkeys(("ContactState.normal_force", "ContactState.force", "ContactState.pressure"), CLOSED),
+    **dict.fromkeys(("ContactState.centre", "ContactState.spread", "ContactState.closed_share"), CLOSED),
+    "ContactState.penetration": f"a limit, no value; {CLOSED}",
+    "ContactState.penalty": "chosen by the solver, of whose answer the penetration tells",
+    "ContactState.interference": "of the settings; it limits the penetration",
+    "ContactState.gap": "of the deformed faces, of which the other one's side is not in the state",
+    "ContactState.points": "of the quadrature of the face at rest: not looked for yet",
+    "ContactState.areas": f"no less than what carries the force; {CLOSED}",
+    **dict.fromkeys(("SpeedRange.interpolation_error", "SpeedRange.total_error", "SpeedRange.held"), RANGE),
+    **dict.fromkeys(("SpeedRange.slopes", "SpeedRange.shift"), RANGE),
+    "SpeedRange.tolerance": f"what the total error is held to; {RANGE}",
+    "SpeedRange.projection_error": "of the unreduced body at the held-out speeds, which is not in the file",
+    "SpeedRange.solved": f"no sample is both solved for and held out; {RANGE}",
+    "SpeedRange.lead": "read-outs that choose a basis within a pair: any will do",
+    "SpeedRange.points": "speeds of a diagram: a choice",
 }  # fmt: skip
 """What a change of one number by a hundredth is not looked for in, and why."""
 

@@ -433,7 +433,14 @@ def test_modal_file_keeps_the_contact(tmp_path):
     np.testing.assert_array_equal(back.pressure, kept.pressure)
     np.testing.assert_array_equal(back.points, basis.groups[0, 0].interfaces["r"].points)
     assert all(c.passed for c in check_basis(basis)), [c for c in check_basis(basis) if not c.passed]
-    for bad in (replace(kept, pressure=-kept.pressure), replace(kept, normal_force=2 * kept.normal_force)):
+    assert kept.spread is not None
+    skew = np.array([[0.0, 1, 0], [-1, 0, 0], [0, 0, 0]]) * np.trace(kept.spread)
+    for bad in (
+        replace(kept, pressure=-kept.pressure), replace(kept, normal_force=2 * kept.normal_force),
+        replace(kept, force=1.01 * kept.force), replace(kept, centre=kept.centre + [0, 0.1, 0]),
+        replace(kept, spread=-kept.spread), replace(kept, spread=kept.spread + 0.01 * skew),
+        replace(kept, closed_share=1.01), replace(kept, areas=0.9 * kept.areas),
+    ):  # fmt: skip
         group = replace(basis.groups[0, 0], contacts={"shroud": bad})
         assert not all(c.passed for c in check_basis(replace(basis, groups={(0, 0): group})))
 

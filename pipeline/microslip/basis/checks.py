@@ -449,7 +449,8 @@ def _place_of_rows_checks(basis: ModalBasis, g: ModalGroup) -> _Findings:
 
 
 def _contact_checks(name: str, c: ContactState) -> _Findings:
-    """A contact presses and never pulls; its force is no more than the integral of its pressure."""
+    """A contact presses and never pulls; its force is no more than the integral of its pressure, whose centre is no
+    farther than a facet from the points, and whose second moment is that of a distribution."""
     total = float(c.areas @ c.pressure)
     top = max(c.normal_force, 1e-12)  # an open contact has none
     resultant = abs(float(np.linalg.norm(c.force)) - c.normal_force) / top
@@ -458,6 +459,25 @@ def _contact_checks(name: str, c: ContactState) -> _Findings:
         (f"contact {name}: normal force is the resultant", resultant, 1e-9, ""),
         (f"contact {name}: pressure adds up to the force", max(c.normal_force - total, 0.0) / top, 1e-9, ""),
         (f"contact {name}: penetration", c.penetration, _depth(c), ""),
+        (f"contact {name}: share that is closed", max(-c.closed_share, c.closed_share - 1.0, 0.0), 1e-9, ""),
+        (f"contact {name}: centre is on the face", _beyond(c), float(np.sqrt(c.areas.max(initial=0.0))), ""),
+        *([] if c.spread is None else _spread_checks(name, c.spread)),
+    ]
+
+
+def _beyond(c: ContactState) -> float:
+    """m, by which the centre of the pressure is outside the box of the face's points."""
+    low, high = c.points.min(axis=0), c.points.max(axis=0)
+    return float(np.maximum(low - c.centre, c.centre - high).max(initial=0.0))
+
+
+def _spread_checks(name: str, spread: Array) -> _Findings:
+    """A second moment is symmetric and has no negative principal value."""
+    top = max(float(np.trace(spread)), 1e-300)
+    least = float(np.linalg.eigvalsh((spread + spread.T) / 2)[0])
+    return [
+        (f"contact {name}: spread is symmetric", _largest(spread - spread.T) / top, 1e-9, ""),
+        (f"contact {name}: spread is that of a pressure", max(-least, 0.0) / top, 1e-9, ""),
     ]
 
 
