@@ -285,7 +285,7 @@ def test_respond_over_speeds(tmp_path, monkeypatch, capsys) -> None:
     np.testing.assert_allclose(found["frequency_Hz"], found["speed_rpm"] * 4 / 60, rtol=1e-10)
     np.testing.assert_allclose(found["normal_force_1_N"], 80 * (found["speed_rpm"] / 20000) ** 2, rtol=1e-2)
     settings, _ = load_case(path, ["speed_rpm=12000"])
-    made = build(settings, {settings.components[0].name: ranged()}, path)
+    made = build(settings, {settings.components[0].name: ranged()})
     alone = response.harmonic_response(problem_of(made, 80 * 0.6**2), np.array([800.0]), np.zeros(1))
     assert found["amplitude_m"][2] == pytest.approx(abs(alone.monitor[0]), rel=1e-6)
     for change, words in (
@@ -313,7 +313,7 @@ def test_speeds_of_a_body_without_a_range_in_the_books_mode(tmp_path, monkeypatc
     said = capsys.readouterr().out
     assert "Book mode" in said and f"The same at all speeds: {blade().name}" in said
     found, (settings, _) = rows("build/line/speeds.csv"), load_case(path)
-    made = build(settings, {settings.components[0].name: blade()}, path)
+    made = build(settings, {settings.components[0].name: blade()})
     alone = response.harmonic_response(problem_of(made, 800 * 0.18**2), np.array([240.0]), np.zeros(1))
     assert alone.slipping.max() > 0
     assert found["amplitude_m"][1] == pytest.approx(abs(alone.monitor[0]), rel=1e-6)

@@ -347,7 +347,7 @@ def test_boxes_of_one_name_add_up_and_none_takes_a_sets_name(tmp_path: Path) -> 
 
     own, made = beam().faces, faces([*ends, ends[0]])["ends"]["triangle6"]
     assert len(made) == len(own["clamp"]["triangle6"]) + len(own["tip"]["triangle6"])
-    refused("body.toml: geometry.faces.tip: ", faces, [{**ends[0], "name": "tip"}])
+    refused("geometry.faces.tip: ", faces, [{**ends[0], "name": "tip"}])
 
 
 def test_what_a_mesh_includes_counts_as_its_input(tmp_path: Path) -> None:
@@ -381,11 +381,7 @@ def test_what_a_path_means(tmp_path, monkeypatch):
     assert meant(Path("blade")) == body and meant(Path("blade"), case=True) == case
     assert meant(Path("geometry/blade")) == Path("geometry/blade")
     assert meant(Path("geometry/blade"), case=True) == case
-    assert (
-        meant(Path("build/rig/response.h5"))
-        == meant(Path("build/rig"))
-        == Path("pipeline/cases/rig.toml")
-    )
+    assert meant(Path("build/rig/response.h5")) == meant(Path("build/rig")) == Path("pipeline/cases/rig.toml")
     (tmp_path / "build" / "own").mkdir()
     assert meant(Path("own/system.toml"), case=True) == Path("own/case.toml")
     assert meant(Path("build/own"), case=True) == Path("own/case.toml")
@@ -456,9 +452,7 @@ def test_what_a_build_file_imports_or_reads_is_an_input_of_the_mesh(
         assert made() and not made(), file
 
 
-def test_a_mesh_counts_for_the_folder_it_was_drawn_in(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_mesh_counts_for_the_folder_it_was_drawn_in(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The same body.toml and build.py beside another table draw another body: 33 mm, not 11 mm."""
     monkeypatch.chdir(tmp_path)
     body = write_box(tmp_path / "box", case=False)
@@ -499,8 +493,8 @@ def test_bodies_of_one_name_do_not_overwrite_each_other(
     assert aluminium == Path("meshes/aluminium.msh")
     case = (box / "case.toml").rename(other / "case.toml")
     with pytest.raises(UserError, match=r"bodies.box: means \S*other/body.toml, but .* is made of b"):
-        places.existing_files(load_case(case)[0], case, None, Path())
+        places.existing_files(load_case(case)[0], None, Path())
     edit(box / "body.toml", 'name = "box"', 'name = "steel"')
     again, _ = modal.modes_stage(open_job(other))
     assert again == Path(BASIS) and read_basis(again).groups[0, 0].omega[0] < 0.6 * first
-    assert places.existing_files(load_case(case)[0], case, None, Path()) == {"box": Path(BASIS)}
+    assert places.existing_files(load_case(case)[0], None, Path()) == {"box": Path(BASIS)}

@@ -416,7 +416,7 @@ def _case_job(
     from .stages.places import modal_files
 
     settings, _ = load_case(case, list(set_))
-    files = (find or partial(modal_files, report=report))(settings, case, root=Path("."))
+    files = (find or partial(modal_files, report=report))(settings, root=Path("."))
     return CaseJob(case, files, Path("build") / settings.name, set_, force, report, not no_pictures)
 
 
@@ -643,7 +643,7 @@ def _followed(case: Path, basis: Path | None, assignments: Sequence[str]) -> Cas
     from .stages.places import existing_files
 
     settings, _ = load_case(case, list(assignments))
-    files = existing_files(settings, case, basis, Path("."))
+    files = existing_files(settings, basis, Path("."))
     return open_case(case, files, Path("build") / settings.name, assignments)
 
 

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BeforeValidator, Field, model_validator
+from pydantic import BeforeValidator, Field, PrivateAttr, model_validator
 
 from ..contact.friction import OfCoulomb
 from ..contact.point import OfPoint
@@ -21,6 +21,7 @@ from ..settings.numbers import (
     NotNegative,
     Number,
     Numbers,
+    OfFile,
     Positive,
     Ratio,
     Ratios,
@@ -282,7 +283,7 @@ def _no_ratio(value: Any) -> Any:
     return value
 
 
-class CaseSettings(Model):
+class CaseSettings(OfFile):
     """A whole case.toml.
 
     body (with the speed, speed_rpm and modes of `BodyOfCase`), or [[bodies]]; excitation and amplitude, or
@@ -299,6 +300,8 @@ class CaseSettings(Model):
     damping_ratio: of the bodies that give none themselves, or of the stuck modes. material_limits: of the body whose
     monitor is drawn, for the margins of its stresses.
     """
+
+    _path: Path = PrivateAttr(default=Path("case.toml"))
 
     name: Name
     description: str = ""

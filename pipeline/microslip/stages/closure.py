@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..errors import UserError, told_of
+from ..errors import UserError, in_its_file
 from ..files import store
 from ..mesh import UNITS
 from ..units import from_rpm
@@ -16,6 +16,7 @@ from .modal import with_temperature
 from .stage import Report
 
 
+@in_its_file
 def closure_stage(
     job: Job, name: str | None, low: float, high: float, points: int, rpm: float, output: Path | None = None,
     report: Report = lambda _: None,
@@ -33,17 +34,16 @@ def closure_stage(
 
     known = [c.name for c in job.settings.closures]
     if name not in (known if len(known) != 1 else [*known, None]):
-        raise UserError(f"{job.path}: closures: the body has {', '.join(known) or 'none'}; name one of them")
+        raise UserError(f"the body has {', '.join(known) or 'none'}; name one of them", "closures")
     if not low < high or points < 2:
         raise UserError("closure --from, --to, --points: give two or more points over a rising approach")
     chosen, scale = name or known[0], UNITS[job.settings.length_unit]
     mesh, warnings = load_mesh(job, mesh_stage(job, report=report))
     for warning in warnings:
         report(f"warning: {warning}")
-    with told_of(job.path):
-        settings, temperature = with_temperature(job, mesh)
-        levels = np.linspace(low, high, points) * scale
-        curve = closure_curve(mesh, settings, chosen, levels, from_rpm(rpm), temperature, report)
+    settings, temperature = with_temperature(job, mesh)
+    levels = np.linspace(low, high, points) * scale
+    curve = closure_curve(mesh, settings, chosen, levels, from_rpm(rpm), temperature, report)
     folder = output or job.basis_file.parent
     table, picture = folder / f"closure_{chosen}.csv", folder / f"closure_{chosen}.png"
     with store.making(table, report):

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..analyses import two_tones
 from ..case import headline
-from ..errors import UserError
+from ..errors import UserError, at, in_its_file
 from ..files import store
 from ..files.tables import columns_csv
 from ..harmonic_balance.tones import Kept
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from ..results.tones import TwoTones
 
 
+@in_its_file
 def tones_stage(case: CaseJob) -> Answer:
     """What a case asks for in [two_tones]; whole if every point converged.
 
@@ -30,7 +31,7 @@ def tones_stage(case: CaseJob) -> Answer:
         UserError: the case asks for none; see `microslip.two_tones`.
     """
     if case.settings.two_tones is None:
-        raise UserError(f"{case.path}: two_tones: is missing; add [two_tones] with start and second (Hz), or ratio")
+        raise UserError("is missing; add [two_tones] with start and second (Hz), or ratio", "two_tones")
     return case.answer("two_tones", "stages.tones", _work)
 
 
@@ -41,16 +42,19 @@ def _work(stage: Stage, case: CaseJob) -> Answer:
     built = case.built()
     first, second = asked.hertz
     points = folder / "two_tones.points"
-    with open_journal(points, case.made_by(stage), {"case": name}, case.force) as journal:
+    with (
+        at("two_tones"),
+        open_journal(points, case.made_by(stage), {"case": name}, case.force) as journal,
+    ):
         try:
             found = two_tones(
                 built, first, second, free=asked.free, harmonics=asked.harmonics, samples=asked.samples,
                 turns=asked.turns, kept=Kept(journal), report=case.report,
             )  # fmt: skip
-        except UserError as error:
+        except UserError:
             if not journal.series:
                 points.unlink()
-            raise UserError(f"{case.path}: two_tones: {error}") from error
+            raise
     stage.begin()
     best = int(np.argmax(np.where(found.converged, np.abs(found.of(1, 0)), -1.0)))
     left_out = found.error_estimate(best) if found.converged[best] else np.inf
