@@ -69,7 +69,7 @@ def rows(path: str) -> dict[str, np.ndarray]:
 def test_identify_finds_the_stiffness_of_the_truth(ring: Path, capsys) -> None:
     """Frequencies of a ring with c_N = 3e6 N/m, c_T half of it, as if measured: found to 1e-6, the others predicted to
     1e-6; the file says which was fitted."""
-    made = build(load_case(ring)[0], {"blade": blade()}, ring)
+    made = build(load_case(ring)[0], {"blade": blade()})
     f = identification.nodal_diagram(made.assembly, 3e6, 0.5).frequency[:, 0]
     others = "".join(
         f"[[identification.measured]]\nnodal_diameter = {k}\nfrequency = {float(f[k])!r}\n" for k in (1, 2)
@@ -133,7 +133,7 @@ def test_the_worst_engine_order_in_stress_and_its_best_normal_force(ring: Path) 
 
     def driven(order: int, push: float) -> Problem:
         settings, _ = load_case(ring, [f"ring.engine_order={order}", f"amplitude={push}"])
-        return problem_of(build(settings, {"blade": stressed()}, ring), 1e4)
+        return problem_of(build(settings, {"blade": stressed()}), 1e4)
 
     found = [
         replace(envelope.over_orders(partial(driven, push=push), [1, 2], (200.0, 420.0), 45), normal_force=push)
@@ -223,7 +223,7 @@ def test_respond_over_ranges(ring: Path) -> None:
     table = rows("build/ring/ranges.csv")
     settings, _ = load_case(ring)
     alone = response.harmonic_response(
-        problem_of(build(settings, {"blade": blade()}, ring), 1e4), table["frequency_Hz"], np.zeros(1)
+        problem_of(build(settings, {"blade": blade()}), 1e4), table["frequency_Hz"], np.zeros(1)
     )
     np.testing.assert_allclose(table["combination_1_m"], np.abs(alone.monitor), rtol=1e-6)  # 1 % as in its modal file
     assert (table["high_m"] >= table["combination_3_m"]).all()
