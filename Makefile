@@ -6,7 +6,8 @@ BODIES   := $(sort $(patsubst geometry/%/build.py,%,$(wildcard geometry/*/build.
 CASES    := $(filter-out $(BODIES),$(sort $(basename $(notdir $(wildcard pipeline/cases/*.toml)))))
 PYTHON   := .venv/bin/python
 RUN      := $(PYTHON) -m microslip
-PYTEST   := $(PYTHON) -m pytest -n 2 --dist loadfile
+# A worker that crashes fails the run: one that took its place would wait for ever.
+PYTEST   := $(PYTHON) -m pytest -n 2 --dist loadfile --max-worker-restart=0
 READY    := .venv/.ready
 
 export OMP_NUM_THREADS ?= 1

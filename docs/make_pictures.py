@@ -13,6 +13,7 @@ import sys
 import time
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -1140,10 +1141,24 @@ def two_tones() -> None:
     """Duffing's oscillator under two forces, and how a slider's amplitudes converge to those of motions in time."""
     import tones_study as study
 
-    from microslip.pictures.tones import point_picture
+    from microslip.analysis import Diagram
+    from microslip.stages.analysing import drawn
+    from microslip.verbs.two_tones import draw_point
 
-    save(from_file(point_picture(study.duffing(), 0, BUILD / "two_tones.png", "")), "two_tones")
+    point = Diagram(partial(draw_point, study.duffing(), 0), size=(9.0, 6.4))
+    save(from_file(drawn(point, BUILD / "two_tones.png")), "two_tones")
     fill("two_tones.md", "slider", table(*study.slider()))
+
+
+def ring_down() -> None:
+    """The sample vane whose loads are taken off at its resonance, and the map of its amplitudes."""
+    BUILD.mkdir(parents=True, exist_ok=True)
+    with contextlib.chdir(BUILD):
+        typed(["ring-down", "sample", "--set", "ring_down.normal_force=20.0", "--set", "ring_down.down_to=0.05"])
+        band = [f"--set=sweep.{key}={value}" for key, value in (("start", 330), ("stop", 410), ("points", 121))]
+        typed(["map", "sample", "--set", "map.low=2.0", "--set", "map.high=200.0", *band])
+    for name in ("ring_down", "map"):
+        save(from_file(BUILD / "build" / "sample" / "pictures" / f"{name}.png"), name)
 
 
 def mistuning() -> None:
@@ -1623,6 +1638,7 @@ STUDIES = {
         reference,
         python,
         two_tones,
+        ring_down,
         mistuning,
         identification,
         stability,

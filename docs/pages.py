@@ -14,14 +14,14 @@ import os
 import re
 import subprocess
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import microslip
 from microslip.case.driving import GroundOfCase
-from microslip.case.settings import CaseSettings, ContactSettings
+from microslip.case.settings import ContactSettings, case_model
 from microslip.contact.settings import ContactFile
 from microslip.data import (
     Compliance,
@@ -88,10 +88,12 @@ def steps(page: str) -> Iterator[Step]:
         yield Step(more if kind == "file" else "", text)
 
 
-def play(page: str, folder: Path, more: Mapping[str, str] | None = None) -> str:
+def play(
+    page: str, folder: Path, more: Mapping[str, str] | None = None, type_in: Callable[[str, Path], str] | None = None
+) -> str:
     """Do what a page says in an empty folder, with this Python's `microslip`; returns what the commands printed.
 
-    more: words to add to lines that begin so.
+    more: words to add to lines that begin so. type_in: runs a line in the folder, `typed` if not given.
 
     Raises:
         RuntimeError: a command failed.
@@ -103,7 +105,7 @@ def play(page: str, folder: Path, more: Mapping[str, str] | None = None) -> str:
             (folder / step.path).write_text(step.text, encoding="utf-8")
         else:
             lines = [line for line in step.text.splitlines() if line and not line.startswith("#")]
-            shown += [typed(" ".join([line, *added(line, more or {})]), folder) for line in lines]
+            shown += [(type_in or typed)(" ".join([line, *added(line, more or {})]), folder) for line in lines]
     return "\n".join(shown)
 
 
@@ -578,6 +580,17 @@ MEANING_CASE: dict[str, tuple[str, str]] = {
     "orbit.release.mode": ("", "or a mode of the bodies without their contacts, by its number from 1"),
     "orbit.release.amplitude": ("m", "of the first monitor in that mode"),
     "orbit.normal_force": ("N", "of the contacts that the sweep presses"),
+    "map.low": ("N", "the first normal force; the smallest above 0 of the sweep if not given"),
+    "map.high": ("N", "the last; the largest of the sweep if not given"),
+    "map.forces": ("", "how many, in equal ratios; more are added beside the lowest resonance"),
+    "ring_down.frequency": ("Hz", "at which the case is driven until its loads are taken off; the highest resonance if "
+                            "not given"),
+    "ring_down.amplitude": ("m", "of the first read-out: the motion begins in the nonlinear mode instead"),
+    "ring_down.mode": ("", "with sticking contacts, 1 the lowest, that is compared"),
+    "ring_down.normal_force": ("N", "instead of those of the sweep"),
+    "ring_down.down_to": ("", "share of the first amplitude at which it ends"),
+    "ring_down.periods": ("", "at most"),
+    "ring_down.samples": ("", "of a period"),
     "two_tones.start": ("Hz", "of the first tone"),
     "two_tones.stop": ("Hz", "if several points are asked for"),
     "two_tones.points": ("", "equally spaced"),
@@ -698,7 +711,7 @@ def contact_reference() -> str:
 
 def case_reference() -> str:
     """Tables of every key of case.toml, likewise."""
-    return _reference(CaseSettings, MEANING_CASE, "case.toml")
+    return _reference(case_model(), MEANING_CASE, "case.toml")
 
 
 STORED: tuple[tuple[str, type], ...] = (

@@ -32,7 +32,7 @@ if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:  # as in a shell's backgro
 
 QUICK = (
     "--xla_cpu_use_fusion_emitters=false --xla_backend_optimization_level=0 --xla_cpu_parallel_codegen_split_count=1 "
-    "--xla_llvm_disable_expensive_passes=true"
+    "--xla_llvm_disable_expensive_passes=true --xla_disable_hlo_passes=while-loop-invariant-code-motion"
 )
 """Compile in a quarter of the time: a test runs a program once or twice, and each piece that a program is split into
 costs a compiler of its own. That a user's gives the same numbers: test_conformance, the sample from a wheel."""
@@ -58,7 +58,7 @@ def pytest_configure(config: pytest.Config) -> None:
 
         PROGRAMS.mkdir(parents=True, exist_ok=True)
         prepare()  # tests call laws by themselves, before anything is solved
-        forget(PROGRAMS)
+        forget(PROGRAMS, 2**31)  # those of the slow tests are kept beside them
         durations.listen()
 
 
@@ -153,6 +153,12 @@ unjudged = pytest.fixture(_unjudged, name="unjudged")
 undrawn_file = pytest.fixture(_undrawn, scope="module", name="undrawn_file")
 unjudged_file = pytest.fixture(_unjudged, scope="module", name="unjudged_file")
 """In every test of a file, and in what they share."""
+
+
+@pytest.fixture
+def unestimated(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A slow test whose subject is not the error that harmonics leave does without its estimate as well."""
+    monkeypatch.setattr("microslip.case.headline.is_estimated", lambda *_, **__: False)
 
 
 @pytest.fixture

@@ -22,6 +22,7 @@ from microslip.basis import read_basis, write_basis
 from microslip.case import load_case
 from microslip.case.assemble import build
 from microslip.case.beyond import Beyond, with_curve
+from microslip.case.curves import Followed
 from microslip.case.messages import CUT, what_moves
 from microslip.case.problem import problem_of
 from microslip.cli import main
@@ -32,6 +33,7 @@ from microslip.harmonic_balance.families import followed, of_frequency
 from microslip.harmonic_balance.refinement import filled_response
 from microslip.harmonic_balance.response import operating
 from microslip.harmonic_balance.solver import solve, sweep
+from microslip.harmonic_balance.stability import Stability
 from microslip.harmonic_balance.sweeps import ends, gaps
 from microslip.results import Journal, open_journal, read_response
 from microslip.stages.places import modal_files
@@ -107,6 +109,27 @@ def test_what_is_said_of_two_motions() -> None:
     (same,) = what_moves(Beyond(100.0, (410.0, 420.0), up, up[::-1]))
     assert "same motion" in same
     assert "no form in time" in what_moves(Beyond(100.0, why="no form in time"))[0]
+
+
+def test_motions_in_time_beside_unstable_ones_are_told() -> None:
+    """Of a curve two motions are unstable. Beside one motions in time swing as high, 4 % less in
+    some periods; at the middle branch, between the two motions of the sweeps, there is none."""
+    up = [motion(400, 42), motion(410, 49), motion(420, 74, least=0.96), motion(430, 70)]
+    down = [motion(430, 70), motion(420, 75), motion(410, 80), motion(400, 30)]
+    at = [(430.0, 70.0, True), (421.0, 75.5, False), (411.0, 62.0, False)]
+    rows = [{"parameter": f, "monitors/tip": 1e-6 * np.array([[0, a]]), "fold": False} for f, a, _ in at]
+    curve = Followed("frequency", 100.0, None, (430.0, 400.0), "one", rows, "bound: left")
+    looked = {i: Stability(np.ones(1, complex), np.zeros(1), ok, "") for i, (*_, ok) in enumerate(at)}
+
+    def said(some: dict[int, Stability]) -> str:
+        b = Beyond(100.0, (410.0, 420.0), up, down, curves=[curve], samples=256, stability=[some])
+        return what_moves(b)[-1]
+
+    both = said(looked)
+    assert "1 of 3 motions" in both and "between 411 and 421 Hz" in both
+    assert "at 421 Hz" in both and "as high" in both and "up to 4 %" in both and "not reached" not in both
+    middle = said({2: looked[2]})
+    assert "at 411 Hz" in middle and "as high" not in middle
 
 
 def test_a_motion_from_rest_is_that_of_the_balance(case: Path) -> None:
@@ -462,7 +485,7 @@ normal_forces = [100.0]
 @pytest.mark.slow
 def test_a_lap_joint_from_rest_stays_closed_and_opens(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Two beams of 120 mm, their far ends clamped, pressed by 100 N where they overlap and shaken by 20 N: two other
-    integrations in time have 20.8 µm at 300 Hz, closed, and open from 400 Hz on, 83 µm there and 73 µm at 423 Hz."""
+    integrations in time have 37.6 µm at 390 Hz, closed, and open from 400 Hz on, 83 µm there and 73 µm at 423 Hz."""
     pytest.importorskip("gmsh")
     monkeypatch.chdir(tmp_path)
     subprocess.run([sys.executable, "-c", DRAW], check=True, capture_output=True)
@@ -475,7 +498,6 @@ def test_a_lap_joint_from_rest_stays_closed_and_opens(tmp_path: Path, monkeypatc
     bases = {name: read_basis(file) for name, file in files.items()}
     pressed = build(settings, bases).pressed(100.0)
     for f, amplitude, opens in (
-        (300.0, 20.8e-6, False),
         (390.0, 37.6e-6, False),
         (400.0, 83e-6, True),
         (423.0, 73e-6, True),

@@ -225,7 +225,7 @@ def test_doubled_orbit_is_what_a_motion_comes_to() -> None:
     """Rossler's: beyond the doubling the orbit of one period is unstable, that of two stable, and SciPy's motion ends
     on it."""
     system = rossler()
-    asked = Asked(2.6, 3.15, nodes=16, doublings=1, attractors=(2.7,), starts=12)
+    asked = Asked(2.6, 3.15, nodes=16, doublings=1, attractors=(2.7,), starts=3)
     found = diagram(system, np.array([0.02, -0.09, 0.09]), asked)
     (one,) = found.at("period doubling")["attractor 1 at 2.7"]
     assert 2.82 < one < 2.84

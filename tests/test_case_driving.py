@@ -150,6 +150,7 @@ def flow(folder: Path, pressure: str) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("unestimated")
 def test_the_response_follows_an_edited_field(tmp_path, monkeypatch, capsys) -> None:
     """From the command line: a field that is twice as large makes the response anew, twice as large while the contact
     sticks; the same field again is up to date; a field that is no field is one sentence and exit code 2."""

@@ -66,6 +66,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("unestimated")
 def test_both_modes_side_by_side(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """One harmonic of both: what is left between them is the swing of the normal force, some per cent here."""
     assert main(["respond", "case.toml", "--compare-book", "--quiet"]) == 0

@@ -287,7 +287,7 @@ def test_hertz_cylinder():
 
 def ball(fine: int, a: float, radius: float, size: float) -> Mesh:
     """A quarter of a sphere's neighbourhood: `fine` boxes to 1.2 a, then growing to `size`; lower face bent."""
-    coarse = 5
+    coarse = 4
     outside = 1.2 + (size / a - 1.2) * graded(coarse, 40.0)(np.linspace(0, 1, coarse + 1))
     knots = np.concatenate([1.2 * np.arange(fine) / fine, outside])
     n = fine + coarse

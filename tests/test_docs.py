@@ -7,6 +7,7 @@ import doctest
 import importlib
 import inspect
 import re
+import shlex
 import sys
 import tomllib
 from functools import cache
@@ -24,6 +25,7 @@ import pages  # noqa: E402
 
 import microslip  # noqa: E402
 from microslip.basis import read_basis  # noqa: E402
+from microslip.cli import main  # noqa: E402
 from microslip.stages.job import open_job  # noqa: E402
 from microslip.stages.modal import modes_stage  # noqa: E402
 
@@ -386,12 +388,28 @@ def test_platforms_page() -> None:
 
 
 @pytest.mark.slow
-def test_own_model_page(tmp_path: Path) -> None:
+def test_own_model_page(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Everything the page says to type, pictures and friction response as well; the frequency it shows. Where its
-    assemblies jump they are not followed in time, which takes up to `sweep.patience` at every place."""
-    still = {f"microslip run {case} ": "--set sweep.patience=0" for case in ("lap", "joint", "bolted")}
-    shown = pages.play("your_own_model.md", tmp_path, still)
-    assert shown.count("sweep.patience=0") == len(still)
+    assemblies jump they are not followed in time, which takes up to `sweep.patience` at every place; they have
+    contacts of nine points, and share what is compiled for them."""
+    still = "--set sweep.patience=0"
+    more = {f"microslip run {case} ": still for case in ("joint", "bolted")}
+    more["microslip run lap "] = f"{still} --set contacts.0.points=[3,3]"
+    monkeypatch.chdir(tmp_path)
+
+    def type_in(line: str, folder: Path) -> str:
+        """The program's lines in this process, which has it loaded; the others in a shell."""
+        program, *words = shlex.split(line)
+        if program != "microslip":
+            return pages.typed(line, folder)
+        code, said = main(words), capsys.readouterr()
+        assert code == 0, f"{line}\n{said.out}{said.err}"
+        return f"$ {line}\n{said.out}"
+
+    shown = pages.play("your_own_model.md", tmp_path, more, type_in)
+    assert shown.count("sweep.patience=0") == len(more)
     for line in pages.filled("your_own_model.md", "import").strip("`").strip().splitlines():
         assert line in shown or "surfaces.png" in line, line  # a machine without OpenGL says so instead
     assert "all " in shown and "checks passed" in shown

@@ -117,6 +117,7 @@ def words_of(page: str) -> str:
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("unestimated")
 def test_stability_of_one_point(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A response that sticks is stable."""
     one_point(tmp_path, monkeypatch, points=3)
@@ -182,6 +183,7 @@ def test_the_error_of_a_backbone_is_what_more_harmonics_and_samples_change(
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("unestimated")
 def test_what_was_found_stays_when_it_is_interrupted(monkeypatch: pytest.MonkeyPatch) -> None:
     """Ctrl-C at the second normal force, the third value, the third point: the rows before it are in the table."""
 
@@ -325,6 +327,7 @@ def test_an_angle_is_followed_through_nothing(monkeypatch: pytest.MonkeyPatch) -
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("unestimated")
 def test_respond_with_stability(capsys: pytest.CaptureFixture[str]) -> None:
     """The response of a sliding block is stable; growth factors of every point are in the table: 1 where sliders that
     stick came to touch their limit, which keep what they are given."""

@@ -468,7 +468,7 @@ def settings_of(kind: str, folder: Path) -> tuple[Path, list[str]]:
 
 FACES = ("clamp", "tip", "contact_left", "contact_right")
 SEEDS = [("case", 0, 6), ("system", 0, 40), ("body", 0, 20)]
-MORE = [("case", 6, 150), ("system", 40, 400), ("body", 20, 400), ("contact", 0, 60)]
+MORE = [("case", 6, 66), ("system", 40, 240), ("body", 20, 140), ("contact", 0, 24)]
 """Kind of a settings file, and which ones are drawn."""
 
 
@@ -499,8 +499,9 @@ def test_nonsense_settings_through_the_command_line(
     [
         *[(suffix, 10) for suffix in (".inp", ".unv", ".cdb", ".bdf")],
         *[(suffix, 2) for suffix in (".h5", ".med")],
-        *[pytest.param(suffix, 300, marks=pytest.mark.slow) for suffix in (".inp", ".unv", ".cdb", ".bdf", ".h5")],
-        *[pytest.param(suffix, 20, marks=pytest.mark.slow) for suffix in (".msh", ".med", ".step")],
+        *[pytest.param(suffix, 300, marks=pytest.mark.slow) for suffix in (".inp", ".unv", ".cdb", ".bdf")],
+        *[pytest.param(suffix, n, marks=pytest.mark.slow) for suffix, n in ((".h5", 80), (".msh", 20), (".med", 20))],
+        pytest.param(".step", 8, marks=pytest.mark.slow),
     ],
 )
 def test_changed_bytes_through_the_command_line(

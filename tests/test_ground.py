@@ -203,15 +203,22 @@ def test_what_moving_ground_gives_is_its_force_times_its_way(taken_along: orbit.
 def test_the_picture_of_a_motion_has_the_loss_of_its_table(
     taken_along: orbit.Orbit, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """On moving ground a loop's area is no loss: what stands in the picture is the table's, whatever that says."""
+    """On moving ground a loop's area is no loss: what stands in the picture is the table's, whatever that says. A long
+    title stands in the picture with all of its letters."""
     from microslip.pictures import orbit as drawing
 
     figures: list = []
     monkeypatch.setattr(drawing, "save_figure", lambda figure, path: figures.append(figure) or path)
-    drawing.orbit_picture(taken_along, {"lost_in_contacts_J_per_period": 123.4}, Path("orbit.png"), "title")
+    long = ", ".join(["title", *15 * ["and it does not come back"]])
+    row = {"lost_in_contacts_J_per_period": 123.4}
+    drawing.orbit_picture(taken_along, row, Path("orbit.png"), long)
     (figure,) = figures
     titles = [figure.get_suptitle(), *(axes.get_title() for axes in figure.axes)]
-    assert [t for t in titles if " J" in t] == ["title; contacts lose 123.4 J a period"]
+    (said,) = [" ".join(t.split()) for t in titles if " J" in t]
+    assert said == f"{long}; contacts lose 123.4 J a period"
+    figure.canvas.draw()
+    title = figure._suptitle.get_window_extent()
+    assert 0 < title.x0 and title.x1 < figure.bbox.width
     assert any("force in N" in axes.get_ylabel() for axes in figure.axes)  # its loops are drawn
 
 

@@ -577,6 +577,7 @@ mu = 0.3
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("unestimated")
 def test_a_case_with_the_law_of_a_contact_file(tmp_path: Path) -> None:
     """The smooth law written in a file of its own, shared out among eight points: the same response, 1e-10."""
     (tmp_path / "sole.toml").write_text(CONTACT)

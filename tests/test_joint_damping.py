@@ -185,6 +185,7 @@ def test_bodies_that_slide_freely_keep_their_own_damping(tmp_path: Path) -> None
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("unestimated")
 def test_what_the_command_line_says_of_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Every stuck mode with damping and width in the summary and the response file; steps wider than a resonance of the
     stuck modes are told; mistakes end with 2."""

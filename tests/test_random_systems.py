@@ -10,7 +10,7 @@ from typing import Any
 import dense
 import numpy as np
 import pytest
-from random_systems import HARD, Verdict, compared, drawn, integrated, right, totalled, verdict
+from random_systems import AT_HOME, HARD, Verdict, at_home, compared, drawn, integrated, lasts, right, totalled, verdict
 
 from microslip.harmonic_balance import accuracy, reduced, response
 from microslip.harmonic_balance import problem as balance
@@ -23,8 +23,8 @@ COUNT = 40
 ALONE = (1, 16, 18, 23, 29)
 """Of them, those whose contacts are sliders on a line: nothing is compiled for these."""
 
-DAMPED = (1, 2, 5, 6, 7, 9, 12, 13, 14, 16, 22, 23, 24, 26, 28, 29, 31, 34, 38, 39)
-"""Those with the largest damping, which come to a periodic motion soonest."""
+SOON = 27.0
+"""Periods in which free vibrations of those that are integrated die out: most of them, contacts of each kind."""
 
 BETWEEN = 49
 """A slider that, of 64 samples, turns less than a quarter of a step beside one, where twice as many miss as much: its
@@ -42,11 +42,11 @@ def test_sliders_on_a_line_are_within_their_estimate_of_a_dense_balance(seed: in
 @pytest.mark.slow
 def test_random_systems_are_within_their_estimate_of_a_dense_balance() -> None:
     """Every one; and the estimate is of the size of the error: three times that, in the median."""
-    found = [compared(seed) for seed in range(COUNT)]
+    found = [compared(seed) for seed in at_home(COUNT)]
     for one in found:
         agree(one)
     shares = [one.off / one.estimate for one in found if one.off > 1e-6]
-    assert len(shares) > 0.7 * COUNT and 0.2 < np.median(shares) < 0.5
+    assert len(found) == 24 and len(shares) > 16 and 0.2 < np.median(shares) < 0.5
     assert np.median([one.own / one.off for one in found if one.off > 1e-6]) < 0.1
 
 
@@ -57,11 +57,11 @@ def agree(one: Verdict) -> None:
 
 @pytest.mark.slow
 def test_systems_that_are_hard_to_solve_are_brought_from_rest() -> None:
-    """All are solutions within their estimates; of three the program says that they need more samples (`counted`)."""
+    """All are solutions within their estimates; of two the program says that they need more samples (`counted`)."""
     found = [compared(seed) for seed in HARD]
     assert all(one.missing <= dense.TOLERANCE and one.status == "converged" for one in found)
     assert not {"amplitude", "balance", "motion"} & {flag for one in found for flag in one.flags}
-    assert sum("counted" in one.flags for one in found) <= 3
+    assert sum("counted" in one.flags for one in found) <= 2
 
 
 @pytest.mark.parametrize("seed", [1, 23])
@@ -73,8 +73,9 @@ def test_sliders_on_a_line_are_within_their_estimate_of_integration_in_time(seed
 @pytest.mark.slow
 def test_random_systems_are_within_their_estimate_of_integration_in_time() -> None:
     """Two bodies, four modes, points that lift off among them; second order in the step, as the sliders allow."""
-    assert sorted(sorted(range(COUNT), key=lambda seed: -drawn(seed).ratio)[: len(DAMPED)]) == list(DAMPED)
-    for seed, (off, estimate, own) in zip(DAMPED, map(integrated, DAMPED), strict=True):
+    short = [seed for seed in at_home(COUNT) if lasts(drawn(seed)) < SOON]
+    assert len(short) == 15 and {t.kind for seed in short for t in drawn(seed).touches} == {"jenkins", *AT_HOME}
+    for seed, (off, estimate, own) in zip(short, map(integrated, short), strict=True):
         assert off <= estimate + own and own < 2e-3, seed
 
 

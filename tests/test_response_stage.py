@@ -416,6 +416,7 @@ SLIDES = ("amplitude=20.0", "sweep.points=5", "sweep.normal_forces=[500.0]")
     "more",
     [*(pytest.param(m, marks=pytest.mark.slow) for m in (('mode="book"',), ("harmonics=3",))), ()],
 )
+@pytest.mark.usefixtures("unestimated")
 def test_the_energy_on_a_contact_map_is_that_of_the_response(folder: Path, more: tuple[str, ...]) -> None:
     """What the mode found, whatever it leaves out: the VTU's J/m2 times areas against the file's J per cycle, single
     precision. The full law marched along the book's motion, or with other samples, takes more or less."""
@@ -516,6 +517,7 @@ normal_forces = [60.0]
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("unestimated")
 def test_coordinates_of_a_cyclic_sector_read_in_their_own_waves(folder: Path) -> None:
     """Engine order 5 on six sectors is nodal diameter 1 the other way round, its third harmonic 3: 1e-9 of the monitor.
 
@@ -569,7 +571,7 @@ SLED = (
     .replace('"probe"', '"middle"').replace('"right"', '"sole"').replace("[2, 2]", "[1, 1]").replace("2e5", "3e6")
     .replace("4e5", "1e6").replace("friction = 0.2", "friction = 0.3").replace("start = 300.0", "start = 80.0")
     .replace("stop = 380.0", "stop = 140.0").replace("points = 9", "points = 7").replace("[50.0]", "[20.0]")
-    .replace("harmonics = 1", 'harmonics = "auto"\nharmonics_error = 4e-4').replace("samples = 24", "samples = 48")
+    .replace("harmonics = 1", 'harmonics = "auto"\nharmonics_error = 4e-3').replace("samples = 24", "samples = 48")
 )  # fmt: skip
 
 
@@ -597,7 +599,7 @@ def test_as_many_harmonics_as_the_error_asks_for(folder: Path) -> None:
     summary, found = json.loads((build / "response.json").read_text()), read_response(build / "response.h5").series[0]
     H = summary["harmonics"]
     assert H > 3 and any(t.endswith(f"all once more with {H}") for t in [said, *told])
-    assert summary["estimated_error_of_harmonics"] <= 4e-4
+    assert summary["estimated_error_of_harmonics"] <= 4e-3
     assert (found.arrays["harmonics"] == H).all() and found.monitor("middle").shape[2] == H + 1
     assert f",{H}," in (build / "response.csv").read_text().splitlines()[1]
     assert f"<td>{H}</td>" in (build / "response.html").read_text()

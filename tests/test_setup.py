@@ -324,6 +324,20 @@ def test_help_lists_every_target() -> None:
         assert target in text
 
 
+@pytest.mark.slow
+def test_a_run_of_tests_that_loses_a_worker_fails(tmp_path: Path) -> None:
+    """By a native fault, which takes the worker with it: with another in its place the run waited for ever."""
+    pytest.importorskip("xdist")
+    crash = "import os\ndef test_a(): pass\ndef test_b(): os.abort()\ndef test_c(): pass\n"
+    wait = "import time, pytest\n@pytest.mark.parametrize('n', range(3))\ndef test(n): time.sleep(0.3)\n"
+    for name, text in {"a": crash, **dict.fromkeys("bcdef", wait)}.items():
+        (tmp_path / f"test_{name}.py").write_text(text)
+    (words,) = re.findall(r"^PYTEST +:= \$\(PYTHON\) (.*)$", (ROOT / "Makefile").read_text(), re.M)
+    command = [sys.executable, *words.split(), "-p", "no:cacheprovider"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=120)
+    assert done.returncode == 1 and "crashed while running 'test_a.py::test_b'" in done.stdout
+
+
 @pytest.fixture(scope="module")
 def clone(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A bare clone: what make would do is asked there, whatever has been built in this checkout."""

@@ -15,7 +15,7 @@ from .analyses import whole_of
 from .basis import read_basis
 from .case.assemble import Built, build
 from .case.contacts import swept
-from .case.settings import UNPRESSED, CaseSettings, unasked_sweep
+from .case.settings import UNPRESSED, case_model, unasked_sweep
 from .data import ModalBasis
 from .errors import UserError
 from .settings.arguments import Index, Text, Vector, checked
@@ -171,7 +171,7 @@ def assemble(
     """
     path = Path(folder) / "case" if isinstance(case, Mapping) else Path(folder) / case
     raw = _said(case) if isinstance(case, Mapping) else load_toml(path)
-    settings = validate(CaseSettings, raw, path)
+    settings = validate(case_model(), raw, path)
     unknown = sorted(set(bases) - {b.name for b in settings.components})
     if unknown:
         raise UserError(

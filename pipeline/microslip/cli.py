@@ -13,7 +13,6 @@ import shutil
 import signal
 import sys
 from collections.abc import Callable, Iterable, Sequence
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -27,7 +26,7 @@ if TYPE_CHECKING:
     from .basis.checks import Check
     from .data import ModalBasis
     from .results import Response
-    from .stages.answer import Answer, CaseJob
+    from .stages.answer import CaseJob, Written
     from .stages.following import Case
     from .stages.stage import Report
 
@@ -220,6 +219,7 @@ def run(
         path: a body.toml, a system.toml, a case.toml, or the folder that holds it; the name of a body or a case; a
             folder or file of products; or the word sample, as respond has it.
     """
+    from .analysis import places
     from .basis import read_basis
     from .settings.meant import meant
     from .stages.job import holds_a_case_alone, open_job, system_file
@@ -249,7 +249,7 @@ def run(
             print("\n".join(frequency_lines(read_basis(job.basis_file))))
     _say(page, quiet)
     if not converged:
-        others = page.name in ("two_tones.html", "mistuning.html")
+        others = page.stem in (*places(), "mistuning")
         some = f"some points of the response did not converge; they are marked in {page.name}"
         raise NotConverged(some if others else unsolved(page.parent) or some)
 
@@ -397,30 +397,30 @@ def orbit(
         basis: see respond.
     """
     from .stages.orbit import orbit_stage
-    from .stages.places import existing_files
 
     case = _case_file(case)
     with progress(f"orbit {case}", quiet) as report:
-        there = partial(existing_files, basis_file=basis)
-        found = orbit_stage(_case_job(case, set_, force, report, no_pictures, there))
+        found = orbit_stage(_case_job(case, set_, force, report, no_pictures, basis))
     _tell(found, quiet, "a motion diverged; {page} holds what was found until then")
 
 
 def _case_job(
-    case: Path, set_: Sequence[str], force: bool, report: Report, no_pictures: bool,
-    find: Callable[..., dict[str, Path]] | None = None,
-) -> CaseJob:  # fmt: skip
-    """A case on its way. find: its modal files; they are made where they are not up to date if not given."""
+    case: Path, set_: Sequence[str], force: bool, report: Report, no_pictures: bool, basis: Path | None = None
+) -> CaseJob:
+    """A case on its way. basis: see respond; modal files are made where they are not up to date if not given."""
     from .case import load_case
     from .stages.answer import CaseJob
-    from .stages.places import modal_files
+    from .stages.places import existing_files, modal_files
 
     settings, _ = load_case(case, list(set_))
-    files = (find or partial(modal_files, report=report))(settings, root=Path("."))
+    if basis is not None:
+        files = existing_files(settings, basis, Path("."))
+    else:
+        files = modal_files(settings, Path("."), report)
     return CaseJob(case, files, Path("build") / settings.name, set_, force, report, not no_pictures)
 
 
-def _tell(found: Answer, quiet: bool, lost: str) -> None:
+def _tell(found: Written, quiet: bool, lost: str) -> None:
     """What is said of an answer, and its files; those of a motion's moments are named in its .pvd.
 
     Raises:
@@ -450,24 +450,6 @@ def bifurcate(
     with progress(f"bifurcate {case}", quiet) as report:
         found = bifurcation_stage(_case_job(case, set_, force, report, no_pictures))
     _tell(found, quiet, "some branches could not be followed to their end; {page} says where and why")
-
-
-@app.command
-def two_tones(
-    case: Path, /, *, no_pictures: NoPictures = False, set_: Set = (), force: Force = False, quiet: Quiet = False
-) -> None:
-    """Vibration under two frequencies without a common period, as [two_tones] asks: two loads, or a load and a
-    self-excited vibration.
-
-    Args:
-        case: a case.toml, the folder that holds it, its name, or its products.
-    """
-    from .stages.tones import tones_stage
-
-    case = _case_file(case)
-    with progress(f"two tones of {case}", quiet) as report:
-        found = tones_stage(_case_job(case, set_, force, report, no_pictures))
-    _tell(found, quiet, "some points did not converge; {page} says which and why")
 
 
 @app.command
@@ -998,6 +980,42 @@ def _expected(words: Sequence[str]) -> float | None:
     from .settings.amount import expected
 
     return expected(words)
+
+
+_ARGUMENTS = """Args:
+    case: a case.toml, the folder that holds it, its name, or its products.
+    basis: see respond; made where it is not up to date if not given.
+"""
+
+
+def _verb(name: str, said: str) -> Callable[..., None]:
+    """The command of an analysis."""
+
+    def verb(
+        case: Path, basis: Path | None = None, /, *, no_pictures: NoPictures = False, set_: Set = (),
+        force: Force = False, quiet: Quiet = False,
+    ) -> None:  # fmt: skip
+        from .analysis import analyses
+        from .stages.analysing import analysed
+
+        case = _case_file(case)
+        with progress(f"{name.replace('_', ' ')} of {case}", quiet) as report:
+            found = analysed(name, _case_job(case, set_, force, report, no_pictures, basis))
+        _tell(found, quiet, f"{analyses()[name].lost}; {{page}} says which and why")
+
+    verb.__doc__ = f"{said}\n\n{_ARGUMENTS}"
+    return verb
+
+
+def _add_verbs() -> None:
+    """Those of all analyses, whose modules are not loaded."""
+    from .analysis import places, said_of
+
+    for name in places():
+        app.command(_verb(name, said_of(name)), name=name.replace("_", "-"))
+
+
+_add_verbs()
 
 
 def main(words: list[str] | None = None) -> int:

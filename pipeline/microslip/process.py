@@ -131,13 +131,13 @@ def forget(folder: Path, most: float = 2**29, every: float = 3600.0) -> None:
             return
         looked.touch()
         entries = [(one.stat(), one.path) for one in os.scandir(folder) if one.path != str(looked)]
-        left = sum(kept.st_size for kept, _ in entries)
+        left = sum(kept.st_size / kept.st_nlink for kept, _ in entries)  # programs have two names
         if left <= most:
             return
         for kept, path in sorted(entries, key=lambda one: max(one[0].st_atime, one[0].st_mtime)):
             if left <= most / 2:
                 return
             Path(path).unlink(missing_ok=True)
-            left -= kept.st_size
+            left -= kept.st_size / kept.st_nlink
     except OSError:  # another process looks through it
         return

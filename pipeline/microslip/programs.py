@@ -16,9 +16,10 @@ import platform
 import sys
 import tempfile
 from collections.abc import Callable, Iterator
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from functools import cache, partial, update_wrapper
 from io import BytesIO
+from operator import is_
 from pathlib import Path
 from types import FunctionType, ModuleType
 from typing import Any
@@ -32,6 +33,9 @@ from .errors import UserError
 from .process import kept_in, prepare
 
 KNOWN = (0, 6) <= jax.__version_info__ < (0, 11)  # other versions may not know the options
+LEFT_OUT = "while-loop-invariant-code-motion" if (0, 10) <= jax.__version_info__ else ""
+"""Passes of the compiler: this one makes a loop anew for each value that it takes out of it, which is half of the time
+that a march takes to compile, and what it takes out is no faster for it. Older versions take no list of them."""
 PACKAGE = __name__.partition(".")[0]
 NAMED = {PACKAGE, "numpy", "jax", "jaxlib", "builtins", "collections", "functools", "copyreg", "pathlib"}
 """Packages whose classes and functions a kept program may name."""
@@ -66,8 +70,8 @@ class Program:
         words = (static_argnames,) if isinstance(static_argnames, str) else static_argnames
         self._names = {*words, *(names[i] for i in numbers)}
         self._numbers = {i for i, name in enumerate(names) if name in self._names}
-        self.options = options if KNOWN else None
-        self.traced = jax.jit(function, compiler_options=self.options, static_argnames=tuple(self._names))
+        self.options = {**(options or {}), **_left_out()} if KNOWN else None
+        self.traced = jax.jit(function, static_argnames=tuple(self._names))
         self.made: dict[Any, Callable[..., Any]] = {}
         _ALL.add(self)
 
@@ -93,7 +97,8 @@ class Program:
         if read is not None and (out := _run(read, given)):
             self.made[asked] = read
         else:
-            self.made[asked], out = _compiled(file, self.traced.lower(*args, **kwargs), given)
+            lowered = _lowered(self.traced.trace(*args, **kwargs))
+            self.made[asked], out = _compiled(file, lowered, self.options, given)
         return out[0]
 
     def _file(self, asked: tuple[Any, Any, Any]) -> Path | None:
@@ -127,6 +132,10 @@ often = partial(Program, options={"xla_cpu_prefer_vector_width": 512})
 
 seldom = partial(Program, options={"xla_cpu_use_fusion_emitters": False, "xla_backend_optimization_level": 0})
 """The same of what is called some dozens of times: compiled in a quarter of the time, half as fast."""
+
+
+def _left_out() -> dict[str, str]:
+    return {"xla_disable_hlo_passes": LEFT_OUT} if LEFT_OUT else {}
 
 
 def _named(kwargs: dict[str, Any], names: set[str]) -> list[tuple[str, Any]]:
@@ -202,8 +211,26 @@ def _source(name: str) -> bytes:
     return hashlib.sha256(Path(sys.modules[name].__file__ or "").read_bytes()).digest()
 
 
+_SEEN = dict[ModuleType, tuple[list[Any], bytes]]()
+
+
 def _held(module: ModuleType) -> bytes:
     """Constants of a module and where the code of its functions stands: some of them may have been replaced."""
+    own, (before, said) = list(_owned(module)), _SEEN.get(module, ([], b""))
+    if len(own) != len(before) or not all(map(is_, own, before)):
+        _SEEN[module] = own, (said := _constants(module))
+    return said
+
+
+def _owned(module: ModuleType) -> Iterator[Any]:
+    """What stands in a module and in its classes."""
+    for value in vars(module).values():
+        yield value
+        if isinstance(value, type) and value.__module__ == module.__name__:
+            yield from vars(value).values()
+
+
+def _constants(module: ModuleType) -> bytes:
     said = _Said()
     for name, value in sorted(vars(module).items()):
         if not name.startswith("__"):
@@ -263,6 +290,30 @@ def _find_lapack() -> None:
     jax.jit(jnp.linalg.inv).lower(np.eye(1))
 
 
+def _lowered(traced: Any) -> Any:
+    """For the compiler, without the lines of the sources and the names that each operation comes from: they are a
+    third of what is kept, and are read again with it."""
+    from jaxlib.mlir.passmanager import PassManager
+
+    with _told("jax_traceback_in_locations_limit", 0):
+        lowered = traced.lower()
+    module = lowered.compiler_ir()
+    with module.context:
+        PassManager.parse("builtin.module(strip-debuginfo)").run(module.operation)
+    return lowered
+
+
+@contextmanager
+def _told(name: str, value: Any) -> Iterator[None]:
+    """A setting of jax for a while."""
+    before = getattr(jax.config, name)
+    jax.config.update(name, value)
+    try:
+        yield
+    finally:
+        jax.config.update(name, before)
+
+
 def _run(read: Callable[..., Any] | None, given: Given) -> list[Any]:
     """What a program that was read finds; nothing if it is not whole, which it says when it is run."""
     if read is None:
@@ -273,31 +324,33 @@ def _run(read: Callable[..., Any] | None, given: Given) -> list[Any]:
         return []
 
 
-def _compiled(file: Path | None, lowered: Any, given: Given) -> tuple[Callable[..., Any], list[Any]]:
+def _compiled(
+    file: Path | None, lowered: Any, options: Any, given: Given
+) -> tuple[Callable[..., Any], list[Any]]:
     """A program and what it finds: compiled and kept, unless one that reads the same for the compiler was kept when
     sources differed."""
-    made, same, found = None, _alike(file, lowered, given), list[Any]()
+    made, same, found = None, _alike(file, lowered, options, given), list[Any]()
     if same is not None and not (found := _run(made := _read(same, jax.tree_util.tree_structure(given)), given)):
-        made, ours = _once(lowered)
+        made, ours = _once(lowered, options)
         _READ.update([] if ours else [same.name])
         same = same if ours and _keep(same, made, lowered.out_tree) else None
     if file is not None and same is not None:
         with suppress(OSError):
             file.unlink(missing_ok=True)
             os.link(same, file)
-    made = made or lowered.compile()
+    made = made or lowered.compile(options)
     return made, found or [made(*given[0], **given[1])]
 
 
-def _alike(file: Path | None, lowered: Any, given: Given) -> Path | None:
-    """Where a program is kept by what the compiler reads, which leaves out arguments that it does not need, and by its
-    arguments; None if it is not to be kept."""
+def _alike(file: Path | None, lowered: Any, options: Any, given: Given) -> Path | None:
+    """Where a program is kept by what the compiler reads, which leaves out arguments that it does not need, by its
+    options and by its arguments; None if it is not to be kept."""
     if file is None:
         return None
     try:
         leaves, tree = jax.tree_util.tree_flatten(given)
         trees = _numbered(tree), _numbered(lowered.out_tree)
-        (said := _Said()).dump((lowered.as_text(), trees, tuple(map(_type, leaves)), _machine()))
+        (said := _Said()).dump((lowered.as_text(), options, trees, tuple(map(_type, leaves)), _machine()))
     except (UserError, pickle.PicklingError):  # a class of another package
         return None
     same = file.with_name(f"{hashlib.sha256(said.text).hexdigest()}-compiled")
@@ -323,20 +376,18 @@ def _keep(same: Path, made: Any, out: Any) -> bool:
     return True
 
 
-def _once(lowered: Any) -> tuple[Any, bool]:
+def _once(lowered: Any, options: Any) -> tuple[Any, bool]:
     """Compiled, and not kept by jax too; and whether it was compiled here: what jax had kept cannot be written again,
     though nothing says so before it is read and run."""
-    name, read = "jax_persistent_cache_min_compile_time_secs", list[str]()
+    read = list[str]()
 
     def heard(event: str, **_: Any) -> None:
         if event == "/jax/compilation_cache/cache_hits":
             read.append(event)
 
-    least = getattr(jax.config, name)
-    jax.config.update(name, np.inf)
     jax.monitoring.register_event_listener(heard)
     try:
-        return lowered.compile(), not read
+        with _told("jax_persistent_cache_min_compile_time_secs", np.inf):
+            return lowered.compile(options), not read
     finally:
-        jax.config.update(name, least)
         jax.monitoring.unregister_event_listener(heard)

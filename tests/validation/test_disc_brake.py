@@ -76,7 +76,7 @@ def test_one_basis_over_the_speeds(brake):
     family, (low, high) = brake.family(), brake.asked.range
     basis = sampled(family, "speed", low, high, brake.window)
     counts = []
-    for speed in (7.0, 4 * np.pi, 17.3, 23.0, 29.0):
+    for speed in (7.0, 17.3, 29.0):
         exact = spectrum(family.at({"speed": speed}), brake.window, neutral=1e-3, certify=False)
         s, error, _ = basis.at(speed)
         assert len(s) == len(exact.roots) and np.abs(basis.samples - speed).min() > 0.1
@@ -86,7 +86,7 @@ def test_one_basis_over_the_speeds(brake):
         away = np.abs(s - exact.roots.s)
         assert (away[grows] < 1e-6 * np.abs(s[grows])).all() and (away <= error).all()
         assert (away[grows] < 1e-4 * exact.growth[grows]).all()  # the growth rates themselves
-    assert counts == [2, 2, 3, 4, 4]
+    assert counts == [2, 3, 4]
 
 
 @pytest.mark.slow
@@ -109,7 +109,7 @@ def test_the_printed_damping_would_not_squeal(brake):
 @pytest.mark.slow
 def test_the_command_line_tells_it_in_one_sentence(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    assert main(["stability", str(BRAKE), "--set", "stability.points=5", "--no-pictures"]) == 0
+    assert main(["stability", str(BRAKE), "--set", "stability.points=3", "--no-pictures"]) == 0
     told = capsys.readouterr().out
     assert (
         "2 of 12 roots grow: 784.99 Hz by 5.474 1/s, 2769.23 Hz by 74.83 1/s; 1 neutral; complete: counted 12" in told

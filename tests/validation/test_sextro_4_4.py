@@ -125,7 +125,7 @@ def chosen(branch: Branch) -> list[int]:
     if branch.still:
         clear = np.abs(branch.multipliers[:, 0].real) > 0.01
     else:
-        clear = np.abs(np.log(np.abs(branch.multipliers[:, 0]) + 1e-300)) > 0.05
+        clear = np.abs(np.log(np.abs(branch.multipliers[:, 0]) + 1e-300)) > 0.1
     places = np.flatnonzero(clear & ~np.isin(branch.kind, (*SPECIAL, "start")))
     return [int(places[round(u * (len(places) - 1))]) for u in (0.1, 0.5, 0.9)]
 

@@ -23,7 +23,7 @@ from ..harmonic_balance.stability import Settings as Multipliers
 from ..harmonic_balance.stability import Stability, orbit, stability
 from ..results import Journal
 from ..time_domain.stepped import Settled
-from ..time_domain.swept import DOWN, REST, UP, Sweeps, on_two_motions
+from ..time_domain.swept import DOWN, REST, SAME, UP, Sweeps, on_two_motions
 from ..units import Quantity, percent
 from .assemble import build
 from .curves import Followed, Keep, curves
@@ -65,6 +65,13 @@ class Beyond:
     def two(self) -> list[tuple[Settled, Settled]]:
         """The lower and the higher motion where sweeps upwards and downwards are on different ones, by frequency."""
         return on_two_motions(self.up, self.down)
+
+    def beside(self, frequency: float, amplitude: float) -> list[Settled]:
+        """The motions of either sweep next to a frequency (Hz) that are as high as an amplitude."""
+        next_to = [
+            min(way, key=lambda m: abs(m.frequency - frequency)) for way in (self.up, self.down) if way
+        ]
+        return [m for m in next_to if m.like(amplitude, SAME)]
 
     @property
     def irregular(self) -> list[Settled]:

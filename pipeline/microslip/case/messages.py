@@ -400,20 +400,32 @@ def _of_curve(one: Followed, patience: float) -> str:
 
 
 def _stable(b: Beyond) -> list[str]:
-    """How many of the motions on the curves are stable, and where some are not."""
+    """How many of the motions on the curves are stable, where some are not, and beside which of
+    these motions in time stay."""
     looked = [
-        (float(one.parameter[i]), s.stable)
+        (float(one.parameter[i]), float(one.amplitude[i]), s.stable)
         for one, each in zip(b.curves, b.stability, strict=True)
         for i, s in each.items()
     ]
     if not looked:
         return []
-    lost = sorted(f for f, stable in looked if not stable)
+    lost = sorted((f, amplitude) for f, amplitude, stable in looked if not stable)
     many = f"{len(looked) - len(lost)} of {counted(len(looked), 'motion')} that were looked at are stable"
     said = f"On the curve, by harmonic balance with {b.samples} samples of a cycle, {many}"
     if not lost:
         return [f"{said}."]
-    where = f"at {lost[0]:.5g} Hz"
-    if len(lost) > 1:
-        where = f"between {lost[0]:.5g} and {lost[-1]:.5g} Hz"
-    return [f"{said}; those that are not, {where}, are not reached: what is, motions in time say."]
+    left = f"those that are not, {_between([f for f, _ in lost])}, are left at the least disturbance"
+    about = [(f, m) for f, amplitude in lost for m in b.beside(f, amplitude)]
+    if not about:
+        return [f"{said}; {left}: what is reached, motions in time say."]
+    varies = percent(max(1 - m.least / m.swing for _, m in about))
+    return [
+        f"{said}; {left}. Beside them, {_between([f for f, _ in about])}, motions in time stay, as high and with "
+        f"swings that differ from period to period by up to {varies}."
+    ]
+
+
+def _between(frequencies: Sequence[float]) -> str:
+    """Where some of several points are, in order, in words."""
+    low, high = frequencies[0], frequencies[-1]
+    return f"at {low:.5g} Hz" if low == high else f"between {low:.5g} and {high:.5g} Hz"

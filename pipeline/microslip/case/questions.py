@@ -5,10 +5,8 @@ from __future__ import annotations
 import math
 from typing import Annotated, Literal
 
-import numpy as np
 from pydantic import BeforeValidator, Field, model_validator
 
-from ..data import Array
 from ..settings.numbers import Coefficient, Model, Name, NotNegative, Number, Positive, Ratios, _finite_vector, _tuple
 from .keys import Orders, Positives
 
@@ -209,40 +207,6 @@ class OrbitOfCase(Model):
     @property
     def hertz(self) -> tuple[float, ...]:
         return self.frequency or tuple(w / (2 * math.pi) for w in self.Omega or ())
-
-
-class TwoTonesOfCase(Model):
-    """Quasi-periodic vibration under loads of two frequencies without a common period, by `microslip two-tones`.
-
-    start: Hz, of the first tone; to stop in so many points, equally spaced. second: Hz, held, or ratio: of the second
-    to the first frequency; of excitations with ``tone = 2``, or where free of a self-excited vibration whose frequency
-    is not known: a guess within 15 %. harmonics: pairs (k1, k2) with |k1| + |k2| up to that are balanced. samples: of a
-    turn of the faster angle. turns: of it in the line along which contacts that remember are marched.
-    """
-
-    start: Positive
-    stop: Positive | None = None
-    points: Annotated[int, Field(ge=1, le=100000)] = 1
-    second: Positive | None = None
-    ratio: Positive | None = None
-    free: bool = False
-    harmonics: Annotated[int, Field(ge=1, le=60)] = 5
-    samples: Annotated[int, Field(ge=8, le=100000)] | None = None
-    turns: Annotated[int, Field(ge=8, le=10000)] | None = None
-
-    @model_validator(mode="after")
-    def _two(self) -> TwoTonesOfCase:
-        if (self.second is None) == (self.ratio is None):
-            raise ValueError("second: give second (Hz) or ratio, and not both")
-        if (self.stop is None) != (self.points == 1):
-            raise ValueError("points: stop and points come together; give both of a sweep, none of a single frequency")
-        return self
-
-    @property
-    def hertz(self) -> tuple[Array, Array]:
-        """(f,) Hz of both tones."""
-        first = np.linspace(self.start, self.stop or self.start, self.points)
-        return first, first * self.ratio if self.ratio is not None else np.full(self.points, self.second or 0.0)
 
 
 class ScatterOfCase(Model):

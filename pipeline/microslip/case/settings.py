@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from functools import cache
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BeforeValidator, Field, PrivateAttr, model_validator
+from pydantic import BeforeValidator, Field, PrivateAttr, create_model, model_validator
 
+from ..analysis import GROUP, analyses
 from ..contact.friction import OfCoulomb
 from ..contact.point import OfPoint
 from ..contact.settings import ContactLaw
+from ..errors import UserError
 from ..operating.fatigue import MaterialLimits
 from ..reduced.compliance import BULK_AND_SURFACE
 from ..settings.mistakes import too_few
@@ -46,7 +49,6 @@ from .questions import (
     RangesOfCase,
     SpeedsOfCase,
     StabilityOfCase,
-    TwoTonesOfCase,
 )
 
 FIRST_HARMONICS = 3
@@ -339,7 +341,6 @@ class CaseSettings(OfFile):
     identification: IdentificationOfCase | None = None
     stability: StabilityOfCase | None = None
     bifurcation: Annotated[tuple[BifurcationOfCase, ...], BeforeValidator(_tuple)] = ()
-    two_tones: TwoTonesOfCase | None = None
     mistuning: MistuningOfCase | None = None
 
     @model_validator(mode="before")
@@ -349,15 +350,23 @@ class CaseSettings(OfFile):
         if not isinstance(raw, dict) or "sweep" in raw:
             return raw
         band = unasked_sweep(raw)
-        asks = [raw.get(key) for key in ("stability", "bifurcation", "two_tones")]
+        asks = [raw.get(key) for key in ("stability", "bifurcation", *_unswept())]
         in_time = isinstance(raw.get("orbit"), dict) and band != NO_SWEEP
         return raw | {"sweep": band} if in_time or any(asks) else raw
 
     @property
+    def asked(self) -> dict[str, Model]:
+        """Analysis -> its keys, of those in whose tables the case asks for something."""
+        return {name: keys for name in analyses() if (keys := getattr(self, name, None)) is not None}
+
+    @property
     def is_only_followed(self) -> bool:
-        """Whether it asks for stability, bifurcations or two tones and for no sweep."""
-        asked = bool(self.stability or self.bifurcation or self.two_tones) and self.orbit is None
-        return asked and self._stands_for(NO_SWEEP)
+        """Whether it asks for what needs no sweep, and for none."""
+        return self._asks_without_sweep and self.orbit is None and self._stands_for(NO_SWEEP)
+
+    @property
+    def _asks_without_sweep(self) -> bool:
+        return bool(self.stability or self.bifurcation or self.asked.keys() & _unswept())
 
     @property
     def is_only_in_time(self) -> bool:
@@ -367,7 +376,7 @@ class CaseSettings(OfFile):
     @property
     def is_only_built(self) -> bool:
         """Whether it asks for nothing: what is analysed is said in Python."""
-        asked = self.stability or self.bifurcation or self.two_tones or self.orbit
+        asked = self._asks_without_sweep or self.orbit is not None
         return not asked and self.sweep.normal_forces == UNPRESSED and self._stands_for(NO_SWEEP)
 
     def _stands_for(self, band: Mapping[str, float]) -> bool:
@@ -480,8 +489,6 @@ class CaseSettings(OfFile):
             raise ValueError("bodies: aerodynamics belong to the waves of a ring; add [ring] with its blades")
         if self.mistuning is not None and self.ring is None:
             raise ValueError("mistuning: is that of a ring; add [ring] with blades and engine_order")
-        if self.two_tones is not None and self.ring is not None:
-            raise ValueError("two_tones: one sector that stands for a ring follows one wave; leave [ring] out")
         if any(c.against_sector for c in self.contacts) and self.ring is None:
             raise ValueError("contacts: against_sector belongs to a ring; add [ring] with blades and engine_order")
         return self
@@ -573,7 +580,7 @@ class CaseSettings(OfFile):
 
 
 NO_SWEEP = {"start": 1.0, "stop": 2.0}
-"""Stands for the sweep of a case that asks for stability, bifurcations or two tones alone, or for nothing."""
+"""Stands for the sweep of a case that asks for what needs none alone, or for nothing."""
 
 UNPRESSED = (0.0,)
 """Normal forces of the sweep of a case whose contacts are pressed in Python."""
@@ -599,4 +606,22 @@ def band_of(orbit: Mapping[str, Any]) -> dict[str, float]:
 
 def load_case(path: Path | str, assignments: Sequence[str] | None = None) -> tuple[CaseSettings, dict[str, Any]]:
     """A case file (SI units); see `read_settings`."""
-    return read_settings(CaseSettings, path, assignments)
+    return read_settings(case_model(), path, assignments)
+
+
+@cache
+def case_model() -> type[CaseSettings]:
+    """`CaseSettings` with the tables of all analyses.
+
+    Raises:
+        UserError: the table of one has the name of another key.
+    """
+    tables: dict[str, Any] = {name: (one.asks | None, None) for name, one in analyses().items()}
+    if taken := sorted(set(tables) & set(CaseSettings.model_fields)):
+        raise UserError(f"{GROUP}: '{taken[0]}' is a key of every case already; remove its package or rename it there")
+    return create_model("CaseSettings", __base__=CaseSettings, __doc__=CaseSettings.__doc__, **tables)
+
+
+def _unswept() -> set[str]:
+    """Analyses that need no sweep."""
+    return {name for name, one in analyses().items() if not one.swept}

@@ -225,6 +225,13 @@ def backbone(
     return Backbone(A, Omega, xi / (2 * Omega) if len(A) else xi, x, omega, status, found, quantity)
 
 
+def motion(problem: Problem, found: Backbone, at: int) -> tuple[Problem, Solved]:
+    """The balance that point number `at` of a nonlinear mode solves, fed as it is there, and its solution."""
+    Omega, xi = float(found.Omega[at]), float(2 * found.damping[at] * found.Omega[at])
+    curve = _Curve(replace(about_rest(problem)[0], share=0.0), 0)
+    return curve._fed(xi), Solved(Omega, found.x[at], CONVERGED, 0.0, 0)
+
+
 def about_rest(problem: Problem) -> tuple[Problem, Array]:
     """The balance whose contacts stick as they do where the steady loads press them, and x (size,) there.
 

@@ -17,7 +17,7 @@ from ..data import Array
 from .problem import Problem
 from .readout import WithOutput, measured
 from .refinement import filled_response
-from .response import no_resonance, operating, parted, refined_peaks, unsolved
+from .response import HarmonicResponse, no_resonance, operating, parted, refined_peaks, unsolved
 from .solver import CONVERGED, Point, Report
 
 Make = Callable[[float], Problem]
@@ -75,7 +75,12 @@ class Top(NamedTuple):
 def highest(problem: Problem, Omega: Array, report: Report = lambda _: None) -> Top:
     """The highest peak of the first read-out in a band, Omega (f,) in rad/s, looked for as a response looks for its
     resonances. A band in which none is known gives one that says why."""
-    response = filled_response(problem, Omega / (2 * np.pi), np.zeros(len(problem.assembly.contacts)), report)
+    limit = np.zeros(len(problem.assembly.contacts))
+    return top_of(problem, filled_response(problem, Omega / (2 * np.pi), limit, report))
+
+
+def top_of(problem: Problem, response: HarmonicResponse) -> Top:
+    """The highest peak of a response; see `highest`."""
     resonances, folds = parted(response, refined_peaks(problem, response))
     best = max(resonances, key=lambda one: one.amplitude, default=None)
     why = no_resonance(response, folds)
@@ -105,12 +110,14 @@ def resonance(peak: Peak) -> HighestPeak:
 def optimum(
     make: Make, values: Sequence[float], Omega: Array, report: Report = lambda _: None,
     keep: Callable[[dict[float, HighestPeak]], None] = lambda found: None,
+    look: Callable[[float, Problem], Top] | None = None,
 ) -> Optimum:  # fmt: skip
     """The value between the first and the last one at which the highest resonance in a band is lowest.
 
     Args:
         values: rising or falling, at all of which it is looked for. Omega: (f,) rad/s, the band on a grid that sees its
             resonances. keep: is given all resonances found so far, by value, whenever there is one more.
+            look: finds the highest peak at a value, `highest` if not given.
     """
     rising: dict[float, float] = {}
     found: dict[float, HighestPeak] = {}
@@ -121,7 +128,7 @@ def optimum(
     def at(value: float) -> Peak:
         report(f"highest resonance at {value:.5g}")
         problem = make(value)
-        top, end, lost = highest(problem, Omega, report)
+        top, end, lost = look(value, problem) if look else highest(problem, Omega, report)
         if end is not None:
             rising[value] = end
         one = found[value] = replace(resonance(top), open=opened(problem, top), unsolved=lost)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
@@ -31,6 +32,8 @@ OF_CONTACTS = 3
 """Contacts that are drawn, those that lose most."""
 WINDOW = 8
 """Periods in each window of a spectrogram."""
+BOLD = 8
+"""Letters of a title to an inch."""
 EVENT_MARKS = (("closes", "v", 4, "meets"), ("slips", "|", 9, "begins to slip"))
 
 
@@ -66,7 +69,8 @@ def orbit_picture(orbit: Orbit, row: Mapping[str, float], path: Path, title: str
     places[0].legend(fontsize=8, loc="lower left", bbox_to_anchor=(0.0, 1.0), frameon=False)
     lost = row["lost_in_contacts_J_per_period"]
     more = f"; contacts lose {lost:.4g} J a period" if len(orbit.touching) and np.isfinite(lost) else ""
-    figure.suptitle(title + more, fontweight="bold")
+    lines = [textwrap.fill(line, int(BOLD * 4.4 * columns)) for line in (title + more).splitlines()]
+    figure.suptitle("\n".join(lines), fontweight="bold")
     return save_figure(figure, path)
 
 

@@ -54,11 +54,13 @@ def traction_picture(found: Studied, path: Path, title: str) -> Path:
     step = (max(1, t.x.shape[0] // 10), max(1, t.x.shape[1] // 10))
     pick = np.s_[step[0] // 2 :: step[0], step[1] // 2 :: step[1]]
     left.quiver(1e3 * t.x[pick], 1e3 * t.y[pick], t.traction_x[pick], t.traction_y[pick], color="white", width=0.004)
-    stretch = stretched(np.ptp(_corners(t), axis=(0, 1)))
-    said = "traction in MPa" if stretch == 1.0 else "traction in MPa, x and y to scales of their own"
+    spans = np.ptp(_corners(t), axis=(0, 1))
+    stretch = stretched(spans)
+    said = "traction in MPa" if stretch == 1.0 else "traction in MPa\nx and y to scales of their own"
     left.set(xlabel="x in mm, rolling to the right", ylabel="y in mm", title=said)
     left.set_aspect(stretch)
-    figure.colorbar(image, ax=left, shrink=0.85)
+    flat = stretch * spans[1] < 0.5 * spans[0]  # no higher than its colour bar is long
+    figure.colorbar(image, ax=left, shrink=0.85, location="bottom" if flat else "right")
     row = t.x.shape[0] // 2
     x, limit = 1e3 * t.x[row], mu * t.pressure[row] / 1e6
     bound = "$\\pm\\mu p$" if found.case.is_constant else "$\\pm\\mu p$, highest $\\mu$"
@@ -66,7 +68,7 @@ def traction_picture(found: Studied, path: Path, title: str) -> Path:
     for i, (name, values) in enumerate((("x", t.traction_x), ("y", t.traction_y))):
         right.plot(x, values[row] / 1e6, color=COLOURS[i], label=f"traction along {name}")
     right.set(xlabel="x in mm", ylabel="MPa", title=f"along the strip y = {1e3 * t.y[row, 0]:.3g} mm")
-    right.legend(fontsize=9)
+    figure.legend(fontsize=9, loc="outside lower right", ncols=3)
     over = LABELS[found.case.creep.over].split(" in ")[0]
     figure.suptitle(f"{title}: {over} {found.over[found.shown]:.4g}")
     return save_figure(figure, path)

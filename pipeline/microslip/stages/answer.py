@@ -19,7 +19,7 @@ from .checkpoint import inputs_of
 from .stage import Made, Report, Stage, hash_of_code
 
 
-class Answer(NamedTuple):
+class Written(NamedTuple):
     """What a stage leaves for a reader.
 
     Attributes:
@@ -31,7 +31,7 @@ class Answer(NamedTuple):
     whole: bool = True
 
 
-def answered(stage: Stage, inputs: Mapping[str, Any], work: Callable[[], Answer]) -> Answer:
+def answered(stage: Stage, inputs: Mapping[str, Any], work: Callable[[], Written]) -> Written:
     """The answer that a stage's product (JSON) holds, made where it is not up to date; see `Stage.make`."""
     folder = stage.product.parent
 
@@ -44,7 +44,7 @@ def answered(stage: Stage, inputs: Mapping[str, Any], work: Callable[[], Answer]
 
     stage.make(inputs, make)
     told = json.loads(stage.product.read_text())
-    return Answer([folder / name for name in told["files"]], told["said"], told["whole"])
+    return Written([folder / name for name in told["files"]], told["said"], told["whole"])
 
 
 @dataclass(frozen=True)
@@ -96,7 +96,7 @@ class CaseJob:
         return store.hash_settings({**self.inputs, "code": hash_of_code(stage.code)})
 
     @in_its_file
-    def answer(self, name: str, module: str, work: Callable[[Stage, CaseJob], Answer]) -> Answer:
+    def answer(self, name: str, module: str | Path, work: Callable[[Stage, CaseJob], Written]) -> Written:
         """The answer that ``name.json`` holds, made by a module's `work` where it is not up to date.
 
         What `work` keeps in ``name.points`` until then is removed.

@@ -21,7 +21,7 @@ from ..files.tables import rows_csv
 from ..report.bifurcation import bifurcation_html
 from ..system.assembly import Assembly
 from ..units import counted
-from .answer import Answer, CaseJob
+from .answer import CaseJob, Written
 from .stage import Stage, hash_of_code
 from .varied import Varied
 
@@ -44,7 +44,7 @@ class Changed:
 
 
 @in_its_file
-def bifurcation_stage(case: CaseJob) -> Answer:
+def bifurcation_stage(case: CaseJob) -> Written:
     """The diagrams that a case asks for, whole if every branch was followed to its end; finished branches are kept.
 
     Raises:
@@ -55,7 +55,7 @@ def bifurcation_stage(case: CaseJob) -> Answer:
     return case.answer("bifurcation", "stages.bifurcation", _work)
 
 
-def _work(stage: Stage, case: CaseJob) -> Answer:
+def _work(stage: Stage, case: CaseJob) -> Written:
     folder, settings = case.folder, case.settings
     changed = [Changed(Varied(case.path, case.raw, case.bases), asked) for asked in settings.bifurcation]
     own = {key: value for key, value in checkpoint.without_defaults(case.raw).items() if key != "bifurcation"}
@@ -77,7 +77,7 @@ def _work(stage: Stage, case: CaseJob) -> Answer:
     page = bifurcation_html(f"{settings.name}: bifurcations", settings.bifurcation, found, sentences, drawn)
     store.write_text(folder / "bifurcation.html", page)
     lost = any(b.lost for one in found for b in one.branches)
-    return Answer([folder / "bifurcation.html", *made, *drawn], sentences, not lost)
+    return Written([folder / "bifurcation.html", *made, *drawn], sentences, not lost)
 
 
 def _diagram(one: Changed, folder: Path, depends: Mapping[str, Any], stage: Stage) -> Diagram:

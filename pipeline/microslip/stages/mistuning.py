@@ -31,12 +31,12 @@ from ..mistuning.statistics import SHARES, fits
 from ..report.mistuning import mistuning_html
 from ..system.assembly import Assembly, Contact
 from ..units import counted
-from .answer import Answer, CaseJob
+from .answer import CaseJob, Written
 from .stage import Stage, hash_of_code
 
 
 @in_its_file
-def mistuning_stage(case: CaseJob, workers: int | None = None) -> Answer:
+def mistuning_stage(case: CaseJob, workers: int | None = None) -> Written:
     """What a case asks for in [mistuning]; whole if every sample has a solution.
 
     Args:
@@ -50,7 +50,7 @@ def mistuning_stage(case: CaseJob, workers: int | None = None) -> Answer:
     return case.answer("mistuning", "stages.mistuning", partial(_work, workers=workers))
 
 
-def _work(stage: Stage, case: CaseJob, workers: int | None) -> Answer:
+def _work(stage: Stage, case: CaseJob, workers: int | None) -> Written:
     folder, settings, built = case.folder, case.settings, case.built()
     asked = settings.mistuning
     assert asked is not None
@@ -80,7 +80,7 @@ def _work(stage: Stage, case: CaseJob, workers: int | None) -> Answer:
     drawn = _pictures(found, worst, near, folder / "pictures", settings.name) if worst and case.pictures else []
     page = folder / "mistuning.html"
     store.write_text(page, mistuning_html(f"{settings.name}: mistuned", found, sentences, drawn))
-    return Answer([page, *made, *drawn], sentences, bool(found.solved.all()))
+    return Written([page, *made, *drawn], sentences, bool(found.solved.all()))
 
 
 def _doubted(found: Ensemble, built: Built, asked: MistuningOfCase) -> list[str]:

@@ -24,13 +24,13 @@ from ..time_domain.classification import Exponent
 from ..time_domain.orbit import Orbit
 from ..time_domain.ramp import Ramp
 from ..units import counted, percent
-from .answer import Answer, CaseJob
+from .answer import CaseJob, Written
 from .moving import moving_bodies
 from .stage import Stage
 
 
 @in_its_file
-def orbit_stage(case: CaseJob) -> Answer:
+def orbit_stage(case: CaseJob) -> Written:
     """The motions in time that a case asks for, a sentence a motion; whole if none diverged.
 
     Raises:
@@ -41,7 +41,7 @@ def orbit_stage(case: CaseJob) -> Answer:
     return case.answer("orbit", "stages.orbit", _work)
 
 
-def _work(stage: Stage, case: CaseJob) -> Answer:
+def _work(stage: Stage, case: CaseJob) -> Written:
     folder, name, built = case.folder, case.settings.name, case.built()
     motions = _asked(case.settings, built)
     stage.begin()
@@ -57,7 +57,7 @@ def _work(stage: Stage, case: CaseJob) -> Answer:
     page = orbit_html(f"{name}: motion in time", rows, notes, messages, drawn)
     store.write_text(folder / "orbit.html", page)
     made = [*(folder / f"orbit.{end}" for end in ("html", "csv", "h5")), *dict.fromkeys(drawn + moving)]
-    return Answer(made, [*notes, *messages], not any(np.isfinite(one.diverged) for _, one in found))
+    return Written(made, [*notes, *messages], not any(np.isfinite(one.diverged) for _, one in found))
 
 
 def _asked(settings: CaseSettings, built: Built) -> list[recorded.Asked]:

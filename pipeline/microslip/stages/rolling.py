@@ -16,14 +16,14 @@ from ..rolling.settings import RollingCase, Section, load_rolling
 from ..rolling.study import Studied, rows_of_patches, study
 from ..rolling.table import creep_table, write_creep_table
 from ..rolling.wearing import Wearing, wearing
-from .answer import Answer, RollJob, answered
+from .answer import RollJob, Written, answered
 from .job import Job, open_job
 from .modal import modes_stage
 from .places import find_body
 from .stage import Report, Stage
 
 
-def rolling_stage(job: RollJob) -> Answer:
+def rolling_stage(job: RollJob) -> Written:
     """What a rolling case asks for.
 
     Raises:
@@ -59,7 +59,7 @@ def _of_one_material(case_path: Path, key: str, job: Job, section: Section) -> N
         )
 
 
-def _work(stage: Stage, case: RollingCase, job: RollJob, bodies: list[Path]) -> Answer:
+def _work(stage: Stage, case: RollingCase, job: RollJob, bodies: list[Path]) -> Written:
     folder = stage.product.parent
     stage.report("patches and creep curve")
     with of_file(job.path):
@@ -79,7 +79,7 @@ def _work(stage: Stage, case: RollingCase, job: RollJob, bodies: list[Path]) -> 
     page = folder / "rolling.html"
     shown = [p for p in drawn if p.suffix == ".png"]
     store.write_text(page, rolling_html(f"{case.name}: rolling contact", found, shown, more))
-    return Answer([page, *made, *beside, *drawn], [*found.sentences(), *more])
+    return Written([page, *made, *beside, *drawn], [*found.sentences(), *more])
 
 
 def _beside(

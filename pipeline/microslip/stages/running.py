@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,7 @@ from ..results import read_response
 from ..results.names import apart
 from ..results.series import unit_of
 from ..units import Quantity, amplitude_of
+from .analysing import analysed
 from .answer import CaseJob
 from .bifurcation import bifurcation_stage
 from .job import Job, open_job
@@ -30,7 +32,6 @@ from .places import existing_files, find_body, modal_files
 from .response import ALL, Wanted, response_of_case, response_stage
 from .squeal import squeal_stage
 from .stage import Report
-from .tones import tones_stage
 
 
 def run_body(
@@ -71,11 +72,10 @@ def _answered(
     job = CaseJob(case.path, files, folder, assignments or (), force, report, wanted.pictures)
     answers = (
         (case.orbit, orbit_stage), (case.stability, squeal_stage), (case.bifurcation, bifurcation_stage),
-        (case.two_tones, tones_stage), (case.mistuning, mistuning_stage),
+        (case.mistuning, mistuning_stage),
     )  # fmt: skip
-    for asked, stage in answers:
-        if asked:
-            converged = stage(job).whole and converged
+    for stage in [stage for asked, stage in answers if asked] + [partial(analysed, name) for name in case.asked]:
+        converged = stage(job).whole and converged
     return response, converged
 
 
@@ -101,7 +101,7 @@ def run_case_file(
     if case.mistuning:
         page = "mistuning.html"
     elif case.is_only_followed:
-        pages = {"stability": case.stability, "bifurcation": case.bifurcation, "two_tones": case.two_tones}
+        pages = {"stability": case.stability, "bifurcation": case.bifurcation, **case.asked}
         page = next(f"{name}.html" for name, asked in pages.items() if asked)
     return folder / page, converged
 

@@ -29,7 +29,7 @@ from ..roots.spectrum import Spectrum, spectrum
 from ..roots.waves import waves
 from ..sliding import Sliding, Tangent
 from ..system.assembly import Assembly
-from .answer import Answer, CaseJob
+from .answer import CaseJob, Written
 from .cycles import Born, born, sentence_of_relief, sentences_of
 from .job import open_job
 from .meshing import load_mesh, mesh_stage
@@ -79,7 +79,7 @@ FASTEST = 4
 
 
 @in_its_file
-def squeal_stage(case: CaseJob) -> Answer:
+def squeal_stage(case: CaseJob) -> Written:
     """Roots of a case about steady sliding; whole if they are proved complete and no limit cycle is lost.
 
     Raises:
@@ -90,7 +90,7 @@ def squeal_stage(case: CaseJob) -> Answer:
     return case.answer("stability", "stages.squeal", _work)
 
 
-def _work(stage: Stage, case: CaseJob) -> Answer:
+def _work(stage: Stage, case: CaseJob) -> Written:
     """What is finished stays in a journal until all that is made of it is there."""
     settings, asked, folder = case.settings, case.settings.stability, case.folder
     assert asked is not None
@@ -116,7 +116,7 @@ def _work(stage: Stage, case: CaseJob) -> Answer:
     moves = moving(state, found, varied.bases, settings, folder) if case.pictures else []
     names = _written(folder, settings.name, found, over, full, said, case.pictures, (cycles, asked.cycle), moves)
     complete = found.complete and all(one.complete for one in full) and cycles.whole
-    return Answer([folder / name for name in names], [*table_lines(found), *said], complete)
+    return Written([folder / name for name in names], [*table_lines(found), *said], complete)
 
 
 def state_of(varied: Varied, values: Mapping[str, float], where: str = "stability") -> State:

@@ -25,7 +25,7 @@ from ..roots.diagram import Diagram, diagram
 from ..roots.spectrum import Spectrum, spectrum
 from ..settings.body import StabilitySettings
 from ..units import rpm_text
-from .answer import Answer, answered
+from .answer import Written, answered
 from .job import Job, open_job
 from .modal import matrices_inputs, modes_stage
 from .stage import Report, Stage
@@ -61,7 +61,7 @@ class Question:
 def stability_stage(
     path: Path, assignments: list[str], force: bool = False, report: Report = lambda _: None, pictures: bool = True,
     speed: int | None = None,
-) -> Answer:  # fmt: skip
+) -> Written:  # fmt: skip
     """Roots of a body or of a modal file, and over a range of a parameter where [stability] asks for it; whole if they
     are proved complete.
 
@@ -139,7 +139,7 @@ def family(job: Job) -> Family:
         return family_of(read_matrices(given, job.folder, job.settings.length_unit, job.settings.parameters))
 
 
-def _work(stage: Stage, q: Question, pictures: bool) -> Answer:
+def _work(stage: Stage, q: Question, pictures: bool) -> Written:
     matrices, asked, report = q.family(), q.asked, stage.report
     with of_file(q.where):
         for value in asked.range or ():
@@ -157,7 +157,7 @@ def _work(stage: Stage, q: Question, pictures: bool) -> Answer:
     stage.begin()
     names = _written(q, found, over, pictures)
     said = [*table_lines(found), found.sentence, *([over.sentence] if over else []), *_which(q)]
-    return Answer([q.folder / name for name in names], said, found.complete or not asked.certify)
+    return Written([q.folder / name for name in names], said, found.complete or not asked.certify)
 
 
 def _which(q: Question) -> list[str]:

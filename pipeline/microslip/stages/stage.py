@@ -44,14 +44,15 @@ class Stage:
 
     Attributes:
         product: the file by which it is known; its sidecar and its lock stand beside it.
-        code: modules that make it; the source of all that they import counts as an input.
+        code: modules that make it, of this package by name, others by file; the source of all that they import counts
+            as an input.
         force: work even if there is nothing to do. report: is told what is being done.
         origin: the settings file by whose name the product is called: that of another file, which
             still has this name, is not overwritten. None: the place was asked for.
     """
 
     product: Path
-    code: tuple[str, ...]
+    code: tuple[str | Path, ...]
     force: bool = False
     report: Report = lambda _: None
     origin: Path | None = None
@@ -141,7 +142,7 @@ def origin_of(product: Path) -> Path | None:
 
 
 @cache
-def hash_of_code(modules: tuple[str, ...]) -> str:
+def hash_of_code(modules: tuple[str | Path, ...]) -> str:
     """SHA-256 of the sources of modules and of all that they import; a package stands for all that is in it.
 
     What is no module counts with the modules of its folder and of the folders above it.
@@ -152,14 +153,16 @@ def hash_of_code(modules: tuple[str, ...]) -> str:
         if file not in found:
             found.add(file)
             todo += _imported(file)
-    folders = {f.parent for f in found} - {PACKAGE}
+    folders = {f.parent for f in found if f.is_relative_to(PACKAGE)} - {PACKAGE}
     beside = {f for folder in folders for f in folder.rglob("*") if f.is_file() and f.suffix != ".py"}
     found |= {f for f in beside if f.parent.name != "__pycache__"}
-    named = sorted((str(f.relative_to(PACKAGE)), store.hash_file(f)) for f in found)
+    named = sorted((os.path.relpath(f, PACKAGE), store.hash_file(f)) for f in found)
     return store.hash_settings(named)
 
 
-def _files(module: str) -> list[Path]:
+def _files(module: str | Path) -> list[Path]:
+    if isinstance(module, Path):
+        return [module]
     place = PACKAGE / module.replace(".", "/")
     return sorted(place.rglob("*.py")) if place.is_dir() else [place.with_suffix(".py")]
 

@@ -11,14 +11,14 @@ from ..files import store
 from ..files.tables import write_tables
 from ..report.tyre import tyre_html
 from ..rolling.slip import Studied, TyreCase, load_tyre, study
-from .answer import Answer, RollJob, answered
+from .answer import RollJob, Written, answered
 from .job import open_job
 from .modal import modes_stage
 from .places import find_body
 from .stage import Stage
 
 
-def tyre_stage(job: RollJob) -> Answer:
+def tyre_stage(job: RollJob) -> Written:
     """What a case of a tyre asks for; the modal file of its body is made where it is not up to date.
 
     Raises:
@@ -30,7 +30,7 @@ def tyre_stage(job: RollJob) -> Answer:
     return answered(stage, job.inputs(raw, [basis.resolve()]), lambda: _work(stage, case, job, basis))
 
 
-def _work(stage: Stage, case: TyreCase, job: RollJob, basis: Path) -> Answer:
+def _work(stage: Stage, case: TyreCase, job: RollJob, basis: Path) -> Written:
     folder = stage.product.parent
     stage.report("jumps of slip and load")
     with of_file(job.path):
@@ -41,7 +41,7 @@ def _work(stage: Stage, case: TyreCase, job: RollJob, basis: Path) -> Answer:
     drawn = [_picture(found, wheel, folder / "pictures", case.name)] if job.pictures else []
     page = folder / "tyre.html"
     store.write_text(page, tyre_html(f"{case.name}: unsteady rolling", found, drawn))
-    return Answer([page, *made, *drawn], found.sentences())
+    return Written([page, *made, *drawn], found.sentences())
 
 
 def _tables(found: Studied, folder: Path) -> list[Path]:

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ..case import CaseSettings
 from ..case.assemble import Built, build
+from ..case.settings import case_model
 from ..data import ModalBasis
 from ..errors import UserError, at, of_file
 from ..settings.mistakes import validate
@@ -44,7 +44,7 @@ class Varied:
         own = [f"{k}={v!r}" for k, v in values.items() if not k.startswith(OF_SYSTEM)]
         others = [f"{k.removeprefix(OF_SYSTEM)}={v!r}" for k, v in values.items() if k.startswith(OF_SYSTEM)]
         with at(where, self.path), of_file(self.path):
-            settings = validate(CaseSettings, override(raw, own, self.path, ""), self.path)
+            settings = validate(case_model(), override(raw, own, self.path, ""), self.path)
             return build(settings, self._systems(others) if others else self.bases)
 
     def _systems(self, assignments: list[str]) -> dict[str, ModalBasis]:

@@ -17,11 +17,11 @@ from ..rolling.settings import Section
 from ..vehicle.kinematics import recorded
 from ..vehicle.settings import KinematicsCase, VehicleCase, load_kinematics, load_vehicle
 from ..vehicle.study import Studied, study
-from .answer import Answer, RollJob, answered
+from .answer import RollJob, Written, answered
 from .stage import Stage, hash_of_code
 
 
-def vehicle_stage(job: RollJob) -> Answer:
+def vehicle_stage(job: RollJob) -> Written:
     """What a case of a vehicle asks for; whole if it did not end early.
 
     Raises:
@@ -33,7 +33,7 @@ def vehicle_stage(job: RollJob) -> Answer:
     return _answered(stage, inputs, lambda: _work(stage, case, job, inputs))
 
 
-def kinematics_stage(job: RollJob) -> Answer:
+def kinematics_stage(job: RollJob) -> Written:
     """Wear of a wheel by the kinematics of a file.
 
     Raises:
@@ -50,7 +50,7 @@ def _profiles(*sections: Section) -> list[str]:
     return [s.profile for s in sections if isinstance(s.profile, str)]
 
 
-def _recorded(stage: Stage, case: KinematicsCase, job: RollJob, inputs: Mapping[str, Any]) -> Answer:
+def _recorded(stage: Stage, case: KinematicsCase, job: RollJob, inputs: Mapping[str, Any]) -> Written:
     with _kept(stage, job.path, inputs) as journal:
         found = recorded(case, job.path.parent, stage.report, journal)
     stage.begin()
@@ -62,14 +62,14 @@ def _recorded(stage: Stage, case: KinematicsCase, job: RollJob, inputs: Mapping[
         drawn = [recorded_picture(found, folder / "pictures" / "circumference.png", case.name)]
     page = folder / "unround.html"
     store.write_text(page, answer_page(f"{case.name}: wear of a wheel", found.sentences(), drawn))
-    return Answer([page, *made, *drawn], found.sentences(), not found.ended)
+    return Written([page, *made, *drawn], found.sentences(), not found.ended)
 
 
 def _points(stage: Stage) -> Path:
     return stage.product.with_suffix(".points")
 
 
-def _answered(stage: Stage, inputs: Mapping[str, Any], work: Callable[[], Answer]) -> Answer:
+def _answered(stage: Stage, inputs: Mapping[str, Any], work: Callable[[], Written]) -> Written:
     found = answered(stage, inputs, work)
     _points(stage).unlink(missing_ok=True)
     return found
@@ -88,7 +88,7 @@ def _kept(stage: Stage, case_path: Path, inputs: Mapping[str, Any]) -> Iterator[
             raise
 
 
-def _work(stage: Stage, case: VehicleCase, job: RollJob, inputs: Mapping[str, Any]) -> Answer:
+def _work(stage: Stage, case: VehicleCase, job: RollJob, inputs: Mapping[str, Any]) -> Written:
     folder = stage.product.parent
     with _kept(stage, job.path, inputs) as journal:
         found = study(case, job.path.parent, stage.report, journal)
@@ -97,7 +97,7 @@ def _work(stage: Stage, case: VehicleCase, job: RollJob, inputs: Mapping[str, An
     drawn = _pictures(found, folder / "pictures", case.name) if job.pictures else []
     page = folder / "unround.html"
     store.write_text(page, vehicle_html(f"{case.name}: unround wheels", found, drawn))
-    return Answer([page, *made, *drawn], found.sentences(), not found.ended)
+    return Written([page, *made, *drawn], found.sentences(), not found.ended)
 
 
 def _tables(found: Studied, folder: Path) -> list[Path]:

@@ -288,9 +288,9 @@ def loops(orbit: Orbit) -> Array:
 
 
 def lost(orbit: Orbit) -> float:
-    """J a period that contacts take for good, counted in every step; nan: less than two periods are kept, or a law does
-    not tell."""
-    periods = len(orbit.time) // orbit.samples - 1
+    """J a period that contacts take for good, counted in every step, over whole repetitions of a motion that comes
+    back; nan: less than two periods are kept, or a law does not tell."""
+    periods = orbit.repeated(len(orbit.time) // orbit.samples - 1)
     taken = orbit.energy["lost"]
     if periods > 0 and orbit.run_up:
         return float(taken[-1] - taken[0]) / orbit.cycles

@@ -226,16 +226,27 @@ class Orbit:
         turned = sum(float(w.sum()) for (w,) in self.strips("angular_frequency")) * self.period / self.samples
         return max(turned / (2 * np.pi), 1.0)
 
+    def repeated(self, periods: int) -> int:
+        """Of so many periods those that are whole repetitions of a motion that comes back, or all."""
+        return periods // self.repeats * self.repeats if self.repeats else periods
+
+    def _a_period(self, times: Array) -> float:
+        """Events at times (s) per period of the excitation, over whole repetitions of a motion that comes back."""
+        if self.run_up or len(self.time) < self.samples:
+            return len(times) / self.cycles
+        periods = self.repeated(len(self.time) // self.samples)
+        return int((times > self.time[-1] - periods * self.period).sum()) / periods
+
     @property
     def impacts(self) -> float:
         """Impacts of all contacts per period of the excitation."""
-        return self.count("closes") / self.cycles
+        return self._a_period(self.times("closes"))
 
     @property
     def slips(self) -> float:
         """Times that a contact with friction begins to slide, per period of the excitation."""
         rubbing = [i for i in range(len(self.touching)) if classification.rubs(self, i)]
-        return sum(self.count("slips", i) for i in rubbing) / self.cycles
+        return sum(self._a_period(self.times("slips", i)) for i in rubbing)
 
     @cached_property
     def said(self) -> str:

@@ -17,6 +17,7 @@ from ..files.hdf5 import refuse_foreign
 from ..files.store import fingerprint
 from ..harmonic_balance import solved
 from ..harmonic_balance.nonlinear_modes import Backbone
+from ..results.dataset import Dataset, is_dataset, read_dataset
 from ..results.series import Series
 from ..results.tones import TwoTones, is_of_tones, read_tones
 from ..settings.arguments import checked
@@ -175,9 +176,9 @@ def read_orbits(path: Path | str) -> tuple[Recorded, ...]:
 
 
 @checked
-def load(path: Path | str) -> Series | Backbone | Recorded | TwoTones:
-    """What a result's `save` wrote: the only series of a response file, a nonlinear mode, the only motion in time, or
-    motions of two frequencies.
+def load(path: Path | str) -> Series | Backbone | Recorded | TwoTones | Dataset:
+    """What a result's `save` wrote: the only series of a response file, a nonlinear mode, the only
+    motion in time, motions of two frequencies, or a dataset.
 
     Files of several are read by `read_response` and `read_orbits`.
 
@@ -186,6 +187,8 @@ def load(path: Path | str) -> Series | Backbone | Recorded | TwoTones:
     """
     if is_of_tones(path):
         return read_tones(path)
+    if is_dataset(path):
+        return read_dataset(path)
     if not samples.is_of_motions(path):
         return solved.load(path)
     found = read_orbits(path)

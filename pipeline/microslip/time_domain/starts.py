@@ -130,13 +130,16 @@ def _coordinates(given: Any, count: int, key: str) -> Array:
     return values
 
 
-def of_balance(e: Equations, problem: Problem) -> Periodic:
+def of_balance(e: Equations, problem: Problem, point: Point | None = None) -> Periodic:
     """The solution of a harmonic balance of the same assembly at the frequency of the equations.
+
+    Args:
+        point: the solution; it is looked for if not given.
 
     Raises:
         NotConverged: there is none.
     """
-    point = sweep(problem, np.array([e.Omega / (2 * np.pi)]))[0]
+    point = point or sweep(problem, np.array([e.Omega / (2 * np.pi)]))[0]
     if not point.converged:
         raise NotConverged(f'start: harmonic balance found no vibration ({point.status}); write start = "static"')
     beside = accuracy.SAFETY * accuracy.left_out(problem, point.x, e.Omega)

@@ -1,0 +1,1 @@
+"""Analyses, a file each: keys, solution, answer, figures; see `microslip.analysis`."""

@@ -1,0 +1,175 @@
+"""Amplitude over frequency and normal force as a map, with the ridge of its resonances and their lowest place, the
+optimal normal force."""
+
+from __future__ import annotations
+
+from functools import cache, partial
+from typing import TYPE_CHECKING, Annotated, Any
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from ..analysis import Analysis, Answer, Diagram, Question
+from ..case.assemble import Built
+from ..case.problem import normal_forces, problem_of
+from ..continuation import NO_OPTIMUM, Peak
+from ..data import Array
+from ..errors import UserError
+from ..harmonic_balance.peak import Optimum, Top, optimum, top_of
+from ..harmonic_balance.problem import Problem
+from ..harmonic_balance.readout import measured
+from ..harmonic_balance.refinement import filled_response
+from ..pictures.plots import plain_numbers
+from ..results import Journal
+from ..results.dataset import Dataset, Variable
+from ..results.journal import once
+from ..settings.numbers import Model, Positive
+from ..units import Quantity
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+KEPT = "normal force"
+"""Series of the journal: a response and its highest resonance under every normal force."""
+
+
+class Keys(Model):
+    """A map of the amplitude over frequency and normal force, by `microslip map`.
+
+    low, high: N, of the normal force; the smallest above 0 and the largest of the sweep if not given. forces: how many,
+    in equal ratios; more are added where the highest resonance is lowest. Frequencies are those of the sweep.
+    """
+
+    low: Positive | None = None
+    high: Positive | None = None
+    forces: Annotated[int, Field(ge=3, le=10000)] = 16
+
+    @model_validator(mode="after")
+    def _rising(self) -> Keys:
+        if self.low is not None and self.high is not None and self.high <= self.low:
+            raise ValueError("high: must be above low")
+        return self
+
+
+def solve(q: Question) -> Answer:
+    """A response under every normal force; whole if each has a resonance that is known."""
+    built: Built = q.built
+    values, band = _forces(q), _band(built)
+    length = problem_of(built, float(np.sqrt(values[0] * values[-1]))).length
+
+    @cache
+    def make(force: float) -> Problem:
+        return problem_of(built, force, length=length)
+
+    def look(force: float, problem: Problem) -> Top:
+        return _top(once(q.kept, KEPT, force, partial(_responded, problem, band, q.report)))
+
+    best = optimum(make, values, 2 * np.pi * band, report=q.report, look=look)
+    of = measured(built.assembly)
+    ridge, points = _ridge(best, of), _points(q.kept, of)
+    title = "amplitude over frequency and normal force"
+    return Answer(
+        sentences=_sentences(best, of),
+        data={"": ridge, "points": points},
+        diagrams={"": Diagram(partial(draw, ridge, points, of), title, (8.0, 5.4))},
+        largest=float(np.nanmax(ridge["amplitude"], initial=0.0)),
+        whole=all(one.status == "converged" for one in best.found.values()),
+    )
+
+
+def _forces(q: Question) -> list[float]:
+    """N, in equal ratios.
+
+    Raises:
+        UserError: no range.
+    """
+    asked: Keys = q.asked
+    swept = [force for force in normal_forces(q.built, "case") if force > 0]
+    low = asked.low or min(swept, default=0.0)
+    high = asked.high or max(swept, default=0.0)
+    if not 0 < low < high:
+        raise UserError(f"low: from {low:g} to {high:g} N there is no range; give low and high, the smaller one first")
+    return [float(force) for force in np.geomspace(low, high, asked.forces)]
+
+
+def _band(built: Built) -> Array:
+    sweep = built.settings.sweep
+    return np.linspace(sweep.start, sweep.stop, sweep.points)
+
+
+def _responded(problem: Problem, band: Array, report: Any) -> dict[str, Any]:
+    """A response and its highest resonance, as a journal keeps them."""
+    response = filled_response(problem, band, np.zeros(len(problem.assembly.contacts)), report)
+    top = top_of(problem, response)
+    return {
+        "frequency": response.frequency,
+        "amplitude": np.where(response.converged, np.abs(response.monitor), np.nan),
+        "x": top.peak.x, "Omega": top.peak.lam, "square": top.peak.value, "kink": int(top.peak.kink),
+        "status": top.peak.status, "tangent": top.peak.tangent, "end": top.end or np.nan, "unsolved": top.unsolved,
+    }  # fmt: skip
+
+
+def _top(kept: dict[str, Any]) -> Top:
+    """The highest resonance that a journal keeps."""
+    whole = ("x", "Omega", "square", "kink", "status", "tangent")
+    x, Omega, square, kink, status, tangent = (kept[name] for name in whole)
+    peak = Peak(x, float(Omega), float(square), bool(kink), status, tangent)
+    return Top(peak, None if np.isnan(kept["end"]) else float(kept["end"]), kept["unsolved"])
+
+
+def _ridge(best: Optimum, of: Quantity) -> Dataset:
+    rows = [(force, one.Omega / (2 * np.pi), one.amplitude) for force, one in best.found.items()]
+    force, frequency, amplitude = np.array(rows).T
+    return Dataset("map", {
+        "normal_force": Variable(force, "N", "of the contacts that the sweep presses"),
+        "frequency": Variable(frequency, "Hz", "of the highest resonance; nan where none is known"),
+        "amplitude": Variable(amplitude, of.unit, "of the first read-out there, 0-peak"),
+    }, {"optimal_normal_force_N": best.parameter})  # fmt: skip
+
+
+def _points(kept: Journal, of: Quantity) -> Dataset:
+    found = kept.of(KEPT)
+    force = np.repeat(list(found), [len(one["frequency"]) for one in found.values()])
+    frequency, amplitude = (np.concatenate([one[key] for one in found.values()]) for key in ("frequency", "amplitude"))
+    return Dataset("map_points", {
+        "normal_force": Variable(force, "N", "of the contacts that the sweep presses"),
+        "frequency": Variable(frequency, "Hz", "of the sweep, and points added where it may miss something"),
+        "amplitude": Variable(amplitude, of.unit, "of the first read-out, 0-peak; nan where there is no solution"),
+    })  # fmt: skip
+
+
+def _sentences(best: Optimum, of: Quantity) -> list[str]:
+    lost = [f"F_N = {force:.5g} N: {one.status}." for force, one in best.found.items() if one.status != "converged"]
+    one, ends = best.resonance, list(best.found)
+    if one.status != "converged":
+        return lost
+    where = f"{of.sized(one.amplitude)} at {one.Omega / (2 * np.pi):.6g} Hz under F_N = {best.parameter:.5g} N"
+    if best.status == NO_OPTIMUM or best.parameter in (ends[0], ends[-1]):
+        return [f"The highest resonance is lowest, {where}, at an end of the range; the optimum lies beyond it.", *lost]
+    return [f"The highest resonance is lowest, {where}.", *lost]
+
+
+def draw(ridge: Dataset, points: Dataset, of: Quantity, figure: Figure) -> None:
+    """The map of the points at the sweep's frequencies, its ridge, and the lowest place of it."""
+    from matplotlib.colors import LogNorm
+
+    forces, every = np.unique(points["normal_force"]), points["frequency"]
+    common = [f for f in np.unique(every) if (every == f).sum() == len(forces)]
+    at = {(n, f): a for n, f, a in zip(points["normal_force"], every, points["amplitude"], strict=True)}
+    by, unit = of.shared(points["amplitude"])
+    amplitude = by * np.array([[at[n, f] for f in common] for n in forces])
+    axes = figure.subplots()
+    axes.set_facecolor("0.85")
+    known = amplitude[np.isfinite(amplitude) & (amplitude > 0)]
+    shades = axes.pcolormesh(common, forces, amplitude, norm=LogNorm(known.min(), known.max()), shading="nearest")
+    axes.plot(ridge["frequency"], ridge["normal_force"], color="white", lw=1.4, label="highest resonance")
+    best = ridge["normal_force"] == ridge.facts["optimal_normal_force_N"]
+    axes.plot(ridge["frequency"][best], ridge["normal_force"][best], "*", color="white", ms=13, mec="black",
+              label=f"lowest: {ridge['normal_force'][best][0]:.4g} N")  # fmt: skip
+    axes.set(yscale="log", xlabel="frequency in Hz", ylabel="normal force in N", xlim=(common[0], common[-1]))
+    plain_numbers(axes.yaxis, (1.0, 2.0, 5.0))
+    axes.legend(fontsize=8, loc="upper right")
+    figure.colorbar(shades, label=f"amplitude in {unit} (0-peak); grey: no solution")
+
+
+ANALYSIS = Analysis(name="map", asks=Keys, solve=solve, lost="a resonance is not known under every normal force")
