@@ -44,7 +44,7 @@ def prepared() -> Varied:
     whole = text[: text.index("[stability.cycle]")]
     CASE.write_text("\n".join(line for line in whole.splitlines() if not line.startswith("full =")) + "\n")
     settings, raw = load_case(CASE)
-    files = modal_files(settings, CASE, Path(), lambda _: None)
+    files = modal_files(settings, Path(), lambda _: None)
     return Varied(CASE, raw, {name: read_basis(file) for name, file in files.items()})
 
 

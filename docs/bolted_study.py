@@ -43,7 +43,7 @@ def joined(basis: ModalBasis, tangential: float, ratio: float = 2.0, normal: flo
     settings, _ = load_case(CASE)
     changes |= {"tangential_stiffness": tangential, "normal_stiffness": ratio * tangential}
     contacts = tuple(c.model_copy(update=changes) for c in settings.contacts)
-    built = build(settings.model_copy(update={"contacts": contacts}), {"upper": basis, "lower": basis}, CASE)
+    built = build(settings.model_copy(update={"contacts": contacts}), {"upper": basis, "lower": basis})
     assembly = built.pressed(normal)
     part = assembly.joined(1)
     k = scipy.linalg.block_diag(*[c.stiffness for c in assembly.contacts])
@@ -115,7 +115,7 @@ def picture(basis: ModalBasis, left: Any, right: Any) -> None:
     left.legend()
     settings, _ = load_case(CASE)
     few = tuple(c.model_copy(update={"points": (2, 2)}) for c in settings.contacts)
-    built = build(settings.model_copy(update={"contacts": few}), {"upper": basis, "lower": basis}, CASE)
+    built = build(settings.model_copy(update={"contacts": few}), {"upper": basis, "lower": basis})
     sweep = settings.sweep
     f = np.linspace(sweep.start, sweep.stop, 201)
     problem = problem_of(built, 1e4, samples=16, periodicity=1e-4, cycles=10)

@@ -51,7 +51,7 @@ def opened(case: str, bases: Bases, *changes: str) -> Built:
     files: dict[str, ModalBasis] = {}
     for b in settings.components:
         files.setdefault(b.body or b.name, bases(b.body or b.name))
-    return build(settings, {b.name: files[b.body or b.name] for b in settings.components}, path)
+    return build(settings, {b.name: files[b.body or b.name] for b in settings.components})
 
 
 def followed(problem: Problem, frequency: Array, finer: int = 3) -> Curve:

@@ -567,7 +567,7 @@ def convergence() -> None:
 def blade_case(basis: ModalBasis, **changes: Any) -> CaseSettings:
     settings, _ = load_case(ROOT / "pipeline" / "cases" / "blade.toml")
     group = basis.groups[0, 0]
-    own = tuple(sized(c, group.interfaces[c.interface], "blade.toml") for c in settings.contacts)
+    own = tuple(sized(c, group.interfaces[c.interface]) for c in settings.contacts)
     return settings.model_copy(update={"contacts": own, **changes})
 
 
@@ -588,7 +588,7 @@ def springs_of(c: ContactSettings) -> np.ndarray:
 def contact() -> None:
     """The blade between its neighbours: sticking frequencies against the printed ones, the friction response."""
     basis = made("blade", "blade", *LIGHT)
-    result = run_case(blade_case(basis), basis, "pipeline/cases/blade.toml")
+    result = run_case(blade_case(basis), basis)
     rows = [
         [name, f"{p:g}", f"{v:.1f}", percent(v, p)]
         for name, p, v in zip(("bending", "bending", "torsion"), PRINTED_STUCK, result.stuck, strict=False)
@@ -659,7 +659,7 @@ def amplitudes(basis: ModalBasis, settings: CaseSettings) -> None:
     rows = []
 
     def row(text: str, b: ModalBasis) -> None:
-        result = run_case(settings.model_copy(update={"sweep": near}), b, "blade.toml")
+        result = run_case(settings.model_copy(update={"sweep": near}), b)
         best = [max(found, key=lambda p: p[1]) for found in result.resonances.values()]
         rows.append([text, *(f"{1e6 * a:.0f} um at {f:.2f} Hz" for f, a in best)])
 
@@ -688,7 +688,7 @@ def arrangement2() -> None:
 def first() -> None:
     """README's first screen: three modes of the free blade, and the friction response between its neighbours."""
     basis = made("blade", "blade", *LIGHT)
-    result = run_case(blade_case(basis), basis, "blade.toml")
+    result = run_case(blade_case(basis), basis)
     left = with_studio(basis, three_modes)
     fig = figure(7.2, left.height / 110)
     axes = fig.subplots()
@@ -953,7 +953,7 @@ def case_frequencies(basis: ModalBasis, includes: str | None) -> np.ndarray:
     settings = blade_case(basis)
     contacts = tuple(c.model_copy(update={"includes": includes}) for c in settings.contacts)
     sweep = settings.sweep.model_copy(update={"points": 2, "normal_forces": (780.0,)})
-    return run_case(settings.model_copy(update={"contacts": contacts, "sweep": sweep}), basis, "blade.toml").stuck[:3]
+    return run_case(settings.model_copy(update={"contacts": contacts, "sweep": sweep}), basis).stuck[:3]
 
 
 def counted_picture(found: Sequence[tuple[float, int, float, float]]) -> Any:
@@ -1058,7 +1058,7 @@ def sticking_force(study: Any) -> None:
         own = {"reduction": method, "modes": settings.modes.model_copy(update={"count": count})}
         groups[label] = study.modal_basis(mesh, settings.model_copy(update=own)).groups[0, 0]
     case, _ = load_case(ROOT / "pipeline" / "cases" / "blade.toml")
-    own = [sized(c, groups["reference"].interfaces[c.interface], "blade.toml") for c in case.contacts]
+    own = [sized(c, groups["reference"].interfaces[c.interface]) for c in case.contacts]
     springs = np.concatenate([springs_of(c) for c in own])
     frequency = np.linspace(60, 1200, 2281)
     found = {label: np.abs(study.reduced_force(g, springs, frequency)) for label, g in groups.items()}

@@ -24,7 +24,7 @@ DRIVEN = """--set name=blade-at-3000-rpm --set body=blade-at-speed --set amplitu
 def maps(basis: ModalBasis, normal: float, hertz: float) -> list[Any]:
     """Contact maps of the rough case at one frequency, reached in a few steps from below."""
     settings, _ = load_case(CASES / "blade-rough.toml", ["harmonics=3"])
-    built = build(settings, {b.name: basis for b in settings.components}, CASES / "blade-rough.toml")
+    built = build(settings, {b.name: basis for b in settings.components})
     problem = problem_of(built, normal)
     point = sweep(problem, np.linspace(0.9, 1.0, 5) * hertz)[-1]
     if not point.converged:

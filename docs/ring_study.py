@@ -41,7 +41,7 @@ class Ring:
         s = self.settings.model_copy(
             update={"ring": self.settings.ring.model_copy(update={"engine_order": order}), "modes": modes}
         )
-        return problem_of(build(s, {"blade": self.basis}, CASE), normal, **finer)
+        return problem_of(build(s, {"blade": self.basis}), normal, **finer)
 
 
 def ring(basis: ModalBasis, points: tuple[int, int] | None = None, **changes: Any) -> Ring:
@@ -112,7 +112,7 @@ def inclined(r: Ring, degrees: float, normal: float, order: int) -> Problem:
 
     assert r.settings.ring is not None
     s = r.settings.model_copy(update={"ring": r.settings.ring.model_copy(update={"engine_order": order})})
-    built = build(s, {"blade": r.basis}, CASE)
+    built = build(s, {"blade": r.basis})
     Q = np.kron(np.eye(2), rotation(np.array([0.0, 0.0, 1.0]), np.radians(degrees)))
 
     def turned(side: ContactFace) -> ContactFace:

@@ -35,7 +35,7 @@ def motions(basis: ModalBasis) -> dict[str, dict[float, Orbit]]:
 def assembled(case: Path, changes: list[str], basis: ModalBasis) -> tuple[list[equations.Equations], OrbitOfCase]:
     """The equations of a case of one body with changes, at each of its frequencies, and what it asks."""
     settings, _ = load_case(case, changes)
-    built, asked = build(settings, {basis.name: basis}, case), settings.orbit
+    built, asked = build(settings, {basis.name: basis}), settings.orbit
     assert asked is not None and asked.Omega is not None
     return [equations.of(built.pressed(asked.normal_force), w) for w in asked.Omega], asked
 

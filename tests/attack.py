@@ -88,17 +88,17 @@ class Case:
 
     @property
     def built(self) -> Built:
-        return build(self.settings, {n: read_basis(f) for n, f in self.bodies.items()}, "case")
+        return build(self.settings, {n: read_basis(f) for n, f in self.bodies.items()})
 
 
 def opened(path: Path, assignments: list[str] | None = None, root: Path = Path(".")) -> Case:
     """A case with the modal files that are there, or are made now."""
     settings, raw = load_case(path, assignments)
     try:
-        files = places.existing_files(settings, path, None, root)
+        files = places.existing_files(settings, None, root)
     except UserError:
-        files = places.modal_files(settings, path, root, lambda text: print(f"  {text}", file=sys.stderr))
-    beside = {os.path.relpath(f, path.parent): f for f in files_of(settings, path).values()}
+        files = places.modal_files(settings, root, lambda text: print(f"  {text}", file=sys.stderr))
+    beside = {os.path.relpath(f, path.parent): f for f in files_of(settings).values()}
     case = Case(raw, settings, files, beside)
     if outside := [name for name in case.inputs if name.startswith(("..", "/"))]:
         raise UserError(f"{path}: {outside[0]} does not stand below the folder of the case; copy it there")

@@ -43,20 +43,14 @@ from microslip.time_domain.swept import Motions, Sweeps
 pytestmark = pytest.mark.usefixtures("undrawn", "unjudged")
 
 
-def swept(
-    frequency: list[float], amplitude: list[float], lost: tuple[float, ...] = ()
-) -> FrequencyResponse:
+def swept(frequency: list[float], amplitude: list[float], lost: tuple[float, ...] = ()) -> FrequencyResponse:
     """A sweep by 10 Hz and what was added between; lost: where it has no solution."""
     f = np.array(frequency)
-    r = replace(
-        modes(f, (1e3, 0.01, 1.0)), monitor=np.array(amplitude, dtype=complex), added=f % 10 != 0
-    )
+    r = replace(modes(f, (1e3, 0.01, 1.0)), monitor=np.array(amplitude, dtype=complex), added=f % 10 != 0)
     return replace(r, converged=~np.isin(f, lost))
 
 
-FOLDED = swept(
-    [400, 410, 420, 423.166, 423.169, 430, 440], [42, 49, 60, 69, 80, 77, 73], (423.169, 430)
-)
+FOLDED = swept([400, 410, 420, 423.166, 423.169, 430, 440], [42, 49, 60, 69, 80, 77, 73], (423.169, 430))
 JUMPS = swept([110, 120, 122.091, 122.092, 130], [1, 4, 10, 11.8, 2])
 SMOOTH = swept([100, 110, 113, 120], [1, 4, 9, 3])
 NARROW = swept([100, 110, 110.1, 120], [1, 4, 9, 3])
@@ -77,9 +71,7 @@ def test_where_a_sweep_ends_is_no_resonance(
     """The last solution before a gap or a jump is an end; a peak that overhangs, or lies between points, is none. What
     is looked at reaches from an overhanging peak to the jump, and over all points without a solution."""
     assert ends(found, peaks) == turns
-    np.testing.assert_allclose(
-        gaps(found, [p for p, turn in zip(peaks, turns, strict=True) if not turn]), beside
-    )
+    np.testing.assert_allclose(gaps(found, [p for p, turn in zip(peaks, turns, strict=True) if not turn]), beside)
 
 
 def motion(frequency: float, amplitude: float, opens: bool = False, least: float = 1.0) -> Settled:
@@ -109,26 +101,10 @@ def test_what_is_said_of_two_motions() -> None:
     ]
     rest = [motion(390, 38), motion(400, 88, True), motion(410, 81, True)]
     said = what_moves(Beyond(100.0, (410.0, 420.0), up, down, rest))
-    assert (
-        "from 390 to 410 Hz" in said[0]
-        and "120 µm at 390 Hz" in said[0]
-        and "F_N = 100 N" in said[0]
-    )
-    assert (
-        "lower one at 390 Hz" in said[1]
-        and "higher one from 400 to 410 Hz" in said[1]
-        and "88 µm" in said[1]
-    )
-    assert (
-        "upwards" in said[2]
-        and "lower one up to 410 Hz (49 µm)" in said[2]
-        and "74 µm at 420 Hz" in said[2]
-    )
-    assert (
-        "downwards" in said[3]
-        and "down to 390 Hz (120 µm)" in said[3]
-        and "30 µm at 380 Hz" in said[3]
-    )
+    assert "from 390 to 410 Hz" in said[0] and "120 µm at 390 Hz" in said[0] and "F_N = 100 N" in said[0]
+    assert "lower one at 390 Hz" in said[1] and "higher one from 400 to 410 Hz" in said[1] and "88 µm" in said[1]
+    assert "upwards" in said[2] and "lower one up to 410 Hz (49 µm)" in said[2] and "74 µm at 420 Hz" in said[2]
+    assert "downwards" in said[3] and "down to 390 Hz (120 µm)" in said[3] and "30 µm at 380 Hz" in said[3]
     assert "irregular" in said[4] and "400 Hz" in said[4] and len(said) == 5
     (same,) = what_moves(Beyond(100.0, (410.0, 420.0), up, up[::-1]))
     assert "same motion" in same
@@ -239,9 +215,7 @@ def test_sweeps_find_both_ends_of_a_motion(case: Path, monkeypatch: pytest.Monke
 
 
 @pytest.mark.parametrize("calls", [1, 7, 20])
-def test_motions_in_time_are_gone_on_with(
-    case: Path, monkeypatch: pytest.MonkeyPatch, calls: int
-) -> None:
+def test_motions_in_time_are_gone_on_with(case: Path, monkeypatch: pytest.MonkeyPatch, calls: int) -> None:
     """Interrupted, or cut for want of patience: with what was kept the answer is that of one run,
     nothing twice, and the time counts that of both."""
     fake = Bistable(monkeypatch)
@@ -263,7 +237,7 @@ def test_motions_in_time_are_gone_on_with(
 @pytest.mark.slow
 def test_a_curve_begins_on_the_solution_of_the_sweep(case: Path) -> None:
     """Of the two motions at 118 Hz the one that is known, with as many harmonics or more; without it the lower one."""
-    pressed = build(load_case(case)[0], {"lifting": lifting()}, case)
+    pressed = build(load_case(case)[0], {"lifting": lifting()})
     p = problem_of(pressed, 10.0)
     low = solve(p, 2 * np.pi * 118.0, [])
     high = max((low.x * c for c in (3.0, 5.0)), key=lambda x: np.abs(solve(p, low.Omega, [x]).x).max())
@@ -286,7 +260,7 @@ def test_a_curve_with_more_harmonics_begins_on_the_motion_that_fewer_tell(case: 
     thirtieth as high; admitted little by little, more harmonics change it by a few hundredths, as
     they do at 100 Hz, where Newton's method stays."""
     settings, path = load_case(case, ["amplitude=0.5"])[0], {"lifting": lifting()}
-    one, more = (problem_of(build(settings, path, case), 10.0, harmonics=n) for n in (1, 7))
+    one, more = (problem_of(build(settings, path), 10.0, harmonics=n) for n in (1, 7))
     known = {round(p.Omega / (2 * np.pi)): p for p in sweep(one, np.arange(150.0, 94.0, -2.0))}
     size = lambda x: np.abs(x).max()  # noqa: E731
     high, at = known[96].x, 2 * np.pi * 96.0
@@ -299,9 +273,7 @@ def test_a_curve_with_more_harmonics_begins_on_the_motion_that_fewer_tell(case: 
 
 
 @pytest.mark.slow
-def test_patience_that_ends_is_told_and_more_of_it_goes_on(
-    case: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_patience_that_ends_is_told_and_more_of_it_goes_on(case: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """The sweep and its resonances stay, what was seen in time is in the table, the sentence says
     where it ended and what to type; that goes on there, and leaves what was there."""
 
@@ -365,7 +337,7 @@ def test_the_curve_and_its_stability_end_with_the_time_of_their_place(case: Path
 
     def asked(patience: float) -> Beyond:
         one = Beyond(10.0, (119.0, 125.0), low, high, patience=patience, spent=100.0)
-        return with_curve(one, found, settings, lies, case, keep, lambda _: None)
+        return with_curve(one, found, settings, lies, keep, lambda _: None)
 
     cut, whole = asked(100.01), asked(1e3)
     (one,) = cut.curves
@@ -396,35 +368,23 @@ def test_what_is_known_is_written_before_motions_in_time(
 
 
 @pytest.mark.slow
-def test_a_response_that_jumps_is_integrated_in_time(
-    case: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_response_that_jumps_is_integrated_in_time(case: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """The sweep jumps at 122 Hz; the motion that lifts off is three to thirty times as high below, and a sweep in time
     downwards follows it, one upwards and starts from rest do not: on page, terminal, table. Its amplitudes are those
     of the balance with 7 harmonics on the curve that leans over, to 2 %."""
     assert main(["respond", "case.toml"]) == 0
     told = capsys.readouterr().err
     rows = list(csv.DictReader(Path("build/lifting/motions.csv").open()))
-    way = {
-        w: {float(r["frequency_Hz"]): r for r in rows if r["way"] == w}
-        for w in ("upwards", "downwards")
-    }
+    way = {w: {float(r["frequency_Hz"]): r for r in rows if r["way"] == w} for w in ("upwards", "downwards")}
     up, down = ({f: float(r["amplitude_m"]) for f, r in way[w].items()} for w in way)
     both = [f for f in up if f in down and 106 < f < 121]
-    assert (
-        len(both) == 5
-        and all(down[f] > 3 * up[f] for f in both)
-        and down[both[0]] > 25 * up[both[0]]
-    )
+    assert len(both) == 5 and all(down[f] > 3 * up[f] for f in both) and down[both[0]] > 25 * up[both[0]]
     at_rest = [r for r in rows if r["way"] == "from rest"]
     assert at_rest and all(
-        float(r["amplitude_m"]) == pytest.approx(up[float(r["frequency_Hz"])], rel=0.02)
-        for r in at_rest
+        float(r["amplitude_m"]) == pytest.approx(up[float(r["frequency_Hz"])], rel=0.02) for r in at_rest
     )
     series = read_response("build/lifting/response.h5").series[0]
-    np.testing.assert_allclose(
-        [up[f] for f in both], np.interp(both, series.key, series.amplitude), rtol=0.02
-    )
+    np.testing.assert_allclose([up[f] for f in both], np.interp(both, series.key, series.amplitude), rtol=0.02)
     summary, page = (
         json.loads(Path("build/lifting/response.json").read_text()),
         Path("build/lifting/response.html"),
@@ -434,7 +394,7 @@ def test_a_response_that_jumps_is_integrated_in_time(
     assert "Motions in time" in page.read_text() and "from rest" in page.read_text()
     assert all(row["frequency_Hz"] < 121 for row in summary["resonances"])
     curve = ms.follow(
-        build(load_case(case)[0], {"lifting": lifting()}, case).pressed(10.0),
+        build(load_case(case)[0], {"lifting": lifting()}).pressed(10.0),
         140.0,
         106.0,
         harmonics=7,
@@ -523,9 +483,7 @@ normal_forces = [100.0]
 
 
 @pytest.mark.slow
-def test_a_lap_joint_from_rest_stays_closed_and_opens(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_lap_joint_from_rest_stays_closed_and_opens(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Two beams of 120 mm, their far ends clamped, pressed by 100 N where they overlap and shaken by 20 N: two other
     integrations in time have 37.6 µm at 390 Hz, closed, and open from 400 Hz on, 83 µm there and 73 µm at 423 Hz."""
     pytest.importorskip("gmsh")
@@ -533,22 +491,16 @@ def test_a_lap_joint_from_rest_stays_closed_and_opens(
     subprocess.run([sys.executable, "-c", DRAW], check=True, capture_output=True)
     for name, other, x in (("lapA", "lapB", 0), ("lapB", "lapA", 200)):
         (tmp_path / name).mkdir()
-        (tmp_path / name / "body.toml").write_text(
-            LAP.format(name=name, other=other, x=x, at=60 + 0.4 * x)
-        )
+        (tmp_path / name / "body.toml").write_text(LAP.format(name=name, other=other, x=x, at=60 + 0.4 * x))
     (tmp_path / "case.toml").write_text(JOINT)
     settings = load_case(tmp_path / "case.toml")[0]
-    files = modal_files(settings, tmp_path / "case.toml", tmp_path, lambda _: None)
+    files = modal_files(settings, tmp_path, lambda _: None)
     bases = {name: read_basis(file) for name, file in files.items()}
-    pressed = build(settings, bases, tmp_path / "case.toml").pressed(100.0)
+    pressed = build(settings, bases).pressed(100.0)
     for f, amplitude, opens in (
         (390.0, 37.6e-6, False),
         (400.0, 83e-6, True),
         (423.0, 73e-6, True),
     ):
         one = settled(pressed, f, 640)
-        assert (
-            one.amplitude == pytest.approx(amplitude, rel=0.06)
-            and one.opens == opens
-            and not one.irregular
-        )
+        assert one.amplitude == pytest.approx(amplitude, rel=0.06) and one.opens == opens and not one.irregular

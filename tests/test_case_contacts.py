@@ -56,8 +56,8 @@ STIFF = {"normal_stiffness": 1e9, "tangential_stiffness": 8e8}
 GIVEN = {"kind": "given", "normal": 1e9, "tangential": 8e8}
 
 
-def made(raw: dict[str, Any]) -> CaseSettings:
-    return validate(CaseSettings, copy.deepcopy(raw), PATH)
+def made(raw: dict[str, Any], path: Path = PATH) -> CaseSettings:
+    return validate(CaseSettings, copy.deepcopy(raw), path)
 
 
 def two(second: dict[str, Any] | None = None, **contact: Any) -> dict[str, Any]:
@@ -80,10 +80,10 @@ def test_what_drives_a_held_place_is_refused_and_what_reads_there_is_told(reduct
     basis = modal_basis(small.beam(), BodySettings.model_validate(own))
     raw = table(**STIFF, includes="surface")
     drives = made(raw | {"excitation": "held"})
-    refused("excitation: 'held' moves nothing", build, drives, {"small": basis}, PATH)
-    found = build(made(raw), {"small": basis}, PATH)
+    refused("excitation: 'held' moves nothing", build, drives, {"small": basis})
+    found = build(made(raw), {"small": basis})
     assert [m for m in found.messages if "Monitor 'tip-probe' reads no u_x: 'small' is held there" in m]
-    sound = build(made(raw), {"small": small.basis()}, PATH)
+    sound = build(made(raw), {"small": small.basis()})
     assert not [m for m in sound.messages if "Monitor" in m]
 
 
@@ -100,10 +100,10 @@ def clamped_beside(part: float) -> dict[str, Any]:
 def test_a_contact_on_a_face_that_supports_hold_is_refused(raw: dict[str, Any]) -> None:
     """With the face and the reason; of a part that is held the share of the area is told."""
     whole = dict.fromkeys(["small", "a", "b"], clamped_beside(1.0)["small"])
-    refused(("contacts", "the supports of 'small' hold the face"), build, made(raw), whole, PATH)
-    some = build(made(raw), dict.fromkeys(["small", "a", "b"], clamped_beside(0.5)["small"]), PATH)
+    refused(("contacts", "the supports of 'small' hold the face"), build, made(raw), whole)
+    some = build(made(raw), dict.fromkeys(["small", "a", "b"], clamped_beside(0.5)["small"]))
     assert [m for m in some.messages if "hold" in m and "% of the face 'right'" in m]
-    free = build(made(raw), dict.fromkeys(["small", "a", "b"], small.basis()), PATH)
+    free = build(made(raw), dict.fromkeys(["small", "a", "b"], small.basis()))
     assert not [m for m in free.messages if "of the face" in m]
     (said,) = held_faces(clamped_beside(1.0)["small"])
     assert said.startswith("interfaces.right: the supports hold its whole face")
@@ -116,7 +116,7 @@ BETWEEN = two() | {"contacts": two()["contacts"] + two(interface="b:right", agai
 
 def built(raw: dict[str, Any]) -> Any:
     settings = made(raw)
-    return build(settings, {b.name: small.basis() for b in settings.components}, PATH)
+    return build(settings, {b.name: small.basis() for b in settings.components})
 
 
 @pytest.mark.slow
@@ -125,7 +125,7 @@ def test_a_beam_whose_patch_deforms_on_the_ground(patch: str, request: Any) -> N
     """It converges, and says how many deformations there are."""
     if patch == "nodal":
         request.getfixturevalue("unestimated")
-    result = run_case(made(table(**STIFF, patch=patch, law="smooth")), {"small": small.basis()}, PATH)
+    result = run_case(made(table(**STIFF, patch=patch, law="smooth")), {"small": small.basis()})
     assert result.responses[200.0].converged.all()
     assert any("deformations of the bodies" in r for r in result.messages) == (patch == "nodal")
 
@@ -155,7 +155,7 @@ def test_a_held_face_is_refused_before_any_contact_is_made(monkeypatch: pytest.M
 
     monkeypatch.setattr(assemble, "springs_of", made_too_early)
     with pytest.raises(UserError, match="hold the face 'left'"):
-        build(made(raw), bases, PATH)
+        build(made(raw), bases)
 
 
 def test_faces_are_set_against_each_other_by_their_places() -> None:
@@ -217,7 +217,7 @@ def test_no_force_fits_no_curve() -> None:
     refused("case.toml: contacts.right: fitted_at", built, raw)
     raw["sweep"]["normal_forces"] = [100.0, 200.0]
     over = "normal_force", lambda _: nullcontext(), lambda _: None
-    refused("case.toml: contacts.right.fitted_at", curves, made(raw), {"small": small.basis()}, PATH, *over)
+    refused("case.toml: contacts.right.fitted_at", curves, made(raw), {"small": small.basis()}, *over)
 
 
 def test_jenkins_elements_of_a_file_are_those_of_the_case(tmp_path: Path) -> None:
@@ -226,11 +226,11 @@ def test_jenkins_elements_of_a_file_are_those_of_the_case(tmp_path: Path) -> Non
     (tmp_path / "contact.toml").write_text(f'name = "c"\n{law}')
     raw, path, bases = table(file="contact.toml"), tmp_path / "case.toml", {"small": small.basis()}
     del raw["contacts"][0]["friction"]
-    found = build(made(raw), bases, path).pressed(200.0).contacts[0].patch
-    own = build(made(table(**STIFF, law="jenkins")), bases, path).pressed(200.0).contacts[0].patch
+    found = build(made(raw, path), bases).pressed(200.0).contacts[0].patch
+    own = build(made(table(**STIFF, law="jenkins")), bases).pressed(200.0).contacts[0].patch
     assert len(found.points) == 4 and found.law == own.law
     raw["contacts"][0]["patch"] = "nodal"
-    refused("contact.toml: patch: law = ", build, made(raw), bases, path)
+    refused("contact.toml: patch: law = ", build, made(raw, path), bases)
 
 
 CURVE = "0 0\n1 10\n2 30\n3 60\n4 100\n"
@@ -242,12 +242,12 @@ def test_points_depend_on_every_file_that_a_file_names(tmp_path: Path) -> None:
     (tmp_path / "contact.toml").write_text(f'{contact}[friction]\nkind = "coulomb"\nmu = 0.3\n')
     raw, path = table(file="contact.toml", points=[2, 2]), tmp_path / "case.toml"
     del raw["contacts"][0]["friction"]
-    settings, found = made(raw), []
+    settings, found = made(raw, path), []
     for scale in (1, 100, 1):
         rows = (line.split() for line in CURVE.splitlines())
         (tmp_path / "curve.txt").write_text("".join(f"{u} {scale * float(f)}\n" for u, f in rows))
-        files = checkpoint.hashes_of(files_of(settings, path))
-        found.append((files, of_points(build(settings, {"small": small.basis()}, path))))
+        files = checkpoint.hashes_of(files_of(settings))
+        found.append((files, of_points(build(settings, {"small": small.basis()}))))
     assert len(found[0][0]) == 2 and found[0] == found[2]
     assert found[0][0] != found[1][0] and found[0][1] != found[1][1]
 
@@ -279,9 +279,9 @@ def test_tables_in_a_case_are_those_of_a_file(tables: dict[str, Any], tmp_path: 
     for contact in (tables, {"file": "contact.toml"}):
         raw = table(points=[2, 2])
         only = {k: v for k, v in raw["contacts"][0].items() if k not in ("friction", "law", *STIFF)}
-        settings = made({**raw, "contacts": [{**only, **contact}]})
-        laws.append(build(settings, {"small": small.basis()}, path).assembly.contacts[0].patch.law)
-        files.append({name.split(": ")[-1] for name in files_of(settings, path)} - {"contact.toml"})
+        settings = made({**raw, "contacts": [{**only, **contact}]}, path)
+        laws.append(build(settings, {"small": small.basis()}).assembly.contacts[0].patch.law)
+        files.append({name.split(": ")[-1] for name in files_of(settings)} - {"contact.toml"})
     first, second = (jax.tree.flatten(law) for law in laws)
     assert first[1] == second[1] and all(np.array_equal(a, b) for a, b in zip(first[0], second[0], strict=True))
     assert files[0] == files[1]
@@ -334,9 +334,9 @@ def test_a_line_of_contact_in_pieces() -> None:
 def test_the_books_mode_of_a_curved_contact(fit: str, points: list[int]) -> None:
     """Gaps and Hertz' law in book mode, with one tangential stiffness; two are refused in one sentence."""
     raw = table(**PIN, fit=fit, points=points) | {"mode": "book"}
-    refused("isotropic", run_case, made(raw), {"small": small.basis()}, PATH)
+    refused("isotropic", run_case, made(raw), {"small": small.basis()})
     raw["contacts"][0]["isotropic"] = True
-    assert run_case(made(raw), {"small": small.basis()}, PATH).responses[200.0].converged.all()
+    assert run_case(made(raw), {"small": small.basis()}).responses[200.0].converged.all()
 
 
 def test_one_round_contact() -> None:
@@ -349,7 +349,7 @@ def test_one_round_contact() -> None:
 @pytest.mark.usefixtures("unestimated")
 @pytest.mark.parametrize("fit, points", CURVED)
 def test_a_curved_face_that_converges_in_a_case(fit: str, points: list[int]) -> None:
-    result = run_case(made(table(**PIN, fit=fit, points=points)), {"small": small.basis()}, PATH)
+    result = run_case(made(table(**PIN, fit=fit, points=points)), {"small": small.basis()})
     assert result.responses[200.0].converged.all()
 
 
@@ -483,8 +483,8 @@ def test_the_limit_of_the_memory_is_ones_own(tmp_path, monkeypatch, capsys) -> N
     settings = made(table(**STIFF, law="smooth", points=[6, 5]) | {"harmonics": 4})
     assert 0.5 < memory_of(settings, 30, 6) / 2**30 < 0.6
     monkeypatch.setattr("microslip.case.contacts.of_this_machine", lambda: 0.5 * 2.0**30)
-    refused("this machine has 0.5;", build, settings, {"small": small.basis()}, PATH)
-    build(settings.model_copy(update={"memory_limit": 3.0}), {"small": small.basis()}, PATH)
+    refused("this machine has 0.5;", build, settings, {"small": small.basis()})
+    build(settings.model_copy(update={"memory_limit": 3.0}), {"small": small.basis()})
 
 
 PEAK = """

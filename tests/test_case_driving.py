@@ -75,7 +75,7 @@ def built(tmp_path, more: str, ring: str = "", body: str = "") -> Built:
     path = tmp_path / "case.toml"
     path.write_text(CASE.format(more=more, ring=ring, body=body))
     settings, _ = load_case(path)
-    return build(settings, {b.name: blade() for b in settings.components}, path)
+    return build(settings, {b.name: blade() for b in settings.components})
 
 
 def loads(tmp_path, more: str, ring: str = "") -> dict[int, complex]:
@@ -132,7 +132,7 @@ def test_damping_of_a_case(tmp_path) -> None:
     )  # fmt: skip
     path = tmp_path / "case.toml"
     path.write_text(text)
-    made = build(load_case(path)[0], {"blade": blade()}, path)
+    made = build(load_case(path)[0], {"blade": blade()})
     (component,) = made.assembly.components
     np.testing.assert_allclose(component.groups[0].damping_ratio, [0.02, *[0.01] * 5])
     assert (
@@ -192,18 +192,18 @@ def test_a_pressure_field_in_a_case(tmp_path) -> None:
     flow(tmp_path, "3,4")
     path = tmp_path / "case.toml"
     path.write_text(BEAM)
-    made = build(load_case(path)[0], {"small": small.basis()}, path)
+    made = build(load_case(path)[0], {"small": small.basis()})
     part = made.assembly.part(made.assembly.components[0], 1)
     gas = small.basis().groups[0, 0].excitations["gas"].rows[0]
     np.testing.assert_allclose(part.load, 2 * (3 - 4j) * gas, rtol=1e-9)
     assert any("on face 'contact_left'" in s for s in made.messages)
     path.write_text(BEAM.replace("amplitude", "harmonic = 0\namplitude"))
-    made = build(load_case(path)[0], {"small": small.basis()}, path)  # Re(p exp(0)) of a steady one
+    made = build(load_case(path)[0], {"small": small.basis()})  # Re(p exp(0)) of a steady one
     part = made.assembly.part(made.assembly.components[0], 0)
     np.testing.assert_allclose(part.load, 2 * 3 * gas, rtol=1e-9)
     path.write_text(BEAM.replace('"mm"', '"m"'))
     with pytest.raises(UserError, match=r"case.toml: excitations.contact_left.field: .*length_unit mm instead of m"):
-        build(load_case(path)[0], {"small": small.basis()}, path)
+        build(load_case(path)[0], {"small": small.basis()})
 
 
 @pytest.mark.parametrize(("more", "ring", "words"), [
@@ -236,7 +236,7 @@ def test_aerodynamics_are_looked_for_beside_the_case(tmp_path) -> None:
     path = tmp_path / "case.toml"
     path.write_text(text)
     with pytest.raises(UserError, match=r"case.toml: bodies.blade.aerodynamics: .*aero.csv: there is no such table"):
-        build(load_case(path)[0], {"blade": blade()}, path)
+        build(load_case(path)[0], {"blade": blade()})
 
 
 def test_entries_are_set_by_their_names(tmp_path) -> None:

@@ -239,7 +239,7 @@ def case(includes: str | None, normal: float, interface: str = "tip") -> CaseSet
 
 def stuck(includes: str | None, normal: float, basis: ModalBasis) -> tuple[Array, tuple[str, ...]]:
     """(m,) frequencies in Hz with sticking contacts, and what is told of the case."""
-    made = build(case(includes, normal), {"bar": basis}, "case.toml")
+    made = build(case(includes, normal), {"bar": basis})
     assembly = made.pressed(10.0)
     return reduced.stuck(assembly.joined(1), assembly.stiffness), tuple(made.messages)
 
@@ -293,7 +293,7 @@ def test_an_impact_on_modes_without_a_static_answer_is_warned_of(blocks: dict[st
     def told(method: str, contact: dict[str, object]) -> list[str]:
         raw = case(None, 1e9).model_dump(exclude_unset=True)
         raw |= {"contacts": [{"interface": "tip", "friction": 0.3, **contact}], "orbit": {"frequency": 500.0}}
-        messages = build(CaseSettings.model_validate(raw), {"bar": blocks[method]}, "case.toml").messages
+        messages = build(CaseSettings.model_validate(raw), {"bar": blocks[method]}).messages
         return [words for words in messages if "no static answer" in words]
 
     soft = {"normal_stiffness": 1e10, "tangential_stiffness": 1e6, "law": "jenkins"}

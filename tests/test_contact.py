@@ -464,11 +464,11 @@ def test_case_takes_the_normal_force_of_the_static_state():
         "sweep": {"start": 50.0, "stop": 60.0, "points": 3, "normal_forces": "static"},
     })  # fmt: skip
     basis = modal_basis(shrouded(), settings_of([6000.0], closures=[closure(interference=2e-5)], **more))
-    (force,) = normal_forces(build(case, {"test": basis}, "case.toml"), "case.toml")
+    (force,) = normal_forces(build(case, {"test": basis}))
     assert force == basis.groups[0, 0].contacts["shroud"].normal_force > 0
     open_one = modal_basis(shrouded(), settings_of([6000.0], closures=[], **more))
     with pytest.raises(UserError, match="the modal file has no closure on interface 'right'"):
-        normal_forces(build(case, {"test": open_one}, "case.toml"), "case.toml")
+        normal_forces(build(case, {"test": open_one}))
 
 
 def test_closed_modes_are_those_of_a_roller():

@@ -179,7 +179,7 @@ def test_temperature_may_differ_from_point_to_point() -> None:
     ],
 )
 def test_bad_tables_are_told_in_a_sentence(speeds, values, shift, said) -> None:
-    assert refused(said, characteristic, speeds, values, "mu.csv", **shift).startswith("mu.csv: ")
+    refused(said, characteristic, speeds, values, **shift)
 
 
 # random in time ------------------------------------------------------------------------------------------------------

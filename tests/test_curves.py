@@ -78,7 +78,7 @@ def rows(name: str) -> dict[str, np.ndarray]:
 
 
 def problem(case: Path, normal: float = 10.0) -> Any:
-    return problem_of(build(load_case(case)[0], {"lifting": lifting()}, case), normal)
+    return problem_of(build(load_case(case)[0], {"lifting": lifting()}), normal)
 
 
 @pytest.mark.slow

@@ -57,7 +57,7 @@ def test_a_case_takes_as_many_modes_as_it_says(sample: ModalBasis) -> None:
 
     The law of the sample counts the surface alone, so the file's static compliance stands beside the modes."""
     settings, _ = load_case(SAMPLES / "case.toml", ["modes=4", "sweep.points=5", *LINEAR])
-    result = run_case(settings, sample, "case.toml")
+    result = run_case(settings, sample)
     g = sample.groups[0, 0]
     Omega = 2 * np.pi * result.free.frequency[:, None]
     watched = g.monitors[settings.monitor]
@@ -75,7 +75,7 @@ def test_a_case_takes_as_many_modes_as_it_says(sample: ModalBasis) -> None:
 def test_the_free_response_has_its_true_peak_on_any_grid(sample: ModalBasis, points: int) -> None:
     """Against 20001 frequencies about the resonance, within 0.2 %; the ends of the sweep stay the ends."""
     settings, _ = load_case(SAMPLES / "case.toml", [f"sweep.points={points}"])
-    built = build(settings, {settings.components[0].name: sample}, "case.toml")
+    built = build(settings, {settings.components[0].name: sample})
     free = free_response(built, np.linspace(settings.sweep.start, settings.sweep.stop, points))
     assert free.frequency[0] == settings.sweep.start and free.frequency[-1] == settings.sweep.stop
     assert np.all(np.diff(free.frequency) > 0)
@@ -90,7 +90,7 @@ def test_the_free_response_has_its_true_peak_on_any_grid(sample: ModalBasis, poi
 def test_more_modes_than_stored_are_refused_in_one_sentence(sample: ModalBasis, modes: int, words: str) -> None:
     with pytest.raises(UserError, match=words) as caught:
         settings, _ = load_case(SAMPLES / "case.toml", [f"modes={modes}"])
-        run_case(settings, sample, "case.toml")
+        run_case(settings, sample)
     assert "\n" not in str(caught.value).strip()
 
 

@@ -152,7 +152,7 @@ def test_optimum_over_the_normal_force(capsys: pytest.CaptureFixture[str]) -> No
     assert f"normal force = {normal:.4g}"[:-1] in capsys.readouterr().out
     assert Path("build/sled/pictures/optimum.png").stat().st_size > 10_000
     settings, _ = load_case(Path("case.toml"), [f"sweep.normal_forces=[{0.9 * normal}, {normal}, {1.1 * normal}]"])
-    peaks = [max(a for _, a in one) for one in run_case(settings, sled(), "case.toml").resonances.values()]
+    peaks = [max(a for _, a in one) for one in run_case(settings, sled()).resonances.values()]
     assert peaks[1] == pytest.approx(height, rel=1e-3) and min(peaks[0], peaks[2]) > 1.0005 * peaks[1]
 
 

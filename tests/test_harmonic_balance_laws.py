@@ -488,7 +488,7 @@ FEW = ("start = 35.0\nstop = 200.0\npoints = 25", "start = 45.0\nstop = 136.0\np
 
 @pytest.fixture(scope="module")
 def answered(tmp_path_factory: pytest.TempPathFactory, unjudged_file: None) -> CaseResult:
-    return run_case(asked(tmp_path_factory.mktemp("sled"), FEW), sled(), "case.toml")
+    return run_case(asked(tmp_path_factory.mktemp("sled"), FEW), sled())
 
 
 def test_a_case_with_a_law_that_sticks_is_springs(answered: CaseResult, tmp_path: Path) -> None:
@@ -498,7 +498,7 @@ def test_a_case_with_a_law_that_sticks_is_springs(answered: CaseResult, tmp_path
     narrow = f"width = {0.06 * np.sqrt(1 - 1 / 16)}\nheight = {0.03 * np.sqrt(1 - 1 / 4)}"
     law, size = ('"smooth"', '"jenkins"'), ("points = [4, 2]\nwidth = 0.06\nheight = 0.03", narrow)
     pressed = ("normal_forces = [5.0, 1e5]", "normal_forces = [1e5]")
-    springs = run_case(asked(tmp_path, FEW, law, size, pressed), sled(), "case.toml")
+    springs = run_case(asked(tmp_path, FEW, law, size, pressed), sled())
     assert all(r.converged.all() for r in result.responses.values())
     np.testing.assert_allclose(result.responses[1e5].monitor, springs.responses[1e5].monitor, rtol=1e-8)
     np.testing.assert_allclose(result.stuck, springs.stuck, rtol=1e-8)
@@ -525,7 +525,7 @@ def test_a_case_says_when_sliders_are_settled(tmp_path: Path) -> None:
     found = {}
     for periodicity in (0.0, 1e-10, 1e-2):
         settings = asked(tmp_path, ("samples = 32", f"samples = 32\nperiodicity = {periodicity}"))
-        built = build(settings, {"sled": sled()}, "case.toml")
+        built = build(settings, {"sled": sled()})
         problem = problem_of(built, 5.0)
         assert getattr(problem.groups[0].model, "periodicity", None) == periodicity
         found[periodicity] = harmonic_response(problem, np.array([60.0]), np.ones(1)).monitor[0]
@@ -558,7 +558,7 @@ def test_mistakes_in_a_case_with_laws(tmp_path: Path, old: str, new: str, told: 
     more = [("harmonics = 2", "harmonics = 3")] if "samples" in old else []
 
     def run() -> None:
-        run_case(asked(tmp_path, (old, new), *more), sled(), tmp_path / "case.toml")
+        run_case(asked(tmp_path, (old, new), *more), sled())
 
     refused(told, run)
 
@@ -583,7 +583,7 @@ def test_a_case_with_the_law_of_a_contact_file(tmp_path: Path) -> None:
     (tmp_path / "sole.toml").write_text(CONTACT)
     own = (DESCRIBED, 'file = "sole.toml"')
     settings = asked(tmp_path, own, FEW)
-    by_file, by_case = (run_case(s, sled(), tmp_path / "case.toml") for s in (settings, asked(tmp_path, FEW)))
+    by_file, by_case = (run_case(s, sled()) for s in (settings, asked(tmp_path, FEW)))
     for normal, r in by_case.responses.items():
         np.testing.assert_allclose(by_file.responses[normal].monitor, r.monitor, rtol=1e-9)
     assert by_case.responses[5.0].slipping.max() > 0.3

@@ -195,8 +195,8 @@ def test_a_case_uses_the_rigid_coordinates_of_a_patch_that_has_more():
         supports=[{"face": "x0"}], interfaces=[RIGHT, TOP], modes={"count": 8}, reduction="macneal",
         damping={"ratio": 0.01}, **COMMON,
     )  # fmt: skip
-    a = run_case(case, modal_basis(mesh(), plain), "case.toml")
-    b = run_case(case, basis("macneal"), "case.toml")
+    a = run_case(case, modal_basis(mesh(), plain))
+    b = run_case(case, basis("macneal"))
     np.testing.assert_allclose(b.responses[1e9].monitor, a.responses[1e9].monitor, rtol=1e-9)
 
 

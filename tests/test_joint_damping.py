@@ -80,7 +80,7 @@ def strips(tmp_path: Path, more: str = "", joint: float = STIFF, order: tuple[st
            each: str = "") -> Built:  # fmt: skip
     path = tmp_path / "case.toml"
     path.write_text(CASE.format(more=more, joint=joint, first=order[0], second=order[1], each=each))
-    return build(load_case(path)[0], BASES, path)
+    return build(load_case(path)[0], BASES)
 
 
 def damping(b: Built, normal: float | None = 1e3) -> tuple[Array, Array]:

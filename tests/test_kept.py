@@ -104,7 +104,7 @@ def block(folder: Path) -> balance.Problem:
     (folder / "case.toml").write_text(CASE)
     more = ["harmonics=3", "samples=16", "amplitude=1.0"]
     settings, _ = load_case(folder / "case.toml", more)
-    built = build(settings, {"lifting": lifting()}, folder / "case.toml")
+    built = build(settings, {"lifting": lifting()})
     return problem_of(built, 10.0)
 
 

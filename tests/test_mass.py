@@ -78,7 +78,7 @@ def test_the_free_response_is_that_of_the_denser_body(sample: ModalBasis, folder
     """By hand from the modes of the stored one, of three times the mass: 1e-10."""
     path = case(folder, f"mass = {3 * sample.mass!r}")
     settings, _ = load_case(path, ["harmonics=1"])
-    free = run_case(settings, {"vane": sample}, path).free
+    free = run_case(settings, {"vane": sample}).free
     g = sample.groups[0, 0]
     Omega = 2 * np.pi * free.frequency[:, None]
     watched = g.monitors["probe"]
@@ -122,7 +122,7 @@ def test_a_body_that_rotates_or_has_no_mass_is_refused(sample: ModalBasis, folde
     path = case(folder, "mass = 1.0")
     settings, _ = load_case(path)
     light = {"vane": replace(sample, mass=0.0)}
-    refused("case.toml: bodies.vane.mass: the modal file of ", load_bodies, settings, light, path)
+    refused("bodies.vane.mass: the modal file of ", load_bodies, settings, light)
     refused("bodies.vane.mass", respond, path, None, ["bodies.vane.mass=-1"])
 
 
@@ -170,12 +170,12 @@ def roof(centre: Array) -> ModalBasis:
 
 def damper(pressed: float, mass: float, centre: Array, shift: Array | None = None) -> list[float]:
     """Normal forces of both flanks."""
-    where, place = "case.toml: bodies.damper.pressed_at_rpm", dict[str, Any]()
+    place = dict[str, Any]()
     if shift is not None:
         place = {"shift": tuple(shift), "turn": 20.0}
     settings = BodyOfCase(name="damper", pressed_at_rpm=pressed, mass=mass, **place)
     about = None if shift is None else (Y, np.zeros(3))  # of the body above
-    return normal_forces(settings, roof(centre), ["left", "right"], where, about)
+    return normal_forces(settings, roof(centre), ["left", "right"], about)
 
 
 Y = np.array([0.0, 1.0, 0.0])
@@ -204,7 +204,7 @@ def test_along_an_engine_order_line_a_damper_is_pressed_by_the_load_of_each_spee
         "sweep": {"start": 1.0, "stop": 2.0},
     })  # fmt: skip
     whole, half = (
-        thrown(_at_speed(case, [], rpm), {"damper": roof(np.array([0.0, 0.0, 0.25]))}, "case.toml").contacts
+        thrown(_at_speed(case, [], rpm), {"damper": roof(np.array([0.0, 0.0, 0.25]))}).contacts
         for rpm in (2700.0, 1350.0)
     )
     for one, other in zip(whole, half, strict=True):

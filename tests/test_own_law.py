@@ -190,7 +190,7 @@ def test_a_law_that_cannot_be_asked_is_refused_before_anything_is_solved(law, wo
             return force.T, after
 
     made = {"Half": Half, "Misspelt": Misspelt, "Turned": lambda: Turned(1e4, 5e3, 0.3, 40.0)}[law]()
-    refused(("case.toml: law: ", *words), composed_with, law=OfGiven(kind="given", made=made))
+    refused(("law: ", *words), composed_with, law=OfGiven(kind="given", made=made))
 
 
 class Misspelt(Law):

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import small
-from test_case_contacts import PATH, STIFF, made, table
+from test_case_contacts import STIFF, made, table
 
 from microslip import plausible
 from microslip.case.assemble import build
@@ -89,7 +89,7 @@ def test_a_static_stress_that_no_metal_bears() -> None:
 def test_a_case_doubts_its_amplitude_and_the_pressure_of_its_contacts() -> None:
     """A resonance of 1 mm, 200 N in the contact: nothing is said. Of 20 mm on a body of 120, of 200 MN: both are."""
     basis = replace(small.basis(), provenance={"settings": '{"material": {"young": 2.1e11}}'})
-    built = build(made(table(**STIFF, includes="surface")), {"small": basis}, PATH)
+    built = build(made(table(**STIFF, includes="surface")), {"small": basis})
     assert plausible.modulus_of(basis) == 2.1e11
     assert doubted(built, 1e-3, 200.0) == []
     amplitude, pressure = doubted(built, 2e-2, 2e8)
@@ -109,5 +109,5 @@ def test_a_load_in_the_wrong_unit_is_doubted_far_from_any_resonance(newtons: flo
     assert bent.distance == pytest.approx(np.linalg.norm(F * L**3 / (3 * 2.1e11 * inertia)), rel=0.03)
     assert bent.stress == pytest.approx((F * L * edge / inertia).sum(), rel=0.15)
     raw = table(**STIFF, includes="surface") | {"amplitude": newtons}
-    said = doubted(build(made(raw), {"small": steel}, PATH), 0.0)
+    said = doubted(build(made(raw), {"small": steel}), 0.0)
     assert len(said) == doubted_by and all("under its load held still" in text for text in said)

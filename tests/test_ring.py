@@ -524,7 +524,7 @@ def test_a_case_of_a_cyclic_body_is_refused(tmp_path: Path) -> None:
             "sweep": {"start": 1.0, "stop": 2.0, "points": 3, "normal_forces": [1.0]},
         }
     )  # fmt: skip
-    refused("one of 6 cyclic sectors", run_case, settings, sector.basis(), "case.toml")
+    refused("one of 6 cyclic sectors", run_case, settings, sector.basis())
 
 
 def test_gyroscopic_coupling_splits_the_speeds_of_forward_and_backward_waves() -> None:

@@ -27,7 +27,7 @@ def masses(B: float, *more: str) -> Assembly:
     path = CASES / "belt.toml"
     settings, _ = load_case(path, [*(f"{key}={B!r}" for key in KEYS), *more])
     basis = load_system(CASES / "masses-on-belt" / "system.toml").basis()
-    return build(settings, {"masses-on-belt": basis}, path).assembly
+    return build(settings, {"masses-on-belt": basis}).assembly
 
 
 def test_two_masses_are_the_books_equations() -> None:

@@ -522,15 +522,15 @@ def test_a_case_responds_at_any_speed_of_the_range(tmp_path) -> None:
     path, group = tmp_path / "case.toml", solved(9000.0)
     text = {"start": 0.9 * group.frequency[0], "stop": 1.1 * group.frequency[0]}
     path.write_text(CASE.format(rpm=9000.0, **text))
-    found = run_case(load_case(path)[0], ranged(), path)
+    found = run_case(load_case(path)[0], ranged())
     assert found.speed == pytest.approx(9000 * np.pi / 30, rel=1e-12)
     peak = found.free.frequency[np.abs(found.free.monitor).argmax()]
     assert peak == pytest.approx(group.frequency[0], rel=0.2 / 59)  # a step of the sweep
     assert abs(ranged().groups[0, 0].frequency[0] / group.frequency[0] - 1) > 0.02  # at rest it is elsewhere
-    stored = run_case(load_case(path)[0], basis_at(ranged(), 9000.0), path)  # 9000 rpm is a speed of this file
+    stored = run_case(load_case(path)[0], basis_at(ranged(), 9000.0))  # 9000 rpm is a speed of this file
     np.testing.assert_allclose(stored.responses[50.0].monitor, found.responses[50.0].monitor, rtol=1e-12)
     (tmp_path / "case.toml").write_text(CASE.format(rpm=17000.0, **text))
-    refused("case.toml: speed_rpm: 17000 rpm", run_case, load_case(path)[0], ranged(), path)
+    refused("case.toml: speed_rpm: 17000 rpm", run_case, load_case(path)[0], ranged())
 
 
 def test_campbell_diagram_of_the_range() -> None:

@@ -141,7 +141,7 @@ def assembled(contacts: list[dict], disc: ModalBasis) -> Assembly:
     case = {"name": "rubs", "bodies": [*bodies, {"name": "disc"}], "contacts": contacts, "damping": "modal"}
     case |= {"monitors": [{"monitor": "pin:read", "direction": "x"}], "stability": {"frequency": [0.0, 1000.0]}}
     settings = validate(CaseSettings, case, "case")
-    return build(settings, dict.fromkeys(names, pin()) | {"disc": disc}, "case").assembly
+    return build(settings, dict.fromkeys(names, pin()) | {"disc": disc}).assembly
 
 
 def rubs(**ground: Any) -> list[dict]:

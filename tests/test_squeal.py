@@ -181,7 +181,7 @@ def test_a_killed_run_goes_on_and_motions_in_time_swing_as_limit_cycles(belt: Pa
     a run without a break. Where a motion in time was made it swings as the orbit beside it, by what is told."""
     short = belt.read_text()
     belt.write_text(short + CYCLE)
-    files = modal_files(load_case(belt)[0], belt, Path(), lambda _: None)
+    files = modal_files(load_case(belt)[0], Path(), lambda _: None)
 
     def run(folder: str, until: str = "to its end") -> list[str]:
         said = list[str]()
@@ -366,8 +366,8 @@ def state_at(folder: Path, *assignments: str) -> State:
     """The case with other keys, about its sliding."""
     path = folder / "squeal.toml"
     settings, raw = load_case(path, list(assignments))
-    files = modal_files(settings, path, folder, lambda _: None)
-    return state_of(Varied(path, raw, {name: read_basis(file) for name, file in files.items()}), {}, path)
+    files = modal_files(settings, folder, lambda _: None)
+    return state_of(Varied(path, raw, {name: read_basis(file) for name, file in files.items()}), {})
 
 
 def mu(value: float) -> list[str]:
@@ -405,9 +405,9 @@ def test_the_wave_of_the_root_that_grows_is_drawn_as_it_is_told(brake: Path, tmp
     diameters, and forward and backward shares as in the sentence; the animation has all frames and moves."""
     path = brake / "squeal.toml"
     settings, raw = load_case(path)
-    files = modal_files(settings, path, brake, lambda _: None)
+    files = modal_files(settings, brake, lambda _: None)
     bases = {name: read_basis(file) for name, file in files.items()}
-    state = state_of(Varied(path, raw, bases), {}, path)
+    state = state_of(Varied(path, raw, bases), {})
     found = spectrum(state.matrices, Window((0.0, 1e4), (1e3, 2 * np.pi * 4000)), certify=False)
     made = moving(state, found, bases, settings, tmp_path)
     assert {p.stem for p in made if p.suffix == ".pvd"} == {f"root_1_{body}" for body in ("disc", "upper", "lower")}

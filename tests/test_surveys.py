@@ -69,7 +69,7 @@ def rows(path: str) -> dict[str, np.ndarray]:
 def test_identify_finds_the_stiffness_of_the_truth(ring: Path, capsys) -> None:
     """Frequencies of a ring with c_N = 3e6 N/m, c_T half of it, as if measured: found to 1e-6, the others predicted to
     1e-6; the file says which was fitted."""
-    made = build(load_case(ring)[0], {"blade": blade()}, ring)
+    made = build(load_case(ring)[0], {"blade": blade()})
     f = identification.nodal_diagram(made.assembly, 3e6, 0.5).frequency[:, 0]
     others = "".join(
         f"[[identification.measured]]\nnodal_diameter = {k}\nfrequency = {float(f[k])!r}\n" for k in (1, 2)
@@ -133,7 +133,7 @@ def test_the_worst_engine_order_in_stress_and_its_best_normal_force(ring: Path) 
 
     def driven(order: int, push: float) -> Problem:
         settings, _ = load_case(ring, [f"ring.engine_order={order}", f"amplitude={push}"])
-        return problem_of(build(settings, {"blade": stressed()}, ring), 1e4)
+        return problem_of(build(settings, {"blade": stressed()}), 1e4)
 
     found = [
         replace(envelope.over_orders(partial(driven, push=push), [1, 2], (200.0, 420.0), 45), normal_force=push)
@@ -223,7 +223,7 @@ def test_respond_over_ranges(ring: Path) -> None:
     table = rows("build/ring/ranges.csv")
     settings, _ = load_case(ring)
     alone = response.harmonic_response(
-        problem_of(build(settings, {"blade": blade()}, ring), 1e4), table["frequency_Hz"], np.zeros(1)
+        problem_of(build(settings, {"blade": blade()}), 1e4), table["frequency_Hz"], np.zeros(1)
     )
     np.testing.assert_allclose(table["combination_1_m"], np.abs(alone.monitor), rtol=1e-6)  # 1 % as in its modal file
     assert (table["high_m"] >= table["combination_3_m"]).all()
@@ -285,7 +285,7 @@ def test_respond_over_speeds(tmp_path, monkeypatch, capsys) -> None:
     np.testing.assert_allclose(found["frequency_Hz"], found["speed_rpm"] * 4 / 60, rtol=1e-10)
     np.testing.assert_allclose(found["normal_force_1_N"], 80 * (found["speed_rpm"] / 20000) ** 2, rtol=1e-2)
     settings, _ = load_case(path, ["speed_rpm=12000"])
-    made = build(settings, {settings.components[0].name: ranged()}, path)
+    made = build(settings, {settings.components[0].name: ranged()})
     alone = response.harmonic_response(problem_of(made, 80 * 0.6**2), np.array([800.0]), np.zeros(1))
     assert found["amplitude_m"][2] == pytest.approx(abs(alone.monitor[0]), rel=1e-6)
     for change, words in (
@@ -313,7 +313,7 @@ def test_speeds_of_a_body_without_a_range_in_the_books_mode(tmp_path, monkeypatc
     said = capsys.readouterr().out
     assert "Book mode" in said and f"The same at all speeds: {blade().name}" in said
     found, (settings, _) = rows("build/line/speeds.csv"), load_case(path)
-    made = build(settings, {settings.components[0].name: blade()}, path)
+    made = build(settings, {settings.components[0].name: blade()})
     alone = response.harmonic_response(problem_of(made, 800 * 0.18**2), np.array([240.0]), np.zeros(1))
     assert alone.slipping.max() > 0
     assert found["amplitude_m"][1] == pytest.approx(abs(alone.monitor[0]), rel=1e-6)

@@ -261,7 +261,7 @@ def test_a_point_contact_has_the_extents_of_its_case(tmp_path: Path) -> None:
         "normal_stiffness = 1e6\ntangential_stiffness = 4e5\nwidth = 0.3\nheight = 0.6\nfriction = 0.2\n"
         "[sweep]\nstart = 1.0\nstop = 9.0\npoints = 3\nnormal_forces = [1e6]\n"
     )
-    stuck = run_case(load_case(tmp_path / "case.toml")[0], system.basis(), "case.toml").stuck
+    stuck = run_case(load_case(tmp_path / "case.toml")[0], system.basis()).stuck
     kn, kt, b2, h2 = 1e6, 4e5, 0.3**2 / 12, 0.6**2 / 12
     held = [(kt + 1) / 2, (kt + 1) / 2, (kn + 1) / 2]  # x = t1, y = t2, z = n
     held += [(kn * h2 + 1) / 0.1, (kn * b2 + 1) / 0.2, (kt * (b2 + h2) + 1) / 0.3]

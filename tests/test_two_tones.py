@@ -390,7 +390,7 @@ def test_a_killed_run_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, u
     (tmp_path / "pair" / "system.toml").write_text(SYSTEM)
     case = tmp_path / "case.toml"
     case.write_text(CASE.replace("points = 2", "points = 3").replace("harmonics = 3", "harmonics = 1"))
-    files = modal_files(load_case(case)[0], case, tmp_path, lambda _: None)
+    files = modal_files(load_case(case)[0], tmp_path, lambda _: None)
     solved, solve = [], tones.solve
 
     def counted(b: Any, first: float, *rest: Any) -> Any:
@@ -432,7 +432,7 @@ def belt(tmp_path: Path) -> Any:
     rate = 'law = { kind = "rate", slope = 10.0 }\nground = { velocity = 1.0 }'
     (tmp_path / "case.toml").write_text(CASE.replace('law = "jenkins"', rate))
     settings, _ = load_case(tmp_path / "case.toml", ["excitations.0.amplitude=0.2", "excitations.1.amplitude=0.1"])
-    return build(settings, {"pair": load_system(tmp_path / "system.toml").basis()}, tmp_path / "case.toml")
+    return build(settings, {"pair": load_system(tmp_path / "system.toml").basis()})
 
 
 def test_moving_ground_supplies_what_is_lost(belt: Any) -> None:

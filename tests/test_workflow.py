@@ -349,7 +349,7 @@ def test_boxes_of_one_name_add_up_and_none_takes_a_sets_name(tmp_path: Path) -> 
 
     own, made = beam().faces, faces([*ends, ends[0]])["ends"]["triangle6"]
     assert len(made) == len(own["clamp"]["triangle6"]) + len(own["tip"]["triangle6"])
-    refused("body.toml: geometry.faces.tip: ", faces, [{**ends[0], "name": "tip"}])
+    refused("geometry.faces.tip: ", faces, [{**ends[0], "name": "tip"}])
 
 
 def test_what_a_mesh_includes_counts_as_its_input(tmp_path: Path) -> None:
@@ -495,11 +495,11 @@ def test_bodies_of_one_name_do_not_overwrite_each_other(
     assert aluminium == Path("meshes/aluminium.msh")
     case = (box / "case.toml").rename(other / "case.toml")
     with pytest.raises(UserError, match=r"bodies.box: means \S*other/body.toml, but .* is made of b"):
-        places.existing_files(load_case(case)[0], case, None, Path())
+        places.existing_files(load_case(case)[0], None, Path())
     edit(box / "body.toml", 'name = "box"', 'name = "steel"')
     again, _ = modal.modes_stage(open_job(other))
     assert again == Path(BASIS) and read_basis(again).groups[0, 0].omega[0] < 0.6 * first
-    assert places.existing_files(load_case(case)[0], case, None, Path()) == {"box": Path(BASIS)}
+    assert places.existing_files(load_case(case)[0], None, Path()) == {"box": Path(BASIS)}
 
 
 CASES = Path(__file__).parents[1] / "pipeline" / "cases"

@@ -175,19 +175,19 @@ def assemble(
     unknown = sorted(set(bases) - {b.name for b in settings.components})
     if unknown:
         raise UserError(
-            f"{path}: bases: there is no body '{unknown[0]}'; it has {', '.join(b.name for b in settings.components)}"
+            f"there is no body '{unknown[0]}'; it has {', '.join(b.name for b in settings.components)}", "bases"
         )
     found = {name: b if isinstance(b, ModalBasis) else read_basis(b) for name, b in bases.items()}
     missing = [b for b in settings.components if b.name not in found]
     if missing:
-        files = modal_files(settings, path, Path(folder), report, {name: Path() for name in found})
+        files = modal_files(settings, Path(folder), report, {name: Path() for name in found})
         found |= {b.name: read_basis(files[b.name]) for b in missing}
     if normal_force is not None:
         bare = [swept(c) and not settings.is_thrown(c) for c in settings.contacts]
         pressed = {"normal_force": normal_force}
         own = [c.model_copy(update=pressed) if b else c for c, b in zip(settings.contacts, bare, strict=True)]
         settings = settings.model_copy(update={"contacts": tuple(own)})
-    return build(settings, found, path)
+    return build(settings, found)
 
 
 def _said(case: Mapping[str, Any]) -> dict[str, Any]:

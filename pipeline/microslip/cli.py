@@ -417,9 +417,9 @@ def _case_job(
     settings, _ = load_case(case, list(set_))
     folder = folder_of_case(case, settings.name)
     if basis is not None:
-        files = existing_files(settings, case, basis, Path("."))
+        files = existing_files(settings, basis, Path("."))
     else:
-        files = modal_files(settings, case, Path("."), report)
+        files = modal_files(settings, Path("."), report)
     return CaseJob(case, files, folder, set_, force, report, not no_pictures)
 
 
@@ -630,7 +630,7 @@ def _followed(case: Path, basis: Path | None, assignments: Sequence[str]) -> Cas
 
     settings, _ = load_case(case, list(assignments))
     folder = folder_of_case(case, settings.name)
-    files = existing_files(settings, case, basis, Path("."))
+    files = existing_files(settings, basis, Path("."))
     return open_case(case, files, folder, assignments)
 
 

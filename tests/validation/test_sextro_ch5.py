@@ -55,7 +55,7 @@ def test_mass_is_that_of_the_drawing(blade):
 def test_sticking_frequencies(blade):
     """3 %: between rigid neighbours through the book's c_N0, c_R0 without any tuning; roughness is left out."""
     settings, _ = load_case(ROOT / "pipeline/cases/blade.toml")
-    pressed = build(settings, {"blade": blade}, "case").pressed(780.0)
+    pressed = build(settings, {"blade": blade}).pressed(780.0)
     sticking = stuck(pressed.joined(1), pressed.stiffness)
     for printed in (120.0, 320.0, 470.0):
         assert np.abs(sticking / printed - 1).min() < 0.035
@@ -66,7 +66,7 @@ def test_the_first_two_bend_and_the_third_twists(blade):
     torsional vibrations", seen where the accelerometer is: the angle Psi about the section's centre, and what is left
     of the displacement 30 mm beside it. The angle is that of the section's ends too (1 %: the section hardly warps)."""
     settings, _ = load_case(ROOT / "pipeline/cases/blade.toml")
-    pressed = build(settings, {"blade": blade}, "case").pressed(780.0)
+    pressed = build(settings, {"blade": blade}).pressed(780.0)
     part, points, g = pressed.joined(1), blade.mesh.points, blade.groups[0, 0]
     values, shapes = stuck_modes(part, pressed.stiffness)
     psi, beside = (g.monitors[name].rows[0] @ shapes for name in ("twist", "accelerometer"))
@@ -87,7 +87,7 @@ def test_friction_lowers_the_first_peak_and_its_frequency(blade):
         ROOT / "pipeline/cases/blade.toml",
         [*JENKINS, "sweep.stop=125.0", "sweep.points=71", "sweep.normal_forces=[10.0, 30.0, 780.0]"],
     )
-    result = run_case(settings, blade, "case")
+    result = run_case(settings, blade)
     peak = {n: max((a, f) for f, a in found) for n, found in result.resonances.items()}
     assert all(r.converged.all() for r in result.responses.values())
     assert peak[10.0][1] < peak[30.0][1] < peak[780.0][1]

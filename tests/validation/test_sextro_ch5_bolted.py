@@ -65,7 +65,7 @@ def test_the_case_resonates_where_the_sticking_joint_does(half: ModalBasis) -> N
     band = [f"sweep.start={linear - 8:.1f}", f"sweep.stop={linear + 8:.1f}", "sweep.points=5", "samples=16"]
     settings, _ = load_case(study.CASE, band)
     few = tuple(c.model_copy(update={"points": (1, 2)}) for c in settings.contacts)
-    result = run_case(settings.model_copy(update={"contacts": few}), {"upper": half, "lower": half}, study.CASE)
+    result = run_case(settings.model_copy(update={"contacts": few}), {"upper": half, "lower": half})
     (r,) = result.responses.values()
     assert r.converged.all() and np.all(r.slipping == 0)
     assert result.resonances[1e4][0][0] == pytest.approx(linear, rel=5e-3)

@@ -49,7 +49,7 @@ def test_the_damper_lowers_amplitudes_by_decades_and_the_stress_by_less(damped: 
     settings, _ = load_case(CASE, ["samples=32"])
     few = {"right": (6, 2), "damper_right": (2, 2)}
     own = tuple(c.model_copy(update={"points": few[c.interface]}) for c in settings.contacts)
-    built = build(settings.model_copy(update={"contacts": own}), {"blade-damped": damped}, CASE)
+    built = build(settings.model_copy(update={"contacts": own}), {"blade-damped": damped})
     band = np.linspace(230.0, 280.0, 11)
     thirty, hundred = (study.highest(problem_of(built, n), damped, band) for n in (30.0, 100.0))
     ring = study.ring(damped, (6, 2), samples=32)

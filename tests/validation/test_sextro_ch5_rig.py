@@ -53,7 +53,7 @@ def meshed(case: str, folder: Path, coarser: float = 1.0) -> tuple[Path, CaseSet
 
 def rig(case: str, folder: Path) -> Rig:
     path, settings, bodies = meshed(case, folder)
-    return Rig(bodies, run_case(settings, bodies, path))
+    return Rig(bodies, run_case(settings, bodies))
 
 
 @pytest.fixture(scope="module")
@@ -69,7 +69,7 @@ def second(tmp_path_factory) -> Rig:
 def test_sticking_frequencies_at_780_newton(tmp_path: Path) -> None:
     """The printed ones, as below, of the linear system alone."""
     path, settings, bodies = meshed("rig", tmp_path, coarser=1.5)
-    assembly = build(settings, bodies, path).pressed(780.0)
+    assembly = build(settings, bodies).pressed(780.0)
     found = stuck(assembly.joined(1), assembly.stiffness)
     for printed in PRINTED:
         assert nearest(found, printed) == pytest.approx(printed, rel=0.035)
@@ -109,7 +109,7 @@ def test_elastic_neighbours_are_as_good_as_the_ground(first: Rig) -> None:
     settings, _ = load_case(ROOT / "pipeline/cases/blade-rough.toml", ["sweep.points=2", "sweep.normal_forces=[780]"])
     few = tuple(c.model_copy(update={"points": (6, 2)}) for c in settings.contacts)
     s = settings.model_copy(update={"contacts": few, "harmonics": 1, "samples": 32})
-    ground = run_case(s, first.bodies["blade"], "ground").stuck
+    ground = run_case(s, first.bodies["blade"]).stuck
     for one, other in zip(first.result.stuck[:3], ground[:3], strict=True):
         assert 0.999 * other < one < other
 

@@ -132,7 +132,7 @@ def ours(bases: dict[str, ModalBasis], mu: float) -> Spectrum:
         "contacts": [contact], "monitors": [{"monitor": "disc:read", "direction": "z"}],
         "stability": {"frequency": [0.0, 7300.0]},
     }  # fmt: skip
-    assembly = build(CaseSettings.model_validate(case), bases, Path("case.toml")).assembly
+    assembly = build(CaseSettings.model_validate(case), bases).assembly
     equations = sliding.of(assembly)
     return spectrum(State(assembly, equations, sliding.equilibrium(equations)).matrices, WINDOW)
 

@@ -37,7 +37,7 @@ from ..data import (
     SpeedRange,
     StressSet,
 )
-from ..errors import UserError
+from ..errors import UserError, in_its_file
 from ..files.declared import (
     Noun,
     Scales,
@@ -348,11 +348,12 @@ def _write_stress(group: h5py.Group, name: str, s: StressSet, scales: Scales) ->
 class OtherFormat(UserError):
     """A sound HDF5 file that is no modal file. `form`: what its attribute 'format' says."""
 
-    def __init__(self, path: Path, form: object) -> None:
-        super().__init__(f"{path}: is no modal file (its attribute 'format' is {form!r}, not '{FORMAT}')")
+    def __init__(self, form: object) -> None:
+        super().__init__(f"is no modal file (its attribute 'format' is {form!r}, not '{FORMAT}')")
         self.form = form
 
 
+@in_its_file
 def open_file(path: Path | str) -> h5py.File:
     """Open a modal file for reading after looking at its seal, its format and the kind of its content.
 
@@ -361,7 +362,7 @@ def open_file(path: Path | str) -> h5py.File:
     """
     path = Path(path)
     if not ordinary(path).is_file():
-        raise UserError(f"{path}: no such modal file; make it first or correct the path")
+        raise UserError("no such modal file; make it first or correct the path")
     refuse_damaged(path, _TRIAL, AGAIN)
     return _open(path)
 
@@ -375,32 +376,33 @@ def _open(path: Path) -> h5py.File:
     try:
         file = h5py.File(path, "r")
     except DAMAGE as error:
-        raise UserError(f"{path}: is damaged or no HDF5 file ({short(error)}); {AGAIN}") from error
+        raise UserError(f"is damaged or no HDF5 file ({short(error)}); {AGAIN}") from error
     try:
-        _accept(file, path)
+        _accept(file)
     except BaseException:
         file.close()
         raise
     return file
 
 
-def _accept(file: h5py.File, path: Path) -> None:
+def _accept(file: h5py.File) -> None:
     try:
         form, version = file.attrs.get("format"), file.attrs.get("format_version")
         known = form == FORMAT
     except DAMAGE as error:
-        raise UserError(f"{path}: is damaged ({short(error)}); {AGAIN}") from error
+        raise UserError(f"is damaged ({short(error)}); {AGAIN}") from error
     if not known:
-        raise OtherFormat(path, form)
+        raise OtherFormat(form)
     if not isinstance(version, str) or version.split(".")[0] != FORMAT_VERSION.split(".")[0]:
-        raise UserError(f"{path}: has format version {version}, this program reads {FORMAT_VERSION}; {AGAIN}")
+        raise UserError(f"has format version {version}, this program reads {FORMAT_VERSION}; {AGAIN}")
     try:
         inspect(file)
     except DAMAGE as error:
-        raise UserError(f"{path}: is damaged or no modal file ({short(error)}); {AGAIN}") from error
+        raise UserError(f"is damaged or no modal file ({short(error)}); {AGAIN}") from error
 
 
 @checked
+@in_its_file
 def read_basis(path: Path | str) -> ModalBasis:
     """Read a modal file.
 
@@ -408,14 +410,14 @@ def read_basis(path: Path | str) -> ModalBasis:
         UserError: see `open_file`; a missing or misshapen part is named.
     """
     with open_file(path) as file:
-        return _read_or_refuse(file, Path(path))
+        return _read_or_refuse(file)
 
 
-def _read_or_refuse(file: h5py.File, path: Path) -> ModalBasis:
+def _read_or_refuse(file: h5py.File) -> ModalBasis:
     try:
         return _read(file)
     except DAMAGE as error:
-        raise UserError(f"{path}: is damaged or incomplete ({short(error)}); {AGAIN}") from error
+        raise UserError(f"is damaged or incomplete ({short(error)}); {AGAIN}") from error
 
 
 def _read(file: h5py.File) -> ModalBasis:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..errors import UserError
+from ..errors import UserError, in_its_file
 from ..files import hdf5, store
 from ..files.hostile import reading, refuse_damaged
 from ..settings.arguments import checked
@@ -57,6 +57,7 @@ def write_bifurcation(path: Path, diagrams: Sequence[Branches]) -> Path:
 
 
 @checked
+@in_its_file
 def read_bifurcation(path: Path | str) -> Mapping[str, Branches]:
     """Read ``bifurcation.h5``: name of a diagram -> its branches, with every orbit and its multipliers.
 
@@ -65,7 +66,7 @@ def read_bifurcation(path: Path | str) -> Mapping[str, Branches]:
     """
     path = Path(path)
     if not store.ordinary(path).is_file():
-        raise UserError(f"{path}: no such file of bifurcations; run microslip bifurcate first or correct the path")
+        raise UserError("no such file of bifurcations; run microslip bifurcate first or correct the path")
     refuse_damaged(path, _TRIAL, "run the case again")
     return _read(path)
 

@@ -5,22 +5,22 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
-from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
 
 from ..data import CENTRIFUGAL, Array, ModalBasis, ModalGroup
-from ..errors import UserError, told_of
+from ..errors import UserError, at, in_its_file
 from ..operating.stress import READS_THE_MESH, in_singular_zone
 from ..process import prepare
 from ..reduced.compliance import SURFACE
 from ..system.assembly import Assembly, Contact, Load, Output
 from ..system.component import Component, Ring
+from ..system.damping import read_aerodynamics
 from ..system.spin import Spin, turned
 from .compliance import Springs, residual_share
 from .contacts import contact_at, described, of_force, sides, springs_of, swept
-from .driving import as_asked, flow_of, loads_of, messages_of, with_field
+from .driving import as_asked, loads_of, messages_of, with_field
 from .loaded import Loaded, axis_of, body_of, load_bodies, place_of
 from .points import (
     fitting_forces,
@@ -83,44 +83,51 @@ class Built:
         return whole
 
 
-def build(settings: CaseSettings, bases: Mapping[str, ModalBasis], path: Path | str) -> Built:
+@in_its_file
+def build(settings: CaseSettings, bases: Mapping[str, ModalBasis]) -> Built:
     """The assembly of a case.
 
     Args:
-        bases: body of the case -> its modal file. path: of the case file, for messages.
+        bases: body of the case -> its modal file.
 
     Raises:
         UserError: names that no modal file holds, faces that do not face each other, stiffnesses that count the bulk
             twice.
     """
     prepare()
-    settings = settings.model_copy(update={"contacts": tuple(described(c, path) for c in settings.contacts)})
-    bodies = load_bodies(settings, bases, path)
+    contacts = list[ContactSettings]()
+    for c in settings.contacts:
+        with at(f"contacts.{c.interface}"):
+            contacts.append(described(c, settings.path))
+    settings = settings.model_copy(update={"contacts": tuple(contacts)})
+    bodies = load_bodies(settings, bases)
     for c in settings.contacts:  # before any of them is made, which compiles
-        sides(settings, bodies, c, path)
-    settings = thrown(settings, {name: b.basis for name, b in bodies.items()}, path)
-    components = _spun({name: _component(settings, b) for name, b in bodies.items()}, settings, bodies, path)
+        with at(f"contacts.{c.interface}"):
+            sides(settings, bodies, c)
+    settings = thrown(settings, {name: b.basis for name, b in bodies.items()})
+    components = _spun({name: _component(settings, b) for name, b in bodies.items()}, settings, bodies)
     contacts, springs, made, messages = [], [], [], list[str]()
     fitted: dict[int, Callable[[float], Contact]] = {}
     for i, c in enumerate(settings.contacts):
         pressed = fitting_forces(settings, c)
-        own, k, said = springs_of(settings, bodies, c, pressed[-1], path)
+        with at(f"contacts.{c.interface}"):
+            own, k, said = springs_of(settings, bodies, c, pressed[-1])
+            under, more = contact_at(settings, bodies, components, own, k)
         contacts.append(own)
         springs.append(k)
-        at, more = contact_at(settings, bodies, components, own, k, path)
         said += more
         for force in pressed:
-            contact, more = at(force)
+            contact, more = under(force)
             said += more
         made.append(contact)
         if follows_the_force(c):
-            fitted[i] = partial(of_force, at)
+            fitted[i] = partial(of_force, under)
         messages += said
-    flowing = tuple(_in_flow(settings, m, bodies[m.name], path) for m in components.values())
-    flowing, loads, said = _loads(settings, bodies, flowing, path)
+    flowing = tuple(_in_flow(settings, m, bodies[m.name]) for m in components.values())
+    flowing, loads, said = _loads(settings, bodies, flowing)
     messages += [*said, *messages_of(flowing, loads, settings.balanced, _blades(settings), settings.turning)]
     ring = Ring(settings.ring.blades, settings.base_order) if settings.ring else None
-    outputs = _outputs(settings, bodies, path)
+    outputs = _outputs(settings, bodies)
     messages += [_held(w) for w in outputs if _is_still(bodies[w.component], "monitor", w.monitor, w.label)]
     messages += [_in_zone(w) for w in outputs if _reads_singular(bodies[w.component].group, w.monitor)]
     assembly = Assembly(flowing, tuple(made), loads, outputs, ring, settings.stuck_ratios)
@@ -146,7 +153,7 @@ def _residual_share(settings: CaseSettings, name: str, b: Loaded) -> Array | Non
 
 
 def _spun(
-    components: dict[str, Component], settings: CaseSettings, bodies: Mapping[str, Loaded], path: Path | str
+    components: dict[str, Component], settings: CaseSettings, bodies: Mapping[str, Loaded]
 ) -> dict[str, Component]:
     """The components, with the inertia of the material that runs through those which ground that turns is of.
 
@@ -157,21 +164,22 @@ def _spun(
     for c in settings.contacts:
         if c.ground is None or c.ground.rpm is None or c.against == GROUND:
             continue
-        where, name = f"{path}: contacts.{c.interface}.ground", settings.ends(c)[1][0]
-        b = body_of(bodies, name, path, f"contacts.{c.interface}")
+        name, key = settings.ends(c)[1][0], f"contacts.{c.interface}.ground"
+        b = bodies[name]
         spin = c.ground.spin(*axis_of(b.settings, b.basis), place_of(b))
         other, inert = spins.setdefault(name, (spin, c.ground.inertia))
         if not spin.same(other) or inert != c.ground.inertia:
             raise UserError(
-                f"{where}: turns the material of '{name}' otherwise than another contact does; write the same rpm, "
-                "axis, point and inertia in both"
+                f"turns the material of '{name}' otherwise than another contact does; write the same rpm, "
+                "axis, point and inertia in both",
+                key,
             )
         if other is not spin or not inert:
             continue
         try:
             components[name] = turned(components[name], spin, b.basis.mesh, b.mass)
         except UserError as error:
-            raise UserError(f"{where}: '{name}': {error}; or leave its inertia out: inertia = false") from error
+            raise UserError(f"'{name}': {error}; or leave its inertia out: inertia = false", key) from error
     return components
 
 
@@ -179,16 +187,17 @@ def _blades(settings: CaseSettings) -> int:
     return settings.ring.blades if settings.ring else 0
 
 
-def _in_flow(settings: CaseSettings, component: Component, b: Loaded, path: Path | str) -> Component:
+def _in_flow(settings: CaseSettings, component: Component, b: Loaded) -> Component:
     """The component with what the flow adds to its waves."""
     if b.settings.aerodynamics is None:
         return component
-    file, where = Path(path).parent / b.settings.aerodynamics, f"{path}: bodies.{b.settings.name}.aerodynamics"
-    return replace(component, aerodynamic=flow_of(file, _blades(settings), settings.turning, where))
+    with at(f"bodies.{b.settings.name}.aerodynamics"):
+        file = settings.path.parent / b.settings.aerodynamics
+        return replace(component, aerodynamic=read_aerodynamics(file, _blades(settings), settings.turning))
 
 
 def _loads(
-    settings: CaseSettings, bodies: Mapping[str, Loaded], components: tuple[Component, ...], path: Path | str
+    settings: CaseSettings, bodies: Mapping[str, Loaded], components: tuple[Component, ...]
 ) -> tuple[tuple[Component, ...], tuple[Load, ...], list[str]]:
     """Members with the rows of pressure fields, all loads, and what a reader should know."""
     found: list[Load] = []
@@ -196,40 +205,42 @@ def _loads(
     base, blades, turning = settings.base_order, _blades(settings), settings.turning
     for i, x in enumerate(settings.loads):
         body, row = settings.address(x.row or x.face or "")
-        b = body_of(bodies, body, path, "excitation")
+        with at("excitation"):
+            b = body_of(bodies, body)
         if x.field is not None:
             row, face = f"field {i + 1}", row  # no excitation of a body has a blank in its name
-            named[body], sentence = with_field(named[body], x, row, face, path)
+            named[body], sentence = with_field(named[body], x, row, face, settings.path)
             said.append(sentence)
         else:
-            _among(b.group.excitations, row, path, "excitation")
+            _among(b.group.excitations, row, "excitation")
             if x.speed_rpm is not None and b.group.excitations[row].unit != CENTRIFUGAL:
-                raise UserError(f"{path}: excitations.{row}.speed_rpm: the excitation is no centrifugal load; write "
-                                "centrifugal = true in the body, or leave speed_rpm out")  # fmt: skip
+                raise UserError("the excitation is no centrifugal load; write centrifugal = true in the body, or leave "
+                                "speed_rpm out", f"excitations.{row}.speed_rpm")  # fmt: skip
             if not x.is_zero and _is_still(b, "excitation", row):
-                raise UserError(f"{path}: excitation: '{x.row}' moves nothing: it acts where '{b.basis.name}' is held; "
-                                "give it another point, or direction, in the body.toml")  # fmt: skip
-        with told_of(f"{path}: excitations.{x.row or x.face}"):
+                raise UserError(f"'{x.row}' moves nothing: it acts where '{b.basis.name}' is held; give it another "
+                                "point, or direction, in the body.toml", "excitation")  # fmt: skip
+        with at(f"excitations.{x.row or x.face}"):
             found += loads_of(x, body, row, base, blades, turning)
     moved = [(*settings.address(s.row), s.stiffness * s.motion) for s in settings.springs if s.motion]
     return tuple(named.values()), (*found, *(Load(*one) for one in moved)), said
 
 
-def _outputs(settings: CaseSettings, bodies: Mapping[str, Loaded], path: Path | str) -> tuple[Output, ...]:
+def _outputs(settings: CaseSettings, bodies: Mapping[str, Loaded]) -> tuple[Output, ...]:
     found = []
     for m in settings.outputs:
         body, name = settings.address(m.monitor)
-        group = body_of(bodies, body, path, "monitor").group
+        with at("monitor"):
+            group = body_of(bodies, body).group
         rows = group.monitors.get(name) or group.gauges.get(name)
         if rows is not None and rows.unit != "m":  # an angle or a strain has one row
             found.append(Output(body, name, rows.labels[0]))
             continue
         known = group.monitors
-        _among(known, name, path, "monitor")
+        _among(known, name, "monitor")
         label = f"u_{m.direction}"
         if label not in known[name].labels:
             labels = ", ".join(known[name].labels)
-            raise UserError(f"{path}: direction: monitor '{name}' reads {labels}, not {label}; choose one")
+            raise UserError(f"monitor '{name}' reads {labels}, not {label}; choose one", "direction")
         found.append(Output(body, name, label))
     return tuple(found)
 
@@ -275,6 +286,6 @@ def _held(w: Output) -> str:
     )
 
 
-def _among(rows: Mapping[str, Any], name: str, path: Path | str, key: str) -> None:
+def _among(rows: Mapping[str, Any], name: str, key: str) -> None:
     if name not in rows:
-        raise UserError(f"{path}: {key}: the modal file has no {key} '{name}'; it has {', '.join(rows) or 'none'}")
+        raise UserError(f"the modal file has no {key} '{name}'; it has {', '.join(rows) or 'none'}", key)

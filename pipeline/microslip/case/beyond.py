@@ -10,7 +10,6 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -132,7 +131,6 @@ def with_curve(
     found: HarmonicResponse,
     settings: CaseSettings,
     bases: Bases,
-    path: Path | str,
     keep: Keep,
     report: Report,
 ) -> Beyond:
@@ -160,15 +158,13 @@ def with_curve(
         if settings.sweep.normal_forces is not None:
             asked["sweep"] = settings.sweep.model_copy(update={"normal_forces": (one.normal,)})
         finer = settings.model_copy(update=asked)
-        both = _both_ways(finer, bases, path, keep, report, known, spend)
+        both = _both_ways(finer, bases, keep, report, known, spend)
         failed = 1 - float(np.mean(np.concatenate([f.converged for f in both]))) if both else 0.0
         if failed <= COARSE or 2 * samples > FINEST or not spend(0.0):
             break
         samples *= 2
-        report(
-            f"{percent(failed)} of the curve's points fail their checks; once more with {samples} samples"
-        )
-    built = build(finer, bases, path)
+        report(f"{percent(failed)} of the curve's points fail their checks; once more with {samples} samples")
+    built = build(finer, bases)
     problem = problem_of(built, one.normal if settings.sweep.normal_forces is not None else None)
     each = [_looked_at(problem, f, max(LOOKED_AT // len(both), 1), report, spend) for f in both]
     return replace(one, curves=both, samples=samples, stability=each)
@@ -177,7 +173,6 @@ def with_curve(
 def _both_ways(
     settings: CaseSettings,
     bases: Bases,
-    path: Path | str,
     keep: Keep,
     report: Report,
     known: Mapping[float, Array],
@@ -190,9 +185,7 @@ def _both_ways(
         if found and (found[0].complete or not spend(0.0)):
             break
         way = settings.curve.model_copy(update={"band": band})
-        some, whole = curves(
-            settings.model_copy(update={"curve": way}), bases, path, "frequency", keep, report, known, spend
-        )
+        some, whole = curves(settings.model_copy(update={"curve": way}), bases, "frequency", keep, report, known, spend)
         if not whole:
             raise KeyboardInterrupt
         found += [replace(f, legs=0) for f in some[:1] if f.rows]  # each is told by where it begins

@@ -14,7 +14,7 @@ import numpy as np
 from ..contact.kinds import files_of as of_contact
 from ..contact.kinds import sources_of_others
 from ..contact.settings import ContactLaw, load_contact
-from ..errors import UserError
+from ..errors import UserError, in_its_file
 from ..files.store import fingerprint
 from ..harmonic_balance.checkpoint import restored
 from ..harmonic_balance.response import traced
@@ -52,14 +52,15 @@ def of_points(built: Built) -> str:
     return fingerprint(replace(problem, assembly=replace(problem.assembly, components=components)), fitted)
 
 
-def files_of(settings: CaseSettings, path: Path) -> dict[str, Path]:
+def files_of(settings: CaseSettings) -> dict[str, Path]:
     """Name -> file of all that a case names, modal files left out, and of what is named there in turn."""
-    found = {name: path.parent / name for name in settings.files}
+    folder = settings.path.parent
+    found = {name: folder / name for name in settings.files}
     contacts: list[ContactLaw] = [*settings.contacts]
     for name in [c.file for c in settings.contacts if c.file is not None]:
-        found |= {f"{name}: {own.name}": own for own in of_contact(path.parent / name)}
+        found |= {f"{name}: {own.name}": own for own in of_contact(folder / name)}
         with contextlib.suppress(UserError):  # told where the contact is made
-            contacts.append(load_contact(path.parent / name))
+            contacts.append(load_contact(folder / name))
     return found | sources_of_others(contacts)
 
 
@@ -88,7 +89,8 @@ def head_of(
     }  # fmt: skip
 
 
-def as_found(settings: CaseSettings, folder: Path, path: Path | str) -> CaseSettings:
+@in_its_file
+def as_found(settings: CaseSettings, folder: Path) -> CaseSettings:
     """A case with the number of harmonics that its response in a folder has, where it does not give one.
 
     Raises:
@@ -99,9 +101,8 @@ def as_found(settings: CaseSettings, folder: Path, path: Path | str) -> CaseSett
     try:
         return settings.with_harmonics(int(json.loads((folder / "response.json").read_text())["harmonics"]))
     except (OSError, ValueError, KeyError, TypeError):
-        raise UserError(
-            f'{path}: harmonics: "auto" is found by microslip respond {path}; run it first, or give a number'
-        ) from None
+        found_by = f'"auto" is found by microslip respond {settings.path}; run it first, or give a number'
+        raise UserError(found_by, "harmonics") from None
 
 
 def _standing(built: Built, name: str) -> list[str]:

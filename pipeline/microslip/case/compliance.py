@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 import numpy as np
 
@@ -37,9 +36,7 @@ class Face:
         return contact_share(self.group, self.reduction, row, self.interface, other, self.sectors)
 
 
-def counted_once(
-    c: ContactSettings, given: Springs, faces: Sequence[Face], path: Path | str
-) -> tuple[Springs, str]:  # fmt: skip
+def counted_once(c: ContactSettings, given: Springs, faces: Sequence[Face]) -> tuple[Springs, str]:
     """The springs of a contact without the bulk that the bodies hold on both of its sides, and a message or nothing.
 
     Args:
@@ -49,7 +46,7 @@ def counted_once(
         UserError: a stiffness that is said to count the bulk, but is stiffer than the bulk alone.
     """
     shares = [_sum([f.share(row) for f in faces]) for row in ("u_n", "u_t1", "u_t2")]
-    kept = _taken_out(c, given, shares, path) if c.includes == BULK_AND_SURFACE else given
+    kept = _taken_out(given, shares) if c.includes == BULK_AND_SURFACE else given
     reduction = ", ".join(dict.fromkeys(f.reduction for f in faces))
     return kept, _what_is_counted(c, given, kept, shares, reduction)
 
@@ -64,14 +61,15 @@ def _sum(shares: list[Share]) -> Share:
     return replace(first, label=label, contacts=1, noise=sum(s.noise for s in shares), **sums)
 
 
-def _taken_out(c: ContactSettings, given: Springs, shares: list[Share], path: Path | str) -> Springs:
+def _taken_out(given: Springs, shares: list[Share]) -> Springs:
     kept = [without_bulk(k, s) for k, s in zip(given, shares, strict=True)]
     for k, new, s, key in zip(given, kept, shares, ("normal", "tangential", "tangential"), strict=True):
         if not 0 < new < np.inf:
             raise UserError(
-                f"{path}: contacts.{c.interface}.{key}_stiffness: {k:g} N/m is said to count the bulk of the body, but "
+                f"{k:g} N/m is said to count the bulk of the body, but "
                 f"the bulk alone, which the basis holds, is as soft as {s.contacts / s.beyond:.3g} N/m ({s.label}); "
-                f'write includes = "{SURFACE}" if it is the stiffness of the surface, or lower it'
+                f'write includes = "{SURFACE}" if it is the stiffness of the surface, or lower it',
+                f"{key}_stiffness",
             )
     return (kept[0], kept[1], kept[2])
 

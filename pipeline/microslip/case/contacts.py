@@ -5,9 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from functools import lru_cache, partial
+from functools import lru_cache
 from pathlib import Path
-from typing import TypeVar
 
 import numpy as np
 
@@ -16,7 +15,7 @@ from ..contact.law import Law
 from ..contact.settings import ContactLaw, load_contact
 from ..contact.stiffness import Given
 from ..data import Array, Interface
-from ..errors import UserError, told_of
+from ..errors import UserError, at, of_file
 from ..files.store import ordinary
 from ..harmonic_balance.accuracy import more
 from ..harmonic_balance.cost import GIB, aft_bytes, of_this_machine
@@ -41,8 +40,6 @@ from .points import (
 )
 from .settings import GROUND, CaseSettings, ContactSettings
 
-T = TypeVar("T")
-
 
 def swept(c: ContactSettings) -> bool:
     """Whether the sweep's normal forces press a contact."""
@@ -50,17 +47,17 @@ def swept(c: ContactSettings) -> bool:
 
 
 def springs_of(
-    settings: CaseSettings, bodies: Mapping[str, Loaded], c: ContactSettings, load: float | None, path: Path | str
+    settings: CaseSettings, bodies: Mapping[str, Loaded], c: ContactSettings, load: float | None
 ) -> tuple[ContactSettings, Springs, list[str]]:
     """A contact's settings with the size of its patch, its springs (of a curved one at a load, N), and messages."""
-    loaded, faces = sides(settings, bodies, c, path)
-    own = sized(c, faces[0], path)
+    loaded, faces = sides(settings, bodies, c)
+    own = sized(c, faces[0])
     if c.is_curved:
-        springs, message = _in_contact(path, c, lambda: curved_springs(own, load))
+        springs, message = curved_springs(own, load)
     elif c.what.rigid:
         springs, message = (0.0, 0.0, 0.0), ""
     else:
-        springs, message = counted_once(c, _given(_composed(c, path)), _faces(settings, c, loaded), path)
+        springs, message = counted_once(c, _given(_composed(c, settings.path)), _faces(settings, c, loaded))
     said = [message]
     if settings.orbit or c.what.rigid:
         stiffness = math.inf if c.what.rigid else springs[0]
@@ -69,7 +66,7 @@ def springs_of(
 
 
 def sides(
-    settings: CaseSettings, bodies: Mapping[str, Loaded], c: ContactSettings, path: Path | str
+    settings: CaseSettings, bodies: Mapping[str, Loaded], c: ContactSettings
 ) -> tuple[list[Loaded], list[Interface]]:
     """The one or two bodies of a contact and their interfaces.
 
@@ -77,12 +74,12 @@ def sides(
         UserError: one that is not there, or that supports hold.
     """
     ends = settings.ends(c)
-    loaded = [body_of(bodies, body, path, f"contacts.{c.interface}") for body, _ in ends]
-    faces = [b.face(name, path, "contacts") for b, (_, name) in zip(loaded, ends, strict=True)]
+    loaded = [body_of(bodies, body) for body, _ in ends]
+    faces = [b.face(name) for b, (_, name) in zip(loaded, ends, strict=True)]
     for b, face, (_, name) in zip(loaded, faces, ends, strict=True):
         if face.held_share == 1.0:
             raise UserError(
-                f"{path}: contacts.{c.interface}: the supports of '{b.basis.name}' hold the face '{name}', so that "
+                f"the supports of '{b.basis.name}' hold the face '{name}', so that "
                 "nothing can open or slip there; free it in [[supports]] of the body, or take another face "
                 '(what stands still is against = "ground")'
             )
@@ -97,14 +94,14 @@ At = Callable[[float | None], tuple["Contact", list[str]]]
 
 def contact_at(
     settings: CaseSettings, bodies: Mapping[str, Loaded], components: Mapping[str, Component], c: ContactSettings,
-    springs: Springs, path: Path | str,
+    springs: Springs,
 ) -> tuple[At, list[str]]:  # fmt: skip
     """A contact for any load, and messages. springs: of one that is not curved."""
     ends = settings.ends(c)
-    loaded, faces = sides(settings, bodies, c, path)
+    loaded, faces = sides(settings, bodies, c)
     first, second, met = ContactFace(*ends[0]), None, None
     if len(ends) == 2:
-        met = _in_contact(path, c, lambda: _met(settings, c, loaded, faces))
+        met = _met(settings, c, loaded, faces)
         second = ContactFace(*ends[1], met.frame, c.against_sector)
     moved = _ground(c, loaded, faces[0])
     said, found, compliance = [f"{c.interface}: {words}" for words in met.messages] if met else [], None, None
@@ -112,31 +109,32 @@ def contact_at(
              "opens or slips there by itself." for b, face, (_, name) in zip(loaded, faces, ends, strict=True)
              if (share := face.held_share) > 0]  # fmt: skip
     if c.patch == "nodal":
-        found, first, second, compliance = _in_contact(
-            path, c, lambda: _nodal(settings, components, c, (first, second), met)
-        )
+        found, first, second, compliance = _nodal(settings, components, c, (first, second), met)
         said.append(f"{c.interface}: the patch of {len(found.points)} points moves with {found.count - 6} deformations "
                     "of the bodies besides its six rigid coordinates.")  # fmt: skip
 
     @lru_cache(maxsize=64)
-    def at(load: float | None) -> tuple[Contact, list[str]]:
-        _in_contact(path, c, lambda: _refuse_too_many(settings, c, load, found))
-        k, words = _in_contact(path, c, lambda: curved_springs(c, load)) if c.is_curved else (springs, "")
+    @at(f"contacts.{c.interface}")
+    def under(load: float | None) -> tuple[Contact, list[str]]:
+        _refuse_too_many(settings, c, load, found)
+        k, words = curved_springs(c, load) if c.is_curved else (springs, "")
         if c.fit == "exact":
-            patch = _in_contact(path, c, lambda: pieces(c, load))
+            patch = pieces(c, load)
         else:
-            whole = _in_contact(path, c, lambda: _law(c, path, k, load))
+            whole = _law(c, settings.path, k, load)
             if found is not None:
                 patch = nodal_patch(c, whole, found)
             else:
-                patch = _in_contact(path, c, lambda: patch_of(c, whole, c.what, faces[0], load))
-        more = [words] * bool(words) + _in_contact(path, c, lambda: resolved(c, patch, load))
+                patch = patch_of(c, whole, c.what, faces[0], load)
+        more = [words] * bool(words) + resolved(c, patch, load)
         more += cut_at_the_outline(c, patch) if found is None else []
-        press = partial(preloaded_contact, second=second, normal=c.normal_force, interference=c.interference or 0.0)
-        made = _in_contact(path, c, lambda: press(c.interface, patch, first, compliance=compliance))
+        made = preloaded_contact(
+            c.interface, patch, first, second=second, normal=c.normal_force, interference=c.interference or 0.0,
+            compliance=compliance,
+        )  # fmt: skip
         return replace(made, ground=moved), more
 
-    return at, said
+    return under, said
 
 
 def _ground(c: ContactSettings, loaded: list[Loaded], face: Interface) -> Ground | None:
@@ -190,12 +188,6 @@ def _nodal(
     return found, first, second, static_compliance(ends, 0, settings.ring.blades if settings.ring else 0)
 
 
-def _in_contact(path: Path | str, c: ContactSettings, make: Callable[[], T]) -> T:
-    """What is made, or its mistake with the contact's place in the case file."""
-    with told_of(f"{path}: contacts.{c.interface}"):
-        return make()
-
-
 def _faces(settings: CaseSettings, c: ContactSettings, loaded: list[Loaded]) -> list[Face]:
     """The sides of a contact, for the compliance that the bodies hold."""
     ends = settings.ends(c)
@@ -222,53 +214,49 @@ def _met(settings: CaseSettings, c: ContactSettings, loaded: list[Loaded], faces
     return in_ring(faces[0], faces[1], axis, point, settings.ring.blades, names, c.against_sector, seen)
 
 
-def described(c: ContactSettings, path: Path | str) -> ContactSettings:
+def described(c: ContactSettings, path: Path) -> ContactSettings:
     """A contact with what its file says it is, where it has one.
 
     Raises:
         UserError: no such file, a law that cannot stand here.
     """
-    where, (said, file) = f"contacts.{c.interface}", _source(c, path)
+    said, file = _source(c, path)
     if c.file is not None:
         c = c.model_copy(update={key: getattr(said, key) for key in ContactLaw.model_fields})
         try:
             c.what.fits(c)
             c.fits_here()
         except ValueError as error:
-            raise UserError(f"{path}: {where}.file: {file}: {error}") from error
+            raise UserError(f"{file}: {error}", "file") from error
     if c.is_curved:
         return c
     found = _composed(c, path)
     if found.law is None:
-        told = f"file: {file} needs" if c.file is not None else "stiffness: it needs"
+        key, it = ("file", file) if c.file is not None else ("stiffness", "it")
         needed = "friction" if said.what.rigid else "friction and a tangential stiffness"
-        raise UserError(f"{path}: {where}.{told} {needed} to make a law; add what is missing")
+        raise UserError(f"{it} needs {needed} to make a law; add what is missing", key)
     if c.includes is None and found.stiffness and found.stiffness.includes == SURFACE:
         c = c.model_copy(update={"includes": SURFACE})
     return c
 
 
-def _source(c: ContactSettings, path: Path | str) -> tuple[ContactLaw, Path]:
+def _source(c: ContactSettings, path: Path) -> tuple[ContactLaw, Path]:
     """Who says what a contact is, and its file: its contact.toml, or the case."""
-    file = Path(path).parent / str(c.file)
+    file = path.parent / str(c.file)
     if c.file is None:
-        return c, Path(path)
+        return c, path
     if not ordinary(file).is_file():
-        raise UserError(f"{path}: contacts.{c.interface}.file: there is no file {file}; correct the path")
+        raise UserError(f"there is no file {file}; correct the path", "file")
     return load_contact(file), file
 
 
-def _composed(
-    c: ContactSettings, path: Path | str, load: float | None = None, given: Given | None = None
-) -> ContactModel:
+def _composed(c: ContactSettings, path: Path, load: float | None = None, given: Given | None = None) -> ContactModel:
     """The laws of a whole contact under a load, N. given: stiffnesses instead of its own."""
     said, file = _source(c, path)
     if given is not None:
         said = said.model_copy(update={"stiffness": given, "normal_stiffness": None, "tangential_stiffness": None})
-    try:
+    with of_file(None if c.file is None else file):
         return compose(said, file, load or 0.0)
-    except UserError as error:
-        raise UserError(str(error).replace(f"{path}: ", f"{path}: contacts.{c.interface}.", 1)) from error
 
 
 def _given(found: ContactModel) -> Springs:
@@ -278,7 +266,7 @@ def _given(found: ContactModel) -> Springs:
     return (found.normal_0, *found.stiffness.tangential)
 
 
-def _law(c: ContactSettings, path: Path | str, springs: Springs, load: float | None) -> Law:
+def _law(c: ContactSettings, path: Path, springs: Springs, load: float | None) -> Law:
     """The law of a whole contact with these stiffnesses.
 
     Raises:
@@ -297,7 +285,7 @@ def _law(c: ContactSettings, path: Path | str, springs: Springs, load: float | N
     return found.law
 
 
-def sized(c: ContactSettings, face: Interface, path: Path | str) -> ContactSettings:
+def sized(c: ContactSettings, face: Interface) -> ContactSettings:
     """The contact with the extents of its patch; given ones that differ by more than 5 % are refused."""
     b0, h0 = (float(v) for v in face.extent)
     sizes = {"width": b0, "height": h0}
@@ -307,7 +295,6 @@ def sized(c: ContactSettings, face: Interface, path: Path | str) -> ContactSetti
             sizes[key] = given or 0.0
         elif given is not None and abs(given / own - 1) > 0.05:
             raise UserError(
-                f"{path}: contacts.{c.interface}.{key}: {given:g} m is not the patch's, which is {own:g} m; "
-                "leave it out or correct it (metres)"
+                f"{given:g} m is not the patch's, which is {own:g} m; leave it out or correct it (metres)", key
             )
     return c.model_copy(update=sizes)

@@ -6,7 +6,6 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
 from functools import cached_property
-from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
@@ -14,7 +13,7 @@ import numpy as np
 
 from ..continuation import Settings
 from ..data import Array
-from ..errors import UserError
+from ..errors import UserError, in_its_file
 from ..harmonic_balance import families
 from ..harmonic_balance.accuracy import Error
 from ..harmonic_balance.checkpoint import Spend, labels, points_of_curve, resumed_curve
@@ -188,10 +187,10 @@ class Followed:
         return f"{said}; another one begins there." if self.leaves_out else f"{said}."
 
 
+@in_its_file
 def curves(
     settings: CaseSettings,
     bases: Bases,
-    path: Path | str,
     over: str,
     keep: Keep,
     report: Report,
@@ -212,18 +211,18 @@ def curves(
     Raises:
         UserError: ends that are missing, no resonance to begin at.
     """
-    asked, built = settings.curve or CurveOfCase(), build(settings, bases, path)
+    asked, built = settings.curve or CurveOfCase(), build(settings, bases)
     of = measured(built.assembly)
-    ends, how = _ends(built, asked, over, path), Settings(points=asked.points, branch_points=False)
+    ends, how = _ends(built, asked, over), Settings(points=asked.points, branch_points=False)
     found: list[Followed] = []
     with keep(built) as journal:
-        for normal in _forces(built, over, ends, path):
+        for normal in _forces(built, over, ends):
             own = None if over == "normal_force" else normal
             one = Followed(over, own, None, ends, "", (), "interrupted", of)
             try:
                 problem = problem_of(built, normal)
                 if over != "frequency":
-                    at = asked.frequency or _resonance(built, problem, normal, journal, path, report)
+                    at = asked.frequency or _resonance(built, problem, normal, journal, report)
                     one = replace(one, frequency=at)
                 one, pressed = one.named, pressed_by(built, problem) if normal is None else normal
                 family = _family(built, problem, one)
@@ -279,37 +278,38 @@ def _followed(
     return replace(one, rows=rows, status=branch.status or CUT)
 
 
-def _ends(built: Built, asked: CurveOfCase, over: str, path: Path | str) -> tuple[float, float]:
+def _ends(built: Built, asked: CurveOfCase, over: str) -> tuple[float, float]:
     """First and last value of what varies."""
     if over == "load":
         return asked.load
     if over == "frequency":
         return asked.band or (built.settings.sweep.start, built.settings.sweep.stop)
     if not any(swept(c) for c in built.contacts):
-        raise UserError(f"{path}: curve: the sweep's normal forces press no contact; there is nothing to change")
+        raise UserError("the sweep's normal forces press no contact; there is nothing to change", "curve")
     for c in (built.contacts[i] for i in built.fitted):
         if c.what.of_the_force:
             raise UserError(
-                f'{path}: contacts.{c.interface}.law: "{c.what.kind}" holds a force given beforehand; write "smooth" '
-                "for a curve over the force"
+                f'"{c.what.kind}" holds a force given beforehand; write "smooth" for a curve over the force',
+                f"contacts.{c.interface}.law",
             )
         raise UserError(
-            f"{path}: contacts.{c.interface}.fitted_at: is missing; along a curve over its force a curved contact has "
-            "one law, so give the force (N) at which it is fitted"
+            "is missing; along a curve over its force a curved contact has one law, so give the force (N) at which it "
+            "is fitted",
+            f"contacts.{c.interface}.fitted_at",
         )
-    forces = normal_forces(built, path)
+    forces = normal_forces(built)
     if asked.normal_force is None and len(set(forces)) < 2:
-        raise UserError(f"{path}: curve.normal_force: give [first, last] in N; the sweep has one normal force alone")
+        raise UserError("give [first, last] in N; the sweep has one normal force alone", "curve.normal_force")
     return asked.normal_force or (min(forces), max(forces))
 
 
-def _forces(built: Built, over: str, ends: tuple[float, float], path: Path | str) -> tuple[float | None, ...]:
+def _forces(built: Built, over: str, ends: tuple[float, float]) -> tuple[float | None, ...]:
     """Normal forces (N) of the curves; where it varies the one that they begin with."""
-    return (ends[0],) if over == "normal_force" else normal_forces(built, path) or (None,)
+    return (ends[0],) if over == "normal_force" else normal_forces(built) or (None,)
 
 
 def _resonance(
-    built: Built, problem: Problem, normal: float | None, journal: Journal, path: Path | str, report: Report
+    built: Built, problem: Problem, normal: float | None, journal: Journal, report: Report
 ) -> float:  # fmt: skip
     """Hz of the highest resonance in the sweep's band, kept before or searched for now."""
     known = dict(journal.head.get("at", {}))
@@ -319,7 +319,7 @@ def _resonance(
         report(f"resonance between {s.start:g} and {s.stop:g} Hz")
         top = largest(problem, np.linspace(s.start, s.stop, s.points))
         if top.missing:
-            raise UserError(f"{path}: curve.frequency: {top.missing}; widen the sweep, or give a frequency (Hz)")
+            raise UserError(f"{top.missing}; widen the sweep, or give a frequency (Hz)", "curve.frequency")
         known[key] = top.frequency
         journal.say({**journal.head, "at": known})
     return float(known[key])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Literal
@@ -11,11 +11,11 @@ import numpy as np
 from pydantic import BeforeValidator, Field, model_validator
 
 from ..data import Array, Interface, ModalGroup
-from ..errors import UserError, told_of
+from ..errors import UserError, at
 from ..settings.numbers import Direction, Model, NotNegative, Number, Numbers, Positive, Vector, _finite_vector, _tuple
 from ..system.assembly import Load
 from ..system.component import Component, Ring
-from ..system.damping import read_aerodynamics, structural, unstable, with_ratios
+from ..system.damping import structural, unstable
 from ..system.excitation import Turning, base_order, harmonic_of, magnets, pattern_loads, unheard
 from ..system.ground import Ground, spectrum, turning
 from ..system.pairing import Place
@@ -239,7 +239,7 @@ def pattern_of(m: MagnetsOfCase):  # type: ignore[no-untyped-def]  # noqa: ANN20
 # --- from settings to loads ------------------------------------------------------------------------------------------
 
 
-def on_springs(group: ModalGroup, springs: Sequence[tuple[str, SpringOfCase]], key: str) -> ModalGroup:
+def on_springs(group: ModalGroup, springs: Sequence[tuple[str, SpringOfCase]]) -> ModalGroup:
     """The group with springs and dampers to the ground along rows of its excitations.
 
     Raises:
@@ -249,7 +249,7 @@ def on_springs(group: ModalGroup, springs: Sequence[tuple[str, SpringOfCase]], k
     for row, s in springs:
         if row not in group.excitations:
             known = ", ".join(group.excitations) or "none"
-            raise UserError(f"{key}: there is no excitation '{row}' to attach it to; the body has {known}")
+            raise UserError(f"there is no excitation '{row}' to attach it to; the body has {known}")
         w = group.excitations[row].rows[0]
         K, C = K + s.stiffness * np.outer(w.conj(), w), C + s.damping * np.outer(w.conj(), w)
     return replace(group, K_r=K, C_r=C) if springs else group
@@ -290,28 +290,17 @@ def loads_of(
 
 
 def with_field(
-    component: Component, x: ExcitationOfCase, name: str, face: str, path: Path | str
+    component: Component, x: ExcitationOfCase, name: str, face: str, path: Path
 ) -> tuple[Component, str]:  # fmt: skip
     """A component with the rows of a pressure field, and what a reader should know of it.
 
     Raises:
         UserError: a file, a face or a unit that does not fit.
     """
-    file = Path(path).parent / str(x.field)
-    with told_of(f"{path}: excitations.{x.face}.field"):
-        field = read_field(file, str(x.length_unit), x.time_factor == "-")
+    with at(f"excitations.{x.face}.field"):
+        field = read_field(path.parent / str(x.field), str(x.length_unit), x.time_factor == "-")
         found = on_face(field, load_face(component, face), face)
         return with_pressure(component, name, found), found.sentence()
-
-
-def damped(groups: Mapping[int, ModalGroup], ratios: float | Sequence[float], where: str) -> dict[int, ModalGroup]:
-    """Groups with the damping ratios of a case.
-
-    Raises:
-        UserError: no ratio.
-    """
-    with told_of(where):
-        return {k: with_ratios(g, ratios) for k, g in groups.items()}
 
 
 def as_asked(component: Component, kind: str, viscous: bool) -> Component:
@@ -323,16 +312,6 @@ def as_asked(component: Component, kind: str, viscous: bool) -> Component:
     if kind == "stuck":
         return replace(component, groups={k: replace(g, C_r=np.zeros_like(g.C_r)) for k, g in component.groups.items()})
     return structural(component) if kind == "structural" and not viscous else component
-
-
-def flow_of(file: Path, blades: int, turning: Turning, where: str) -> dict[int, complex]:
-    """Frequency shift and damping that the flow adds, by wave.
-
-    Raises:
-        UserError: a file that does not fit the ring.
-    """
-    with told_of(where):
-        return read_aerodynamics(file, blades, turning)
 
 
 def messages_of(

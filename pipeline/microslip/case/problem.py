@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -53,7 +52,7 @@ def pressed_by(built: Built, problem: Problem) -> float:
     return float(group.force(group.relative(problem.displacement(point.x)), 1.0)[0, 0, 0])
 
 
-def normal_forces(built: Built, path: Path | str, asked: Any = None) -> tuple[float, ...]:
+def normal_forces(built: Built, asked: Any = None) -> tuple[float, ...]:
     """The forces asked for, or the one that the static state at speed has in every contact that the sweep presses.
 
     Args:
@@ -71,14 +70,16 @@ def normal_forces(built: Built, path: Path | str, asked: Any = None) -> tuple[fl
     missing = [c.interface for c, force in zip(contacts, found, strict=True) if force is None]
     if missing:
         raise UserError(
-            f'{path}: sweep.normal_forces: "static", but the modal file has no closure on interface '
-            f"'{missing[0]}' or its partner; add [[closures]] to the body or give numbers"
+            f"\"static\", but the modal file has no closure on interface '{missing[0]}' or its partner; add "
+            "[[closures]] to the body or give numbers",
+            "sweep.normal_forces",
         )
     forces = [force for force in found if force is not None]
     if not forces or max(forces) - min(forces) > 0.01 * max(forces):
         raise UserError(
-            f'{path}: sweep.normal_forces: "static" needs contacts that are pressed alike; they have '
-            f"{', '.join(f'{force:.4g}' for force in forces) or 'none'} N; give numbers"
+            '"static" needs contacts that are pressed alike; they have '
+            f"{', '.join(f'{force:.4g}' for force in forces) or 'none'} N; give numbers",
+            "sweep.normal_forces",
         )
     return (forces[0],)
 

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 
 import numpy as np
 import scipy.linalg
 
 from ..data import Array, ComplexArray, ModalBasis
-from ..errors import UserError
+from ..errors import UserError, at, in_its_file
 from ..harmonic_balance import FrequencyResponse
 from ..harmonic_balance.accuracy import FLOOR, Error, enough, judged
 from ..harmonic_balance.book import normal_law
@@ -105,8 +104,9 @@ class _TooFew(Exception):
         self.harmonics = harmonics
 
 
+@in_its_file
 def run_case(
-    settings: CaseSettings, basis: ModalBasis | Mapping[str, ModalBasis], path: Path | str,
+    settings: CaseSettings, basis: ModalBasis | Mapping[str, ModalBasis],
     report: Callable[[str], None] = lambda _: None, keep: Keep | None = None, begin: int = FIRST_HARMONICS,
 ) -> CaseResult:  # fmt: skip
     """Frequency responses at every normal force.
@@ -123,29 +123,31 @@ def run_case(
         UserError: names that the modal files do not hold, see `assemble.build`.
     """
     if not settings.looks_for_harmonics:
-        return _run(settings, basis, path, report, keep, None)
+        return _run(settings, basis, report, keep, None)
     tolerance = settings.harmonics_error or headline.TRUNCATION
     while True:
         try:
-            return _run(settings.with_harmonics(begin), basis, path, report, keep, tolerance)
+            return _run(settings.with_harmonics(begin), basis, report, keep, tolerance)
         except _TooFew as found:
             begin = found.harmonics
             report(str(found))
 
 
 def _run(
-    settings: CaseSettings, basis: ModalBasis | Mapping[str, ModalBasis], path: Path | str,
+    settings: CaseSettings, basis: ModalBasis | Mapping[str, ModalBasis],
     report: Callable[[str], None], keep: Keep | None, tolerance: float | None,
 ) -> CaseResult:  # fmt: skip
     """`run_case` with a number of harmonics; tolerance: of their error, if it is looked at."""
     bases = basis if isinstance(basis, Mapping) else {b.name: basis for b in settings.components}
-    built = build(settings, bases, path)
+    built = build(settings, bases)
     sweep = settings.sweep
     frequency = np.linspace(sweep.start, sweep.stop, sweep.points)
-    forces = normal_forces(built, path)
+    forces = normal_forces(built)
     left = _Left(built, tolerance)
-    _book_can(built, path)
-    _can_be_pressed(built, forces, path)
+    _book_can(built)
+    with at("sweep.normal_forces"):  # before anything is kept
+        for normal in forces:
+            built.pressed(normal)
     with keep(built) if keep else nullcontext() as journal:
         responses, resonances, folds, stuck, messages = _answered(built, forces, frequency, report, journal, left)
     free = free_response(built, frequency)
@@ -276,20 +278,7 @@ def _swept(
     return resumed_response(problem, frequency, limits, journal, name, report)
 
 
-def _can_be_pressed(built: Built, forces: Sequence[float | None], path: Path | str) -> None:
-    """Press the contacts by all forces of the sweep before anything is kept.
-
-    Raises:
-        UserError: with the file's name.
-    """
-    try:
-        for normal in forces:
-            built.pressed(normal)
-    except UserError as error:
-        raise UserError(f"{path}: sweep.normal_forces: {error}") from error
-
-
-def _book_can(built: Built, path: Path | str) -> None:
+def _book_can(built: Built) -> None:
     """Say which contact the book's mode cannot be made of.
 
     Raises:
@@ -303,7 +292,7 @@ def _book_can(built: Built, path: Path | str) -> None:
             normal_law(c.patch.law, built.settings.strips)
         except UserError as error:
             more = ", or isotropic = true in a curved contact" if "along t1 and t2" in str(error) else ""
-            raise UserError(f'{path}: contacts.{c.name}: {error}{more}, or write mode = "aft"') from error
+            raise UserError(f'{error}{more}, or write mode = "aft"', f"contacts.{c.name}") from error
 
 
 def free_response(built: Built, frequency: Array) -> FrequencyResponse:

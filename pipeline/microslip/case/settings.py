@@ -8,7 +8,7 @@ from functools import cache
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BeforeValidator, Field, create_model, model_validator
+from pydantic import BeforeValidator, Field, PrivateAttr, create_model, model_validator
 
 from ..analysis import GROUP, analyses
 from ..contact.friction import OfCoulomb
@@ -24,6 +24,7 @@ from ..settings.numbers import (
     NotNegative,
     Number,
     Numbers,
+    OfFile,
     Positive,
     Ratio,
     Ratios,
@@ -284,7 +285,7 @@ def _no_ratio(value: Any) -> Any:
     return value
 
 
-class CaseSettings(Model):
+class CaseSettings(OfFile):
     """A whole case.toml.
 
     body (with the speed, speed_rpm and modes of `BodyOfCase`), or [[bodies]]; excitation and amplitude, or
@@ -301,6 +302,8 @@ class CaseSettings(Model):
     damping_ratio: of the bodies that give none themselves, or of the stuck modes. material_limits: of the body whose
     monitor is drawn, for the margins of its stresses.
     """
+
+    _path: Path = PrivateAttr(default=Path("case.toml"))
 
     name: Name
     description: str = ""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from pathlib import Path
 
 import numpy as np
 import scipy.optimize
@@ -18,7 +17,7 @@ UNHELD = 0.05
 of faces as drawn, and a body that leans farther is held by more than they tell."""
 
 
-def thrown(settings: CaseSettings, bases: Mapping[str, ModalBasis], path: Path | str) -> CaseSettings:
+def thrown(settings: CaseSettings, bases: Mapping[str, ModalBasis]) -> CaseSettings:
     """The case with the normal forces of contacts into which bodies press themselves (`pressed_at_rpm`).
 
     Raises:
@@ -28,20 +27,23 @@ def thrown(settings: CaseSettings, bases: Mapping[str, ModalBasis], path: Path |
     for b in settings.components:
         if b.pressed_at_rpm is None:
             continue
-        where = f"{path}: bodies.{b.name}.pressed_at_rpm"
         faces = {i: face for i, c in enumerate(contacts) for body, face in settings.ends(c) if body == b.name}
         others = [body for i in faces for body, _ in settings.ends(contacts[i]) if body != b.name]
         holder = next((m for m in settings.components if m.name in others[:1]), b)
         about = axis_of(holder, bases[holder.name])
-        for i, force in zip(faces, normal_forces(b, bases[b.name], list(faces.values()), where, about), strict=True):
+        for i, force in zip(faces, normal_forces(b, bases[b.name], list(faces.values()), about), strict=True):
             if contacts[i].normal_force is not None or contacts[i].interference is not None:
-                raise UserError(f"{where}: contacts.{contacts[i].interface} is pressed already; leave one of both out")
+                raise UserError(f"contacts.{contacts[i].interface} is pressed already; leave one of both out", _key(b))
             contacts[i] = contacts[i].model_copy(update={"normal_force": force})
     return settings.model_copy(update={"contacts": tuple(contacts)})
 
 
+def _key(b: BodyOfCase) -> str:
+    return f"bodies.{b.name}.pressed_at_rpm"
+
+
 def normal_forces(
-    b: BodyOfCase, basis: ModalBasis, faces: list[str], where: str, about: tuple[Array, Array] | None = None
+    b: BodyOfCase, basis: ModalBasis, faces: list[str], about: tuple[Array, Array] | None = None
 ) -> list[float]:
     """N, of every face: none pulls, and together they balance m r Omega^2 at the centre of mass, without friction.
 
@@ -61,7 +63,8 @@ def normal_forces(
     if not left <= UNHELD * np.linalg.norm(load):
         said = f"{100 * left / np.linalg.norm(load):.3g} % of its centrifugal load" if len(normals) else "it"
         raise UserError(
-            f"{where}: the contacts of '{b.name}' do not hold {said}; name the faces that it lies against, or give "
-            "sweep.normal_forces"
+            f"the contacts of '{b.name}' do not hold {said}; name the faces that it lies against, or give "
+            "sweep.normal_forces",
+            _key(b),
         )
     return [float(force) for force in found]

@@ -18,16 +18,14 @@ SHIFT = 0.01
 """Share of a frequency by which weak springs raise it, from which on they are told of."""
 
 
-def on_weak_springs(group: ModalGroup, frequency: float, key: str) -> ModalGroup:
+def on_weak_springs(group: ModalGroup, frequency: float) -> ModalGroup:
     """The group on springs that give each of its rigid motions a frequency (Hz); elastic modes are left alone.
 
     Raises:
         UserError: the body has no rigid motion.
     """
     if not (group.omega == 0).any():
-        raise UserError(
-            f"{key}: the body is held already; weak_springs are for bodies with free = true, leave them out"
-        )
+        raise UserError("the body is held already; weak_springs are for bodies with free = true, leave them out")
     return replace(group, K_r=group.K_r + _springs(group, frequency))
 
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 
-from ..errors import UserError
+from ..errors import UserError, at
 from . import others
 from .friction import Friction, OfCoulomb
 from .heights import Heights
@@ -103,19 +103,15 @@ def compose(settings: ContactLaw, path: Path, pressed: float = 0.0) -> ContactMo
     """
     if settings.what.rigid:
         return _rigid(settings, path)
-    given = settings.springs
-    try:
-        source = given.source(path)
-    except UserError as error:
-        own = str(error).startswith((str(path), str(path.parent / getattr(given, "file", path.name))))
-        raise UserError(str(error) if own else f"{path}: stiffness.{error}") from error
-    heights = roughness = friction = None
+    with at("stiffness"):
+        source = settings.springs.source(path)
+    heights = roughness = None
     law = source.law
     if settings.roughness is not None:
-        heights, roughness = settings.roughness.heights(path, settings.unit)
+        with at("roughness"):
+            heights, roughness = settings.roughness.heights(path, settings.unit)
         law = Rough(value(source.normal), value(roughness), heights)
-    if settings.friction is not None:
-        friction = settings.friction.friction(path, settings.temperature, source.area)
+    friction = _friction(settings, path, source.area)
     found = ContactModel(
         settings, path, source.normal, source.stiffness, source.area, heights, roughness, law, friction, pressed,
         source.layer, source.hertz,
@@ -125,15 +121,22 @@ def compose(settings: ContactLaw, path: Path, pressed: float = 0.0) -> ContactMo
 
 
 def _rigid(settings: ContactLaw, path: Path) -> ContactModel:
-    friction = None if settings.friction is None else settings.friction.friction(path, settings.temperature, None)
+    friction = _friction(settings, path, None)
     found = ContactModel(settings, path, 0.0, None, None, None, None, Preload(value(0.0)), friction)
     return replace(found, law=_law(found))
+
+
+def _friction(settings: ContactLaw, path: Path, area: float | None) -> Friction | None:
+    if settings.friction is None:
+        return None
+    with at("friction"):
+        return settings.friction.friction(path, settings.temperature, area)
 
 
 def _law(c: ContactModel) -> Law | None:
     if c.friction is None or (c.stiffness is None and not c.settings.what.rigid):
         return None
-    key = f"{c.path}: law"
-    law: Law = others.running(lambda: c.settings.what.law(c), key, c.settings.what)
-    others.tried(law, key, c.settings.what, c.friction)
+    with at("law"):
+        law: Law = others.running(lambda: c.settings.what.law(c), c.settings.what)
+        others.tried(law, c.settings.what, c.friction)
     return law

@@ -19,7 +19,7 @@ from scipy.interpolate import CubicHermiteSpline, PchipInterpolator
 from scipy.optimize import isotonic_regression
 
 from ..data import Array, Indices
-from ..errors import UserError
+from ..errors import UserError, in_its_file, of_file
 from ..files.store import ordinary
 from ..reduced.compliance import BULK_AND_SURFACE
 from .hertz import Hertz
@@ -239,16 +239,17 @@ def read_curve(
     Raises:
         UserError: what cannot be read, with file and line; see `curve`.
     """
-    path = Path(path)
-    for what, unit, known in (("length_unit", length_unit, LENGTHS), ("force_unit", force_unit, FORCES)):
-        if unit not in known:
-            raise UserError(f"{path}: {what}: '{unit}' is unknown; choose one of {', '.join(known)}")
+    with of_file(path):
+        for what, unit, known in (("length_unit", length_unit, LENGTHS), ("force_unit", force_unit, FORCES)):
+            if unit not in known:
+                raise UserError(f"'{unit}' is unknown; choose one of {', '.join(known)}", what)
     table, places = read_columns(path, (displacement, force))
     order = slice(None, None, -1) if gap and len(table) > 1 and table[0, 0] < table[-1, 0] else slice(None)
     x, F, places = table[order, 0] * LENGTHS[length_unit], table[order, 1] * FORCES[force_unit], places[order]
     return curve(-x if gap else x, F, noise, includes, str(path), places)
 
 
+@in_its_file
 def read_columns(path: Path | str, columns: tuple[int | str, ...]) -> tuple[Array, Indices]:
     """(k, c) numbers of some columns of a text file, and the lines they stand in, counted from 1.
 
@@ -258,14 +259,13 @@ def read_columns(path: Path | str, columns: tuple[int | str, ...]) -> tuple[Arra
     Raises:
         UserError: no such file, no such column, a line that is short or holds no number.
     """
-    path = Path(path)
-    lines = [(i, line.split("#", 1)[0].strip()) for i, line in enumerate(_text(path).splitlines(), 1)]
+    lines = [(i, line.split("#", 1)[0].strip()) for i, line in enumerate(_text(Path(path)).splitlines(), 1)]
     lines = [(i, line) for i, line in lines if line]
     if not lines:
-        raise UserError(f"{path}: is empty; it needs columns of numbers")
+        raise UserError("is empty; it needs columns of numbers")
     split = _splitter([line for _, line in lines])
     heads = _headings([split(line) for _, line in lines])
-    picks = [_column(path, c, heads) for c in columns]
+    picks = [_column(c, heads) for c in columns]
     rows, places = [], []
     for i, line in lines[len(heads) :]:
         cells = split(line)
@@ -273,7 +273,7 @@ def read_columns(path: Path | str, columns: tuple[int | str, ...]) -> tuple[Arra
         for p, v in zip(picks, values, strict=True):
             if v is None:
                 held = f"'{cells[p]}' is no number" if p < len(cells) else "there is none"
-                raise UserError(f"{path}: line {i}: column {p + 1}: {held}; correct the line or begin it with #")
+                raise UserError(f"line {i}: column {p + 1}: {held}; correct the line or begin it with #")
         rows.append(values)
         places.append(i)
     return np.array(rows, dtype=float).reshape(-1, len(picks)), np.array(places, dtype=np.int64)
@@ -283,6 +283,7 @@ _DECIMALS = re.compile(r"[^\s,]+(,[^\s,]+)?(\s+[^\s,]+(,[^\s,]+)?)+")
 """A line of columns parted by blanks, each with one comma inside at most."""
 
 
+@in_its_file
 def read_table(path: Path, columns: tuple[int | str, ...], names: tuple[str, ...]) -> Array:
     """`read_columns`, all numbers of which are finite.
 
@@ -292,7 +293,7 @@ def read_table(path: Path, columns: tuple[int | str, ...], names: tuple[str, ...
     table, lines = read_columns(path, columns)
     if (bad := np.argwhere(~np.isfinite(table))).size:
         row, column = bad[0]
-        raise UserError(f"{path}: line {lines[row]}: the {names[column]} is no finite number; correct it")
+        raise UserError(f"line {lines[row]}: the {names[column]} is no finite number; correct it")
     return table
 
 
@@ -300,9 +301,9 @@ def _text(path: Path) -> str:
     try:
         raw = ordinary(path).read_bytes()
     except OSError as error:
-        raise UserError(f"{path}: cannot be read ({error.strerror}); correct the path") from error
+        raise UserError(f"cannot be read ({error.strerror}); correct the path") from error
     if b"\0" in raw:
-        raise UserError(f"{path}: is no text file; give columns of numbers as text")
+        raise UserError("is no text file; give columns of numbers as text")
     try:
         return raw.decode("utf-8-sig")
     except UnicodeDecodeError:
@@ -338,13 +339,13 @@ def _headings(lines: list[list[str]]) -> list[list[str]]:
     return lines[: next(numbers, 1)]
 
 
-def _column(path: Path, wanted: int | str, heads: list[list[str]]) -> int:
+def _column(wanted: int | str, heads: list[list[str]]) -> int:
     if isinstance(wanted, int):
         if wanted < 1:
-            raise UserError(f"{path}: column {wanted}: columns are counted from 1")
+            raise UserError("columns are counted from 1", f"column {wanted}")
         return wanted - 1
     for head in heads:
         if wanted in head:
             return head.index(wanted)
     names = ", ".join(name for head in heads for name in head)
-    raise UserError(f"{path}: column '{wanted}': the file has {names or 'no names'}; give a number")
+    raise UserError(f"the file has {names or 'no names'}; give a number", f"column '{wanted}'")

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 from pydantic import Field
 from scipy.interpolate import PchipInterpolator
 
-from ..errors import UserError
+from ..errors import UserError, of_file
 from ..programs import program
 from ..settings.mistakes import bounded
 from ..settings.numbers import Coefficient, NotNegative, Number, Positive
@@ -229,11 +229,11 @@ class Measured(Friction):
         return jnp.broadcast_to(jnp.max(self.values), pressed.shape)
 
 
-def characteristic(speeds: ArrayLike, values: ArrayLike, where: str = "the table", **shift: float) -> Measured:
+def characteristic(speeds: ArrayLike, values: ArrayLike, **shift: float) -> Measured:
     """A `Measured` characteristic from columns, checked.
 
     Args:
-        speeds: (m,) m/s. values: (m,) coefficients. where: file or key, for the sentence. shift: temperature,
+        speeds: (m,) m/s. values: (m,) coefficients. shift: temperature,
             reference, c_1, c_2 of `Measured`.
 
     Raises:
@@ -242,28 +242,28 @@ def characteristic(speeds: ArrayLike, values: ArrayLike, where: str = "the table
     """
     v, mu = np.asarray(speeds, dtype=float), np.asarray(values, dtype=float)
     if v.ndim != 1 or v.shape != mu.shape or len(v) < 2:
-        raise UserError(f"{where}: a characteristic needs two or more pairs of speed and coefficient")
+        raise UserError("a characteristic needs two or more pairs of speed and coefficient")
     for name, column in (("speed", v), ("coefficient", mu)):
         if not np.isfinite(column).all():
             line = int(np.flatnonzero(~np.isfinite(column))[0]) + 1
-            raise UserError(f"{where}: {name} {line} is not a finite number; correct or remove the pair")
+            raise UserError(f"{name} {line} is not a finite number; correct or remove the pair")
     if v[0] <= 0 or np.any(np.diff(v) <= 0):
         raise UserError(
-            f"{where}: the speeds must be positive and rise; sort them, keep each once, and leave 0 out or give it a "
+            "the speeds must be positive and rise; sort them, keep each once, and leave 0 out or give it a "
             "small speed: the table runs over the logarithm of the speed, and below its first one the value stays"
         )
     if np.any(mu < 0):
-        raise UserError(f"{where}: coefficient {int(np.argmax(mu < 0)) + 1} is negative; a coefficient is not")
+        raise UserError(f"coefficient {int(np.argmax(mu < 0)) + 1} is negative; a coefficient is not")
     x = np.log(v)
     slopes = PchipInterpolator(x, mu)(x, 1)
     slopes[[0, -1]] = 0.0  # constant outside
     speed, value, slope = (jax.device_put(column)[:, None] for column in (v, mu, slopes))
     for name, given in shift.items():
-        bounded(f"{where}: {name}", given)
+        bounded(name, given)
     made = Measured(speed, value, slope, **shift)
     if not made.c_2 + made.temperature - made.reference > 0:
         raise UserError(
-            f"{where}: the shift with the temperature has no value at {made.temperature:g} K; it needs more than "
+            f"the shift with the temperature has no value at {made.temperature:g} K; it needs more than "
             f"{made.reference - made.c_2:g} K (reference less c_2), where rubber is glass"
         )
     return made
@@ -535,10 +535,11 @@ class OfTable(FrictionKind):
     c_2: Positive = 101.6
 
     def mean(self, path: Path, heat: Temperature | None, area: float | None) -> Friction:
-        file = beside(path, self.file, "friction.file")
+        file = beside(path, self.file)
         table = read_table(file, self.columns, ("speed", "coefficient"))
         shift = {key: getattr(self, key) for key in ("temperature", "reference", "c_1", "c_2")}
-        return characteristic(table[:, 0], table[:, 1], str(file), **shift)
+        with of_file(file):
+            return characteristic(table[:, 0], table[:, 1], **shift)
 
 
 class OfLubricated(OfHeated):

@@ -81,7 +81,7 @@ def half_curvatures(
         UserError: a radius of 0, or bodies that conform, so that they do not touch in a point.
     """
     if not all(abs(r) > 0 for r in (*first, *second)):
-        raise UserError("radii: a radius of curvature is 0; give inf for a flat side")
+        raise UserError("a radius of curvature is 0; give inf for a flat side", "radii")
     H = _curvature(first, 0.0) + _curvature(second, angle)
     values, axes = np.linalg.eigh(H)
     if not values[0] > SLENDEREST * values[1]:

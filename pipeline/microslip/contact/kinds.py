@@ -104,7 +104,7 @@ class LawKind(Kind):
         raise NotImplementedError
 
 
-def beside(path: Path, name: str, key: str) -> Path:
+def beside(path: Path, name: str) -> Path:
     """A file that a contact file names, sought beside it.
 
     Raises:
@@ -112,7 +112,7 @@ def beside(path: Path, name: str, key: str) -> Path:
     """
     found = path.parent / name
     if not ordinary(found).is_file():
-        raise UserError(f"{path}: {key}: there is no file {found}; correct the name (it is sought beside this file)")
+        raise UserError(f"there is no file {found}; correct the name (it is sought beside this file)", "file")
     return found
 
 

@@ -46,13 +46,13 @@ class Layer:
 
     def __post_init__(self) -> None:
         if self.boundary not in BOUNDARIES:
-            raise UserError(f"boundary: '{self.boundary}' is unknown; choose one of {', '.join(BOUNDARIES)}")
+            raise UserError(f"'{self.boundary}' is unknown; choose one of {', '.join(BOUNDARIES)}", "boundary")
         if not 0 < self.thickness < np.inf:
-            raise UserError(f"thickness: {self.thickness:g} m is no depth of a layer; it must be greater than 0")
+            raise UserError(f"{self.thickness:g} m is no depth of a layer; it must be greater than 0", "thickness")
         if self.density is not None and not 0 < self.density < np.inf:
-            raise UserError(f"density: {self.density:g} kg/m3 is impossible; it must be greater than 0")
+            raise UserError(f"{self.density:g} kg/m3 is impossible; it must be greater than 0", "density")
         if self.boundary != STRESS_FREE and self.solid.poisson >= 0.5:
-            raise UserError("poisson: 0.5 and held sides make a layer that cannot be compressed; take 0.49, say")
+            raise UserError("0.5 and held sides make a layer that cannot be compressed; take 0.49, say", "poisson")
 
     @property
     def modulus(self) -> float:
@@ -148,7 +148,7 @@ class Layer:
             if len(bad):
                 raise UserError(f"{name}: entry {bad[0] + 1} is not finite; correct it")
         if (p < 0).any():
-            raise UserError(f"pressure: entry {p.argmin() + 1} is {p.min():g} Pa; a contact does not pull")
+            raise UserError(f"entry {p.argmin() + 1} is {p.min():g} Pa; a contact does not pull", "pressure")
         utilisation = self.shear_stress(p, tau) / limit
         return YieldCheck(utilisation, p, xyz, None if names is None else tuple(names))
 
@@ -183,9 +183,9 @@ class Layer:
             UserError: no density, a negative frequency, a tolerance that is not positive.
         """
         if not 0 <= frequency < np.inf:
-            raise UserError(f"frequency: {frequency:g} Hz is none; it must not be negative")
+            raise UserError(f"{frequency:g} Hz is none; it must not be negative", "frequency")
         if not 0 < tolerance < np.inf:
-            raise UserError(f"tolerance: {tolerance:g} must be greater than 0, 0.01 for 1 %")
+            raise UserError(f"{tolerance:g} must be greater than 0, 0.01 for 1 %", "tolerance")
         first = {d: float(self.eigenfrequencies(d)[0]) / (2 * np.pi) for d in DIRECTIONS}
         direction = min(first, key=lambda d: first[d])
         errors = {d: quasi_static_error(frequency / f) for d, f in first.items()}
@@ -197,12 +197,12 @@ class Layer:
 
     def _modulus(self, direction: str) -> float:
         if direction not in DIRECTIONS:
-            raise UserError(f"direction: '{direction}' is unknown; choose one of {', '.join(DIRECTIONS)}")
+            raise UserError(f"'{direction}' is unknown; choose one of {', '.join(DIRECTIONS)}", "direction")
         return self.modulus if direction == "normal" else self.solid.shear
 
     def _rho(self) -> float:
         if self.density is None:
-            raise UserError("density: not given, and a frequency needs it; 7850 kg/m3 for steel")
+            raise UserError("not given, and a frequency needs it; 7850 kg/m3 for steel", "density")
         return self.density
 
 
@@ -329,5 +329,5 @@ def _x_cot_x(x: Array) -> Array:
 def _yield_shear(value: ArrayLike) -> Array:
     tau_s = np.asarray(value, dtype=float)
     if not ((tau_s > 0) & np.isfinite(tau_s)).all():
-        raise UserError("yield_shear: must be greater than 0 Pa; half the yield stress of a tensile test")
+        raise UserError("must be greater than 0 Pa; half the yield stress of a tensile test", "yield_shear")
     return tau_s

@@ -19,11 +19,11 @@ def is_other(thing: object) -> bool:
     return not type(thing).__module__.startswith(f"{__name__.split('.')[0]}.")
 
 
-def tried(law: Law, key: str, *parts: object) -> None:
+def tried(law: Law, *parts: object) -> None:
     """Trace every method of a law for two points, which computes nothing.
 
     Args:
-        key: file and key that name it. parts: of the law, which may be of other packages too.
+        parts: of the law, which may be of other packages too.
 
     Raises:
         UserError: a method that is missing, fails or returns another shape.
@@ -31,15 +31,15 @@ def tried(law: Law, key: str, *parts: object) -> None:
     kind = type(law)
     if missing := [name for name in Law.NEEDED if getattr(kind, name) is getattr(Law, name)]:
         raise UserError(
-            f"{key}: {kind.__name__} of {kind.__module__} has no method {', '.join(missing)}; add "
+            f"{kind.__name__} of {kind.__module__} has no method {', '.join(missing)}; add "
             "what is missing, docs/own_law.md says what each returns"
         )
     if not any(is_other(one) for one in (law, *parts)):
         return
-    shape = running(lambda: jax.eval_shape(lambda: _methods(law)).shape, key, law, *parts)
+    shape = running(lambda: jax.eval_shape(lambda: _methods(law)).shape, law, *parts)
     if shape != (2, 3):
         raise UserError(
-            f"{key}: step of {kind.__name__} gives two points a force of shape {shape}; it has to be "
+            f"step of {kind.__name__} gives two points a force of shape {shape}; it has to be "
             "(2, 3), a row for each point along n, t1 and t2"
         )
 
@@ -56,7 +56,7 @@ def _methods(law: Law) -> Any:
     return force
 
 
-def running(what: Callable[[], Any], key: str, *others: object) -> Any:
+def running(what: Callable[[], Any], *others: object) -> Any:
     """What code of other packages returns.
 
     Raises:
@@ -64,8 +64,8 @@ def running(what: Callable[[], Any], key: str, *others: object) -> Any:
     """
     try:
         return what()
-    except UserError as error:
-        raise UserError(f"{key}: {error}") from error
+    except UserError:
+        raise
     except Exception as error:
         files = {getattr(sys.modules.get(type(one).__module__), "__file__", "") for one in others if is_other(one)}
         places = [f for f in traceback.extract_tb(error.__traceback__) if f.filename in files]
@@ -73,5 +73,5 @@ def running(what: Callable[[], Any], key: str, *others: object) -> Any:
             raise
         at, said = places[-1], str(error).splitlines()[0] if str(error) else ""
         raise UserError(
-            f"{key}: {at.filename}, line {at.lineno}, in {at.name}: {type(error).__name__}: {said}; correct it"
+            f"{at.filename}, line {at.lineno}, in {at.name}: {type(error).__name__}: {said}; correct it"
         ) from error

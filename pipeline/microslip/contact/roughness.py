@@ -8,7 +8,8 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field, model_validator
 
-from ..errors import UserError
+from ..data import Array
+from ..errors import UserError, of_file
 from ..settings.numbers import Numbers, Positive, PositiveLength
 from . import topography
 from .curves import read_table
@@ -92,21 +93,22 @@ class TableHeights(Roughness):
         return self
 
     def own(self, path: Path, unit: float) -> tuple[Heights, float]:
-        depth, share, name = np.array(self.depth), np.array(self.share), f"{path}: roughness"
-        if self.file is not None:
-            file = beside(path, self.file, "roughness.file")
-            table = read_table(file, self.columns, ("depth", "share"))
-            depth, share, name = table[:, 0] * unit, table[:, 1], str(file)
+        if self.file is None:
+            return self._table(np.array(self.depth), np.array(self.share))
+        file = beside(path, self.file)
+        table = read_table(file, self.columns, ("depth", "share"))
+        with of_file(file):
+            return self._table(table[:, 0] * unit, table[:, 1])
+
+    def _table(self, depth: Array, share: Array) -> tuple[Heights, float]:
         if len(depth) < 2:
-            raise UserError(f"{name}: {len(depth)} depths; a height distribution needs two or more")
+            raise UserError(f"{len(depth)} depths; a height distribution needs two or more")
         if depth[0] < 0:
-            raise UserError(
-                f"{name}: the first depth is {depth[0]:g} m; depths are counted from the highest peak, from 0"
-            )
+            raise UserError(f"the first depth is {depth[0]:g} m; depths are counted from the highest peak, from 0")
         roughness = self.R_Z or float(depth[-1])
         if not roughness > 0:
-            raise UserError(f"{name}: the deepest height is {depth[-1]:g} m; give depths that rise from 0")
-        return tabulated(depth / roughness, share, name), roughness
+            raise UserError(f"the deepest height is {depth[-1]:g} m; give depths that rise from 0")
+        return tabulated(depth / roughness, share), roughness
 
 
 class ProfileHeights(Roughness):
@@ -120,7 +122,7 @@ class ProfileHeights(Roughness):
     level: Annotated[int, Field(ge=0, le=10)] | Literal["none"] = 1
 
     def own(self, path: Path, unit: float) -> tuple[Heights, float]:
-        file = beside(path, self.file, "roughness.file")
+        file = beside(path, self.file)
         level = None if self.level == "none" else self.level
         profile = topography.read_profile(file, (self.way_unit or self.unit, self.unit), level, self.columns)
         roughness = topography.roughness(profile).Rz

@@ -29,11 +29,11 @@ class Solid:
 
     def __post_init__(self) -> None:
         if not self.young > 0:
-            raise UserError(f"young: {self.young:g} Pa is no modulus; it must be greater than 0")
+            raise UserError(f"{self.young:g} Pa is no modulus; it must be greater than 0", "young")
         if not -1 < self.poisson <= 0.5:
-            raise UserError(f"poisson: {self.poisson:g} is impossible; it lies between -1 and 0.5, 0.3 say")
+            raise UserError(f"{self.poisson:g} is impossible; it lies between -1 and 0.5, 0.3 say", "poisson")
         if self.given_shear is not None and not self.given_shear > 0:
-            raise UserError(f"shear: {self.given_shear:g} Pa is no modulus; it must be greater than 0")
+            raise UserError(f"{self.given_shear:g} Pa is no modulus; it must be greater than 0", "shear")
 
     @property
     def shear(self) -> float:
@@ -49,7 +49,7 @@ def pressing(force: ArrayLike) -> Array:
     """
     F = np.asarray(force, dtype=float)
     if not (F >= 0).all():
-        raise UserError(f"force: {F.min():g} N; a contact is pressed, so the force must not be negative")
+        raise UserError(f"{F.min():g} N; a contact is pressed, so the force must not be negative", "force")
     return F
 
 
@@ -96,7 +96,7 @@ def mismatch(first: Solid, second: Solid) -> float:
 
 def _elastic(compliance: float) -> float:
     if not compliance > 0 or not np.isfinite(compliance):
-        raise UserError("young: both bodies are rigid, so their contact has no stiffness; give one of them a modulus")
+        raise UserError("both bodies are rigid, so their contact has no stiffness; give one of them a modulus", "young")
     return float(compliance)
 
 

@@ -56,7 +56,7 @@ class Stiffness(Kind):
         """What the contact file at a path makes of it.
 
         Raises:
-            UserError: with its key, the section's name left out.
+            UserError: with its key in the section.
         """
         raise NotImplementedError
 
@@ -138,7 +138,7 @@ class OfCurve(Stiffness):
     is_law: ClassVar[bool] = True
 
     def source(self, path: Path) -> Source:
-        file = beside(path, self.file, "stiffness.file")
+        file = beside(path, self.file)
         units = self.displacement_unit, self.force_unit
         law = measured(read_curve(file, *self.columns, *units, self.gap, self.noise, self.includes))
         normal = float(law.nominal)
@@ -154,12 +154,12 @@ class OfBasis(Stiffness):
     facing: Name | None = None
 
     def source(self, path: Path) -> Source:
-        basis = read_basis(beside(path, self.file, "stiffness.file"))
+        basis = read_basis(beside(path, self.file))
         group = basis.groups[0, 0]
         for key, name in (("interface", self.interface), ("facing", self.facing)):
             if name is not None and name not in group.interfaces:
                 known = ", ".join(group.interfaces) or "none"
-                raise UserError(f"{key}: the modal file of '{basis.name}' has no interface '{name}'; it has {known}")
+                raise UserError(f"the modal file of '{basis.name}' has no interface '{name}'; it has {known}", key)
         found = of_patch(group, basis.reduction, self.interface, self.facing or "", basis.sectors)
         area = float(np.sum(group.interfaces[self.interface].areas))
         return Source(found.normal, found, area, Penalty(value(found.normal)))

@@ -14,7 +14,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from .. import plausible
-from ..errors import UserError, told_of
+from ..errors import UserError, in_its_file
 from ..programs import program
 from . import microslip
 from . import settings as S
@@ -62,18 +62,18 @@ class _Findings:
     sentences: list[str] = field(default_factory=list)
 
 
+@in_its_file
 def study(path: Path | str, assignments: list[str] | None = None) -> Study:
     """Read a contact file and compute all that it gives what is needed for.
 
     Raises:
         UserError: every mistake, with file and key. NotConverged: an element that could not be integrated.
     """
-    path = Path(path)
     settings = S.load_contact(path, assignments)
     if settings.what.rigid:
-        raise UserError(f"{path}: {REFUSED}")
+        raise UserError(REFUSED)
     pressed = settings.motion.normal_force if settings.motion else None
-    contact = compose(settings, path, pressed or 0.0)
+    contact = compose(settings, Path(path), pressed or 0.0)
     found, working = _Findings(), _working(contact)
     _normal(contact, working, found)
     if contact.friction is not None:
@@ -120,7 +120,7 @@ def approach_under(c: ContactModel, force: float) -> float:
             break
         high *= 2
     else:
-        raise UserError(f"{c.path}: motion.normal_force: {force:g} N is more than the normal law reaches; lower it")
+        raise UserError(f"{force:g} N is more than the normal law reaches; lower it", "motion.normal_force")
     for _ in range(80):
         middle = 0.5 * (low + high)
         low, high = (middle, high) if values(c.normal, "force", middle) < force else (low, middle)
@@ -405,8 +405,7 @@ def _wear(c: ContactModel, found: _Findings) -> None:
     energy = mu * given.normal_force * given.speed * time
     coefficient = _wear_coefficient(given, mu)
     stars = dimensionless_time(energy, coefficient, law, c.area, np.asarray(given.normal_force))
-    with told_of(c.path):
-        worn = course(c.heights, given.normal_force / (c.normal_0 * c.roughness), stars)
+    worn = course(c.heights, given.normal_force / (c.normal_0 * c.roughness), stars)
     scale = c.normal_0 * c.roughness / c.area
     share = worn.area
     found.tables["wear"] = {

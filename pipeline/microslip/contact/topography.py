@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..errors import UserError
+from ..errors import UserError, in_its_file
 from ..files.store import ordinary
 from .curves import LENGTHS, read_columns
 
@@ -68,6 +68,7 @@ class Fit:
     residual: float
 
 
+@in_its_file
 def read_profile(
     path: str | Path, unit: str | tuple[str, str], level: int | None = 1, columns: tuple[int | str, int | str] = (1, 2)
 ) -> Profile:
@@ -87,42 +88,43 @@ def read_profile(
     path = Path(path)
     if path.suffix.lower() not in (".txt", ".csv", ".tsv", ".dat", ".asc", ".prf", ""):
         return read_instrument(path, level)
-    scales = _scales(unit, path)
+    scales = _scales(unit)
     table, lines = read_columns(path, columns)
     bad = np.argwhere(~np.isfinite(table))
     if len(bad):
         i, column = bad[0]
-        raise UserError(f"{path}: line {lines[i]}: {'xz'[column]} is no finite number; correct it or take the line out")
+        raise UserError(f"line {lines[i]}: {'xz'[column]} is no finite number; correct it or take the line out")
     x = table[:, 0]
     falls = np.flatnonzero(np.diff(x) <= 0)
     if len(falls):
         i = falls[0] + 1
         raise UserError(
-            f"{path}: line {lines[i]}: x = {x[i]:g} does not lie behind {x[i - 1]:g}; "
+            f"line {lines[i]}: x = {x[i]:g} does not lie behind {x[i - 1]:g}; "
             "sort the lines by x and leave doubled ones out"
         )
     return levelled(_checked(Profile(x * scales[0], table[:, 1] * scales[1], str(path))), level)
 
 
-def _scales(unit: str | tuple[str, str], path: Path) -> tuple[float, float]:
+def _scales(unit: str | tuple[str, str]) -> tuple[float, float]:
     names = (unit, unit) if isinstance(unit, str) else tuple(unit)
     for name in names:
         if name not in UNITS:
-            raise UserError(f"{path}: unknown unit of length {name!r}; one of {', '.join(UNITS)}")
+            raise UserError(f"unknown unit of length {name!r}; one of {', '.join(UNITS)}")
     if len(names) != 2:
-        raise UserError(f"{path}: units of x and z are two names; got {len(names)}")
+        raise UserError(f"units of x and z are two names; got {len(names)}")
     return UNITS[names[0]], UNITS[names[1]]
 
 
 def _checked(profile: Profile) -> Profile:
     z = profile.lines
     if z.shape[1] < 10:
-        raise UserError(f"{profile.name}: {z.shape[1]} points; a profile needs ten or more")
+        raise UserError(f"{z.shape[1]} points; a profile needs ten or more")
     if np.ptp(z) == 0:
-        raise UserError(f"{profile.name}: z is {z[0, 0]:g} m everywhere; a smooth surface needs no height distribution")
+        raise UserError(f"z is {z[0, 0]:g} m everywhere; a smooth surface needs no height distribution")
     return profile
 
 
+@in_its_file
 def read_instrument(path: str | Path, level: int | None = 1) -> Profile:
     """A line or a map from a file of a profilometer, by SurfaceTopography (`pip install "microslip[profile]"`).
 
@@ -138,20 +140,20 @@ def read_instrument(path: str | Path, level: int | None = 1) -> Profile:
         from SurfaceTopography import read_topography
     except ImportError:
         raise UserError(
-            f"{path}: files of instruments are read by SurfaceTopography; "
+            "files of instruments are read by SurfaceTopography; "
             'pip install "microslip[profile]", or write two columns x, z to a .txt file'
         ) from None
     if not ordinary(path).is_file():
-        raise UserError(f"{path}: no such file")
+        raise UserError("no such file")
     try:
         topography = read_topography(str(path))
         x, z = _positions(topography)
     except Exception as error:  # a reader per instrument, each with its own
-        raise UserError(f"{path}: SurfaceTopography cannot read it ({str(error).splitlines()[0]})") from None
+        raise UserError(f"SurfaceTopography cannot read it ({str(error).splitlines()[0]})") from None
     if topography.unit not in UNITS:
-        raise UserError(f"{path}: its unit of length is {topography.unit!r}, not one of {', '.join(UNITS)}")
+        raise UserError(f"its unit of length is {topography.unit!r}, not one of {', '.join(UNITS)}")
     if np.ma.is_masked(z) or not np.all(np.isfinite(z)):
-        raise UserError(f"{path}: z: some points were not measured; fill them in the instrument's program")
+        raise UserError("some points were not measured; fill them in the instrument's program", "z")
     scale = UNITS[topography.unit]
     return levelled(_checked(Profile(np.asarray(x) * scale, np.asarray(z) * scale, str(path))), level)
 

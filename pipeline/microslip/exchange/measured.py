@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from ..data import Array, Compliance, Indices, Mesh, ModalBasis, ModalGroup, Rows
-from ..errors import UserError
+from ..errors import UserError, in_its_file
 from ..files.store import ordinary
 from ..linalg.canonical import signs
 from ..mesh import UNITS
@@ -67,6 +67,7 @@ def holds_modes(path: Path | str) -> bool:
     return modes or (others and not has_solids(Path(path)))
 
 
+@in_its_file
 def read_measured(path: Path | str, unit: str = "m", name: str = "") -> tuple[ModalBasis, tuple[str, ...]]:
     """A measured body, and what its reader should be told.
 
@@ -79,22 +80,22 @@ def read_measured(path: Path | str, unit: str = "m", name: str = "") -> tuple[Mo
     path = Path(path)
     sets = _sets(path)
     length, force, told = _units(sets, unit)
-    modes = [_mode(path, s, length, force) for s in sets if s["type"] == 55 and s.get("analysis_type") in _KINDS]
+    modes = [_mode(s, length, force) for s in sets if s["type"] == 55 and s.get("analysis_type") in _KINDS]
     others = sum(s["type"] == 58 or s["type"] == 55 and s.get("analysis_type") not in _KINDS for s in sets)
     if not modes:
         found = f"{others} measured functions and no" if others else "no"
-        raise UserError(f"{path}: holds {found} mode shapes (data set 55); identify modes in the test program first")
-    number, place = _points(path, sets)
+        raise UserError(f"holds {found} mode shapes (data set 55); identify modes in the test program first")
+    number, place = _points(sets)
     modes.sort(key=lambda m: m.omega)
     used = modes[0].nodes
     for i, m in enumerate(modes):
         if not np.array_equal(m.nodes, used):
             hertz = m.omega / (2 * np.pi)
-            raise UserError(f"{path}: mode {i + 1} ({hertz:.6g} Hz) is at other points than the first one")
+            raise UserError(f"mode {i + 1} ({hertz:.6g} Hz) is at other points than the first one")
     position = {int(n): i for i, n in enumerate(number)}
     lost = [int(n) for n in used if int(n) not in position]
     if lost:
-        raise UserError(f"{path}: point {lost[0]} of the modes has no place (data set 15 or 2411)")
+        raise UserError(f"point {lost[0]} of the modes has no place (data set 15 or 2411)")
     points = place[[position[int(n)] for n in used]] / length
     phi, scaled = _shapes(modes)
     told.append(
@@ -118,7 +119,7 @@ def _sets(path: Path) -> list[dict[str, Any]]:
     import pyuff
 
     if not ordinary(path).is_file():
-        raise UserError(f"{path}: there is no such file; correct the path")
+        raise UserError("there is no such file; correct the path")
     wanted = (15, 2411, 55, 58, 164, 2420)
     try:
         file = pyuff.UFF(str(path))
@@ -130,7 +131,7 @@ def _sets(path: Path) -> list[dict[str, Any]]:
             return [file.read_sets(i) | {"type": k} for i, k in enumerate(kinds) if k in wanted]
     except Exception as error:  # pyuff raises whatever its parsing meets
         raise UserError(
-            f"{path}: cannot be read as a Universal File ({type(error).__name__}: {_short(error)}); export it again"
+            f"cannot be read as a Universal File ({type(error).__name__}: {_short(error)}); export it again"
         ) from error
 
 
@@ -155,20 +156,20 @@ def _number(table: dict[str, Any], key: str) -> float:
     return value if np.isfinite(value) else 0.0
 
 
-def _points(path: Path, sets: list[dict[str, Any]]) -> tuple[Indices, Array]:
+def _points(sets: list[dict[str, Any]]) -> tuple[Indices, Array]:
     """(p,) numbers and (p, 3) places of all points, in the file's unit."""
     if any(s["type"] == 2420 and not _aligned(s) for s in sets):
-        raise UserError(f"{path}: has local coordinate systems (data set 2420); export it in the global one")
+        raise UserError("has local coordinate systems (data set 2420); export it in the global one")
     found = [s for s in sets if s["type"] in (15, 2411)]
     if not found:
-        raise UserError(f"{path}: holds no points (data set 15 or 2411); export the geometry too")
+        raise UserError("holds no points (data set 15 or 2411); export the geometry too")
     try:
         number = np.concatenate([np.atleast_1d(s["node_nums"]) for s in found]).astype(np.int64)
         place = np.concatenate([np.column_stack([np.atleast_1d(s[c]) for c in "xyz"]) for s in found]).astype(float)
     except (KeyError, ValueError, TypeError) as error:
-        raise UserError(f"{path}: its points cannot be read ({_short(error)}); export it again") from error
+        raise UserError(f"its points cannot be read ({_short(error)}); export it again") from error
     if len(number) != len(place) or not np.isfinite(place).all() or len(np.unique(number)) != len(number):
-        raise UserError(f"{path}: its points are incomplete or numbered twice; export it again")
+        raise UserError("its points are incomplete or numbered twice; export it again")
     return number, place
 
 
@@ -178,22 +179,22 @@ def _aligned(s: dict[str, Any]) -> bool:
     return all(np.allclose(m, np.vstack([np.eye(3), np.zeros(3)]), atol=1e-9) for m in matrices)
 
 
-def _mode(path: Path, s: dict[str, Any], length: float, force: float) -> _Mode:
+def _mode(s: dict[str, Any], length: float, force: float) -> _Mode:
     """One data set 55; velocities and accelerations become displacements."""
     kind, moved = int(s["analysis_type"]), s.get("spec_data_type")
     if moved not in _MOVEMENTS:
         raise UserError(
-            f"{path}: a mode shape (data set 55) has the specific data type {moved}; displacements, velocities and "
+            f"a mode shape (data set 55) has the specific data type {moved}; displacements, velocities and "
             "accelerations (8, 11, 12) are read"
         )
     try:
         nodes = np.atleast_1d(s["node_nums"]).astype(np.int64)
         raw = np.column_stack([np.atleast_1d(s[f"r{i}"]) for i in (1, 2, 3)])
     except (KeyError, ValueError, TypeError) as error:
-        raise UserError(f"{path}: a mode shape (data set 55) cannot be read ({_short(error)})") from error
+        raise UserError(f"a mode shape (data set 55) cannot be read ({_short(error)})") from error
     omega, damping, mass = _eigenvalue(s, kind)
     if not omega > 0 or not np.isfinite(raw).all() or len(np.unique(nodes)) != len(nodes):
-        raise UserError(f"{path}: a mode shape (data set 55) has no frequency, or points twice or without numbers")
+        raise UserError("a mode shape (data set 55) has no frequency, or points twice or without numbers")
     order = np.argsort(nodes)
     shape = raw[order] / (length * (1j * omega) ** _MOVEMENTS[moved])
     return _Mode(omega, damping, mass * length / force, nodes[order], shape)

@@ -66,7 +66,7 @@ def folder_complete_or_absent(path: Path, mark: str) -> Iterator[Path]:
         os.replace(temporary, path)
         temporary = None
     except OSError as error:
-        raise UserError(refused(path, error)) from error
+        raise refused(path, error) from error
     finally:
         if temporary is not None:
             with suppress(OSError):

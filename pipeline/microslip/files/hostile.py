@@ -16,7 +16,7 @@ from typing import Any
 import h5py
 import numpy as np
 
-from ..errors import UserError
+from ..errors import UserError, in_its_file, of_file
 from .hdf5 import seal_state
 
 DAMAGE = (
@@ -39,6 +39,7 @@ def short(error: BaseException) -> str:
     return " ".join((str(error).splitlines() or ["unreadable"])[0].split())[:120]
 
 
+@in_its_file
 def refuse_damaged(path: Path, code: str, again: str) -> None:
     """Look at a file's seal before HDF5 meets the file.
 
@@ -54,13 +55,13 @@ def refuse_damaged(path: Path, code: str, again: str) -> None:
     try:
         state = seal_state(path)
     except OSError as error:
-        raise UserError(f"{path}: cannot be read ({error.strerror}); correct the path or its rights") from error
+        raise UserError(f"cannot be read ({error.strerror}); correct the path or its rights") from error
     if state == "broken":
-        raise UserError(f"{path}: is damaged (its bytes are not those it was sealed with); {again}")
+        raise UserError(f"is damaged (its bytes are not those it was sealed with); {again}")
     if not h5py.is_hdf5(path):
-        raise UserError(f"{path}: is damaged or no HDF5 file; {again}")
+        raise UserError(f"is damaged or no HDF5 file; {again}")
     if state == "absent" and (trouble := trial(code, path)):
-        raise UserError(f"{path}: is damaged (HDF5 {trouble} on it); {again}")
+        raise UserError(f"is damaged (HDF5 {trouble} on it); {again}")
 
 
 def inspect(file: h5py.File) -> None:
@@ -85,16 +86,21 @@ def reading(path: Path, form: str, version: str, again: str) -> Iterator[h5py.Fi
     Raises:
         UserError: damaged while it is read, foreign or of another version.
     """
+    with of_file(path):
+        yield from _read(path, (form, version), again)
+
+
+def _read(path: Path, wanted: tuple[str, str], again: str) -> Iterator[h5py.File]:
     try:
         with h5py.File(path, "r") as file:
             found = file.attrs.get("format"), file.attrs.get("format_version", file.attrs.get("version", ""))
-            if found != (form, version):
-                said, wanted = (" ".join(filter(None, map(str, pair))) for pair in (found, (form, version)))
-                raise UserError(f"{path}: is '{said}' and not '{wanted}'; {again}")
+            if found != wanted:
+                said, ours = (" ".join(filter(None, map(str, pair))) for pair in (found, wanted))
+                raise UserError(f"is '{said}' and not '{ours}'; {again}")
             inspect(file)
             yield file
     except DAMAGE as error:
-        raise UserError(f"{path}: is damaged or incomplete ({short(error)}); {again}") from error
+        raise UserError(f"is damaged or incomplete ({short(error)}); {again}") from error
 
 
 def _inspect_group(group: h5py.Group, where: str, above: tuple[Any, ...], budget: list[int]) -> None:

@@ -28,7 +28,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import UserError
+from ..errors import UserError, in_its_file
 from ..interrupts import look, writing
 
 _ODD = {
@@ -48,6 +48,7 @@ def _odd(path: Path) -> str:
         return ""
 
 
+@in_its_file
 def ordinary(path: Path | str) -> Path:
     """The path of something to read, before it is opened: pipes and devices may be waited for without end.
 
@@ -56,7 +57,7 @@ def ordinary(path: Path | str) -> Path:
     """
     path = Path(path)
     if odd := _odd(path):
-        raise UserError(f"{path}: is {odd}, not a file; correct the path")
+        raise UserError(f"is {odd}, not a file; correct the path")
     return path
 
 
@@ -88,7 +89,7 @@ def complete_or_absent(path: Path | str) -> Iterator[Path]:
             put_in_place(temporary, path)
             temporary = None
         except OSError as error:
-            raise UserError(refused(path, error)) from error
+            raise refused(path, error) from error
         finally:
             if temporary is not None:
                 with contextlib.suppress(OSError):
@@ -126,6 +127,7 @@ def kind_of(path: Path) -> str:
     return f"{kind} ({mark[0].decode().strip(': ')})" if mark else kind
 
 
+@in_its_file
 def refuse_other(path: Path | str, kind: str) -> None:
     """Refuse to replace a file that is none of a kind (`kind_of`), and no product with a sidecar; an empty one may go.
 
@@ -139,9 +141,10 @@ def refuse_other(path: Path | str, kind: str) -> None:
     if (there := kind_of(path)) not in ("", kind):
         is_, would = there.split(" (")[0], kind.split(" (")[0]
         words = f"{is_}, not {would}" if is_ != would else f"{is_} of another kind"
-        raise UserError(f"{path}: is there already and is {words}; give another name or remove it")
+        raise UserError(f"is there already and is {words}; give another name or remove it")
 
 
+@in_its_file
 def open_to_append(path: Path | str) -> int:
     """Descriptor of a file that grows, made if it is not there.
 
@@ -161,15 +164,16 @@ def open_to_append(path: Path | str) -> int:
         flags = getattr(os, "O_BINARY", 0) | getattr(os, "O_NOFOLLOW", 0)
         return os.open(path, os.O_RDWR | os.O_CREAT | os.O_APPEND | flags, 0o666)
     except OSError as error:
-        raise UserError(refused(path, error)) from error
+        raise refused(path, error) from error
 
 
+@in_its_file
 def _refuse_odd(path: Path) -> None:
     if odd := _odd(path):
-        raise UserError(f"{path}: cannot be written: {odd} has that name; choose another one")
+        raise UserError(f"cannot be written: {odd} has that name; choose another one")
 
 
-def refused(path: Path, error: OSError) -> str:
+def refused(path: Path, error: OSError) -> UserError:
     """Why a file could not be written, and what to do, in one sentence."""
     reason = os.strerror(error.errno) if error.errno else " ".join(str(error).split())[:120] or "unknown reason"
     remedies = {
@@ -183,7 +187,7 @@ def refused(path: Path, error: OSError) -> str:
         errno.ENOTDIR: "a file stands where its folder should be, choose another one",
     }
     remedy = remedies.get(error.errno or 0, "choose another folder")
-    return f"{path}: cannot be written ({reason}); this file was not changed, {remedy}"
+    return UserError(f"cannot be written ({reason}); this file was not changed, {remedy}", file=path)
 
 
 def _remove_leftovers(path: Path) -> None:
@@ -438,7 +442,7 @@ def unfinished(product: Path | str) -> None:
         for name in {sidecar_path(product).name, f"{product.name}.json"}:  # as it was called first
             product.with_name(name).unlink(missing_ok=True)
     except OSError as error:
-        raise UserError(refused(sidecar_path(product), error)) from error
+        raise refused(sidecar_path(product), error) from error
 
 
 def _former(product: Path) -> Path:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..data import Array
-from ..errors import UserError
+from ..errors import UserError, in_its_file
 from ..results.files import Response, read_response, stacked, write_response
 from ..results.series import Series
 from ..settings.mistakes import numbered
@@ -131,6 +131,7 @@ class Motions(Series):
         return Path(path)
 
 
+@in_its_file
 def load(path: Path | str) -> Series | Backbone:
     """The only series of a response file, as `Motions.save` writes it, or a nonlinear mode; `read_response` reads files
     of several.
@@ -142,5 +143,5 @@ def load(path: Path | str) -> Series | Backbone:
     found = response.series
     if len(found) != 1:
         names = ", ".join(s.name for s in found)
-        raise UserError(f"{path}: holds {len(found)} series ({names}); take one of read_response(path).series")
+        raise UserError(f"holds {len(found)} series ({names}); take one of read_response(path).series")
     return Backbone.of(response) if found[0].over == OVER_AMPLITUDE else found[0]

@@ -22,7 +22,7 @@ import numpy as np
 from .. import __version__
 from ..contact.law import settings
 from ..data import Array
-from ..errors import UserError
+from ..errors import UserError, in_its_file
 from ..files.store import complete_or_absent
 from ..programs import program
 
@@ -191,13 +191,13 @@ def write(table: Table, path: Path | str) -> None:
         np.savez(file, notes=text, **table.arrays)  # type: ignore[arg-type]
 
 
+@in_its_file
 def read(path: Path | str, kind: str, law: str | None = None) -> Table:
     """Read a table and check that it is whole and the one that is wanted.
 
     Raises:
         UserError: no such file, a damaged or foreign one, a table of something else.
     """
-    path = Path(path)
     try:
         with np.load(path, allow_pickle=False) as file:
             arrays = {name: file[name] for name in file.files}
@@ -205,13 +205,13 @@ def read(path: Path | str, kind: str, law: str | None = None) -> Table:
         whole = notes["format"] == FORMAT and notes["seal"] == _seal(arrays)
         numbers = [float(notes[key]) for key in ("error", "typical", "tolerance", "held_out")]
     except FileNotFoundError as error:
-        raise UserError(f"{path}: no such table; leave it out and it is computed") from error
+        raise UserError("no such table; leave it out and it is computed") from error
     except Exception as error:  # whatever a damaged archive makes its readers raise
-        raise UserError(f"{path}: damaged, or no table of microslip; delete it and it is computed again") from error
+        raise UserError("damaged, or no table of microslip; delete it and it is computed again") from error
     if not whole:
-        raise UserError(f"{path}: damaged: its numbers are not those that were written; delete it")
+        raise UserError("damaged: its numbers are not those that were written; delete it")
     if (notes["version"], notes["kind"]) != (VERSION, kind) or law not in (None, notes["law"]):
-        raise UserError(f"{path}: a table of something else ({notes['kind']}, version {notes['version']}); delete it")
+        raise UserError(f"a table of something else ({notes['kind']}, version {notes['version']}); delete it")
     return Table(kind, notes["law"], arrays, numbers[0], numbers[1], numbers[2], int(numbers[3]))
 
 

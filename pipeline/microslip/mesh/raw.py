@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from ..data import Array, Indices, Joint, Link, Sector
+from ..errors import UserError
 
 NODES = {
     "vertex": 1, "line": 2, "line3": 3, "triangle": 3, "triangle6": 6, "quad": 4, "quad8": 8, "quad9": 9, "tetra": 4,
@@ -126,6 +127,12 @@ def in_file(path: Path, text: str) -> str:
     return f"{path}{text.removeprefix(path.name)}" if text.startswith(f"{path.name}, ") else f"{path}: {text}"
 
 
+def refused(path: Path, text: str) -> UserError:
+    """The mistake of a file, or of a line of it, that a sentence tells; see `in_file`."""
+    place, _, told = text.partition(": ") if text.startswith(f"{path.name}, ") else (path.name, "", text)
+    return UserError(told, file=f"{path}{place.removeprefix(path.name)}")
+
+
 def undefined(name: str, what: str, numbers: Indices) -> str:
     """What is said of a set that names nodes or elements (`what`) which the file does not define."""
     first, count = numbers[0], len(numbers)
@@ -202,9 +209,7 @@ class Numbering:
 
     def between(self, first: int, last: int) -> Indices:
         """The numbers from first to last that nodes have, ascending."""
-        return self.sorted[
-            np.searchsorted(self.sorted, first) : np.searchsorted(self.sorted, last, "right")
-        ]
+        return self.sorted[np.searchsorted(self.sorted, first) : np.searchsorted(self.sorted, last, "right")]
 
     def positions(self, ids: Indices, what: str) -> Indices:
         """Positions of node numbers, any shape.

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from ..data import Array, Indices, Mesh
-from ..errors import UserError
+from ..errors import UserError, in_its_file
 from ..files.hostile import tried
 from ..files.store import ordinary
 from ..topology import CELL_TYPES, FACET_CORNERS
@@ -29,7 +29,7 @@ from .linking import renumbered
 from .materials import in_si
 from .med import read_med
 from .msh import is_msh41, read_msh41
-from .raw import NODES, Damaged, RawMesh, in_file
+from .raw import NODES, Damaged, RawMesh, refused
 from .surface import boundary_facets, faces_from_points, match_facets
 from .unv import length_unit, read_unv
 
@@ -40,6 +40,7 @@ _FARTHEST = 1e9  # m; beyond it a file is damaged, and geometry loses its digits
 _IGNORED = {"vertex", "line", "line3"}
 
 
+@in_its_file
 def read_mesh(path: Path | str, unit: str, system: str | None = None, zero: float = 0.0) -> Mesh:
     """Read a volume mesh with its named sets.
 
@@ -59,29 +60,26 @@ def read_mesh(path: Path | str, unit: str, system: str | None = None, zero: floa
     """
     path = Path(path)
     if unit not in UNITS:
-        raise UserError(f"{path}: the unit of length '{unit}' is unknown; choose one of {', '.join(UNITS)}")
+        raise UserError(f"the unit of length '{unit}' is unknown; choose one of {', '.join(UNITS)}")
     if not ordinary(path).is_file():
-        raise UserError(f"{path}: no such mesh file; make it first or correct the path")
+        raise UserError("no such mesh file; make it first or correct the path")
     try:
         raw = _read_raw(path)
         if (said := unit_of(path)) not in ("", unit):
-            raw.lost.append(
-                f"the file tells its lengths in {said}, here they are taken in {unit}: which is "
-                "right?"
-            )
+            raw.lost.append(f"the file tells its lengths in {said}, here they are taken in {unit}: which is right?")
         materials = tuple(in_si(m, system, zero) for m in raw.materials) if system else ()
-        mesh = _mesh_of(raw, UNITS[unit], path)
+        mesh = _mesh_of(raw, UNITS[unit])
         return replace(mesh, materials=materials, regions=mesh.regions if materials else {})
     except Damaged as error:
-        raise UserError(_refused(path, str(error))) from error
+        raise _refused(path, str(error)) from error
     except OSError as error:
-        raise UserError(f"{path}: cannot be read ({error.strerror}); correct the path") from error
+        raise UserError(f"cannot be read ({error.strerror}); correct the path") from error
 
 
-def _refused(path: Path, text: str) -> str:
-    """What is wrong with a file, its name once before the line, and what to do."""
+def _refused(path: Path, text: str) -> UserError:
+    """What is wrong with a file, or with a line of it, and what to do."""
     told = text if text.startswith(f"{path.name}, ") else f"cannot be used: {text}"
-    return in_file(path, told) + ("" if "; " in text else "; correct it or write it again")
+    return refused(path, told + ("" if "; " in text else "; correct it or write it again"))
 
 
 _READERS: dict[str, Callable[[Path], RawMesh]] = {
@@ -145,16 +143,16 @@ def _read_raw(path: Path) -> RawMesh:
     if suffix in _BY_MESHIO:
         return _by_meshio(path, _from_meshio)
     known = ", ".join([*_READERS, *_BY_MESHIO])
-    raise UserError(f"{path}: meshes are not read from a file '{suffix}'; use one of {known}")
+    raise UserError(f"meshes are not read from a file '{suffix}'; use one of {known}")
 
 
-def _mesh_of(raw: RawMesh, metres: float, path: Path) -> Mesh:
+def _mesh_of(raw: RawMesh, metres: float) -> Mesh:
     foreign = sorted({kind for kind, cells in raw.blocks if kind not in CELL_TYPES and len(cells)})
     if foreign:
         way = f"convert the mesh to one of {', '.join(CELL_TYPES)}"
         if {"wedge18", "pyramid14"} & set(foreign):
             way += " (in gmsh: Mesh.SecondOrderIncomplete = 1)"
-        raise UserError(f"{path}: cells of type {', '.join(foreign)} cannot be assembled; {way}")
+        raise UserError(f"cells of type {', '.join(foreign)} cannot be assembled; {way}")
     _sort_by_region(raw)
     _turn_left_handed(raw)
     cells: dict[str, list[Indices]] = {}
@@ -162,12 +160,12 @@ def _mesh_of(raw: RawMesh, metres: float, path: Path) -> Mesh:
         if len(connectivity):
             cells.setdefault(kind, []).append(connectivity)
     if not cells:
-        raise UserError(f"{path}: holds no volume cells (only surfaces or lines?); mesh the volume first")
+        raise UserError("holds no volume cells (only surfaces or lines?); mesh the volume first")
     points = raw.points * metres
     if points.shape[1:] != (3,) or not np.isfinite(points).all():
-        raise UserError(f"{path}: coordinates must be three finite numbers a point; the file is damaged or not 3-D")
+        raise UserError("coordinates must be three finite numbers a point; the file is damaged or not 3-D")
     if np.abs(points).max() > _FARTHEST:
-        raise UserError(f"{path}: a point lies {np.abs(points).max():.3g} m from the origin; the file is damaged")
+        raise UserError(f"a point lies {np.abs(points).max():.3g} m from the origin; the file is damaged")
     return _assemble_mesh(raw, points, {t: np.concatenate(c) for t, c in cells.items()}, metres)
 
 
@@ -193,14 +191,13 @@ def _turn_left_handed(raw: RawMesh) -> None:
             cells = cells.copy()
             cells[left] = cells[left][:, _MIRRORED[kind]]
             raw.blocks[number] = kind, cells
-            raw.remarks.append(
-                f"{left.sum()} left-handed cells {kind} are counted the other way round"
-            )
+            raw.remarks.append(f"{left.sum()} left-handed cells {kind} are counted the other way round")
 
 
 # other formats, by meshio ----------------------------------------------------------------------------------------
 
 
+@in_its_file
 def point_data(path: Path) -> tuple[Array, dict[str, Array]]:
     """(n, 3) points of a file in its own unit and the values that it holds at them, by name.
 
@@ -210,7 +207,7 @@ def point_data(path: Path) -> tuple[Array, dict[str, Array]]:
     try:
         mesh = _by_meshio(path, lambda found: found)
     except Damaged as error:
-        raise UserError(f"{path}: is damaged or cannot be used ({error}); write it again") from error
+        raise UserError(f"is damaged or cannot be used ({error}); write it again") from error
     return np.asarray(mesh.points, dtype=float), {k: np.asarray(v) for k, v in mesh.point_data.items()}
 
 

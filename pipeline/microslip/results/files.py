@@ -14,7 +14,7 @@ import h5py
 import numpy as np
 
 from ..data import Array, ModalBasis, ModalGroup
-from ..errors import UserError
+from ..errors import UserError, in_its_file
 from ..files.hdf5 import IMAGINARY, put, sealed
 from ..files.hostile import DAMAGE, reading, refuse_damaged, short
 from ..files.store import json_text, ordinary
@@ -231,6 +231,7 @@ def _put_text(file: h5py.File, name: str, text: str) -> None:
 
 
 @checked
+@in_its_file
 def read_response(path: Path | str) -> Response:
     """Read ``response.h5``, or the journal of a response that is still computed or was killed.
 
@@ -239,7 +240,7 @@ def read_response(path: Path | str) -> Response:
     """
     path = Path(path)
     if not ordinary(path).is_file():
-        raise UserError(f"{path}: no such response; run the case first or correct the path")
+        raise UserError("no such response; run the case first or correct the path")
     with contextlib.suppress(OSError):  # told below
         if is_journal(path):
             return _from_journal(path)
@@ -255,7 +256,7 @@ def _from_journal(path: Path) -> Response:
     try:
         return response_of(head, answers(head, series))
     except DAMAGE as error:
-        raise UserError(f"{path}: is damaged or incomplete ({short(error)}); run the case again") from error
+        raise UserError(f"is damaged or incomplete ({short(error)}); run the case again") from error
 
 
 def _read(path: Path) -> Response:

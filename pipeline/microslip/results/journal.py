@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from ..data import Array
-from ..errors import UserError
+from ..errors import UserError, in_its_file
 from ..files.store import open_to_append, ordinary, refused
 from ..interrupts import writing
 
@@ -83,7 +83,7 @@ class Journal:
         except OSError as error:
             with contextlib.suppress(OSError):
                 os.ftruncate(self._file, whole)
-            raise UserError(refused(self.path, error)) from error
+            raise refused(self.path, error) from error
 
 
 def once(
@@ -129,7 +129,7 @@ def open_journal(path: Path | str, inputs: str, head: Mapping[str, Any], fresh: 
 def _continued(file: int, path: Path, inputs: str) -> Journal | None:
     """The journal that is there, its torn end cut off; None if it is empty, foreign or of other inputs."""
     try:
-        head, series, end = _parsed(path.read_bytes(), path)
+        head, series, end = _parsed(path.read_bytes())
     except UserError:
         return None
     if head.get("inputs") != inputs:
@@ -138,6 +138,7 @@ def _continued(file: int, path: Path, inputs: str) -> Journal | None:
     return Journal(path, head, series, file)
 
 
+@in_its_file
 def read_journal(path: Path | str) -> tuple[dict[str, Any], dict[str, dict[float, dict[str, Any]]]]:
     """Head and series of a journal, also of one that is being written or whose writer was killed.
 
@@ -147,8 +148,8 @@ def read_journal(path: Path | str) -> tuple[dict[str, Any], dict[str, dict[float
     try:
         data = ordinary(path).read_bytes()
     except OSError as error:
-        raise UserError(f"{path}: cannot be read ({error.strerror}); correct the path or its rights") from error
-    return _parsed(data, Path(path))[:2]
+        raise UserError(f"cannot be read ({error.strerror}); correct the path or its rights") from error
+    return _parsed(data)[:2]
 
 
 def answers(
@@ -188,7 +189,7 @@ def _packed(words: dict[str, Any], point: Point) -> bytes:
     return _HEAD.pack(_MARK, len(body), len(text), zlib.crc32(body)) + body
 
 
-def _parsed(data: bytes, path: Path) -> tuple[dict[str, Any], dict[str, dict[float, dict[str, Any]]], int]:
+def _parsed(data: bytes) -> tuple[dict[str, Any], dict[str, dict[float, dict[str, Any]]], int]:
     """Head, series, and where the last complete record ends.
 
     Raises:
@@ -196,13 +197,11 @@ def _parsed(data: bytes, path: Path) -> tuple[dict[str, Any], dict[str, dict[flo
     """
     records, end = _records(data)
     if not records or records[0][0].get("format") != FORMAT:
-        raise UserError(f"{path}: is no journal of a response, or its beginning is damaged; run the case again")
+        raise UserError("is no journal of a response, or its beginning is damaged; run the case again")
     first = records[0][0]
     if str(first.get("format_version")).split(".")[0] != FORMAT_VERSION.split(".")[0]:
         version = first.get("format_version")
-        raise UserError(
-            f"{path}: has format version {version}, this program reads {FORMAT_VERSION}; run the case again"
-        )
+        raise UserError(f"has format version {version}, this program reads {FORMAT_VERSION}; run the case again")
     series: dict[str, dict[float, dict[str, Any]]] = {}
     for words, point in records:
         if "head" in words:

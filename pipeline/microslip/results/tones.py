@@ -11,7 +11,7 @@ import h5py
 import numpy as np
 
 from ..data import Array, ComplexArray, Indices
-from ..errors import UserError
+from ..errors import UserError, in_its_file
 from ..files.hdf5 import IMAGINARY, put, sealed
 from ..files.hostile import DAMAGE, reading, refuse_damaged
 from ..files.store import ordinary
@@ -265,6 +265,7 @@ def is_of_tones(path: Path | str) -> bool:
         return False
 
 
+@in_its_file
 def read_tones(path: Path | str) -> TwoTones:
     """What `TwoTones.save` wrote.
 
@@ -273,7 +274,7 @@ def read_tones(path: Path | str) -> TwoTones:
     """
     path = Path(path)
     if not ordinary(path).is_file():
-        raise UserError(f"{path}: no such file; save the motions first or correct the path")
+        raise UserError("no such file; save the motions first or correct the path")
     refuse_damaged(path, "from microslip.results.tones import _read; _read(path)", "save the motions again")
     return _read(path)
 

@@ -18,7 +18,7 @@ from scipy.interpolate import CubicSpline, UnivariateSpline
 from scipy.optimize import minimize_scalar
 
 from ..data import Array
-from ..errors import UserError
+from ..errors import UserError, in_its_file, of_file
 from ..files import store
 from ..settings.arguments import checked
 from ..settings.mistakes import is_number
@@ -78,7 +78,8 @@ class Profile:
             return self
         c, s = np.cos(angle), np.sin(angle)
         y, z = c * self.y + s * self.z, c * self.z - s * self.y
-        turned = _checked(y, z, self.name, self.noise)
+        with of_file(self.name):
+            turned = _checked(y, z, self.name, self.noise)
         at = np.clip(np.argmin(z), 1, len(z) - 2)
         top = minimize_scalar(turned.height, bounds=sorted((y[at - 1], y[at + 1])), method="bounded").x
         high = float(turned.height(top))
@@ -116,6 +117,7 @@ DEEP = 0.015
 
 
 @checked
+@in_its_file
 def read_profile(
     path: Path | str, noise: NotNegative = 0.0, unit: Positive = 1e-3, mirror: Mirror = "",
     between: Sequence[float] = EVERYWHERE,
@@ -136,42 +138,42 @@ def read_profile(
     try:
         lines = store.ordinary(path).read_text(encoding="utf-8-sig").splitlines()
     except (OSError, UnicodeDecodeError) as error:
-        raise UserError(f"{path}: cannot be read as a profile ({error}); correct the path") from error
+        raise UserError(f"cannot be read as a profile ({error}); correct the path") from error
     lines = [line.split("!")[0].split("#")[0].strip() for line in lines]
     sign, shift = np.ones(2), np.zeros(2)
     if path.suffix.lower() in MINIPROF:
-        unit, lines = 1e-3, _miniprof(lines, path)
+        unit, lines = 1e-3, _miniprof(lines)
     if comma := next((line for line in lines if DECIMAL_COMMA.search(line)), None):
-        raise UserError(f"{path}: writes decimal commas ({comma}); write decimal points")
+        raise UserError(f"writes decimal commas ({comma}); write decimal points")
     if "point.begin" in lines:
         begin, end = lines.index("point.begin"), lines.index("point.end") if "point.end" in lines else len(lines)
-        unit, sign, shift = _header(lines[:begin], path)
+        unit, sign, shift = _header(lines[:begin])
         lines = lines[begin + 1 : end]
         rows = [line.replace(",", " ").replace(";", " ").split()[:2] for line in lines if line]
     else:
-        rows = _table([line for line in lines if line], path)
+        rows = _table([line for line in lines if line])
     try:
         points = np.array([[float(v) for v in row] for row in rows])
     except ValueError as error:
-        raise UserError(f"{path}: {error}; a profile is a table of y and z") from error
+        raise UserError(f"{error}; a profile is a table of y and z") from error
     if points.ndim != 2 or points.shape[1:] != (2,) or len(points) < 5 or not np.isfinite(points).all():
-        raise UserError(f"{path}: has no five points of y and z; a profile is a table of both")
+        raise UserError("has no five points of y and z; a profile is a table of both")
     y, z = ((points + shift) * sign * unit * [1 - 2 * (axis in mirror) for axis in "yz"]).T
     kept = (y >= between[0]) & (y <= between[1])
     if kept.sum() < 5:
-        raise UserError(f"{path}: has no five points between {between[0]:g} and {between[1]:g} m; correct that")
+        raise UserError(f"has no five points between {between[0]:g} and {between[1]:g} m; correct that")
     y, z = y[kept], z[kept]
     middle = float(np.median(z))
     if np.ptp(z) > DEEP and middle - z.min() > z.max() - middle:
         other = mirror.replace("z", "") if "z" in mirror else mirror + "z"
         raise UserError(
-            f"{path}: lies upside down with mirror = {mirror!r}, as flanges and sides of a head reach down and z with "
+            f"lies upside down with mirror = {mirror!r}, as flanges and sides of a head reach down and z with "
             f"them; set mirror = {other!r}"
         )
     return _checked(y, z, str(path), noise)
 
 
-def _table(lines: list[str], path: Path) -> list[list[str]]:
+def _table(lines: list[str]) -> list[list[str]]:
     """Rows of y and z of a table, with a head or without; more columns need a head that names both.
 
     Raises:
@@ -187,7 +189,7 @@ def _table(lines: list[str], path: Path) -> list[list[str]]:
         return rows
     wide = max(rows, key=len, default=head)
     raise UserError(
-        f"{path}: has {len(wide)} columns ({' '.join(head or wide)}); a profile is a table of y and z, so leave out "
+        f"has {len(wide)} columns ({' '.join(head or wide)}); a profile is a table of y and z, so leave out "
         "the others, or name y and z in its first line"
     )
 
@@ -196,7 +198,7 @@ DECIMAL_COMMA = re.compile(r"\d,\d.*[;\t ]\s*[-+]?\d|\d[;\t ]\s*[-+]?\d+,\d")
 """Beside another mark between the columns."""
 
 
-def _header(lines: list[str], path: Path) -> tuple[float, Array, Array]:
+def _header(lines: list[str]) -> tuple[float, Array, Array]:
     """Unit in m, signs and shifts of y and z, as a ``.prr`` or ``.prw`` tells them."""
     told = dict.fromkeys(("shift.y", "shift.z", "mirror.y", "mirror.z", "rotate"), 0.0) | {"units.len.f": 1e3}
     for line in lines:
@@ -204,23 +206,23 @@ def _header(lines: list[str], path: Path) -> tuple[float, Array, Array]:
         if equals and key in told and is_number(value):
             told[key] = float(value)
     if told["rotate"]:
-        raise UserError(f"{path}: rotate is not read; turn the points, or set inclination in the case")
+        raise UserError("rotate is not read; turn the points, or set inclination in the case")
     if not told["units.len.f"] > 0:
-        raise UserError(f"{path}: units.len.f must be greater than 0; 1000 says that the points are in mm")
+        raise UserError("units.len.f must be greater than 0; 1000 says that the points are in mm")
     sign = 1 - 2 * np.array([told["mirror.y"], told["mirror.z"]])
     return 1 / told["units.len.f"], sign, np.array([told["shift.y"], told["shift.z"]])
 
 
-def _miniprof(lines: list[str], path: Path) -> list[str]:
+def _miniprof(lines: list[str]) -> list[str]:
     """Points as "y z" of a file of MiniProf: keys or free text before, what begins with a quotation mark left out."""
     lines = [line for line in lines if not line.startswith('"')]
     told = dict(line.split("=", 1) for line in lines if "=" in line)
     for key in ("XOffset", "YOffset", "Tilt"):
         if is_number(told.get(key, "")) and float(told[key]):
-            raise UserError(f"{path}: {key} is not read; save the profile with {key} applied to its points")
+            raise UserError(f"{key} is not read; save the profile with {key} applied to its points")
     names = [name.strip() for name in told.get("ColumnDef", "X,Y").split(",")]
     if not {"X", "Y"} <= set(names):
-        raise UserError(f"{path}: ColumnDef names no X and Y; save the profile with both")
+        raise UserError("ColumnDef names no X and Y; save the profile with both")
     rows = [line.split() for line in lines]
     rows = [row for row in rows if len(row) >= len(names) and all(map(is_number, row))]
     return [f"{row[names.index('X')]} {row[names.index('Y')]}" for row in rows]
@@ -235,11 +237,11 @@ def _checked(y: Array, z: Array, name: str, noise: float) -> Profile:
     if not (rising > 0).all():
         at = int(np.argmax(rising <= 0)) + 1
         raise UserError(
-            f"{name}: turns back or crosses itself at point {at + 1} (y = {y[at] * 1e3:.4g} mm); y must rise or fall "
+            f"turns back or crosses itself at point {at + 1} (y = {y[at] * 1e3:.4g} mm); y must rise or fall "
             "all along, so cut off what lies behind"
         )
     width = abs(y[-1] - y[0])
     if not WIDEST / 1000 < width < WIDEST:
-        raise UserError(f"{name}: is {width:.3g} m wide; profiles are given in mm (unit = 1.0 for metres)")
+        raise UserError(f"is {width:.3g} m wide; profiles are given in mm (unit = 1.0 for metres)")
     order = slice(None, None, 1 if y[-1] > y[0] else -1)
     return Profile(np.ascontiguousarray(y[order]), np.ascontiguousarray(z[order]), name, noise)

@@ -15,7 +15,7 @@ from ..contact.keys import FileName, OneOrTwo, Poisson
 from ..contact.law import value
 from ..contact.settings import AnyFriction, AnyRoughness, _short
 from ..contact.solids import Solid
-from ..errors import UserError
+from ..errors import UserError, at
 from ..settings.numbers import Model, Name, NotNegative, Number, Numbers, Positive, _finite_vector, _tuple
 from ..settings.toml import read_settings
 from .contact_table import POINTS as SHIFTS
@@ -316,9 +316,10 @@ class RollingCase(Model):
         Raises:
             UserError: a file that is none, no friction.
         """
-        found = self.friction.friction(path, None, None)
-        if not np.max(found.highest(jnp.ones(1))) > 0:
-            raise UserError("friction: is 0 at all speeds; the creep force is a part of it, so give more than 0")
+        with at("friction"):
+            found = self.friction.friction(path, None, None)
+            if not np.max(found.highest(jnp.ones(1))) > 0:
+                raise UserError("is 0 at all speeds; the creep force is a part of it, so give more than 0")
         return found
 
     def surface(self, path: Path) -> Surface | None:
@@ -329,9 +330,10 @@ class RollingCase(Model):
         """
         if self.roughness is None:
             return None
-        heights, R_Z = self.roughness.heights(path, 1.0)
-        if R_Z > ROUGHEST:
-            raise UserError(f"roughness: R_Z = {float(R_Z):g} m is no roughness; give it in m, worn rails have 1e-5")
+        with at("roughness"):
+            heights, R_Z = self.roughness.heights(path, 1.0)
+            if R_Z > ROUGHEST:
+                raise UserError(f"R_Z = {float(R_Z):g} m is no roughness; give it in m, worn rails have 1e-5")
         return Surface(heights, value(R_Z))
 
     @property

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from pydantic import BaseModel, ValidationError
 
-from ..errors import UserError
-from .numbers import BEYOND
+from ..errors import UserError, of_file
+from .numbers import BEYOND, OfFile
 
 _WORDS = {
     "float_type": "must be a number",
@@ -42,16 +42,20 @@ _NO_TABLE = {"model_type", "model_attributes_type", "dict_type"}
 
 
 def validate(model: type[Any], raw: dict[str, Any], path: Path | str) -> Any:
-    """Check a table against a settings model.
+    """Check a table against a settings model, which is to stand in a file.
 
     Raises:
         UserError: one sentence a mistake, each with file and key.
     """
-    try:
-        return model.model_validate(raw)
-    except ValidationError as error:
-        lines = _sentences(error.errors(include_url=False), raw, model)
-        raise UserError("\n".join(f"{path}: {line}" for line in dict.fromkeys(lines))) from error
+    with of_file(path):
+        try:
+            found = model.model_validate(raw)
+        except ValidationError as error:
+            lines = _sentences(error.errors(include_url=False), raw, model)
+            raise UserError("\n".join(dict.fromkeys(lines))) from error
+    if isinstance(found, OfFile):
+        found._path = Path(path)
+    return found
 
 
 def bounded(what: str, value: Any, gt: float | None = None, ge: float | None = None, le: float | None = None) -> None:

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, PrivateAttr
 
 LENGTH = "length"
 """Marks a number as a length in the file's unit."""
@@ -138,6 +139,17 @@ class Model(BaseModel):
     """Strict, frozen, no unknown keys."""
 
     model_config = ConfigDict(strict=True, extra="forbid", frozen=True)
+
+
+class OfFile(Model):
+    """What a whole file says, which knows where it stands."""
+
+    _path: Path = PrivateAttr()
+
+    @property
+    def path(self) -> Path:
+        """Of the file, beside which others are that it names."""
+        return self._path
 
 
 def only_one(model: Model, *keys: str, what: str = "") -> None:

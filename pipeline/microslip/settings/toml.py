@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from ..errors import UserError
+from ..errors import UserError, in_its_file
 from ..files.store import ordinary
 from .mistakes import validate
 
@@ -31,23 +31,23 @@ def read_settings(
     return validate(model, raw, path), raw
 
 
+@in_its_file
 def load_toml(path: Path | str) -> dict[str, Any]:
     """Read a TOML file (UTF-8, with or without a byte-order mark).
 
     Raises:
         UserError: missing, unreadable or not TOML.
     """
-    path = Path(path)
     try:
-        return tomllib.loads(ordinary(path).read_bytes().decode("utf-8-sig"))
+        return tomllib.loads(ordinary(Path(path)).read_bytes().decode("utf-8-sig"))
     except UnicodeDecodeError as error:
-        raise UserError(f"{path}: is not UTF-8 text (byte {error.start + 1}); save it as UTF-8") from error
+        raise UserError(f"is not UTF-8 text (byte {error.start + 1}); save it as UTF-8") from error
     except OSError as error:
-        raise UserError(f"{path}: cannot be read ({error.strerror}); correct the path") from error
+        raise UserError(f"cannot be read ({error.strerror}); correct the path") from error
     except tomllib.TOMLDecodeError as error:
-        raise UserError(f"{path}: is not valid TOML ({_one_line(error)}); correct that place") from error
+        raise UserError(f"is not valid TOML ({_one_line(error)}); correct that place") from error
     except (ValueError, RecursionError) as error:  # a number of thousands of digits, brackets without end
-        raise UserError(f"{path}: cannot be read ({_one_line(error)}); is it a settings file?") from error
+        raise UserError(f"cannot be read ({_one_line(error)}); is it a settings file?") from error
 
 
 def _one_line(error: BaseException) -> str:
@@ -55,26 +55,30 @@ def _one_line(error: BaseException) -> str:
     return text[:1].lower() + text[1:120]
 
 
-def override(table: dict[str, Any], assignments: list[str], path: Path) -> dict[str, Any]:
-    """Apply ``key.subkey=value`` texts (value in TOML's notation, or bare text) to a settings table."""
+def override(table: dict[str, Any], assignments: list[str], path: Path, by: str = "--set ") -> dict[str, Any]:
+    """Apply ``key.subkey=value`` texts (value in TOML's notation, or bare text) to a settings table of a file.
+
+    Args:
+        by: what gives them, for messages.
+    """
     for text in assignments:
         key, equals, value = text.partition("=")
         key = " ".join(key.split())
         steps = [step.strip() for step in key.split(".")]
         if not equals or not all(steps):
-            raise UserError(f"--set {key + equals}: is no setting; write --set key.subkey=value")
+            raise UserError("is no setting; write --set key.subkey=value", f"{by}{key + equals}")
         place: Any = table
         for number, step in enumerate(steps[:-1]):
             if isinstance(place, list):
-                place = _entry(place, step, key, path)
+                place = _entry(place, step, by + key, path)
             else:
                 place = place.setdefault(step, {})
             if not isinstance(place, dict | list):
                 above = ".".join(steps[: number + 1])
-                raise UserError(f"--set {key}: '{above}' in {path} is a value, not a table; correct the key")
+                raise UserError(f"'{above}' in {path} is a value, not a table; correct the key", by + key)
         if isinstance(place, list):
             above = ".".join(steps[:-1])
-            raise UserError(f"--set {key}: name the entry and its key; write --set {above}.NAME.KEY=value")
+            raise UserError(f"name the entry and its key; write --set {above}.NAME.KEY=value", by + key)
         place[steps[-1]] = _parsed(value)
     return table
 
@@ -98,4 +102,4 @@ def _entry(items: list[Any], name: str, key: str, path: Path) -> Any:
             return item
     tables = [(number, item) for number, item in enumerate(items) if isinstance(item, dict)]
     known = [str(next((item[k] for k in _NAMES if item.get(k)), number)) for number, item in tables]
-    raise UserError(f"--set {key}: {path} has no entry '{name}' there; choose one of {', '.join(known) or 'none'}")
+    raise UserError(f"{path} has no entry '{name}' there; choose one of {', '.join(known) or 'none'}", key)

@@ -9,7 +9,7 @@ from typing import Any
 from .. import analysis
 from ..analysis import Analysis, Answer, Diagram, Question
 from ..case import headline
-from ..errors import UserError
+from ..errors import UserError, at
 from ..files import store
 from ..files.tables import columns_csv
 from ..pictures.plots import empty_figure, save_figure
@@ -29,7 +29,7 @@ def analysed(name: str, case: CaseJob) -> Written:
     one = analysis.analyses()[name]
     asked = case.settings.asked.get(name)
     if asked is None and one.needed:
-        raise UserError(f"{case.path}: {name}: is missing; add [{name}] with {one.needed}")
+        raise UserError(f"is missing; add [{name}] with {one.needed}", name, case.path)
     asked = validate(one.asks, {}, case.path) if asked is None else asked
     file = analysis.file_of(name)
     return case.answer(name, file, partial(_work, one, asked))
@@ -38,13 +38,14 @@ def analysed(name: str, case: CaseJob) -> Written:
 def _work(one: Analysis, asked: Any, stage: Stage, case: CaseJob) -> Written:
     """Finished points stay in a journal until all that is made of them is there."""
     points, built = case.folder / f"{one.name}.points", case.built()
-    with open_journal(points, case.made_by(stage), {"case": case.settings.name}, case.force) as journal:
+    inputs, head = case.made_by(stage), {"case": case.settings.name}
+    with at(one.name), open_journal(points, inputs, head, case.force) as journal:
         try:
             answer = one.solve(Question(asked, built, journal, case.report))
-        except UserError as error:
+        except UserError:
             if not journal.series:
                 points.unlink()
-            raise UserError(f"{case.path}: {one.name}: {error}") from error
+            raise
     stage.begin()
     doubts = headline.doubted(built, answer.largest)
     sentences = [*answer.sentences, *built.messages, *doubts]

@@ -13,6 +13,7 @@ from ..basis import read_basis
 from ..case import CaseSettings, load_case
 from ..case.assemble import Built, build
 from ..data import ModalBasis
+from ..errors import in_its_file
 from ..files import store
 from .checkpoint import inputs_of
 from .stage import Made, Report, Stage, folder_of_case, hash_of_code
@@ -83,17 +84,18 @@ class CaseJob:
 
     def built(self) -> Built:
         """The case's assembly."""
-        return build(self.settings, self.bases, self.path)
+        return build(self.settings, self.bases)
 
     @cached_property
     def inputs(self) -> dict[str, Any]:
         """What the answer depends on, besides pictures."""
-        return inputs_of(self.raw, self.settings, self.path, self.files)
+        return inputs_of(self.raw, self.settings, self.files)
 
     def made_by(self, stage: Stage) -> str:
         """Hash of what all that is computed depends on."""
         return store.hash_settings({**self.inputs, "code": hash_of_code(stage.code)})
 
+    @in_its_file
     def answer(self, name: str, module: str | Path, work: Callable[[Stage, CaseJob], Written]) -> Written:
         """The answer that ``name.json`` holds, made by a module's `work` where it is not up to date.
 

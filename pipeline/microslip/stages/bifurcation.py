@@ -15,7 +15,7 @@ from ..bifurcation.diagram import Asked, Diagram, diagram
 from ..bifurcation.recorded import Branches, write_bifurcation
 from ..case import CaseSettings, checkpoint, headline
 from ..case.questions import BifurcationOfCase
-from ..errors import NotConverged, UserError
+from ..errors import NotConverged, UserError, in_its_file
 from ..files import store
 from ..files.tables import rows_csv
 from ..report.bifurcation import bifurcation_html
@@ -43,6 +43,7 @@ class Changed:
         return self.varied.under(values, f"bifurcation.{self.asked.name}.keys")
 
 
+@in_its_file
 def bifurcation_stage(case: CaseJob) -> Written:
     """The diagrams that a case asks for, whole if every branch was followed to its end; finished branches are kept.
 
@@ -50,7 +51,7 @@ def bifurcation_stage(case: CaseJob) -> Written:
         UserError: the case asks for none; a key that is none; no equilibrium to begin with.
     """
     if not case.settings.bifurcation:
-        raise UserError(f"{case.path}: bifurcation: is missing; add [[bifurcation]] with keys, start and stop")
+        raise UserError("is missing; add [[bifurcation]] with keys, start and stop", "bifurcation")
     return case.answer("bifurcation", "stages.bifurcation", _work)
 
 
@@ -95,7 +96,7 @@ def _diagram(one: Changed, folder: Path, depends: Mapping[str, Any], stage: Stag
     try:
         begin = sliding.equilibrium(sliding.of(one.at(asked.start)))
     except NotConverged as error:
-        raise UserError(f"{one.varied.path}: bifurcation.{name}.start: {error}") from error
+        raise UserError(str(error), f"bifurcation.{name}.start") from error
     return diagram(
         system, begin, given,
         lambda branch: None if stage.force else branches.kept(file(branch), inputs),

@@ -25,13 +25,13 @@ def hashes_of(files: Mapping[str, Path]) -> dict[str, str]:
 
 
 def inputs_of(
-    raw: Mapping[str, Any], settings: CaseSettings, path: Path, modal_files: Mapping[str, Path]
+    raw: Mapping[str, Any], settings: CaseSettings, modal_files: Mapping[str, Path]
 ) -> dict[str, Any]:  # fmt: skip
     """What an answer to a case depends on: the case without the keys that say nothing, and hashes of its files."""
     return {
         "case": checkpoint.without_defaults(raw),
         "basis": hashes_of(modal_files),
-        "files": hashes_of(checkpoint.files_of(settings, path)),
+        "files": hashes_of(checkpoint.files_of(settings)),
     }
 
 

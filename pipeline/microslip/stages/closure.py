@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..errors import UserError, told_of
+from ..errors import UserError, in_its_file
 from ..files import store
 from ..mesh import UNITS
 from ..units import from_rpm
@@ -16,6 +16,7 @@ from .modal import with_temperature
 from .stage import Made, Report, Stage
 
 
+@in_its_file
 def closure_stage(
     job: Job, name: str | None, low: float, high: float, points: int, rpm: float, output: Path | None = None,
     report: Report = lambda _: None,
@@ -33,7 +34,7 @@ def closure_stage(
 
     known = [c.name for c in job.settings.closures]
     if name not in (known if len(known) != 1 else [*known, None]):
-        raise UserError(f"{job.path}: closures: the body has {', '.join(known) or 'none'}; name one of them")
+        raise UserError(f"the body has {', '.join(known) or 'none'}; name one of them", "closures")
     if not low < high or points < 2:
         raise UserError("closure --from, --to, --points: give two or more points over a rising approach")
     chosen, scale = name or known[0], UNITS[job.settings.length_unit]
@@ -44,10 +45,9 @@ def closure_stage(
     table, picture = folder / f"closure_{chosen}.csv", folder / f"closure_{chosen}.png"
 
     def work() -> Made:
-        with told_of(job.path):
-            settings, temperature = with_temperature(job, mesh)
-            levels = np.linspace(low, high, points) * scale
-            curve = closure_curve(mesh, settings, chosen, levels, from_rpm(rpm), temperature, report)
+        settings, temperature = with_temperature(job, mesh)
+        levels = np.linspace(low, high, points) * scale
+        curve = closure_curve(mesh, settings, chosen, levels, from_rpm(rpm), temperature, report)
         store.write_text(table, curve.table())
         title = f"{job.settings.name}: closure '{chosen}' at {rpm:g} rpm"
         return Made([closure_curve_plot(curve, title, picture)])

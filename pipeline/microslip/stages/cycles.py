@@ -19,7 +19,7 @@ from ..bifurcation.dynamics import Dynamics
 from ..bifurcation.equilibria import Hopf
 from ..case.questions import Cycle
 from ..data import Array
-from ..errors import told_of
+from ..errors import at
 from ..results import Journal
 from ..system.assembly import Assembly
 from .stage import Report
@@ -94,7 +94,7 @@ class _Work:
         if known is not None:
             return [_unpacked(known, f"{i}/", system) for i in range(int(known["count"]))]
         begin = sliding.equilibrium(sliding.of(make(asked.start)))
-        with told_of(f"{self.varied.path}: stability.cycle: {asked.parameter}"):
+        with at(f"stability.cycle: {asked.parameter}"):
             found = cycles(system, begin, asked.start, asked.stop, harmonics, self.band, asked.points, self.report)
         point: dict[str, Any] = {"count": len(found)}
         for i, c in enumerate(found):

@@ -22,7 +22,7 @@ from ..case.messages import lifts
 from ..case.problem import pressed_by, problem_of
 from ..continuation import NO_OPTIMUM
 from ..data import Array
-from ..errors import UserError
+from ..errors import UserError, in_its_file
 from ..files import store
 from ..files.store import ordinary
 from ..files.tables import rows_csv
@@ -98,7 +98,7 @@ class Case(Varied):
 def open_case(path: Path, files: Mapping[str, Path], folder: Path, assignments: Sequence[str] = ()) -> Case:
     """A case and its modal files."""
     asked, raw = load_case(path, assignments)
-    settings = checkpoint.as_found(asked, folder, path)
+    settings = checkpoint.as_found(asked, folder)
     if asked.looks_for_harmonics:
         raw = {k: v for k, v in raw.items() if k != "harmonics_error"}
         raw |= {"harmonics": settings.harmonics, "samples": settings.sampled}
@@ -109,13 +109,14 @@ def normal_forces(built: Built) -> tuple[float | None, ...]:
     """Those of the sweep, N; None: every contact has its own."""
     asked = built.settings.sweep.normal_forces
     if isinstance(asked, str):
-        raise UserError(f'sweep.normal_forces: "{asked}" has one value; give numbers here')
+        raise UserError(f'"{asked}" has one value; give numbers here', "sweep.normal_forces")
     return asked or (None,)
 
 
 # nonlinear modes -----------------------------------------------------------------------------------------------------
 
 
+@in_its_file
 def backbones(
     case: Case,
     mode: int | None = None,
@@ -281,6 +282,7 @@ def _title(case: Case, what: str) -> str:
 # the optimum of a setting --------------------------------------------------------------------------------------------
 
 
+@in_its_file
 def optimum_over(
     case: Case, over: str = NORMAL_FORCE, low: float | None = None, high: float | None = None, points: int = 6,
     report: Report = lambda _: None,
@@ -308,7 +310,7 @@ def optimum_over(
         given = "" if low is None or high is None else f" from {low:g} to {high:g} there is no range;"
         raise UserError(f"{over}:{given} give --low and --high, two {kind}, the first one smaller")
     if over == NORMAL_FORCE and not forces:
-        raise UserError(f"{case.path}: no contact is pressed by the sweep's normal forces; there is nothing to change")
+        raise UserError("no contact is pressed by the sweep's normal forces; there is nothing to change")
     if over != NORMAL_FORCE:  # what is wrong with the key, or at an end, is said before anything is computed
         _check_key(over, case)
         for value in (low, high):
@@ -337,8 +339,8 @@ def _check_key(over: str, case: Case) -> None:
     if whose == "contacts" and key in OF_CONTACTS:
         names = ", ".join(c.interface for c in case.plain.settings.contacts)
         raise UserError(
-            f"{case.path}: --over {over}: names no contact; write --over {key} for all of them, or contacts.NAME.{key} "
-            f"with NAME of {names}"
+            f"names no contact; write --over {key} for all of them, or contacts.NAME.{key} with NAME of {names}",
+            f"--over {over}",
         )
 
 
@@ -568,6 +570,7 @@ def missed(found: Optimum, over: str) -> str:
 # stability -----------------------------------------------------------------------------------------------------------
 
 
+@in_its_file
 def stabilities(case: Case, report: Report = lambda _: None) -> dict[float, dict[float, Stability]]:
     """Of every converged point of the case's ``response.h5``: normal force, N -> frequency, Hz -> its stability.
 
@@ -580,11 +583,9 @@ def stabilities(case: Case, report: Report = lambda _: None) -> dict[float, dict
 
     built, found = case.plain, dict[float, dict[float, Any]]()
     if built.settings.ring is not None and built.settings.ring.model == "sector":
-        raise UserError(
-            f'{case.path}: ring.model: "sector" cannot tell whether the sectors stay alike; write model = "full"'
-        )
+        raise UserError('"sector" cannot tell whether the sectors stay alike; write model = "full"', "ring.model")
     if built.settings.mode == "book":
-        raise UserError(f'{case.path}: mode: "book" has no motion in time to perturb; write mode = "aft"')
+        raise UserError('"book" has no motion in time to perturb; write mode = "aft"', "mode")
     response = read_response(case.folder / "response.h5")
     done, count = 0, sum(int(series.converged.sum()) for series in response.series)
     for series in response.series:

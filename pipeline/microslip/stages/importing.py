@@ -22,7 +22,7 @@ from ..errors import UserError
 from ..files.store import ordinary, write_text
 from ..mesh import UNITS, mesh_problems, read_mesh, suffix_of, unit_of
 from ..mesh.chosen import of_instances
-from ..mesh.raw import Unread, in_file, joined
+from ..mesh.raw import Unread, joined, refused
 from ..units import SYSTEMS, usual_system
 from .meshing import run_apart
 from .stage import Report
@@ -48,8 +48,12 @@ class Imported:
 
 
 def import_file(
-    file: Path, folder: Path | None, unit: str | None = None, instances: Sequence[str] = (),
-    report: Report = lambda _: None, name: str = "",
+    file: Path,
+    folder: Path | None,
+    unit: str | None = None,
+    instances: Sequence[str] = (),
+    report: Report = lambda _: None,
+    name: str = "",
 ) -> Imported:
     """Write a body.toml around a CAD file, a mesh or matrices; nothing is copied, the file is named where it lies.
 
@@ -218,7 +222,7 @@ def _tied(file: Path, mesh: Mesh) -> tuple[Mesh, list[str]]:
         mesh, told = linked(mesh)
         tied_upper(discretise(mesh).pattern, np.zeros(0, dtype=np.int64), mesh.ties)
     except UserError as error:
-        raise UserError(in_file(file, str(error))) from None
+        raise refused(file, str(error)) from None
     said: dict[str, list[str]] = {}
     for link, text in zip(links.items, told, strict=True):
         said.setdefault(link.where, []).append(text)
@@ -231,9 +235,7 @@ LONGEST_LOOK = 30.0
 then not at all."""
 
 
-def cad_table(
-    file: Path, unit: str, picture: Path | None = None, report: Report = lambda _: None
-) -> tuple[str, str]:
+def cad_table(file: Path, unit: str, picture: Path | None = None, report: Report = lambda _: None) -> tuple[str, str]:
     """Solids and numbered surfaces of a CAD file, read in a process of its own.
 
     Args:
@@ -375,9 +377,7 @@ def _temperatures(mesh: Mesh) -> tuple[list[str], list[str]]:
         return [], [f"warning: {text}" for text in said]
     free, actual = mesh.temperature[:, 0], _actual(mesh.temperature)
     whole = not np.isnan(free).any() and np.ptp(free) <= 1e-9 * max(np.abs(free).max(), 1.0)
-    strained = bool((np.abs(actual - free) > 0).any()) and any(
-        m.expansion.any() for m in mesh.materials
-    )
+    strained = bool((np.abs(actual - free) > 0).any()) and any(m.expansion.any() for m in mesh.materials)
     lines = ["[temperature]", 'from = "mesh"', 'scale = "C"             # or "K"']
     if hanging and whole and not strained:
         return ["", *lines], [f"temperatures of the file are in force: {text}" for text in said]
@@ -428,9 +428,7 @@ def _cyclic(mesh: Mesh, metres: float) -> tuple[list[str], list[str]]:
     point = metres * np.array(sector.point)
     one, other = (mesh.points[mesh.face_points(n)].mean(axis=0) - point for n in sector.faces)
     left, right = sector.faces if axis @ np.cross(one, other) > 0 else sector.faces[::-1]
-    numbers = [
-        ", ".join(f"{v:.9g}" for v in row) for row in (axis + 0.0, np.array(sector.point) + 0.0)
-    ]
+    numbers = [", ".join(f"{v:.9g}" for v in row) for row in (axis + 0.0, np.array(sector.point) + 0.0)]
     lines = ["", "[rotation]", f"axis = [{numbers[0]}]", f"point = [{numbers[1]}]", "", "[cyclic]"]
     lines += [
         f"sectors = {sector.sectors}",
@@ -438,9 +436,7 @@ def _cyclic(mesh: Mesh, metres: float) -> tuple[list[str], list[str]]:
         f"right = {json.dumps(right)}",
     ]
     lines += [f"nodal_diameters = {list(sector.diameters)}"] if sector.diameters else []
-    return lines, [
-        f"{sector.where}: one of {sector.sectors} cyclic sectors, '{right}' ahead of '{left}'"
-    ]
+    return lines, [f"{sector.where}: one of {sector.sectors} cyclic sectors, '{right}' ahead of '{left}'"]
 
 
 def _pressed(mesh: Mesh) -> list[str]:

@@ -17,18 +17,19 @@ from typing import Any
 import numpy as np
 
 from ..data import Indices, Material, Mesh
-from ..errors import UserError
+from ..errors import UserError, at, in_its_file, of_file
 from ..files import store
 from ..interrupts import look
 from ..mesh import mesh_problems, part_numbers, read_mesh
 from ..mesh.chosen import of_instances, with_parts
-from ..mesh.raw import in_file
+from ..mesh.raw import in_file, refused
 from ..settings.body import FaceRule, MaterialSettings, implausible
 from ..units import SYSTEMS, usual_system
 from .job import Job
 from .stage import PACKAGE, Made, Report, Stage, seen_from
 
 
+@in_its_file
 def mesh_stage(job: Job, output: Path | None = None, force: bool = False, report: Report = lambda _: None) -> Path:
     """Build, or check that it is up to date, the mesh of a body. Returns its path.
 
@@ -39,20 +40,20 @@ def mesh_stage(job: Job, output: Path | None = None, force: bool = False, report
     """
     geometry = job.settings.geometry
     if geometry.matrices is not None:
-        raise UserError(f"{job.path}: geometry.matrices: there is nothing to mesh; type: microslip modes {job.folder}")
+        raise UserError(f"there is nothing to mesh; type: microslip modes {job.folder}", "geometry.matrices")
     if geometry.mesh is not None:
         if not store.ordinary(job.mesh_file).is_file():
-            raise UserError(f"{job.path}: geometry.mesh: there is no file {job.mesh_file}; correct the path")
+            raise UserError(f"there is no file {job.mesh_file}; correct the path", "geometry.mesh")
         return job.mesh_file
     product = output or job.mesh_file
     source = job.folder / (geometry.build or geometry.cad or "")
     if not store.ordinary(source).is_file():
         key = "build" if geometry.build else "cad"
-        raise UserError(f"{job.path}: geometry.{key}: there is no file {source}; correct the path")
+        raise UserError(f"there is no file {source}; correct the path", f"geometry.{key}")
     if geometry.build and not source.resolve().is_relative_to(job.folder.resolve()):
         raise UserError(
-            f"{job.path}: geometry.build: {source.resolve()} is outside the body's folder, and only what stands in it "
-            "is run; copy it there"
+            f"{source.resolve()} is outside the body's folder, and only what stands in it is run; copy it there",
+            "geometry.build",
         )
     if geometry.cad:
         _refuse_unnamed_faces(job)
@@ -92,7 +93,7 @@ def _refuse_unnamed_faces(job: Job) -> None:
     asked += [("excitations", i.name, i.face) for i in s.excitations if i.face is not None]
     told = f"it names {', '.join(names) or 'none'}"
     wrong = [
-        f"{job.path}: {table}.{label}.face: geometry.faces names no face '{face}'; {told}"
+        f"{table}.{label}.face: geometry.faces names no face '{face}'; {told}"
         for table, label, face in asked
         if face not in names
     ]
@@ -212,21 +213,22 @@ def _mesher_failure(job: Job, done: subprocess.CompletedProcess[str]) -> str:
         )
     if done.returncode < 0 and job.settings.geometry.cad:
         return (
-            f"{job.path}: geometry.cad: the CAD kernel crashed on {job.settings.geometry.cad} "
+            f"geometry.cad: the CAD kernel crashed on {job.settings.geometry.cad} "
             f"(signal {-done.returncode}); the file is probably damaged, export it again"
         )
     if done.returncode < 0:
-        return f"{job.path}: gmsh stopped with signal {-done.returncode}; change mesh.size or simplify the geometry"
+        return f"gmsh stopped with signal {-done.returncode}; change mesh.size or simplify the geometry"
     if done.returncode == 2 and text:
-        return text if str(job.path) in text else f"{job.path}: {text}"
+        return text
     last = text.splitlines()[-1] if text else "no message"
     folder, built = str(job.folder.resolve()), job.settings.geometry.build
     lines = re.findall(rf'File "{re.escape(folder)}[/\\]([^"/\\]+)", line (\d+)', text)
     if built and lines:  # it ends before it draws
-        return f"{job.path}: {lines[-1][0]}, line {lines[-1][1]}: {last}; correct it"
-    return f"{job.path}: meshing failed ({last}); check [geometry] and [mesh]"
+        return f"{lines[-1][0]}, line {lines[-1][1]}: {last}; correct it"
+    return f"meshing failed ({last}); check [geometry] and [mesh]"
 
 
+@in_its_file
 def load_mesh(job: Job, path: Path | None = None) -> tuple[Mesh, list[str]]:
     """Read the mesh of a body, name its faces by the body's rules, and pass the quality gates.
 
@@ -239,10 +241,8 @@ def load_mesh(job: Job, path: Path | None = None) -> tuple[Mesh, list[str]]:
     path = path or job.mesh_file
     mesh, told = _read_with_materials(job, path)
     if names := job.settings.geometry.instances:
-        try:
+        with at(f"geometry.instances: {path}"):
             mesh = of_instances(mesh, names)
-        except UserError as error:
-            raise UserError(f"{job.path}: geometry.instances: {path} {error}") from None
     if job.settings.geometry.mesh is not None:
         mesh = _faces_by_rule(job, mesh)
     mesh = linked_mesh(path, mesh)
@@ -250,7 +250,8 @@ def load_mesh(job: Job, path: Path | None = None) -> tuple[Mesh, list[str]]:
     if job.settings.cyclic is not None and part_numbers(mesh, tied=True).max() > 0:
         errors.append("the mesh of a cyclic sector falls into parts that share no points; join them")
     if errors:
-        raise UserError("\n".join(f"{path}: {e}" for e in errors))
+        with of_file(path):
+            raise UserError("\n".join(errors))
     if mesh.sector is not None and job.settings.cyclic is None:
         warnings.append(
             f"{mesh.sector.where}: the body is one of {mesh.sector.sectors} cyclic sectors; "
@@ -276,7 +277,7 @@ def linked_mesh(path: Path, mesh: Mesh) -> Mesh:
     try:
         return linked(mesh)[0]
     except UserError as error:
-        raise UserError(in_file(path, str(error))) from None
+        raise refused(path, str(error)) from None
 
 
 def _read_with_materials(job: Job, path: Path) -> tuple[Mesh, list[str]]:
@@ -294,12 +295,10 @@ def _read_with_materials(job: Job, path: Path) -> tuple[Mesh, list[str]]:
         return replace(mesh, materials=(), regions={}), told
     system = material.units or usual
     if system is None:
-        raise UserError(
-            f'{job.path}: material.units: with length_unit = "{unit}" it must be said; choose ' + ", ".join(SYSTEMS)
-        )
+        raise UserError(f'with length_unit = "{unit}" it must be said; choose ' + ", ".join(SYSTEMS), "material.units")
     mesh = read_mesh(path, unit, system, zero)
     if not mesh.materials:
-        raise UserError(f"{path}: brings no material; write density, young and poisson in [material]")
+        raise refused(path, "brings no material; write density, young and poisson in [material]")
     return mesh, [] if material.unusual else [text for m in mesh.materials if (text := strange_material(m, system))]
 
 
@@ -335,16 +334,17 @@ def _faces_by_rule(job: Job, mesh: Mesh) -> Mesh:
     """
     made: dict[str, dict[str, Indices]] = {}
     for rule in job.settings.geometry.faces:
-        place = f"{job.path}: geometry.faces.{rule.name}"
-        if rule.name in mesh.faces:
-            raise UserError(f"{place}: the mesh file has a set of that name; give the face another one")
+        with at(f"geometry.faces.{rule.name}"):
+            if rule.name in mesh.faces:
+                raise UserError("the mesh file has a set of that name; give the face another one")
+            answering = _answering(job, mesh, rule)
         face = made.setdefault(rule.name, {})
-        for kind, facets in _answering(job, mesh, rule, place).items():
+        for kind, facets in answering.items():
             face[kind] = np.unique(np.concatenate([face[kind], facets]), axis=0) if kind in face else facets
     return replace(mesh, faces={**mesh.faces, **made})
 
 
-def _answering(job: Job, mesh: Mesh, rule: FaceRule, place: str) -> dict[str, Indices]:
+def _answering(job: Job, mesh: Mesh, rule: FaceRule) -> dict[str, Indices]:
     """Type -> facets of a mesh's surface that answer to a rule: those in its box, on another mesh, or both.
 
     Raises:
@@ -354,7 +354,7 @@ def _answering(job: Job, mesh: Mesh, rule: FaceRule, place: str) -> dict[str, In
     from ..mesh.touching import touching_facets
 
     if rule.cut or rule.box is None and rule.touching is None:
-        raise UserError(f"{place}: a mesh file has no labels or colours and is not cut; use box or touching alone")
+        raise UserError("a mesh file has no labels or colours and is not cut; use box or touching alone")
     found = boundary_facets(mesh)
     if rule.box is not None:
         low, high = np.array(rule.box[:3]), np.array(rule.box[3:])
@@ -362,23 +362,23 @@ def _answering(job: Job, mesh: Mesh, rule: FaceRule, place: str) -> dict[str, In
         inside = ((mesh.points >= low - slack) & (mesh.points <= high + slack)).all(axis=1)
         found = faces_from_points(found, np.flatnonzero(inside), mesh.n_points)
     if found and rule.touching is not None:
-        found = touching_facets(mesh, _other_mesh(job, rule.touching, place), found)
+        found = touching_facets(mesh, _other_mesh(job, rule.touching), found)
     if not found:
         where = f"lies on {rule.touching}" if rule.touching is not None else "is in the box; widen it"
-        raise UserError(f"{place}: no facet of the surface {where}")
+        raise UserError(f"no facet of the surface {where}")
     return found
 
 
-def _other_mesh(job: Job, name: str, place: str) -> Mesh:
+def _other_mesh(job: Job, name: str) -> Mesh:
     """The mesh that a face lies on: of another file, or what of the body's own deck is not this
     body."""
     file, instances = job.folder / name, job.settings.geometry.instances
     if not store.ordinary(file).is_file():
-        raise UserError(f"{place}: touching: there is no file {file}")
+        raise UserError(f"there is no file {file}", "touching")
     mesh = read_mesh(file, job.settings.length_unit)
     if file.resolve() != job.mesh_file.resolve():
         return mesh
     others = [part for part in with_parts(mesh).instances if part not in instances]
     if not instances or not others:
-        raise UserError(f"{place}: touching: names the body's own mesh, of which geometry.instances leaves nothing out")
+        raise UserError("names the body's own mesh, of which geometry.instances leaves nothing out", "touching")
     return of_instances(mesh, others)

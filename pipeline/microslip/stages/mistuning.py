@@ -18,7 +18,7 @@ from ..case.contacts import swept
 from ..case.problem import book_models
 from ..case.questions import MistuningOfCase, ScatterOfCase
 from ..data import Array, Indices
-from ..errors import UserError, told_of
+from ..errors import UserError, at, in_its_file
 from ..files import store
 from ..files.tables import columns_csv, rows_csv
 from ..harmonic_balance.readout import measured
@@ -35,6 +35,7 @@ from .answer import CaseJob, Written
 from .stage import Stage, hash_of_code
 
 
+@in_its_file
 def mistuning_stage(case: CaseJob, workers: int | None = None) -> Written:
     """What a case asks for in [mistuning]; whole if every sample has a solution.
 
@@ -45,7 +46,7 @@ def mistuning_stage(case: CaseJob, workers: int | None = None) -> Written:
         UserError: the case asks for none; a scatter of what is not there, or that leaves nothing of it.
     """
     if case.settings.mistuning is None:
-        raise UserError(f"{case.path}: mistuning: is missing; add [[mistuning.scatter]] with of and deviation")
+        raise UserError("is missing; add [[mistuning.scatter]] with of and deviation", "mistuning")
     return case.answer("mistuning", "stages.mistuning", partial(_work, workers=workers))
 
 
@@ -58,15 +59,12 @@ def _work(stage: Stage, case: CaseJob, workers: int | None) -> Written:
         for old in (kept, folder / "rare.npz"):
             old.unlink(missing_ok=True)
     known = _of_samples(case.inputs)
-    try:
-        what = asked_of(built, settings, case.path)
+    with at("mistuning", case.path):
+        what = asked_of(built, settings)
         ready(what, asked.samples, asked.rare)
         found = run(what, asked.samples, asked.until, workers, kept, known, report=case.report)
         if asked.rare:
             found.rare = choose(found, asked.rare, workers, folder / "rare.npz", known, report=case.report)
-    except UserError as error:
-        text = str(error).removeprefix(f"{case.path}: ").removeprefix("mistuning: ")
-        raise UserError(f"{case.path}: mistuning: {text}") from error
     worst = None
     if found.solved.any():
         case.report("the highest sample, searched again from either side")
@@ -102,7 +100,7 @@ def _of_samples(inputs: Mapping[str, Any]) -> str:
     return store.fingerprint({**inputs, "case": case}, hash_of_code(("mistuning.samples",)))
 
 
-def asked_of(built: Built, case: CaseSettings, path: Path) -> Asked:
+def asked_of(built: Built, case: CaseSettings) -> Asked:
     """What is asked of every sample of a case.
 
     Raises:
@@ -113,8 +111,9 @@ def asked_of(built: Built, case: CaseSettings, path: Path) -> Asked:
     force = _normal_force(built, asked)
     sector = built.one(force)
     sector = replace(sector, outputs=sector.outputs[:1])
-    others = (_others(s, i, built, case, path, force) for i, s in enumerate(asked.scatter))
-    scatter = tuple(_scatter(s, i, built, path, o) for i, (s, o) in enumerate(zip(asked.scatter, others, strict=True)))
+    others = (_others(s, i, built, case, force) for i, s in enumerate(asked.scatter))
+    each = enumerate(zip(asked.scatter, others, strict=True))
+    scatter = tuple(_scatter(s, i, built, case.path.parent, o) for i, (s, o) in each)
     check(scatter)
     thrown = {b.name for b in settings.components if b.pressed_at_rpm is not None}
     pressed = {name: tuple(c.name for c in sector.contacts if name in _ends(c)) for name in thrown}
@@ -137,36 +136,32 @@ def _normal_force(built: Built, asked: MistuningOfCase) -> float | None:
         return None
     given = built.settings.sweep.normal_forces
     if asked.normal_force is None and (not given or isinstance(given, str)):
-        raise UserError("normal_force: is missing; give that of the contacts, in N")
+        raise UserError("is missing; give that of the contacts, in N", "normal_force")
     return asked.normal_force if asked.normal_force is not None else min(float(x) for x in given or ())
 
 
 def _others(
-    s: ScatterOfCase, number: int, built: Built, case: CaseSettings, path: Path, force: float | None
+    s: ScatterOfCase, number: int, built: Built, case: CaseSettings, force: float | None
 ) -> dict[int, Assembly]:  # fmt: skip
     """Sector -> what stands for a ring of bodies made from its modal file; every file is read once."""
     bases, made = {name: b.basis for name, b in built.bodies.items()}, dict[str, Assembly]()
     name = s.body or next(iter(bases))
     for sector, file in s.others.items():
-        try:
+        with at(f"scatter.{number}.others.{sector} ({file})", case.path):
             if file not in made:
-                made[file] = build(case, {**bases, name: read_basis(path.parent / file)}, path).one(force)
-        except UserError as error:
-            text = str(error).removeprefix(f"{path}: ")
-            raise UserError(f"scatter.{number}.others.{sector} ({file}): {text}") from error
+                made[file] = build(case, {**bases, name: read_basis(case.path.parent / file)}).one(force)
     return {int(sector): made[file] for sector, file in s.others.items()}
 
 
-def _scatter(s: ScatterOfCase, number: int, built: Built, path: Path, others: Mapping[int, Assembly]) -> Scatter:
-    where = f"scatter.{number} ({s.of})"
+def _scatter(s: ScatterOfCase, number: int, built: Built, folder: Path, others: Mapping[int, Assembly]) -> Scatter:
     ring = built.assembly.ring
     blades = ring.blades if ring is not None and s.arrangement != "drawn" else None
-    values = _measured(path.parent / s.file, s.of, blades) if s.file else s.values
+    values = _measured(folder / s.file, s.of, blades) if s.file else s.values
     contact = s.contact
     if contact is not None and s.of in OF_CONTACTS:
         named = {c.interface: x.name for c, x in zip(built.contacts, built.assembly.contacts, strict=True)}
         contact = named.get(contact, contact)
-    with told_of(where):
+    with at(f"scatter.{number} ({s.of})"):
         return Scatter(s.of, s.deviation, s.distribution, values, others, s.arrangement, s.body, contact, s.at,
                        s.together, s.neighbours)  # fmt: skip
 

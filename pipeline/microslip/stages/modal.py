@@ -14,7 +14,7 @@ from .. import __version__, plausible
 from ..basis import write_basis
 from ..basis.files import FORMAT, size_in_words
 from ..data import Array, Mesh, ModalBasis
-from ..errors import UserError, told_of
+from ..errors import UserError, in_its_file, of_file
 from ..files import store
 from ..files.hdf5 import refuse_foreign
 from ..mesh import UNITS
@@ -106,7 +106,7 @@ def basis_of(job: Job, mesh_file: Path, report: Report) -> tuple[ModalBasis, lis
     mesh, warnings = load_mesh(job, mesh_file)
     for warning in warnings:
         report(f"warning: {warning}")
-    with told_of(job.path):
+    with of_file(job.path):
         settings, temperature = with_temperature(job, mesh)
         return modal_basis(mesh, settings, temperature, report, provenance(job, mesh_file)), warnings
 
@@ -116,7 +116,7 @@ def _from_matrices(job: Job, given: MatrixFiles, report: Report) -> tuple[ModalB
     from ..exchange.matrices import read_matrices
     from ..modal.foreign import foreign_basis
 
-    with told_of(job.path, job.folder):
+    with of_file(job.path):
         body = read_matrices(given, job.folder, job.settings.length_unit, job.settings.parameters)
         basis, messages = foreign_basis(body, job.settings, report, provenance(job, job.path))
     warnings = [f"{job.path}: {message}" for message in messages]
@@ -125,6 +125,7 @@ def _from_matrices(job: Job, given: MatrixFiles, report: Report) -> tuple[ModalB
     return basis, warnings
 
 
+@in_its_file
 def matrices_inputs(job: Job, given: MatrixFiles) -> dict[str, Any]:
     """What a modal file made of foreign matrices depends on: all settings but the prose, the files, the code."""
     from ..exchange.matrices import files_of
@@ -132,7 +133,7 @@ def matrices_inputs(job: Job, given: MatrixFiles) -> dict[str, Any]:
     settings = {k: v for k, v in job.raw.items() if k not in ("description", "note")}
     files = [job.folder / name for name in files_of(given, job.settings.parameters)]
     if missing := [f for f in files if not store.ordinary(f).is_file()]:
-        raise UserError(f"{job.path}: geometry.matrices: there is no file {missing[0]}; correct the path")
+        raise UserError(f"there is no file {missing[0]}; correct the path", "geometry.matrices")
     return {"settings": settings, "files": [store.hash_file(f) for f in files]}
 
 
@@ -172,10 +173,11 @@ def provenance(job: Job, mesh_file: Path) -> dict[str, str]:
     return found
 
 
+@in_its_file
 def _temperature_file(job: Job) -> Path:
     path = job.folder / (job.settings.temperature.file or "")
     if not store.ordinary(path).is_file():
-        raise UserError(f"{job.path}: temperature.file: there is no file {path}; correct the path")
+        raise UserError(f"there is no file {path}; correct the path", "temperature.file")
     return path
 
 

@@ -14,7 +14,7 @@ from ..case.assemble import Built
 from ..case.contacts import swept
 from ..case.problem import problem_of
 from ..case.questions import OrbitOfCase, RunUpOfCase
-from ..errors import UserError, told_of
+from ..errors import UserError, at, in_its_file
 from ..files import store
 from ..files.tables import columns_csv
 from ..report.orbit import orbit_html
@@ -29,6 +29,7 @@ from .moving import moving_bodies
 from .stage import Stage
 
 
+@in_its_file
 def orbit_stage(case: CaseJob) -> Written:
     """The motions in time that a case asks for, a sentence a motion; whole if none diverged.
 
@@ -36,13 +37,13 @@ def orbit_stage(case: CaseJob) -> Written:
         UserError: the case asks for none.
     """
     if case.settings.orbit is None:
-        raise UserError(f"{case.path}: orbit: is missing; add [orbit] with frequency (Hz), Omega (rad/s) or run_up")
+        raise UserError("is missing; add [orbit] with frequency (Hz), Omega (rad/s) or run_up", "orbit")
     return case.answer("orbit", "stages.orbit", _work)
 
 
 def _work(stage: Stage, case: CaseJob) -> Written:
     folder, name, built = case.folder, case.settings.name, case.built()
-    motions = _asked(case.settings, built, case.path)
+    motions = _asked(case.settings, built)
     stage.begin()
     ran = recorded.run(folder / "orbit.h5", motions, case.made_by(stage), case.force, case.report)
     found = [(m.name, m) for m in ran]
@@ -59,7 +60,7 @@ def _work(stage: Stage, case: CaseJob) -> Written:
     return Written(made, [*notes, *messages], not any(np.isfinite(one.diverged) for _, one in found))
 
 
-def _asked(settings: CaseSettings, built: Built, case_path: Path) -> list[recorded.Asked]:
+def _asked(settings: CaseSettings, built: Built) -> list[recorded.Asked]:
     """The motions that a case asks for.
 
     Raises:
@@ -68,10 +69,10 @@ def _asked(settings: CaseSettings, built: Built, case_path: Path) -> list[record
     asked, motions = settings.orbit, list[recorded.Asked]()
     assert asked is not None
     if asked.normal_force is None and (waiting := [c.interface for c in built.contacts if swept(c)]):
-        raise UserError(f"{case_path}: contacts.{waiting[0]}: nothing presses it; give orbit.normal_force, N")
+        raise UserError("nothing presses it; give orbit.normal_force, N", f"contacts.{waiting[0]}")
     assembly = built.pressed(asked.normal_force)
     if asked.run_up is not None:
-        motions.append(_run_up(assembly, asked, asked.run_up, case_path))
+        motions.append(_run_up(assembly, asked, asked.run_up))
     for f in asked.hertz:
         name = f"{2 * np.pi * f:.6g} rad/s" if asked.Omega else f"{f:.6g} Hz"
         driven = equations.of(assembly, 2 * np.pi * f)
@@ -79,25 +80,25 @@ def _asked(settings: CaseSettings, built: Built, case_path: Path) -> list[record
         if asked.start == "balance":
             start = starts.of_balance(driven, problem_of(built, asked.normal_force))
         else:
-            start = _rest(driven, asked, case_path)
+            start = _rest(driven, asked)
         motions.append(recorded.Asked(name, driven, asked.settle, asked.keep, asked.samples, asked.steps, start))
     return motions
 
 
-def _rest(e: equations.Equations, asked: OrbitOfCase, path: Path) -> orbit.Start:
+def _rest(e: equations.Equations, asked: OrbitOfCase) -> orbit.Start:
     """Where bodies stand, or are let go."""
     if asked.release is not None:
-        with told_of(f"{path}: orbit"):
+        with at("orbit"):
             return starts.released(e, asked.release.model_dump(), "release")
     assert asked.start != "balance"
     return asked.start
 
 
-def _run_up(assembly: Assembly, asked: OrbitOfCase, how: RunUpOfCase, path: Path) -> recorded.Asked:
+def _run_up(assembly: Assembly, asked: OrbitOfCase, how: RunUpOfCase) -> recorded.Asked:
     ramp = Ramp(2 * np.pi * how.start, 2 * np.pi * how.stop, how.time, how.engine_order, how.euler)
     name = f"{how.start:.6g} to {how.stop:.6g} Hz in {how.time:.6g} s"
     driven = equations.of_ramp(assembly, ramp)
-    start = _rest(driven, asked, path)
+    start = _rest(driven, asked)
     return recorded.Asked(name, driven, 0, ramp.periods, asked.samples, asked.steps, start)
 
 

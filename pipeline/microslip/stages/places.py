@@ -11,7 +11,7 @@ from pathlib import Path
 
 from ..case import CaseSettings
 from ..case.settings import BodyOfCase
-from ..errors import UserError
+from ..errors import UserError, in_its_file
 from ..files import store
 from ..settings.toml import load_toml
 from .job import ASKED, bodies_of, open_job, system_file
@@ -50,7 +50,7 @@ def is_case(path: Path) -> bool:
 
 
 def modal_files(
-    case: CaseSettings, path: Path, root: Path, report: Report, known: Mapping[str, Path] | None = None
+    case: CaseSettings, root: Path, report: Report, known: Mapping[str, Path] | None = None
 ) -> dict[str, Path]:
     """Body of a case -> its modal file, computed where that is not up to date; basis.h5 beside a case of one body
     without a body.toml there.
@@ -58,7 +58,8 @@ def modal_files(
     Raises:
         UserError: a body that is nowhere.
     """
-    found = ({} if path.with_name("body.toml").is_file() else _beside(case, path)) | dict(known or {})
+    path = case.path
+    found = ({} if path.with_name("body.toml").is_file() else _beside(case)) | dict(known or {})
     for b in case.components:
         if b.name in found:
             continue
@@ -83,21 +84,23 @@ def lumped(case_path: Path, name: str) -> Path | None:
     return None
 
 
-def existing_files(case: CaseSettings, path: Path, basis_file: Path | None, root: Path) -> dict[str, Path]:
+@in_its_file
+def existing_files(case: CaseSettings, basis_file: Path | None, root: Path) -> dict[str, Path]:
     """Body of a case -> a modal file that exists."""
+    path = case.path
     beside = path.with_name("basis.h5")
     if len(case.components) == 1 and case.components[0].file is None and basis_file is not None:
         return {case.components[0].name: basis_file}
-    if there := _beside(case, path):
+    if there := _beside(case):
         return there
     if basis_file is not None:
-        raise UserError(f"{path}: has {len(case.components)} bodies; name their modal files in it (bodies.<name>.file)")
+        raise UserError(f"has {len(case.components)} bodies; name their modal files in it (bodies.<name>.file)")
     found = {}
     for b in case.components:
         found[b.name] = _named(path, b) if b.file else root / "build" / (b.body or b.name) / "basis.h5"
         if not found[b.name].is_file():
             own = [beside] if len(case.components) == 1 else []
-            raise UserError(_nowhere(case, path, b, [*own, found[b.name]], root))
+            raise UserError(_nowhere(case, b, [*own, found[b.name]], root))
         if b.file is None:
             _refuse_another(path, b, found[b.name], root)
     return found
@@ -110,19 +113,20 @@ def _refuse_another(path: Path, b: BodyOfCase, file: Path, root: Path) -> None:
         meant = meant or find_body(path, b.body or b.name, root)
     if made_of is not None and meant is not None and not is_same(made_of, meant):
         raise UserError(
-            f"{path}: bodies.{b.name}: means {meant}, but {file} is made of {made_of}, which has the "
-            "same name; give one of them another name and type: microslip modes "
-            f"{shlex.quote(str(meant))}"
+            f"means {meant}, but {file} is made of {made_of}, which has the same name; give one of "
+            f"them another name and type: microslip modes {shlex.quote(str(meant))}",
+            f"bodies.{b.name}",
         )
 
 
-def _beside(case: CaseSettings, path: Path) -> dict[str, Path]:
+def _beside(case: CaseSettings) -> dict[str, Path]:
     """The modal file basis.h5 beside a case of one body that names no other."""
-    file = path.with_name("basis.h5")
+    file = case.path.with_name("basis.h5")
     one = case.components[0] if len(case.components) == 1 else None
     return {one.name: file} if one is not None and one.file is None and file.is_file() else {}
 
 
+@in_its_file
 def _named(path: Path, b: BodyOfCase) -> Path:
     """The modal file that a body of a case names.
 
@@ -132,16 +136,16 @@ def _named(path: Path, b: BodyOfCase) -> Path:
     file = path.parent / (b.file or "")
     if not store.ordinary(file).is_file():
         raise UserError(
-            f"{path}: bodies.{b.name}.file: there is no file {file}; paths in a case start in the folder of the case: "
-            "correct it"
+            f"there is no file {file}; paths in a case start in the folder of the case: correct it",
+            f"bodies.{b.name}.file",
         )
     return file
 
 
-def _nowhere(case: CaseSettings, path: Path, b: BodyOfCase, looked: list[Path], root: Path) -> str:
+def _nowhere(case: CaseSettings, b: BodyOfCase, looked: list[Path], root: Path) -> str:
     """A modal file that is not there: where it was looked for, and what to type."""
-    name, said = b.body or b.name, " or ".join(map(str, looked))
-    begun = f"{path}: there is no modal file of '{name}': no {said} in {root.resolve()}"
+    path, name, said = case.path, b.body or b.name, " or ".join(map(str, looked))
+    begun = f"there is no modal file of '{name}': no {said} in {root.resolve()}"
     with contextlib.suppress(UserError):
         by_hand = lumped(path, name)
         if by_hand is None:
@@ -167,6 +171,7 @@ def _elsewhere(path: Path, name: str, root: Path) -> str:
     return f"the bodies here are {', '.join(known)}: correct the name in the case" if known else ""
 
 
+@in_its_file
 def find_body(case_path: Path, name: str, root: Path) -> Path:
     """The body file of a name that a case gives.
 
@@ -186,9 +191,10 @@ def find_body(case_path: Path, name: str, root: Path) -> Path:
             if load_toml(file).get("name") == name:
                 return file
     raise UserError(
-        f"{case_path}: body: no body.toml of a body '{name}' is beside it, nor in {name}/ or geometry/ of its folder, "
+        f"no body.toml of a body '{name}' is beside it, nor in {name}/ or geometry/ of its folder, "
         f"of one above it or of {root.resolve()}; "
-        + (_elsewhere(case_path, name, root) or "correct the name, or type this where geometry/ is")
+        + (_elsewhere(case_path, name, root) or "correct the name, or type this where geometry/ is"),
+        "body",
     )
 
 

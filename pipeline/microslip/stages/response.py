@@ -21,7 +21,7 @@ from ..case.messages import at_places, lifted, method, off, what_moves
 from ..case.run import jumps, with_motions
 from ..case.settings import FIRST_HARMONICS
 from ..data import Array, ModalBasis
-from ..errors import UserError
+from ..errors import UserError, in_its_file
 from ..files import store
 from ..files.tables import rows_csv, write_tables
 from ..harmonic_balance.response import HarmonicResponse
@@ -57,6 +57,7 @@ class Wanted:
 ALL = Wanted()
 
 
+@in_its_file
 def response_stage(
     case_path: Path, files: Mapping[str, Path], folder: Path, assignments: list[str] | None = None,
     force: bool = False, report: Report = lambda _: None, log: bool = False, wanted: Wanted = ALL,
@@ -74,11 +75,11 @@ def response_stage(
     stage = response_of_case(folder, force, report, case_path)
     with stage.making():
         settings, raw = load_case(case_path, assignments)
-        inputs = inputs_of(raw, settings, case_path, files)
+        inputs = inputs_of(raw, settings, files)
         more = {"wanted": asdict(ALL)}  # what is there with all that can be made will do
         if wanted == ALL or not stage.is_made(inputs | more):
             more = {"wanted": asdict(wanted)}
-        stage.make(inputs | more, lambda: _work(stage, settings, raw, case_path, files, wanted))
+        stage.make(inputs | more, lambda: _work(stage, settings, raw, files, wanted))
         summary = json.loads(stage.product.read_text())
         if log:
             store.write_text(folder / "convergence.csv", convergence_table(read_response(folder / "response.h5")))
@@ -98,7 +99,6 @@ def _work(
     stage: Stage,
     settings: CaseSettings,
     raw: dict[str, Any],
-    case_path: Path,
     files: Mapping[str, Path],
     wanted: Wanted,
 ) -> Made:
@@ -107,8 +107,8 @@ def _work(
     told = stage.report if stage.is_unfinished else None
     points = Checkpoint(folder / "response.points", raw, files, stage.force, stage.begin, True, told)
     try:
-        begin = _harmonics(points, settings, bases, case_path) if settings.looks_for_harmonics else FIRST_HARMONICS
-        result = run_case(settings, bases, case_path, stage.report, points.journal, begin)
+        begin = _harmonics(points, settings, bases) if settings.looks_for_harmonics else FIRST_HARMONICS
+        result = run_case(settings, bases, stage.report, points.journal, begin)
         if places := jumps(result):
             at = f"at {counted(len(places), 'place')} the response jumps, folds or has no solution"
             left = f"Motions in time are not on this page yet: {at}; the same command goes on."
@@ -121,7 +121,7 @@ def _work(
         motions = Checkpoint(folder / "motions.points", raw, files, stage.force, stage.begin, True)
         result = with_motions(result, stage.report, motions.journal)
         curve = Checkpoint(folder / "curve.points", raw, files, stage.force, stage.begin)
-        own = bases, case_path, curve.journal, stage.report
+        own = bases, curve.journal, stage.report
         each = (with_curve(b, result.responses[b.normal], result.settings, *own) for b in result.beyond)
         result = replace(result, beyond=tuple(each))
     except KeyboardInterrupt:
@@ -133,12 +133,12 @@ def _work(
     return Made([*pictures, *(folder / name for name in summary["files"])])
 
 
-def _harmonics(points: Checkpoint, settings: CaseSettings, bases: Mapping[str, ModalBasis], path: Path) -> int:
+def _harmonics(points: Checkpoint, settings: CaseSettings, bases: Mapping[str, ModalBasis]) -> int:
     """With how many to begin where their number is looked for: those of the points that are kept."""
     with contextlib.suppress(UserError, KeyError, ValueError, TypeError):
         head, _ = read_journal(points.file)
         kept = int(head["harmonics"])
-        built = build(settings.with_harmonics(kept), bases, path)
+        built = build(settings.with_harmonics(kept), bases)
         if not points.fresh and head["inputs"] == points.inputs(built):
             return kept
     return FIRST_HARMONICS

@@ -6,7 +6,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from ..basis import read_basis
-from ..errors import UserError, told_of
+from ..errors import UserError, in_its_file, of_file
 from ..files import store
 from ..files.tables import rows_csv, write_tables
 from ..report.rolling import rolling_html
@@ -47,13 +47,14 @@ def _bodies(case: RollingCase, case_path: Path, report: Report) -> list[Path]:
     return [modes_stage(job, report=report)[0] for job in jobs.values()]
 
 
+@in_its_file
 def _of_one_material(case_path: Path, key: str, job: Job, section: Section) -> None:
     """A body and the half-space that stands for its contact, of which one is taken out and the other put in."""
     own = [getattr(job.settings.material, name, None) for name in ("young", "poisson")]
     asked = [section.young, section.poisson]
     if None not in own and own != asked:
         raise UserError(
-            f"{case_path}: {key}.young, {key}.poisson: {asked} in the case and {own} in {job.path}; with [elastic] "
+            f"{key}.young, {key}.poisson: {asked} in the case and {own} in {job.path}; with [elastic] "
             "they must be the same, correct one"
         )
 
@@ -61,7 +62,7 @@ def _of_one_material(case_path: Path, key: str, job: Job, section: Section) -> N
 def _work(stage: Stage, case: RollingCase, job: RollJob, bodies: list[Path]) -> Written:
     folder = stage.product.parent
     stage.report("patches and creep curve")
-    with told_of(job.path):
+    with of_file(job.path):
         found = study(case, job.path)
         elastic = _behind(found, bodies)
         contacts = _contacts(stage, found)

@@ -54,23 +54,23 @@ def run_body(
     modes_stage(job, force=force, report=report)
     if job.case_file is not None:
         files = {b.name: job.basis_file for b in case.components if (b.body or b.name) == job.settings.name}
-        files |= modal_files(case, job.case_file, job.root, report, known=files)
+        files |= modal_files(case, job.root, report, known=files)
     with response_of_case(job.build_folder, report=report).making():
         if job.case_file is not None:
-            response, converged = _answered(job.case_file, case, files, job.build_folder, None, force, report, wanted)
+            response, converged = _answered(case, files, job.build_folder, None, force, report, wanted)
         return report_stage(job, response, force, report, wanted.pictures), converged
 
 
 def _answered(
-    path: Path, case: CaseSettings, files: Mapping[str, Path], folder: Path, assignments: list[str] | None,
+    case: CaseSettings, files: Mapping[str, Path], folder: Path, assignments: list[str] | None,
     force: bool, report: Report, wanted: Wanted,
 ) -> tuple[dict[str, Any] | None, bool]:  # fmt: skip
     """The response of a case, None if it asks for none, and what else it asks for; whether all converged."""
     response, converged = None, True
     if not case.is_only_in_time and not case.is_only_followed and not case.mistuning:
-        response, converged = response_stage(path, files, folder, assignments, force, report, wanted=wanted)
+        response, converged = response_stage(case.path, files, folder, assignments, force, report, wanted=wanted)
         _tell(response, report)
-    job = CaseJob(path, files, folder, assignments or (), force, report, wanted.pictures)
+    job = CaseJob(case.path, files, folder, assignments or (), force, report, wanted.pictures)
     answers = (
         (case.orbit, orbit_stage), (case.stability, squeal_stage), (case.bifurcation, bifurcation_stage),
         (case.mistuning, mistuning_stage),
@@ -91,13 +91,13 @@ def run_case_file(
     """
     case, _ = load_case(path, assignments)
     folder = folder_of_case(path, case.name)
-    files = modal_files(case, path, Path("."), report)
+    files = modal_files(case, Path("."), report)
     if case.body is not None and case.body == case.name:
         job = open_job(find_body(path, case.body, Path(".")))
         with response_of_case(job.build_folder, report=report).making():
-            response, converged = _answered(path, case, files, job.build_folder, assignments, force, report, wanted)
+            response, converged = _answered(case, files, job.build_folder, assignments, force, report, wanted)
             return report_stage(job, response, force, report, wanted.pictures), converged
-    _, converged = _answered(path, case, files, folder, assignments, force, report, wanted)
+    _, converged = _answered(case, files, folder, assignments, force, report, wanted)
     page = "orbit.html" if case.is_only_in_time else "response.csv"
     if case.mistuning:
         page = "mistuning.html"
@@ -140,7 +140,7 @@ def respond(
         UserError: the case is about another body, a modal file is missing.
     """
     case, _ = load_case(case_path, assignments)
-    files = existing_files(case, case_path, basis_file, root)
+    files = existing_files(case, basis_file, root)
     for b in case.components:
         name = read_basis(files[b.name]).name
         if (b.body or b.name) != name and b.file is None:
@@ -194,7 +194,7 @@ def compare_book(
     own, _ = load_case(case_path, given)
     case, _ = load_case(case_path, [*given, 'mode="aft"', "strips=0"])
     strips = load_case(case_path, [*given, 'mode="book"'])[0].strips
-    files = existing_files(case, case_path, basis_file, root)
+    files = existing_files(case, basis_file, root)
     folder = folder_of_case(case_path, case.name, root / "build")
     folders = {mode: folder if mode == own.mode else folder / mode for mode in ("aft", "book")}
     ways = {
@@ -203,7 +203,7 @@ def compare_book(
     }
     found = {m: response_stage(case_path, files, f, a, force, report, log) for m, (f, a) in ways.items()}
     pairs = paired(*(summary["resonances"] for summary, _ in found.values()))
-    case = checkpoint.as_found(case, folder, case_path)
+    case = checkpoint.as_found(case, folder)
     table, picture = folder / "book.csv", folder / "pictures" / "book.png"
     of = Quantity(unit_of(next(iter(read_response(folder / "response.h5").labels))))
     store.write_text(table, comparison_table(pairs, of))

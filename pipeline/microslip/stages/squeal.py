@@ -15,7 +15,7 @@ from ..case import CaseSettings, headline
 from ..case.questions import Cycle, Over, StabilityOfCase
 from ..case.settings import GROUND
 from ..data import Array, ComplexArray, ModalBasis
-from ..errors import NotConverged, UserError
+from ..errors import NotConverged, UserError, in_its_file
 from ..files import store
 from ..files.tables import columns_csv
 from ..linalg import quadratic
@@ -78,6 +78,7 @@ FASTEST = 4
 """Roots that grow whose shapes are written as motions."""
 
 
+@in_its_file
 def squeal_stage(case: CaseJob) -> Written:
     """Roots of a case about steady sliding; whole if they are proved complete and no limit cycle is lost.
 
@@ -85,7 +86,7 @@ def squeal_stage(case: CaseJob) -> Written:
         UserError: the case asks for none; nothing slides; a contact that lifts off; what `sliding.of` refuses.
     """
     if case.settings.stability is None:
-        raise UserError(f"{case.path}: stability: is missing; add [stability] with frequency = [0.0, HIGHEST] in Hz")
+        raise UserError("is missing; add [stability] with frequency = [0.0, HIGHEST] in Hz", "stability")
     return case.answer("stability", "stages.squeal", _work)
 
 
@@ -97,14 +98,14 @@ def _work(stage: Stage, case: CaseJob) -> Written:
     axes = _map_of(varied, asked) if asked.over else None
     _try_ends(varied, asked)
     jobs = {b.name: _meshed(b.body or b.name, case.path) for b in settings.components if asked.full}
-    state = state_of(varied, {}, case.path)
+    state = state_of(varied, {})
     found = spectrum(state.matrices, window_of(asked), accuracy=asked.accuracy, neutral=asked.neutral)
     points = folder / "stability.points"
     over, full, cycles = None, list[Compared](), Born((), ())
     with open_journal(points, case.made_by(stage), {"case": settings.name}, case.force) as journal:
         if axes is not None:
             over = over_map(*axes, window_of(asked), asked.neutral, case.report, journal)
-            full = _in_full(varied, asked, over, jobs, case.path, case.report, journal) if asked.full else []
+            full = _in_full(varied, asked, over, jobs, case.report, journal) if asked.full else []
         if asked.cycle:
             cycles = born(varied, asked.cycle, window_of(asked).omega, journal, case.report)
     stage.begin()
@@ -120,7 +121,7 @@ def _work(stage: Stage, case: CaseJob) -> Written:
     return Written([folder / name for name in names], [*table_lines(found), *said], complete)
 
 
-def state_of(varied: Varied, values: Mapping[str, float], path: Path, where: str = "stability") -> State:
+def state_of(varied: Varied, values: Mapping[str, float], where: str = "stability") -> State:
     """The case about its sliding, with other values of keys.
 
     Raises:
@@ -128,22 +129,23 @@ def state_of(varied: Varied, values: Mapping[str, float], path: Path, where: str
     """
     assembly = varied.under(values, where)
     if not assembly.contacts:
-        raise UserError(f"{path}: contacts: there are none, so nothing slides; add [[contacts]] with friction")
+        raise UserError("there are none, so nothing slides; add [[contacts]] with friction", "contacts")
     try:
         equations = sliding.of(assembly)
         state = State(assembly, equations, sliding.equilibrium(equations))
-    except (NotConverged, UserError) as error:
-        raise UserError(f"{path}: {error}") from error
+    except NotConverged as error:
+        raise UserError(str(error)) from error
     for c, at in zip(assembly.unrolled().contacts, state.contacts, strict=True):
         if not np.linalg.norm(at.velocity[:, 1:], axis=1).min() > 0:
             raise UserError(
-                f"{path}: contacts.{c.name}.ground: is missing: the contact does not slide, and friction at rest has "
-                "no direction; add ground = { rpm = ... } or { velocity = ... }"
+                "is missing: the contact does not slide, and friction at rest has no direction; add ground = "
+                "{ rpm = ... } or { velocity = ... }",
+                f"contacts.{c.name}.ground",
             )
         if not (at.force[:, 0] > 0).any():
             raise UserError(
-                f"{path}: contacts.{c.name}: lifts off: at the equilibrium no point of it is pressed; raise its "
-                "normal_force"
+                "lifts off: at the equilibrium no point of it is pressed; raise its normal_force",
+                f"contacts.{c.name}",
             )
     return state
 
@@ -227,7 +229,7 @@ FULL = "states in unreduced matrices"
 
 
 def _in_full(
-    varied: Varied, asked: StabilityOfCase, over: Map, jobs: Mapping[str, Job], path: Path, report: Report,
+    varied: Varied, asked: StabilityOfCase, over: Map, jobs: Mapping[str, Job], report: Report,
     journal: Journal,
 ) -> list[Compared]:  # fmt: skip
     """States of the map, evenly spread over it, in unreduced matrices."""
@@ -235,19 +237,19 @@ def _in_full(
     for n in range(asked.full):
         if n not in journal.of(FULL):
             report(f"unreduced, state {n + 1} of {asked.full}")
-            journal.keep(FULL, n, vars(_one_in_full(n, varied, asked, over, bodies, path)))
+            journal.keep(FULL, n, vars(_one_in_full(n, varied, asked, over, bodies)))
     return [Compared(**known) for known in journal.of(FULL).values()]
 
 
 def _one_in_full(
-    n: int, varied: Varied, asked: StabilityOfCase, over: Map, bodies: Mapping[str, Unreduced], path: Path
+    n: int, varied: Varied, asked: StabilityOfCase, over: Map, bodies: Mapping[str, Unreduced]
 ) -> Compared:  # fmt: skip
     window, (ny, nx) = window_of(asked), over.unstable.shape
     grows = Window((max(asked.neutral, 0.0), window.growth[1]), window.omega)
     share = (n + 0.5) / asked.full
     i, j = int(share * ny), int((7 * n + 3) % asked.full / max(asked.full - 1, 1) * (nx - 1))
     x, y = float(over.x.values[j]), float(over.y.values[i])
-    state = state_of(varied, {**over.x.at(x), **over.y.at(y)}, path, "stability.over.keys")
+    state = state_of(varied, {**over.x.at(x), **over.y.at(y)}, "stability.over.keys")
     own = quadratic.every_value(state.matrices)
     full = growing(full_matrices(bodies, state.assembly, state.contacts), grows, own)
     mine = own[grows.holds(own)]
@@ -275,7 +277,7 @@ def _meshed(name: str, path: Path) -> Job:
     """
     job = None if lumped(path, name) else open_job(find_body(path, name, Path(".")))
     if job is None or job.settings.geometry.matrices is not None:
-        raise UserError(f"{path}: stability.full: '{name}' has no mesh, so there is nothing unreduced; leave full out")
+        raise UserError(f"'{name}' has no mesh, so there is nothing unreduced; leave full out", "stability.full", path)
     return job
 
 

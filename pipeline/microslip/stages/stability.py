@@ -12,7 +12,7 @@ import numpy as np
 
 from ..basis import read_basis
 from ..case.questions import StabilityOfCase
-from ..errors import UserError, told_of
+from ..errors import UserError, in_its_file, of_file
 from ..exchange.choice import select
 from ..files import hdf5, store
 from ..files.tables import columns_csv
@@ -77,6 +77,7 @@ def stability_stage(
     return answered(stage, {**q.inputs, "pictures": pictures}, lambda: _work(stage, q, pictures))
 
 
+@in_its_file
 def question(
     path: Path, assignments: list[str], report: Report = lambda _: None, speed: int | None = None
 ) -> Question:  # fmt: skip
@@ -88,16 +89,16 @@ def question(
     """
     if path.suffix == ".h5":
         if assignments:
-            raise UserError(f"{path}: --set {assignments[0]}: a modal file has no settings; give its body.toml instead")
+            raise UserError(f"--set {assignments[0]}: a modal file has no settings; give its body.toml instead")
         return _of_basis(path, None, speed)
     job = open_job(path, assignments)
     given, asked = job.settings.geometry.matrices, job.settings.stability
     if given is None:
         return _of_basis(modes_stage(job, report=report)[0], asked, speed)
     if speed is not None:
-        raise UserError(f"{job.path}: --speed {speed}: is of a modal file; matrices have rotation.speeds_rpm")
+        raise UserError(f"--speed {speed}: is of a modal file; matrices have rotation.speeds_rpm")
     if asked is None:
-        raise UserError(f"{job.path}: stability: is missing; add [stability] with frequency = [0.0, HIGHEST] in Hz")
+        raise UserError("is missing; add [stability] with frequency = [0.0, HIGHEST] in Hz", "stability")
     return Question(
         job.settings.name, job.build_folder, job.path, lambda: family(job), values_of(job.settings), window_of(asked),
         asked, matrices_inputs(job, given),
@@ -135,13 +136,13 @@ def family(job: Job) -> Family:
 
     given = job.settings.geometry.matrices
     assert given is not None
-    with told_of(job.path, job.folder):
+    with of_file(job.path):
         return family_of(read_matrices(given, job.folder, job.settings.length_unit, job.settings.parameters))
 
 
 def _work(stage: Stage, q: Question, pictures: bool) -> Written:
     matrices, asked, report = q.family(), q.asked, stage.report
-    with told_of(q.where):
+    with of_file(q.where):
         for value in asked.range or ():
             matrices.values({**q.at, asked.over: value}, asked.over)
         Q = matrices.at(q.at)

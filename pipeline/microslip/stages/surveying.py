@@ -17,6 +17,7 @@ from ..case.assemble import Built, build
 from ..case.curves import UNITS, Followed, curves, error_of, highest
 from ..case.problem import normal_forces
 from ..data import Array, ModalBasis
+from ..errors import in_its_file
 from ..files import store
 from ..files.tables import write_tables
 from ..harmonic_balance.envelope import Worst, lowest, worst
@@ -62,6 +63,7 @@ class Survey:
     remarks: list[str] | None = None
 
 
+@in_its_file
 def survey_stage(
     case_path: Path, basis_file: Path | None, kind: str, assignments: list[str] | None = None, force: bool = False,
     report: Report = lambda _: None,
@@ -80,20 +82,18 @@ def survey_stage(
     """
     settings, raw = load_case(case_path, assignments)
     folder = folder_of_case(case_path, settings.name)
-    files = existing_files(settings, case_path, basis_file, Path("."))
+    files = existing_files(settings, basis_file, Path("."))
     stage = Stage(folder / f"{kind}.txt", ("stages.surveying",), force, report, case=case_path)
     with stage.making():
-        settings = settings if kind == "identification" else checkpoint.as_found(settings, folder, case_path)
+        settings = settings if kind == "identification" else checkpoint.as_found(settings, folder)
         if raw.get("harmonics") == "auto":
             raw = raw | {"harmonics": settings.harmonics}
-        inputs = inputs_of(raw, settings, case_path, files)
-        stage.make(inputs, lambda: _work(stage, settings, raw, case_path, files, kind))
+        inputs = inputs_of(raw, settings, files)
+        stage.make(inputs, lambda: _work(stage, settings, raw, files, kind))
         return _told(stage.product)
 
 
-def _work(
-    stage: Stage, settings: CaseSettings, raw: dict[str, Any], case_path: Path, files: Mapping[str, Path], kind: str
-) -> Made:
+def _work(stage: Stage, settings: CaseSettings, raw: dict[str, Any], files: Mapping[str, Path], kind: str) -> Made:
     said, folder = stage.product, stage.product.parent
 
     def begin() -> None:
@@ -110,11 +110,11 @@ def _work(
 
     survey = partial(KINDS[kind], write) if kind in KINDS else partial(_curve, kind, points)
     bases = {name: read_basis(file) for name, file in files.items()}
-    found = survey(settings, bases, case_path, stage.report)
+    found = survey(settings, bases, stage.report)
     if found.largest is not None:
         how = headline.said_of(settings, "", None) if found.remarks is None else found.remarks
-        built = surveys.at_its_beginning(settings, bases, case_path, kind)
-        doubts = headline.doubted(built, _top(found.largest), _pressing(built, case_path), _top(found.stress))
+        built = surveys.at_its_beginning(settings, bases, kind)
+        doubts = headline.doubted(built, _top(found.largest), _pressing(built), _top(found.stress))
         found = replace(found, sentences=[*how, *found.sentences, *doubts])
     write(found.tables)
     names = [*found.tables, *found.draw, _shown(found, kind, settings.name, folder)]
@@ -130,9 +130,9 @@ def _top(values: Array) -> float:
     return float(np.nanmax(values, initial=0.0))
 
 
-def _pressing(built: Built, path: Path) -> float | None:
+def _pressing(built: Built) -> float | None:
     """N, the largest normal force of the sweep."""
-    return max(normal_forces(built, path), default=None)
+    return max(normal_forces(built), default=None)
 
 
 def _told(said: Path) -> tuple[list[Path], list[str], str]:
@@ -164,7 +164,7 @@ _TITLES = {"orders": "engine orders", "speeds": "over the speed", "ranges": "ove
 """What pages of surveys are called."""
 
 
-def _orders(write: Write, settings: CaseSettings, bases: Bases, path: Path, report: Report) -> Survey:
+def _orders(write: Write, settings: CaseSettings, bases: Bases, report: Report) -> Survey:
     from ..pictures.coupled import over_orders_picture, worst_order_picture
 
     def tables(found: Mapping[str, OverOrders]) -> Tables:
@@ -177,7 +177,7 @@ def _orders(write: Write, settings: CaseSettings, bases: Bases, path: Path, repo
         return {"orders_worst.csv": _worst_table(list(found.values())), "orders.csv": columns}
 
     of_all = {"engine_order", "wave"}
-    found = surveys.over_orders(settings, bases, path, report, lambda some: write(tables(some)))
+    found = surveys.over_orders(settings, bases, report, lambda some: write(tables(some)))
     title = f"{settings.name}: resonances over the engine order"
     failed = _unsolved(sum(int(r.failed.sum()) for r in found.values()))
     draw: dict[str, Callable[[Path], Path]] = {"pictures/orders.png": lambda p: over_orders_picture(found, p, title)}
@@ -263,13 +263,13 @@ def _known(row: Worst) -> str:
     return f" ({', '.join(said)})" if said else ""
 
 
-def _speeds(write: Write, settings: CaseSettings, bases: Bases, path: Path, report: Report) -> Survey:
+def _speeds(write: Write, settings: CaseSettings, bases: Bases, report: Report) -> Survey:
     from ..pictures.coupled import speed_line_picture
 
     def tables(r: SpeedResponse) -> Tables:
         return {"speeds.csv": {"frequency_Hz": r.frequency, **r.columns()}}
 
-    r = surveys.over_speeds(settings, bases, path, report, lambda some: write(tables(some)))
+    r = surveys.over_speeds(settings, bases, report, lambda some: write(tables(some)))
     amplitude = np.where(r.converged, np.abs(r.monitor), np.nan)
     title = f"{settings.name}: along engine order {r.order}"
     top = int(np.argmax(np.nan_to_num(amplitude)))
@@ -288,13 +288,13 @@ def _speeds(write: Write, settings: CaseSettings, bases: Bases, path: Path, repo
     )
 
 
-def _ranges(write: Write, settings: CaseSettings, bases: Bases, path: Path, report: Report) -> Survey:
+def _ranges(write: Write, settings: CaseSettings, bases: Bases, report: Report) -> Survey:
     from ..pictures.coupled import envelope_picture
 
     def tables(e: Envelope) -> Tables:
         return {"ranges_combinations.csv": e.corners(), "ranges.csv": e.columns()}
 
-    e = surveys.over_ranges(settings, bases, path, report, lambda some: write(tables(some)))
+    e = surveys.over_ranges(settings, bases, report, lambda some: write(tables(some)))
     title = f"{settings.name}: over {', '.join(e.names).replace('_', ' ')}"
     return Survey(
         tables(e), {"pictures/ranges.png": lambda p: envelope_picture(e, p, title)}, _ranges_sentences(e),
@@ -325,10 +325,10 @@ def _combination(e: Envelope, i: int) -> str:
     return ", ".join(f"{name.replace('_', ' ')} {v:.4g}" for name, v in zip(e.names, e.values[i], strict=True))
 
 
-def _identification(write: Write, settings: CaseSettings, bases: Bases, path: Path, report: Report) -> Survey:
+def _identification(write: Write, settings: CaseSettings, bases: Bases, report: Report) -> Survey:
     from ..pictures.coupled import nodal_diameter_picture
 
-    found, diagrams = surveys.identification(settings, bases, path)
+    found, diagrams = surveys.identification(settings, bases)
     title = f"{settings.name}: nodal diameters with sticking contacts, $c_T$ = {found.ratio:g} $c_N$"
     at = next(d for d in diagrams if d.stiffness == found.stiffness)
     return Survey(
@@ -338,16 +338,16 @@ def _identification(write: Write, settings: CaseSettings, bases: Bases, path: Pa
     )
 
 
-def _curve(over: str, points: Checkpoint, settings: CaseSettings, bases: Bases, path: Path, report: Report) -> Survey:
+def _curve(over: str, points: Checkpoint, settings: CaseSettings, bases: Bases, report: Report) -> Survey:
     from ..pictures.following import curve_plot
 
-    found, whole = curves(settings, bases, path, over, points.journal, report)
+    found, whole = curves(settings, bases, over, points.journal, report)
     if not whole:
         found = [one for one in found if one.rows]
     if not found:
         raise KeyboardInterrupt
     columns = {name: np.concatenate([one.columns()[name] for one in found]) for name in found[0].columns()}
-    error, remarks = _error(found, settings, bases, path, report) if whole else (None, None)
+    error, remarks = _error(found, settings, bases, report) if whole else (None, None)
     title, name = f"{settings.name}: over the {over.replace('_', ' ')}", f"over_{over}"
     response = _written(points, found, whole)
     failed = _unsolved(sum(int((~s.converged).sum()) for s in response.series))
@@ -368,14 +368,14 @@ def _curve(over: str, points: Checkpoint, settings: CaseSettings, bases: Bases, 
 
 
 def _error(
-    found: Sequence[Followed], settings: CaseSettings, bases: Bases, path: Path, report: Report
+    found: Sequence[Followed], settings: CaseSettings, bases: Bases, report: Report
 ) -> tuple[float | None, list[str] | None]:
     """Estimated error of the highest point, over its amplitude, and what is said of it; None where there is none."""
     if (top := highest(found)) is None:
         return None, None
     one, i = top
     report("error of harmonics and samples")
-    e, fed = error_of(build(settings, bases, path), one, i)
+    e, fed = error_of(build(settings, bases), one, i)
     at = f"{one.parameter[i]:.6g} {UNITS[one.over]}"
     said = headline.said_of(settings, f"{one.label}: the amplitude at {at}", e)
     if e is None:
@@ -400,7 +400,7 @@ def _written(points: Checkpoint, found: list[Followed], whole: bool) -> Response
     return response
 
 
-KINDS: dict[str, Callable[[Write, CaseSettings, Bases, Path, Report], Survey]] = {
+KINDS: dict[str, Callable[[Write, CaseSettings, Bases, Report], Survey]] = {
     "orders": _orders,
     "speeds": _speeds,
     "ranges": _ranges,

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from ..basis import read_basis
 from ..data import ModalBasis
-from ..errors import told_of
+from ..errors import of_file
 from ..files import store
 from ..files.tables import write_tables
 from ..report.tyre import tyre_html
@@ -33,7 +33,7 @@ def tyre_stage(job: RollJob) -> Written:
 def _work(stage: Stage, case: TyreCase, job: RollJob, basis: Path) -> Written:
     folder = stage.product.parent
     stage.report("jumps of slip and load")
-    with told_of(job.path):
+    with of_file(job.path):
         wheel = read_basis(basis)
         found = study(case, wheel.groups[0, 0])
     stage.begin()

@@ -11,7 +11,7 @@ from typing import Any
 from ..case.assemble import Built, build
 from ..case.settings import case_model
 from ..data import ModalBasis
-from ..errors import UserError
+from ..errors import UserError, at, of_file
 from ..settings.mistakes import validate
 from ..settings.toml import override
 from ..system.assembly import Assembly
@@ -43,20 +43,16 @@ class Varied:
         raw: dict[str, Any] = copy.deepcopy(dict(self.raw))
         own = [f"{k}={v!r}" for k, v in values.items() if not k.startswith(OF_SYSTEM)]
         others = [f"{k.removeprefix(OF_SYSTEM)}={v!r}" for k, v in values.items() if k.startswith(OF_SYSTEM)]
-        where = f"{self.path}: {where}" if where else str(self.path)
-        try:
-            settings = validate(case_model(), override(raw, own, self.path), self.path)
-            return build(settings, self._systems(others, where) if others else self.bases, self.path)
-        except UserError as error:
-            text = str(error).removeprefix("--set ").removeprefix(f"{self.path}: ")
-            raise UserError(f"{where}: {text}") from error
+        with at(where, self.path), of_file(self.path):
+            settings = validate(case_model(), override(raw, own, self.path, ""), self.path)
+            return build(settings, self._systems(others) if others else self.bases)
 
-    def _systems(self, assignments: list[str], where: str) -> dict[str, ModalBasis]:
+    def _systems(self, assignments: list[str]) -> dict[str, ModalBasis]:
         found = dict(self.bases)
         made = {name: lumped(self.path, basis.name) for name, basis in self.bases.items()}
         for name, file in made.items():
             if file is not None:
                 found[name] = load_system(file, assignments).basis()
         if not any(made.values()):
-            raise UserError(f"{where}: '{OF_SYSTEM}' names a key of a system.toml, but no body of this case has one")
+            raise UserError(f"'{OF_SYSTEM}' names a key of a system.toml, but no body of this case has one")
         return found

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from ..errors import UserError, told_of
+from ..errors import UserError, of_file
 from ..files import store
 from ..files.tables import write_tables
 from ..report.page import answer_page
@@ -79,7 +79,7 @@ def _answered(stage: Stage, inputs: Mapping[str, Any], work: Callable[[], Writte
 def _kept(stage: Stage, case_path: Path, inputs: Mapping[str, Any]) -> Iterator[Journal]:
     """A journal of what is finished, until all that is made of it is there; mistakes are told with the case."""
     depends = store.hash_settings({**inputs, "pictures": None, "code": hash_of_code(stage.code)})
-    with told_of(case_path), open_journal(_points(stage), depends, {"case": str(case_path)}, stage.force) as journal:
+    with of_file(case_path), open_journal(_points(stage), depends, {"case": str(case_path)}, stage.force) as journal:
         try:
             yield journal
         except UserError:

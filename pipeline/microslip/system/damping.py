@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from ..data import Array, ModalGroup
-from ..errors import UserError, told_of
+from ..errors import UserError, at, in_its_file
 from ..files.store import ordinary
 from ..reduced.coordinates import own_stiffness
 from ..ring.expansion import BACKWARD, FORWARD
@@ -70,6 +70,7 @@ def structural(component: Component) -> Component:
     return replace(component, groups={k: g for k, (g, _) in both.items()}, loss=loss, residual_loss=last)
 
 
+@in_its_file
 def read_aerodynamics(path: Path | str, blades: int, turning: Turning = 1) -> dict[int, complex]:
     """Relative frequency shift + i damping ratio of every wave of a ring, from a table.
 
@@ -82,21 +83,18 @@ def read_aerodynamics(path: Path | str, blades: int, turning: Turning = 1) -> di
     Raises:
         UserError: a file that cannot be read, a wave that is missing, given twice or does not exist.
     """
-    path = Path(path)
     found: dict[int, complex] = {}
-    for line, row in enumerate(_table(path), 2):
-        where = f"{path}: line {line}"
-        k, value, sense = _row(row, where)
-        with told_of(where):
+    for line, row in enumerate(_table(Path(path)), 2):
+        with at(f"line {line}"):
+            k, value, sense = _row(row)
             waves = {index_of(k, s, blades, turning) for s in ((FORWARD, BACKWARD) if sense == BOTH else (sense,))}
-        again = waves & set(found)
-        if again:
-            raise UserError(f"{where}: nodal diameter {k}, {sense}, is given twice; remove one")
+            if waves & set(found):
+                raise UserError(f"nodal diameter {k}, {sense}, is given twice; remove one")
         found |= dict.fromkeys(waves, value)
     missing = [i for i in range(blades) if i not in found]
     if missing:
         words = ", ".join(_wave(i, blades, turning) for i in missing[:4]) + (", ..." if len(missing) > 4 else "")
-        raise UserError(f"{path}: lacks the waves of {words}; add a line for each, with 0 where the flow does nothing")
+        raise UserError(f"lacks the waves of {words}; add a line for each, with 0 where the flow does nothing")
     return found
 
 
@@ -107,27 +105,25 @@ def _table(path: Path) -> list[dict[str, str]]:
             rows = [{str(k).strip(): str(v or "").strip() for k, v in row.items()} for row in reader]
             names = [str(n).strip() for n in reader.fieldnames or ()]
     except FileNotFoundError as error:
-        raise UserError(f"{path}: there is no such table; correct the name") from error
+        raise UserError("there is no such table; correct the name") from error
     except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise UserError(f"{path}: cannot be read as comma-separated values ({error})") from error
+        raise UserError(f"cannot be read as comma-separated values ({error})") from error
     missing = [c for c in COLUMNS if c not in names]
     if missing:
-        raise UserError(f"{path}: has no column {', '.join(missing)}; it needs {', '.join(COLUMNS)}")
+        raise UserError(f"has no column {', '.join(missing)}; it needs {', '.join(COLUMNS)}")
     return rows
 
 
-def _row(row: Mapping[str, str], where: str) -> tuple[int, complex, str]:
+def _row(row: Mapping[str, str]) -> tuple[int, complex, str]:
     try:
         k, shift, ratio = int(row[COLUMNS[0]]), float(row[COLUMNS[1]]), float(row[COLUMNS[2]])
     except ValueError as error:
-        raise UserError(f"{where}: {error}; a whole number and two numbers are needed") from error
+        raise UserError(f"{error}; a whole number and two numbers are needed") from error
     if not np.isfinite([shift, ratio]).all() or abs(shift) >= 0.5 or abs(ratio) >= 0.5:
-        raise UserError(
-            f"{where}: frequency_shift and damping_ratio are shares of 1, far below 0.5 in size; correct them"
-        )
+        raise UserError("frequency_shift and damping_ratio are shares of 1, far below 0.5 in size; correct them")
     sense = row.get("direction") or BOTH
     if sense not in (FORWARD, BACKWARD, BOTH):
-        raise UserError(f"{where}: direction: '{sense}' must be forward, backward or both")
+        raise UserError(f"direction: '{sense}' must be forward, backward or both")
     return k, complex(shift, ratio), sense
 
 

@@ -16,7 +16,7 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from ..data import Array, ComplexArray, Interface, ModalGroup, Rows
-from ..errors import UserError
+from ..errors import UserError, in_its_file
 from ..files.store import ordinary
 from ..mesh import UNITS, point_data
 from .assembly import Load
@@ -68,6 +68,7 @@ class FacePressure:
 # --- reading ---------------------------------------------------------------------------------------------------------
 
 
+@in_its_file
 def read_field(path: Path | str, length_unit: str, conjugate: bool = False) -> PressureField:
     """A field from a file: .csv with a line of names (x, y, z, p_real, p_imag), .npz with arrays of these names, or any
     mesh that meshio reads (.vtu, .vtk) with point data p_real and p_imag.
@@ -80,24 +81,24 @@ def read_field(path: Path | str, length_unit: str, conjugate: bool = False) -> P
     """
     path = Path(path)
     if length_unit not in UNITS:
-        raise UserError(f"{path}: length_unit: '{length_unit}' is none of {', '.join(UNITS)}")
+        raise UserError(f"'{length_unit}' is none of {', '.join(UNITS)}", "length_unit")
     if not ordinary(path).is_file():
-        raise UserError(f"{path}: there is no such file of a pressure field; correct the name")
+        raise UserError("there is no such file of a pressure field; correct the name")
     readers = {".csv": _from_csv, ".npz": _from_npz}
     columns = readers.get(path.suffix.lower(), _from_mesh)(path)
     missing = [name for name in COLUMNS[:4] if name not in columns]
     if missing:
-        raise UserError(f"{path}: has no {', '.join(missing)}; a pressure field needs {', '.join(COLUMNS)}")
+        raise UserError(f"has no {', '.join(missing)}; a pressure field needs {', '.join(COLUMNS)}")
     try:
         values = [np.asarray(columns[n], dtype=float).ravel() for n in COLUMNS if n in columns]
     except (TypeError, ValueError) as error:
-        raise UserError(f"{path}: {error}; the columns must be real numbers") from error
+        raise UserError(f"{error}; the columns must be real numbers") from error
     if len({len(v) for v in values}) > 1 or len(values[0]) < 3:
-        raise UserError(f"{path}: needs three points or more, with as many values of each column")
+        raise UserError("needs three points or more, with as many values of each column")
     table = np.array(values)
     if not np.isfinite(table).all():
         row = int(np.flatnonzero(~np.isfinite(table).all(axis=0))[0]) + 1
-        raise UserError(f"{path}: point {row} holds something that is no finite number; correct it")
+        raise UserError(f"point {row} holds something that is no finite number; correct it")
     p = table[3] + 1j * (table[4] if len(table) > 4 else 0.0)
     return PressureField(table[:3].T * UNITS[length_unit], p.conj() if conjugate else p, str(path))
 
@@ -107,16 +108,16 @@ def _from_csv(path: Path) -> Mapping[str, object]:
         with path.open(newline="", encoding="utf-8-sig") as file:
             lines = [line for line in csv.reader(row for row in file if row.strip() and not row.startswith("#"))]
     except (UnicodeDecodeError, csv.Error) as error:
-        raise UserError(f"{path}: is no text of comma-separated values ({error})") from error
+        raise UserError(f"is no text of comma-separated values ({error})") from error
     names = [name.strip() for name in lines[0]] if lines else []
     short = next((i for i, line in enumerate(lines[1:], 1) if len(line) != len(names)), None)
     if short is not None:
-        raise UserError(f"{path}: point {short} has {len(lines[short])} values and the line of names {len(names)}")
+        raise UserError(f"point {short} has {len(lines[short])} values and the line of names {len(names)}")
     wanted = {name: i for i, name in enumerate(names) if name in COLUMNS}
     try:
         return {name: [float(line[i]) for line in lines[1:]] for name, i in wanted.items()}
     except ValueError as error:
-        raise UserError(f"{path}: {error}; correct it") from error
+        raise UserError(f"{error}; correct it") from error
 
 
 def _from_npz(path: Path) -> Mapping[str, object]:
@@ -124,16 +125,16 @@ def _from_npz(path: Path) -> Mapping[str, object]:
         with np.load(path, allow_pickle=False) as file:
             return {name: file[name] for name in COLUMNS if name in file.files}
     except Exception as error:  # damaged archives raise a dozen kinds
-        raise UserError(f"{path}: cannot be read as an .npz archive of plain arrays ({error})") from error
+        raise UserError(f"cannot be read as an .npz archive of plain arrays ({error})") from error
 
 
 def _from_mesh(path: Path) -> Mapping[str, object]:
     if path.suffix.lower() not in (".vtu", ".vtk"):
-        raise UserError(f"{path}: a pressure field is not read from '{path.suffix}'; use .csv, .npz, .vtu or .vtk")
+        raise UserError(f"a pressure field is not read from '{path.suffix}'; use .csv, .npz, .vtu or .vtk")
     try:
         points, values = point_data(path)
     except ImportError as error:
-        raise UserError(f"{path}: to read this kind of file install microslip[fem], or write .csv") from error
+        raise UserError("to read this kind of file install microslip[fem], or write .csv") from error
     return dict(zip("xyz", points.T, strict=True)) | {n: v for n, v in values.items() if n in COLUMNS}
 
 

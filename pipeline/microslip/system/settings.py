@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Field, model_validator
 
 from ..data import ModalBasis
-from ..errors import UserError, told_of
+from ..errors import UserError, in_its_file
 from ..settings.numbers import (
     Direction,
     Model,
@@ -132,13 +132,13 @@ class SystemSettings(Model):
         return self
 
 
+@in_its_file
 def load_system(path: Path | str, assignments: list[str] | None = None) -> System:
     """Read and check a system file; components are its masses, then its bodies, in the order of the file.
 
     Raises:
         UserError: with every mistake named by file and key.
     """
-    path = Path(path)
     s, raw = read_settings(SystemSettings, path, assignments)
     components = [Body(m.name, m.mass, m.at, None, m.free) for m in s.masses]
     components += [Body(b.name, b.mass, b.at, b.inertia, b.free) for b in s.bodies]
@@ -152,16 +152,15 @@ def load_system(path: Path | str, assignments: list[str] | None = None) -> Syste
     if m is not None:
         more |= {"mass": m.mass, "stiffness": m.stiffness, "damping": m.damping}
     if not components:
-        raise UserError(f"{path}: the system has no components; add [[masses]], [[bodies]] or [matrices]")
+        raise UserError("the system has no components; add [[masses]], [[bodies]] or [matrices]")
     return System(s.name, components, links, settings=raw, **more)
 
 
+@in_its_file
 def system_basis(path: Path | str, assignments: list[str] | None = None) -> ModalBasis:
     """The modal basis of a system file.
 
     Raises:
         UserError: with the file's name.
     """
-    system = load_system(path, assignments)
-    with told_of(path):
-        return system.basis()
+    return load_system(path, assignments).basis()

@@ -22,7 +22,7 @@ import numpy as np
 from ..contact.elements import Spring
 from ..contact.patch import Patch
 from ..data import Array
-from ..errors import UserError
+from ..errors import UserError, in_its_file
 from ..files.hdf5 import ANNOUNCED, create, put, seal, seal_state
 from ..files.hostile import DAMAGE, inspect, refuse_damaged, short
 from ..files.store import complete_or_absent, ordinary, put_in_place, refused
@@ -353,7 +353,7 @@ def recording(
         put_in_place(_part(path), path)
         _state(path).unlink(missing_ok=True)
     except OSError as error:
-        raise UserError(refused(path, error)) from error
+        raise refused(path, error) from error
     finally:
         if not _state(path).exists():  # whole, or nothing in it
             _part(path).unlink(missing_ok=True)
@@ -484,6 +484,7 @@ def is_of_motions(path: Path | str) -> bool:
     return False
 
 
+@in_its_file
 def opened(path: Path | str) -> h5py.File:
     """A file of motions, open to be read, looked at before.
 
@@ -492,22 +493,22 @@ def opened(path: Path | str) -> h5py.File:
     """
     path = Path(path)
     if not ordinary(path).is_file():
-        raise UserError(f"{path}: no such file of motions; run the case first or correct the path")
+        raise UserError("no such file of motions; run the case first or correct the path")
     refuse_damaged(path, _TRIAL, "run the case again")
     try:
         file = h5py.File(path, "r")
         form, version = file.attrs.get("format"), str(file.attrs.get("format_version"))
         if form != FORMAT:
-            raise UserError(f"{path}: holds no motions (its attribute 'format' is {form!r}, not '{FORMAT}')")
+            raise UserError(f"holds no motions (its attribute 'format' is {form!r}, not '{FORMAT}')")
         if version != FORMAT_VERSION:
-            raise UserError(f"{path}: has format version {version}, this program reads {FORMAT_VERSION}; run it again")
+            raise UserError(f"has format version {version}, this program reads {FORMAT_VERSION}; run it again")
         inspect(file)
         for group in file.values():
             if any(group[name].shape[-1] != len(group["time"]) for name in UNITS) or group["event"].shape[1:] != (3,):
                 raise ValueError(f"{group.name}: arrays of different lengths")
         return file
     except DAMAGE as error:
-        raise UserError(f"{path}: is damaged or incomplete ({short(error)}); run the case again") from error
+        raise UserError(f"is damaged or incomplete ({short(error)}); run the case again") from error
 
 
 _TRIAL = "from microslip.time_domain.samples import opened; import h5py; h5py.File(path, 'r').visititems(print)"

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from ..data import Array
-from ..errors import UserError
+from ..errors import UserError, at, in_its_file
 from ..files import store
 from ..results import Journal
 from ..rolling.wear import smoothed
@@ -63,6 +63,7 @@ class Kinematics:
         return int((self.angle[-1] - self.angle[0]) / (2 * np.pi) + 1e-9)
 
 
+@in_its_file
 def read_kinematics(path: Path) -> Kinematics:
     """A table with a head: ``NEEDED`` and ``GIVEN``, comma-separated, in any order.
 
@@ -73,28 +74,29 @@ def read_kinematics(path: Path) -> Kinematics:
     try:
         text = store.ordinary(path).read_text(encoding="utf-8-sig")
     except FileNotFoundError as error:
-        raise UserError(f"{path}: there is no such table of kinematics; correct kinematics.file") from error
+        raise UserError("there is no such table of kinematics; correct kinematics.file") from error
     except (OSError, UnicodeDecodeError) as error:
-        raise UserError(f"{path}: cannot be read as a table of kinematics; correct kinematics.file") from error
+        raise UserError("cannot be read as a table of kinematics; correct kinematics.file") from error
     rows = list(csv.reader(text.splitlines()))
     head = [h.strip() for h in rows[0]] if rows else []
     if missing := [c for c in (*NEEDED, *GIVEN) if c not in head]:
-        raise UserError(
-            f"{path}: has no column {missing[0]}; its first line names the columns {', '.join(head) or '-'}"
-        )
-    numbers = [_numbers(row, head, f"{path}: row {n}") for n, row in enumerate(rows[1:], 2) if row]
+        raise UserError(f"has no column {missing[0]}; its first line names the columns {', '.join(head) or '-'}")
+    numbers = []
+    for n, row in enumerate(rows[1:], 2):
+        with at(f"row {n}"):
+            numbers += [_numbers(row, head)] if row else []
     if len(numbers) < 8:
-        raise UserError(f"{path}: has {len(numbers)} rows of numbers; give eight at the least")
+        raise UserError(f"has {len(numbers)} rows of numbers; give eight at the least")
     found = Kinematics(*np.array(numbers).T)
-    _sound(found, path)
+    _sound(found)
     return found
 
 
-def _numbers(row: list[str], head: list[str], where: str) -> list[float]:
+def _numbers(row: list[str], head: list[str]) -> list[float]:
     """Of the columns that are known, in their order."""
     if len(row) != len(head):
         raise UserError(
-            f"{where}: has {len(row)} cells and the first line {len(head)}; write decimal points, and commas between "
+            f"has {len(row)} cells and the first line {len(head)}; write decimal points, and commas between "
             "the columns alone"
         )
     found = []
@@ -105,33 +107,31 @@ def _numbers(row: list[str], head: list[str], where: str) -> list[float]:
         except ValueError:
             found.append(np.nan)
         if not np.isfinite(found[-1]):
-            raise UserError(f"{where}: {column}: '{cell.strip()}' is no finite number; leave out what is not known")
+            raise UserError(f"{column}: '{cell.strip()}' is no finite number; leave out what is not known")
     return found
 
 
-def _sound(k: Kinematics, path: Path) -> None:
+def _sound(k: Kinematics) -> None:
     """Refuse what no run of a wheel can be."""
     for name, values in (("time_s", k.time), ("angle_rad", k.angle)):
         if (np.diff(values) <= 0).any():
             at = int(np.argmax(np.diff(values) <= 0)) + 2
-            raise UserError(f"{path}: {name} does not rise at row {at}; sort the rows and leave out what stands still")
+            raise UserError(f"{name} does not rise at row {at}; sort the rows and leave out what stands still")
     step = np.diff(k.time)
     if (wide := step > GAP * np.median(step)).any():
         at = int(np.argmax(wide))
-        raise UserError(f"{path}: has a gap from {k.time[at]:.6g} to {k.time[at + 1]:.6g} s; give the rows between")
+        raise UserError(f"has a gap from {k.time[at]:.6g} to {k.time[at + 1]:.6g} s; give the rows between")
     side = np.abs(np.diff(k.lateral))
     if (leap := side > np.maximum(20 * np.median(side), 1e-3)).any():
         at = int(np.argmax(leap))
-        raise UserError(
-            f"{path}: lateral_m jumps by {1e3 * side[at]:.3g} mm at {k.time[at + 1]:.6g} s; no wheelset does"
-        )
+        raise UserError(f"lateral_m jumps by {1e3 * side[at]:.3g} mm at {k.time[at + 1]:.6g} s; no wheelset does")
     if not (k.normal_force > 0).all():
         at = int(np.argmin(k.normal_force > 0))
-        raise UserError(f"{path}: normal_force_N: the wheel leaves the rail at {k.time[at]:.6g} s; end the table there")
+        raise UserError(f"normal_force_N: the wheel leaves the rail at {k.time[at]:.6g} s; end the table there")
     if not (k.speed > 0).all():
-        raise UserError(f"{path}: speed_m_per_s must be greater than 0")
+        raise UserError("speed_m_per_s must be greater than 0")
     if k.turns < 1:
-        raise UserError(f"{path}: is of less than a turn of the wheel; give one at the least")
+        raise UserError("is of less than a turn of the wheel; give one at the least")
 
 
 class Places:

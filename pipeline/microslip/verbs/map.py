@@ -84,7 +84,7 @@ def _forces(q: Question) -> list[float]:
         UserError: no range.
     """
     asked: Keys = q.asked
-    swept = [force for force in normal_forces(q.built, "case") if force > 0]
+    swept = [force for force in normal_forces(q.built) if force > 0]
     low = asked.low or min(swept, default=0.0)
     high = asked.high or max(swept, default=0.0)
     if not 0 < low < high:

@@ -71,7 +71,7 @@ def solve(q: Question) -> Answer:
     """A motion under every normal force; whole if none ends above `down_to`, and no nonlinear mode early."""
     asked: Keys = q.asked
     built: Built = q.built
-    swept: list[float | None] = [*normal_forces(built, "case")] if asked.normal_force is None else [asked.normal_force]
+    swept: list[float | None] = [*normal_forces(built)] if asked.normal_force is None else [asked.normal_force]
     forces = swept or [None]
     quantity, kept = measured(built.assembly), dict[float, dict[str, Any]]()
     for number, force in enumerate(forces):

@@ -13,7 +13,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from ...data import Array, Indices, Matrices, MatrixTerm, Mesh
-from ...errors import UserError
+from ...errors import UserError, in_its_file, of_file
 from ...files.store import ordinary
 from ...units import SYSTEMS, usual_system
 from . import calculix, hdf5, market, matlab, nastran, numpy_archive
@@ -78,7 +78,8 @@ def read_matrices(
     asked = [(role, references[role], item) for role, item in found.items()]
     asked += [(term.role, term.matrix, _read(folder, term.matrix, term.role)) for term in terms]
     checked = [_checked(item, role, reference, folder, rows, dofs) for role, reference, item in asked]
-    _check_mass(checked[list(found).index("mass")][0], folder / split(given.mass)[0], dofs)
+    with of_file(folder / split(given.mass)[0]):
+        _check_mass(checked[list(found).index("mass")][0], dofs)
     system = _system(given, length_unit)
     in_si = [_in_si(matrix, role, system, component) for (role, *_), (matrix, _) in zip(asked, checked, strict=True)]
     own = dict(zip(found, in_si, strict=False))
@@ -98,13 +99,14 @@ def _checked(
 ) -> tuple[sp.csr_matrix, str]:  # fmt: skip
     """The matrix on the rows of all, as symmetric as its role says, and what is told of that."""
     path = folder / split(reference)[0]
-    matrix = _in_order(item, dofs, path) if item.dofs is not None else item.matrix
-    if matrix.shape[0] != rows:
-        raise UserError(
-            f"{path}: the {role} matrix {split(reference)[1]} has {matrix.shape[0]} rows and the stiffness {rows}; "
-            "give matrices of the same coordinates"
-        )
-    return (matrix, "") if role == "circulatory" else _symmetric(matrix, role, path)
+    with of_file(path):
+        matrix = _in_order(item, dofs) if item.dofs is not None else item.matrix
+        if matrix.shape[0] != rows:
+            raise UserError(
+                f"the {role} matrix {split(reference)[1]} has {matrix.shape[0]} rows and the stiffness {rows}; "
+                "give matrices of the same coordinates"
+            )
+        return (matrix, "") if role == "circulatory" else _symmetric(matrix, role, path.name)
 
 
 def _system(given: MatrixFiles, length_unit: str) -> str:
@@ -140,31 +142,32 @@ def own_nodes(path: Path) -> tuple[bool, bool]:
     return True, dofs is not None and bool((dofs[:, 1] == 0).any())
 
 
+@in_its_file
 def _reader(path: Path) -> ModuleType:
     if path.suffix.lower() not in READERS:
-        raise UserError(
-            f"{path}: matrices are not read from a file '{path.suffix}'; use one of {', '.join(sorted(READERS))}"
-        )
+        raise UserError(f"matrices are not read from a file '{path.suffix}'; use one of {', '.join(sorted(READERS))}")
     if not ordinary(path).is_file():
-        raise UserError(f"{path}: there is no such file; correct the path")
+        raise UserError("there is no such file; correct the path")
     return READERS[path.suffix.lower()]
 
 
 @contextmanager
 def _readable(path: Path, what: str = "") -> Iterator[None]:
     """What cannot be read here is told with its file."""
-    try:
-        yield
-    except (Unreadable, OSError) as error:
-        told = error if isinstance(error, Unreadable) else f"cannot be read ({getattr(error, 'strerror', error)})"
-        raise UserError(f"{path}: {what}{told}; write it again") from error
-    except MemoryError as error:
-        raise UserError(f"{path}: {what or 'it '}needs more memory than there is; store it sparse") from error
+    with of_file(path):
+        try:
+            yield
+        except (Unreadable, OSError) as error:
+            told = error if isinstance(error, Unreadable) else f"cannot be read ({getattr(error, 'strerror', error)})"
+            raise UserError(f"{what}{told}; write it again") from error
+        except MemoryError as error:
+            raise UserError(f"{what or 'it '}needs more memory than there is; store it sparse") from error
 
 
+@in_its_file
 def _there(path: Path, key: str) -> Path:
     if not ordinary(path).is_file():
-        raise UserError(f"{path}: there is no such file; correct geometry.matrices.{key}")
+        raise UserError(f"there is no such file; correct geometry.matrices.{key}")
     return path
 
 
@@ -249,7 +252,7 @@ def _meaning(dofs: Indices, mesh: Mesh, rows: int, superelement: bool, where: st
     return np.where(physical, order[at], -1), whole[:, 1] - 1
 
 
-def _in_order(item: Found, dofs: Indices, path: Path) -> sp.csr_matrix:
+def _in_order(item: Found, dofs: Indices) -> sp.csr_matrix:
     """A matrix with rows of its own on the rows of all."""
     assert item.dofs is not None
     if item.dofs.shape == dofs.shape and (item.dofs == dofs).all():
@@ -258,12 +261,12 @@ def _in_order(item: Found, dofs: Indices, path: Path) -> sp.csr_matrix:
     try:
         at = np.array([place[tuple(d)] for d in item.dofs.tolist()], dtype=np.int64)
     except KeyError as error:
-        raise UserError(f"{path}: has a row of node {error.args[0][0]} that geometry.matrices.dofs lacks") from None
+        raise UserError(f"has a row of node {error.args[0][0]} that geometry.matrices.dofs lacks") from None
     entries = item.matrix.tocoo()
     return sp.coo_matrix((entries.data, (at[entries.row], at[entries.col])), shape=(len(dofs),) * 2).tocsr()
 
 
-def _symmetric(matrix: sp.csr_matrix, role: str, path: Path) -> tuple[sp.csr_matrix, str]:
+def _symmetric(matrix: sp.csr_matrix, role: str, name: str) -> tuple[sp.csr_matrix, str]:
     """The matrix made exactly (skew-)symmetric; a triangle alone is completed, which is told.
 
     Raises:
@@ -275,10 +278,10 @@ def _symmetric(matrix: sp.csr_matrix, role: str, path: Path) -> tuple[sp.csr_mat
     message = ""
     if off.nnz and (not _largest(lower)) != (not _largest(upper)):
         matrix = (matrix + sign * off.T).tocsr()
-        message = f"{path.name}: only a triangle of the {role} matrix is stored; the other one was completed"
+        message = f"{name}: only a triangle of the {role} matrix is stored; the other one was completed"
     top = _largest(matrix)
     if not top and role in ("stiffness", "mass"):
-        raise UserError(f"{path}: the {role} matrix is zero; write it again")
+        raise UserError(f"the {role} matrix is zero; write it again")
     wrong = _largest(matrix - sign * matrix.T)
     if wrong > _SYMMETRY * top:
         kind = "skew-symmetric" if sign < 0 else "symmetric"
@@ -286,7 +289,7 @@ def _symmetric(matrix: sp.csr_matrix, role: str, path: Path) -> tuple[sp.csr_mat
         if role == "stiffness":
             way = ", or give what is not symmetric (friction, follower forces) the role circulatory"
         raise UserError(
-            f"{path}: the {role} matrix is not {kind} (entries differ by {wrong / top:.2g} of the largest); rows and "
+            f"the {role} matrix is not {kind} (entries differ by {wrong / top:.2g} of the largest); rows and "
             f"columns must be in the same order{way}"
         )
     return (0.5 * (matrix + sign * matrix.T)).tocsr(), message
@@ -296,11 +299,11 @@ def _largest(matrix: sp.csr_matrix) -> float:
     return float(np.abs(matrix.data).max(initial=0.0))
 
 
-def _check_mass(mass: sp.csr_matrix, path: Path, dofs: Indices) -> None:
+def _check_mass(mass: sp.csr_matrix, dofs: Indices) -> None:
     low = int(mass.diagonal().argmin())
     if mass.diagonal()[low] < 0:
         what = f" (node {dofs[low, 0]})" if low < len(dofs) else ""
-        raise UserError(f"{path}: the mass of row {low + 1}{what} is negative; is it the mass matrix?")
+        raise UserError(f"the mass of row {low + 1}{what} is negative; is it the mass matrix?")
 
 
 def _in_si(matrix: sp.csr_matrix, role: str, system: str, component: Indices) -> sp.csr_matrix:

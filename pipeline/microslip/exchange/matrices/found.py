@@ -101,12 +101,12 @@ def pick(names: list[str], wanted: str, usual: tuple[str, ...], path: Path) -> s
     if wanted:
         if wanted.upper() in known:
             return known[wanted.upper()]
-        raise UserError(f"{path}: holds no matrix '{wanted}'; it holds {', '.join(names) or 'none'}")
+        raise UserError(f"holds no matrix '{wanted}'; it holds {', '.join(names) or 'none'}")
     if found := [known[u] for u in usual if u in known]:
         return found[0]
     if len(names) == 1:
         return names[0]
-    raise UserError(f"{path}: holds {', '.join(names) or 'no matrix'}; say which one is meant as {path.name}#NAME")
+    raise UserError(f"holds {', '.join(names) or 'no matrix'}; say which one is meant as {path.name}#NAME")
 
 
 def table(text: str, columns: int, what: str) -> Array:

@@ -41,7 +41,7 @@ def _stored(path: Path, name: str) -> Array:
 
     if h5py.is_hdf5(path):
         if not name:
-            raise UserError(f"{path}: say which table holds number, x, y, z as {path.name}#NAME")
+            raise UserError(f"say which table holds number, x, y, z as {path.name}#NAME")
         return hdf5.read_table(path, name, 4)
     import scipy.io
 
