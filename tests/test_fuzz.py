@@ -313,7 +313,7 @@ for seed in range(int(sys.argv[3]), int(sys.argv[4])):
     print("seed", seed, flush=True)
     try:
         with files._open(out) as file:
-            found = files._read_or_refuse(file, out)
+            found = files._read_or_refuse(file)
         check_basis(found)
     except UserError:
         pass

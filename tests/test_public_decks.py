@@ -242,7 +242,7 @@ def test_touching_parts_of_a_deck_become_bodies_in_contact(tmp_path, capsys):
     assert [b["name"] for b in case["bodies"]] == ["part-1", "part-2"]
     for part, other in (("part-1", "part-2"), ("part-2", "part-1")):
         assert main(["modes", f"body/{part}", "-q", "--set", "modes.solver=superlu"]) == 0
-        basis = read_basis(tmp_path / "build" / part / "basis.h5")
+        basis = read_basis(tmp_path / "build" / f"body-{part}" / "basis.h5")
         np.testing.assert_allclose(basis.groups[0, 0].frequency[:2], [4294.67, 5245.33], rtol=3e-6)
         assert basis.groups[0, 0].interfaces[other].areas.sum() == pytest.approx(80e-6)
     (tmp_path / "one.inp").write_text(deck(block()))

@@ -415,7 +415,7 @@ def continuous_integration(folder: Path, *fails: str, **environment: str) -> tup
 
 @POSIX
 def test_ci_stops_where_a_step_or_a_peer_fails(tmp_path: Path) -> None:
-    steps = ["setup", "peers", "-j2 -O lint blade shroud", "test", "test-slow"]  # the second beside the third
+    steps = ["setup", "peers", "-j2 -O blade shroud lint", "test", "test-slow"]  # the second beside the third
 
     def ordered(asked: list[str], how: str = "required") -> list[str]:
         return sorted((a.removeprefix(f"{how} ") for a in asked), key=steps.index)

@@ -187,7 +187,7 @@ def jumps(result: CaseResult) -> list[tuple[float | None, float, tuple[float, fl
     has none."""
     if result.settings.mode == "book" or not result.settings.sweep.patience:
         return []
-    forces = dict.fromkeys(normal_forces(result.built, "") or (None,))
+    forces = dict.fromkeys(normal_forces(result.built) or (None,))
     return [
         (asked, normal, gap)
         for asked, (normal, r) in zip(forces, result.responses.items(), strict=True)

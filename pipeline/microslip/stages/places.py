@@ -53,7 +53,7 @@ def modal_files(
     case: CaseSettings, root: Path, report: Report, known: Mapping[str, Path] | None = None
 ) -> dict[str, Path]:
     """Body of a case -> its modal file, computed where that is not up to date; basis.h5 beside a case of one body
-    without a body.toml there.
+    without a body.toml there; that of a body that is nowhere, if it was made once.
 
     Raises:
         UserError: a body that is nowhere.
@@ -69,10 +69,22 @@ def modal_files(
         elif (system := lumped(path, body)) is not None:
             found[b.name] = system_stage(system, report=report, root=root)
         else:
-            job = open_job(find_body(path, body, root), root=root)
-            modes_stage(job, report=report)
-            found[b.name] = job.basis_file
+            found[b.name] = _made(path, body, root, report)
     return found
+
+
+def _made(path: Path, body: str, root: Path, report: Report) -> Path:
+    """The modal file of a body that a case names."""
+    file = root / "build" / body / "basis.h5"
+    try:
+        place = find_body(path, body, root)
+    except UserError:
+        if file.is_file():
+            return file
+        raise
+    job = open_job(place, root=root)
+    modes_stage(job, report=report)
+    return job.basis_file
 
 
 def lumped(case_path: Path, name: str) -> Path | None:

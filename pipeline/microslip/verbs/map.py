@@ -33,6 +33,10 @@ KEPT = "normal force"
 """Series of the journal: a response and its highest resonance under every normal force."""
 
 
+BESIDE = 3.0
+"""Steps of the sweep by which its highest point may be beside the resonance."""
+
+
 class Keys(Model):
     """A map of the amplitude over frequency and normal force, by `microslip map`.
 
@@ -66,10 +70,11 @@ def solve(q: Question) -> Answer:
 
     best = optimum(make, values, 2 * np.pi * band, report=q.report, look=look)
     of = measured(built.assembly)
-    ridge, points = _ridge(best, of), _points(q.kept, of)
+    ridge, points = _ridge(best, q.kept, of), _points(q.kept, of)
+    past = _passed(ridge, band)
     title = "amplitude over frequency and normal force"
     return Answer(
-        sentences=_sentences(best, of),
+        sentences=[*_sentences(best, of), *past],
         data={"": ridge, "points": points},
         diagrams={"": Diagram(partial(draw, ridge, points, of), title, (8.0, 5.4))},
         largest=float(np.nanmax(ridge["amplitude"], initial=0.0)),
@@ -117,13 +122,19 @@ def _top(kept: dict[str, Any]) -> Top:
     return Top(peak, None if np.isnan(kept["end"]) else float(kept["end"]), kept["unsolved"])
 
 
-def _ridge(best: Optimum, of: Quantity) -> Dataset:
-    rows = [(force, one.Omega / (2 * np.pi), one.amplitude) for force, one in best.found.items()]
-    force, frequency, amplitude = np.array(rows).T
+def _ridge(best: Optimum, kept: Journal, of: Quantity) -> Dataset:
+    rows = []
+    for force, one in best.found.items():
+        response = kept.series[KEPT][force]
+        known = np.isfinite(response["amplitude"])
+        top = response["frequency"][known][response["amplitude"][known].argmax()] if known.any() else np.nan
+        rows.append((force, one.Omega / (2 * np.pi), one.amplitude, top))
+    force, frequency, amplitude, swept = np.array(rows).T
     return Dataset("map", {
         "normal_force": Variable(force, "N", "of the contacts that the sweep presses"),
         "frequency": Variable(frequency, "Hz", "of the highest resonance; nan where none is known"),
         "amplitude": Variable(amplitude, of.unit, "of the first read-out there, 0-peak"),
+        "swept_frequency": Variable(swept, "Hz", "of the highest point of the sweep"),
     }, {"optimal_normal_force_N": best.parameter})  # fmt: skip
 
 
@@ -147,6 +158,19 @@ def _sentences(best: Optimum, of: Quantity) -> list[str]:
     if best.status == NO_OPTIMUM or best.parameter in (ends[0], ends[-1]):
         return [f"The highest resonance is lowest, {where}, at an end of the range; the optimum lies beyond it.", *lost]
     return [f"The highest resonance is lowest, {where}.", *lost]
+
+
+def _passed(ridge: Dataset, band: Array) -> list[str]:
+    """Where the sweep has not been where the resonance is: the curve overhangs there."""
+    beside = np.abs(ridge["frequency"] - ridge["swept_frequency"]) > BESIDE * (band[1] - band[0])
+    forces = ridge["normal_force"][beside]
+    if not len(forces):
+        return []
+    under = f"{forces[0]:.5g} N" if len(forces) == 1 else f"{forces[0]:.5g} to {forces[-1]:.5g} N"
+    return [
+        f"Under {under} the highest resonance stands on a part of the curve that overhangs: the sweep, which the map "
+        "shows, jumps past it (microslip respond --over frequency follows it)."
+    ]
 
 
 def draw(ridge: Dataset, points: Dataset, of: Quantity, figure: Figure) -> None:
