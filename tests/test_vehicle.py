@@ -336,7 +336,7 @@ def test_a_run_that_is_killed_goes_on(
     """Stopped among the jumps, then among the speeds, or among the jumps by a file: the third run has the bytes of one
     that nothing stops, and leaves no journal."""
     name, stops, made = "given", (2, 1), ("circumference.csv", "wear.csv", "unround.html")
-    given = ["roll", str(written(tmp_path, table(rolling)[0])), "--set", "kinematics.places=12", "--no-pictures"]
+    given = ["roll", str(written(tmp_path, table(rolling)[0])), "--set", "kinematics.places=24", "--no-pictures"]
     if of == "vehicle":
         name, stops, made = "unround-wheel", (3, 5), ("growth.csv", "circumference.csv", "speeds.csv", "unround.html")
         given = [a for a in asked("running.speeds=[40.0,60.0]", "running.turns=2e5") if a != "-q"]
