@@ -1141,11 +1141,11 @@ def two_tones() -> None:
     """Duffing's oscillator under two forces, and how a slider's amplitudes converge to those of motions in time."""
     import tones_study as study
 
-    from microslip.analysis import Diagram
+    from microslip.analysis import Drawing
     from microslip.stages.analysing import drawn
     from microslip.verbs.two_tones import draw_point
 
-    point = Diagram(partial(draw_point, study.duffing(), 0), size=(9.0, 6.4))
+    point = Drawing(partial(draw_point, study.duffing(), 0), size=(9.0, 6.4))
     save(from_file(drawn(point, BUILD / "two_tones.png")), "two_tones")
     fill("two_tones.md", "slider", table(*study.slider()))
 

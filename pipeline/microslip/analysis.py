@@ -39,7 +39,7 @@ class Data(Protocol):
         """Write a file, complete or absent."""
 
 
-class Diagram(NamedTuple):
+class Drawing(NamedTuple):
     """A figure: what draws it from the data beside it, its title, and its size in inches."""
 
     draw: Callable[[Figure], None]
@@ -74,7 +74,7 @@ class Answer:
 
     sentences: Sequence[str]
     data: Mapping[str, Data]
-    diagrams: Mapping[str, Diagram] = field(default_factory=dict)
+    diagrams: Mapping[str, Drawing] = field(default_factory=dict)
     tables: Sequence[Any] = ()
     largest: float = 0.0
     whole: bool = True

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from .. import analysis
-from ..analysis import Analysis, Answer, Diagram, Question
+from ..analysis import Analysis, Answer, Drawing, Question
 from ..case import headline
 from ..errors import UserError, at
 from ..files import store
@@ -75,7 +75,7 @@ def _drawn(name: str, answer: Answer, case: CaseJob) -> list[Path]:
     return [drawn(d, folder / f"{_named(name, end)}.png", case.settings.name) for end, d in answer.diagrams.items()]
 
 
-def drawn(diagram: Diagram, path: Path, case: str = "") -> Path:
+def drawn(diagram: Drawing, path: Path, case: str = "") -> Path:
     """A diagram as a PNG, the name of its case before its title."""
     figure = empty_figure(*diagram.size)
     diagram.draw(figure)

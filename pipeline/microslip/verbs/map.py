@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import numpy as np
 from pydantic import Field, model_validator
 
-from ..analysis import Analysis, Answer, Diagram, Question
+from ..analysis import Analysis, Answer, Drawing, Question
 from ..case.assemble import Built
 from ..case.problem import normal_forces, problem_of
 from ..continuation import NO_OPTIMUM, Peak
@@ -76,7 +76,7 @@ def solve(q: Question) -> Answer:
     return Answer(
         sentences=[*_sentences(best, of), *past],
         data={"": ridge, "points": points},
-        diagrams={"": Diagram(partial(draw, ridge, points, of), title, (8.0, 5.4))},
+        diagrams={"": Drawing(partial(draw, ridge, points, of), title, (8.0, 5.4))},
         largest=float(np.nanmax(ridge["amplitude"], initial=0.0)),
         whole=all(one.status == "converged" for one in best.found.values()),
     )

@@ -14,7 +14,7 @@ from pydantic import Field
 from scipy.signal import fftconvolve
 from scipy.signal.windows import blackmanharris
 
-from ..analysis import Analysis, Answer, Diagram, Question
+from ..analysis import Analysis, Answer, Drawing, Question
 from ..case.assemble import Built
 from ..case.problem import normal_forces, pressed_by, problem_of
 from ..data import Array
@@ -90,7 +90,7 @@ def solve(q: Question) -> Answer:
             words for normal, one in kept.items() for words in _sentences(normal, decays[normal], one, quantity)
         ],
         data={"": decay, "motion": motion},
-        diagrams={"": Diagram(partial(draw, decay, motion, quantity), "a vibration that dies away", (9.0, 7.2))},
+        diagrams={"": Drawing(partial(draw, decay, motion, quantity), "a vibration that dies away", (9.0, 7.2))},
         largest=max(one["amplitude"] for one in kept.values()),
         whole=not any(one["unreached"] or decays[normal].lost for normal, one in kept.items()),
     )

@@ -10,7 +10,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from ..analyses import two_tones
-from ..analysis import Analysis, Answer, Diagram, Question
+from ..analysis import Analysis, Answer, Drawing, Question
 from ..data import Array
 from ..harmonic_balance.tones import Kept
 from ..pictures.plots import plain_axes
@@ -78,12 +78,12 @@ def solve(q: Question) -> Answer:
     )  # fmt: skip
     highest = int(np.argmax(np.where(motions.converged, np.abs(motions.of(1, 0)), -1.0)))
     reached = np.abs(motions.amplitude[motions.converged, 0, 1:]).sum(axis=-1).max(initial=0.0)
-    solved, diagrams = bool(motions.converged[highest]), dict[str, Diagram]()
+    solved, diagrams = bool(motions.converged[highest]), dict[str, Drawing]()
     title = f"{motions.first[highest]:.6g} and {motions.second[highest]:.6g} Hz"
     if len(motions) > 1 and motions.converged.any():
-        diagrams[""] = Diagram(partial(draw_amplitudes, motions))
+        diagrams[""] = Drawing(partial(draw_amplitudes, motions))
     if solved:
-        diagrams["point"] = Diagram(partial(draw_point, motions, highest), title, (9.0, 6.4))
+        diagrams["point"] = Drawing(partial(draw_point, motions, highest), title, (9.0, 6.4))
     return Answer(
         sentences=[*_sentences(motions, highest), *motions.messages],
         data={"": motions},
