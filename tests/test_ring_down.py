@@ -7,37 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 from refusals import refused_command
+from test_bifurcation_cli import SHAKEN
 
 import microslip as ms
 from microslip.cli import main
 from microslip.verbs.ring_down import measured_decay
 
-SYSTEM = """
-name = "mass"
-[[masses]]
-name = "block"
-mass = 1.0
-at = [0.0, 0.0, 0.0]
-free = "x"
-[[springs]]
-between = ["ground", "block"]
-stiffness = 3e4
-[[dampers]]
-between = ["ground", "block"]
-damping = 1.0
-[[contacts]]
-name = "sole"
-on = "block"
-normal = [0.0, 0.0, -1.0]
-t2 = [0.0, -1.0, 0.0]
-[[forces]]
-name = "push"
-on = "block"
-direction = [1.0, 0.0, 0.0]
-[[monitors]]
-name = "block"
-on = "block"
-"""
+SYSTEM = SHAKEN.replace('"shaken"', '"mass"').replace("= 1.0\n[[dampers]]", "= 3e4\n[[dampers]]").replace("0.1", "1.0")
 MASS, SPRING, SLIDER, DAMPER, LIMIT = 1.0, 3e4, 1e4, 1.0, 3.0
 CASE = f"""
 name = "rung"
@@ -82,6 +58,12 @@ def test_an_exponential_beside_a_level(damping: float, within: float) -> None:
     np.testing.assert_allclose(found.frequency[large], 31.0, rtol=within)
     np.testing.assert_allclose(found.damping[large], damping, rtol=10 * within)
     np.testing.assert_allclose(found.amplitude[large], exact[large], rtol=10 * within)
+
+
+def test_a_motion_that_is_gone_within_the_window_tells_nothing() -> None:
+    time = np.arange(64 * 8) / (64 * 30.0)
+    found = measured_decay(time, np.exp(-100 * time), 2 * np.pi * 30.0, 0.01, 1.0)
+    assert not len(found.time) and found.lost
 
 
 @pytest.mark.slow

@@ -133,7 +133,7 @@ def _of_motions(kept: Mapping[float, dict[str, Any]], of: Quantity) -> Dataset:
 def _sentences(normal: float, d: Decay, one: dict[str, Any], of: Quantity) -> list[str]:
     begun = f"F_N = {normal:g} N: "
     if not len(d.time):
-        return [f"{begun}the motion is gone before its frequency can be told; give a smaller down_to."]
+        return [f"{begun}{d.lost or 'it ends before its frequency can be told'}."]
     most = int(d.damping.argmax())
     said = (
         f"{begun}from {d.frequency[0]:.6g} Hz at {of.sized(d.amplitude[0])} to {d.frequency[-1]:.6g} Hz at "
@@ -263,6 +263,8 @@ def measured_decay(time: Array, y: Array, Omega: float, down_to: float, first: f
     passed = np.exp(np.outer(sigma, (np.arange(count) - 0.5 * (count - 1)) * -step)) @ window
     inside = slice(WINDOW // 2, -WINDOW // 2)  # whose windows see the level of theirs
     t, a, f, zeta = (v[inside] for v in (t, np.abs(c) / passed, omega / (2 * np.pi), sigma / omega))
+    if not len(a):
+        return Decay(t, a, f, zeta, "it is gone before its frequency can be told; give a smaller down_to")
     ended = np.flatnonzero(a < down_to * first)
     lost = "" if len(ended) else f"after {time[-1]:.4g} s it still has {percent(a[-1] / first)} of its amplitude"
     last = int(ended[0]) if len(ended) else len(a)
