@@ -39,7 +39,8 @@ from microslip.data import (
     StressSet,
 )
 from microslip.files.declared import declared
-from microslip.settings.body import BodySettings, _is_length
+from microslip.settings.body import BodySettings
+from microslip.settings.numbers import keys_of
 
 HERE = Path(__file__).parent
 BLOCK = re.compile(r"<!-- (file|run)(?: ([^\n]*?))? -->\n+```\w*\n(.*?)```", re.S)
@@ -126,19 +127,7 @@ def typed(line: str, folder: Path) -> str:
 # body.toml ---------------------------------------------------------------------------------------------------------
 
 MEANING: dict[str, tuple[str, str]] = {
-    # key: (unit, meaning); "*" stands for the unit of the file's lengths
-    "name": ("", "names the products: `meshes/NAME.msh`, `build/NAME/`, of no other body of the name"),
-    "description": ("", "one line for the report"),
-    "length_unit": ("", "unit of every length in this file and of the mesh or CAD file"),
-    "reduction": ("", "method of reduction, see reduction.md"),
-    "free": ("", "the body is meant to float; rigid motions are kept, [at speed](rotation.md#free-bodies) too"),
-    "values": ("", "table: name of a parameter = its value, 1 if not given; the speed stands in rotation.speeds_rpm"),
-    "parameters.role": ("", "matrix it is added to"),
-    "parameters.matrix": ("", "FILE or FILE#NAME, times factor (value / reference)^power"),
-    "parameters.name": ("", "of the parameter; speed is that of rotation.speeds_rpm, in rad/s"),
-    "parameters.power": ("", "-1 for what falls with the speed, 0 for a constant matrix"),
-    "parameters.factor": ("", "of the matrix"),
-    "parameters.reference": ("", "value of the parameter at which the matrix stands as it is"),
+    # key: (unit, meaning), of models that do not say it themselves
     "stability.growth": ("1/s", "growth rates of the window of roots, from, to"),
     "stability.frequency": ("Hz", "frequencies of the window, from, to"),
     "stability.over": ("", "parameter of the diagram"),
@@ -148,99 +137,6 @@ MEANING: dict[str, tuple[str, str]] = {
     "stability.accuracy": ("", "relative, of the matrices' entries: decides which growth rates are neutral"),
     "stability.neutral": ("1/s", "growth rates below it are neutral whatever the accuracy"),
     "stability.certify": ("", "count the roots by the argument principle"),
-    "note": ("", "a remark that `modes` and the report repeat; `import` says here what it left out of a mesh file"),
-    "geometry.build": (
-        "",
-        "a Python file that draws the body with gmsh; one outside its folder, by a path or a link, is refused",
-    ),
-    "geometry.cad": ("", "a STEP, BREP or IGES file"),
-    "geometry.mesh": ("", "a mesh file (.inp, .msh, .med, .unv, .vtu, ...) with named sets"),
-    "geometry.instances": ("", "those instances of the deck that are this body; all if not given"),
-    "geometry.matrices.stiffness": ("", "K: FILE or FILE#NAME; .mtx, .mat, .h5, .npz, .op4, DMIG cards, .sti"),
-    "geometry.matrices.mass": ("", "M, likewise"),
-    "geometry.matrices.damping": ("", "C, likewise; instead of [damping]"),
-    "geometry.matrices.gyroscopic": ("", "G, likewise, skew-symmetric, at the speed of rotation.speeds_rpm"),
-    "geometry.matrices.circulatory": (
-        "",
-        "what the stiffness holds beside its symmetric part (friction, follower forces), any square matrix; goes to "
-        "N_r, see [stability](stability.md)",
-    ),
-    "geometry.matrices.dofs": (
-        "",
-        "node and direction (1 to 6) of every row: lines `node.direction` or two columns; not needed where the "
-        "matrices name their rows, or where every node has three or six rows in the order of `nodes`",
-    ),
-    "geometry.matrices.nodes": (
-        "",
-        "number, x, y, z: .csv, .mat, .h5, GRID cards, or a mesh with its sets; without it "
-        "every row is a generalised coordinate and the supports are in the matrices",
-    ),
-    "geometry.matrices.units": ("", "of the matrices; m-kg-s, mm-t-s, in-lbf-s go without saying with m, mm, in"),
-    "geometry.matrices.grounded": ("", "the supports are in the matrices already"),
-    "geometry.matrices.superelement": ("", "rows without a node are the generalised coordinates of a superelement"),
-    "geometry.matrices.sets": ("", "table: name of a set = list of node numbers"),
-    "geometry.parameters": ("", "table handed to the build file"),
-    "geometry.faces.name": ("", "name of the face; several rules of one name add up"),
-    "geometry.faces.label": ("", "the surface's label in the CAD file, or a part of it"),
-    "geometry.faces.colour": ("0-255", "the surface's colour, red, green, blue"),
-    "geometry.faces.box": ("*", "x, y, z of the low and of the high corner; what lies wholly inside"),
-    "geometry.faces.cut": ("", "CAD: whether the box cuts: its part of the surface becomes a face of its own"),
-    "geometry.faces.touching": (
-        "",
-        "another file of the same kind in the same coordinates, or the body's own deck (what of it is not this body); "
-        "where the two surfaces meet; with box: inside it",
-    ),
-    "geometry.faces.surfaces": ("", "numbers from the table of `microslip info FILE`"),
-    "mesh.size": ("*", "size of the elements; chosen from the body where it is not given"),
-    "mesh.integration": (
-        "",
-        'of the stiffness; `"reduced"` takes 8 points in bricks of 20 nodes, which do not lock near a Poisson\'s ratio '
-        "of 0.5",
-    ),
-    "mesh.order": ("", "order of the elements; 1 is far too stiff in bending"),
-    "mesh.local": ("*", "table: name of a face = size there"),
-    "material.name": ("", "for the report"),
-    "material.density": ("kg/m3", ""),
-    "material.young": ("Pa", "Young's modulus; orthotropic: E1, E2, E3"),
-    "material.poisson": ("", "Poisson's ratio; orthotropic: nu12, nu23, nu13"),
-    "material.shear": ("Pa", "orthotropic only: G12, G23, G13"),
-    "material.axes": ("", "orthotropic only: the material's three axes in body axes"),
-    "material.expansion": ("1/K", "thermal expansion, one or along the three material axes"),
-    "material.temperature": ("K", "rising temperatures of `modulus_factor`"),
-    "material.modulus_factor": ("", "factor on the moduli at those temperatures; linear between, constant outside"),
-    "material.from": ("", "the mesh file's own material, or materials"),
-    "material.units": ("", "of the mesh file; m-kg-s, mm-t-s, in-lbf-s go without saying with m, mm, in"),
-    "material.unusual": ("", "silences the warnings about implausible units"),
-    "temperature.from": ("", "both temperatures from the mesh file"),
-    "temperature.scale": ("", "of the mesh file's temperatures: °C or K"),
-    "temperature.reference": ("K", "free of thermal stress"),
-    "temperature.uniform": ("K", "one temperature everywhere"),
-    "temperature.file": ("*, K", "CSV lines x, y, z, T; linear between, nearest outside"),
-    "supports.face": ("", "face, or set of points, that is held"),
-    "supports.directions": ("", "body directions in which it is held"),
-    "supports.rotations": ("", "hold rotations of its nodes too, all or some (matrices, reference nodes)"),
-    "rotation.axis": ("", "direction of the rotor axis"),
-    "rotation.point": ("*", "a point of the axis"),
-    "cyclic.sectors": ("", "N, how many of this body make the ring"),
-    "cyclic.left": ("", "face towards the previous sector"),
-    "cyclic.right": ("", "face towards the next sector: the left one turned by 2 pi / N about the rotation axis"),
-    "cyclic.nodal_diameters": ("", "which to analyse, or all from 0 to N/2"),
-    "output.stress_nodal_diameters": ("", "nodal diameters whose stress modes are kept (a file grows by them)"),
-    "output.shape_nodal_diameters": ("", "nodal diameters whose shapes, of body and patches, are kept"),
-    "rotation.speeds_rpm": ("rpm", "speeds to analyse, rising"),
-    "rotation.prestress": ("", "how the stiffness at speed is made, see [modes](modes.md#equilibrium-at-speed)"),
-    "rotation.spin_softening": ("", "whether -Omega^2 M P is in K"),
-    "rotation.gyroscopic": ("", "whether the modes with gyroscopic coupling are computed at speed, see rotation.md"),
-    "rotation.engine_orders": ("", "lines of the Campbell diagram"),
-    "rotation.range_rpm": ("rpm", "lowest and highest speed of one basis for all speeds between, see speeds.md"),
-    "rotation.range_points": ("", "speeds of the Campbell diagram over the range"),
-    "rotation.range_tolerance": ("", "relative frequency error allowed at held-out speeds of the range"),
-    "rotation.range_stress": ("", "strain and stress modes at every speed of the range (large files)"),
-    "loads.kind": ("", "a static load that acts at every speed"),
-    "loads.face": ("", "of a pressure or a force"),
-    "loads.point": ("*", "of a force"),
-    "loads.value": ("Pa", "of a pressure, positive into the body"),
-    "loads.vector": ("m/s2 or N", "of gravity or a force"),
     "closures.name": ("", "the contact's name in the modal file and the report"),
     "closures.face": ("", "face whose points are held apart from the other side (the finer meshed one)"),
     "closures.against": ("", "the face it meets, or `ground`"),
@@ -255,55 +151,6 @@ MEANING: dict[str, tuple[str, str]] = {
     ),
     "closures.slide": ("*", "how far the faces may slide on each other; 1.5 elements if not given"),
     "closures.penalty": ("Pa/m", "only the number of iterations depends on it; chosen from the modulus if not given"),
-    "bolts.name": ("", ""),
-    "bolts.face": ("", "the ring under the head"),
-    "bolts.against": ("", "the ring under the nut, or `ground`"),
-    "bolts.preload": ("N", "force of the bolt; keeps its direction"),
-    "interfaces.name": ("", ""),
-    "interfaces.face": ("", "the contact patch"),
-    "interfaces.role": ("", "see [conventions](conventions.md#frames)"),
-    "interfaces.partner": ("", "name of the interface it faces"),
-    "interfaces.sector_shift": ("", "where the partner is: next blade 1, previous -1, else 0"),
-    "interfaces.t2": (
-        "",
-        "direction whose projection on the patch becomes t2; if not given z, or y where the patch lies across z",
-    ),
-    "interfaces.normal": ("", "outward normal of a list of nodes that does not tell it itself (matrices only)"),
-    "interfaces.coordinates": ("", "rigid: six; characteristic: six and the softest shapes of the patch"),
-    "interfaces.count": ("", "how many characteristic shapes"),
-    "excitations.name": ("", ""),
-    "excitations.point": ("*", "where a unit force acts"),
-    "excitations.node": ("", "or the number of a node in the mesh file"),
-    "excitations.face": ("", "or the face over which it is spread"),
-    "excitations.direction": ("", "of the force; its length does not matter"),
-    "excitations.pressure": ("", "a unit pressure (1 Pa) on the face instead"),
-    "excitations.centrifugal": ("", "the centrifugal force on the whole body per (rad/s)^2 about the [rotation] axis"),
-    "monitors.name": ("", ""),
-    "monitors.point": ("*", "where displacements are read"),
-    "monitors.node": ("", "or the number of a node in the mesh file"),
-    "monitors.directions": ("", "body directions"),
-    "monitors.points": (
-        "*",
-        "or places that turn: read is the angle, rad, about `axis` of the rigid motion that fits them best; two read "
-        "the difference of their displacements over their distance",
-    ),
-    "monitors.axis": ("", "of that angle, right-handed; neither its length nor its place matters"),
-    "gauges.name": ("", ""),
-    "gauges.point": ("*", "where the strain is read"),
-    "gauges.direction": ("", "of the strain gauge"),
-    "modes.count": ("", "how many modes"),
-    "modes.max_frequency": ("Hz", "only modes below it; `count` is then the upper limit"),
-    "modes.certify": ("", "prove by an inertia count that none is missing"),
-    "modes.solver": ("", "sparse direct solver, see [platforms](platforms.md)"),
-    "damping.ratio": ("", "one damping ratio D for all modes"),
-    "damping.table": ("", "a ratio per mode; the last one serves all further modes"),
-    "damping.alpha": ("1/s", "Rayleigh damping alpha M + beta K"),
-    "damping.beta": ("s", "Rayleigh damping"),
-    "output.shapes": ("", "mode shapes at all nodes"),
-    "output.patch_shapes": ("", "mode shapes at the points of contact and load faces"),
-    "output.gauss": ("", "strain and stress modes at integration points (the largest part of the file)"),
-    "output.stiffening": ("", "whether the modal file holds how large rigid motion stiffens the body, see rotation.md"),
-    "output.nodal_stress": ("", "strain and stress modes smoothed to the nodes"),
 }
 
 
@@ -685,15 +532,6 @@ MEANING_CASE: dict[str, tuple[str, str]] = {
 }  # fmt: skip
 
 
-def body_reference() -> str:
-    """Tables of every key of body.toml, made from the models that read it.
-
-    Raises:
-        SystemExit: a key without a meaning here, or a meaning without a key.
-    """
-    return _reference(BodySettings, MEANING, "body.toml")
-
-
 def public_reference() -> str:
     """Table of the public names: what they are called with and the first sentence of their docstrings."""
     rows = []
@@ -704,14 +542,25 @@ def public_reference() -> str:
     return table(["name", "what it is"], rows)
 
 
-def contact_reference() -> str:
-    """Tables of every key of contact.toml, likewise."""
-    return _reference(ContactFile, MEANING_CONTACT, "contact.toml")
+FILES: dict[str, tuple[Any, dict[str, tuple[str, str]]]] = {
+    "body_toml": (BodySettings, MEANING),
+    "contact_toml": (ContactFile, MEANING_CONTACT),
+    "case_toml": (case_model(), MEANING_CASE),
+}
+"""Page and name of a table -> the model that reads the file, and keys that it does not describe itself."""
 
 
-def case_reference() -> str:
-    """Tables of every key of case.toml, likewise."""
-    return _reference(case_model(), MEANING_CASE, "case.toml")
+def file_reference(name: str) -> str:
+    """Tables of every key of a settings file, made from the models that read it."""
+    model, meanings = FILES[name]
+    return "\n\n".join(_section(*s, meanings) for s in sections(model))
+
+
+def silent(name: str) -> list[str]:
+    """Keys of a settings file that do not say what they are."""
+    model, meanings = FILES[name]
+    keys = {f"{prefix}{k}": any(keys_of(m)[k]) for prefix, _, _, m in sections(model) for k in _plain_keys(m)}
+    return [key for key, says in keys.items() if not says and key not in meanings]
 
 
 STORED: tuple[tuple[str, type], ...] = (
@@ -742,15 +591,8 @@ def stored_rows(group: str, noun: type) -> list[list[str]]:
     return rows
 
 
-def _reference(model: Any, meanings: dict[str, tuple[str, str]], file: str) -> str:
-    sections = list(_sections(model, "", ""))
-    known = {f"{prefix}{key}" for prefix, _, _, model in sections for key in _plain_keys(model)}
-    if wrong := sorted(known ^ set(meanings)):
-        raise SystemExit(f"docs/pages.py: the meanings and {file} differ in {', '.join(wrong)}")
-    return "\n\n".join(_section(*s, meanings) for s in sections)
-
-
-def _sections(model: Any, prefix: str, title: str) -> Iterator[tuple[str, str, str, Any]]:
+def sections(model: Any, prefix: str = "", title: str = "") -> Iterator[tuple[str, str, str, Any]]:
+    """Prefix of its keys, heading, text and model of each table of a settings file, in order."""
     yield prefix, title, "" if not prefix else " ".join((model.__doc__ or "").split("\n\n")[0].split()), model
     for key, field in _fields(model).items():
         for number, (inner, many) in enumerate(_told(model, field)):
@@ -761,7 +603,7 @@ def _sections(model: Any, prefix: str, title: str) -> Iterator[tuple[str, str, s
                 head += " kind = " + " or ".join(f'"{kind}"' for kind in kinds.__args__)
             elif number:
                 head += ", or instead"
-            yield from _sections(inner, f"{name}.", head)
+            yield from sections(inner, f"{name}.", head)
 
 
 def _fields(model: Any) -> dict[str, Any]:
@@ -789,15 +631,12 @@ def _plain_keys(model: Any) -> list[str]:
 
 
 def _section(prefix: str, title: str, text: str, model: Any, meanings: dict[str, tuple[str, str]]) -> str:
-    schema = model.model_json_schema()["properties"]
+    schema, said = model.model_json_schema()["properties"], keys_of(model)
     rows = []
     for key in _plain_keys(model):
-        field = _fields(model)[key]
-        unit, meaning = meanings[f"{prefix}{key}"]
-        if _is_length(field) and not unit.startswith("*"):
-            raise SystemExit(f"docs/pages.py: {prefix}{key} is a length; mark its unit with *")
+        unit, meaning = meanings.get(f"{prefix}{key}") or said[key]
         unit = unit.replace("*", "length_unit")
-        rows.append([f"`{key}`", _type(schema[key]), unit, _default(field), meaning])
+        rows.append([f"`{key}`", _type(schema[key]), unit, _default(_fields(model)[key]), meaning])
     head = f"## {title}" if title else "## Top of the file"
     return f"{head}\n\n" + (f"{text}\n\n" if text else "") + table(["key", "value", "unit", "default", "meaning"], rows)
 
@@ -820,7 +659,17 @@ def _toml(value: Any) -> str:
 
 
 WORDS = {"number": "number", "integer": "integer", "string": "text", "boolean": "true or false"}
-SIGNS = {"exclusiveMinimum": ">", "gt": ">", "minimum": ">=", "exclusiveMaximum": "<", "lt": "<", "maximum": "<="}
+SIGNS = {
+    "minimum": ">=",
+    "ge": ">=",
+    "exclusiveMinimum": ">",
+    "gt": ">",
+    "maximum": "<=",
+    "le": "<=",
+    "exclusiveMaximum": "<",
+    "lt": "<",
+}
+"""Bounds of a JSON schema; of two on one side the later one counts."""
 
 
 def _type(schema: dict[str, Any]) -> str:
@@ -840,5 +689,5 @@ def _type(schema: dict[str, Any]) -> str:
         return f"{times if count else 'list of'} {inner}"
     if kind == "object":
         return "table"
-    bounds = [f"{sign} {schema[k]:g}" for k, sign in SIGNS.items() if k in schema]
-    return " ".join([WORDS.get(str(kind), "any"), ", ".join(bounds)]).strip()
+    bounds = {sign[0]: f"{sign} {schema[key]:g}" for key, sign in SIGNS.items() if key in schema}
+    return " ".join([WORDS.get(str(kind), "any"), ", ".join(bounds.values())]).strip()

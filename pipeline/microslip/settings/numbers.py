@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -136,9 +137,26 @@ EngineOrder = Annotated[int, Field(ge=1, le=10000)]
 
 
 class Model(BaseModel):
-    """Strict, frozen, no unknown keys."""
+    """Strict, frozen, no unknown keys. Below a key stand its unit and what it means, ``[Hz] of the load``."""
 
-    model_config = ConfigDict(strict=True, extra="forbid", frozen=True)
+    model_config = ConfigDict(strict=True, extra="forbid", frozen=True, use_attribute_docstrings=True)
+
+
+def keys_of(model: type[BaseModel]) -> dict[str, tuple[str, str]]:
+    """Key as it is written -> unit and meaning: the text below it, or below that of its base."""
+    return {f.alias or name: _said(model, name, f) for name, f in model.model_fields.items()}
+
+
+def _said(model: type[BaseModel], name: str, field: Any) -> tuple[str, str]:
+    bases = (base.model_fields.get(name) for base in model.__mro__ if issubclass(base, BaseModel))
+    text = next((of.description for of in bases if of is not None and of.description), "")
+    _, unit, meaning = re.split(r"^(?:\[([^]]*)\](?!\())?", " ".join(text.split()), maxsplit=1)
+    return unit or ("length_unit" if is_length(field) else ""), meaning.strip()
+
+
+def is_length(field: Any) -> bool:
+    """Whether the number of a key is marked as a length."""
+    return LENGTH in field.metadata or f"'{LENGTH}'" in str(field.annotation)
 
 
 class OfFile(Model):
