@@ -1109,8 +1109,8 @@ def own() -> None:
 def reference() -> None:
     """The references of body.toml, contact.toml and case.toml, of the modal file and of the public names."""
     fill("modal_file.md", "modal_file", modal_reference())
-    for name in FILES:
-        fill(f"{name}.md", name, file_reference(name))
+    for name, (page, *_) in FILES.items():
+        fill(page, name, file_reference(name))
     fill("python.md", "public", public_reference())
 
 

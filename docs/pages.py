@@ -20,9 +20,9 @@ from pathlib import Path
 from typing import Any
 
 import microslip
-from microslip.case.driving import GroundOfCase
-from microslip.case.settings import ContactSettings, case_model
-from microslip.contact.settings import ContactFile
+from microslip.case.settings import case_model
+from microslip.contact.kinds import Kind
+from microslip.contact.settings import ContactFile, Temperature
 from microslip.data import (
     Compliance,
     ContactState,
@@ -39,8 +39,12 @@ from microslip.data import (
     StressSet,
 )
 from microslip.files.declared import declared
+from microslip.rolling.settings import RollingCase
+from microslip.rolling.slip import TyreCase
 from microslip.settings.body import BodySettings
 from microslip.settings.numbers import keys_of
+from microslip.system.settings import SystemSettings
+from microslip.vehicle.settings import KinematicsCase, VehicleCase
 
 HERE = Path(__file__).parent
 BLOCK = re.compile(r"<!-- (file|run)(?: ([^\n]*?))? -->\n+```\w*\n(.*?)```", re.S)
@@ -260,23 +264,29 @@ def public_reference() -> str:
     return table(["name", "what it is"], rows)
 
 
-FILES: dict[str, tuple[Any, dict[str, tuple[str, str]]]] = {
-    "body_toml": (BodySettings, MEANING),
-    "contact_toml": (ContactFile, {}),
-    "case_toml": (case_model(), MEANING_CASE),
+FILES: dict[str, tuple[str, Any, dict[str, tuple[str, str]]]] = {
+    "body_toml": ("body_toml.md", BodySettings, MEANING),
+    "contact_toml": ("contact_toml.md", ContactFile, {}),
+    "case_toml": ("case_toml.md", case_model(), MEANING_CASE),
+    "system_toml": ("system_toml.md", SystemSettings, {}),
+    "wheel_on_rail": ("rolling_toml.md", RollingCase, {}),
+    "tyre": ("rolling_toml.md", TyreCase, {}),
+    "vehicle": ("rolling_toml.md", VehicleCase, {}),
+    "kinematics": ("rolling_toml.md", KinematicsCase, {}),
 }
-"""Page and name of a table -> the model that reads the file, and keys that it does not describe itself."""
+"""Table -> its page, the model that reads the file, and keys that it does not describe itself."""
 
 
 def file_reference(name: str) -> str:
     """Tables of every key of a settings file, made from the models that read it."""
-    model, meanings = FILES[name]
-    return "\n\n".join(_section(*s, meanings) for s in sections(model))
+    page, model, meanings = FILES[name]
+    depth = "##" if page == f"{name}.md" else "###"
+    return "\n\n".join(f"{depth} {_section(*s, meanings)}" for s in sections(model))
 
 
 def silent(name: str) -> list[str]:
     """Keys of a settings file that do not say what they are."""
-    model, meanings = FILES[name]
+    _, model, meanings = FILES[name]
     keys = {f"{prefix}{k}": any(keys_of(m)[k]) for prefix, _, _, m in sections(model) for k in _plain_keys(m)}
     return [key for key, says in keys.items() if not says and key not in meanings]
 
@@ -339,9 +349,9 @@ def _inner(annotation: Any, many: bool = False) -> list[tuple[Any, bool]]:
 
 
 def _told(model: Any, field: Any) -> list[tuple[Any, bool]]:
-    """`_inner`, without the tables of a contact file in a contact of a case, which have a page of their own."""
-    found = _inner(field.annotation)
-    return [x for x in found if x[0] is GroundOfCase] if model is ContactSettings else found
+    """`_inner`; the tables of a contact file in another one have a page of their own."""
+    whole = issubclass(model, ContactFile)
+    return [x for x in _inner(field.annotation) if whole or not issubclass(x[0], (Kind, Temperature))]
 
 
 def _plain_keys(model: Any) -> list[str]:
@@ -355,8 +365,11 @@ def _section(prefix: str, title: str, text: str, model: Any, meanings: dict[str,
         unit, meaning = meanings.get(f"{prefix}{key}") or said[key]
         unit = unit.replace("*", "length_unit")
         rows.append([f"`{key}`", _type(schema[key]), unit, _default(_fields(model)[key]), meaning])
-    head = f"## {title}" if title else "## Top of the file"
-    return f"{head}\n\n" + (f"{text}\n\n" if text else "") + table(["key", "value", "unit", "default", "meaning"], rows)
+    return (
+        f"{title or 'Top of the file'}\n\n"
+        + (f"{text}\n\n" if text else "")
+        + table(["key", "value", "unit", "default", "meaning"], rows)
+    )
 
 
 def _default(field: Any) -> str:
@@ -373,6 +386,8 @@ def _toml(value: Any) -> str:
         return str(value).lower()
     if isinstance(value, tuple):
         return "[" + ", ".join(_toml(v) for v in value) + "]"
+    if isinstance(value, float) and value >= 1e6:
+        return f"{value:g}"
     return f'"{value}"' if isinstance(value, str) else str(value)
 
 

@@ -83,8 +83,8 @@ def test_every_picture_is_shown_and_small() -> None:
 
 def test_references_of_files_are_current() -> None:
     """`python docs/make_pictures.py reference` would change nothing."""
-    for name in pages.FILES:
-        assert pages.filled(f"{name}.md", name) == pages.file_reference(name).strip()
+    for name, (page, *_) in pages.FILES.items():
+        assert pages.filled(page, name) == pages.file_reference(name).strip()
     assert pages.filled("python.md", "public") == pages.public_reference().strip()
     assert pages.filled("modal_file.md", "modal_file") == pages.modal_reference().strip()
 
