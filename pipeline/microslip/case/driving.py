@@ -171,7 +171,7 @@ class ExcitationOfCase(Model):
     row: Address | None = None
     """excitation of a body, `body:excitation` where there are several"""
     amplitude: Number = 1.0
-    """[N, Pa] 0-peak; of a pressure field: a factor"""
+    """[N or Pa] 0-peak; of a pressure field: a factor"""
     phase: Number = 0.0
     """[degrees] by which it leads"""
     harmonic: Annotated[int, Field(ge=0, le=1000)] = 1
@@ -181,7 +181,7 @@ class ExcitationOfCase(Model):
     engine_order: Order | None = None
     """instead of the harmonic"""
     steady: Number | None = None
-    """[N, Pa] steady gas load, with stimulus instead of amplitude"""
+    """[N or Pa] steady gas load, with stimulus instead of amplitude"""
     stimulus: NotNegative | None = None
     """its share that vibrates"""
     speed_rpm: NotNegative | None = None

@@ -323,7 +323,7 @@ class CaseSettings(OfFile):
     excitation: Address | None = None
     """short for one `[[excitations]]`"""
     amplitude: Number = 1.0
-    """[N, Pa] of that excitation"""
+    """[N or Pa] of that excitation"""
     excitations: Annotated[tuple[ExcitationOfCase, ...], BeforeValidator(_tuple)] = ()
     monitor: Address | None = None
     """short for one `[[monitors]]`"""

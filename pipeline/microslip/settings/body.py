@@ -69,7 +69,7 @@ class FaceRule(Model):
     label: str | None = None
     """the surface's label in the CAD file, or a part of it"""
     colour: Annotated[tuple[Byte, Byte, Byte], BeforeValidator(_tuple)] | None = None
-    """[0-255] the surface's colour, red, green, blue"""
+    """the surface's colour, red, green, blue"""
     box: Box | None = None
     """x, y, z of the low and of the high corner; what lies wholly inside"""
     cut: bool = False

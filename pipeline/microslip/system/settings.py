@@ -74,7 +74,7 @@ class SpringSettings(LinkSettings):
     """A spring."""
 
     stiffness: Six
-    """[N/m, N m/rad] one number along the axis, three along x, y, z, or six with those about
+    """[N/m or N m/rad] one number along the axis, three along x, y, z, or six with those about
     them"""
 
 
@@ -82,7 +82,7 @@ class DamperSettings(LinkSettings):
     """A damper."""
 
     damping: Six
-    """[N s/m, N m s/rad] likewise"""
+    """[N s/m or N m s/rad] likewise"""
 
 
 class ContactOfSystem(Model):
