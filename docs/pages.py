@@ -287,8 +287,8 @@ def file_reference(name: str) -> str:
 def silent(name: str) -> list[str]:
     """Keys of a settings file that do not say what they are."""
     _, model, meanings = FILES[name]
-    keys = {f"{prefix}{k}": any(keys_of(m)[k]) for prefix, _, _, m in sections(model) for k in _plain_keys(m)}
-    return [key for key, says in keys.items() if not says and key not in meanings]
+    keys = [(f"{s[0]}{key}", keys_of(s[-1])[key]) for s in sections(model) for key in _plain_keys(s[-1])]
+    return [key for key, says in keys if not any(says) and key not in meanings]
 
 
 STORED: tuple[tuple[str, type], ...] = (
@@ -350,8 +350,8 @@ def _inner(annotation: Any, many: bool = False) -> list[tuple[Any, bool]]:
 
 def _told(model: Any, field: Any) -> list[tuple[Any, bool]]:
     """`_inner`; the tables of a contact file in another one have a page of their own."""
-    whole = issubclass(model, ContactFile)
-    return [x for x in _inner(field.annotation) if whole or not issubclass(x[0], (Kind, Temperature))]
+    elsewhere = () if issubclass(model, ContactFile) else (Kind, Temperature)
+    return [x for x in _inner(field.annotation) if not issubclass(x[0], elsewhere)]
 
 
 def _plain_keys(model: Any) -> list[str]:

@@ -37,7 +37,8 @@ def test_keys_stand_one_behind_the_other() -> None:
 
 
 def test_a_mistake_of_another_file_stands_whole_behind_the_key_that_names_it() -> None:
-    error = mistake(of_file("case.toml"), at("contacts.right.file"), of_file("pad.toml"), key="law.mass")
+    named = at("contacts.right.file")
+    error = mistake(of_file("case.toml"), named, of_file("pad.toml"), key="law.mass")
     assert (error.key, error.file) == ("contacts.right.file", "case.toml")
     assert str(error) == "case.toml: contacts.right.file: pad.toml: law.mass: is wrong; correct it"
 

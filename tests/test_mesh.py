@@ -316,7 +316,7 @@ def test_included_files_and_files_of_data(tmp_path: Path) -> None:
 
 
 def test_an_included_file_of_another_folder(tmp_path: Path) -> None:
-    """Files of data stand beside the file that names them, or beside the whole deck; a mistake names file and line."""
+    """Data stand beside the file that names them, or beside the deck; a mistake names its line."""
     head, nodes = INP.split("*NODE, NSET=NALL\n")
     nodes, rest = nodes.split("*ELEMENT", 1)
     (tmp_path / "sub").mkdir()

@@ -53,7 +53,7 @@ class MagnetsOfCase(Model):
 
 
 class SpringOfCase(Model):
-    """A spring from a body to the ground, where and along which an excitation of the body pushes."""
+    """A spring from a body to the ground, where and as an excitation of the body pushes."""
 
     row: Address
     """excitation of a body, `body:excitation` where there are several: its point and direction"""
@@ -163,7 +163,7 @@ class GroundOfCase(Model):
 
 
 class ExcitationOfCase(Model):
-    """A harmonic force: a row of a body's modal file, or a pressure field on a face, times an amplitude.
+    """A harmonic force: an amplitude times a row of a body's modal file or a pressure field.
 
     Beside the case a field is .csv, .npz, .vtu or .vtk with x, y, z and p_real, p_imag in Pa.
     """

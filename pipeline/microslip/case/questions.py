@@ -62,7 +62,8 @@ class SpeedsOfCase(Model):
 class RangesOfCase(Model):
     """Envelope of the responses over all combinations of these values (Sextro Fig. 5.4-2), by `respond --over ranges`.
 
-    Two values are the ends of a range; give more where the smallest amplitude matters, which may lie between them.
+    Two values are the ends of a range; give more where the smallest amplitude matters, which may
+    lie between them.
     """
 
     damping_ratio: Ratios = ()

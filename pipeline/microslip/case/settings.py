@@ -79,8 +79,8 @@ BodyName = Annotated[Name, BeforeValidator(_no_path)]
 class BodyOfCase(Model):
     """A body of an assembly, of the modal file that its body.toml or system.toml makes.
 
-    A body that slides in all of its contacts has no place of its own; without weak_springs it slides away where mean
-    forces do not balance.
+    A body that slides in all of its contacts has no place of its own; without weak_springs it
+    slides away where mean forces do not balance.
     """
 
     name: Name
@@ -130,7 +130,8 @@ class RingSettings(Model):
 class ContactSettings(ContactLaw):
     """A contact of an interface with the ground, a rigid neighbour, or with another body's interface.
 
-    What it is say the keys of a contact.toml, of the whole patch in SI, of which every point carries its share.
+    What it is say the keys of a contact.toml, of the whole patch in SI, of which every point
+    carries its share.
     """
 
     interface: Address
@@ -261,7 +262,7 @@ class ContactSettings(ContactLaw):
 
 
 class Sweep(Model):
-    """Frequencies, and the normal forces to compare, which press every contact that nothing else presses."""
+    """Frequencies, and the normal forces to compare."""
 
     start: Positive
     """[Hz] first frequency"""

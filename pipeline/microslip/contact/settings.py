@@ -190,7 +190,8 @@ def _named(value: Any) -> Any:
 class ContactLaw(Model):
     """What a contact is, wherever it stands: the same keys in contact.toml and in a contact of case.toml.
 
-    A number stands for a table: R_Z of polynomial heights, Coulomb's coefficient; so does the name of a law.
+    A number stands for a table: R_Z of polynomial heights, Coulomb's coefficient; so does the name
+    of a law.
     """
 
     stiffness: AnyStiffness | None = None

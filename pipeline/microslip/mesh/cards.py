@@ -20,8 +20,8 @@ class Card:
     """A keyword line and its data.
 
     Attributes:
-        keyword: in capitals, without the star. parameters: in capitals -> as written, INPUT a path. lines: of data,
-            without comments. where: ``part.inp, line 12``. place: the same with the path of the file.
+        keyword: in capitals, without the star. parameters: in capitals -> as written, INPUT a path.
+            lines: of data, without comments. where: ``part.inp, line 12``. place: with its path.
     """
 
     keyword: str

@@ -21,7 +21,7 @@ NODES = {
 
 
 class Damaged(UserError):
-    """A mesh file that contradicts itself or ends too early. file: its name and line where one line does."""
+    """A mesh file that contradicts itself or ends too early. file: with its line, if one does."""
 
 
 class Unread(Damaged):

@@ -199,7 +199,8 @@ class TableOfCase(Model):
 
 
 class ContactsOfCase(Model):
-    """A table of contacts, made for the vertical force of the case on each wheel, see `contact_table.ContactTable`."""
+    """A table of contacts, made for the vertical force of the case on each wheel, see
+    `contact_table.ContactTable`."""
 
     lateral: Annotated[Positive, Field(le=0.05)]
     """[m] shift to either side"""

@@ -136,7 +136,8 @@ class MatrixTerm(Model):
     matrix: str
     """FILE or FILE#NAME, times factor (value / reference)^power"""
     name: Name = "speed"
-    """of the parameter; speed is that of rotation.speeds_rpm, in rad/s, any other stands in values"""
+    """of the parameter; speed is that of rotation.speeds_rpm, in rad/s, any other stands in
+    values"""
     power: Annotated[float, BeforeValidator(_float), Field(ge=-8, le=8)] = 1.0
     """-1 for what falls with the speed, 0 for a constant matrix"""
     factor: Number = 1.0
@@ -287,7 +288,7 @@ class MaterialSettings(Model):
 
 
 class ForeignMaterial(Model):
-    """The material stands elsewhere: in the mesh file itself, or in the matrices, which hold it already."""
+    """The material stands elsewhere: in the mesh file, or in the matrices, which hold it already."""
 
     source: Annotated[Literal["mesh", "matrices"], Field(alias="from")]
     """the mesh file's own material, or materials"""
@@ -481,7 +482,8 @@ class Closure(Model):
 
 
 class Bolt(Model):
-    """A tensioned bolt: `preload` (N) presses a face (under its head) and the face against it (under its nut)."""
+    """A tensioned bolt: its preload presses a face (under its head) and the face against it (under
+    its nut)."""
 
     name: Name
     """by which messages name it"""

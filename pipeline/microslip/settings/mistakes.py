@@ -155,7 +155,8 @@ def _sentences(errors: list[Any], raw: dict[str, Any], model: type[BaseModel]) -
         if found[0][1]["type"] != "extra_forbidden" and not (found[0][1]["type"] == "missing" and key in meant):
             unit, _ = known[key].get(key[-1] if key else "", ("", ""))
             said = _sentence(key, found, raw)
-            yield f"{said}, in {unit}" if unit and said.endswith((" add it", " correct it")) else said
+            bare = not unit or not said.endswith((" add it", " correct it"))
+            yield said if bare else f"{said}, in {unit}"
 
 
 def _close(key: str, known: Iterable[str]) -> list[str]:
@@ -208,7 +209,7 @@ def _label(items: list[Any], number: int) -> str:
     return str(number)
 
 
-def _hint(key: tuple[Any, ...], close: list[str], known: Iterable[str], model: type[BaseModel]) -> str:
+def _hint(key: tuple[Any, ...], close: list[str], known: Iterable[str], model: Any) -> str:
     if close:
         return f"did you mean '{close[0]}'?"
     homes = sorted(table for table, keys in _tables(model) if key[-1] in keys)

@@ -142,13 +142,13 @@ EngineOrder = Annotated[int, Field(ge=1, le=10000)]
 
 
 class Model(BaseModel):
-    """Strict, frozen, no unknown keys. Below a key stand its unit and what it means, ``[Hz] of the load``."""
+    """Strict, frozen, no unknown keys. Below a key stands what it is, ``[Hz] of the load``."""
 
     model_config = ConfigDict(strict=True, extra="forbid", frozen=True)
 
 
 def keys_of(model: type[BaseModel]) -> dict[str, tuple[str, str]]:
-    """Key as it is written -> its unit and what it means, by the text below it or below that of a base."""
+    """Key as it is written -> unit and meaning, by the text below it or below that of a base."""
     return {f.alias or name: _said(model, name, f) for name, f in model.model_fields.items()}
 
 
@@ -161,7 +161,7 @@ def _said(model: type[BaseModel], name: str, field: Any) -> tuple[str, str]:
 
 @cache
 def _texts(module: str) -> dict[tuple[str, str], str]:
-    """Class and key -> text below it, read when asked for: pydantic's own way costs 3 ms a class."""
+    """Class and key -> text below it; pydantic's own way costs every import 3 ms a class."""
     try:
         classes = ast.walk(ast.parse(inspect.getsource(sys.modules[module])))
     except (OSError, TypeError):

@@ -38,7 +38,7 @@ BESIDE = 3.0
 
 
 class Keys(Model):
-    """A map of the amplitude over frequency, that of the sweep, and normal force, by `microslip map`."""
+    """A map of the amplitude over the sweep's frequencies and normal force, by `microslip map`."""
 
     low: Positive | None = None
     """[N] the first normal force; the smallest above 0 of the sweep if not given"""

@@ -55,7 +55,8 @@ class Keys(Model):
     """[Hz] at which the case is driven until its loads are taken off; the highest resonance in
     the sweep's band if not given"""
     amplitude: Positive | None = None
-    """[m] of the first read-out: the motion begins in the nonlinear mode instead, where that has it"""
+    """[m] of the first read-out: the motion begins in the nonlinear mode instead, where that has
+    it"""
     mode: Annotated[int, Field(ge=1, le=2000)] | None = None
     """with sticking contacts, 1 the lowest, that is compared; the one that answers the excitation
     most in the sweep's band if not given"""
