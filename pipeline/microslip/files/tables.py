@@ -30,9 +30,14 @@ def columns_csv(columns: Mapping[str, Iterable[Any]], digits: int) -> str:
     return rows_csv(columns, zip(*columns.values(), strict=True), digits)
 
 
+def write_columns(columns: Mapping[str, Iterable[Any]], digits: int, path: Path) -> None:
+    """Name -> numbers or texts, as a file."""
+    write_text(path, columns_csv(columns, digits))
+
+
 def write_tables(folder: Path, tables: Mapping[str, Mapping[str, Iterable[Any]]], digits: int) -> list[Path]:
     """Write file name -> columns; those without columns are left out."""
     made = [folder / name for name, columns in tables.items() if columns]
     for path in made:
-        write_text(path, columns_csv(tables[path.name], digits))
+        write_columns(tables[path.name], digits, path)
     return made

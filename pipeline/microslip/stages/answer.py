@@ -91,9 +91,10 @@ class CaseJob:
         """What the answer depends on, besides pictures."""
         return inputs_of(self.raw, self.settings, self.files)
 
-    def made_by(self, stage: Stage) -> str:
-        """Hash of what all that is computed depends on."""
-        return store.hash_settings({**self.inputs, "code": hash_of_code(stage.code)})
+    def made_by(self, stage: Stage, but: str = "") -> str:
+        """Hash of what all that is computed depends on, but a table of the case."""
+        case = {key: value for key, value in self.inputs["case"].items() if key != but}
+        return store.hash_settings({**self.inputs, "case": case, "code": hash_of_code(stage.code)})
 
     @in_its_file
     def answer(self, name: str, module: str | Path, work: Callable[[Stage, CaseJob], Written]) -> Written:
