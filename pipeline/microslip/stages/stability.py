@@ -29,8 +29,7 @@ from ..roots.recorded import write_roots
 from ..roots.spectrum import spectrum
 from ..settings.body import StabilitySettings
 from ..units import rpm_text
-from .analysing import written
-from .answer import Written, answered
+from .answer import Written, answered, written
 from .job import Job, open_job
 from .modal import matrices_inputs, modes_stage
 from .stage import Report, Stage
