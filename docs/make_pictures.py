@@ -1131,7 +1131,7 @@ def two_tones() -> None:
     import tones_study as study
 
     from microslip.analysis import Drawing
-    from microslip.stages.analysing import drawn
+    from microslip.stages.answer import drawn
     from microslip.verbs.two_tones import draw_point
 
     point = Drawing(partial(draw_point, study.duffing(), 0), size=(9.0, 6.4))

@@ -185,6 +185,10 @@ MEANING_CASE: dict[str, tuple[str, str]] = {
     "mistuning.seed": ("", "of all random numbers; a sample depends on it and its number alone"),
     "mistuning.stuck": ("", "whether contacts stick, which is linear"),
     "mistuning.normal_force": ("N", "of the contacts that the sweep presses; its smallest if not given"),
+    "mistuning.workers": (
+        "",
+        "processes; as many as there are cores if not given, samples are the same for any number",
+    ),
     "mistuning.scatter.of": ("", "what differs from sector to sector"),
     "mistuning.scatter.deviation": ("", "standard deviation, a share of the nominal value; of `added_mass` kg, of "
                                     "`gap` m"),

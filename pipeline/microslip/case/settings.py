@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, PrivateAttr, create_model, model_validator
 
-from ..analysis import GROUP, analyses
+from ..analysis import GROUP, Analysis, analyses
 from ..contact.friction import OfCoulomb
 from ..contact.point import OfPoint
 from ..contact.settings import ContactLaw
@@ -40,15 +40,11 @@ from .driving import ROTATION, ExcitationOfCase, GroundOfCase, SpringOfCase, bas
 from .keys import GROUND as GROUND
 from .keys import Address, Count, Order
 from .questions import (
-    BifurcationOfCase,
     CurveOfCase,
     IdentificationOfCase,
-    MistuningOfCase,
-    OrbitOfCase,
     OrdersOfCase,
     RangesOfCase,
     SpeedsOfCase,
-    StabilityOfCase,
 )
 
 FIRST_HARMONICS = 3
@@ -366,46 +362,36 @@ class CaseSettings(OfFile):
     speeds: SpeedsOfCase | None = None
     ranges: RangesOfCase | None = None
     curve: CurveOfCase | None = None
-    orbit: OrbitOfCase | None = None
     identification: IdentificationOfCase | None = None
-    stability: StabilityOfCase | None = None
-    bifurcation: Annotated[tuple[BifurcationOfCase, ...], BeforeValidator(_tuple)] = ()
-    mistuning: MistuningOfCase | None = None
 
     @model_validator(mode="before")
     @classmethod
     def _swept(cls, raw: Any) -> Any:
-        """A case that asks for a motion in time alone needs no sweep: it is an octave on either side."""
-        if not isinstance(raw, dict) or "sweep" in raw:
+        """A case that asks for what needs no sweep has one that stands for it."""
+        if not isinstance(raw, dict) or "sweep" in raw or not any(raw.get(key) for key in _unswept()):
             return raw
-        band = unasked_sweep(raw)
-        asks = [raw.get(key) for key in ("stability", "bifurcation", *_unswept())]
-        in_time = isinstance(raw.get("orbit"), dict) and band != NO_SWEEP
-        return raw | {"sweep": band} if in_time or any(asks) else raw
+        return raw | {"sweep": unasked_sweep(raw)}
 
     @property
-    def asked(self) -> dict[str, Model]:
+    def asked(self) -> dict[str, Any]:
         """Analysis -> its keys, of those in whose tables the case asks for something."""
-        return {name: keys for name in analyses() if (keys := getattr(self, name, None)) is not None}
+        return {name: keys for name in analyses() if (keys := getattr(self, name, None))}
 
     @property
     def is_only_followed(self) -> bool:
         """Whether it asks for what needs no sweep, and for none."""
-        return self._asks_without_sweep and self.orbit is None and self._stands_for(NO_SWEEP)
+        asked = self.model_dump(include=self.asked.keys() & _unswept())
+        return bool(asked) and self._stands_for(unasked_sweep(asked))
 
     @property
-    def _asks_without_sweep(self) -> bool:
-        return bool(self.stability or self.bifurcation or self.asked.keys() & _unswept())
-
-    @property
-    def is_only_in_time(self) -> bool:
-        """Whether it asks for motions in time and for no sweep."""
-        return self.orbit is not None and self._stands_for(band_of(self.orbit.model_dump()))
+    def has_no_response(self) -> bool:
+        """Whether all that it asks for is in the tables of its analyses."""
+        return self.is_only_followed or any(analyses()[name].alone for name in self.asked)
 
     @property
     def is_only_built(self) -> bool:
         """Whether it asks for nothing: what is analysed is said in Python."""
-        asked = self._asks_without_sweep or self.orbit is not None
+        asked = self.asked.keys() & _unswept()
         return not asked and self.sweep.normal_forces == UNPRESSED and self._stands_for(NO_SWEEP)
 
     def _stands_for(self, band: Mapping[str, float]) -> bool:
@@ -416,9 +402,9 @@ class CaseSettings(OfFile):
 
     @model_validator(mode="after")
     def _fits_together(self) -> CaseSettings:
-        free = self.bifurcation or self.stability or self.is_only_built or any(s.motion for s in self.springs)
+        free = self.is_only_built or any(s.motion for s in self.springs)
         free = free or any(c.ground is not None for c in self.contacts)
-        free = free or self.orbit is not None and self.orbit.release is not None
+        free = free or any(analyses()[name].unloaded(keys) for name, keys in self.asked.items())
         moved = free and not self.excitation and not self.excitations
         for short, many in (("body", "bodies"), ("excitation", "excitations"), ("monitor", "monitors")):
             if bool(getattr(self, short)) == bool(getattr(self, many)) and not (moved and short == "excitation"):
@@ -426,7 +412,7 @@ class CaseSettings(OfFile):
         names = [b.name for b in self.components]
         if twice := sorted({n for n in names if names.count(n) > 1}):
             raise ValueError(f"bodies: the name '{twice[0]}' is taken; give every body its own")
-        named_once(self, "bifurcation")
+        named_once(self, *(name for name in self.asked if analyses()[name].several))
         if said := self._whose():
             raise ValueError(said)
         if self.loads and all(x.is_zero for x in self.loads):
@@ -502,7 +488,7 @@ class CaseSettings(OfFile):
 
     def _pressed(self) -> CaseSettings:
         moves = [c.interface for c in self.contacts if c.ground is not None]
-        if moves and not (self.is_only_in_time or self.is_only_followed or self.is_only_built):
+        if moves and not (self.is_only_followed or self.is_only_built):
             raise ValueError(
                 f"contacts.{moves[0]}.ground: only a motion in time knows ground that moves; give [orbit], "
                 "[stability], [[bifurcation]] or [two_tones], and no sweep"
@@ -516,8 +502,9 @@ class CaseSettings(OfFile):
             )
         if any(b.aerodynamics for b in self.bodies) and self.ring is None:
             raise ValueError("bodies: aerodynamics belong to the waves of a ring; add [ring] with its blades")
-        if self.mistuning is not None and self.ring is None:
-            raise ValueError("mistuning: is that of a ring; add [ring] with blades and engine_order")
+        for name, keys in self.asked.items():
+            if words := analyses()[name].fits(keys, self):
+                raise ValueError(f"{name}: {words}")
         if any(c.against_sector for c in self.contacts) and self.ring is None:
             raise ValueError("contacts: against_sector belongs to a ring; add [ring] with blades and engine_order")
         return self
@@ -574,7 +561,7 @@ class CaseSettings(OfFile):
             [f for c in self.contacts for f in c.files]
             + [x.field for x in self.loads]
             + [b.aerodynamics for b in self.components]
-            + [f for s in (self.mistuning.scatter if self.mistuning else ()) for f in (s.file, *s.others.values())]
+            + [f for name, keys in self.asked.items() for f in analyses()[name].files(keys)]
         )
         return tuple(dict.fromkeys(f for f in named if f is not None))
 
@@ -615,22 +602,10 @@ UNPRESSED = (0.0,)
 """Normal forces of the sweep of a case whose contacts are pressed in Python."""
 
 
-def unasked_sweep(raw: Mapping[str, Any]) -> dict[str, float]:
-    """Start and stop (Hz) of the sweep of a case that has none, by its keys."""
-    asked = raw.get("orbit")
-    return (band_of(asked) if isinstance(asked, Mapping) else {}) or NO_SWEEP
-
-
-def band_of(orbit: Mapping[str, Any]) -> dict[str, float]:
-    """Start and stop (Hz) of the sweep of a case that has none: an octave around what is asked of its motion in time;
-    nothing where that says no numbers."""
-    ramp = orbit.get("run_up")
-    ends = [ramp.get("start"), ramp.get("stop")] if isinstance(ramp, Mapping) else None
-    for values, unit in ((orbit.get("frequency"), 1.0), (orbit.get("Omega"), 2 * math.pi), (ends, 1.0)):
-        asked = [v for v in (values if isinstance(values, list | tuple) else [values]) if isinstance(v, int | float)]
-        if asked and min(asked) > 0:
-            return {"start": 0.5 * min(asked) / unit, "stop": 2.0 * max(asked) / unit}
-    return {}
+def unasked_sweep(asked: Mapping[str, Any]) -> Mapping[str, float]:
+    """Start and stop (Hz) of the sweep of a case that has none, by what it asks for."""
+    bands = (analyses()[name].band(keys) for name, keys in asked.items() if name in _unswept())
+    return next(filter(None, bands), NO_SWEEP)
 
 
 def load_case(path: Path | str, assignments: Sequence[str] | None = None) -> tuple[CaseSettings, dict[str, Any]]:
@@ -645,10 +620,15 @@ def case_model() -> type[CaseSettings]:
     Raises:
         UserError: the table of one has the name of another key.
     """
-    tables: dict[str, Any] = {name: (one.asks | None, None) for name, one in analyses().items()}
+    tables: dict[str, Any] = {name: (_table_of(one) | None, None) for name, one in analyses().items()}
     if taken := sorted(set(tables) & set(CaseSettings.model_fields)):
         raise UserError(f"{GROUP}: '{taken[0]}' is a key of every case already; remove its package or rename it there")
     return create_model("CaseSettings", __base__=CaseSettings, __doc__=CaseSettings.__doc__, **tables)
+
+
+def _table_of(one: Analysis) -> Any:
+    """The type of the keys of an analysis."""
+    return Annotated[tuple[one.asks, ...], BeforeValidator(_tuple)] if one.several else one.asks  # type: ignore[name-defined]
 
 
 def _unswept() -> set[str]:

@@ -2,19 +2,25 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from ..analysis import Answer, Drawing
 from ..basis import read_basis
 from ..case import CaseSettings, load_case
 from ..case.assemble import Built, build
 from ..data import ModalBasis
-from ..errors import in_its_file
+from ..errors import UserError, in_its_file, of_file
 from ..files import store
+from ..files.tables import columns_csv
+from ..pictures.plots import empty_figure, save_figure
+from ..report.page import answer_page
+from ..results import Journal, open_journal
 from .checkpoint import inputs_of
 from .stage import Made, Report, Stage, folder_of_case, hash_of_code
 
@@ -32,7 +38,8 @@ class Written(NamedTuple):
 
 
 def answered(stage: Stage, inputs: Mapping[str, Any], work: Callable[[], Written]) -> Written:
-    """The answer that a stage's product (JSON) holds, made where it is not up to date; see `Stage.make`."""
+    """The answer that a stage's product (JSON) holds, made where it is not up to date; see `Stage.make`. What
+    `work` keeps in ``NAME.points`` until then is removed."""
     folder = stage.product.parent
 
     def make() -> Made:
@@ -43,8 +50,73 @@ def answered(stage: Stage, inputs: Mapping[str, Any], work: Callable[[], Written
         return Made(found.files)
 
     stage.make(inputs, make)
+    points_of(stage).unlink(missing_ok=True)
     told = json.loads(stage.product.read_text())
     return Written([folder / name for name in told["files"]], told["said"], told["whole"])
+
+
+def points_of(stage: Stage) -> Path:
+    """The journal of what is finished, until all that is made of it is there."""
+    return stage.product.with_suffix(".points")
+
+
+@contextlib.contextmanager
+def kept(stage: Stage, inputs: str, head: Mapping[str, Any]) -> Iterator[Journal]:
+    """That journal, opened; gone where a mistake is told before anything is finished. inputs, head:
+    see `results.open_journal`."""
+    with open_journal(points_of(stage), inputs, head, stage.force) as journal:
+        try:
+            yield journal
+        except UserError:
+            if not journal.series:
+                points_of(stage).unlink()
+            raise
+
+
+def written(answer: Answer, name: str, folder: Path, title: str, pictures: bool, case: str = "") -> Written:
+    """The files of an answer, the page first, and what is said of them.
+
+    Args:
+        name: begins those that have no name of their own. case: begins the titles of diagrams.
+    """
+    made, moving, begins = _data(name, answer, folder), list[Path](), "pictures/"
+    pictured = [file for file in answer.files if file.startswith(begins) and pictures]
+    for file, write in answer.files.items():
+        if file in pictured or not file.startswith(begins):
+            write(folder / file)
+    made += [folder / file for file in answer.files if not file.startswith(begins)]
+    shown = [folder / file for file in pictured]
+    if pictures:
+        shown += [drawn(d, folder / f"{begins}{_named(name, end)}.png", case) for end, d in answer.diagrams.items()]
+        moving = list(answer.moving(folder))
+    shown += [path for path in moving if path.suffix == ".gif"]
+    page = folder / f"{name}.html"
+    store.write_text(page, answer_page(title, answer.sentences, shown, *answer.tables))
+    files = [page, *made, *dict.fromkeys([*shown, *moving])]
+    return Written(files, [*answer.lines, *answer.sentences], answer.whole)
+
+
+def _named(name: str, end: str) -> str:
+    return f"{name}_{end}" if end else name
+
+
+def _data(name: str, answer: Answer, folder: Path) -> list[Path]:
+    """A table and a file of each."""
+    files = []
+    for end, data in answer.data.items():
+        stem = folder / _named(name, end)
+        store.write_text(stem.with_suffix(".csv"), columns_csv(data.columns(), 10))
+        files += [stem.with_suffix(".csv"), data.save(stem.with_suffix(".h5"))]
+    return files
+
+
+def drawn(diagram: Drawing, path: Path, case: str = "") -> Path:
+    """A diagram as a PNG, the name of its case before its title."""
+    figure = empty_figure(*diagram.size)
+    diagram.draw(figure)
+    if title := ": ".join(filter(None, (case, diagram.title))):
+        figure.suptitle(title)
+    return save_figure(figure, path)
 
 
 @dataclass(frozen=True)
@@ -91,21 +163,17 @@ class CaseJob:
         """What the answer depends on, besides pictures."""
         return inputs_of(self.raw, self.settings, self.files)
 
-    def made_by(self, stage: Stage) -> str:
-        """Hash of what all that is computed depends on."""
-        return store.hash_settings({**self.inputs, "code": hash_of_code(stage.code)})
+    def made_by(self, stage: Stage, but: str = "") -> str:
+        """Hash of what all that is computed depends on, but a table of the case."""
+        case = {key: value for key, value in self.inputs["case"].items() if key != but}
+        return store.hash_settings({**self.inputs, "case": case, "code": hash_of_code(stage.code)})
 
     @in_its_file
     def answer(self, name: str, module: str | Path, work: Callable[[Stage, CaseJob], Written]) -> Written:
-        """The answer that ``name.json`` holds, made by a module's `work` where it is not up to date.
-
-        What `work` keeps in ``name.points`` until then is removed.
-        """
+        """The answer that ``name.json`` holds, made by a module's `work` where it is not up to date."""
         product = self.folder / f"{name}.json"
         stage = Stage(product, (module,), self.force, self.report, case=self.path)
-        found = answered(stage, {**self.inputs, "pictures": self.pictures}, lambda: work(stage, self))
-        stage.product.with_suffix(".points").unlink(missing_ok=True)
-        return found
+        return answered(stage, {**self.inputs, "pictures": self.pictures}, lambda: work(stage, self))
 
 
 @dataclass(frozen=True)
@@ -123,13 +191,26 @@ class RollJob:
     report: Report = lambda _: None
     pictures: bool = True
 
-    def stage(self, case: str, name: str, module: str) -> Stage:
-        """The stage whose product is ``name.json``, made by a module."""
-        product = folder_of_case(self.path, case, self.root) / f"{name}.json"
-        return Stage(product, (module,), self.force, self.report, case=self.path)
+    def answer(
+        self, case: str, name: str, module: str, raw: Mapping[str, Any], files: Iterable[Path | str],
+        title: str, solve: Callable[[Journal, Report], Answer],
+    ) -> Written:  # fmt: skip
+        """The answer that ``name.json`` holds, made where it is not up to date.
 
-    def inputs(self, raw: Mapping[str, Any], files: Iterable[Path | str]) -> dict[str, Any]:
-        """What the answer depends on: the case as a table, files that it names (what is missing is told where it is
-        read), and whether pictures are wanted."""
-        there = [file for name in files if (file := self.path.parent / name).is_file()]
-        return {"case": raw, "files": [store.hash_file(file) for file in there], "pictures": self.pictures}
+        Args:
+            case: its name. raw: it as a table. files: that it names; what is missing is told where
+                it is read. title: of the page.
+        """
+        product = folder_of_case(self.path, case, self.root) / f"{name}.json"
+        stage = Stage(product, (module,), self.force, self.report, case=self.path)
+        there = [file for f in files if (file := self.path.parent / f).is_file()]
+        inputs = {"case": raw, "files": [store.hash_file(file) for file in there]}
+        own = store.hash_settings({**inputs, "code": hash_of_code(stage.code)})
+
+        def work() -> Written:
+            with of_file(self.path), kept(stage, own, {"case": case}) as journal:
+                answer = solve(journal, self.report)
+            stage.begin()
+            return written(answer, name, product.parent, f"{case}: {title}", self.pictures)
+
+        return answered(stage, {**inputs, "pictures": self.pictures}, work)
