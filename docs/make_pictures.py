@@ -1109,7 +1109,7 @@ def own() -> None:
 def reference() -> None:
     """The references of body.toml, contact.toml and case.toml, of the modal file and of the public names."""
     fill("modal_file.md", "modal_file", modal_reference())
-    for name, (page, *_) in FILES.items():
+    for name, (page, _) in FILES.items():
         fill(page, name, file_reference(name))
     fill("python.md", "public", public_reference())
 

@@ -128,134 +128,7 @@ def typed(line: str, folder: Path) -> str:
     return f"$ {line}\n{done.stdout}"
 
 
-# body.toml ---------------------------------------------------------------------------------------------------------
-
-MEANING: dict[str, tuple[str, str]] = {
-    # key: (unit, meaning), of models that do not say it themselves
-    "stability.growth": ("1/s", "growth rates of the window of roots, from, to"),
-    "stability.frequency": ("Hz", "frequencies of the window, from, to"),
-    "stability.over": ("", "parameter of the diagram"),
-    "stability.range": ("", "its first and last value, speed in rad/s; no diagram if not given"),
-    "stability.points": ("", "number of values between them"),
-    "stability.tolerance": ("", "largest relative error of a root at the values held out from the basis"),
-    "stability.accuracy": ("", "relative, of the matrices' entries: decides which growth rates are neutral"),
-    "stability.neutral": ("1/s", "growth rates below it are neutral whatever the accuracy"),
-    "stability.certify": ("", "count the roots by the argument principle"),
-    "closures.name": ("", "the contact's name in the modal file and the report"),
-    "closures.face": ("", "face whose points are held apart from the other side (the finer meshed one)"),
-    "closures.against": ("", "the face it meets, or `ground`"),
-    "closures.sector_shift": ("", "where that face is: next blade 1, previous -1, this body 0"),
-    "closures.interference": ("*", "by how much the drawn faces overlap when assembled; negative: a further gap"),
-    "closures.point": ("*", "of the ground; the middle of the face if not given"),
-    "closures.normal": ("", "of the ground, towards the body; opposite to the face if not given"),
-    "closures.modes": (
-        "",
-        "`open`: the modes leave the contact to the friction law, its static force stays; "
-        "`closed`: they keep its stiffness along the normal, free to slide",
-    ),
-    "closures.slide": ("*", "how far the faces may slide on each other; 1.5 elements if not given"),
-    "closures.penalty": ("Pa/m", "only the number of iterations depends on it; chosen from the modulus if not given"),
-}
-
-
-MEANING_CASE: dict[str, tuple[str, str]] = {
-    "orbit.frequency": ("Hz", "of the first harmonic of the excitations: one or several, one motion each"),
-    "orbit.Omega": ("rad/s", "or so"),
-    "orbit.run_up.start": ("Hz", "the frequency goes linearly from here; instead of `frequency`"),
-    "orbit.run_up.stop": ("Hz", "to here, up or down"),
-    "orbit.run_up.time": ("s", "within this time"),
-    "orbit.run_up.engine_order": ("", "the rotation speed is the frequency over it; centrifugal loads follow its "
-                                      "square"),
-    "orbit.run_up.euler": ("", "bodies that turn with it, which feel its change as a load"),
-    "orbit.settle": ("", "periods that are left to themselves"),
-    "orbit.keep": ("", "periods that are kept"),
-    "orbit.samples": ("", "of each that is kept"),
-    "orbit.steps": ("", "of each; if not given, 150 in a period of the fastest motion with closed contacts, and 512 at "
-                    "least"),
-    "orbit.start": ("", "at rest under the steady loads, or as preloaded; or on the vibration of harmonic balance"),
-    "orbit.release.displacement": ("m", "where the bodies are let go, instead of `start`: coordinates of all of them, "
-                                   "those of their modes, zero if not given"),
-    "orbit.release.velocity": ("m/s", "of these coordinates"),
-    "orbit.release.mode": ("", "or a mode of the bodies without their contacts, by its number from 1"),
-    "orbit.release.amplitude": ("m", "of the first monitor in that mode"),
-    "orbit.normal_force": ("N", "of the contacts that the sweep presses"),
-    "mistuning.samples": ("", "whole rings that are solved, at most"),
-    "mistuning.until": ("", "ends when half of the interval of the 95 % quantile is that share of it"),
-    "mistuning.rare": ("", "further samples, chosen by a linear ring, for the 99.9 % quantile; none if 0"),
-    "mistuning.seed": ("", "of all random numbers; a sample depends on it and its number alone"),
-    "mistuning.stuck": ("", "whether contacts stick, which is linear"),
-    "mistuning.normal_force": ("N", "of the contacts that the sweep presses; its smallest if not given"),
-    "mistuning.workers": (
-        "",
-        "processes; as many as there are cores if not given, samples are the same for any number",
-    ),
-    "mistuning.scatter.of": ("", "what differs from sector to sector"),
-    "mistuning.scatter.deviation": ("", "standard deviation, a share of the nominal value; of `added_mass` kg, of "
-                                    "`gap` m"),
-    "mistuning.scatter.distribution": ("", "the median of a lognormal one is nominal"),
-    "mistuning.scatter.values": ("", "or deviations that are known, sector by sector; a shorter pattern is repeated"),
-    "mistuning.scatter.file": (
-        "",
-        "or a table with the column `deviation`, or `frequency_Hz`, whose mean is nominal; in the order of its rows, "
-        "or of its column `blade` or `sector`",
-    ),
-    "mistuning.scatter.others": ("", "or sectors, from 0, that have another modal file, and the file (`{ 3 = "
-                                 "\"repaired.h5\" }`), of `modal_file`"),
-    "mistuning.scatter.arrangement": ("", "of the known values: as given, in another order in every sample, or each "
-                                      "drawn from them"),
-    "mistuning.scatter.body": ("", "whose; may be left out where there is one"),
-    "mistuning.scatter.contact": ("", "its interface; may be left out where there is one"),
-    "mistuning.scatter.at": ("", "monitor at which `added_mass` sits"),
-    "mistuning.scatter.together": ("", "correlation between the modes of a body; 0: each alone"),
-    "mistuning.scatter.neighbours": ("", "correlation between a sector and the next one"),
-    "stability.growth": ("1/s", "from, to, of the roots that are wanted ([squeal](squeal.md))"),
-    "stability.frequency": ("Hz", "from, to"),
-    "stability.accuracy": ("", "relative, of the entries of the matrices"),
-    "stability.neutral": ("1/s", "growth rates below it are neither growth nor decay"),
-    "stability.full": ("", "states of the map at which the unreduced matrices are counted as well"),
-    "stability.over.parameter": ("", "what the axis of the map says; two of these tables make one"),
-    "stability.over.unit": ("", "of the parameter, on the axis"),
-    "stability.over.keys": ("", "keys of this case, dotted, that follow the parameter, each with its factor"),
-    "stability.over.start": ("", "of the parameter"),
-    "stability.over.stop": ("", "above it"),
-    "stability.over.points": ("", "evenly spaced"),
-    "stability.cycle.parameter": ("", "over which the limit cycles born at Hopf points are followed"),
-    "stability.cycle.unit": ("", "of the parameter"),
-    "stability.cycle.keys": ("", "as above"),
-    "stability.cycle.start": ("", "of the parameter"),
-    "stability.cycle.stop": ("", "above it"),
-    "stability.cycle.points": ("", "of a branch at most"),
-    "stability.cycle.harmonics": ("", "of the balance along a branch"),
-    "stability.cycle.accuracy": ("", "share of the amplitude to which three orbits of a branch get harmonics, that are "
-                                 "compared with a motion in time and judged by their Floquet multipliers"),
-    "stability.cycle.across.parameter": ("", "a second one, at whose values they are followed as well"),
-    "stability.cycle.across.unit": ("", "of it"),
-    "stability.cycle.across.keys": ("", "as above"),
-    "stability.cycle.across.start": ("", "of it"),
-    "stability.cycle.across.stop": ("", "above it"),
-    "stability.cycle.across.points": ("", "values of it, evenly spaced"),
-    "stability.cycle.across.harmonics": ("", "of the balance along these branches"),
-    "bifurcation.name": ("", "of the diagram's files"),
-    "bifurcation.parameter": ("", "what its axis says"),
-    "bifurcation.unit": ("", "of the parameter, on the axis"),
-    "bifurcation.keys": ("", "keys of this case, dotted, that follow the parameter, each with the factor that makes "
-                         "its value; `system.` begins those of a system.toml"),
-    "bifurcation.fixed": ("", "other keys and their values, of this diagram alone"),
-    "bifurcation.start": ("", "of the parameter"),
-    "bifurcation.stop": ("", "of it; may be the smaller one"),
-    "bifurcation.orbits": ("", "whether the orbits born at Hopf points are followed"),
-    "bifurcation.doublings": ("", "how often from an orbit on to that of twice its period"),
-    "bifurcation.attractors": ("", "values of the parameter at which motions from many starts are left alone, to find "
-                               "orbits that coexist"),
-    "bifurcation.starts": ("", "how many"),
-    "bifurcation.seed": ("", "from which they are drawn"),
-    "bifurcation.deflate": ("", "values of the parameter at which orbits, stable or not, are looked for beside all "
-                            "that is known"),
-    "bifurcation.nodes": ("", "of an orbit, from which it is shot; doubled with its period"),
-    "bifurcation.step": ("", "the longest along a branch, a share of start to stop"),
-    "bifurcation.points": ("", "of a branch at most"),
-    "bifurcation.frequency": ("Hz", "of the first harmonic of the excitations, where there are any"),
-}  # fmt: skip
+# references ---------------------------------------------------------------------------------------
 
 
 def public_reference() -> str:
@@ -268,31 +141,34 @@ def public_reference() -> str:
     return table(["name", "what it is"], rows)
 
 
-FILES: dict[str, tuple[str, Any, dict[str, tuple[str, str]]]] = {
-    "body_toml": ("body_toml.md", BodySettings, MEANING),
-    "contact_toml": ("contact_toml.md", ContactFile, {}),
-    "case_toml": ("case_toml.md", case_model(), MEANING_CASE),
-    "system_toml": ("system_toml.md", SystemSettings, {}),
-    "wheel_on_rail": ("rolling_toml.md", RollingCase, {}),
-    "tyre": ("rolling_toml.md", TyreCase, {}),
-    "vehicle": ("rolling_toml.md", VehicleCase, {}),
-    "kinematics": ("rolling_toml.md", KinematicsCase, {}),
+FILES: dict[str, tuple[str, Any]] = {
+    "body_toml": ("body_toml.md", BodySettings),
+    "contact_toml": ("contact_toml.md", ContactFile),
+    "case_toml": ("case_toml.md", case_model()),
+    "system_toml": ("system_toml.md", SystemSettings),
+    "wheel_on_rail": ("rolling_toml.md", RollingCase),
+    "tyre": ("rolling_toml.md", TyreCase),
+    "vehicle": ("rolling_toml.md", VehicleCase),
+    "kinematics": ("rolling_toml.md", KinematicsCase),
 }
-"""Table -> its page, the model that reads the file, and keys that it does not describe itself."""
+"""Table -> its page, and the model that reads the file."""
 
 
 def file_reference(name: str) -> str:
     """Tables of every key of a settings file, made from the models that read it."""
-    page, model, meanings = FILES[name]
+    page, model = FILES[name]
     depth = "##" if page == f"{name}.md" else "###"
-    return "\n\n".join(f"{depth} {_section(*s, meanings)}" for s in sections(model))
+    return "\n\n".join(f"{depth} {_section(*s)}" for s in sections(model))
 
 
-def silent(name: str) -> list[str]:
+def silent(model: Any) -> list[str]:
     """Keys of a settings file that do not say what they are."""
-    _, model, meanings = FILES[name]
-    keys = [(f"{s[0]}{key}", keys_of(s[-1])[key]) for s in sections(model) for key in _plain_keys(s[-1])]
-    return [key for key, says in keys if not any(says) and key not in meanings]
+    return [
+        f"{prefix}{key}"
+        for prefix, _, _, part in sections(model)
+        for key in _plain_keys(part)
+        if not any(keys_of(part)[key])
+    ]
 
 
 STORED: tuple[tuple[str, type], ...] = (
@@ -362,13 +238,13 @@ def _plain_keys(model: Any) -> list[str]:
     return [k for k, f in _fields(model).items() if not _told(model, f)]
 
 
-def _section(prefix: str, title: str, text: str, model: Any, meanings: dict[str, tuple[str, str]]) -> str:
+def _section(prefix: str, title: str, text: str, model: Any) -> str:
     schema, said = model.model_json_schema()["properties"], keys_of(model)
     rows = []
     for key in _plain_keys(model):
-        unit, meaning = meanings.get(f"{prefix}{key}") or said[key]
-        unit = unit.replace("*", "length_unit")
-        rows.append([f"`{key}`", _type(schema[key]), unit, _default(_fields(model)[key]), meaning])
+        unit, meaning = said[key]
+        default = _default(_fields(model)[key])
+        rows.append([f"`{key}`", _type(schema[key]), unit, default, meaning])
     return (
         f"{title or 'Top of the file'}\n\n"
         + (f"{text}\n\n" if text else "")

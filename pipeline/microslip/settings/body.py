@@ -147,21 +147,27 @@ class MatrixTerm(Model):
 
 
 class StabilitySettings(Model):
-    """Which roots of (s^2 M + s C + K) x = 0 are wanted: all with growth rates (1/s) and frequencies (Hz) from, to.
-
-    over: parameter of the diagram, with its first and last value in `range`. accuracy: relative, of the matrices'
-    entries. neutral: growth rates (1/s) below it are neither growth nor decay, whatever the accuracy.
-    """
+    """Which roots of (s^2 M + s C + K) x = 0 are wanted: all with growth rates and frequencies in
+    a window."""
 
     growth: Annotated[tuple[Number, Number], BeforeValidator(_finite_vector)] = (-100.0, 1000.0)
+    """[1/s] growth rates of the window of roots, from, to"""
     frequency: Annotated[tuple[NotNegative, NotNegative], BeforeValidator(_finite_vector)]
+    """[Hz] frequencies of the window, from, to"""
     over: Name = "speed"
+    """parameter of the diagram"""
     range: Annotated[tuple[Number, Number] | None, BeforeValidator(_finite_vector)] = None
+    """its first and last value, speed in rad/s; no diagram if not given"""
     points: Annotated[int, Field(ge=2, le=10000)] = 100
+    """number of values between them"""
     tolerance: Annotated[float, BeforeValidator(_float), Field(ge=1e-10, le=1e-2)] = 1e-7
+    """largest relative error of a root at the values held out from the basis"""
     accuracy: Annotated[float, BeforeValidator(_float), Field(ge=0, le=0.1)] = 1e-8
+    """relative, of the matrices' entries: decides which growth rates are neutral"""
     neutral: NotNegative = 0.0
+    """[1/s] growth rates below it are neutral whatever the accuracy"""
     certify: bool = True
+    """count the roots by the argument principle"""
 
     @model_validator(mode="after")
     def _has_area(self) -> StabilitySettings:
@@ -453,22 +459,30 @@ class Load(Model):
 
 
 class Closure(Model):
-    """Two faces that may touch in the static state, without friction; Newton finds where they do and how hard.
-
-    against: the face on the other side, or ``ground``, a rigid plane (through `point` with `normal` towards the body;
-    if not given, through the middle of the face).
-    """
+    """Two faces that may touch in the static state, without friction; Newton finds where they do
+    and how hard."""
 
     name: Name
+    """the contact's name in the modal file and the report"""
     face: FaceName
+    """face whose points are held apart from the other side (the finer meshed one)"""
     against: FaceName
+    """the face it meets, or `ground`, a rigid plane"""
     sector_shift: Annotated[Literal[-1, 0, 1], BeforeValidator(_whole)] = 0
+    """where that face is: next blade 1, previous -1, this body 0"""
     interference: Length = 0.0
+    """by how much the drawn faces overlap when assembled; negative: a further gap"""
     point: Point | None = None
+    """of the ground; the middle of the face if not given"""
     normal: Direction | None = None
+    """of the ground, towards the body; opposite to the face if not given"""
     modes: Literal["open", "closed"] = "open"
+    """`open`: the modes leave the contact to the friction law, its static force stays; `closed`:
+    they keep its stiffness along the normal, free to slide"""
     slide: PositiveLength | None = None
+    """how far the faces may slide on each other; 1.5 elements if not given"""
     penalty: Positive | None = None
+    """[Pa/m] only the number of iterations depends on it; chosen from the modulus if not given"""
 
     @model_validator(mode="after")
     def _sides(self) -> Closure:
