@@ -281,7 +281,8 @@ def file_reference(name: str) -> str:
     """Tables of every key of a settings file, made from the models that read it."""
     page, model, meanings = FILES[name]
     depth = "##" if page == f"{name}.md" else "###"
-    return "\n\n".join(f"{depth} {_section(*s, meanings)}" for s in sections(model))
+    length = "length_unit" if "length_unit" in model.model_fields else "m"
+    return "\n\n".join(f"{depth} {_section(*s, length, meanings)}" for s in sections(model))
 
 
 def silent(name: str) -> list[str]:
@@ -358,12 +359,12 @@ def _plain_keys(model: Any) -> list[str]:
     return [k for k, f in _fields(model).items() if not _told(model, f)]
 
 
-def _section(prefix: str, title: str, text: str, model: Any, meanings: dict[str, tuple[str, str]]) -> str:
+def _section(prefix: str, title: str, text: str, model: Any, length: str, meanings: dict[str, tuple[str, str]]) -> str:
     schema, said = model.model_json_schema()["properties"], keys_of(model)
     rows = []
     for key in _plain_keys(model):
         unit, meaning = meanings.get(f"{prefix}{key}") or said[key]
-        unit = unit.replace("*", "length_unit")
+        unit = unit.replace("*", length).replace("length_unit", length)
         rows.append([f"`{key}`", _type(schema[key]), unit, _default(_fields(model)[key]), meaning])
     return (
         f"{title or 'Top of the file'}\n\n"

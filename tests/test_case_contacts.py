@@ -358,6 +358,9 @@ WRONG: dict[str, tuple[dict[str, Any], str]] = {
     "neither": (table(**STIFF, friction="0.3"), "friction: must be a number or a table"),
     "unknown kind": (table(**STIFF, law="iwam"), 'right.law: "iwam" is unknown; choose one of'),
     "part of it": (table(**STIFF, friction={"kind": "coulomb"}), "contacts.right.friction.mu: is missing; add it"),
+    "a length": (
+        table(**STIFF, roughness={"kind": "polynomial", "R_Z": -1.0}), "(it is -1.0); correct it, in m"
+    ),
     "both": (table(**STIFF, stiffness=GIVEN), "normal_stiffness: is short for a table"),
     "smooth strips": (table(**STIFF, law="strips"), "law: strips are those of a rough surface"),
     "cold": (table(**STIFF, friction={"kind": "heated", "mu_0": 0.3}), "the heat of sliding; add [temperature]"),
