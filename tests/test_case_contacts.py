@@ -418,8 +418,11 @@ def test_mistakes_are_named_with_the_file(raw: dict[str, Any], words: str) -> No
     assert refused(words, built, raw).startswith("case.toml: ")
 
 
-def test_mistakes_at_the_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_mistakes_at_the_command_line(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Exit code 2, one sentence, and what was there before stays as it was."""
+    monkeypatch.chdir(tmp_path)
     write_basis(tmp_path / "beam.h5", small.basis())
     case = tmp_path / "case.toml"
     text = """name = "pair"
