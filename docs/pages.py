@@ -158,7 +158,8 @@ def file_reference(name: str) -> str:
     """Tables of every key of a settings file, made from the models that read it."""
     page, model = FILES[name]
     depth = "##" if page == f"{name}.md" else "###"
-    return "\n\n".join(f"{depth} {_section(*s)}" for s in sections(model))
+    length = "length_unit" if "length_unit" in model.model_fields else "m"
+    return "\n\n".join(f"{depth} {_section(*s[1:], length)}" for s in sections(model))
 
 
 def silent(model: Any) -> list[str]:
@@ -238,12 +239,12 @@ def _plain_keys(model: Any) -> list[str]:
     return [k for k, f in _fields(model).items() if not _told(model, f)]
 
 
-def _section(prefix: str, title: str, text: str, model: Any) -> str:
+def _section(title: str, text: str, model: Any, length: str) -> str:
     schema, said = model.model_json_schema()["properties"], keys_of(model)
     rows = []
     for key in _plain_keys(model):
         unit, meaning = said[key]
-        default = _default(_fields(model)[key])
+        unit, default = unit.replace("length_unit", length), _default(_fields(model)[key])
         rows.append([f"`{key}`", _type(schema[key]), unit, default, meaning])
     return (
         f"{title or 'Top of the file'}\n\n"

@@ -202,7 +202,7 @@ class ContactLaw(Model):
     tangential_stiffness: Positive | None = None
     """[N/m] c_R0, likewise"""
     roughness: Annotated[AnyRoughness | None, _short("polynomial", "R_Z", AnyRoughness)] = None
-    """[m] R_Z, or a table as in a contact.toml"""
+    """[length_unit] R_Z, or a table as in a contact.toml"""
     friction: Annotated[AnyFriction | None, _short("coulomb", "mu", AnyFriction)] = None
     """coefficient, or a table as in a contact.toml; **required** without file"""
     law: Annotated[AnyLaw | None, BeforeValidator(_named, json_schema_input_type=str | AnyLaw)] = None

@@ -154,6 +154,7 @@ def _sentences(errors: list[Any], raw: dict[str, Any], model: type[BaseModel]) -
     for key, found in by_key.items():
         if found[0][1]["type"] != "extra_forbidden" and not (found[0][1]["type"] == "missing" and key in meant):
             unit, _ = known[key].get(key[-1] if key else "", ("", ""))
+            unit = unit if "length_unit" in model.model_fields else unit.replace("length_unit", "m")
             said = _sentence(key, found, raw)
             bare = not unit or not said.endswith((" add it", " correct it"))
             yield said if bare else f"{said}, in {unit}"

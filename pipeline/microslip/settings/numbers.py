@@ -164,7 +164,7 @@ def _texts(module: str) -> dict[tuple[str, str], str]:
     """Class and key -> text below it; pydantic's own way costs every import 3 ms a class."""
     try:
         classes = ast.walk(ast.parse(inspect.getsource(sys.modules[module])))
-    except (OSError, TypeError):
+    except (KeyError, OSError, TypeError):
         return {}
     return {
         (of.name, ast.unparse(key.target)): str(text.value.value)
