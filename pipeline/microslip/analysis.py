@@ -81,7 +81,8 @@ class Answer:
             tell all that is to be said of the case. whole: whether nothing of it was lost.
         files: other files by their names, below the folder of the answer -> what writes them;
             pictures are shown on the page. moving: writes bodies that move below that folder, where
-            pictures are wanted. lines: of a table for the terminal.
+            pictures are wanted. lines: of a table for the terminal. missing: what was asked for and is not
+            known, in words.
     """
 
     sentences: Sequence[str]
@@ -93,6 +94,7 @@ class Answer:
     files: Mapping[str, Callable[[Path], Any]] = field(default_factory=dict)
     moving: Callable[[Path], Sequence[Path]] = lambda _: ()
     lines: Sequence[str] = ()
+    missing: str = ""
 
 
 @dataclass(frozen=True)

@@ -382,10 +382,8 @@ def _survey(case: Path, basis: Path | None, kind: str, set_: Sequence[str], forc
     from .stages.surveying import survey_stage
 
     with progress(f"{kind.replace('_', ' ')} of {case}", quiet) as report:
-        made, sentences, missing = survey_stage(case, basis, kind, list(set_), force, report)
-    _say("\n".join([*sentences, *map(str, made)]), quiet)
-    if missing:
-        raise NotConverged(f"{missing}; {made[0]} holds what was found")
+        found = survey_stage(case, basis, kind, list(set_), force, report)
+    _tell(found, quiet, f"{found.missing}; {{page}} holds what was found")
 
 
 def _case_job(

@@ -29,12 +29,14 @@ class Written(NamedTuple):
     """What a stage leaves for a reader.
 
     Attributes:
-        files: the page first. said: sentences, and lines of a table. whole: whether nothing of it was lost.
+        files: the page first. said: sentences, and lines of a table. whole: whether nothing of it was lost. missing:
+            what, in words.
     """
 
     files: Sequence[Path]
     said: Sequence[str]
     whole: bool = True
+    missing: str = ""
 
 
 def answered(stage: Stage, inputs: Mapping[str, Any], work: Callable[[], Written]) -> Written:
@@ -46,13 +48,14 @@ def answered(stage: Stage, inputs: Mapping[str, Any], work: Callable[[], Written
         found = work()
         names = [str(path.relative_to(folder)) for path in found.files]
         told = {"files": names, "said": list(found.said), "whole": bool(found.whole)}
+        told |= {"missing": found.missing}
         store.write_json(stage.product, told)
         return Made(found.files)
 
     stage.make(inputs, make)
     points_of(stage).unlink(missing_ok=True)
     told = json.loads(stage.product.read_text())
-    return Written([folder / name for name in told["files"]], told["said"], told["whole"])
+    return Written([folder / name for name in told["files"]], told["said"], told["whole"], told["missing"])
 
 
 def points_of(stage: Stage) -> Path:
@@ -93,7 +96,8 @@ def written(answer: Answer, name: str, folder: Path, title: str, pictures: bool,
     page = folder / f"{name}.html"
     store.write_text(page, answer_page(title, answer.sentences, shown, *answer.tables))
     files = [page, *made, *dict.fromkeys([*shown, *moving])]
-    return Written(files, [*answer.lines, *answer.sentences], answer.whole)
+    whole = answer.whole and not answer.missing
+    return Written(files, [*answer.lines, *answer.sentences], whole, answer.missing)
 
 
 def _named(name: str, end: str) -> str:
