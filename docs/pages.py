@@ -288,8 +288,12 @@ def file_reference(name: str) -> str:
 def silent(name: str) -> list[str]:
     """Keys of a settings file that do not say what they are."""
     _, model, meanings = FILES[name]
-    keys = [(f"{s[0]}{key}", keys_of(s[-1])[key]) for s in sections(model) for key in _plain_keys(s[-1])]
-    return [key for key, says in keys if not any(says) and key not in meanings]
+    return [
+        f"{prefix}{key}"
+        for prefix, _, _, part in sections(model)
+        for key in _plain_keys(part)
+        if not any(keys_of(part)[key]) and f"{prefix}{key}" not in meanings
+    ]
 
 
 STORED: tuple[tuple[str, type], ...] = (
@@ -359,7 +363,14 @@ def _plain_keys(model: Any) -> list[str]:
     return [k for k, f in _fields(model).items() if not _told(model, f)]
 
 
-def _section(prefix: str, title: str, text: str, model: Any, length: str, meanings: dict[str, tuple[str, str]]) -> str:
+def _section(
+    prefix: str,
+    title: str,
+    text: str,
+    model: Any,
+    length: str,
+    meanings: dict[str, tuple[str, str]],
+) -> str:
     schema, said = model.model_json_schema()["properties"], keys_of(model)
     rows = []
     for key in _plain_keys(model):
