@@ -168,9 +168,7 @@ def _read_nodes(archive: _Archive, words: list[str], lines: list[str], at: int) 
 
 def _read_elements(archive: _Archive, words: list[str], lines: list[str], at: int) -> int:
     if "COMPACT" in (word.upper() for word in words):
-        raise Damaged(
-            "EBLOCK is in the COMPACT form, which is not read; write the archive again with EBLOCK,19,SOLID (CDWRITE)"
-        )
+        raise Damaged("EBLOCK is in the COMPACT form; write the archive with EBLOCK,19,SOLID (CDWRITE)")
     fields = _widths(lines, at, "EBLOCK")
     solid = len(words) > 2 and words[2].upper() == "SOLID"
     announced = _whole(words[4], "EBLOCK") if solid and len(words) > 4 and words[4] else 0

@@ -93,7 +93,8 @@ def constraints(deck: Deck) -> Constraints:
     for word, directions, place in deck.held:
         key, found = deck.key(deck.node_sets, word), deck.nodes(word)
         if found is None:
-            raise Damaged(f"*BOUNDARY names the node set '{word}', which is not defined", file=place)
+            text = f"*BOUNDARY names the node set '{word}', which is not defined"
+            raise Damaged(text, file=place)
         if key is None and not known.issuperset(found.tolist()):
             raise Damaged(f"*BOUNDARY names the node {word}, which is not defined", file=place)
         if key is not None:

@@ -48,7 +48,7 @@ def joints_of(deck: Deck) -> list[Joint]:
 
 
 def unread(deck: Deck) -> list[str]:
-    """What is said of contacts whose law is more than a coefficient of friction, or that are tied."""
+    """What is said of contacts whose law is more than one coefficient, or that are tied."""
     said = []
     for card, _ in deck.links:
         if card.keyword == "FRICTION" and (card.parameters or len(card.lines) > 1):

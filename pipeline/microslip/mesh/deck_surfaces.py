@@ -31,7 +31,14 @@ def add_surfaces(deck: Deck, raw: RawMesh, numbering: Numbering) -> None:
                 _combined(raw, deck, name, kind, [word for row in rows for word in row if word])
 
 
-def _node_surface(deck: Deck, raw: RawMesh, numbering: Numbering, name: str, rows: list[list[str]], space: str) -> None:
+def _node_surface(
+    deck: Deck,
+    raw: RawMesh,
+    numbering: Numbering,
+    name: str,
+    rows: list[list[str]],
+    space: str,
+) -> None:
     for row in rows:
         found = deck.nodes(row[0], space)
         if found is None:
@@ -57,7 +64,14 @@ def _combined(raw: RawMesh, deck: Deck, name: str, way: str, words: list[str]) -
         raw.facets.setdefault(name, []).append(block[inside if way == "INTERSECTION" else ~inside])
 
 
-def _element_surface(deck: Deck, raw: RawMesh, name: str, rows: list[list[str]], space: str, card: Card) -> None:
+def _element_surface(
+    deck: Deck,
+    raw: RawMesh,
+    name: str,
+    rows: list[list[str]],
+    space: str,
+    card: Card,
+) -> None:
     """Faces S1 ... S6 of cells given by number or set; without a face the free ones."""
     for row in rows:
         everything = joined(c.ids for c in (*deck.solids, *deck.facets))

@@ -364,8 +364,8 @@ def _factors_serve(steps: list[float]) -> bool:
 
 def _unstable(model: BodyModel, speed: float, count: int) -> UserError:
     why = "buckling or centrifugal divergence); lower the speed or the loads" if speed else "buckling); lower them"
-    text = f"at {rpm_text(speed)} the body is unstable (its stiffness has {count} negative directions"
-    return UserError(f"{text}: {why}", what_loads(model, speed))
+    text = f"the body is unstable (its stiffness has {count} negative directions: {why}"
+    return UserError(f"at {rpm_text(speed)} {text}", what_loads(model, speed))
 
 
 def what_loads(model: BodyModel, speed: float) -> str:

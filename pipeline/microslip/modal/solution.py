@@ -252,7 +252,13 @@ def held_compliance(T: Array, reduced: Reduced, labels: tuple[str, ...] = ()) ->
     return held(T, labels, reduced.kind, reduced.K_r, reduced.omega, reduced.to_diagonal)
 
 
-def _divergence(settings: BodySettings, speed: float, count: int, model: BodyModel, where: str) -> UserError:
+def _divergence(
+    settings: BodySettings,
+    speed: float,
+    count: int,
+    model: BodyModel,
+    where: str,
+) -> UserError:
     if not speed and not model.loaded:
         return UserError(
             f"the stiffness has {count} negative eigenvalues although nothing loads the body: its "

@@ -294,7 +294,7 @@ class MaterialSettings(Model):
 
 
 class ForeignMaterial(Model):
-    """The material stands elsewhere: in the mesh file, or in the matrices, which hold it already."""
+    """The material stands elsewhere: in the mesh file, or in the matrices, which hold it."""
 
     source: Annotated[Literal["mesh", "matrices"], Field(alias="from")]
     """the mesh file's own material, or materials"""
