@@ -13,6 +13,7 @@ from scipy.optimize import brentq
 
 import microslip as ms
 from microslip.basis import read_basis, write_basis
+from microslip.case import load_case
 from microslip.data import ModalBasis
 from microslip.errors import UserError
 from microslip.harmonic_balance import problem as balance
@@ -26,7 +27,9 @@ from microslip.mistuning.scatter import OF_CONTACTS, Scatter
 from microslip.mistuning.sensitivity import Linearised, sensitivities, softening, spread
 from microslip.mistuning.statistics import Envelope, fits, quantile
 from microslip.mistuning.weibull import exponent
+from microslip.settings.mistakes import validate
 from microslip.system.assembly import Assembly
+from microslip.verbs.mistuning import Keys
 
 RUB = {
     "interface": "right", "against": "left", "against_sector": 1, "law": "smooth", "normal_force": 20.0,
@@ -436,7 +439,7 @@ def test_a_case_leaves_its_samples(tmp_path: Path) -> None:
     for samples in (4, 8):
         path.write_text(CASE.format(file=ms.sample(), samples=samples, sector=2))
         job = CaseJob(path, files, tmp_path, ["mistuning.workers=1"], report=told.append, pictures=False)
-        made, sentences, fine = analysed("mistuning", job)
+        made, sentences, fine, _ = analysed("mistuning", job)
         rows[samples] = (tmp_path / "samples.csv").read_text().splitlines()
     assert fine
     assert rows[8][:5] == rows[4]
@@ -453,6 +456,21 @@ def test_a_case_leaves_its_samples(tmp_path: Path) -> None:
             (tmp_path / "other.h5").unlink()
         refused(words, analysed, "mistuning", CaseJob(path, files, tmp_path, pictures=False))
     assert (tmp_path / "samples.csv").read_text().splitlines() == rows[8]
+
+
+def test_a_share_may_be_written_in_percent() -> None:
+    """As `mistune --until 2%` does; what is none is refused by its key."""
+    scatter = [{"of": "frequency", "deviation": 0.01}]
+    assert validate(Keys, {"scatter": scatter, "until": "2%"}, Path("c")).until == pytest.approx(0.02)
+    for wrong in ("200%", "%", "two"):
+        refused("until", validate, Keys, {"scatter": scatter, "until": wrong}, Path("c"))
+
+
+def test_only_a_ring_is_mistuned(tmp_path: Path) -> None:
+    """A case without [ring] is refused before anything of it is built."""
+    text = CASE.format(file=ms.sample(), samples=4, sector=2)
+    (tmp_path / "case.toml").write_text(text.replace("ring = { blades = 4, engine_order = 1 }", ""))
+    refused(("mistuning", "[ring]"), load_case, tmp_path / "case.toml")
 
 
 @pytest.mark.parametrize("of", ["frequency", "damping"])

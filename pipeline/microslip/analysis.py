@@ -29,6 +29,10 @@ if TYPE_CHECKING:
 GROUP = "microslip.analysis"
 
 
+Files = dict[str, Callable[[Path], Any]]
+"""Names below the folder of an answer -> what writes them."""
+
+
 class Data(Protocol):
     """What is written as a table and as a file of all that is known."""
 
@@ -91,7 +95,7 @@ class Answer:
     tables: Sequence[Any] = ()
     largest: float | None = 0.0
     whole: bool = True
-    files: Mapping[str, Callable[[Path], Any]] = field(default_factory=dict)
+    files: Files = field(default_factory=dict)
     moving: Callable[[Path], Sequence[Path]] = lambda _: ()
     lines: Sequence[str] = ()
     missing: str = ""

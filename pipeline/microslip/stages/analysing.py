@@ -7,12 +7,14 @@ from functools import partial
 from typing import Any
 
 from .. import analysis
-from ..analysis import Analysis, Question
+from ..analysis import Analysis, Answer, Question
 from ..case import headline
-from ..errors import UserError
+from ..errors import UserError, of_file
+from ..files import store
+from ..results import Journal
 from ..settings.mistakes import validate
-from .answer import CaseJob, Written, kept, written
-from .stage import Stage
+from .answer import CaseJob, Written, made
+from .stage import Stage, hash_of_code
 from .varied import Varied
 
 
@@ -28,25 +30,25 @@ def analysed(name: str, case: CaseJob) -> Written:
         table = f"[[{name}]]" if one.several else f"[{name}]"
         raise UserError(f"is missing; add {table} with {one.needed}", name, case.path)
     asked = validate(one.asks, {}, case.path) if asked is None else asked
-    file = analysis.file_of(name)
-    return case.answer(name, file, partial(_work, one, asked))
+    code, called = (analysis.file_of(name),), case.settings.name
+    stage = Stage(case.folder / f"{name}.json", code, case.force, case.report, case=case.path)
+    solve, title = partial(_answer, one, asked, stage, case), f"{called}: {name.replace('_', ' ')}"
+    with of_file(case.path):
+        return made(stage, case.inputs, title, case.pictures, solve, called)
 
 
-def _work(one: Analysis, asked: Any, stage: Stage, case: CaseJob) -> Written:
-    """Finished points stay in a journal until all that is made of them is there."""
+def _answer(one: Analysis, asked: Any, stage: Stage, case: CaseJob, journal: Journal) -> Answer:
     built, varied = case.built(), Varied(case.path, case.raw, case.bases)
-    own, head = case.made_by(stage, one.name), {"case": case.settings.name}
-    with kept(stage, case.made_by(stage), head) as journal:
-        question = Question(asked, built, journal, case.report, varied, case.folder, own, case.force)
-        try:
-            answer = one.solve(question)
-        except UserError as error:
-            if error.file is None:
-                error.key = ".".join(filter(None, (one.name, error.key)))
-            raise
-    stage.begin()
-    title = f"{case.settings.name}: {one.name.replace('_', ' ')}"
-    if answer.largest is not None:
-        of_case = [*built.messages, *headline.doubted(built, answer.largest)]
-        answer = replace(answer, sentences=[*answer.sentences, *of_case])
-    return written(answer, one.name, case.folder, title, case.pictures, case.settings.name)
+    others = {key: value for key, value in case.inputs["case"].items() if key != one.name}
+    inputs = {**case.inputs, "case": others, "code": hash_of_code(stage.code)}
+    own = store.hash_settings(inputs)
+    try:
+        answer = one.solve(Question(asked, built, journal, case.report, varied, case.folder, own, case.force))
+    except UserError as error:
+        if error.file is None:
+            error.key = ".".join(filter(None, (one.name, error.key)))
+        raise
+    if answer.largest is None:
+        return answer
+    of_case = [*built.messages, *headline.doubted(built, answer.largest)]
+    return replace(answer, sentences=[*answer.sentences, *of_case])

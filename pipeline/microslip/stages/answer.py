@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import contextlib
 import json
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -15,7 +14,7 @@ from ..basis import read_basis
 from ..case import CaseSettings, load_case
 from ..case.assemble import Built, build
 from ..data import ModalBasis
-from ..errors import UserError, in_its_file, of_file
+from ..errors import UserError, of_file
 from ..files import store
 from ..files.tables import columns_csv
 from ..pictures.plots import empty_figure, save_figure
@@ -40,40 +39,47 @@ class Written(NamedTuple):
 
 
 def answered(stage: Stage, inputs: Mapping[str, Any], work: Callable[[], Written]) -> Written:
-    """The answer that a stage's product (JSON) holds, made where it is not up to date; see `Stage.make`. What
-    `work` keeps in ``NAME.points`` until then is removed."""
+    """What a stage's product (JSON) holds of an answer, made where it is not up to date; see `Stage.make`."""
     folder = stage.product.parent
 
     def make() -> Made:
         found = work()
         names = [str(path.relative_to(folder)) for path in found.files]
         told = {"files": names, "said": list(found.said), "whole": bool(found.whole)}
-        told |= {"missing": found.missing}
-        store.write_json(stage.product, told)
+        store.write_json(stage.product, {**told, "missing": found.missing})
         return Made(found.files)
 
     stage.make(inputs, make)
-    points_of(stage).unlink(missing_ok=True)
     told = json.loads(stage.product.read_text())
     return Written([folder / name for name in told["files"]], told["said"], told["whole"], told["missing"])
 
 
-def points_of(stage: Stage) -> Path:
-    """The journal of what is finished, until all that is made of it is there."""
-    return stage.product.with_suffix(".points")
+def made(
+    stage: Stage, inputs: Mapping[str, Any], title: str, pictures: bool, solve: Callable[[Journal], Answer],
+    case: str = "",
+) -> Written:  # fmt: skip
+    """The answer that a stage's product (JSON) holds, solved where it is not up to date. What is finished stays in a
+    journal, ``NAME.points``, until all that is made of it is there.
 
+    Args:
+        inputs: what it depends on, besides pictures. title: of the page. case: begins the titles of diagrams.
+    """
+    points, depends = stage.product.with_suffix(".points"), {**inputs, "code": hash_of_code(stage.code)}
 
-@contextlib.contextmanager
-def kept(stage: Stage, inputs: str, head: Mapping[str, Any]) -> Iterator[Journal]:
-    """That journal, opened; gone where a mistake is told before anything is finished. inputs, head:
-    see `results.open_journal`."""
-    with open_journal(points_of(stage), inputs, head, stage.force) as journal:
-        try:
-            yield journal
-        except UserError:
-            if not journal.series:
-                points_of(stage).unlink()
-            raise
+    def work() -> Written:
+        with open_journal(points, store.hash_settings(depends), {"case": case}, stage.force) as journal:
+            try:
+                answer = solve(journal)
+            except UserError:
+                if not journal.series:
+                    points.unlink()
+                raise
+        stage.begin()
+        return written(answer, stage.product.stem, stage.product.parent, title, pictures, case)
+
+    found = answered(stage, {**inputs, "pictures": pictures}, work)
+    points.unlink(missing_ok=True)
+    return found
 
 
 def written(answer: Answer, name: str, folder: Path, title: str, pictures: bool, case: str = "") -> Written:
@@ -167,18 +173,6 @@ class CaseJob:
         """What the answer depends on, besides pictures."""
         return inputs_of(self.raw, self.settings, self.files)
 
-    def made_by(self, stage: Stage, but: str = "") -> str:
-        """Hash of what all that is computed depends on, but a table of the case."""
-        case = {key: value for key, value in self.inputs["case"].items() if key != but}
-        return store.hash_settings({**self.inputs, "case": case, "code": hash_of_code(stage.code)})
-
-    @in_its_file
-    def answer(self, name: str, module: str | Path, work: Callable[[Stage, CaseJob], Written]) -> Written:
-        """The answer that ``name.json`` holds, made by a module's `work` where it is not up to date."""
-        product = self.folder / f"{name}.json"
-        stage = Stage(product, (module,), self.force, self.report, case=self.path)
-        return answered(stage, {**self.inputs, "pictures": self.pictures}, lambda: work(stage, self))
-
 
 @dataclass(frozen=True)
 class RollJob:
@@ -195,26 +189,23 @@ class RollJob:
     report: Report = lambda _: None
     pictures: bool = True
 
+    def stage(self, case: str, name: str, module: str) -> Stage:
+        """The stage whose product is ``name.json``, made by a module. case: its name."""
+        product = folder_of_case(self.path, case, self.root) / f"{name}.json"
+        return Stage(product, (module,), self.force, self.report, case=self.path)
+
     def answer(
-        self, case: str, name: str, module: str, raw: Mapping[str, Any], files: Iterable[Path | str],
-        title: str, solve: Callable[[Journal, Report], Answer],
+        self, stage: Stage, case: str, raw: Mapping[str, Any], files: Iterable[Path | str],
+        title: str, solve: Callable[..., Answer],
     ) -> Written:  # fmt: skip
-        """The answer that ``name.json`` holds, made where it is not up to date.
+        """The answer that a stage's product holds, made where it is not up to date.
 
         Args:
             case: its name. raw: it as a table. files: that it names; what is missing is told where
-                it is read. title: of the page.
+                it is read. title: of the page. solve: is called with a journal, and `report`.
         """
-        product = folder_of_case(self.path, case, self.root) / f"{name}.json"
-        stage = Stage(product, (module,), self.force, self.report, case=self.path)
         there = [file for f in files if (file := self.path.parent / f).is_file()]
         inputs = {"case": raw, "files": [store.hash_file(file) for file in there]}
-        own = store.hash_settings({**inputs, "code": hash_of_code(stage.code)})
-
-        def work() -> Written:
-            with of_file(self.path), kept(stage, own, {"case": case}) as journal:
-                answer = solve(journal, self.report)
-            stage.begin()
-            return written(answer, name, product.parent, f"{case}: {title}", self.pictures)
-
-        return answered(stage, {**inputs, "pictures": self.pictures}, work)
+        with of_file(self.path):
+            words = f"{case}: {title}"
+            return made(stage, inputs, words, self.pictures, partial(solve, report=self.report), case)

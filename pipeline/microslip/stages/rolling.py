@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any
 
-from ..analysis import Answer
+from ..analysis import Answer, Files
 from ..basis import read_basis
 from ..errors import UserError, in_its_file
 from ..files import store
@@ -28,8 +26,6 @@ from .modal import modes_stage
 from .places import find_body
 from .stage import Report
 
-Files = dict[str, Callable[[Path], Any]]
-
 
 def rolling_stage(job: RollJob) -> Written:
     """What a rolling case asks for.
@@ -38,13 +34,12 @@ def rolling_stage(job: RollJob) -> Written:
         UserError: mistakes of the case or its profiles.
     """
     case, raw = load_rolling(job.path, list(job.assignments))
+    stage = job.stage(case.name, "rolling", "stages.rolling")
     bodies = _bodies(case, job.path, job.report)
     files: list[Path | str] = [*case.files, *(body.resolve() for body in bodies)]
 
-    def solve(_: Journal, report: Report) -> Answer:
-        return _answer(case, job.path, bodies, report)
-
-    return job.answer(case.name, "rolling", "stages.rolling", raw, files, "rolling contact", solve)
+    solve = partial(_answer, case, job.path, bodies)
+    return job.answer(stage, case.name, raw, files, "rolling contact", solve)
 
 
 def _bodies(case: RollingCase, case_path: Path, report: Report) -> list[Path]:
@@ -70,7 +65,7 @@ def _of_one_material(case_path: Path, key: str, job: Job, section: Section) -> N
         )
 
 
-def _answer(case: RollingCase, path: Path, bodies: list[Path], report: Report) -> Answer:
+def _answer(case: RollingCase, path: Path, bodies: list[Path], _: Journal, report: Report) -> Answer:
     report("patches and creep curve")
     found = study(case, path)
     elastic, contacts = _behind(found, bodies), _contacts(found, report)

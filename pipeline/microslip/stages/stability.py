@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ..analysis import Answer
+from ..analysis import Answer, Files
 from ..basis import read_basis
 from ..errors import UserError, in_its_file, of_file
 from ..exchange.choice import select
@@ -29,7 +29,7 @@ from ..roots.recorded import write_roots
 from ..roots.spectrum import spectrum
 from ..settings.body import StabilitySettings
 from ..units import rpm_text
-from .answer import Written, answered, written
+from .answer import Written, made
 from .job import Job, open_job
 from .modal import matrices_inputs, modes_stage
 from .stage import Report, Stage
@@ -78,7 +78,7 @@ def stability_stage(
     q = question(path, assignments, report, speed)
     origin = None if q.where.suffix == ".h5" else q.where
     stage = Stage(q.folder / "stability.json", ("stages.stability",), force, report, origin)
-    return answered(stage, {**q.inputs, "pictures": pictures}, lambda: _work(stage, q, pictures))
+    return made(stage, q.inputs, f"{q.name}: stability. {q.state}", pictures, lambda _: _answer(q, report))
 
 
 @in_its_file
@@ -138,8 +138,8 @@ def family(job: Job) -> Family:
         return family_of(read_matrices(given, job.folder, job.settings.length_unit, job.settings.parameters))
 
 
-def _work(stage: Stage, q: Question, pictures: bool) -> Written:
-    matrices, asked, report = q.family(), q.asked, stage.report
+def _answer(q: Question, report: Report) -> Answer:
+    matrices, asked = q.family(), q.asked
     with of_file(q.where):
         for value in asked.range or ():
             matrices.values({**q.at, asked.over: value}, asked.over)
@@ -153,8 +153,7 @@ def _work(stage: Stage, q: Question, pictures: bool) -> Written:
             matrices, asked.over, np.linspace(*asked.range, asked.points), q.window, at=q.at,
             tolerance=asked.tolerance, neutral=asked.neutral, report=report,
         )  # fmt: skip
-    stage.begin()
-    files: dict[str, Callable[[Path], Any]] = {
+    files: Files = {
         "stability.csv": partial(write_columns, found.columns, 16),
         "stability.h5": lambda path: write_roots(path, found, over, q.at),
         "pictures/roots.png": partial(plane_picture, found),
@@ -167,8 +166,7 @@ def _work(stage: Stage, q: Question, pictures: bool) -> Written:
         pieces.append(fold("How many roots grow at each value", table([over.parameter, "grow"], counts)))
         said.append(over.sentence)
     whole = found.complete or not asked.certify
-    answer = Answer([*said, *_which(q)], tables=pieces, whole=whole, files=files, lines=table_lines(found))
-    return written(answer, "stability", q.folder, f"{q.name}: stability. {q.state}", pictures)
+    return Answer([*said, *_which(q)], tables=pieces, whole=whole, files=files, lines=table_lines(found))
 
 
 def _which(q: Question) -> list[str]:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from ..analysis import Answer
+from ..analysis import Answer, Files
 from ..basis import read_basis
 from ..case import CaseSettings, checkpoint, headline, load_case, surveys
 from ..case.assemble import build
@@ -95,7 +95,7 @@ def _work(stage: Stage, settings: CaseSettings, raw: dict[str, Any], files: Mapp
 
 
 def _answer(
-    tables: Tables, draw: Mapping[str, Callable[[Path], Any]], sentences: Sequence[str],
+    tables: Tables, draw: Files, sentences: Sequence[str],
     missing: str = "", whole: bool = True,
 ) -> Answer:  # fmt: skip
     """A survey: its tables are shown whole. missing: what was asked for and is not known. whole: nobody interrupted
@@ -324,7 +324,7 @@ def _curve(over: str, points: Checkpoint, settings: CaseSettings, bases: Bases, 
     missing += ["not every curve reaches the other end"] if arrived < asked and not early else []
     largest = np.concatenate([np.where(one.converged, one.amplitude, 0.0) for one in found])
     said = [*(words for one in found for words in one.sentences(by)), sentence(response, error)]
-    draw: dict[str, Callable[[Path], Any]] = {f"{name}.h5": lambda p: write_response(p, response)}
+    draw: Files = {f"{name}.h5": lambda p: write_response(p, response)}
     if drawn:
         draw[f"pictures/{name}.png"] = lambda p: curve_plot(drawn, p, title)
     return _answer(

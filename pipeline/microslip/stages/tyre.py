@@ -27,6 +27,7 @@ def tyre_stage(job: RollJob) -> Written:
         UserError: mistakes of the case or its body.
     """
     case, raw = load_tyre(job.path, list(job.assignments))
+    stage = job.stage(case.name, "tyre", "stages.tyre")
     file, _ = modes_stage(open_job(find_body(job.path, case.tyre.body, Path("."))), report=job.report)
 
     def solve(_: Journal, report: Report) -> Answer:
@@ -35,7 +36,7 @@ def tyre_stage(job: RollJob) -> Written:
         return _answer(study(case, wheel.groups[0, 0]), wheel, case.name)
 
     files = [file.resolve()]
-    return job.answer(case.name, "tyre", "stages.tyre", raw, files, "unsteady rolling", solve)
+    return job.answer(stage, case.name, raw, files, "unsteady rolling", solve)
 
 
 def _answer(found: Studied, wheel: ModalBasis, case: str) -> Answer:

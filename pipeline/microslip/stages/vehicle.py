@@ -24,8 +24,9 @@ def vehicle_stage(job: RollJob) -> Written:
         UserError: mistakes of the case or its profiles.
     """
     case, raw = load_vehicle(job.path, list(job.assignments))
+    stage = job.stage(case.name, "unround", "stages.vehicle")
     solve, files = partial(_unround, job, case), _profiles(case.wheel, case.rail)
-    return job.answer(case.name, "unround", "stages.vehicle", raw, files, "unround wheels", solve)
+    return job.answer(stage, case.name, raw, files, "unround wheels", solve)
 
 
 def kinematics_stage(job: RollJob) -> Written:
@@ -35,9 +36,10 @@ def kinematics_stage(job: RollJob) -> Written:
         UserError: mistakes of the case or its files.
     """
     case, raw = load_kinematics(job.path, list(job.assignments))
+    stage = job.stage(case.name, "unround", "stages.vehicle")
     files = [*_profiles(case.wheel, case.rail), case.kinematics.file]
     solve = partial(_recorded, job, case)
-    return job.answer(case.name, "unround", "stages.vehicle", raw, files, "wear of a wheel", solve)
+    return job.answer(stage, case.name, raw, files, "wear of a wheel", solve)
 
 
 def _profiles(*sections: Section) -> list[str]:

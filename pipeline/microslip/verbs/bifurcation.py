@@ -9,13 +9,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 from pydantic import BeforeValidator, Field, model_validator
 
 from .. import sliding
-from ..analysis import Analysis, Answer, Question
+from ..analysis import Analysis, Answer, Files, Question
 from ..bifurcation import branches, mechanics
 from ..bifurcation.branches import SPECIAL, Branch
 from ..bifurcation.diagram import Asked, Diagram, diagram
@@ -99,7 +99,7 @@ def solve(q: Question) -> Answer:
     swings = [b.swing[:, 0] for b in every if not b.still and b.swing.size]
     top = max((float(np.max(swing, initial=0.0)) for swing in swings), default=0.0)
     whole = [Branches(a.name, a.parameter, a.unit, one.branches) for a, one in found]
-    files: dict[str, Callable[[Path], Any]] = {}
+    files: Files = {}
     for asked, one in found:
         files[f"bifurcation_{asked.name}.csv"] = partial(_table, one)
     files["bifurcation.h5"] = lambda path: write_bifurcation(path, whole)
@@ -161,11 +161,9 @@ def _table(found: Diagram, path: Path) -> None:
     write_text(path, rows_csv(keys, rows, 10))
 
 
-def _pictures(asked: Keys, found: Diagram, case: str) -> dict[str, Callable[[Path], Any]]:
+def _pictures(asked: Keys, found: Diagram, case: str) -> Files:
     title, begins = f"{case}: {asked.parameter}", "pictures/"
-    drawn: dict[str, Callable[[Path], Any]] = {
-        f"{begins}bifurcation_{asked.name}.png": lambda p: diagram_picture(found, p, title, _axis(asked))
-    }
+    drawn: Files = {f"{begins}bifurcation_{asked.name}.png": lambda p: diagram_picture(found, p, title, _axis(asked))}
     if any(not b.still for b in found.branches):
         portraits = partial(portraits_picture, found, title=title, unit=asked.unit)
         drawn[f"{begins}orbits_{asked.name}.png"] = portraits

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -12,7 +12,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import BeforeValidator, Field, model_validator
 
-from ..analysis import Analysis, Answer, Question
+from ..analysis import Analysis, Answer, Files, Question
 from ..basis import read_basis
 from ..case import CaseSettings, headline
 from ..case.assemble import Built, build
@@ -21,7 +21,7 @@ from ..case.problem import book_models
 from ..data import Array, Indices
 from ..errors import UserError, at
 from ..files import store
-from ..files.tables import rows_csv, write_columns
+from ..files.tables import csv_files, rows_csv
 from ..harmonic_balance.readout import measured
 from ..mistuning.ensemble import COLUMNS, RARE, Ensemble, choose, ready, run
 from ..mistuning.ring import Tuned
@@ -310,9 +310,6 @@ def said(found: Ensemble) -> list[str]:
     return [*told, *warned]
 
 
-Files = dict[str, Callable[[Path], Any]]
-
-
 def _files(found: Ensemble, near: Approximation | None) -> Files:
     column = measured(found.asked.tuned.whole).column
     told_of = [n for n in COLUMNS if n not in ("stress_Pa", "strain") or not np.isnan(found.column(n)).all()]
@@ -338,19 +335,14 @@ def _files(found: Ensemble, near: Approximation | None) -> Files:
             quantiles[f"chosen_{name}"] = np.array([own if share == RARE else np.nan for share in SHARES])
     for fit in fits(found.amplification[found.solved]):
         quantiles[fit.name.replace(" ", "_")] = np.array([fit.quantiles[share] for share in SHARES])
-    files: Files = {
-        "samples.csv": lambda path: store.write_text(path, samples),
-        "quantiles.csv": partial(write_columns, quantiles, 8),
-        "envelope.csv": partial(write_columns, envelope, 8),
-    }
+    tables = {"quantiles.csv": quantiles, "envelope.csv": envelope}
     if near is not None:
-        columns: dict[str, Array] = {
+        tables["approximation.csv"] = {
             "frequency_Hz": near.frequency, column("mean"): near.mean, column("deviation"): near.deviation,
             "weibull_exponent": near.weibull_exponent, column("quantile_2.5_percent"): near.envelope(0.025),
             column("quantile_97.5_percent"): near.envelope(0.975),
         }  # fmt: skip
-        files["approximation.csv"] = partial(write_columns, columns, 8)
-    return files
+    return {"samples.csv": partial(store.write_text, text=samples)} | csv_files(tables, 8)
 
 
 def _pictures(found: Ensemble, worst: Sample, near: Approximation | None, case: str) -> Files:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -12,7 +12,7 @@ import numpy as np
 from pydantic import BeforeValidator, Field, model_validator
 from scipy.interpolate import CubicHermiteSpline
 
-from ..analysis import Analysis, Answer, Question
+from ..analysis import Analysis, Answer, Files, Question
 from ..case import headline
 from ..case.assemble import Built
 from ..case.contacts import swept
@@ -125,7 +125,7 @@ def solve(q: Question) -> Answer:
     with of_file(q.varied.path):
         ran = recorded.run(file, _asked(q.asked, built), q.inputs, q.fresh, q.report)
     found: Named = [(one.name, one) for one in ran]
-    files: dict[str, Callable[[Path], Any]] = {"orbit.csv": partial(_table, found)}
+    files: Files = {"orbit.csv": partial(_table, found)}
     files["orbit.h5"] = lambda _: None  # is there
     return Answer(
         [*_notes(found), *_messages(found, built), *_doubted(found, built, q.asked)],
@@ -236,10 +236,10 @@ def _chatter(name: str, one: Orbit) -> list[str]:
     return said
 
 
-def _pictures(found: Named, case: str) -> dict[str, Callable[[Path], Any]]:
+def _pictures(found: Named, case: str) -> Files:
     """Phase portraits together, a sheet a motion, and one more for each contact that chatters."""
     seen = [(name, one) for name, one in found if len(one.time)]
-    drawn: dict[str, Callable[[Path], Any]] = {}
+    drawn: Files = {}
     if len(seen) > 1:  # one that diverges as it settles leaves nothing to draw
         drawn["phase_portraits.png"] = partial(portraits, seen, title=f"{case}: phase portraits")
     for i, (name, one) in enumerate(seen, 1):
@@ -381,7 +381,7 @@ ANALYSIS = Analysis(
     name="orbit",
     asks=Keys,
     solve=solve,
-    lost="a motion diverged, and is here until then",
+    lost="a motion diverged",
     needed="frequency (Hz), Omega (rad/s) or run_up",
     swept=False,
     band=_band,

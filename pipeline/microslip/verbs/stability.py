@@ -3,7 +3,7 @@ a map of where they grow, and the limit cycles that follow, as [stability] asks.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
 from pathlib import Path
@@ -13,13 +13,13 @@ import numpy as np
 from pydantic import BeforeValidator, Field, model_validator
 
 from .. import sliding
-from ..analysis import Analysis, Answer, Question
+from ..analysis import Analysis, Answer, Files, Question
 from ..case import CaseSettings, headline
 from ..case.questions import Pair
 from ..case.settings import GROUND
 from ..data import Array, ComplexArray, ModalBasis
 from ..errors import NotConverged, UserError, of_file
-from ..files.tables import write_columns
+from ..files.tables import csv_files
 from ..linalg import quadratic
 from ..linalg.quadratic import Quadratic, Window
 from ..modal.unreduced import unreduced
@@ -303,33 +303,29 @@ OF_WAVES = (
     "ParaView."
 )
 
-Files = dict[str, Callable[[Path], Any]]
-
 
 def _files(found: Spectrum, over: Map | None, full: Sequence[Compared]) -> Files:
-    files: Files = {"stability.csv": partial(write_columns, found.columns, 16)}
-    if over is not None:
-        dots = [(one.x, one.y, one.full) for one in full]
-        files["stability_map.csv"] = partial(write_columns, over.columns, 12)
-        files["pictures/roots_map.png"] = partial(map_picture, over, dots)
+    dots, tables = [(one.x, one.y, one.full) for one in full], {"stability_map.csv": over.columns if over else {}}
     if full:
-        columns = {key: np.array([getattr(one, key) for one in full], dtype=float) for key in Compared.__annotations__}
-        files["stability_full.csv"] = partial(write_columns, columns, 12)
+        keys = Compared.__annotations__
+        tables["stability_full.csv"] = {key: np.array([getattr(one, key) for one in full], dtype=float) for key in keys}
+    files: Files = csv_files({"stability.csv": found.columns}, 16) | csv_files(tables, 12)
     files["stability.h5"] = lambda path: write_roots(path, found, None, {})
+    if over:
+        files["pictures/roots_map.png"] = partial(map_picture, over, dots)
     return files | {"pictures/roots.png": partial(plane_picture, found)}
 
 
 def _of_cycles(cycles: Born, asked: Cycle | None) -> Files:
-    files: Files = {
-        f"stability_cycle_{number}.csv": partial(write_columns, c.columns, 12) for number, c in enumerate(cycles.own, 1)
-    }
+    tables = {f"stability_cycle_{number}.csv": c.columns for number, c in enumerate(cycles.own, 1)}
+    drawn: Files = {}
     if asked is not None and cycles.own:
-        files["pictures/roots_cycles.png"] = partial(cycles_picture, cycles.own, _axis(asked))
+        drawn["pictures/roots_cycles.png"] = partial(cycles_picture, cycles.own, _axis(asked))
     if asked is not None and asked.across is not None and cycles.relief:
-        axes, columns = (_axis(asked), _axis(asked.across)), cycles.columns(asked.across.parameter)
-        files["stability_relief.csv"] = partial(write_columns, columns, 12)
-        files["pictures/roots_relief.png"] = partial(relief_picture, cycles.relief, axes)
-    return files
+        axes = _axis(asked), _axis(asked.across)
+        tables["stability_relief.csv"] = cycles.columns(asked.across.parameter)
+        drawn["pictures/roots_relief.png"] = partial(relief_picture, cycles.relief, axes)
+    return csv_files(tables, 12) | drawn
 
 
 def _axis(over: Over) -> str:
