@@ -25,11 +25,12 @@ from microslip.basis import read_basis
 from microslip.case import load_case
 from microslip.cli import main as typed
 from microslip.linalg.quadratic import Quadratic, every_value
+from microslip.modal.unreduced import unreduced
+from microslip.roots.asked import window_of
 from microslip.roots.full import full_matrices
 from microslip.stages.places import modal_files
-from microslip.stages.squeal import state_of, unreduced_body
-from microslip.stages.stability import window_of
 from microslip.stages.varied import Varied
+from microslip.verbs.stability import state_of
 
 ROOT = Path(__file__).resolve().parents[1]
 STATES = 10
@@ -51,9 +52,9 @@ def prepared() -> Varied:
 def states(varied: Varied) -> list[tuple[Quadratic, int]]:
     """Unreduced matrices along the diagonal of the map, and how many roots the reduced ones say grow."""
     settings, _ = load_case(CASE)
-    asked, found = settings.stability, []
-    assert asked is not None
-    window, bodies = window_of(asked), {b.name: unreduced_body(b.body or b.name, CASE) for b in settings.components}
+    asked, found = settings.asked["stability"], []
+    named = {b.name: varied.meshed(b.body or b.name, "bodies") for b in settings.components}
+    window, bodies = window_of(asked), {name: unreduced(*of) for name, of in named.items()}
     for share in ((np.arange(STATES) + 0.5) / STATES).tolist():
         values = {k: f * (o.start + share * (o.stop - o.start)) for o in asked.over for k, f in o.keys.items()}
         state = state_of(varied, values, CASE)
@@ -69,8 +70,7 @@ def main() -> None:
     count = len(Path("build/squeal/stability_map.csv").read_text().splitlines()) - 1
     assert code == 0
     settings, _ = load_case(CASE)
-    assert settings.stability is not None
-    window, known = window_of(settings.stability), states(varied)
+    window, known = window_of(settings.asked["stability"]), states(varied)
     print("| what | coordinates | states | CPU s | a state |\n|---|--:|--:|--:|--:|")
     n = sum(b.groups[0, 0].n_modes for b in varied.bases.values())
     print(f"| `microslip stability`, the map | {n} | {count} | {seconds:.1f} | {seconds / count:.3f} |")

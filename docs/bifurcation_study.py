@@ -11,8 +11,8 @@ from matplotlib.axes import Axes
 import microslip as ms
 from microslip.bifurcation.drawn import draw
 from microslip.case import load_case
+from microslip.stages.analysing import analysed
 from microslip.stages.answer import CaseJob
-from microslip.stages.bifurcation import bifurcation_stage
 from microslip.stages.places import modal_files
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -28,7 +28,7 @@ def followed(folder: Path, report: Callable[[str], None]) -> list[Path]:
     """The case's diagrams; their files."""
     settings, _ = load_case(CASE)
     files = modal_files(settings, CASE, ROOT, report)
-    return list(bifurcation_stage(CaseJob(CASE, files, folder, report=report)).files)
+    return list(analysed("bifurcation", CaseJob(CASE, files, folder, report=report)).files)
 
 
 def panels(folder: Path, places: Iterable[Axes]) -> None:

@@ -10,12 +10,12 @@ import numpy as np
 import microslip as ms
 from microslip.case import load_case
 from microslip.case.assemble import build
-from microslip.case.questions import OrbitOfCase
 from microslip.data import ModalBasis
 from microslip.pictures.orbit import portraits
 from microslip.time_domain import equations, orbit
 from microslip.time_domain.orbit import Orbit
 from microslip.units import counted
+from microslip.verbs.orbit import Keys
 
 ROOT = Path(__file__).resolve().parents[1]
 CASE = ROOT / "pipeline" / "cases" / "pendulum.toml"
@@ -32,11 +32,11 @@ def motions(basis: ModalBasis) -> dict[str, dict[float, Orbit]]:
     return found
 
 
-def assembled(case: Path, changes: list[str], basis: ModalBasis) -> tuple[list[equations.Equations], OrbitOfCase]:
+def assembled(case: Path, changes: list[str], basis: ModalBasis) -> tuple[list[equations.Equations], Keys]:
     """The equations of a case of one body with changes, at each of its frequencies, and what it asks."""
     settings, _ = load_case(case, changes)
-    built, asked = build(settings, {basis.name: basis}), settings.orbit
-    assert asked is not None and asked.Omega is not None
+    built, asked = build(settings, {basis.name: basis}), settings.asked["orbit"]
+    assert asked.Omega is not None
     return [equations.of(built.pressed(asked.normal_force), w) for w in asked.Omega], asked
 
 

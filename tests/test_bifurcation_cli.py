@@ -42,7 +42,7 @@ def test_hopf_points_in_files_and_words(case: Path, capsys: pytest.CaptureFixtur
     np.testing.assert_allclose(again.at("Hopf")["equilibria"], hopf, rtol=1e-9)
     assert len(again.to_dataframe()) == len(rows) - 1 and "load parameter B" in repr(again)
     page = (folder / "bifurcation.html").read_text()
-    assert page.index("<img") < page.index("Hopf point at")  # it begins with the diagram
+    assert page.index("Hopf point at") < page.index("<img") < page.index("<td>Hopf")  # the answer first
     kept = folder / "branches" / "load_equilibria.h5"
     before = kept.stat().st_mtime_ns
     (folder / "bifurcation.json").unlink()  # as if the run had been interrupted

@@ -119,7 +119,7 @@ def test_interrupted_and_resumed(case: Path) -> None:
     assert len(half["leg"]) >= 20 and not read_response("build/lifting/over_frequency.h5").finished
     assert Path("build/lifting/pictures/over_frequency.png").is_file()
     told: list[str] = []
-    _, sentences, missing = surveying.survey_stage(case, None, "frequency", report=told.append)
+    _, sentences, _, missing = surveying.survey_stage(case, None, "frequency", report=told.append)
     resumed = rows("over_frequency.csv")
     assert not missing and sentences and int([t for t in told if "% of the way" in t][0].split()[7]) > 20
     np.testing.assert_array_equal(resumed["frequency_Hz"][: len(half["leg"])], half["frequency_Hz"])

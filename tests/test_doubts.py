@@ -9,7 +9,7 @@ from types import SimpleNamespace
 import pytest
 
 from microslip.cli import main
-from microslip.stages import squeal
+from microslip.verbs import stability
 
 VANE = """
 name = "s"
@@ -88,7 +88,7 @@ def test_an_amplitude_beyond_a_body_is_doubted(
     """On the terminal and on the page, with the amplitude that the analysis found; of limit cycles it is given."""
     monkeypatch.chdir(tmp_path)
     cycles = SimpleNamespace(own=(), relief=(), whole=True, largest=1e-6 * newtons)
-    monkeypatch.setattr(squeal, "born", lambda *_, **__: cycles)
+    monkeypatch.setattr(stability, "born", lambda *_, **__: cycles)
     assert main(["init", "sample", "s"]) == 0
     (tmp_path / "s" / "case.toml").write_text(VANE.format(newtons=newtons) + ASKED[verb])
     assert main([verb, "s", "--no-pictures"]) in (0, 1)

@@ -27,9 +27,9 @@ from microslip.operating.motion import read_out
 from microslip.reduced.coordinates import of_density
 from microslip.results import read_response
 from microslip.settings.body import BodySettings
-from microslip.stages.orbit import _messages
 from microslip.stages.response import Wanted
 from microslip.stages.running import respond
+from microslip.verbs.orbit import _messages
 
 SAMPLES = Path(__file__).parents[1] / "pipeline/microslip/samples"
 BODIES = """

@@ -13,6 +13,7 @@ from scipy.optimize import brentq
 
 import microslip as ms
 from microslip.basis import read_basis, write_basis
+from microslip.case import load_case
 from microslip.data import ModalBasis
 from microslip.errors import UserError
 from microslip.harmonic_balance import problem as balance
@@ -26,7 +27,9 @@ from microslip.mistuning.scatter import OF_CONTACTS, Scatter
 from microslip.mistuning.sensitivity import Linearised, sensitivities, softening, spread
 from microslip.mistuning.statistics import Envelope, fits, quantile
 from microslip.mistuning.weibull import exponent
+from microslip.settings.mistakes import validate
 from microslip.system.assembly import Assembly
+from microslip.verbs.mistuning import Keys
 
 RUB = {
     "interface": "right", "against": "left", "against_sector": 1, "law": "smooth", "normal_force": 20.0,
@@ -426,8 +429,8 @@ scatter = [
 
 def test_a_case_leaves_its_samples(tmp_path: Path) -> None:
     """The table holds the samples of the ring, more of them go on, and measured frequencies are shuffled."""
+    from microslip.stages.analysing import analysed
     from microslip.stages.answer import CaseJob
-    from microslip.stages.mistuning import mistuning_stage
 
     path, files, told = tmp_path / "case.toml", {"vane": ms.sample()}, list[str]()
     (tmp_path / "blades.csv").write_text("blade,frequency_Hz\n0,99\n1,100\n2,101\n3,100\n")
@@ -435,8 +438,8 @@ def test_a_case_leaves_its_samples(tmp_path: Path) -> None:
     rows = {}
     for samples in (4, 8):
         path.write_text(CASE.format(file=ms.sample(), samples=samples, sector=2))
-        job = CaseJob(path, files, tmp_path, report=told.append, pictures=False)
-        made, sentences, fine = mistuning_stage(job, workers=1)
+        job = CaseJob(path, files, tmp_path, ["mistuning.workers=1"], report=told.append, pictures=False)
+        made, sentences, fine, _ = analysed("mistuning", job)
         rows[samples] = (tmp_path / "samples.csv").read_text().splitlines()
     assert fine
     assert rows[8][:5] == rows[4]
@@ -451,8 +454,23 @@ def test_a_case_leaves_its_samples(tmp_path: Path) -> None:
         path.write_text(CASE.format(file=ms.sample(), samples=4, sector=sector))
         if words == "other.h5":
             (tmp_path / "other.h5").unlink()
-        refused(words, mistuning_stage, CaseJob(path, files, tmp_path, pictures=False), workers=1)
+        refused(words, analysed, "mistuning", CaseJob(path, files, tmp_path, pictures=False))
     assert (tmp_path / "samples.csv").read_text().splitlines() == rows[8]
+
+
+def test_a_share_may_be_written_in_percent() -> None:
+    """As `mistune --until 2%` does; what is none is refused by its key."""
+    scatter = [{"of": "frequency", "deviation": 0.01}]
+    assert validate(Keys, {"scatter": scatter, "until": "2%"}, Path("c")).until == pytest.approx(0.02)
+    for wrong in ("200%", "%", "two"):
+        refused("until", validate, Keys, {"scatter": scatter, "until": wrong}, Path("c"))
+
+
+def test_only_a_ring_is_mistuned(tmp_path: Path) -> None:
+    """A case without [ring] is refused before anything of it is built."""
+    text = CASE.format(file=ms.sample(), samples=4, sector=2)
+    (tmp_path / "case.toml").write_text(text.replace("ring = { blades = 4, engine_order = 1 }", ""))
+    refused(("mistuning", "[ring]"), load_case, tmp_path / "case.toml")
 
 
 @pytest.mark.parametrize("of", ["frequency", "damping"])
@@ -618,7 +636,7 @@ def test_correlations_are_as_asked() -> None:
 
 def test_a_table_tells_its_blades(tmp_path: Path) -> None:
     """Rows in any order, numbered from 1: the same ring; one blade twice is none, nor are some of all blades."""
-    from microslip.stages.mistuning import _measured
+    from microslip.verbs.mistuning import _measured
 
     (file := tmp_path / "blades.csv").write_text("blade,frequency_Hz\n3,101\n1,99\n4,102\n2,98\n")
     assert _measured(file, "frequency") == pytest.approx([-0.01, -0.02, 0.01, 0.02])

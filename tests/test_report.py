@@ -15,8 +15,8 @@ from hypothesis import strategies as st
 
 from microslip.data import ContactState, ModalBasis
 from microslip.report.body import report_html
-from microslip.report.page import text
-from microslip.report.response import response_html, survey_html
+from microslip.report.page import page, text
+from microslip.report.response import number_tables, response_html
 from microslip.report.words import certificate, contact_sentence, fit_sentence, number_list
 
 PNG = bytes.fromhex(
@@ -62,6 +62,10 @@ def parsed(page: str) -> Tags:
 
 def said(page: str) -> str:
     return re.sub(r"\s+", " ", "".join(parsed(page).words).replace("\xa0", " "))
+
+
+def tabulated(tables: dict[str, dict[str, list[str]]]) -> str:
+    return page("t", number_tables(tables))
 
 
 def album(tmp_path: Path, *names: str) -> dict[str, Path]:
@@ -286,8 +290,8 @@ def test_what_stands_in_a_table_is_told_once_and_rounding_not_at_all() -> None:
         ("load_m", "1.5e-3", "load in mm 1.5"),
         ("speed_rad_s", "2", "speed in rad/s 2"),
     ):
-        assert shown in said(survey_html("t", [], {"t.csv": {column: [value]}}, []))
-    assert "1e-13" not in said(survey_html("t", [], {"t.csv": {"load_m": ["1.5e-3", "1e-16"]}}, []))
+        assert shown in said(tabulated({"t.csv": {column: [value]}}))
+    assert "1e-13" not in said(tabulated({"t.csv": {"load_m": ["1.5e-3", "1e-16"]}}))
 
 
 def test_a_page_has_one_unit_of_length_and_tells_rows_apart() -> None:
@@ -295,7 +299,7 @@ def test_a_page_has_one_unit_of_length_and_tells_rows_apart() -> None:
     near = ["377.4231", "300.00001", "377.4232", "377.4233", "377.4243"]
     a, mean = ["1.53e-3", "9.8e-4", "2e-5", "1e-3", "1e-3"], ["7.981e-11", "-1e-10", "3.5e-7", "0", "0"]
     curve = {"frequency_Hz": near, "amplitude_m": a, "mean_m": mean}
-    table = said(survey_html("t", [], {"t.csv": curve, "u.csv": {"amplitude_m": ["2e-5"]}}, []))
+    table = said(tabulated({"t.csv": curve, "u.csv": {"amplitude_m": ["2e-5"]}}))
     shown = ("1.53", "0.98", "377.42", "300", "377.4232", "377.4233", "377.424", "0.00035")
     assert table.count("amplitude in mm") == 2 and all(n in table for n in shown)
     assert not any(n in table for n in ("µm", "300.0", "·10", "7.981"))

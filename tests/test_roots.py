@@ -296,7 +296,7 @@ def test_the_modal_file_of_all_modes_has_the_roots_of_the_matrices(tmp_path, mon
     write_basis(tmp_path / "again.h5", basis)
     assert np.array_equal(read_basis(tmp_path / "again.h5").groups[(0, 0)].N_r, g.N_r)
     page = (tmp_path / "build/chain/stability.html").read_text(encoding="utf-8")
-    assert full.sentence.split(";")[0] in page
+    assert full.sentence.split(";")[0].capitalize() in page
     with h5py.File("build/chain/stability.h5") as file:
         assert file["roots/s"][:] + 1j * file["roots/s_imag"][:] == pytest.approx(full.roots.s, rel=1e-9)
     assert main(["stability", "build/chain/basis.h5", "--no-pictures"]) == 0

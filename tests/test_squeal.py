@@ -25,14 +25,15 @@ from microslip.bifurcation.cycles import checked, cycles, in_time, refined
 from microslip.case import load_case
 from microslip.cli import main
 from microslip.linalg.quadratic import Window, every_root, every_value
+from microslip.pictures.moving import moving_shape
 from microslip.roots.spectrum import spectrum
 from microslip.roots.waves import waves
+from microslip.stages.analysing import analysed
 from microslip.stages.answer import CaseJob
-from microslip.stages.moving import moving_shape
 from microslip.stages.places import modal_files
-from microslip.stages.squeal import State, moving, shapes, squeal_stage, state_of
 from microslip.stages.varied import Varied
 from microslip.system.ground import turning
+from microslip.verbs.stability import State, moving, shapes, state_of
 
 ROOT = Path(__file__).parents[1]
 CASES = ROOT / "pipeline" / "cases"
@@ -192,7 +193,7 @@ def test_a_killed_run_goes_on_and_motions_in_time_swing_as_limit_cycles(belt: Pa
                 raise KeyboardInterrupt
 
         with contextlib.suppress(KeyboardInterrupt):
-            squeal_stage(CaseJob(belt, files, Path(folder), report=report, pictures=False))
+            analysed("stability", CaseJob(belt, files, Path(folder), report=report, pictures=False))
         return said
 
     assert len(run("a", "3 of 5")) == 3
@@ -340,7 +341,7 @@ def test_ranges_are_tried_before_anything_is_computed(
         belt.write_text(text.replace("[stability]\n", keys, 1))
     else:
         belt.write_text(text + keys.format(*ranges))
-    monkeypatch.setattr("microslip.stages.squeal.state_of", pytest.fail)
+    monkeypatch.setattr("microslip.verbs.stability.state_of", pytest.fail)
     refused_command(["stability", str(belt), "-q"], capsys, "mesh" if "full" in keys else "sole-9")
 
 

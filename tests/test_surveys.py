@@ -203,7 +203,7 @@ def test_surveys_that_are_interrupted_leave_what_was_finished(ring: Path) -> Non
 
         with pytest.raises(KeyboardInterrupt):
             survey_stage(ring, None, kind, ["sweep.points=5"], report=report)
-        assert not Path(f"build/ring/{kind}.txt").exists()
+        assert not Path(f"build/ring/{kind}.json").exists()
     assert rows("build/ring/orders.csv")["engine_order"].tolist() == [1]
     assert rows("build/ring/ranges_combinations.csv")["combination"].tolist() == [1]
 

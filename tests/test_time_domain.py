@@ -35,8 +35,8 @@ from microslip.contact.point import PointContact
 from microslip.data import CENTRIFUGAL, Rows, RunUp
 from microslip.errors import UserError
 from microslip.exchange.vtu import write_motion
+from microslip.pictures.moving import whole_ring
 from microslip.report.page import number, text
-from microslip.stages.moving import whole_ring
 from microslip.system import Body, Contact, Force, Monitor, Spring, System
 from microslip.system.assembly import Assembly, ContactFace, Load, Output, Ring, preloaded_contact
 from microslip.system.component import Component
@@ -989,7 +989,7 @@ def test_many_chaotic_starts_have_the_exponent_of_duffings_oscillator() -> None:
 
 
 def test_extremes_of_a_table_lie_between_its_samples() -> None:
-    from microslip.stages.orbit import _row
+    from microslip.verbs.orbit import _row
 
     swing = ms.structure(1.0, 1.0, 0.2, force={0: 0.2}, output=0)
     row = _row(ms.integrate(swing, 1.0, unit="rad/s", settle=40, keep=1, samples=32))

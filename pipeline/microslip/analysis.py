@@ -18,7 +18,7 @@ from importlib import import_module
 from importlib.metadata import entry_points
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, TypeGuard
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -27,6 +27,10 @@ if TYPE_CHECKING:
     from .settings.numbers import Model
 
 GROUP = "microslip.analysis"
+
+
+Files = dict[str, Callable[[Path], Any]]
+"""Names below the folder of an answer -> what writes them."""
 
 
 class Data(Protocol):
@@ -52,14 +56,22 @@ class Question:
     """What is asked of a case.
 
     Attributes:
-        asked: the keys of the analysis, a model of its `Analysis.asks`. built: the case's assembly, a
-            `case.assemble.Built`. kept: what is finished, for a run that goes on. report: is told what is under way.
+        asked: the keys of the analysis, a model of its `Analysis.asks`. built: the case's assembly,
+            a `case.assemble.Built`. kept: what is finished, for a run that goes on. report: is told
+            what is under way. varied: the case with other values of its keys, and meshes of its
+            bodies, a `stages.varied.Varied`. folder: of the answer, where a run may keep what it
+            will go on with in files of its own; inputs: hash of what they depend on besides the
+            keys of the analysis; fresh: they are to be made anew.
     """
 
     asked: Any
     built: Any
     kept: Journal
     report: Callable[[str], None]
+    varied: Any
+    folder: Path
+    inputs: str
+    fresh: bool = False
 
 
 @dataclass(frozen=True)
@@ -69,15 +81,24 @@ class Answer:
     Attributes:
         sentences: the result first. data: end of the files' names -> what they hold; the first one without an end.
             diagrams: likewise. tables: pieces of the page (`report.page`). largest: amplitude of the first read-out, of
-            which is told whether it looks like a number in a wrong unit. whole: whether nothing of it was lost.
+            which is told whether it looks like a number in a wrong unit; None where the sentences
+            tell all that is to be said of the case. whole: whether nothing of it was lost.
+        files: other files by their names, below the folder of the answer -> what writes them;
+            pictures are shown on the page. moving: writes bodies that move below that folder, where
+            pictures are wanted. lines: of a table for the terminal. missing: what was asked for and is not
+            known, in words.
     """
 
     sentences: Sequence[str]
-    data: Mapping[str, Data]
+    data: Mapping[str, Data] = field(default_factory=dict)
     diagrams: Mapping[str, Drawing] = field(default_factory=dict)
     tables: Sequence[Any] = ()
-    largest: float = 0.0
+    largest: float | None = 0.0
     whole: bool = True
+    files: Files = field(default_factory=dict)
+    moving: Callable[[Path], Sequence[Path]] = lambda _: ()
+    lines: Sequence[str] = ()
+    missing: str = ""
 
 
 @dataclass(frozen=True)
@@ -86,11 +107,19 @@ class Analysis:
 
     Attributes:
         name: its table in a case.toml, and how its files are called; its verb has hyphens.
-        asks: the keys of that table. solve: raises `UserError` for what cannot be, whose sentence
-            begins with a key.
+        asks: the keys of that table. solve: raises `UserError` for what cannot be, with a key of
+            the table, or with the case file and any key of it.
         lost: what has happened where an answer is not whole, for a reader.
         needed: keys without which a case asks for nothing; "": the table may be left out.
         swept: whether it is about the case's sweep, which must be given.
+        verb: another one, as it is written here. options: keys that are options of the verb too ->
+            what the help says of them, as written here.
+        several: whether a case may have several such tables, whose keys have a name; `asked` is
+            a tuple of them.
+        alone: whether its sweep is for it, so that `microslip run` makes no response of the case.
+        band: keys as they are written -> start and stop (Hz) of the sweep of a case that has none;
+            nothing: any will do. unloaded: whether what they ask for needs no excitation.
+        fits: a sentence where they do not go with a `case.CaseSettings`. files: that they name.
     """
 
     name: str
@@ -99,6 +128,14 @@ class Analysis:
     lost: str
     needed: str = ""
     swept: bool = True
+    verb: str = ""
+    options: Mapping[str, str] = field(default_factory=dict)
+    several: bool = False
+    alone: bool = False
+    band: Callable[[Mapping[str, Any]], Mapping[str, float]] = lambda _: {}
+    unloaded: Callable[[Any], bool] = lambda _: False
+    fits: Callable[[Any, Any], str] = lambda *_: ""
+    files: Callable[[Any], Sequence[str | None]] = lambda _: ()
 
 
 @cache
@@ -134,6 +171,21 @@ def file_of(name: str) -> Path:
     return Path(spec.origin)
 
 
-def said_of(name: str) -> str:
-    """What the module of an analysis says at its head."""
-    return ast.get_docstring(ast.parse(file_of(name).read_text(encoding="utf-8"))) or name
+class Verb(NamedTuple):
+    """A verb as its module says it. Attributes: name. help: the head of the module. options: `Analysis.options`."""
+
+    name: str
+    help: str
+    options: Mapping[str, str]
+
+
+def verb_of(name: str) -> Verb:
+    """The verb of an analysis, whose module is not loaded."""
+    tree = ast.parse(file_of(name).read_text(encoding="utf-8"))
+    keys = {k.arg: k.value for call in ast.walk(tree) if _makes(call) for k in call.keywords}
+    verb, options = (ast.literal_eval(keys[key]) if key in keys else None for key in ("verb", "options"))
+    return Verb(verb or name.replace("_", "-"), ast.get_docstring(tree) or name, options or {})
+
+
+def _makes(node: ast.AST) -> TypeGuard[ast.Call]:
+    return isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == Analysis.__name__

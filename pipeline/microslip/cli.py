@@ -4,6 +4,7 @@ interrupted, 143 ended by SIGTERM."""
 from __future__ import annotations
 
 import codecs
+import inspect
 import io
 import logging
 import os
@@ -23,6 +24,7 @@ from .errors import NotConverged, UserError
 from .progress import announced, progress
 
 if TYPE_CHECKING:
+    from .analysis import Verb
     from .basis.checks import Check
     from .data import ModalBasis
     from .results import Response
@@ -249,7 +251,7 @@ def run(
             print("\n".join(frequency_lines(read_basis(job.basis_file))))
     _say(page, quiet)
     if not converged:
-        others = page.stem in (*places(), "mistuning")
+        others = page.stem in places()
         some = f"some points of the response did not converge; they are marked in {page.name}"
         raise NotConverged(some if others else unsolved(page.parent) or some)
 
@@ -380,29 +382,8 @@ def _survey(case: Path, basis: Path | None, kind: str, set_: Sequence[str], forc
     from .stages.surveying import survey_stage
 
     with progress(f"{kind.replace('_', ' ')} of {case}", quiet) as report:
-        made, sentences, missing = survey_stage(case, basis, kind, list(set_), force, report)
-    _say("\n".join([*sentences, *map(str, made)]), quiet)
-    if missing:
-        raise NotConverged(f"{missing}; {made[0]} holds what was found")
-
-
-@app.command
-def orbit(
-    case: Path, basis: Path | None = None, /, *, no_pictures: NoPictures = False, set_: Set = (),
-    force: Force = False, quiet: Quiet = False,
-) -> None:  # fmt: skip
-    """Motion in time of a case from rest, as [orbit] asks: phase portraits, impacts, periods after which it comes back.
-
-    Args:
-        case: a case.toml, the folder that holds it, its name, or its products.
-        basis: see respond.
-    """
-    from .stages.orbit import orbit_stage
-
-    case = _case_file(case)
-    with progress(f"orbit {case}", quiet) as report:
-        found = orbit_stage(_case_job(case, set_, force, report, no_pictures, basis))
-    _tell(found, quiet, "a motion diverged; {page} holds what was found until then")
+        found = survey_stage(case, basis, kind, list(set_), force, report)
+    _tell(found, quiet, f"{found.missing}; {{page}} holds what was found")
 
 
 def _case_job(
@@ -436,52 +417,6 @@ def _tell(found: Written, quiet: bool, lost: str) -> None:
 
 
 @app.command
-def bifurcate(
-    case: Path, /, *, no_pictures: NoPictures = False, set_: Set = (), force: Force = False, quiet: Quiet = False
-) -> None:
-    """Does a case begin to move by itself, and what then: equilibria and periodic orbits over a parameter, stable and
-    unstable ones, as [[bifurcation]] asks.
-
-    Every finished branch is kept; interrupted, the same command goes on where it was.
-
-    Args:
-        case: a case.toml, the folder that holds it, its name, or its products.
-    """
-    from .stages.bifurcation import bifurcation_stage
-
-    case = _case_file(case)
-    with progress(f"bifurcate {case}", quiet) as report:
-        found = bifurcation_stage(_case_job(case, set_, force, report, no_pictures))
-    _tell(found, quiet, "some branches could not be followed to their end; {page} says where and why")
-
-
-@app.command
-def mistune(
-    case: Path, /, *, samples: int | None = None, until: str | None = None, rare: int | None = None,
-    workers: int | None = None, no_pictures: NoPictures = False, set_: Set = (), force: Force = False,
-    quiet: Quiet = False,
-) -> None:  # fmt: skip
-    """Samples of a ring whose blades or contacts differ, as [mistuning] says: how much higher the highest blade gets.
-
-    Args:
-        case: a case.toml, the folder that holds it, its name, or its products.
-        samples: at most, in the place of the case's number.
-        until: ends when half of the 95 % quantile's interval is that share of it, as 2%.
-        rare: further samples, chosen by a linear ring, for the 99.9 % quantile.
-        workers: processes; as many as there are cores if not given. Samples are the same for any number.
-    """
-    from .stages.mistuning import mistuning_stage
-
-    case = _case_file(case)
-    asked = [*set_] + [f"mistuning.samples={samples}"] * (samples is not None)
-    asked += [f"mistuning.until={_share(until)}"] if until is not None else []
-    asked += [f"mistuning.rare={rare}"] if rare is not None else []
-    with progress(f"mistuning of {case}", quiet) as report:
-        found = mistuning_stage(_case_job(case, asked, force, report, no_pictures), workers)
-    _tell(found, quiet, "some samples have no solution; samples.csv has no amplitude for them")
-
-
-@app.command
 def roll(
     case: Path, /, *, no_pictures: NoPictures = False, set_: Set = (), force: Force = False, quiet: Quiet = False
 ) -> None:
@@ -505,14 +440,6 @@ def roll(
     _tell(found, quiet, "the run ended early; {page} says why, and holds what was found")
 
 
-def _share(text: str) -> float:
-    """2% or 0.02."""
-    try:
-        return float(text.removesuffix("%")) / (100 if text.endswith("%") else 1)
-    except ValueError as error:
-        raise UserError(f"--until {text}: is no share; write 2% or 0.02") from error
-
-
 @app.command
 def stability(
     path: Path, /, *, speed: int | None = None, no_pictures: NoPictures = False, set_: Set = (), force: Force = False,
@@ -527,20 +454,18 @@ def stability(
     """
     from .settings.meant import meant
     from .stages.places import is_case
-    from .stages.squeal import squeal_stage
     from .stages.stability import stability_stage
 
     path = path if path.suffix == ".h5" else meant(path)
     if (path / "case.toml").is_file() and not (path / "body.toml").is_file():
         path = path / "case.toml"
-    with progress(f"stability of {path}", quiet) as report:
-        if is_case(path):
-            if speed is not None:
-                raise UserError(f"{path}: --speed {speed}: is of a modal file; a case has bodies.speed")
-            found = squeal_stage(_case_job(path, set_, force, report, no_pictures))
-        else:
-            found = stability_stage(path, list(set_), force, report, not no_pictures, speed)
-    _tell(found, quiet, "not all was found, roots in the window or limit cycles; {page} says what")
+    if is_case(path):
+        if speed is not None:
+            raise UserError(f"{path}: --speed {speed}: is of a modal file; a case has bodies.speed")
+        return _analyse("stability", "stability", path, None, no_pictures, set_, force, quiet)
+    with progress(f"stability {path}", quiet) as report:
+        found = stability_stage(path, list(set_), force, report, not no_pictures, speed)
+    _tell(found, quiet, "roots in the window are missing; {page} says what")
 
 
 @app.command
@@ -993,31 +918,47 @@ _ARGUMENTS = """Args:
 """
 
 
-def _verb(name: str, said: str) -> Callable[..., None]:
+def _analyse(
+    name: str, verb: str, case: Path, basis: Path | None, no_pictures: bool, set_: Sequence[str], force: bool,
+    quiet: bool,
+) -> None:  # fmt: skip
+    """The answer of an analysis."""
+    from .analysis import analyses
+    from .stages.analysing import analysed
+
+    with progress(f"{verb} {case}", quiet) as report:
+        found = analysed(name, _case_job(case, set_, force, report, no_pictures, basis))
+    _tell(found, quiet, f"{analyses()[name].lost}; {{page}} says which and why")
+
+
+def _verb(name: str, said: Verb) -> Callable[..., None]:
     """The command of an analysis."""
 
     def verb(
         case: Path, basis: Path | None = None, /, *, no_pictures: NoPictures = False, set_: Set = (),
-        force: Force = False, quiet: Quiet = False,
+        force: Force = False, quiet: Quiet = False, **keys: str | None,
     ) -> None:  # fmt: skip
-        from .analysis import analyses
-        from .stages.analysing import analysed
+        more = [f"{name}.{key}={value}" for key, value in keys.items() if value is not None]
+        _analyse(name, said.name, _case_file(case), basis, no_pictures, [*set_, *more], force, quiet)
 
-        case = _case_file(case)
-        with progress(f"{name.replace('_', ' ')} of {case}", quiet) as report:
-            found = analysed(name, _case_job(case, set_, force, report, no_pictures, basis))
-        _tell(found, quiet, f"{analyses()[name].lost}; {{page}} says which and why")
-
-    verb.__doc__ = f"{said}\n\n{_ARGUMENTS}"
+    of = inspect.signature(verb, eval_str=True)
+    kept = [p for p in of.parameters.values() if p.kind is not p.VAR_KEYWORD]
+    options = {key: Annotated[str | None, Parameter(help=what)] for key, what in said.options.items()}
+    more = [inspect.Parameter(key, inspect.Parameter.KEYWORD_ONLY, default=None, annotation=kind)
+            for key, kind in options.items()]  # fmt: skip
+    verb.__signature__ = of.replace(parameters=[*kept, *more])  # type: ignore[attr-defined]
+    verb.__annotations__ = {p.name: p.annotation for p in (*kept, *more)}
+    verb.__doc__ = f"{said.help}\n\n{_ARGUMENTS}"
     return verb
 
 
 def _add_verbs() -> None:
     """Those of all analyses, whose modules are not loaded."""
-    from .analysis import places, said_of
+    from .analysis import places, verb_of
 
     for name in places():
-        app.command(_verb(name, said_of(name)), name=name.replace("_", "-"))
+        if (said := verb_of(name)).name not in app:
+            app.command(_verb(name, said), name=said.name)
 
 
 _add_verbs()

@@ -28,7 +28,7 @@ from microslip.data import Mesh, ModalBasis
 from microslip.linalg.quadratic import Window
 from microslip.modal.compute import modal_basis
 from microslip.roots.spectrum import Spectrum, spectrum
-from microslip.stages.squeal import State
+from microslip.verbs.stability import State
 
 pytestmark = [
     pytest.mark.slow,

@@ -33,7 +33,7 @@ Kept = Callable[[str], Branch | None]
 
 @dataclass(frozen=True)
 class Asked:
-    """What a diagram is to show, see `case.questions.BifurcationOfCase`."""
+    """What a diagram is to show, see the keys of `verbs.bifurcation`."""
 
     start: float
     stop: float

@@ -59,7 +59,7 @@ def springs_of(
     else:
         springs, message = counted_once(c, _given(_composed(c, settings.path)), _faces(settings, c, loaded))
     said = [message]
-    if settings.orbit or c.what.rigid:
+    if "orbit" in settings.asked or c.what.rigid:
         stiffness = math.inf if c.what.rigid else springs[0]
         said.append(static_answer(c, stiffness, _faces(settings, c, loaded)))
     return own, springs, [words for words in said if words]

@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, PrivateAttr, create_model, model_validator
 
-from ..analysis import GROUP, analyses
+from ..analysis import GROUP, Analysis, analyses
 from ..contact.friction import OfCoulomb
 from ..contact.point import OfPoint
 from ..contact.settings import ContactLaw
@@ -40,15 +40,11 @@ from .driving import ROTATION, ExcitationOfCase, GroundOfCase, SpringOfCase, bas
 from .keys import GROUND as GROUND
 from .keys import Address, Count, Order
 from .questions import (
-    BifurcationOfCase,
     CurveOfCase,
     IdentificationOfCase,
-    MistuningOfCase,
-    OrbitOfCase,
     OrdersOfCase,
     RangesOfCase,
     SpeedsOfCase,
-    StabilityOfCase,
 )
 
 FIRST_HARMONICS = 3
@@ -77,90 +73,100 @@ BodyName = Annotated[Name, BeforeValidator(_no_path)]
 
 
 class BodyOfCase(Model):
-    """A body of an assembly.
+    """A body of an assembly, of the modal file that its body.toml or system.toml makes.
 
-    name: in this case. body: the name of a body.toml (see `places.find_body`) or of a system.toml beside the case, the
-    name if not given. file: a modal file instead, beside the case. speed: of the file, counted from 0, or speed_rpm.
-    turn: degrees about the body's rotation axis, and shift: m, from where its file has it to where it stands here.
-    damping_ratio: instead of the file's, one for all modes or one a mode, the last one for all that follow.
-    aerodynamics: a table beside the case (.csv: nodal_diameter, frequency_shift, damping_ratio and, where they differ,
-    direction ``forward``, ``backward`` or ``both``) of what the flow adds to the modes in each wave of the ring.
-    modes: how many of the stored eigenmodes are used, all if not given.
-    mass: kg, of a body at rest made of another density, instead of the file's; its shape and stiffness stay.
-    pressed_at_rpm: the speed whose centrifugal load presses a loose body into its contacts, which share it as normal
-    forces without friction; they need no other.
-    weak_springs: Hz, of a free body on springs so soft that it has this frequency in each of its rigid motions. A body
-    that slides in all of its contacts has no place of its own; without them it slides away where mean forces do not
-    balance.
+    A body that slides in all of its contacts has no place of its own; without weak_springs it
+    slides away where mean forces do not balance.
     """
 
     name: Name
+    """in this case"""
     body: BodyName | None = None
+    """name of the body whose modal file it is, looked for as said above; the name if not given"""
     file: str | None = None
+    """a modal file beside the case instead"""
     speed: Annotated[int, Field(ge=0)] = 0
+    """which speed of the modal file, from 0"""
     speed_rpm: NotNegative | None = None
+    """[rpm] or a speed of the file or of its range"""
     damping_ratio: Ratio | Ratios | None = None
+    """instead of the file's: one, or one a mode, the last one for all that follow"""
     aerodynamics: str | None = None
+    """a table (.csv) beside the case of [what the flow adds](excitation.md#damping) to every wave
+    of the ring"""
     modes: Annotated[int, Field(ge=1, le=2000)] | None = None
+    """how many of those that the modal file stores, all if not given"""
     mass: Positive | None = None
+    """[kg] of the same shape and stiffness at rest, made of another density"""
     pressed_at_rpm: Positive | None = None
+    """[rpm] whose centrifugal load presses a loose body into its contacts, as normal forces
+    without friction; they need no other"""
     turn: Number = 0.0
+    """[degrees] about the body's rotation axis, from where its file has it"""
     weak_springs: Positive | None = None
+    """[Hz] that hold a body which nothing else does: frequency of its rigid motions"""
     shift: Annotated[Vector, BeforeValidator(_finite_vector)] = (0.0, 0.0, 0.0)
+    """[m] from where its file has it, after the turn"""
 
 
 class RingSettings(Model):
-    """All bodies of the case stand blades times in a circle, driven by an engine order.
-
-    engine_order: of the frequency that is swept; if not given, the greatest common divisor of those that excitations
-    name, or 1. Negative ones run round with the rotor and faster. rotation: ``-`` for a rotor that turns from sector 1
-    to sector 0. model: ``sector``, one that stands for all, or ``full``, all of them.
-    """
+    """All bodies of the case stand blades times in a circle, driven by an engine order."""
 
     blades: Annotated[int, Field(ge=2, le=1000)]
+    """N, as many as the sectors of a cyclic body"""
     engine_order: Order | None = None
+    """of the swept frequency; if not given, the greatest common divisor of those that
+    excitations name, or 1; negative: [round with the rotor](excitation.md#engine-orders)"""
     rotation: Literal["+", "-"] = "+"
+    """`-`: the rotor turns from sector 1 to sector 0"""
     model: Literal["sector", "full"] = "sector"
+    """one sector that stands for all, or all of them"""
 
 
 class ContactSettings(ContactLaw):
     """A contact of an interface with the ground, a rigid neighbour, or with another body's interface.
 
-    against: ``ground``, or an interface, ``body:interface``; against_sector: of a ring, how many sectors further that
-    body stands. normal_force: N, or interference: m, negative a gap, where the sweep's normal forces are not this
-    contact's. width (along t1) and height (along t2) in m are the patch's own if not given; points: of it along t1 and
-    t2 (four of Jenkins elements if not given).
-
-    What it is: the keys of a contact.toml (`docs/contact_toml.md`), of the whole patch in SI, of which every point
-    carries its share; or file: a contact.toml beside the case. includes: which compliance the stiffnesses count, that
-    of the surface alone or of bulk and surface (the book's E A / l0); see `compliance`.
-
-    patch: ``rigid``, six coordinates, or ``nodal``, points that move as the shapes of the bodies say. curvature:
-    relative radii (m) along t1 and t2, inf where it is flat (a pin of radius r in a hole of radius R: r R / (R - r)).
-    young (Pa) and poisson of both bodies take the place of the two stiffnesses there: springs that agree with Hertz in
-    their ``approach`` or ``width`` (fit), at the load `fitted_at` (N; if not given the force that presses it: its own,
-    or each of the sweep); or fit = ``exact``: a line of contact in pieces, or one round contact, with Hertz' own law.
-    isotropic: of both tangential stiffnesses that Hertz' contact has the geometric mean, as mode = ``book`` needs it.
-    ground: how the other side moves; of another body, how fast its material runs through.
+    What it is say the keys of a contact.toml, of the whole patch in SI, of which every point
+    carries its share.
     """
 
     interface: Address
+    """of a body, `body:interface` where there are several; its frame is the contact's"""
     against: Address = GROUND
+    """`ground`, or the other interface"""
     against_sector: Annotated[int, Field(ge=-1000, le=1000)] = 0
+    """of a ring: how many sectors further the other body stands"""
     normal_force: NotNegative | None = None
+    """[N] where the sweep's forces are not this contact's"""
     interference: Number | None = None
+    """[m] or how far the faces overlap at rest; negative: a gap"""
     file: str | None = None
+    """a [contact.toml](contact_toml.md) instead of stiffnesses, friction, law and roughness"""
     width: Positive | None = None
+    """[m] b_0 along t1; the patch's own if not given"""
     height: Positive | None = None
+    """[m] h_0 along t2, likewise"""
     includes: Literal["surface", "bulk+surface"] | None = None
+    """which [compliance](contact.md) the stiffnesses count (bulk: the book's E A / l0)"""
     points: Annotated[tuple[Count, Count], BeforeValidator(_tuple)] | None = None
+    """how many along t1 and t2; four of Jenkins elements if not given"""
     patch: Literal["rigid", "nodal"] = "rigid"
+    """six coordinates, or points that move as the shapes of the bodies say"""
     curvature: Annotated[tuple[Radius, Radius], BeforeValidator(_tuple)] | None = None
+    """[m] relative radii along t1 and t2, inf where it is flat (a pin of radius r in a hole of
+    radius R: r R / (R - r))"""
     young: Positive | None = None
+    """[Pa] E of both bodies, for a curved patch, instead of the stiffnesses"""
     poisson: Annotated[Number, Field(gt=-1, le=0.5)] = 0.3
+    """nu of both bodies"""
     fit: Literal["approach", "width", "exact"] = "approach"
+    """in what the springs of a curved patch agree with Hertz; `exact`: his own law, of a line of
+    contact in pieces or of one round contact"""
     fitted_at: Positive | None = None
+    """[N] at which load; if not given the force that presses it: its own, or each of the sweep"""
     isotropic: bool = False
+    """geometric mean of both tangential stiffnesses of a curved patch, as the book's mode needs
+    it"""
     ground: GroundOfCase | None = None
 
     @property
@@ -252,16 +258,21 @@ class ContactSettings(ContactLaw):
 
 
 class Sweep(Model):
-    """Frequencies (Hz), linearly spaced, and the normal forces (N) to compare, or ``static``: the modal file's own.
-
-    They press every contact that has neither normal_force nor interference.
-    """
+    """Frequencies, and the normal forces to compare."""
 
     start: Positive
+    """[Hz] first frequency"""
     stop: Positive
+    """[Hz] last one"""
     points: Annotated[int, Field(ge=2, le=200000)] = 600
+    """equally spaced"""
     normal_forces: Literal["static"] | Numbers | None = None
+    """[N] to compare, in every contact that nothing else presses; `static`: of the body's
+    closures"""
     patience: NotNegative = 180.0
+    """[s] CPU time for each place where the sweep jumps or has no solution, of motions in time
+    (seven tenths of it), the curve about it and its stability; what compiles is not counted;
+    0: none of these"""
 
     @model_validator(mode="after")
     def _rising(self) -> Sweep:
@@ -273,10 +284,12 @@ class Sweep(Model):
 
 
 class MonitorOfCase(Model):
-    """A read-out: ``monitor`` or ``body:monitor``, and the direction of a displacement; or a strain gauge."""
+    """A read-out: a displacement, or a strain gauge."""
 
     monitor: Address
+    """of a body, `body:monitor` where there are several; all drawn, resonances of the first"""
     direction: Literal["x", "y", "z"] = "x"
+    """in body axes"""
 
 
 def _no_ratio(value: Any) -> Any:
@@ -286,49 +299,61 @@ def _no_ratio(value: Any) -> Any:
 
 
 class CaseSettings(OfFile):
-    """A whole case.toml.
-
-    body (with the speed, speed_rpm and modes of `BodyOfCase`), or [[bodies]]; excitation and amplitude, or
-    [[excitations]]; monitor and direction, or [[monitors]], all of which are drawn, and in the first of which
-    resonances are looked for. harmonics, ``auto`` for as many as an estimated harmonics_error (a share of the
-    amplitude, 0.5 at most) at the resonances asks for; samples (of a cycle, 16 a harmonic and 48 at least if not
-    given), cycles (marched at most until the sliders are periodic) and periodicity (within which share of the largest
-    force they count as periodic, 0: never): of contacts with a law. memory_limit: GiB that they may take by an estimate
-    before they begin, the machine's if not given. mode: ``aft``, their laws in time, or ``book`` (Sextro
-    5.2): one harmonic, constant normal force, elliptic orbits, from tables; strips: into which it cuts the
-    touching part of a rough surface, for microslip (5.2-33), 0 for none. damping: ``modal``, each body's own modes as
-    Sextro Eq. (2.4-13) has it; ``structural``, the bodies' ratios as loss factors, so that elastic deformation damps in
-    every motion; or ``stuck``, the modes with sticking contacts. Not given: modal for one body, structural for several.
-    damping_ratio: of the bodies that give none themselves, or of the stuck modes. material_limits: of the body whose
-    monitor is drawn, for the margins of its stresses.
-    """
+    """A whole case.toml."""
 
     _path: Path = PrivateAttr(default=Path("case.toml"))
 
     name: Name
+    """names the folder of the products, `build/NAME/`"""
     description: str = ""
+    """one line for the report"""
     body: BodyName | None = None
+    """the only body, short for one `[[bodies]]`"""
     bodies: Annotated[tuple[BodyOfCase, ...], BeforeValidator(_tuple)] = ()
     ring: RingSettings | None = None
     speed: Annotated[int, Field(ge=0)] = 0
+    """of the only body: which speed of its modal file, from 0"""
     speed_rpm: NotNegative | None = None
+    """[rpm] or a speed of the file or of its range"""
     modes: Annotated[int, Field(ge=1, le=2000)] | None = None
+    """how many of those that the modal file stores"""
     excitation: Address | None = None
+    """short for one `[[excitations]]`"""
     amplitude: Number = 1.0
+    """[N or Pa] of that excitation"""
     excitations: Annotated[tuple[ExcitationOfCase, ...], BeforeValidator(_tuple)] = ()
     monitor: Address | None = None
+    """short for one `[[monitors]]`"""
     direction: Literal["x", "y", "z"] = "x"
+    """of that monitor"""
     monitors: Annotated[tuple[MonitorOfCase, ...], BeforeValidator(_tuple)] = ()
     mode: Literal["aft", "book"] = "aft"
+    """laws marched in time, or the [book's contact](book_mode.md)"""
     strips: Annotated[int, Field(ge=0, le=1000)] = 0
+    """book's mode: into how many strips a patch's roughness makes microslip (5.2-33); 0: none"""
     damping: Annotated[Literal["modal", "structural", "stuck"] | None, BeforeValidator(_no_ratio)] = None
+    """[how the ratios are meant](excitation.md#damping): of each body's own modes (the book's),
+    as loss factors of the bodies, or of the modes with sticking contacts; if not given,
+    `modal` for one body, `structural` for several"""
     damping_ratio: Ratio | Ratios | None = None
+    """of the bodies that give none themselves, or of the stuck modes: one, or one a mode, the
+    last one for all that follow"""
     harmonics: Literal["auto"] | Annotated[int, Field(ge=1, le=200)] = 3
+    """H, besides the mean; `auto`: [as many as the error asks
+    for](harmonic_balance.md#what-is-followed-instead-of-swept)"""
     harmonics_error: Annotated[Positive, Field(le=0.5)] | None = None
+    """of `auto`: estimated error of the resonances that is allowed, a share of the amplitude;
+    0.01 if not given"""
     samples: Annotated[int, Field(ge=8, le=100000)] | None = None
+    """of a cycle; at least four a harmonic; sixteen a harmonic and 48 at least if not given"""
     cycles: Annotated[int, Field(ge=1, le=1000)] = 100
+    """marched at most until the sliders are periodic"""
     periodicity: Annotated[NotNegative, Field(le=1e-2)] = 1e-10
+    """share of the largest force within which they count as periodic; 0: all cycles are marched"""
     memory_limit: Positive | None = None
+    """[GiB] that the points of contact may take, by [an
+    estimate](harmonic_balance.md#what-it-costs) before they begin; that of the machine if not
+    given"""
     springs: Annotated[tuple[SpringOfCase, ...], BeforeValidator(_tuple)] = ()
     contacts: Annotated[tuple[ContactSettings, ...], BeforeValidator(_tuple)]
     sweep: Sweep
@@ -337,46 +362,36 @@ class CaseSettings(OfFile):
     speeds: SpeedsOfCase | None = None
     ranges: RangesOfCase | None = None
     curve: CurveOfCase | None = None
-    orbit: OrbitOfCase | None = None
     identification: IdentificationOfCase | None = None
-    stability: StabilityOfCase | None = None
-    bifurcation: Annotated[tuple[BifurcationOfCase, ...], BeforeValidator(_tuple)] = ()
-    mistuning: MistuningOfCase | None = None
 
     @model_validator(mode="before")
     @classmethod
     def _swept(cls, raw: Any) -> Any:
-        """A case that asks for a motion in time alone needs no sweep: it is an octave on either side."""
-        if not isinstance(raw, dict) or "sweep" in raw:
+        """A case that asks for what needs no sweep has one that stands for it."""
+        if not isinstance(raw, dict) or "sweep" in raw or not any(raw.get(key) for key in _unswept()):
             return raw
-        band = unasked_sweep(raw)
-        asks = [raw.get(key) for key in ("stability", "bifurcation", *_unswept())]
-        in_time = isinstance(raw.get("orbit"), dict) and band != NO_SWEEP
-        return raw | {"sweep": band} if in_time or any(asks) else raw
+        return raw | {"sweep": unasked_sweep(raw)}
 
     @property
-    def asked(self) -> dict[str, Model]:
+    def asked(self) -> dict[str, Any]:
         """Analysis -> its keys, of those in whose tables the case asks for something."""
-        return {name: keys for name in analyses() if (keys := getattr(self, name, None)) is not None}
+        return {name: keys for name in analyses() if (keys := getattr(self, name, None))}
 
     @property
     def is_only_followed(self) -> bool:
         """Whether it asks for what needs no sweep, and for none."""
-        return self._asks_without_sweep and self.orbit is None and self._stands_for(NO_SWEEP)
+        asked = self.model_dump(include=self.asked.keys() & _unswept())
+        return bool(asked) and self._stands_for(unasked_sweep(asked))
 
     @property
-    def _asks_without_sweep(self) -> bool:
-        return bool(self.stability or self.bifurcation or self.asked.keys() & _unswept())
-
-    @property
-    def is_only_in_time(self) -> bool:
-        """Whether it asks for motions in time and for no sweep."""
-        return self.orbit is not None and self._stands_for(band_of(self.orbit.model_dump()))
+    def has_no_response(self) -> bool:
+        """Whether all that it asks for is in the tables of its analyses."""
+        return self.is_only_followed or any(analyses()[name].alone for name in self.asked)
 
     @property
     def is_only_built(self) -> bool:
         """Whether it asks for nothing: what is analysed is said in Python."""
-        asked = self._asks_without_sweep or self.orbit is not None
+        asked = self.asked.keys() & _unswept()
         return not asked and self.sweep.normal_forces == UNPRESSED and self._stands_for(NO_SWEEP)
 
     def _stands_for(self, band: Mapping[str, float]) -> bool:
@@ -387,9 +402,9 @@ class CaseSettings(OfFile):
 
     @model_validator(mode="after")
     def _fits_together(self) -> CaseSettings:
-        free = self.bifurcation or self.stability or self.is_only_built or any(s.motion for s in self.springs)
+        free = self.is_only_built or any(s.motion for s in self.springs)
         free = free or any(c.ground is not None for c in self.contacts)
-        free = free or self.orbit is not None and self.orbit.release is not None
+        free = free or any(analyses()[name].unloaded(keys) for name, keys in self.asked.items())
         moved = free and not self.excitation and not self.excitations
         for short, many in (("body", "bodies"), ("excitation", "excitations"), ("monitor", "monitors")):
             if bool(getattr(self, short)) == bool(getattr(self, many)) and not (moved and short == "excitation"):
@@ -397,7 +412,7 @@ class CaseSettings(OfFile):
         names = [b.name for b in self.components]
         if twice := sorted({n for n in names if names.count(n) > 1}):
             raise ValueError(f"bodies: the name '{twice[0]}' is taken; give every body its own")
-        named_once(self, "bifurcation")
+        named_once(self, *(name for name in self.asked if analyses()[name].several))
         if said := self._whose():
             raise ValueError(said)
         if self.loads and all(x.is_zero for x in self.loads):
@@ -473,7 +488,7 @@ class CaseSettings(OfFile):
 
     def _pressed(self) -> CaseSettings:
         moves = [c.interface for c in self.contacts if c.ground is not None]
-        if moves and not (self.is_only_in_time or self.is_only_followed or self.is_only_built):
+        if moves and not (self.is_only_followed or self.is_only_built):
             raise ValueError(
                 f"contacts.{moves[0]}.ground: only a motion in time knows ground that moves; give [orbit], "
                 "[stability], [[bifurcation]] or [two_tones], and no sweep"
@@ -487,8 +502,9 @@ class CaseSettings(OfFile):
             )
         if any(b.aerodynamics for b in self.bodies) and self.ring is None:
             raise ValueError("bodies: aerodynamics belong to the waves of a ring; add [ring] with its blades")
-        if self.mistuning is not None and self.ring is None:
-            raise ValueError("mistuning: is that of a ring; add [ring] with blades and engine_order")
+        for name, keys in self.asked.items():
+            if words := analyses()[name].fits(keys, self):
+                raise ValueError(f"{name}: {words}")
         if any(c.against_sector for c in self.contacts) and self.ring is None:
             raise ValueError("contacts: against_sector belongs to a ring; add [ring] with blades and engine_order")
         return self
@@ -545,7 +561,7 @@ class CaseSettings(OfFile):
             [f for c in self.contacts for f in c.files]
             + [x.field for x in self.loads]
             + [b.aerodynamics for b in self.components]
-            + [f for s in (self.mistuning.scatter if self.mistuning else ()) for f in (s.file, *s.others.values())]
+            + [f for name, keys in self.asked.items() for f in analyses()[name].files(keys)]
         )
         return tuple(dict.fromkeys(f for f in named if f is not None))
 
@@ -586,22 +602,10 @@ UNPRESSED = (0.0,)
 """Normal forces of the sweep of a case whose contacts are pressed in Python."""
 
 
-def unasked_sweep(raw: Mapping[str, Any]) -> dict[str, float]:
-    """Start and stop (Hz) of the sweep of a case that has none, by its keys."""
-    asked = raw.get("orbit")
-    return (band_of(asked) if isinstance(asked, Mapping) else {}) or NO_SWEEP
-
-
-def band_of(orbit: Mapping[str, Any]) -> dict[str, float]:
-    """Start and stop (Hz) of the sweep of a case that has none: an octave around what is asked of its motion in time;
-    nothing where that says no numbers."""
-    ramp = orbit.get("run_up")
-    ends = [ramp.get("start"), ramp.get("stop")] if isinstance(ramp, Mapping) else None
-    for values, unit in ((orbit.get("frequency"), 1.0), (orbit.get("Omega"), 2 * math.pi), (ends, 1.0)):
-        asked = [v for v in (values if isinstance(values, list | tuple) else [values]) if isinstance(v, int | float)]
-        if asked and min(asked) > 0:
-            return {"start": 0.5 * min(asked) / unit, "stop": 2.0 * max(asked) / unit}
-    return {}
+def unasked_sweep(asked: Mapping[str, Any]) -> Mapping[str, float]:
+    """Start and stop (Hz) of the sweep of a case that has none, by what it asks for."""
+    bands = (analyses()[name].band(keys) for name, keys in asked.items() if name in _unswept())
+    return next(filter(None, bands), NO_SWEEP)
 
 
 def load_case(path: Path | str, assignments: Sequence[str] | None = None) -> tuple[CaseSettings, dict[str, Any]]:
@@ -616,10 +620,15 @@ def case_model() -> type[CaseSettings]:
     Raises:
         UserError: the table of one has the name of another key.
     """
-    tables: dict[str, Any] = {name: (one.asks | None, None) for name, one in analyses().items()}
+    tables: dict[str, Any] = {name: (_table_of(one) | None, None) for name, one in analyses().items()}
     if taken := sorted(set(tables) & set(CaseSettings.model_fields)):
         raise UserError(f"{GROUP}: '{taken[0]}' is a key of every case already; remove its package or rename it there")
     return create_model("CaseSettings", __base__=CaseSettings, __doc__=CaseSettings.__doc__, **tables)
+
+
+def _table_of(one: Analysis) -> Any:
+    """The type of the keys of an analysis."""
+    return Annotated[tuple[one.asks, ...], BeforeValidator(_tuple)] if one.several else one.asks  # type: ignore[name-defined]
 
 
 def _unswept() -> set[str]:

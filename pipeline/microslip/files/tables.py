@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -30,9 +31,19 @@ def columns_csv(columns: Mapping[str, Iterable[Any]], digits: int) -> str:
     return rows_csv(columns, zip(*columns.values(), strict=True), digits)
 
 
+def write_columns(columns: Mapping[str, Iterable[Any]], digits: int, path: Path) -> None:
+    """Name -> numbers or texts, as a file."""
+    write_text(path, columns_csv(columns, digits))
+
+
+def csv_files(tables: Mapping[str, Mapping[str, Iterable[Any]]], digits: int) -> dict[str, Callable[[Path], None]]:
+    """File name -> what writes its columns; those without columns are left out."""
+    return {name: partial(write_columns, of, digits) for name, of in tables.items() if of}
+
+
 def write_tables(folder: Path, tables: Mapping[str, Mapping[str, Iterable[Any]]], digits: int) -> list[Path]:
     """Write file name -> columns; those without columns are left out."""
-    made = [folder / name for name, columns in tables.items() if columns]
-    for path in made:
-        write_text(path, columns_csv(tables[path.name], digits))
-    return made
+    files = csv_files(tables, digits)
+    for name, write in files.items():
+        write(folder / name)
+    return [folder / name for name in files]

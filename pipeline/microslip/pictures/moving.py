@@ -1,15 +1,99 @@
-"""A body that moves in time, as an animation of one period."""
+"""Bodies that move, over the last period of a motion or one of a root: for ParaView, and as animations."""
 
 from __future__ import annotations
 
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 
-from ..data import Array, ModalBasis
+from ..case.assemble import Built
+from ..case.loaded import Loaded
+from ..data import Array, ComplexArray, ModalBasis, ModalGroup
+from ..exchange.vtu import write_motion
+from ..operating.cycle import longest
+from ..ring.expansion import sector_rotation
+from ..system.disc import spread
+from ..time_domain import classification
+from ..time_domain.orbit import Orbit
 from ..units import METRES
-from . import lettering, ring_views, views
+from . import can_draw, lettering, ring_views, views
 from .scene import Stage, fit, quiet_vtk
+
+FRAMES = 32
+"""Of a period that is animated."""
+
+SIZE = 1e-3
+"""m, the largest displacement of a root's shape, which has no size of its own."""
+
+
+def moving_bodies(found: Sequence[tuple[str, Orbit]], built: Built, folder: Path) -> list[Path]:
+    """Files of every body that has a mesh and shapes; of a cyclic one all sectors, of lone blades in a ring the first.
+
+    Returns:
+        Those in ``motion/`` for ParaView, and animations in ``pictures/``.
+    """
+    made = list[Path]()
+    for i, (name, one) in enumerate(found, 1):
+        if len(one.time) < one.samples:
+            continue
+        at = len(one.time) - one.samples + np.arange(0, one.samples, max(one.samples // FRAMES, 1))
+        for j, component in enumerate(one.equations.assembly.components):
+            body = built.bodies.get(component.name.removesuffix("_0" if built.settings.ring else ""))
+            if body is None or not body.basis.mesh.n_cells or not all(len(g.phi) for g in body.groups.values()):
+                continue
+            moved = _moved(body, classification.of_body(one, j, at))
+            made += write_motion(body.basis, one.time[at], moved, folder / "motion" / f"{component.name}_{i}.pvd")
+            if can_draw() is None:
+                path = folder / "pictures" / f"moving_{i}_{component.name}.gif"
+                title = f"{built.settings.name}: {name}, one period of the excitation"
+                made.append(moving_gif(body.basis, moved, path, title))
+    return made
+
+
+def moving_shape(
+    shape: Mapping[str, ComplexArray], bases: Mapping[str, ModalBasis], frequency: float, animated: Collection[str],
+    title: str, number: int, folder: Path,
+) -> list[Path]:  # fmt: skip
+    """One period of the shape of a root, Re(u exp(i omega t)) without its growth, largest over all bodies `SIZE`.
+
+    Args:
+        shape: body -> (n, 3) complex motion u of its points. frequency: Hz. animated: bodies that are drawn.
+        number: of the root, in names.
+
+    Returns:
+        Files of every body in ``motion/`` for ParaView, and animations in ``pictures/`` where PyVista is.
+    """
+    made, part, scenes = list[Path](), np.arange(FRAMES) / FRAMES, bool(animated) and can_draw() is None
+    scale = SIZE / max(float(longest(u).max()) for u in shape.values())
+    for name, u in shape.items():
+        moved = scale * np.real(np.exp(2j * np.pi * part)[:, None, None, None] * u)
+        made += write_motion(bases[name], part / frequency, moved, folder / "motion" / f"root_{number}_{name}.pvd")
+        if scenes and name in animated:
+            path = folder / "pictures" / f"root_{number}_{name}.gif"
+            made.append(moving_gif(bases[name], moved, path, title))
+    return made
+
+
+def _moved(body: Loaded, q: Array) -> Array:
+    """(f, sectors, points, 3) m of a body, by its coordinates (f, m), those of all sectors of a cyclic one."""
+    if body.basis.sectors == 1:
+        return np.einsum("pxm,fm->fpx", body.group.phi, q)[:, None]
+    return whole_ring(body.basis, body.groups, q)
+
+
+def whole_ring(basis: ModalBasis, groups: Mapping[int, ModalGroup], q: Array) -> Array:
+    """(f, N, points, 3) m of all sectors in the axes of the ring, by its coordinates (f, m) of `system.disc`.
+
+    Args:
+        groups: of every nodal diameter.
+    """
+    waves = [groups[k].phi for k in sorted(groups)]
+    found = np.empty((len(q), basis.sectors, *waves[0].shape[:2]), np.float32)
+    for j in range(basis.sectors):
+        shapes = spread(waves, j, basis.sectors)
+        found[:, j] = np.einsum("yx,pxm,fm->fpy", sector_rotation(basis, j), shapes, q, optimize=True)
+    return found
 
 
 def moving_gif(basis: ModalBasis, moved: Array, path: Path, title: str) -> Path:

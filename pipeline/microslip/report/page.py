@@ -56,8 +56,13 @@ def answer_page(title: str, told: Sequence[str], pictures: Sequence[Path], *rest
     """A page of sentences, those that warn apart, pictures, and what follows."""
     lead, warnings = ([s for s in told if s.startswith("warning") is w] for w in (False, True))
     shown = Album({p.name: p for p in pictures}).begun("")
-    pieces = [say(*lead, tone="lead"), say(*warnings, tone="warn"), *shown, *rest]
+    pieces = [say(*map(_sentence, lead), tone="lead"), say(*warnings, tone="warn"), *shown, *rest]
     return page(title, [piece for piece in pieces if piece])
+
+
+def _sentence(words: str) -> str:
+    """What has no full stop yet gets one, and a capital letter."""
+    return words if words.endswith((".", "!", "?")) else f"{words[:1].upper()}{words[1:]}."
 
 
 class Album:

@@ -202,23 +202,19 @@ _DIFFERS = re.compile(r"'[^']*'|^[\w.@-]+:|\b[\w-]*\d[\w.+-]*")
 """Names and numbers in a message."""
 
 
-def survey_html(
-    title: str, sentences: Sequence[str], tables: Mapping[str, Mapping[str, Any]], pictures: Sequence[Path]
-) -> str:
-    """The page of a survey: what was found in words, pictures and tables (file name -> column -> values)."""
-    album = Album({p.name: p for p in pictures})
-    pieces = [say(*sentences, tone="note"), *album.begun("")]
+def number_tables(tables: Mapping[str, Mapping[str, Any]]) -> list[Piece]:
+    """Tables as a page has them: file name -> column -> values."""
     told = {
         name: [dict(zip(columns, map(_number_or_words, row), strict=True))
                for row in zip(*columns.values(), strict=True)]
         for name, columns in tables.items()
     }  # fmt: skip
-    factors = _factors(told)
+    factors, pieces = _factors(told), list[Piece]()
     for name, rows in told.items():
         shown = _table_of(rows, factors) if rows else say("")
         heading = f"Numbers in {name}" if name.endswith(".csv") else name
         pieces += [Piece("h2", heading), shown if len(rows) <= MOST_ROWS else fold(f"{len(rows)} rows", shown)]
-    return page(title, pieces)
+    return pieces
 
 
 def _number_or_words(value: Any) -> float | str:

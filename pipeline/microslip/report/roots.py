@@ -1,45 +1,15 @@
-"""The page of roots: the answer, the plane, the table, what happens over a range."""
+"""Roots as a table, on a page and on the terminal."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from pathlib import Path
+from collections.abc import Sequence
 
-from ..roots.diagram import Diagram
 from ..roots.spectrum import Spectrum
-from .page import Album, Piece, fold, page, say, table
-
-CAPTIONS = {
-    "plane": "Roots in the complex plane. What stands right of the line grows by itself.",
-    "over": "Growth rate and frequency of every root; in colour those that grow somewhere.",
-}
+from .page import Piece, say, table
 
 
-def roots_html(
-    title: str, state: str, found: Spectrum, over: Diagram | None, pictures: Mapping[str, Path]
-) -> str:  # fmt: skip
-    """The page, which begins with the answer.
-
-    Args:
-        state: the values of the parameters, in words. pictures: ``plane`` and ``over``.
-    """
-    album = Album(pictures)
-    lead = [f"{state}: {found.sentence}."] + ([f"{over.sentence[0].upper()}{over.sentence[1:]}."] if over else [])
-    pieces = [
-        say(*lead, tone="lead"),
-        album.take("plane", CAPTIONS["plane"]),
-        root_table(found),
-        say(READ_AS, tone="note"),
-        album.take("over", CAPTIONS["over"]),
-    ]
-    if over is not None:
-        counts = [(f"{v:.6g}", str(n)) for v, n in zip(over.values, over.unstable, strict=True)]
-        pieces.append(fold("How many roots grow at each value", table([over.parameter, "grow"], counts)))
-    return page(title, pieces)
-
-
-def root_table(found: Spectrum) -> Piece:
-    """A row a root."""
+def root_table(found: Spectrum) -> list[Piece]:
+    """A row a root, and how it is read."""
     c = found.columns
     rows: list[Sequence[object]] = [
         (f"{f:.7f}", f"{g:.7g}", f"{d:.3e}", v, f"{t:.1e}", f"{r:.1e}", f"{e:.1e}")
@@ -49,10 +19,19 @@ def root_table(found: Spectrum) -> Piece:
         )
     ]  # fmt: skip
     head = ["Hz", "growth 1/s", "damping ratio", "", "neutral below 1/s", "residual", "backward error"]
-    return table(head, rows)
+    return [table(head, rows), say(READ_AS, tone="note")]
 
 
 READ_AS = (
     "An amplitude grows as exp(growth t). Neutral: the growth rate is nearer to zero than the data decide. Residual: "
     "of the equation over the elastic force; backward error: over the norms of the matrices."
 )
+
+
+def table_lines(found: Spectrum) -> list[str]:
+    """The table for the terminal."""
+    head = f"{'Hz':>14} {'growth 1/s':>14} {'damping':>11}  {'':8} {'backward error':>14}"
+    c = found.columns
+    shown = ("frequency_Hz", "growth_1_s", "damping_ratio", "verdict", "backward_error")
+    rows = zip(*(c[k] for k in shown), strict=True)
+    return [head, *(f"{f:14.7f} {g:14.7g} {d:11.3e}  {v:8} {e:14.1e}" for f, g, d, v, e in rows)]

@@ -44,6 +44,12 @@ def roots_of(
     return diagram(family, over, points, window, at=at, neutral=neutral, report=report)
 
 
+def window_of(asked: Any) -> Window:
+    """The window, in 1/s and rad/s, of keys whose `frequency` is in Hz and `growth` in 1/s."""
+    low, high = asked.frequency
+    return Window(asked.growth, (2 * np.pi * low, 2 * np.pi * high))
+
+
 def _family(body: Any, speed: int | None) -> Family:
     if speed is not None and not isinstance(body, ModalBasis):
         raise UserError("stability: speed: is that of a modal file or basis; leave it out")

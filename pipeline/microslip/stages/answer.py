@@ -5,16 +5,21 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from ..analysis import Answer, Drawing
 from ..basis import read_basis
 from ..case import CaseSettings, load_case
 from ..case.assemble import Built, build
 from ..data import ModalBasis
-from ..errors import in_its_file
+from ..errors import UserError, of_file
 from ..files import store
+from ..files.tables import columns_csv
+from ..pictures.plots import empty_figure, save_figure
+from ..report.page import answer_page
+from ..results import Journal, open_journal
 from .checkpoint import inputs_of
 from .stage import Made, Report, Stage, folder_of_case, hash_of_code
 
@@ -23,28 +28,105 @@ class Written(NamedTuple):
     """What a stage leaves for a reader.
 
     Attributes:
-        files: the page first. said: sentences, and lines of a table. whole: whether nothing of it was lost.
+        files: the page first. said: sentences, and lines of a table. whole: whether nothing of it was lost. missing:
+            what, in words.
     """
 
     files: Sequence[Path]
     said: Sequence[str]
     whole: bool = True
+    missing: str = ""
 
 
 def answered(stage: Stage, inputs: Mapping[str, Any], work: Callable[[], Written]) -> Written:
-    """The answer that a stage's product (JSON) holds, made where it is not up to date; see `Stage.make`."""
+    """What a stage's product (JSON) holds of an answer, made where it is not up to date; see `Stage.make`."""
     folder = stage.product.parent
 
     def make() -> Made:
         found = work()
         names = [str(path.relative_to(folder)) for path in found.files]
         told = {"files": names, "said": list(found.said), "whole": bool(found.whole)}
-        store.write_json(stage.product, told)
+        store.write_json(stage.product, {**told, "missing": found.missing})
         return Made(found.files)
 
     stage.make(inputs, make)
     told = json.loads(stage.product.read_text())
-    return Written([folder / name for name in told["files"]], told["said"], told["whole"])
+    return Written([folder / name for name in told["files"]], told["said"], told["whole"], told["missing"])
+
+
+def made(
+    stage: Stage, inputs: Mapping[str, Any], title: str, pictures: bool, solve: Callable[[Journal], Answer],
+    case: str = "",
+) -> Written:  # fmt: skip
+    """The answer that a stage's product (JSON) holds, solved where it is not up to date. What is finished stays in a
+    journal, ``NAME.points``, until all that is made of it is there.
+
+    Args:
+        inputs: what it depends on, besides pictures. title: of the page. case: begins the titles of diagrams.
+    """
+    points, depends = stage.product.with_suffix(".points"), {**inputs, "code": hash_of_code(stage.code)}
+
+    def work() -> Written:
+        with open_journal(points, store.hash_settings(depends), {"case": case}, stage.force) as journal:
+            try:
+                answer = solve(journal)
+            except UserError:
+                if not journal.series:
+                    points.unlink()
+                raise
+        stage.begin()
+        return written(answer, stage.product.stem, stage.product.parent, title, pictures, case)
+
+    found = answered(stage, {**inputs, "pictures": pictures}, work)
+    points.unlink(missing_ok=True)
+    return found
+
+
+def written(answer: Answer, name: str, folder: Path, title: str, pictures: bool, case: str = "") -> Written:
+    """The files of an answer, the page first, and what is said of them.
+
+    Args:
+        name: begins those that have no name of their own. case: begins the titles of diagrams.
+    """
+    made, moving, begins = _data(name, answer, folder), list[Path](), "pictures/"
+    pictured = [file for file in answer.files if file.startswith(begins) and pictures]
+    for file, write in answer.files.items():
+        if file in pictured or not file.startswith(begins):
+            write(folder / file)
+    made += [folder / file for file in answer.files if not file.startswith(begins)]
+    shown = [folder / file for file in pictured]
+    if pictures:
+        shown += [drawn(d, folder / f"{begins}{_named(name, end)}.png", case) for end, d in answer.diagrams.items()]
+        moving = list(answer.moving(folder))
+    shown += [path for path in moving if path.suffix == ".gif"]
+    page = folder / f"{name}.html"
+    store.write_text(page, answer_page(title, answer.sentences, shown, *answer.tables))
+    files = [page, *made, *dict.fromkeys([*shown, *moving])]
+    whole = answer.whole and not answer.missing
+    return Written(files, [*answer.lines, *answer.sentences], whole, answer.missing)
+
+
+def _named(name: str, end: str) -> str:
+    return f"{name}_{end}" if end else name
+
+
+def _data(name: str, answer: Answer, folder: Path) -> list[Path]:
+    """A table and a file of each."""
+    files = []
+    for end, data in answer.data.items():
+        stem = folder / _named(name, end)
+        store.write_text(stem.with_suffix(".csv"), columns_csv(data.columns(), 10))
+        files += [stem.with_suffix(".csv"), data.save(stem.with_suffix(".h5"))]
+    return files
+
+
+def drawn(diagram: Drawing, path: Path, case: str = "") -> Path:
+    """A diagram as a PNG, the name of its case before its title."""
+    figure = empty_figure(*diagram.size)
+    diagram.draw(figure)
+    if title := ": ".join(filter(None, (case, diagram.title))):
+        figure.suptitle(title)
+    return save_figure(figure, path)
 
 
 @dataclass(frozen=True)
@@ -91,22 +173,6 @@ class CaseJob:
         """What the answer depends on, besides pictures."""
         return inputs_of(self.raw, self.settings, self.files)
 
-    def made_by(self, stage: Stage) -> str:
-        """Hash of what all that is computed depends on."""
-        return store.hash_settings({**self.inputs, "code": hash_of_code(stage.code)})
-
-    @in_its_file
-    def answer(self, name: str, module: str | Path, work: Callable[[Stage, CaseJob], Written]) -> Written:
-        """The answer that ``name.json`` holds, made by a module's `work` where it is not up to date.
-
-        What `work` keeps in ``name.points`` until then is removed.
-        """
-        product = self.folder / f"{name}.json"
-        stage = Stage(product, (module,), self.force, self.report, case=self.path)
-        found = answered(stage, {**self.inputs, "pictures": self.pictures}, lambda: work(stage, self))
-        stage.product.with_suffix(".points").unlink(missing_ok=True)
-        return found
-
 
 @dataclass(frozen=True)
 class RollJob:
@@ -124,12 +190,22 @@ class RollJob:
     pictures: bool = True
 
     def stage(self, case: str, name: str, module: str) -> Stage:
-        """The stage whose product is ``name.json``, made by a module."""
+        """The stage whose product is ``name.json``, made by a module. case: its name."""
         product = folder_of_case(self.path, case, self.root) / f"{name}.json"
         return Stage(product, (module,), self.force, self.report, case=self.path)
 
-    def inputs(self, raw: Mapping[str, Any], files: Iterable[Path | str]) -> dict[str, Any]:
-        """What the answer depends on: the case as a table, files that it names (what is missing is told where it is
-        read), and whether pictures are wanted."""
-        there = [file for name in files if (file := self.path.parent / name).is_file()]
-        return {"case": raw, "files": [store.hash_file(file) for file in there], "pictures": self.pictures}
+    def answer(
+        self, stage: Stage, case: str, raw: Mapping[str, Any], files: Iterable[Path | str],
+        title: str, solve: Callable[..., Answer],
+    ) -> Written:  # fmt: skip
+        """The answer that a stage's product holds, made where it is not up to date.
+
+        Args:
+            case: its name. raw: it as a table. files: that it names; what is missing is told where
+                it is read. title: of the page. solve: is called with a journal, and `report`.
+        """
+        there = [file for f in files if (file := self.path.parent / f).is_file()]
+        inputs = {"case": raw, "files": [store.hash_file(file) for file in there]}
+        with of_file(self.path):
+            words = f"{case}: {title}"
+            return made(stage, inputs, words, self.pictures, partial(solve, report=self.report), case)

@@ -255,14 +255,16 @@ def _backbone_message(normal: float, one: Backbone, of: Quantity) -> str:
 
 def _page(case: Case, name: str, title: str, sentences: Sequence[str], files: Sequence[Path]) -> Path:
     """The page of tables and pictures that were written."""
-    from ..report.response import survey_html
+    from ..report.page import answer_page
+    from ..report.response import number_tables
 
     tables = {}
     for file in (f for f in files if f.suffix == ".csv"):
         head, *rows = csv.reader(file.read_text(encoding="utf-8").splitlines())
         tables[file.name] = dict(zip(head, zip(*rows, strict=True), strict=True)) if rows else {}
     page = case.folder / f"{name}.html"
-    store.write_text(page, survey_html(title, sentences, tables, [f for f in files if f.suffix == ".png"]))
+    drawn = [f for f in files if f.suffix == ".png"]
+    store.write_text(page, answer_page(title, sentences, drawn, *number_tables(tables)))
     return page
 
 

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from ..analysis import places
 from ..errors import UserError
 from ..settings.body import BodySettings, body_settings, load_body
 from ..settings.toml import load_toml
@@ -112,7 +113,7 @@ def holds_a_case_alone(path: Path) -> bool:
     return [(path / f"{name}.toml").is_file() for name in ("case", "body", "system")] == [True, False, False]
 
 
-ASKED = frozenset({"sweep", "orbit", "stability", "bifurcation"})
+ASKED = frozenset({"sweep", *places()})
 """Keys of a case, one of which it has, and a system.toml none."""
 
 

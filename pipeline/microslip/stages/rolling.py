@@ -2,25 +2,29 @@
 
 from __future__ import annotations
 
+from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
 
+from ..analysis import Answer, Files
 from ..basis import read_basis
-from ..errors import UserError, in_its_file, of_file
+from ..errors import UserError, in_its_file
 from ..files import store
-from ..files.tables import rows_csv, write_tables
-from ..report.rolling import rolling_html
+from ..files.tables import csv_files, rows_csv
+from ..pictures.rolling import curve_picture, traction_picture, wearing_picture, write_tractions_vtu
+from ..report.page import Piece, number, say, table
+from ..results import Journal
 from ..rolling.behind import ROWS, Behind, behind
 from ..rolling.contact_table import ContactTable, contact_table, write_contact_table
 from ..rolling.settings import RollingCase, Section, load_rolling
 from ..rolling.study import Studied, rows_of_patches, study
 from ..rolling.table import creep_table, write_creep_table
 from ..rolling.wearing import Wearing, wearing
-from .answer import RollJob, Written, answered
+from .answer import RollJob, Written
 from .job import Job, open_job
 from .modal import modes_stage
 from .places import find_body
-from .stage import Report, Stage
+from .stage import Report
 
 
 def rolling_stage(job: RollJob) -> Written:
@@ -32,8 +36,10 @@ def rolling_stage(job: RollJob) -> Written:
     case, raw = load_rolling(job.path, list(job.assignments))
     stage = job.stage(case.name, "rolling", "stages.rolling")
     bodies = _bodies(case, job.path, job.report)
-    inputs = job.inputs(raw, [*case.files, *(body.resolve() for body in bodies)])
-    return answered(stage, inputs, lambda: _work(stage, case, job, bodies))
+    files: list[Path | str] = [*case.files, *(body.resolve() for body in bodies)]
+
+    solve = partial(_answer, case, job.path, bodies)
+    return job.answer(stage, case.name, raw, files, "rolling contact", solve)
 
 
 def _bodies(case: RollingCase, case_path: Path, report: Report) -> list[Path]:
@@ -59,47 +65,32 @@ def _of_one_material(case_path: Path, key: str, job: Job, section: Section) -> N
         )
 
 
-def _work(stage: Stage, case: RollingCase, job: RollJob, bodies: list[Path]) -> Written:
-    folder = stage.product.parent
-    stage.report("patches and creep curve")
-    with of_file(job.path):
-        found = study(case, job.path)
-        elastic = _behind(found, bodies)
-        contacts = _contacts(stage, found)
-        worn = _wearing(stage, found, job.path)
-    stage.begin()
-    made = _tables(found, folder)
-    beside, more = _beside(stage, found, elastic, contacts)
-    if worn is not None:
-        beside += _worn_tables(worn, folder)
-        more += [worn.sentence(), *worn.warnings()]
-    drawn = []
-    if job.pictures and found.forces is not None:
-        drawn = _pictures(found, worn, folder / "pictures", case.name)
-    page = folder / "rolling.html"
-    shown = [p for p in drawn if p.suffix == ".png"]
-    store.write_text(page, rolling_html(f"{case.name}: rolling contact", found, shown, more))
-    return Written([page, *made, *beside, *drawn], [*found.sentences(), *more])
-
-
-def _beside(
-    stage: Stage, found: Studied, elastic: Behind | None, contacts: ContactTable | None
-) -> tuple[list[Path], list[str]]:
-    """Files of what is asked beside the curve, and what is said of them."""
-    folder, case, made, more = stage.product.parent, found.case, [], []
+def _answer(case: RollingCase, path: Path, bodies: list[Path], _: Journal, report: Report) -> Answer:
+    report("patches and creep curve")
+    found = study(case, path)
+    elastic, contacts = _behind(found, bodies), _contacts(found, report)
+    worn = _wearing(found, path, report)
+    files, said = _tables(found) | ({} if worn is None else _worn_tables(worn)), found.sentences()
     if elastic is not None:
-        made += write_tables(folder, {"stiffness.csv": {"direction": ROWS, **elastic.columns()}}, 8)
-        more.append(elastic.sentence())
+        files |= csv_files({"stiffness.csv": {"direction": ROWS, **elastic.columns()}}, 8)
+        said.append(elastic.sentence())
     if case.table is not None:
-        stage.report("table of creep forces")
+        report("table of creep forces")
         how = case.model.model_dump(include={"distribution", "coefficients"})
         table = creep_table(found.track.elastic.poisson, **case.table.model_dump(), **how)
-        made.append(write_creep_table(folder / "creep_table.h5", table))
-        more.append(table.sentence())
+        files["creep_table.h5"] = lambda file: write_creep_table(file, table)
+        said.append(table.sentence())
     if contacts is not None:
-        made.append(write_contact_table(folder / "contact_table.h5", contacts))
-        more.append(contacts.sentence())
-    return made, more
+        files["contact_table.h5"] = lambda file: write_contact_table(file, contacts)
+        said.append(contacts.sentence())
+    said += [worn.sentence(), *worn.warnings()] if worn is not None else []
+    drawn = _pictures(found, worn, case.name) if found.forces is not None else {}
+    return Answer(
+        said,
+        tables=[_patches(found), say(READ_AS, tone="note")],
+        files=files | drawn,
+        moving=partial(_in_paraview, found),
+    )
 
 
 def _behind(found: Studied, bodies: list[Path]) -> Behind | None:
@@ -111,48 +102,65 @@ def _behind(found: Studied, bodies: list[Path]) -> Behind | None:
     return behind(found.patches[0], found.case.solids, groups, elastic.face, methods)
 
 
-def _contacts(stage: Stage, found: Studied) -> ContactTable | None:
+def _contacts(found: Studied, report: Report) -> ContactTable | None:
     asked = found.case.contacts
     if asked is None:
         return None
-    return contact_table(found.track, found.case.vertical_force, **asked.model_dump(), report=stage.report)
+    return contact_table(found.track, found.case.vertical_force, **asked.model_dump(), report=report)
 
 
-def _wearing(stage: Stage, found: Studied, path: Path) -> Wearing | None:
+def _wearing(found: Studied, path: Path, report: Report) -> Wearing | None:
     if found.case.wear is None or not found.case.wear.updates:
         return None
-    return wearing(found.case, found.track, found.case.characteristic(path), found.case.surface(path), stage.report)
+    return wearing(found.case, found.track, found.case.characteristic(path), found.case.surface(path), report)
 
 
-def _worn_tables(worn: Wearing, folder: Path) -> list[Path]:
+def _worn_tables(worn: Wearing) -> Files:
     """Over the passages, and both profiles as tables in mm that a case takes."""
     tables = {"wearing.csv": worn.columns()}
     tables |= {f"{name}_worn.csv": getattr(worn, name).columns(worn.smoothing) for name in ("wheel", "rail")}
-    return write_tables(folder, tables, 10)
+    return csv_files(tables, 10)
 
 
-def _tables(found: Studied, folder: Path) -> list[Path]:
-    head, rows = rows_of_patches(found.patches)
-    store.write_text(folder / "patches.csv", rows_csv(head, rows))
-    if found.forces is None:
-        return [folder / "patches.csv"]
-    made = {"creep.csv": found.columns(), "exact.csv": found.beside(), "wear.csv": found.worn()}
-    written = write_tables(folder, made, 8)
-    head, rows = found.generalised()
-    store.write_text(folder / "forces.csv", rows_csv(head, rows))
-    return [*written, folder / "patches.csv", folder / "forces.csv"]
+def _tables(found: Studied) -> Files:
+    rows = {"patches.csv": rows_of_patches(found.patches)}
+    made: Files = {}
+    if found.forces is not None:
+        columns = {"creep.csv": found.columns(), "exact.csv": found.beside(), "wear.csv": found.worn()}
+        made, rows["forces.csv"] = csv_files(columns, 8), found.generalised()
+    return made | {name: partial(store.write_text, text=rows_csv(*of)) for name, of in rows.items()}
 
 
-def _pictures(found: Studied, worn: Wearing | None, folder: Path, name: str) -> list[Path]:
-    from ..pictures.rolling import curve_picture, traction_picture, wearing_picture, write_tractions_vtu
-
-    drawn = [
-        curve_picture(found, folder / "creep.png", f"{name}: creep curve"),
-        traction_picture(found, folder / "tractions.png", name),
-    ]
+def _pictures(found: Studied, worn: Wearing | None, case: str) -> Files:
+    drawn: Files = {
+        "pictures/creep.png": partial(curve_picture, found, title=f"{case}: creep curve"),
+        "pictures/tractions.png": partial(traction_picture, found, title=case),
+    }
     if worn is not None:
-        drawn.append(wearing_picture(worn, folder / "wearing.png", name))
-    if found.tractions is not None and find_spec("meshio"):
-        drawn.append(folder.parent / "tractions.vtu")
-        write_tractions_vtu(found.tractions, drawn[-1])
+        drawn["pictures/wearing.png"] = partial(wearing_picture, worn, title=case)
     return drawn
+
+
+def _in_paraview(found: Studied, folder: Path) -> list[Path]:
+    if found.forces is None or found.tractions is None or not find_spec("meshio"):
+        return []
+    write_tractions_vtu(found.tractions, file := folder / "tractions.vtu")
+    return [file]
+
+
+READ_AS = (
+    "Forces act on the wheel, at the middle of the patch: x forward, y to the left, z up. A positive creepage means "
+    "that the wheel's surface moves forward (to the left) against the rail, and gives a negative force. Hertz' ellipse "
+    "with the mean curvature over the patch; strips of point contacts (Sextro, 6.5)."
+)
+
+
+def _patches(found: Studied) -> Piece:
+    head = ["y on the rail in mm", "angle in mrad", "a, b in mm", "normal force in N", "pressure in MPa",
+            "creepages", "spin in 1/m"]  # fmt: skip
+    rows = [
+        [number(1e3 * p.on_rail), number(1e3 * p.angle, 3), f"{1e3 * p.a:.3g}, {1e3 * p.b:.3g}",
+         number(p.normal_force, 5), number(p.pressure / 1e6), f"{p.xi:.3g}, {p.eta:.3g}", number(p.phi, 3)]
+        for p in found.patches
+    ]  # fmt: skip
+    return table(head, rows)

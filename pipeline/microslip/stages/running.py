@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -22,15 +21,11 @@ from ..results.series import unit_of
 from ..units import Quantity, amplitude_of
 from .analysing import analysed
 from .answer import CaseJob
-from .bifurcation import bifurcation_stage
 from .job import Job, open_job
-from .mistuning import mistuning_stage
 from .modal import modes_stage, system_stage
-from .orbit import orbit_stage
 from .page import report_stage
 from .places import existing_files, find_body, modal_files
 from .response import ALL, Wanted, response_of_case, response_stage
-from .squeal import squeal_stage
 from .stage import Report, folder_of_case
 
 
@@ -67,16 +62,12 @@ def _answered(
 ) -> tuple[dict[str, Any] | None, bool]:  # fmt: skip
     """The response of a case, None if it asks for none, and what else it asks for; whether all converged."""
     response, converged = None, True
-    if not case.is_only_in_time and not case.is_only_followed and not case.mistuning:
+    if not case.has_no_response:
         response, converged = response_stage(case.path, files, folder, assignments, force, report, wanted=wanted)
         _tell(response, report)
     job = CaseJob(case.path, files, folder, assignments or (), force, report, wanted.pictures)
-    answers = (
-        (case.orbit, orbit_stage), (case.stability, squeal_stage), (case.bifurcation, bifurcation_stage),
-        (case.mistuning, mistuning_stage),
-    )  # fmt: skip
-    for stage in [stage for asked, stage in answers if asked] + [partial(analysed, name) for name in case.asked]:
-        converged = stage(job).whole and converged
+    for name in case.asked:
+        converged = analysed(name, job).whole and converged
     return response, converged
 
 
@@ -98,12 +89,7 @@ def run_case_file(
             response, converged = _answered(case, files, job.build_folder, assignments, force, report, wanted)
             return report_stage(job, response, force, report, wanted.pictures), converged
     _, converged = _answered(case, files, folder, assignments, force, report, wanted)
-    page = "orbit.html" if case.is_only_in_time else "response.csv"
-    if case.mistuning:
-        page = "mistuning.html"
-    elif case.is_only_followed:
-        pages = {"stability": case.stability, "bifurcation": case.bifurcation, **case.asked}
-        page = next(f"{name}.html" for name, asked in pages.items() if asked)
+    page = f"{next(iter(case.asked))}.html" if case.has_no_response else "response.csv"
     return folder / page, converged
 
 

@@ -2,30 +2,34 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from ..analysis import Answer, Files
 from ..basis import read_basis
-from ..case.questions import StabilityOfCase
 from ..errors import UserError, in_its_file, of_file
 from ..exchange.choice import select
-from ..files import hdf5, store
-from ..files.tables import columns_csv
+from ..files import store
+from ..files.tables import write_columns
 from ..linalg.parametric import Family, family_of, family_of_group
 from ..linalg.quadratic import Window
 from ..modal.foreign import values_of
-from ..report.roots import roots_html
+from ..pictures.roots import over_picture, plane_picture
+from ..report.page import fold, table
+from ..report.roots import root_table, table_lines
 from ..ring.resonances import speeds_of
-from ..roots.diagram import Diagram, diagram
-from ..roots.spectrum import Spectrum, spectrum
+from ..roots.asked import window_of
+from ..roots.diagram import diagram
+from ..roots.recorded import write_roots
+from ..roots.spectrum import spectrum
 from ..settings.body import StabilitySettings
 from ..units import rpm_text
-from .answer import Written, answered
+from .answer import Written, made
 from .job import Job, open_job
 from .modal import matrices_inputs, modes_stage
 from .stage import Report, Stage
@@ -74,7 +78,7 @@ def stability_stage(
     q = question(path, assignments, report, speed)
     origin = None if q.where.suffix == ".h5" else q.where
     stage = Stage(q.folder / "stability.json", ("stages.stability",), force, report, origin)
-    return answered(stage, {**q.inputs, "pictures": pictures}, lambda: _work(stage, q, pictures))
+    return made(stage, q.inputs, f"{q.name}: stability. {q.state}", pictures, lambda _: _answer(q, report))
 
 
 @in_its_file
@@ -120,12 +124,6 @@ def _of_basis(file: Path, asked: StabilitySettings | None, speed: int | None) ->
     )
 
 
-def window_of(asked: StabilitySettings | StabilityOfCase) -> Window:
-    """The window in 1/s and rad/s."""
-    low, high = asked.frequency
-    return Window(asked.growth, (2 * np.pi * low, 2 * np.pi * high))
-
-
 def family(job: Job) -> Family:
     """The matrices of a body, with what scales with parameters.
 
@@ -140,8 +138,8 @@ def family(job: Job) -> Family:
         return family_of(read_matrices(given, job.folder, job.settings.length_unit, job.settings.parameters))
 
 
-def _work(stage: Stage, q: Question, pictures: bool) -> Written:
-    matrices, asked, report = q.family(), q.asked, stage.report
+def _answer(q: Question, report: Report) -> Answer:
+    matrices, asked = q.family(), q.asked
     with of_file(q.where):
         for value in asked.range or ():
             matrices.values({**q.at, asked.over: value}, asked.over)
@@ -155,10 +153,20 @@ def _work(stage: Stage, q: Question, pictures: bool) -> Written:
             matrices, asked.over, np.linspace(*asked.range, asked.points), q.window, at=q.at,
             tolerance=asked.tolerance, neutral=asked.neutral, report=report,
         )  # fmt: skip
-    stage.begin()
-    names = _written(q, found, over, pictures)
-    said = [*table_lines(found), found.sentence, *([over.sentence] if over else []), *_which(q)]
-    return Written([q.folder / name for name in names], said, found.complete or not asked.certify)
+    files: Files = {
+        "stability.csv": partial(write_columns, found.columns, 16),
+        "stability.h5": lambda path: write_roots(path, found, over, q.at),
+        "pictures/roots.png": partial(plane_picture, found),
+    }
+    pieces, said = root_table(found), [found.sentence]
+    if over is not None:
+        files["stability_over.csv"] = partial(write_columns, over.columns, 12)
+        files["pictures/roots_over.png"] = partial(over_picture, over)
+        counts = [(f"{v:.6g}", str(n)) for v, n in zip(over.values, over.unstable, strict=True)]
+        pieces.append(fold("How many roots grow at each value", table([over.parameter, "grow"], counts)))
+        said.append(over.sentence)
+    whole = found.complete or not asked.certify
+    return Answer([*said, *_which(q)], tables=pieces, whole=whole, files=files, lines=table_lines(found))
 
 
 def _which(q: Question) -> list[str]:
@@ -166,56 +174,3 @@ def _which(q: Question) -> list[str]:
     if q.speeds == 1:
         return []
     return [f"{q.state}, one of the {q.speeds} speeds of the modal file: --speed 0 to {q.speeds - 1} chooses"]
-
-
-def _written(q: Question, found: Spectrum, over: Diagram | None, pictures: bool) -> list[str]:
-    """Names of the files, the page first."""
-    folder = q.folder
-    drawn = _pictures(found, over, folder / "pictures") if pictures else {}
-    texts = {
-        "stability.html": roots_html(f"{q.name}: stability", q.state, found, over, drawn),
-        "stability.csv": columns_csv(found.columns, 16),
-    }
-    if over is not None:
-        texts["stability_over.csv"] = columns_csv(over.columns, 12)
-    for name, text in texts.items():
-        store.write_text(folder / name, text)
-    write_roots(folder / "stability.h5", found, over, q.at)
-    return [*texts, "stability.h5", *(str(p.relative_to(folder)) for p in drawn.values())]
-
-
-def write_roots(path: Path, found: Spectrum, over: Diagram | None, values: Mapping[str, float]) -> None:
-    """Roots, their right and left vectors, and the roots over a range, as HDF5 with named dimensions.
-
-    Raises:
-        UserError: no permission, no space.
-    """
-    with hdf5.sealed(path) as file:
-        file.attrs["format"], file.attrs["complete"] = "microslip-roots", int(found.complete)
-        file.attrs["values"] = json.dumps(dict(values))
-        where = file.create_group("roots")
-        for name, column in found.columns.items():
-            hdf5.put(where, name, np.array(column), dims=("root",))
-        hdf5.put(where, "s", found.roots.s, "1/s", ("root",))
-        for name, vectors in (("shape", found.roots.x), ("left", found.roots.y)):
-            hdf5.put(where, name, vectors, dims=("coordinate", "root"))
-        for name, column in over.columns.items() if over else ():
-            hdf5.put(file.require_group("over"), name, column, dims=("row",))
-
-
-def _pictures(found: Spectrum, over: Diagram | None, folder: Path) -> dict[str, Path]:
-    from ..pictures.roots import over_picture, plane_picture
-
-    drawn = {"plane": plane_picture(found, folder / "roots.png")}
-    if over is not None:
-        drawn["over"] = over_picture(over, folder / "roots_over.png")
-    return drawn
-
-
-def table_lines(found: Spectrum) -> list[str]:
-    """The table for the terminal."""
-    head = f"{'Hz':>14} {'growth 1/s':>14} {'damping':>11}  {'':8} {'backward error':>14}"
-    c = found.columns
-    shown = ("frequency_Hz", "growth_1_s", "damping_ratio", "verdict", "backward_error")
-    rows = zip(*(c[k] for k in shown), strict=True)
-    return [head, *(f"{f:14.7f} {g:14.7g} {d:11.3e}  {v:8} {e:14.1e}" for f, g, d, v, e in rows)]

@@ -4,31 +4,31 @@ arclength; identification."""
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
+from ..analysis import Answer, Files
 from ..basis import read_basis
 from ..case import CaseSettings, checkpoint, headline, load_case, surveys
-from ..case.assemble import Built, build
+from ..case.assemble import build
 from ..case.curves import UNITS, Followed, curves, error_of, highest
 from ..case.problem import normal_forces
 from ..data import Array, ModalBasis
 from ..errors import in_its_file
-from ..files import store
-from ..files.tables import write_tables
+from ..files.tables import csv_files, write_tables
 from ..harmonic_balance.envelope import Worst, lowest, worst
-from ..report.response import survey_html
+from ..report.response import number_tables
 from ..report.words import number_list
 from ..results import Response, read_journal, response_of, write_response
 from ..results.checks import sentence
 from ..units import counted
+from .answer import Written, answered, written
 from .checkpoint import Checkpoint, inputs_of
 from .places import existing_files
-from .stage import Made, Report, Stage, folder_of_case
+from .stage import Report, Stage, folder_of_case
 
 if TYPE_CHECKING:
     from ..harmonic_balance.envelope import Envelope, OverOrders
@@ -41,40 +41,15 @@ Write = Callable[[Tables], None]
 """Writes what there is of the tables of a survey, which may be interrupted."""
 
 
-@dataclass(frozen=True)
-class Survey:
-    """What a survey leaves.
-
-    Attributes:
-        tables: file name -> (column -> values). draw: file name -> what draws it. sentences: for the reader. missing:
-            what was asked for and is not known, in words; nothing where all is. whole: nobody interrupted it.
-            largest: amplitudes of the first read-out, and stress: Pa, of which the largest are looked at, see
-            `headline.doubted`; none where it is about neither. remarks: on how uncertain it is; None: that was
-            not estimated.
-    """
-
-    tables: Tables
-    draw: Mapping[str, Callable[[Path], Path]]
-    sentences: list[str] = field(default_factory=list)
-    missing: str = ""
-    whole: bool = True
-    largest: Array | None = None
-    stress: Array = field(default_factory=lambda: np.zeros(0))
-    remarks: list[str] | None = None
-
-
 @in_its_file
 def survey_stage(
     case_path: Path, basis_file: Path | None, kind: str, assignments: list[str] | None = None, force: bool = False,
     report: Report = lambda _: None,
-) -> tuple[list[Path], list[str], str]:  # fmt: skip
+) -> Written:  # fmt: skip
     """A survey of a case on modal files that are there already, in build/<case>/.
 
     Args:
         kind: a key of `KINDS`, or one of `curves.OVER`. basis_file: see `respond`.
-
-    Returns:
-        The files, sentences for the reader, and what is missing, in words.
 
     Raises:
         UserError: the case does not ask for it, or asks for what cannot be.
@@ -83,22 +58,21 @@ def survey_stage(
     settings, raw = load_case(case_path, assignments)
     folder = folder_of_case(case_path, settings.name)
     files = existing_files(settings, basis_file, Path("."))
-    stage = Stage(folder / f"{kind}.txt", ("stages.surveying",), force, report, case=case_path)
+    stage = Stage(folder / f"{kind}.json", ("stages.surveying",), force, report, case=case_path)
     with stage.making():
         settings = settings if kind == "identification" else checkpoint.as_found(settings, folder)
         if raw.get("harmonics") == "auto":
             raw = raw | {"harmonics": settings.harmonics}
         inputs = inputs_of(raw, settings, files)
-        stage.make(inputs, lambda: _work(stage, settings, raw, files, kind))
-        return _told(stage.product)
+        return answered(stage, inputs, lambda: _work(stage, settings, raw, files, kind))
 
 
-def _work(stage: Stage, settings: CaseSettings, raw: dict[str, Any], files: Mapping[str, Path], kind: str) -> Made:
-    said, folder = stage.product, stage.product.parent
+def _work(stage: Stage, settings: CaseSettings, raw: dict[str, Any], files: Mapping[str, Path], kind: str) -> Written:
+    folder = stage.product.parent
 
     def begin() -> None:
         stage.begin()
-        said.unlink(missing_ok=True)
+        stage.product.unlink(missing_ok=True)
 
     told = stage.report if stage.is_unfinished else None
     points = Checkpoint(folder / f"over_{kind}.points", raw, files, stage.force, begin, report=told)
@@ -109,37 +83,41 @@ def _work(stage: Stage, settings: CaseSettings, raw: dict[str, Any], files: Mapp
         write_tables(folder, tables, 12)
 
     survey = partial(KINDS[kind], write) if kind in KINDS else partial(_curve, kind, points)
-    bases = {name: read_basis(file) for name, file in files.items()}
-    found = survey(settings, bases, stage.report)
-    if found.largest is not None:
-        how = headline.said_of(settings, "", None) if found.remarks is None else found.remarks
-        built = surveys.at_its_beginning(settings, bases, kind)
-        doubts = headline.doubted(built, _top(found.largest), _pressing(built), _top(found.stress))
-        found = replace(found, sentences=[*how, *found.sentences, *doubts])
-    write(found.tables)
-    names = [*found.tables, *found.draw, _shown(found, kind, settings.name, folder)]
-    if not found.whole:
+    answer = survey(settings, {name: read_basis(file) for name, file in files.items()}, stage.report)
+    begin()
+    name, words = kind, _TITLES.get(kind, kind)
+    if kind not in KINDS:
+        name, words = f"over_{kind}", f"over the {kind.replace('_', ' ')}"
+    found = written(answer, name, folder, f"{settings.name}: {words}", True)
+    if not answer.whole:
         raise KeyboardInterrupt
-    store.write_text(said, "\n".join([f"{', '.join(names)}: {found.missing}", *found.sentences]) + "\n")
-    beside = [points.file.with_suffix(".h5")] if kind not in KINDS else []
-    return Made([*(folder / name for name in names), *beside])
+    return found
 
 
-def _top(values: Array) -> float:
-    """The largest of those that are known, 0 where none is."""
-    return float(np.nanmax(values, initial=0.0))
+def _answer(
+    tables: Tables, draw: Files, sentences: Sequence[str],
+    missing: str = "", whole: bool = True,
+) -> Answer:  # fmt: skip
+    """A survey: its tables are shown whole. missing: what was asked for and is not known. whole: nobody interrupted
+    it."""
+    pieces, files = number_tables(tables), csv_files(tables, 12) | dict(draw)
+    return Answer(sentences, tables=pieces, files=files, missing=missing, whole=whole)
 
 
-def _pressing(built: Built) -> float | None:
-    """N, the largest normal force of the sweep."""
-    return max(normal_forces(built), default=None)
+def _judged_by(
+    said: Sequence[str], settings: CaseSettings, bases: Bases, kind: str, largest: Array,
+    stress: Sequence[float] | Array = (), remarks: list[str] | None = None,
+) -> list[str]:  # fmt: skip
+    """Sentences, and what is said of the largest motion, see `headline.doubted`.
 
-
-def _told(said: Path) -> tuple[list[Path], list[str], str]:
-    """What `survey_stage` returned when it wrote a file of sentences."""
-    first, *sentences = said.read_text().splitlines()
-    listed, _, missing = first.partition(": ")
-    return [said.parent / name for name in listed.split(", ")], sentences, missing
+    Args:
+        largest, stress: amplitudes of the first read-out, and Pa. remarks: on how uncertain it is; None: that was
+            not estimated.
+    """
+    how = headline.said_of(settings, "", None) if remarks is None else remarks
+    built = surveys.at_its_beginning(settings, bases, kind)
+    tops = (float(np.nanmax(values, initial=0.0)) for values in (largest, np.asarray(stress)))
+    return [*how, *said, *headline.doubted(built, next(tops), max(normal_forces(built), default=None), next(tops))]
 
 
 def _unsolved(points: int) -> str:
@@ -147,24 +125,11 @@ def _unsolved(points: int) -> str:
     return f"{counted(points, 'point')} did not converge" if points else ""
 
 
-def _shown(found: Survey, kind: str, case: str, folder: Path) -> str:
-    """Pictures and the page of a survey; the name of the page."""
-    for name, draw in found.draw.items():
-        (folder / name).parent.mkdir(parents=True, exist_ok=True)
-        draw(folder / name)
-    page, words = f"{kind}.html", _TITLES.get(kind, kind)
-    if kind not in KINDS:
-        page, words = f"over_{kind}.html", f"over the {kind.replace('_', ' ')}"
-    pictures = [folder / name for name in found.draw]
-    store.write_text(folder / page, survey_html(f"{case}: {words}", found.sentences, found.tables, pictures))
-    return page
-
-
 _TITLES = {"orders": "engine orders", "speeds": "over the speed", "ranges": "over ranges of its settings"}
 """What pages of surveys are called."""
 
 
-def _orders(write: Write, settings: CaseSettings, bases: Bases, report: Report) -> Survey:
+def _orders(write: Write, settings: CaseSettings, bases: Bases, report: Report) -> Answer:
     from ..pictures.coupled import over_orders_picture, worst_order_picture
 
     def tables(found: Mapping[str, OverOrders]) -> Tables:
@@ -186,8 +151,8 @@ def _orders(write: Write, settings: CaseSettings, bases: Bases, report: Report) 
         draw = {"pictures/orders_worst.png": lambda p: worst_order_picture(list(found.values()), p, words)} | draw
     every = list(found.values())
     amplitude, stress = (np.concatenate([getattr(r, of) for r in every]) for of in ("amplitude", "stress"))
-    said = _worst_sentences(every)
-    return Survey(tables(found), draw, said, failed, largest=amplitude, stress=stress)
+    said = _judged_by(_worst_sentences(every), settings, bases, "orders", amplitude, stress)
+    return _answer(tables(found), draw, said, failed)
 
 
 def _padded(column: Array, left: int) -> Array:
@@ -263,7 +228,7 @@ def _known(row: Worst) -> str:
     return f" ({', '.join(said)})" if said else ""
 
 
-def _speeds(write: Write, settings: CaseSettings, bases: Bases, report: Report) -> Survey:
+def _speeds(write: Write, settings: CaseSettings, bases: Bases, report: Report) -> Answer:
     from ..pictures.coupled import speed_line_picture
 
     def tables(r: SpeedResponse) -> Tables:
@@ -279,16 +244,15 @@ def _speeds(write: Write, settings: CaseSettings, bases: Bases, report: Report) 
     said = said if r.converged.any() else ["No amplitude is known: no speed has a solution."]
     if still := [b.name for b in settings.components if not bases[b.name].ranges]:
         said.append(f"The same at all speeds: {', '.join(still)} (no rotation.range_rpm in a body.toml).")
-    return Survey(
+    return _answer(
         tables(r),
         {"pictures/speeds.png": lambda p: speed_line_picture(*drawn, p, title, r.quantity)},
-        said,
+        _judged_by(said, settings, bases, "speeds", amplitude),
         _unsolved(int((~r.converged).sum())),
-        largest=amplitude,
     )
 
 
-def _ranges(write: Write, settings: CaseSettings, bases: Bases, report: Report) -> Survey:
+def _ranges(write: Write, settings: CaseSettings, bases: Bases, report: Report) -> Answer:
     from ..pictures.coupled import envelope_picture
 
     def tables(e: Envelope) -> Tables:
@@ -296,10 +260,12 @@ def _ranges(write: Write, settings: CaseSettings, bases: Bases, report: Report) 
 
     e = surveys.over_ranges(settings, bases, report, lambda some: write(tables(some)))
     title = f"{settings.name}: over {', '.join(e.names).replace('_', ' ')}"
-    return Survey(
-        tables(e), {"pictures/ranges.png": lambda p: envelope_picture(e, p, title)}, _ranges_sentences(e),
-        _unsolved(int((~e.converged).sum())), largest=e.peaks,
-    )  # fmt: skip
+    return _answer(
+        tables(e),
+        {"pictures/ranges.png": lambda p: envelope_picture(e, p, title)},
+        _judged_by(_ranges_sentences(e), settings, bases, "ranges", e.peaks),
+        _unsolved(int((~e.converged).sum())),
+    )
 
 
 def _ranges_sentences(e: Envelope) -> list[str]:
@@ -325,20 +291,20 @@ def _combination(e: Envelope, i: int) -> str:
     return ", ".join(f"{name.replace('_', ' ')} {v:.4g}" for name, v in zip(e.names, e.values[i], strict=True))
 
 
-def _identification(write: Write, settings: CaseSettings, bases: Bases, report: Report) -> Survey:
+def _identification(write: Write, settings: CaseSettings, bases: Bases, report: Report) -> Answer:
     from ..pictures.coupled import nodal_diameter_picture
 
     found, diagrams = surveys.identification(settings, bases)
     title = f"{settings.name}: nodal diameters with sticking contacts, $c_T$ = {found.ratio:g} $c_N$"
     at = next(d for d in diagrams if d.stiffness == found.stiffness)
-    return Survey(
+    return _answer(
         {"identification.csv": found.columns(), "nodal_diameters.csv": at.columns()},
         {"pictures/nodal_diameters_stuck.png": lambda p: nodal_diameter_picture(diagrams, p, title, found)},
         found.sentences(),
     )
 
 
-def _curve(over: str, points: Checkpoint, settings: CaseSettings, bases: Bases, report: Report) -> Survey:
+def _curve(over: str, points: Checkpoint, settings: CaseSettings, bases: Bases, report: Report) -> Answer:
     from ..pictures.following import curve_plot
 
     found, whole = curves(settings, bases, over, points.journal, report)
@@ -356,14 +322,17 @@ def _curve(over: str, points: Checkpoint, settings: CaseSettings, bases: Bases, 
     arrived, asked = sum(one.complete for one in found), sum(one.legs is None for one in found)
     missing = [f"{early} of {counted(len(found), 'curve')} end{'s' * (early == 1)} early"] if early else []
     missing += ["not every curve reaches the other end"] if arrived < asked and not early else []
-    return Survey(
+    largest = np.concatenate([np.where(one.converged, one.amplitude, 0.0) for one in found])
+    said = [*(words for one in found for words in one.sentences(by)), sentence(response, error)]
+    draw: Files = {f"{name}.h5": lambda p: write_response(p, response)}
+    if drawn:
+        draw[f"pictures/{name}.png"] = lambda p: curve_plot(drawn, p, title)
+    return _answer(
         {f"{name}.csv": columns},
-        {f"pictures/{name}.png": lambda p: curve_plot(drawn, p, title)} if drawn else {},
-        [*(words for one in found for words in one.sentences(by)), sentence(response, error)],
+        draw,
+        _judged_by(said, settings, bases, over, largest, remarks=remarks),
         "; ".join([*missing, *filter(None, [failed])]),
         whole,
-        largest=np.concatenate([np.where(one.converged, one.amplitude, 0.0) for one in found]),
-        remarks=remarks,
     )
 
 
@@ -384,7 +353,7 @@ def _error(
 
 
 def _written(points: Checkpoint, found: list[Followed], whole: bool) -> Response:
-    """The points as a response file, beside their journal."""
+    """The points as a response."""
     from ..harmonic_balance.checkpoint import OF_THE_WAY
 
     head, _ = read_journal(points.file)
@@ -395,12 +364,10 @@ def _written(points: Checkpoint, found: list[Followed], whole: bool) -> Response
         for one in found
         if one.rows
     }
-    response = response_of({**head, "finished": whole}, series)
-    write_response(points.file.with_suffix(".h5"), response)
-    return response
+    return response_of({**head, "finished": whole}, series)
 
 
-KINDS: dict[str, Callable[[Write, CaseSettings, Bases, Report], Survey]] = {
+KINDS: dict[str, Callable[[Write, CaseSettings, Bases, Report], Answer]] = {
     "orders": _orders,
     "speeds": _speeds,
     "ranges": _ranges,

@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 
+from ..analysis import Answer
 from ..basis import read_basis
 from ..data import ModalBasis
-from ..errors import of_file
-from ..files import store
-from ..files.tables import write_tables
-from ..report.tyre import tyre_html
-from ..rolling.slip import Studied, TyreCase, load_tyre, study
-from .answer import RollJob, Written, answered
+from ..files.tables import csv_files
+from ..pictures.tyre import tyre_picture
+from ..report.page import Piece, number, say, table
+from ..results import Journal
+from ..rolling.slip import Studied, load_tyre, study
+from .answer import RollJob, Written
 from .job import open_job
 from .modal import modes_stage
 from .places import find_body
-from .stage import Stage
+from .stage import Report
 
 
 def tyre_stage(job: RollJob) -> Written:
@@ -26,34 +28,35 @@ def tyre_stage(job: RollJob) -> Written:
     """
     case, raw = load_tyre(job.path, list(job.assignments))
     stage = job.stage(case.name, "tyre", "stages.tyre")
-    basis, _ = modes_stage(open_job(find_body(job.path, case.tyre.body, Path("."))), report=job.report)
-    return answered(stage, job.inputs(raw, [basis.resolve()]), lambda: _work(stage, case, job, basis))
+    file, _ = modes_stage(open_job(find_body(job.path, case.tyre.body, Path("."))), report=job.report)
+
+    def solve(_: Journal, report: Report) -> Answer:
+        report("jumps of slip and load")
+        wheel = read_basis(file)
+        return _answer(study(case, wheel.groups[0, 0]), wheel, case.name)
+
+    files = [file.resolve()]
+    return job.answer(stage, case.name, raw, files, "unsteady rolling", solve)
 
 
-def _work(stage: Stage, case: TyreCase, job: RollJob, basis: Path) -> Written:
-    folder = stage.product.parent
-    stage.report("jumps of slip and load")
-    with of_file(job.path):
-        wheel = read_basis(basis)
-        found = study(case, wheel.groups[0, 0])
-    stage.begin()
-    made = _tables(found, folder)
-    drawn = [_picture(found, wheel, folder / "pictures", case.name)] if job.pictures else []
-    page = folder / "tyre.html"
-    store.write_text(page, tyre_html(f"{case.name}: unsteady rolling", found, drawn))
-    return Written([page, *made, *drawn], found.sentences())
-
-
-def _tables(found: Studied, folder: Path) -> list[Path]:
+def _answer(found: Studied, wheel: ModalBasis, case: str) -> Answer:
     slips, forces = found.steady
-    tables = {
-        "constants.csv": found.constants, "loads.csv": found.loads(),
-        "steady.csv": {"slip": slips, "force_over_normal_force": forces},
-    }  # fmt: skip
-    return write_tables(folder, tables, 8)
+    steady = {"slip": slips, "force_over_normal_force": forces}
+    tables = {"constants.csv": found.constants, "loads.csv": found.loads(), "steady.csv": steady}
+    drawn = {"pictures/tyre.png": partial(tyre_picture, found, title=case, wheel=wheel)}
+    pieces = [_loads(found), say(READ_AS, tone="note")]
+    return Answer(found.sentences(), tables=pieces, files=csv_files(tables, 8) | drawn)
 
 
-def _picture(found: Studied, wheel: ModalBasis, folder: Path, name: str) -> Path:
-    from ..pictures.tyre import tyre_picture
+READ_AS = (
+    "A row of point contacts along the middle of the patch, each with its share of the static pressure, is passed by "
+    "the material (Sextro, 6.10). Time constants are of the exponential that fits the force best; the normal force "
+    "follows from the static state, large displacements and contact by Newton's method."
+)
 
-    return tyre_picture(found, folder / "tyre.png", name, wheel)
+
+def _loads(found: Studied) -> Piece:
+    columns = found.loads()
+    head = ["load jumps to its share", "patch then in mm", "force before in N", "after in N", "1 - 1/e of it after s"]
+    columns["patch_length_m"] = 1e3 * columns["patch_length_m"]
+    return table(head, [[number(v) for v in row] for row in zip(*columns.values(), strict=True)])

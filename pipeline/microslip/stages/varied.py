@@ -1,4 +1,4 @@
-"""A case with other values of its keys: the assembly that it then describes."""
+"""A case with other values of its keys: the assembly that it then describes; its bodies as they are meshed."""
 
 from __future__ import annotations
 
@@ -10,13 +10,16 @@ from typing import Any
 
 from ..case.assemble import Built, build
 from ..case.settings import case_model
-from ..data import ModalBasis
+from ..data import Mesh, ModalBasis
 from ..errors import UserError, at, of_file
+from ..settings.body import BodySettings
 from ..settings.mistakes import validate
 from ..settings.toml import override
 from ..system.assembly import Assembly
 from ..system.settings import load_system
-from .places import lumped
+from .job import open_job
+from .meshing import load_mesh, mesh_stage
+from .places import find_body, lumped
 
 OF_SYSTEM = "system."
 """Begins keys that are those of a system.toml and not of the case."""
@@ -46,6 +49,17 @@ class Varied:
         with at(where, self.path), of_file(self.path):
             settings = validate(case_model(), override(raw, own, self.path, ""), self.path)
             return build(settings, self._systems(others) if others else self.bases)
+
+    def meshed(self, name: str, where: str) -> tuple[Mesh, BodySettings]:
+        """The mesh of a body, in metres, and its settings. where: the key that asks for it.
+
+        Raises:
+            UserError: it has none.
+        """
+        job = None if lumped(self.path, name) else open_job(find_body(self.path, name, Path(".")))
+        if job is None or job.settings.geometry.matrices is not None:
+            raise UserError(f"'{name}' has no mesh, so there is nothing unreduced; leave full out", where, self.path)
+        return load_mesh(job, mesh_stage(job))[0], job.settings
 
     def _systems(self, assignments: list[str]) -> dict[str, ModalBasis]:
         found = dict(self.bases)

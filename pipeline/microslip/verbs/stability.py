@@ -1,43 +1,70 @@
-"""Roots of a case about steady sliding, and a map of where they grow: tables, pictures, a page that begins with it."""
+"""Does it move by itself: all complex roots of a case about steady sliding in a window of frequencies and growth rates,
+a map of where they grow, and the limit cycles that follow, as [stability] asks."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
+from pydantic import BeforeValidator, Field, model_validator
 
 from .. import sliding
+from ..analysis import Analysis, Answer, Files, Question
 from ..case import CaseSettings, headline
-from ..case.questions import Cycle, Over, StabilityOfCase
+from ..case.questions import Pair
 from ..case.settings import GROUND
 from ..data import Array, ComplexArray, ModalBasis
-from ..errors import NotConverged, UserError, in_its_file
-from ..files import store
-from ..files.tables import columns_csv
+from ..errors import NotConverged, UserError, of_file
+from ..files.tables import csv_files
 from ..linalg import quadratic
 from ..linalg.quadratic import Quadratic, Window
-from ..modal.unreduced import Unreduced, unreduced
-from ..report.squeal import squeal_html
-from ..results import Journal, open_journal
+from ..modal.unreduced import unreduced
+from ..pictures.roots import cycles_picture, map_picture, plane_picture, relief_picture
+from ..report.page import fold, say, table
+from ..report.roots import root_table, table_lines
+from ..results.journal import once
+from ..roots.asked import window_of
+from ..roots.cycles import Born, Cycle, Over, born, sentence_of_relief, sentences_of
 from ..roots.full import Compared, compared, full_matrices, growing
 from ..roots.map import Axis, Map, over_map
+from ..roots.recorded import write_roots
 from ..roots.spectrum import Spectrum, spectrum
 from ..roots.waves import waves
+from ..settings.numbers import Model, NotNegative, Number, _finite_vector, _tuple
 from ..sliding import Sliding, Tangent
 from ..system.assembly import Assembly
-from .answer import CaseJob, Written
-from .cycles import Born, born, sentence_of_relief, sentences_of
-from .job import Job, open_job
-from .meshing import load_mesh, mesh_stage
-from .moving import moving_shape
-from .places import find_body, lumped
-from .stability import table_lines, window_of, write_roots
-from .stage import Report, Stage
-from .varied import Varied
+
+
+class Keys(Model):
+    """Roots of the assembly about its steady sliding, by `microslip stability`: all that grow, and
+    those of a window."""
+
+    growth: Annotated[tuple[Number, Number], BeforeValidator(_finite_vector)] = (-1000.0, 10000.0)
+    """[1/s] from, to, of the roots that are wanted ([squeal](squeal.md))"""
+    frequency: Pair
+    """[Hz] from, to"""
+    accuracy: Annotated[Number, Field(ge=0, le=0.1)] = 1e-8
+    """relative, of the entries of the matrices: decides which growth rates are neutral"""
+    neutral: NotNegative = 0.0
+    """[1/s] growth rates below it are neither growth nor decay"""
+    over: Annotated[tuple[Over, ...], BeforeValidator(_tuple)] = ()
+    full: Annotated[int, Field(ge=0, le=1000)] = 0
+    """states of the map, evenly spread, at which the unreduced matrices are counted as well"""
+    cycle: Cycle | None = None
+
+    @model_validator(mode="after")
+    def _has_area(self) -> Keys:
+        for key in ("growth", "frequency"):
+            low, high = getattr(self, key)
+            if low >= high:
+                raise ValueError(f"{key}: from {low:g} to {high:g} the window has no area; give the smaller one first")
+        if len(self.over) not in (0, 2):
+            raise ValueError("over: a map has two parameters; give two [[stability.over]], or none")
+        return self
 
 
 @dataclass(frozen=True)
@@ -78,50 +105,47 @@ FASTEST = 4
 """Roots that grow whose shapes are written as motions."""
 
 
-@in_its_file
-def squeal_stage(case: CaseJob) -> Written:
-    """Roots of a case about steady sliding; whole if they are proved complete and no limit cycle is lost.
-
-    Raises:
-        UserError: the case asks for none; nothing slides; a contact that lifts off; what `sliding.of` refuses.
-    """
-    if case.settings.stability is None:
-        raise UserError("is missing; add [stability] with frequency = [0.0, HIGHEST] in Hz", "stability")
-    return case.answer("stability", "stages.squeal", _work)
+def solve(q: Question) -> Answer:
+    """Roots about steady sliding; whole if they are proved complete and no limit cycle is lost."""
+    with of_file(q.varied.path):
+        return _answer(q, q.asked, q.built.settings)
 
 
-def _work(stage: Stage, case: CaseJob) -> Written:
-    """What is finished stays in a journal until all that is made of it is there."""
-    settings, asked, folder = case.settings, case.settings.stability, case.folder
-    assert asked is not None
-    varied = Varied(case.path, case.raw, case.bases)
+def _answer(q: Question, asked: Keys, settings: CaseSettings) -> Answer:
+    varied, window = q.varied, window_of(asked)
     axes = _map_of(varied, asked) if asked.over else None
     _try_ends(varied, asked)
-    jobs = {b.name: _meshed(b.body or b.name, case.path) for b in settings.components if asked.full}
+    meshed = {b.name: varied.meshed(b.body or b.name, "stability.full") for b in settings.components if asked.full}
     state = state_of(varied, {})
-    found = spectrum(state.matrices, window_of(asked), accuracy=asked.accuracy, neutral=asked.neutral)
-    points = folder / "stability.points"
+    found = spectrum(state.matrices, window, accuracy=asked.accuracy, neutral=asked.neutral)
     over, full, cycles = None, list[Compared](), Born((), ())
-    with open_journal(points, case.made_by(stage), {"case": settings.name}, case.force) as journal:
-        if axes is not None:
-            over = over_map(*axes, window_of(asked), asked.neutral, case.report, journal)
-            full = _in_full(varied, asked, over, jobs, case.report, journal) if asked.full else []
-        if asked.cycle:
-            cycles = born(varied, asked.cycle, window_of(asked).omega, journal, case.report)
-    stage.begin()
-    told = [*shapes(state, found, varied.bases, settings), *pressed(state)]
-    said = [found.sentence, *told, *([over.sentence] if over else []), *_told(full)]
+    if axes is not None:
+        over = over_map(*axes, window, asked.neutral, q.report, q.kept)
+        full = _in_full(q, asked, over, meshed) if asked.full else []
+    if asked.cycle:
+        cycles = born(varied.under, asked.cycle, window.omega, q.kept, q.report)
+    said = [found.sentence, *shapes(state, found, varied.bases, settings), *pressed(state)]
+    said += [*([over.sentence] if over else []), *_told(full)]
     if asked.cycle:
         said += [words for c in cycles.own for words in sentences_of(c, asked.cycle)]
         said += sentence_of_relief(cycles, asked.cycle)
-        said += headline.doubted(case.built(), cycles.largest)
-    moves = moving(state, found, varied.bases, settings, folder) if case.pictures else []
-    names = _written(folder, settings.name, found, over, full, said, case.pictures, (cycles, asked.cycle), moves)
-    complete = found.complete and all(one.complete for one in full) and cycles.whole
-    return Written([folder / name for name in names], [*table_lines(found), *said], complete)
+        said += headline.doubted(q.built, cycles.largest)
+    return Answer(
+        said,
+        tables=[
+            *([_in_words(full, over)] if full and over else []),
+            *([say(OF_WAVES, tone="note")] if growing_ones(found) else []),
+            *root_table(found),
+        ],
+        largest=None,
+        whole=found.complete and all(one.complete for one in full) and cycles.whole,
+        files=_files(found, over, full) | _of_cycles(cycles, asked.cycle),
+        moving=lambda folder: moving(state, found, varied.bases, settings, folder),
+        lines=table_lines(found),
+    )
 
 
-def state_of(varied: Varied, values: Mapping[str, float], where: str = "stability") -> State:
+def state_of(varied: Any, values: Mapping[str, float], where: str = "stability") -> State:
     """The case about its sliding, with other values of keys.
 
     Raises:
@@ -173,6 +197,8 @@ def moving(
     """Shapes of the fastest `FASTEST` roots that grow and swing, as motions of their bodies; those whose material turns
     are animated, or all where none does."""
     grow = sorted((i for i in growing_ones(found) if found.frequency[i] > 0), key=lambda i: -found.growth[i])
+    from ..pictures.moving import moving_shape
+
     made = list[Path]()
     for number, i in enumerate(grow[:FASTEST], 1):
         u = {n: v for n, v in state.shapes(found.roots.x[:, i], bases).items() if bases[n].mesh.n_cells}
@@ -198,7 +224,7 @@ def pressed(state: State) -> list[str]:
     return said
 
 
-def _map_of(varied: Varied, asked: StabilityOfCase) -> tuple[Any, Axis, Axis]:
+def _map_of(varied: Any, asked: Keys) -> tuple[Any, Axis, Axis]:
     """What makes the assemblies of the map, and its axes."""
     x, y = (Axis(o.parameter, o.unit, np.linspace(o.start, o.stop, o.points), o.keys) for o in asked.over)
 
@@ -208,7 +234,7 @@ def _map_of(varied: Varied, asked: StabilityOfCase) -> tuple[Any, Axis, Axis]:
     return make, x, y
 
 
-def _try_ends(varied: Varied, asked: StabilityOfCase) -> None:
+def _try_ends(varied: Any, asked: Keys) -> None:
     """The case with all keys that follow a parameter, at the ends of its range: what is wrong with them is said before
     anything is computed.
 
@@ -228,22 +254,20 @@ FULL = "states in unreduced matrices"
 """Series of the journal."""
 
 
-def _in_full(
-    varied: Varied, asked: StabilityOfCase, over: Map, jobs: Mapping[str, Job], report: Report,
-    journal: Journal,
-) -> list[Compared]:  # fmt: skip
+def _in_full(q: Question, asked: Keys, over: Map, meshed: Mapping[str, Any]) -> list[Compared]:
     """States of the map, evenly spread over it, in unreduced matrices."""
-    bodies = {name: _unreduced(job) for name, job in jobs.items()}
+    bodies = {name: unreduced(*of) for name, of in meshed.items()}
+    found = []
     for n in range(asked.full):
-        if n not in journal.of(FULL):
-            report(f"unreduced, state {n + 1} of {asked.full}")
-            journal.keep(FULL, n, vars(_one_in_full(n, varied, asked, over, bodies)))
-    return [Compared(**known) for known in journal.of(FULL).values()]
+        q.report(f"unreduced, state {n + 1} of {asked.full}")
+        state = partial(_one_in_full, n, q.varied, asked, over, bodies)
+        found.append(Compared(**once(q.kept, FULL, n, state)))
+    return found
 
 
 def _one_in_full(
-    n: int, varied: Varied, asked: StabilityOfCase, over: Map, bodies: Mapping[str, Unreduced]
-) -> Compared:  # fmt: skip
+    n: int, varied: Any, asked: Keys, over: Map, bodies: Mapping[str, Any]
+) -> dict[str, Any]:  # fmt: skip
     window, (ny, nx) = window_of(asked), over.unstable.shape
     grows = Window((max(asked.neutral, 0.0), window.growth[1]), window.omega)
     share = (n + 0.5) / asked.full
@@ -253,32 +277,8 @@ def _one_in_full(
     own = quadratic.every_value(state.matrices)
     full = growing(full_matrices(bodies, state.assembly, state.contacts), grows, own)
     mine = own[grows.holds(own)]
-    return Compared(x, y, len(mine), len(full.roots), compared(mine, full.roots.s), full.complete)
-
-
-def unreduced_body(name: str, path: Path) -> Unreduced:
-    """The unreduced matrices of a body that a case names.
-
-    Raises:
-        UserError: it has no mesh; see `modal.unreduced`.
-    """
-    return _unreduced(_meshed(name, path))
-
-
-def _unreduced(job: Job) -> Unreduced:
-    return unreduced(load_mesh(job, mesh_stage(job))[0], job.settings)
-
-
-def _meshed(name: str, path: Path) -> Job:
-    """A body that a case names, which has a mesh.
-
-    Raises:
-        UserError: it has none.
-    """
-    job = None if lumped(path, name) else open_job(find_body(path, name, Path(".")))
-    if job is None or job.settings.geometry.matrices is not None:
-        raise UserError(f"'{name}' has no mesh, so there is nothing unreduced; leave full out", "stability.full", path)
-    return job
+    away = compared(mine, full.roots.s)
+    return vars(Compared(x, y, len(mine), len(full.roots), away, full.complete))
 
 
 def _told(full: Sequence[Compared]) -> list[str]:
@@ -292,49 +292,52 @@ def _told(full: Sequence[Compared]) -> list[str]:
     ]
 
 
-def _written(
-    folder: Path, name: str, found: Spectrum, over: Map | None, full: Sequence[Compared], said: Sequence[str],
-    pictures: bool, cycles: tuple[Born, Cycle | None], moves: Sequence[Path],
-) -> list[str]:  # fmt: skip
-    """Names of the files, the page first. moves: of `moving`."""
-    drawn = _pictures(found, over, full, folder / "pictures", cycles) if pictures else {}
-    drawn |= {path.stem: path for path in moves if path.suffix == ".gif"}
-    texts = {
-        "stability.html": squeal_html(f"{name}: stability of sliding", said, found, over, full, drawn),
-        "stability.csv": columns_csv(found.columns, 16),
-    }
-    if over is not None:
-        texts["stability_map.csv"] = columns_csv(over.columns, 12)
+def _in_words(full: Sequence[Compared], over: Map) -> Any:
+    rows = [(f"{c.x:.4g}", f"{c.y:.4g}", c.reduced, c.full, f"{c.distance:.1e}") for c in full]
+    head = [over.x.title, over.y.title, "grow, reduced", "grow, unreduced", "relative difference"]
+    return fold("States in unreduced matrices", table(head, rows))
+
+
+OF_WAVES = (
+    "Moving pictures: one period of a root that grows, without its growth. Its size is chosen; motion/ holds it for "
+    "ParaView."
+)
+
+
+def _files(found: Spectrum, over: Map | None, full: Sequence[Compared]) -> Files:
+    dots, tables = [(one.x, one.y, one.full) for one in full], {"stability_map.csv": over.columns if over else {}}
     if full:
-        columns = {key: np.array([getattr(one, key) for one in full], dtype=float) for key in Compared.__annotations__}
-        texts["stability_full.csv"] = columns_csv(columns, 12)
-    for number, c in enumerate(cycles[0].own, 1):
-        texts[f"stability_cycle_{number}.csv"] = columns_csv(c.columns, 12)
-    if cycles[0].relief and cycles[1] and cycles[1].across:
-        texts["stability_relief.csv"] = columns_csv(cycles[0].columns(cycles[1].across.parameter), 12)
-    for file, text in texts.items():
-        store.write_text(folder / file, text)
-    write_roots(folder / "stability.h5", found, None, {})
-    return [*texts, "stability.h5", *dict.fromkeys(str(p.relative_to(folder)) for p in (*drawn.values(), *moves))]
+        keys = Compared.__annotations__
+        tables["stability_full.csv"] = {key: np.array([getattr(one, key) for one in full], dtype=float) for key in keys}
+    files: Files = csv_files({"stability.csv": found.columns}, 16) | csv_files(tables, 12)
+    files["stability.h5"] = lambda path: write_roots(path, found, None, {})
+    if over:
+        files["pictures/roots_map.png"] = partial(map_picture, over, dots)
+    return files | {"pictures/roots.png": partial(plane_picture, found)}
 
 
-def _pictures(
-    found: Spectrum, over: Map | None, full: Sequence[Compared], folder: Path,
-    cycles: tuple[Born, Cycle | None],
-) -> dict[str, Path]:  # fmt: skip
-    from ..pictures.roots import cycles_picture, map_picture, plane_picture, relief_picture
-
-    drawn = {"plane": plane_picture(found, folder / "roots.png")}
-    if over is not None:
-        drawn["map"] = map_picture(over, [(one.x, one.y, one.full) for one in full], folder / "roots_map.png")
-    seen, asked = cycles
-    if asked is not None and seen.own:
-        drawn["cycles"] = cycles_picture(seen.own, _axis(asked), folder / "roots_cycles.png")
-    if asked is not None and asked.across is not None and seen.relief:
+def _of_cycles(cycles: Born, asked: Cycle | None) -> Files:
+    tables = {f"stability_cycle_{number}.csv": c.columns for number, c in enumerate(cycles.own, 1)}
+    drawn: Files = {}
+    if asked is not None and cycles.own:
+        drawn["pictures/roots_cycles.png"] = partial(cycles_picture, cycles.own, _axis(asked))
+    if asked is not None and asked.across is not None and cycles.relief:
         axes = _axis(asked), _axis(asked.across)
-        drawn["relief"] = relief_picture(seen.relief, axes, folder / "roots_relief.png")
-    return drawn
+        tables["stability_relief.csv"] = cycles.columns(asked.across.parameter)
+        drawn["pictures/roots_relief.png"] = partial(relief_picture, cycles.relief, axes)
+    return csv_files(tables, 12) | drawn
 
 
 def _axis(over: Over) -> str:
     return f"{over.parameter} in {over.unit}" if over.unit else over.parameter
+
+
+ANALYSIS = Analysis(
+    name="stability",
+    asks=Keys,
+    solve=solve,
+    lost="not all was found, roots in the window or limit cycles",
+    needed="frequency = [0.0, HIGHEST] in Hz",
+    swept=False,
+    unloaded=lambda _: True,
+)

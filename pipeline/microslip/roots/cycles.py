@@ -5,11 +5,12 @@ What is finished stays in a journal: the cycles of one value of the second param
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
+from pydantic import Field, model_validator
 
 from .. import sliding
 from ..bifurcation import mechanics
@@ -17,16 +18,65 @@ from ..bifurcation.balance import Harmonics
 from ..bifurcation.cycles import PERIODS, Checked, Cycles, checked, cycles
 from ..bifurcation.dynamics import Dynamics
 from ..bifurcation.equilibria import Hopf
-from ..case.questions import Cycle
 from ..data import Array
 from ..errors import at
 from ..results import Journal
+from ..settings.numbers import Model, Number, Positive
 from ..system.assembly import Assembly
-from .stage import Report
-from .varied import Varied
+
+Report = Callable[[str], None]
+Under = Callable[[Mapping[str, float], str], Assembly]
+"""The assembly of a case with other values of keys; the key that says so."""
 
 KEPT = "limit cycles"
 """Series of the journal: by the number of the second parameter's value, -1 at the case's own state."""
+
+
+class Over(Model):
+    """A parameter of a map; two of these tables make one."""
+
+    parameter: str
+    """what its axis says"""
+    unit: str = ""
+    """of the parameter, on the axis"""
+    keys: dict[str, Number]
+    """keys of this case, dotted, that follow the parameter, each with the factor that makes its
+    value"""
+    start: Number
+    """of the parameter"""
+    stop: Number
+    """above it"""
+    points: Annotated[int, Field(ge=2, le=1000)] = 40
+    """values of it, evenly spaced"""
+
+    @model_validator(mode="after")
+    def _somewhere(self) -> Over:
+        if self.start >= self.stop:
+            raise ValueError("stop: must be above start; exchange them")
+        if not self.keys:
+            raise ValueError("keys: name one or more keys of the case that follow the parameter, with a factor each")
+        return self
+
+
+class Across(Over):
+    """A second parameter, at whose values limit cycles are followed as well."""
+
+    points: Annotated[int, Field(ge=2, le=1000)] = 5
+    harmonics: Annotated[int, Field(ge=1, le=200)] = 5
+    """of the balance along these branches"""
+
+
+class Cycle(Over):
+    """A parameter over which the limit cycles born at Hopf points are followed."""
+
+    points: Annotated[int, Field(ge=2, le=1000)] = 40
+    """of a branch at most"""
+    harmonics: Annotated[int, Field(ge=1, le=200)] = 7
+    """of the balance along a branch"""
+    accuracy: Annotated[Positive, Field(le=0.1)] = 1e-4
+    """share of the amplitude to which three orbits of a branch get harmonics, that are compared
+    with a motion in time and judged by their Floquet multipliers"""
+    across: Across | None = None
 
 
 @dataclass(frozen=True)
@@ -54,13 +104,13 @@ class Born:
         return {key: np.concatenate([part[key] for part in parts]) for key in parts[0]}
 
 
-def born(varied: Varied, asked: Cycle, band: tuple[float, float], journal: Journal, report: Report) -> Born:
+def born(under: Under, asked: Cycle, band: tuple[float, float], journal: Journal, report: Report) -> Born:
     """The limit cycles that a case asks for. band: rad/s, of their Hopf points.
 
     Raises:
         UserError: no equilibrium to begin with; equations that do not change smoothly.
     """
-    work = _Work(varied, asked, band, journal, report)
+    work = _Work(under, asked, band, journal, report)
     first = work.followed(-1, {}, asked.harmonics)
     own = [work.judged(c, f"{i}", (1, 2, 3), asked.accuracy) for i, c in enumerate(first)]
     over, relief = asked.across, list[tuple[float, Cycles]]()
@@ -75,7 +125,7 @@ def born(varied: Varied, asked: Cycle, band: tuple[float, float], journal: Journ
 
 @dataclass(frozen=True)
 class _Work:
-    varied: Varied
+    under: Under
     asked: Cycle
     band: tuple[float, float]
     journal: Journal
@@ -86,7 +136,7 @@ class _Work:
         asked, where = self.asked, "stability.cycle.keys" if number < 0 else "stability.cycle.across.keys"
 
         def make(p: float) -> Assembly:
-            return self.varied.under({**fixed, **{key: factor * p for key, factor in asked.keys.items()}}, where)
+            return self.under({**fixed, **{key: factor * p for key, factor in asked.keys.items()}}, where)
 
         self.report(f"equations over {asked.parameter}")
         system = mechanics.dynamics(make, asked.start, asked.stop)

@@ -1,4 +1,4 @@
-"""Samples of a case's ring with sectors that differ: all of them as a table, envelopes, pictures and a page."""
+"""Samples of a ring whose blades or contacts differ, as [mistuning] says: how much higher the highest blade gets."""
 
 from __future__ import annotations
 
@@ -7,20 +7,21 @@ from collections.abc import Mapping
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
+from pydantic import BeforeValidator, Field, model_validator
 
+from ..analysis import Analysis, Answer, Files, Question
 from ..basis import read_basis
 from ..case import CaseSettings, headline
 from ..case.assemble import Built, build
 from ..case.contacts import swept
 from ..case.problem import book_models
-from ..case.questions import MistuningOfCase, ScatterOfCase
 from ..data import Array, Indices
-from ..errors import UserError, at, in_its_file
+from ..errors import UserError, at
 from ..files import store
-from ..files.tables import columns_csv, rows_csv
+from ..files.tables import csv_files, rows_csv
 from ..harmonic_balance.readout import measured
 from ..mistuning.ensemble import COLUMNS, RARE, Ensemble, choose, ready, run
 from ..mistuning.ring import Tuned
@@ -28,62 +29,125 @@ from ..mistuning.samples import Asked, Sample
 from ..mistuning.scatter import OF_CONTACTS, Scatter, check
 from ..mistuning.sensitivity import Approximation, approximation
 from ..mistuning.statistics import SHARES, fits
-from ..report.mistuning import mistuning_html
+from ..pictures.mistuning import (
+    amplification_picture,
+    envelope_picture,
+    sensitivity_picture,
+    worst_picture,
+)
+from ..report.page import Piece, fold, number, say, table
+from ..settings.numbers import Model, NotNegative, Number, Positive, _finite_vector, _tuple
 from ..system.assembly import Assembly, Contact
 from ..units import counted
-from .answer import CaseJob, Written
-from .stage import Stage, hash_of_code
 
 
-@in_its_file
-def mistuning_stage(case: CaseJob, workers: int | None = None) -> Written:
-    """What a case asks for in [mistuning]; whole if every sample has a solution.
-
-    Args:
-        workers: see `mistuning.ensemble.run`.
-
-    Raises:
-        UserError: the case asks for none; a scatter of what is not there, or that leaves nothing of it.
-    """
-    if case.settings.mistuning is None:
-        raise UserError("is missing; add [[mistuning.scatter]] with of and deviation", "mistuning")
-    return case.answer("mistuning", "stages.mistuning", partial(_work, workers=workers))
+def _share(value: Any) -> Any:
+    """2% or 0.02."""
+    if isinstance(value, str) and value.endswith("%"):
+        try:
+            return float(value.removesuffix("%")) / 100
+        except ValueError:
+            return value
+    return value
 
 
-def _work(stage: Stage, case: CaseJob, workers: int | None) -> Written:
-    folder, settings, built = case.folder, case.settings, case.built()
-    asked = settings.mistuning
-    assert asked is not None
-    kept = folder / "mistuning.npz"
-    if case.force:
-        for old in (kept, folder / "rare.npz"):
+class ScatterKeys(Model):
+    """What differs from sector to sector of a ring."""
+
+    of: Literal[
+        "frequency", "damping", "mass", "added_mass", "modal_file", "normal_force", "gap", "friction", "stiffness"
+    ]
+    """of a body's modes, its mass, `added_mass` at a monitor or `modal_file`; or of a contact"""
+    deviation: NotNegative = 0.0
+    """standard deviation, a share of the nominal value; of `added_mass` kg, of `gap` m"""
+    distribution: Literal["normal", "lognormal", "uniform"] = "normal"
+    """the median of a lognormal one is nominal"""
+    values: Annotated[tuple[Number, ...], BeforeValidator(_finite_vector)] = ()
+    """or deviations that are known, sector by sector; a shorter pattern is repeated"""
+    file: str | None = None
+    """or a table with the column `deviation`, or `frequency_Hz`, whose mean is nominal; in the
+    order of its rows, or of its column `blade` or `sector`"""
+    others: dict[str, str] = {}
+    """or sectors, from 0, that have another modal file, and the file (`{ 3 = "repaired.h5" }`),
+    of `modal_file`"""
+    arrangement: Literal["given", "shuffled", "drawn"] = "given"
+    """of the known values: as given, in another order in every sample, or each drawn from them"""
+    body: str | None = None
+    """whose; may be left out where there is one"""
+    contact: str | None = None
+    """its interface; may be left out where there is one"""
+    at: str | None = None
+    """monitor at which `added_mass` sits"""
+    together: Annotated[Number, Field(ge=0, le=1)] = 1.0
+    """correlation between the modes of a body; 0: each alone"""
+    neighbours: Annotated[Number, Field(ge=-1, le=1)] = 0.0
+    """correlation between a sector and the next one"""
+
+    @model_validator(mode="after")
+    def _one_of_three(self) -> ScatterKeys:
+        if (self.of == "modal_file") != bool(self.others):
+            raise ValueError("others: belong to modal_file, which needs them; give { 3 = 'repaired.h5' }")
+        given = sum(map(bool, (self.deviation, self.values, self.file, self.others)))
+        if not given:
+            raise ValueError("deviation: nothing scatters; give one above zero, or values or a file of known ones")
+        if given > 1:
+            raise ValueError("deviation: give one of deviation, values, file and others")
+        if bad := [key for key in self.others if not key.isdecimal()]:
+            raise ValueError(f"others.{bad[0]}: is no sector; count them from 0")
+        return self
+
+
+class Keys(Model):
+    """Samples of the whole ring with sectors that differ, by `microslip mistune`."""
+
+    scatter: Annotated[tuple[ScatterKeys, ...], BeforeValidator(_tuple), Field(min_length=1)]
+    samples: Annotated[int, Field(ge=1, le=100000000)] = 100
+    """whole rings that are solved, at most"""
+    until: Annotated[Positive, Field(le=1), BeforeValidator(_share)] | None = None
+    """ends when half of the interval of the 95 % quantile is that share of it"""
+    rare: Annotated[int, Field(ge=0, le=1000000)] = 0
+    """further samples, chosen by a linear ring, for the 99.9 % quantile; none if 0"""
+    seed: Annotated[int, Field(ge=0)] = 0
+    """of all random numbers; a sample depends on it and its number alone"""
+    stuck: bool = False
+    """whether contacts stick, which is linear"""
+    normal_force: NotNegative | None = None
+    """[N] of the contacts that the sweep presses; its smallest if not given"""
+    workers: Annotated[int, Field(ge=1, le=1024)] | None = None
+    """processes; as many as there are cores if not given, samples are the same for any number"""
+
+
+def solve(q: Question) -> Answer:
+    """All samples; whole if every one has a solution."""
+    built, asked, folder = q.built, q.asked, q.folder
+    kept = [folder / "mistuning.npz", folder / "rare.npz"]
+    if q.fresh:
+        for old in kept:
             old.unlink(missing_ok=True)
-    known = _of_samples(case.inputs)
-    with at("mistuning", case.path):
-        what = asked_of(built, settings)
-        ready(what, asked.samples, asked.rare)
-        found = run(what, asked.samples, asked.until, workers, kept, known, report=case.report)
-        if asked.rare:
-            found.rare = choose(found, asked.rare, workers, folder / "rare.npz", known, report=case.report)
+    known = store.fingerprint(q.inputs, asked.model_dump(exclude={"samples", "until", "rare", "workers"}))
+    what = asked_of(built, asked)
+    ready(what, asked.samples, asked.rare)
+    found = run(what, asked.samples, asked.until, asked.workers, kept[0], known, report=q.report)
+    if asked.rare:
+        found.rare = choose(found, asked.rare, asked.workers, kept[1], known, report=q.report)
     worst = None
     if found.solved.any():
-        case.report("the highest sample, searched again from either side")
+        q.report("the highest sample, searched again from either side")
         worst = found.search_again()
-    stage.begin()
     first = next((s for s in what.scatter if s.of == "frequency" and s.deviation), None)
-    lone = first is not None and what.tuned.body(first).sectors == 1 and settings.stuck_ratios is None
+    lone = first is not None and what.tuned.body(first).sectors == 1 and built.settings.stuck_ratios is None
     near = approximation(what, first) if first and lone and not what.stuck else None
     alone = near is not None and len(what.scatter) > 1
-    doubts = _doubted(found, built, asked)
-    sentences = [*said(found), *([FIRST_ALONE] if alone else []), *built.messages, *doubts]
-    made = _written(found, near, folder)
-    drawn = _pictures(found, worst, near, folder / "pictures", settings.name) if worst and case.pictures else []
-    page = folder / "mistuning.html"
-    store.write_text(page, mistuning_html(f"{settings.name}: mistuned", found, sentences, drawn))
-    return Written([page, *made, *drawn], sentences, bool(found.solved.all()))
+    return Answer(
+        [*said(found), *([FIRST_ALONE] if alone else []), *built.messages, *_doubted(found, built, asked)],
+        tables=_pieces(found),
+        largest=None,
+        whole=bool(found.solved.all()),
+        files=_files(found, near) | (_pictures(found, worst, near, built.settings.name) if worst else {}),
+    )
 
 
-def _doubted(found: Ensemble, built: Built, asked: MistuningOfCase) -> list[str]:
+def _doubted(found: Ensemble, built: Built, asked: Keys) -> list[str]:
     """What looks like a number in a wrong unit: of the highest blade of all samples, or the tuned ring's."""
     amplitude, stress = (float(np.nanmax(found.column(of), initial=0.0)) for of in ("amplitude", "stress_Pa"))
     top = max(amplitude, found.tuned.top.amplitude)
@@ -93,27 +157,19 @@ def _doubted(found: Ensemble, built: Built, asked: MistuningOfCase) -> list[str]
 FIRST_ALONE = "First order is of the first scatter of frequencies alone; the samples have all that scatters."
 
 
-def _of_samples(inputs: Mapping[str, Any]) -> str:
-    """Hash of what one sample depends on: not how many there are."""
-    case = dict(inputs["case"])
-    case["mistuning"] = {k: v for k, v in case["mistuning"].items() if k not in ("samples", "until", "rare")}
-    return store.fingerprint({**inputs, "case": case}, hash_of_code(("mistuning.samples",)))
-
-
-def asked_of(built: Built, case: CaseSettings) -> Asked:
+def asked_of(built: Built, asked: Keys) -> Asked:
     """What is asked of every sample of a case.
 
     Raises:
         UserError: a scatter of what is not there, or that leaves nothing of it.
     """
-    settings, asked = built.settings, case.mistuning
-    assert asked is not None
+    settings = built.settings
     force = _normal_force(built, asked)
     sector = built.one(force)
     sector = replace(sector, outputs=sector.outputs[:1])
-    others = (_others(s, i, built, case, force) for i, s in enumerate(asked.scatter))
+    others = (_others(s, i, built, force) for i, s in enumerate(asked.scatter))
     each = enumerate(zip(asked.scatter, others, strict=True))
-    scatter = tuple(_scatter(s, i, built, case.path.parent, o) for i, (s, o) in each)
+    scatter = tuple(_scatter(s, i, built, settings.path.parent, o) for i, (s, o) in each)
     check(scatter)
     thrown = {b.name for b in settings.components if b.pressed_at_rpm is not None}
     pressed = {name: tuple(c.name for c in sector.contacts if name in _ends(c)) for name in thrown}
@@ -130,7 +186,7 @@ def _ends(contact: Contact) -> set[str]:
     return {side.component for side in (contact.first, contact.second) if side is not None}
 
 
-def _normal_force(built: Built, asked: MistuningOfCase) -> float | None:
+def _normal_force(built: Built, asked: Keys) -> float | None:
     """N, of the contacts that the sweep presses; None where there are none."""
     if not any(swept(c) for c in built.contacts):
         return None
@@ -140,10 +196,9 @@ def _normal_force(built: Built, asked: MistuningOfCase) -> float | None:
     return asked.normal_force if asked.normal_force is not None else min(float(x) for x in given or ())
 
 
-def _others(
-    s: ScatterOfCase, number: int, built: Built, case: CaseSettings, force: float | None
-) -> dict[int, Assembly]:  # fmt: skip
+def _others(s: ScatterKeys, number: int, built: Built, force: float | None) -> dict[int, Assembly]:
     """Sector -> what stands for a ring of bodies made from its modal file; every file is read once."""
+    case = built.settings
     bases, made = {name: b.basis for name, b in built.bodies.items()}, dict[str, Assembly]()
     name = s.body or next(iter(bases))
     for sector, file in s.others.items():
@@ -153,7 +208,7 @@ def _others(
     return {int(sector): made[file] for sector, file in s.others.items()}
 
 
-def _scatter(s: ScatterOfCase, number: int, built: Built, folder: Path, others: Mapping[int, Assembly]) -> Scatter:
+def _scatter(s: ScatterKeys, number: int, built: Built, folder: Path, others: Mapping[int, Assembly]) -> Scatter:
     ring = built.assembly.ring
     blades = ring.blades if ring is not None and s.arrangement != "drawn" else None
     values = _measured(folder / s.file, s.of, blades) if s.file else s.values
@@ -255,21 +310,20 @@ def said(found: Ensemble) -> list[str]:
     return [*told, *warned]
 
 
-def _written(found: Ensemble, near: Approximation | None, folder: Path) -> list[Path]:
+def _files(found: Ensemble, near: Approximation | None) -> Files:
     column = measured(found.asked.tuned.whole).column
     told_of = [n for n in COLUMNS if n not in ("stress_Pa", "strain") or not np.isnan(found.column(n)).all()]
     rows = found.rows[:, [COLUMNS.index(n) for n in told_of]]
     head = ["sample", "amplification", *(column(n) if n == "amplitude" else n for n in told_of)]
-    cells = (
+    cells = [
         [str(i), f"{a:.12g}", *(f"{v:.12g}" for v in row)]
         for i, (a, row) in enumerate(zip(found.amplification, rows, strict=True))
-    )
-    store.write_text(folder / "samples.csv", rows_csv(head, cells))
+    ]
+    samples = rows_csv(head, cells)
     tuned = np.nanmax(found.tuned.grid, axis=1)
     envelope = {"frequency_Hz": found.asked.frequency, column("tuned"): tuned} | {
         n if n == "weibull_exponent" else column(n): v for n, v in found.envelope.columns().items()
     }
-    store.write_text(folder / "envelope.csv", columns_csv(envelope, 8))
     told = [found.quantile(share) for share in SHARES]
     quantiles: dict[str, Array] = {
         "share": np.array(SHARES),
@@ -281,26 +335,97 @@ def _written(found: Ensemble, near: Approximation | None, folder: Path) -> list[
             quantiles[f"chosen_{name}"] = np.array([own if share == RARE else np.nan for share in SHARES])
     for fit in fits(found.amplification[found.solved]):
         quantiles[fit.name.replace(" ", "_")] = np.array([fit.quantiles[share] for share in SHARES])
-    store.write_text(folder / "quantiles.csv", columns_csv(quantiles, 8))
-    names = ["samples.csv", "quantiles.csv", "envelope.csv"]
+    tables = {"quantiles.csv": quantiles, "envelope.csv": envelope}
     if near is not None:
-        columns: dict[str, Array] = {
+        tables["approximation.csv"] = {
             "frequency_Hz": near.frequency, column("mean"): near.mean, column("deviation"): near.deviation,
             "weibull_exponent": near.weibull_exponent, column("quantile_2.5_percent"): near.envelope(0.025),
             column("quantile_97.5_percent"): near.envelope(0.975),
         }  # fmt: skip
-        store.write_text(folder / "approximation.csv", columns_csv(columns, 8))
-        names.append("approximation.csv")
-    return [folder / name for name in names]
+    return {"samples.csv": partial(store.write_text, text=samples)} | csv_files(tables, 8)
 
 
-def _pictures(found: Ensemble, worst: Sample, near: Approximation | None, folder: Path, case: str) -> list[Path]:
-    from ..pictures.mistuning import amplification_picture, envelope_picture, sensitivity_picture, worst_picture
+def _pictures(found: Ensemble, worst: Sample, near: Approximation | None, case: str) -> Files:
+    title = f"{case}: highest blade over the tuned ring's"
+    drawn: Files = {"amplification": partial(amplification_picture, found, title=title)}
+    title = f"{case}: all blades of all samples"
+    drawn["mistuned"] = partial(envelope_picture, found, near, title=title)
+    title = f"{case}: the highest of all samples"
+    drawn["worst"] = partial(worst_picture, found, worst, title=title)
+    if near:
+        title = f"{case}: sensitivities"
+        drawn["sensitivity"] = partial(sensitivity_picture, near, title=title)
+    return {f"pictures/{name}.png": draw for name, draw in drawn.items()}
 
-    drawn = [sensitivity_picture(near, folder / "sensitivity.png", f"{case}: sensitivities")] if near else []
-    return [
-        amplification_picture(found, folder / "amplification.png", f"{case}: highest blade over the tuned ring's"),
-        envelope_picture(found, near, folder / "mistuned.png", f"{case}: all blades of all samples"),
-        worst_picture(found, worst, folder / "worst.png", f"{case}: the highest of all samples"),
-        *drawn,
+
+READ_AS = (
+    "Amplification: the highest amplitude of any blade over the frequency, over that of the ring of equal sectors. "
+    "Intervals lie between order statistics and hold whatever the distribution is. The distance of a fit is the "
+    "largest difference between its distribution function and that of the samples; in the tail, of the highest tenth."
+)
+WORST = 12
+"""Samples in the table of the highest."""
+
+
+def _pieces(found: Ensemble) -> list[Piece]:
+    highest = fold("The highest samples, all in samples.csv", _highest(found))
+    return [_quantiles(found), _fits(found), highest, say(READ_AS, tone="note")]
+
+
+def _quantiles(found: Ensemble) -> Piece:
+    told = [found.quantile(share) for share in SHARES]
+    rows = [[f"{100 * q.share:g} %", number(q.value), _end(q.low), _end(q.high)] for q in told]
+    if found.rare is not None:
+        q = found.rare.quantile
+        head = f"{100 * q.share:g} %, by {found.rare.samples} chosen samples"
+        rows.append([head, number(q.value), _end(q.low), _end(q.high)])
+    return table(["of the samples below", "amplification", "at least", "at most"], rows)
+
+
+def _end(value: float) -> str:
+    return number(value) if 0 < value < np.inf else "too few samples"
+
+
+def _fits(found: Ensemble) -> Piece:
+    rows = [
+        [f.name, *(number(v) for v in f.quantiles.values()), number(f.distance, 2), number(f.tail, 2)]
+        for f in fits(found.amplification[found.solved])
     ]
+    return table(["fit", *(f"{100 * s:g} %" for s in SHARES), "distance", "in the tail"], rows)
+
+
+def _highest(found: Ensemble) -> Piece:
+    a = np.where(found.solved, found.amplification, -np.inf)
+    rows = [
+        [i, number(a[i]), number(found.column("frequency_Hz")[i], 6), int(found.column("sector")[i]),
+         number(found.column("localisation")[i], 3)]
+        for i in np.argsort(-a, kind="stable")[:WORST] if np.isfinite(a[i])
+    ]  # fmt: skip
+    return table(["sample", "amplification", "frequency in Hz", "blade", "localisation"], rows)
+
+
+def _of_a_ring(asked: Keys, case: CaseSettings) -> str:
+    return "" if case.ring else "is that of a ring; add [ring] with blades and engine_order"
+
+
+def _named(asked: Keys) -> list[str | None]:
+    return [file for s in asked.scatter for file in (s.file, *s.others.values())]
+
+
+ANALYSIS = Analysis(
+    name="mistuning",
+    asks=Keys,
+    solve=solve,
+    lost="some samples have no solution; samples.csv has no amplitude for them",
+    needed="scatter = [{ of, deviation }]",
+    verb="mistune",
+    options={
+        "samples": "at most, in the place of the case's number.",
+        "until": "ends when half of the 95 % quantile's interval is that share of it, as 2%.",
+        "rare": "further samples, chosen by a linear ring, for the 99.9 % quantile.",
+        "workers": "processes; as many as there are cores if not given. Samples are the same for any number.",
+    },
+    alone=True,
+    fits=_of_a_ring,
+    files=_named,
+)
