@@ -202,3 +202,15 @@ def test_mistakes():
     refused("there are 1", backbone, sliding(), 1e-6, 1e-5, mode=1)
     beside = ms.structure(np.eye(2), np.diag([1.0, 4.0]), elements=[ms.jenkins(1.0, 1.0, at=0)], output=1)
     refused("does not move", ms.backbone, beside, 1e-6, 1e-5)
+
+
+def test_a_damper_that_hardly_anything_holds_may_drift_while_it_slides():
+    """0.1 kg on 1 N/m under a steady 0.5 N: as long as a friction contact sticks it stays, and 0.5 m away when all
+    slide, a hundred times the motion that makes them. What is left then is the mass without its damper."""
+    friction = [ms.jenkins(1e6, limit, 0, 1) for limit in (2.0, 8.0)]
+    K = np.diag([1e5, 1.0])
+    both = ms.structure(np.diag([1.0, 0.1]), K, steady={1: 0.5}, damping_ratio=0.001, elements=friction, output=0)
+    curve = ms.backbone(both, 1e-4, 0.1, mode=0, harmonics=1, samples=24)
+    assert curve.complete and len(curve.Omega) < 200, curve.status
+    np.testing.assert_allclose(curve.Omega[0], np.sqrt(1e5 / 1.1), rtol=1e-3)
+    np.testing.assert_allclose(curve.Omega[-1], np.sqrt(1e5), rtol=1e-4)

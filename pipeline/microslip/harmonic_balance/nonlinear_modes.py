@@ -270,14 +270,28 @@ def strongest(problem: Problem, low: float, high: float) -> int:
     return int(np.argmax(np.where(inside, height, 0.0) if height[inside].any() else height))
 
 
-def _growth(problem: Problem, mode: int) -> float:
-    """How many times as far the contacts move in the mode without them that is most like a mode with sticking ones (in
-    kinetic energy): the way a nonlinear mode goes in its unknowns."""
+DRIFT = 1e4
+"""A mean motion may become as many times as large as the vibration before steps along the curve are shorter for it."""
+
+
+def _growth(problem: Problem, mode: int) -> Array:
+    """(size,) how many times as far the contacts may move when they slide as while they stick.
+
+    Vibrations as far as in the mode without contacts that is most like a mode with sticking ones (in kinetic energy).
+    Mean motions as far as the forces of sticking contacts move the bodies without contacts: a damper that hardly
+    anything else holds drifts millions of times as far, up to `DRIFT` of which count: its contacts are `DRIFT` times
+    as soft here.
+    """
     part, k = _only(problem), problem.stiffness[0]
     held, free = (assembly.stuck_modes(*of)[1] for of in ((part, k), (untouched(part), np.zeros((0, 0)))))
     like = int(np.abs(free.conj().T @ part.M @ held[:, mode]).argmax())
     stays = np.linalg.solve(np.eye(part.count) + part.residual @ k, part.rows @ held[:, mode])
-    return max(1.0, float(np.abs(part.rows @ free[:, like]).max() / np.abs(stays).max()))
+    grown = np.full(problem.size, max(1.0, float(np.abs(part.rows @ free[:, like]).max() / np.abs(stays).max())))
+    (still,) = problem.parts[0]
+    T, soft = still.rows, k / DRIFT
+    moved = T @ np.linalg.solve(still.stiff + T.conj().T @ soft @ T, T.conj().T) + still.residual
+    grown[: problem.count] *= np.maximum(1.0, np.abs(np.diag(moved @ k)))
+    return grown
 
 
 def sliding_amplitude(problem: Problem, mode: int) -> float:
