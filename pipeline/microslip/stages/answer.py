@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 from ..analysis import Answer, Drawing
 from ..basis import read_basis
-from ..case import CaseSettings, load_case
+from ..case import CaseSettings, checkpoint, load_case
 from ..case.assemble import Built, build
 from ..data import ModalBasis
 from ..errors import UserError, of_file
@@ -135,7 +135,8 @@ class CaseJob:
 
     Attributes:
         path: the case file. files: body of the case -> its modal file. folder: of the answer. assignments: keys that
-            have other values. force, report: see `Stage`. pictures: whether they are wanted.
+            have other values. force, report: see `Stage`. pictures: whether they are wanted. swept: whether it takes as
+            many harmonics as the response has, where their number follows from its error.
     """
 
     path: Path
@@ -145,10 +146,12 @@ class CaseJob:
     force: bool = False
     report: Report = lambda _: None
     pictures: bool = True
+    swept: bool = False
 
     @cached_property
     def _loaded(self) -> tuple[CaseSettings, dict[str, Any]]:
-        return load_case(self.path, list(self.assignments))
+        settings, raw = load_case(self.path, list(self.assignments))
+        return checkpoint.followed(settings, raw, self.folder) if self.swept else (settings, raw)
 
     @property
     def settings(self) -> CaseSettings:
