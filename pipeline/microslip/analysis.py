@@ -79,14 +79,15 @@ class Answer:
     """What is answered.
 
     Attributes:
-        sentences: the result first. data: end of the files' names -> what they hold; the first one without an end.
-            diagrams: likewise. tables: pieces of the page (`report.page`). largest: amplitude of the first read-out, of
-            which is told whether it looks like a number in a wrong unit; None where the sentences
-            tell all that is to be said of the case. whole: whether nothing of it was lost.
-        files: other files by their names, below the folder of the answer -> what writes them;
-            pictures are shown on the page. moving: writes bodies that move below that folder, where
-            pictures are wanted. lines: of a table for the terminal. missing: what was asked for and is not
-            known, in words.
+        sentences: the result first. data: end of the files' names -> what they hold; the first one
+            without an end. diagrams: likewise. tables: pieces of the page (`report.page`). largest:
+            amplitude of the first read-out, of which is told whether it looks like a number in a
+            wrong unit; None where the sentences tell all that is to be said of the case. whole:
+            whether nothing of it was lost. missing: what was asked for and is not known, in words.
+        files: other files by their names, below the folder of the answer -> what writes them; PNG
+            files are made where pictures are wanted, and shown on the page. moving: writes bodies
+            that move below that folder, where pictures are wanted. lines: of a table for the
+            terminal.
     """
 
     sentences: Sequence[str]

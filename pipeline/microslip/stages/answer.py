@@ -88,22 +88,23 @@ def written(answer: Answer, name: str, folder: Path, title: str, pictures: bool,
     Args:
         name: begins those that have no name of their own. case: begins the titles of diagrams.
     """
-    made, moving, begins = _data(name, answer, folder), list[Path](), "pictures/"
-    pictured = [file for file in answer.files if file.startswith(begins) and pictures]
-    for file, write in answer.files.items():
-        if file in pictured or not file.startswith(begins):
-            write(folder / file)
-    made += [folder / file for file in answer.files if not file.startswith(begins)]
-    shown = [folder / file for file in pictured]
+    wanted = {file: write for file, write in answer.files.items() if pictures or not file.endswith(".png")}
+    for file, write in wanted.items():
+        write(folder / file)
+    shown = [folder / file for file in wanted if file.endswith(".png")]
+    made = [*_data(name, answer, folder), *(folder / file for file in wanted if not file.endswith(".png"))]
+    moving: Sequence[Path] = ()
     if pictures:
-        shown += [drawn(d, folder / f"{begins}{_named(name, end)}.png", case) for end, d in answer.diagrams.items()]
-        moving = list(answer.moving(folder))
+        places = {folder / "pictures" / f"{_named(name, end)}.png": d for end, d in answer.diagrams.items()}
+        shown += [drawn(diagram, place, case) for place, diagram in places.items()]
+        moving = answer.moving(folder)
     shown += [path for path in moving if path.suffix == ".gif"]
     page = folder / f"{name}.html"
     store.write_text(page, answer_page(title, answer.sentences, shown, *answer.tables))
-    files = [page, *made, *dict.fromkeys([*shown, *moving])]
     whole = answer.whole and not answer.missing
-    return Written(files, [*answer.lines, *answer.sentences], whole, answer.missing)
+    return Written(
+        [page, *made, *dict.fromkeys([*shown, *moving])], [*answer.lines, *answer.sentences], whole, answer.missing
+    )
 
 
 def _named(name: str, end: str) -> str:
