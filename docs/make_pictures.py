@@ -20,17 +20,7 @@ from typing import Any
 import damper_study
 import numpy as np
 import scipy.linalg
-from pages import (
-    HERE,
-    body_reference,
-    case_reference,
-    contact_reference,
-    fill,
-    modal_reference,
-    play,
-    public_reference,
-    table,
-)
+from pages import FILES, HERE, file_reference, fill, modal_reference, play, public_reference, table
 
 from microslip.basis import read_basis
 from microslip.case import CaseSettings, load_case, run_case
@@ -1118,9 +1108,8 @@ def own() -> None:
 def reference() -> None:
     """The references of body.toml, contact.toml and case.toml, of the modal file and of the public names."""
     fill("modal_file.md", "modal_file", modal_reference())
-    fill("body_toml.md", "body_toml", body_reference())
-    fill("contact_toml.md", "contact_toml", contact_reference())
-    fill("case_toml.md", "case_toml", case_reference())
+    for name, (page, _) in FILES.items():
+        fill(page, name, file_reference(name))
     fill("python.md", "public", public_reference())
 
 

@@ -358,6 +358,9 @@ WRONG: dict[str, tuple[dict[str, Any], str]] = {
     "neither": (table(**STIFF, friction="0.3"), "friction: must be a number or a table"),
     "unknown kind": (table(**STIFF, law="iwam"), 'right.law: "iwam" is unknown; choose one of'),
     "part of it": (table(**STIFF, friction={"kind": "coulomb"}), "contacts.right.friction.mu: is missing; add it"),
+    "a length": (
+        table(**STIFF, roughness={"kind": "polynomial", "R_Z": -1.0}), "(it is -1.0); correct it, in m"
+    ),
     "both": (table(**STIFF, stiffness=GIVEN), "normal_stiffness: is short for a table"),
     "smooth strips": (table(**STIFF, law="strips"), "law: strips are those of a rough surface"),
     "cold": (table(**STIFF, friction={"kind": "heated", "mu_0": 0.3}), "the heat of sliding; add [temperature]"),
@@ -415,8 +418,11 @@ def test_mistakes_are_named_with_the_file(raw: dict[str, Any], words: str) -> No
     assert refused(words, built, raw).startswith("case.toml: ")
 
 
-def test_mistakes_at_the_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_mistakes_at_the_command_line(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Exit code 2, one sentence, and what was there before stays as it was."""
+    monkeypatch.chdir(tmp_path)
     write_basis(tmp_path / "beam.h5", small.basis())
     case = tmp_path / "case.toml"
     text = """name = "pair"

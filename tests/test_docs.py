@@ -83,11 +83,16 @@ def test_every_picture_is_shown_and_small() -> None:
 
 def test_references_of_files_are_current() -> None:
     """`python docs/make_pictures.py reference` would change nothing."""
-    assert pages.filled("body_toml.md", "body_toml") == pages.body_reference().strip()
-    assert pages.filled("contact_toml.md", "contact_toml") == pages.contact_reference().strip()
-    assert pages.filled("case_toml.md", "case_toml") == pages.case_reference().strip()
+    for name, (page, _) in pages.FILES.items():
+        assert pages.filled(page, name) == pages.file_reference(name).strip()
     assert pages.filled("python.md", "public") == pages.public_reference().strip()
     assert pages.filled("modal_file.md", "modal_file") == pages.modal_reference().strip()
+
+
+@pytest.mark.parametrize("model", [model for _, model in pages.FILES.values()])
+def test_every_key_says_what_it_means(model: type) -> None:
+    """Or at least its unit, in the text below it."""
+    assert not pages.silent(model)
 
 
 def test_a_public_name_is_no_package_of_the_same_name() -> None:

@@ -105,6 +105,16 @@ def test_stiff_contacts_are_rigid_links(stiffness: float) -> None:
         np.testing.assert_allclose(found.amplitude, expected, rtol=3e-4)
 
 
+@pytest.mark.parametrize("stiffness", [1e12, 1e15])
+def test_a_mass_that_a_steady_force_holds_on_a_stiff_stop_moves_as_its_spring(stiffness: float) -> None:
+    """What is lost is less than the rounding of the work of the loads: no reason to refuse a motion that is right."""
+    held = ms.structure(1.0, 1e6, force=[1.0], steady=[10.0], damping_ratio=0.01, elements=[ms.stop(stiffness, 0.0)])
+    W = 2 * np.pi * np.array([10.0, 100.0])
+    found = ms.harmonic_response(held, W, unit="rad/s")
+    assert found.converged.all(), found.status
+    np.testing.assert_allclose(found.amplitude, 1 / (stiffness + 1e6 - W**2), rtol=1e-5)
+
+
 def test_why_a_hard_stop_has_no_solution_names_what_a_person_can_set() -> None:
     found = ms.harmonic_response(
         ms.structure(1.0, 1.0, 0.02, force={0: 0.3}, elements=[ms.stop(1e15, 0.1)]), [1.0], unit="rad/s"

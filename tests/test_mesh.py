@@ -315,6 +315,23 @@ def test_included_files_and_files_of_data(tmp_path: Path) -> None:
     assert "names no file" in refusal(written(tmp_path, "*INCLUDE\n", "a.inp"))
 
 
+def test_an_included_file_of_another_folder(tmp_path: Path) -> None:
+    """Data stand beside the file that names them, or beside the deck; a mistake names its line."""
+    head, nodes = INP.split("*NODE, NSET=NALL\n")
+    nodes, rest = nodes.split("*ELEMENT", 1)
+    (tmp_path / "sub").mkdir()
+    main = written(tmp_path, f"{head}*INCLUDE, INPUT=sub/part.inc\n*ELEMENT{rest}", "main.inp")
+    part = written(tmp_path, "*NODE, INPUT=bare.txt, NSET=NALL\n", "sub/part.inc")
+    for place in ("sub/bare.txt", "bare.txt"):
+        bare = written(tmp_path, nodes, place)
+        assert len(read_mesh(main, "mm").points) == 12
+        bare.unlink()
+    written(tmp_path, "*NODE, NSET=NALL\n1, a, 0., 0.\n", "sub/part.inc")
+    with pytest.raises(UserError) as error:
+        read_mesh(main, "mm")
+    assert error.value.file == f"{part}, line 1"
+
+
 def test_one_instance_is_the_part_itself(tmp_path: Path) -> None:
     body, _ = INP.split("*MATERIAL")
     part = "*PART, NAME=P\n" + body.removeprefix("*HEADING\n") + "*END PART\n*ASSEMBLY, NAME=A\n"

@@ -65,12 +65,14 @@ def over(make: Make, low: float, high: float) -> Over:
         x = np.cos(np.pi * (np.arange(count) + 0.5) / count)
         found = [jax.tree_util.tree_flatten(sliding.of(make(_value(low, high, one)), like)) for one in x]
         if len({str(tree) for _, tree in found}) > 1:
-            raise UserError("parameter: laws of contacts change in kind with it; take another one, or a shorter range")
+            text = "laws of contacts change in kind with it; take another one, or a shorter range"
+            raise UserError(text, "parameter")
         columns = zip(*(leaves for leaves, _ in found), strict=True)
         series = [_series(x, np.array([np.asarray(leaf) for leaf in leaves])) for leaves in columns]
         if all(_is_short(c) for c in series):
             return Over(low, high, found[0][1], [_cut(c) for c in series])
-    raise UserError("parameter: the equations do not change smoothly with it; take a shorter range")
+    text = "the equations do not change smoothly with it; take a shorter range"
+    raise UserError(text, "parameter")
 
 
 def _value(low: float, high: float, x: float) -> float:

@@ -28,19 +28,20 @@ ROTATION: dict[str, Turning] = {"+": 1, "-": -1}
 
 
 class MagnetsOfCase(Model):
-    """Exciters that stand around the rotor: their engine orders follow from where they stand.
-
-    angles: degrees. force: peak of each, or one for all, N. width: degrees over which each is felt. pulse: ``cosine``,
-    cos^2, or ``rectangular``. place: degrees at which the loaded spot of the first blade stands at time 0. highest:
-    engine order.
-    """
+    """Exciters that stand around the rotor: their engine orders follow from where they stand."""
 
     angles: Numbers
+    """[degrees] where they stand around the rotor"""
     force: Number | Numbers = 1.0
+    """[N] peak of each, or one for all"""
     width: Positive
+    """[degrees] over which each is felt"""
     pulse: Literal["cosine", "rectangular"] = "cosine"
+    """cos^2, or constant over the width"""
     place: Number = 0.0
+    """[degrees] of the loaded spot of the first blade at time 0"""
     highest: Annotated[int, Field(ge=1, le=1000)] = 24
+    """engine order that is kept"""
 
     @model_validator(mode="after")
     def _fits(self) -> MagnetsOfCase:
@@ -52,39 +53,45 @@ class MagnetsOfCase(Model):
 
 
 class SpringOfCase(Model):
-    """A spring from a body to the ground, where and along which an excitation of the body pushes.
-
-    row: ``excitation``, or ``body:excitation``, of one force at a point. stiffness: N/m. damping: N s/m against the
-    ground. motion: m, 0-peak, with which the far end of the spring moves, as cos of the driving frequency.
-    """
+    """A spring from a body to the ground, where and as an excitation of the body pushes."""
 
     row: Address
+    """excitation of a body, `body:excitation` where there are several: its point and direction"""
     stiffness: Positive
+    """[N/m] of the spring"""
     damping: NotNegative = 0.0
+    """[N s/m] of a damper beside it, against the ground"""
     motion: NotNegative = 0.0
+    """[m] 0-peak, of its far end: moves as cos of the driving frequency"""
 
 
 class WaveOfCase(Model):
-    """A sine wave of the ground (Sextro Eq. (4.3-1)): amplitude and length in m; phase: degrees where u_r = 0."""
+    """A sine wave of the ground along its direction (Sextro Eq. (4.3-1))."""
 
     amplitude: NotNegative
+    """[m] y_A"""
     length: Positive
+    """[m] lambda"""
     phase: Number = 0.0
+    """[degrees] where the contact begins, at u_r = 0"""
 
 
 class SpectrumOfCase(Model):
-    """Waves of a ground whose profile has a power spectrum over the wave number that falls with an exponent.
-
-    height: m, root of the mean square. longest, shortest: wave lengths, m. exponent: 2 of a random walk. waves: how
-    many. seed: of their phases and lengths.
-    """
+    """Waves of a ground whose profile has a power spectrum over the wave number that falls with an
+    exponent."""
 
     height: NotNegative
+    """[m] root of the mean square"""
     longest: Positive
+    """[m] wave length"""
     shortest: Positive
+    """[m] wave length"""
     exponent: Number = 2.0
+    """with which the power falls; 2 of a random walk"""
     waves: Annotated[int, Field(ge=1, le=200)] = 32
+    """how many"""
     seed: Annotated[int, Field(ge=0, le=2**32 - 1)] = 0
+    """of their phases and lengths"""
 
     @model_validator(mode="after")
     def _falling(self) -> SpectrumOfCase:
@@ -96,23 +103,27 @@ class SpectrumOfCase(Model):
 class GroundOfCase(Model):
     """Ground that moves under a contact, of a motion in time or of steady sliding (Sextro, sections 4.1 and 4.3).
 
-    velocity: m/s, steady. direction: degrees of it, from t1 towards t2. waviness: sine waves, along the direction.
-    spectrum: more of them. pushes: whether the slope of a wave turns the normal force, so that it pushes the body along
-    the ground; false, as the book has it, leaves that out. rpm: instead of the velocity, of material that turns about
-    the axis of the body that the contact is against, and runs through that body while its shape stands; axis: direction
-    and point: m, in the axes of the case, where it turns about another one. inertia: of the material that runs through
-    (see `system.spin`); false leaves that out, as for a body whose shape is not one of revolution.
+    With rpm it is material that runs through the other body while its shape stands.
     """
 
     velocity: Number = 0.0
+    """[m/s] V of the other side, of a [motion in time](time_domain.md)"""
     direction: Number = 0.0
+    """[degrees] of the velocity, from t1 towards t2"""
     rpm: Number | None = None
+    """[rpm] instead of the velocity: material that turns about the axis of the body which the
+    contact is against ([squeal](squeal.md))"""
     axis: Direction | None = None
+    """along another axis, in the axes of the case"""
     point: Annotated[Vector, BeforeValidator(_finite_vector)] | None = None
+    """[m] through this point"""
     waviness: Annotated[tuple[WaveOfCase, ...], BeforeValidator(_tuple)] = ()
     spectrum: SpectrumOfCase | None = None
     pushes: bool = True
+    """whether the slope of a wave pushes the body along the ground; the book: false"""
     inertia: bool = True
+    """of the [material that runs through](squeal.md#the-material-that-runs-through); false
+    leaves it out, as for a body whose shape is not one of revolution"""
 
     @model_validator(mode="after")
     def _moves(self) -> GroundOfCase:
@@ -152,33 +163,38 @@ class GroundOfCase(Model):
 
 
 class ExcitationOfCase(Model):
-    """A harmonic force: a row of a body's modal file times an amplitude (N, or Pa for a unit pressure).
+    """A harmonic force: an amplitude times a row of a body's modal file or a pressure field.
 
-    row: ``excitation``, or ``body:excitation``. phase: degrees. harmonic: of the frequency that is swept; 0: steady.
-    tone: 2, where the harmonic is one of a second frequency ([two_tones]). engine_order: instead of the harmonic; the
-    swept frequency is that of the greatest common divisor of all engine orders, or of ring.engine_order where that is
-    given. stimulus times steady (N or Pa): instead of the amplitude.
-    speed_rpm: of a centrifugal excitation, steady. magnets: instead of amplitude and order.
-
-    field: a complex pressure field on a face (an interface, or a face that an excitation of the body names) instead of
-    a row: .csv, .npz, .vtu or .vtk beside the case, with x, y, z in length_unit and p_real, p_imag in Pa;
-    time_factor ``-`` for programs with exp(-i Omega t). amplitude then multiplies the field.
+    Beside the case a field is .csv, .npz, .vtu or .vtk with x, y, z and p_real, p_imag in Pa.
     """
 
     row: Address | None = None
+    """excitation of a body, `body:excitation` where there are several"""
     amplitude: Number = 1.0
+    """[N or Pa] 0-peak; of a pressure field: a factor"""
     phase: Number = 0.0
+    """[degrees] by which it leads"""
     harmonic: Annotated[int, Field(ge=0, le=1000)] = 1
+    """of the swept frequency; 0: steady"""
     tone: Literal[1, 2] = 1
+    """2, where the harmonic is one of a second frequency, see `[two_tones]`"""
     engine_order: Order | None = None
+    """instead of the harmonic"""
     steady: Number | None = None
+    """[N or Pa] steady gas load, with stimulus instead of amplitude"""
     stimulus: NotNegative | None = None
+    """its share that vibrates"""
     speed_rpm: NotNegative | None = None
+    """[rpm] of a centrifugal excitation, instead of amplitude and harmonic"""
     magnets: MagnetsOfCase | None = None
     field: str | None = None
+    """file of a [complex pressure field](excitation.md#pressure-fields), instead of a row"""
     face: Address | None = None
+    """where the field acts: an interface, or a face that an excitation of the body names"""
     length_unit: Literal["m", "cm", "mm", "um", "in", "ft"] | None = None
+    """of the field's x, y, z"""
     time_factor: Literal["+", "-"] = "+"
+    """`-`: the field stands for p exp(-i Omega t)"""
 
     @model_validator(mode="after")
     def _one_kind(self) -> ExcitationOfCase:

@@ -15,14 +15,13 @@ Ends = Annotated[tuple[Positive, Positive], BeforeValidator(_finite_vector)]
 
 
 class OrdersOfCase(Model):
-    """The largest resonance in the sweep's band for each engine order (Sextro Fig. 5.5-2), by `respond --over orders`.
-
-    engine_orders: ``all`` from 1 to half the number of blades, or a list. points: of the sweep that looks for them, the
-    case's own if not given.
-    """
+    """The largest resonance in the sweep's band for each engine order (Sextro Fig. 5.5-2), by
+    `respond --over orders`."""
 
     engine_orders: Literal["all"] | Orders = "all"
+    """`all`: 1 to N/2, half the number of blades"""
     points: Annotated[int, Field(ge=5, le=10000)] | None = None
+    """of the sweep that looks for the peaks; the sweep's if not given"""
 
     @model_validator(mode="after")
     def _some(self) -> OrdersOfCase:
@@ -36,14 +35,17 @@ class SpeedsOfCase(Model):
 
     Bodies whose modal files have a speed range take part in the speed, others stay as they are; centrifugal excitations
     (speed_rpm) follow it.
-    normal_force: of the contacts that the sweep presses, ``static`` (the closures of the modal file), a number (N), or
-    [[rpm, N], ...], straight lines in the square of the speed; if not given, the sweep's one.
     """
 
     start_rpm: Positive
+    """[rpm] first speed"""
     stop_rpm: Positive
+    """[rpm] last one, above or below"""
     points: Annotated[int, Field(ge=2, le=100000)] = 101
+    """equally spaced"""
     normal_force: Literal["static"] | NotNegative | Annotated[tuple[Pair, ...], BeforeValidator(_tuple)] | None = None
+    """[N] `static`, one, or pairs [rpm, N], straight lines in the square of the speed; the
+    sweep's one if not given"""
 
     @model_validator(mode="after")
     def _rising(self) -> SpeedsOfCase:
@@ -59,15 +61,18 @@ class SpeedsOfCase(Model):
 class RangesOfCase(Model):
     """Envelope of the responses over all combinations of these values (Sextro Fig. 5.4-2), by `respond --over ranges`.
 
-    damping_ratio: of all modes of all bodies, or of the stuck modes where damping = ``stuck``. load: factors on the
-    loads that are not steady. friction: of all contacts. normal_force: N, of the contacts that the sweep presses. Two
-    values are the ends of a range; give more where the smallest amplitude matters, which may lie between them.
+    Two values are the ends of a range; give more where the smallest amplitude matters, which may
+    lie between them.
     """
 
     damping_ratio: Ratios = ()
+    """of all modes of all bodies, or of the stuck modes with damping = `stuck`"""
     load: NotNegatives = ()
+    """factors on the loads that are not steady"""
     friction: Annotated[tuple[Coefficient, ...], BeforeValidator(_finite_vector)] = ()
+    """coefficients of all contacts"""
     normal_force: NotNegatives = ()
+    """[N] of the contacts that the sweep presses"""
 
     @model_validator(mode="after")
     def _some(self) -> RangesOfCase:
@@ -84,17 +89,21 @@ class RangesOfCase(Model):
 class CurveOfCase(Model):
     """Responses followed through folds and lift-off, by `respond --over frequency`, `load` and `normal-force`.
 
-    band: Hz, first and last frequency; the sweep's start and stop if not given. load: first and last factor on the
-    loads that are not steady. normal_force: N, first and last; the smallest and the largest of the sweep if not given.
-    The first may be the larger one. frequency: Hz, at which load and normal force vary; the highest resonance in the
-    sweep's band if not given, for the normal force that at its first value. points: of a curve at most.
+    The first of two values may be the larger one.
     """
 
     band: Ends | None = None
+    """[Hz] first and last frequency; the sweep's start and stop if not given"""
     load: Ends = (0.01, 1.0)
+    """first and last factor on the loads that are not steady"""
     normal_force: Pair | None = None
+    """[N] first and last, of the contacts that the sweep presses; its smallest and largest if
+    not given"""
     frequency: Positive | None = None
+    """[Hz] at which load or normal force vary; the highest resonance in the sweep's band if not
+    given, at the first normal force where that varies"""
     points: Annotated[int, Field(ge=2, le=1000000)] = 3000
+    """of a curve at most"""
 
     @model_validator(mode="after")
     def _apart(self) -> CurveOfCase:
@@ -106,22 +115,25 @@ class CurveOfCase(Model):
 
 
 class MeasuredOfCase(Model):
-    """A measured frequency (Hz) of a mode, counted from 1, of a nodal diameter."""
+    """A measured frequency of a mode of a nodal diameter."""
 
     nodal_diameter: Annotated[int, Field(ge=0, le=500)]
+    """of its mode"""
     mode: Annotated[int, Field(ge=1, le=500)] = 1
+    """from 1, in the order of the frequencies"""
     frequency: Positive
+    """[Hz] measured; of fit it is met, others are predicted"""
 
 
 class IdentificationOfCase(Model):
-    """Contact stiffness from one measured frequency, others predicted (Sextro Fig. 5.4-1), by `microslip identify`.
-
-    fit: the frequency that is met. measured: others that are predicted. ratio: tangential over normal stiffness, kept.
-    stiffnesses: N/m, of further curves in the diagram. modes: how many of them are drawn.
-    """
+    """Contact stiffness from one measured frequency, others predicted (Sextro Fig. 5.4-1), by
+    `microslip identify`."""
 
     fit: MeasuredOfCase
     measured: Annotated[tuple[MeasuredOfCase, ...], BeforeValidator(_tuple)] = ()
     ratio: Positive = 0.5
+    """c_T / c_N, kept"""
     stiffnesses: Positives = ()
+    """[N/m] c_N of further curves in the diagram"""
     modes: Annotated[int, Field(ge=1, le=100)] = 3
+    """how many are drawn"""

@@ -73,90 +73,100 @@ BodyName = Annotated[Name, BeforeValidator(_no_path)]
 
 
 class BodyOfCase(Model):
-    """A body of an assembly.
+    """A body of an assembly, of the modal file that its body.toml or system.toml makes.
 
-    name: in this case. body: the name of a body.toml (see `places.find_body`) or of a system.toml beside the case, the
-    name if not given. file: a modal file instead, beside the case. speed: of the file, counted from 0, or speed_rpm.
-    turn: degrees about the body's rotation axis, and shift: m, from where its file has it to where it stands here.
-    damping_ratio: instead of the file's, one for all modes or one a mode, the last one for all that follow.
-    aerodynamics: a table beside the case (.csv: nodal_diameter, frequency_shift, damping_ratio and, where they differ,
-    direction ``forward``, ``backward`` or ``both``) of what the flow adds to the modes in each wave of the ring.
-    modes: how many of the stored eigenmodes are used, all if not given.
-    mass: kg, of a body at rest made of another density, instead of the file's; its shape and stiffness stay.
-    pressed_at_rpm: the speed whose centrifugal load presses a loose body into its contacts, which share it as normal
-    forces without friction; they need no other.
-    weak_springs: Hz, of a free body on springs so soft that it has this frequency in each of its rigid motions. A body
-    that slides in all of its contacts has no place of its own; without them it slides away where mean forces do not
-    balance.
+    A body that slides in all of its contacts has no place of its own; without weak_springs it
+    slides away where mean forces do not balance.
     """
 
     name: Name
+    """in this case"""
     body: BodyName | None = None
+    """name of the body whose modal file it is, looked for as said above; the name if not given"""
     file: str | None = None
+    """a modal file beside the case instead"""
     speed: Annotated[int, Field(ge=0)] = 0
+    """which speed of the modal file, from 0"""
     speed_rpm: NotNegative | None = None
+    """[rpm] or a speed of the file or of its range"""
     damping_ratio: Ratio | Ratios | None = None
+    """instead of the file's: one, or one a mode, the last one for all that follow"""
     aerodynamics: str | None = None
+    """a table (.csv) beside the case of [what the flow adds](excitation.md#damping) to every wave
+    of the ring"""
     modes: Annotated[int, Field(ge=1, le=2000)] | None = None
+    """how many of those that the modal file stores, all if not given"""
     mass: Positive | None = None
+    """[kg] of the same shape and stiffness at rest, made of another density"""
     pressed_at_rpm: Positive | None = None
+    """[rpm] whose centrifugal load presses a loose body into its contacts, as normal forces
+    without friction; they need no other"""
     turn: Number = 0.0
+    """[degrees] about the body's rotation axis, from where its file has it"""
     weak_springs: Positive | None = None
+    """[Hz] that hold a body which nothing else does: frequency of its rigid motions"""
     shift: Annotated[Vector, BeforeValidator(_finite_vector)] = (0.0, 0.0, 0.0)
+    """[m] from where its file has it, after the turn"""
 
 
 class RingSettings(Model):
-    """All bodies of the case stand blades times in a circle, driven by an engine order.
-
-    engine_order: of the frequency that is swept; if not given, the greatest common divisor of those that excitations
-    name, or 1. Negative ones run round with the rotor and faster. rotation: ``-`` for a rotor that turns from sector 1
-    to sector 0. model: ``sector``, one that stands for all, or ``full``, all of them.
-    """
+    """All bodies of the case stand blades times in a circle, driven by an engine order."""
 
     blades: Annotated[int, Field(ge=2, le=1000)]
+    """N, as many as the sectors of a cyclic body"""
     engine_order: Order | None = None
+    """of the swept frequency; if not given, the greatest common divisor of those that
+    excitations name, or 1; negative: [round with the rotor](excitation.md#engine-orders)"""
     rotation: Literal["+", "-"] = "+"
+    """`-`: the rotor turns from sector 1 to sector 0"""
     model: Literal["sector", "full"] = "sector"
+    """one sector that stands for all, or all of them"""
 
 
 class ContactSettings(ContactLaw):
     """A contact of an interface with the ground, a rigid neighbour, or with another body's interface.
 
-    against: ``ground``, or an interface, ``body:interface``; against_sector: of a ring, how many sectors further that
-    body stands. normal_force: N, or interference: m, negative a gap, where the sweep's normal forces are not this
-    contact's. width (along t1) and height (along t2) in m are the patch's own if not given; points: of it along t1 and
-    t2 (four of Jenkins elements if not given).
-
-    What it is: the keys of a contact.toml (`docs/contact_toml.md`), of the whole patch in SI, of which every point
-    carries its share; or file: a contact.toml beside the case. includes: which compliance the stiffnesses count, that
-    of the surface alone or of bulk and surface (the book's E A / l0); see `compliance`.
-
-    patch: ``rigid``, six coordinates, or ``nodal``, points that move as the shapes of the bodies say. curvature:
-    relative radii (m) along t1 and t2, inf where it is flat (a pin of radius r in a hole of radius R: r R / (R - r)).
-    young (Pa) and poisson of both bodies take the place of the two stiffnesses there: springs that agree with Hertz in
-    their ``approach`` or ``width`` (fit), at the load `fitted_at` (N; if not given the force that presses it: its own,
-    or each of the sweep); or fit = ``exact``: a line of contact in pieces, or one round contact, with Hertz' own law.
-    isotropic: of both tangential stiffnesses that Hertz' contact has the geometric mean, as mode = ``book`` needs it.
-    ground: how the other side moves; of another body, how fast its material runs through.
+    What it is say the keys of a contact.toml, of the whole patch in SI, of which every point
+    carries its share.
     """
 
     interface: Address
+    """of a body, `body:interface` where there are several; its frame is the contact's"""
     against: Address = GROUND
+    """`ground`, or the other interface"""
     against_sector: Annotated[int, Field(ge=-1000, le=1000)] = 0
+    """of a ring: how many sectors further the other body stands"""
     normal_force: NotNegative | None = None
+    """[N] where the sweep's forces are not this contact's"""
     interference: Number | None = None
+    """[m] or how far the faces overlap at rest; negative: a gap"""
     file: str | None = None
+    """a [contact.toml](contact_toml.md) instead of stiffnesses, friction, law and roughness"""
     width: Positive | None = None
+    """[m] b_0 along t1; the patch's own if not given"""
     height: Positive | None = None
+    """[m] h_0 along t2, likewise"""
     includes: Literal["surface", "bulk+surface"] | None = None
+    """which [compliance](contact.md) the stiffnesses count (bulk: the book's E A / l0)"""
     points: Annotated[tuple[Count, Count], BeforeValidator(_tuple)] | None = None
+    """how many along t1 and t2; four of Jenkins elements if not given"""
     patch: Literal["rigid", "nodal"] = "rigid"
+    """six coordinates, or points that move as the shapes of the bodies say"""
     curvature: Annotated[tuple[Radius, Radius], BeforeValidator(_tuple)] | None = None
+    """[m] relative radii along t1 and t2, inf where it is flat (a pin of radius r in a hole of
+    radius R: r R / (R - r))"""
     young: Positive | None = None
+    """[Pa] E of both bodies, for a curved patch, instead of the stiffnesses"""
     poisson: Annotated[Number, Field(gt=-1, le=0.5)] = 0.3
+    """nu of both bodies"""
     fit: Literal["approach", "width", "exact"] = "approach"
+    """in what the springs of a curved patch agree with Hertz; `exact`: his own law, of a line of
+    contact in pieces or of one round contact"""
     fitted_at: Positive | None = None
+    """[N] at which load; if not given the force that presses it: its own, or each of the sweep"""
     isotropic: bool = False
+    """geometric mean of both tangential stiffnesses of a curved patch, as the book's mode needs
+    it"""
     ground: GroundOfCase | None = None
 
     @property
@@ -248,16 +258,21 @@ class ContactSettings(ContactLaw):
 
 
 class Sweep(Model):
-    """Frequencies (Hz), linearly spaced, and the normal forces (N) to compare, or ``static``: the modal file's own.
-
-    They press every contact that has neither normal_force nor interference.
-    """
+    """Frequencies, and the normal forces to compare."""
 
     start: Positive
+    """[Hz] first frequency"""
     stop: Positive
+    """[Hz] last one"""
     points: Annotated[int, Field(ge=2, le=200000)] = 600
+    """equally spaced"""
     normal_forces: Literal["static"] | Numbers | None = None
+    """[N] to compare, in every contact that nothing else presses; `static`: of the body's
+    closures"""
     patience: NotNegative = 180.0
+    """[s] CPU time for each place where the sweep jumps or has no solution, of motions in time
+    (seven tenths of it), the curve about it and its stability; what compiles is not counted;
+    0: none of these"""
 
     @model_validator(mode="after")
     def _rising(self) -> Sweep:
@@ -269,10 +284,12 @@ class Sweep(Model):
 
 
 class MonitorOfCase(Model):
-    """A read-out: ``monitor`` or ``body:monitor``, and the direction of a displacement; or a strain gauge."""
+    """A read-out: a displacement, or a strain gauge."""
 
     monitor: Address
+    """of a body, `body:monitor` where there are several; all drawn, resonances of the first"""
     direction: Literal["x", "y", "z"] = "x"
+    """in body axes"""
 
 
 def _no_ratio(value: Any) -> Any:
@@ -282,49 +299,61 @@ def _no_ratio(value: Any) -> Any:
 
 
 class CaseSettings(OfFile):
-    """A whole case.toml.
-
-    body (with the speed, speed_rpm and modes of `BodyOfCase`), or [[bodies]]; excitation and amplitude, or
-    [[excitations]]; monitor and direction, or [[monitors]], all of which are drawn, and in the first of which
-    resonances are looked for. harmonics, ``auto`` for as many as an estimated harmonics_error (a share of the
-    amplitude, 0.5 at most) at the resonances asks for; samples (of a cycle, 16 a harmonic and 48 at least if not
-    given), cycles (marched at most until the sliders are periodic) and periodicity (within which share of the largest
-    force they count as periodic, 0: never): of contacts with a law. memory_limit: GiB that they may take by an estimate
-    before they begin, the machine's if not given. mode: ``aft``, their laws in time, or ``book`` (Sextro
-    5.2): one harmonic, constant normal force, elliptic orbits, from tables; strips: into which it cuts the
-    touching part of a rough surface, for microslip (5.2-33), 0 for none. damping: ``modal``, each body's own modes as
-    Sextro Eq. (2.4-13) has it; ``structural``, the bodies' ratios as loss factors, so that elastic deformation damps in
-    every motion; or ``stuck``, the modes with sticking contacts. Not given: modal for one body, structural for several.
-    damping_ratio: of the bodies that give none themselves, or of the stuck modes. material_limits: of the body whose
-    monitor is drawn, for the margins of its stresses.
-    """
+    """A whole case.toml."""
 
     _path: Path = PrivateAttr(default=Path("case.toml"))
 
     name: Name
+    """names the folder of the products, `build/NAME/`"""
     description: str = ""
+    """one line for the report"""
     body: BodyName | None = None
+    """the only body, short for one `[[bodies]]`"""
     bodies: Annotated[tuple[BodyOfCase, ...], BeforeValidator(_tuple)] = ()
     ring: RingSettings | None = None
     speed: Annotated[int, Field(ge=0)] = 0
+    """of the only body: which speed of its modal file, from 0"""
     speed_rpm: NotNegative | None = None
+    """[rpm] or a speed of the file or of its range"""
     modes: Annotated[int, Field(ge=1, le=2000)] | None = None
+    """how many of those that the modal file stores"""
     excitation: Address | None = None
+    """short for one `[[excitations]]`"""
     amplitude: Number = 1.0
+    """[N or Pa] of that excitation"""
     excitations: Annotated[tuple[ExcitationOfCase, ...], BeforeValidator(_tuple)] = ()
     monitor: Address | None = None
+    """short for one `[[monitors]]`"""
     direction: Literal["x", "y", "z"] = "x"
+    """of that monitor"""
     monitors: Annotated[tuple[MonitorOfCase, ...], BeforeValidator(_tuple)] = ()
     mode: Literal["aft", "book"] = "aft"
+    """laws marched in time, or the [book's contact](book_mode.md)"""
     strips: Annotated[int, Field(ge=0, le=1000)] = 0
+    """book's mode: into how many strips a patch's roughness makes microslip (5.2-33); 0: none"""
     damping: Annotated[Literal["modal", "structural", "stuck"] | None, BeforeValidator(_no_ratio)] = None
+    """[how the ratios are meant](excitation.md#damping): of each body's own modes (the book's),
+    as loss factors of the bodies, or of the modes with sticking contacts; if not given,
+    `modal` for one body, `structural` for several"""
     damping_ratio: Ratio | Ratios | None = None
+    """of the bodies that give none themselves, or of the stuck modes: one, or one a mode, the
+    last one for all that follow"""
     harmonics: Literal["auto"] | Annotated[int, Field(ge=1, le=200)] = 3
+    """H, besides the mean; `auto`: [as many as the error asks
+    for](harmonic_balance.md#what-is-followed-instead-of-swept)"""
     harmonics_error: Annotated[Positive, Field(le=0.5)] | None = None
+    """of `auto`: estimated error of the resonances that is allowed, a share of the amplitude;
+    0.01 if not given"""
     samples: Annotated[int, Field(ge=8, le=100000)] | None = None
+    """of a cycle; at least four a harmonic; sixteen a harmonic and 48 at least if not given"""
     cycles: Annotated[int, Field(ge=1, le=1000)] = 100
+    """marched at most until the sliders are periodic"""
     periodicity: Annotated[NotNegative, Field(le=1e-2)] = 1e-10
+    """share of the largest force within which they count as periodic; 0: all cycles are marched"""
     memory_limit: Positive | None = None
+    """[GiB] that the points of contact may take, by [an
+    estimate](harmonic_balance.md#what-it-costs) before they begin; that of the machine if not
+    given"""
     springs: Annotated[tuple[SpringOfCase, ...], BeforeValidator(_tuple)] = ()
     contacts: Annotated[tuple[ContactSettings, ...], BeforeValidator(_tuple)]
     sweep: Sweep

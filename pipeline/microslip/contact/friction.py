@@ -448,9 +448,14 @@ class FrictionKind(Kind):
     """
 
     heated: ClassVar[bool] = False
+    kind: str
+    """friction characteristic"""
     deviation: NotNegative = 0.0
+    """relative standard deviation in time"""
     memory: Positive = 1e-3
+    """[s] correlation exp(-t/memory)"""
     seed: Annotated[int, Field(ge=0, le=2**32 - 1)] = 0
+    """of the random numbers"""
 
     def friction(self, path: Path, heat: Temperature | None, area: float | None) -> Friction:
         """The characteristic.
@@ -471,6 +476,7 @@ class OfCoulomb(FrictionKind):
 
     kind: Literal["coulomb"]
     mu: Coefficient
+    """coefficient"""
 
     def mean(self, path: Path, heat: Temperature | None, area: float | None) -> Friction:
         return Coulomb(value(self.mu))
@@ -481,7 +487,9 @@ class OfStaticSliding(FrictionKind):
 
     kind: Literal["static-sliding"]
     static: Coefficient
+    """coefficient at rest"""
     sliding: Coefficient
+    """coefficient of sliding"""
 
     def mean(self, path: Path, heat: Temperature | None, area: float | None) -> Friction:
         return StaticSliding(value(self.static), value(self.sliding))
@@ -492,7 +500,9 @@ class OfFalling(FrictionKind):
 
     kind: Literal["falling"]
     mu_0: Coefficient
+    """coefficient at zero speed, cold"""
     p_v: NotNegative
+    """[s/m] of (3.6-15)"""
 
     def mean(self, path: Path, heat: Temperature | None, area: float | None) -> Friction:
         return Falling(value(self.mu_0), value(self.p_v))
@@ -503,8 +513,11 @@ class OfExponential(FrictionKind):
 
     kind: Literal["exponential"]
     mu_0: Coefficient
+    """coefficient at zero speed, cold"""
     mu_inf: Coefficient
+    """coefficient at high speed"""
     rate: NotNegative
+    """[s/m] lambda_e"""
 
     def mean(self, path: Path, heat: Temperature | None, area: float | None) -> Friction:
         return Exponential(value(self.mu_0), value(self.mu_inf), value(self.rate))
@@ -515,6 +528,7 @@ class OfHeated(FrictionKind):
 
     kind: Literal["heated"]
     mu_0: Coefficient
+    """coefficient at zero speed, cold"""
 
     heated: ClassVar[bool] = True
 
@@ -528,11 +542,17 @@ class OfTable(FrictionKind):
 
     kind: Literal["table"]
     file: FileName
+    """columns of speed in m/s (above 0, rising) and coefficient"""
     columns: Columns = (1, 2)
+    """counted from 1 or by name"""
     temperature: Positive = 293.15
+    """[K] at which it slides"""
     reference: Positive = 293.15
+    """[K] at which it was measured"""
     c_1: Number = 8.86
+    """of Williams, Landel and Ferry"""
     c_2: Positive = 101.6
+    """[K] likewise"""
 
     def mean(self, path: Path, heat: Temperature | None, area: float | None) -> Friction:
         file = beside(path, self.file)
@@ -548,4 +568,6 @@ class OfLubricated(OfHeated):
     kind: Literal["lubricated"]  # type: ignore[assignment]
     mu_0: Annotated[Coefficient, Field(gt=0)]
     viscosity: NotNegative
+    """[Pa s] of the fluid"""
     film: Annotated[Number, Field(gt=0, lt=1)] = 0.01
+    """smallest film over R_Z; the fluid part has no value without"""

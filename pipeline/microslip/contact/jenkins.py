@@ -111,6 +111,7 @@ class OfJenkins(LawKind):
 
     kind: Literal["jenkins"]
     slides_along: Literal["t1", "t2"] = "t1"
+    """the tangent with the slider"""
 
     opens: ClassVar[bool] = False
     of_the_force: ClassVar[bool] = True

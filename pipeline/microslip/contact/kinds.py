@@ -75,6 +75,8 @@ class LawKind(Kind):
             has no stiffness at all.
     """
 
+    kind: str
+    """what sticks, slips and opens"""
     partly: ClassVar[bool] = False
     opens: ClassVar[bool] = True
     of_the_force: ClassVar[bool] = False

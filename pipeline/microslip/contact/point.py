@@ -533,6 +533,7 @@ class OwnNormal(LawKind):
     """A law that may have a normal law of its own."""
 
     length: PositiveLength | None = None
+    """l_0: the hyperbolic law of a short layer (3.4)"""
 
     def fits(self, contact: ContactLaw) -> None:
         if self.length is not None and contact.roughness is None:
@@ -550,7 +551,9 @@ class OfPoint(OwnNormal):
 
     kind: Literal["smooth", "rough"]
     damping: NotNegative = 0.0
+    """[s] beta: force per rate of the springs (3.7-18)"""
     preload: Positive | None = None
+    """[N] a constant normal force in place of a normal law"""
 
     def fits(self, contact: ContactLaw) -> None:
         super().fits(contact)

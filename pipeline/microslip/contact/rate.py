@@ -110,7 +110,9 @@ class OfRate(OwnNormal):
 
     kind: Literal["rate"]
     slope: Positive
+    """[s/m] k_S of the smoothed friction (3.7-43)"""
     damping: NotNegative = 0.0
+    """[s] beta: force per rate of the springs (3.7-18)"""
 
     def law(self, contact: ContactModel) -> Law:
         return RateContact(contact.normal, contact.sliding, value(self.slope), value(self.damping))

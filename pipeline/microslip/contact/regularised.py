@@ -342,9 +342,13 @@ class WithMass(OwnNormal):
 
     kind: Literal["with-mass"]
     mass: Positive
+    """[kg] m_D, reduced mass of the full area"""
     slope: Positive
+    """[s/m] k_S of the smoothed friction (3.7-43)"""
     damping: NotNegative = 0.0
+    """[s] beta: force per rate of the springs (3.7-18)"""
     printed: bool = False
+    """the book's stretch of the springs, which may give energy"""
 
     def law(self, contact: ContactModel) -> Law:
         mass, damping, slope = map(value, (self.mass, self.damping, self.slope))

@@ -23,7 +23,10 @@ from .topography import UNITS
 class Roughness(Kind):
     """A distribution of heights, of the first surface and of the other one if that is rough too."""
 
+    kind: str
+    """cumulative height distribution; without [roughness] the faces are smooth"""
     R_Z_other: NotNegativeLength = 0.0
+    """of the other face, with the polynomial's heights; the two are combined (3.3-10)"""
 
     def heights(self, path: Path, unit: float) -> tuple[Heights, float]:
         """The distribution and R_Z in m.
@@ -46,6 +49,7 @@ class Shape(Roughness):
 
     kind: Literal["polynomial", "linear"]
     R_Z: PositiveLength
+    """highest peak to deepest valley of the heights"""
 
     def own(self, path: Path, unit: float) -> tuple[Heights, float]:
         return (Polynomial() if self.kind == "polynomial" else Linear()), self.R_Z
@@ -56,7 +60,9 @@ class ExponentialHeights(Roughness):
 
     kind: Literal["exponential"]
     R_Z: PositiveLength
+    """highest peak to deepest valley of the heights"""
     rate: Positive = 4.0
+    """R_Z/sigma_S"""
 
     def own(self, path: Path, unit: float) -> tuple[Heights, float]:
         return Cut(Exponential(value(self.rate))), self.R_Z
@@ -67,8 +73,11 @@ class GaussianHeights(Roughness):
 
     kind: Literal["gaussian"]
     R_Z: PositiveLength
+    """highest peak to deepest valley of the heights"""
     mean: Positive = 0.5
+    """over R_Z, below the highest peak"""
     deviation: Positive = 20**-0.5
+    """over R_Z"""
 
     def own(self, path: Path, unit: float) -> tuple[Heights, float]:
         return Cut(Gaussian(value(self.mean), value(self.deviation))), self.R_Z
@@ -79,10 +88,15 @@ class TableHeights(Roughness):
 
     kind: Literal["table"]
     R_Z: PositiveLength | None = None
+    """highest peak to deepest valley of the heights; the deepest depth if not given"""
     depth: Lengths = ()
+    """below the highest peak, rising from 0"""
     share: Numbers = ()
+    """of the area that lies higher, from 0 to 1"""
     file: str | None = None
+    """columns of both, depth in length_unit, instead"""
     columns: Columns = (1, 2)
+    """counted from 1 or by name"""
 
     @model_validator(mode="after")
     def _one_way(self) -> TableHeights:
@@ -116,10 +130,15 @@ class ProfileHeights(Roughness):
 
     kind: Literal["profile"]
     file: FileName
+    """columns of way and height, or of an instrument"""
     unit: Literal[tuple(UNITS)] = "um"  # type: ignore[valid-type]
+    """of the heights in the profile"""
     way_unit: Literal[tuple(UNITS)] | None = None  # type: ignore[valid-type]
+    """of the way; that of the heights if not given"""
     columns: Columns = (1, 2)
+    """counted from 1 or by name"""
     level: Annotated[int, Field(ge=0, le=10)] | Literal["none"] = 1
+    """order of the polynomial that is taken off the profile, or none"""
 
     def own(self, path: Path, unit: float) -> tuple[Heights, float]:
         file = beside(path, self.file)

@@ -73,6 +73,7 @@ class OfSetValued(LawKind):
 
     kind: Literal["set-valued"]
     restitution: Annotated[Number, Field(ge=0, le=1)] = 0.0
+    """e of an impact between masses"""
 
     rigid: ClassVar[bool] = True
 

@@ -64,14 +64,23 @@ class Motion(Model):
     """How the contact moves: u_n > 0 closes. Each row is mean, cos, sin, cos 2, sin 2, ... of the frequency."""
 
     frequency: Positive
+    """[Hz] of the first harmonic"""
     normal: Lengths = (0.0,)
+    """u_n, positive closes: mean, cos, sin, cos 2, sin 2, ..."""
     t1: Lengths = (0.0,)
+    """u_t1, likewise"""
     t2: Lengths = (0.0,)
+    """u_t2, likewise"""
     normal_force: Positive | None = None
+    """[N] static; instead of the mean of `normal`"""
     drift: Number = 0.0
+    """[m/s] constant speed along t1 besides"""
     cycles: Annotated[int, Field(ge=1, le=1000)] = 3
+    """how many; the last one is drawn"""
     samples: Annotated[int, Field(ge=16, le=100000)] = 512
+    """of a cycle"""
     amplitudes: PositiveLengths = ()
+    """of the hysteresis loops along t1; about the slip limit if not given"""
 
     @model_validator(mode="after")
     def _rows(self) -> Motion:
@@ -89,18 +98,26 @@ class Temperature(Model):
     """Heat of sliding (3.6-3, 3.6-5, 3.8-4)."""
 
     resistance: NotNegative
+    """[K m2/W] k_T: rise of temperature over heat flow"""
     limit: Positive
+    """[K] dT_E: rise at which friction and shear strength would be gone"""
 
 
 class Microslip(Model):
     """First loading with shear strength and heating (3.8): tangential force over displacement."""
 
     mu: Annotated[Coefficient, Field(gt=0)] | None = None
+    """friction coefficient, cold; that of [friction] if not given"""
     speed: NotNegative = 0.0
+    """[m/s] of loading, for the heat"""
     yield_shear: Positive | None = None
+    """[Pa] tau_S0, shear strength, cold"""
     approaches: PositiveLengths = ()
+    """one curve each"""
     normal_forces: Positives = ()
+    """[N] one curve each; instead of approaches"""
     displacement: PositiveLength | None = None
+    """up to which it is drawn"""
 
     @model_validator(mode="after")
     def _pressed(self) -> Microslip:
@@ -113,13 +130,21 @@ class Wear(Model):
     """Wear at a constant normal force (3.9): exactly one of coefficient, archard (with hardness), energy_density."""
 
     normal_force: Positive
+    """[N] constant"""
     speed: Positive
+    """[m/s] of sliding"""
     time: Positive
+    """[s] of sliding"""
     mu: Annotated[Coefficient, Field(gt=0)] | None = None
+    """friction coefficient; that of [friction] at the speed if not given"""
     coefficient: Positive | None = None
+    """[m3/J] I_W: worn volume over frictional work"""
     archard: Positive | None = None
+    """K: worn volume = K force way/hardness"""
     hardness: Positive | None = None
+    """[Pa] of the softer body"""
     energy_density: Positive | None = None
+    """[J/m3] Fleischer's: frictional work over worn volume"""
 
     @model_validator(mode="after")
     def _one_way(self) -> Wear:
@@ -133,8 +158,11 @@ class Limits(Model):
     """What the contact is held against: yield by Tresca (3.1-31), and the frequency of the motion (3.2-31)."""
 
     yield_shear: Positive | None = None
+    """[Pa] tau_S, yield stress in shear: half of that in tension"""
     tolerance: Positive = 0.01
+    """error of the static stiffness that is allowed (3.2-31)"""
     boundary: Boundary = "stress-free"
+    """what holds the sides, for the yield check where the stiffness is not a layer's"""
 
 
 def _short(kind: str, key: str, tables: Any) -> BeforeValidator:
@@ -162,18 +190,26 @@ def _named(value: Any) -> Any:
 class ContactLaw(Model):
     """What a contact is, wherever it stands: the same keys in contact.toml and in a contact of case.toml.
 
-    stiffness: a table of one of its kinds; or normal_stiffness and tangential_stiffness, N/m of the full area.
-    roughness: a table, or a number, R_Z of polynomial heights. friction: a table, or a number, Coulomb's coefficient.
-    law: a table of one of its kinds, or its name; if not given ``rough`` with roughness, ``smooth`` without.
+    A number stands for a table: R_Z of polynomial heights, Coulomb's coefficient; so does the name
+    of a law.
     """
 
     stiffness: AnyStiffness | None = None
+    """as in a [contact.toml](contact_toml.md), lengths in m, instead of the two below"""
     normal_stiffness: Positive | None = None
+    """[N/m] c_N0 of the whole patch, short for stiffness of kind given; **required** where nothing
+    else says it"""
     tangential_stiffness: Positive | None = None
+    """[N/m] c_R0, likewise"""
     roughness: Annotated[AnyRoughness | None, _short("polynomial", "R_Z", AnyRoughness)] = None
+    """[length_unit] R_Z, or a table as in a contact.toml"""
     friction: Annotated[AnyFriction | None, _short("coulomb", "mu", AnyFriction)] = None
+    """coefficient, or a table as in a contact.toml; **required** without file"""
     law: Annotated[AnyLaw | None, BeforeValidator(_named, json_schema_input_type=str | AnyLaw)] = None
+    """name or table of a law, as in a contact.toml, also of [another package](own_law.md);
+    `rough` with roughness, `smooth` without if not given"""
     temperature: Temperature | None = None
+    """heat of sliding, as in a [contact.toml](contact_toml.md)"""
 
     @property
     def is_pressed(self) -> bool:
@@ -251,8 +287,11 @@ class ContactFile(ContactLaw):
     """A whole contact.toml."""
 
     name: Name
+    """names the folder of the products, `build/NAME/`"""
     description: str = ""
+    """one line for the report"""
     length_unit: Literal["m", "cm", "mm", "um", "in", "ft"] = "m"
+    """unit of every length in this file; areas are its square"""
     motion: Motion | None = None
     microslip: Microslip | None = None
     wear: Wear | None = None

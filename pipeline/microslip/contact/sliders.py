@@ -448,6 +448,7 @@ class OfStrips(_Parallel):
 
     kind: Literal["strips"]
     count: Annotated[int, Field(ge=2, le=500)] = 32
+    """of strips"""
 
     def fits(self, contact: ContactLaw) -> None:
         super().fits(contact)
@@ -466,9 +467,13 @@ class OfIwan(_Parallel):
 
     kind: Literal["iwan"]
     count: Annotated[int, Field(ge=2, le=500)] = 32
+    """of sliders"""
     weakest: Annotated[Number, Field(ge=0, lt=1)] = 0.0
+    """strength of the weakest slider over that of the strongest"""
     exponent: Annotated[Number, Field(gt=-1, le=0)] | None = None
+    """chi of Segalman's distribution"""
     ratio: NotNegative = 0.0
+    """beta: stiffness of its last slider over that of all others"""
 
     def law(self, contact: ContactModel) -> Law:
         shares = uniform(self.count, self.weakest)
@@ -482,6 +487,7 @@ class OfMindlin(_Parallel):
 
     kind: Literal["mindlin"]
     count: Annotated[int, Field(ge=2, le=500)] = 32
+    """of sliders"""
 
     def fits(self, contact: ContactLaw) -> None:
         super().fits(contact)

@@ -51,6 +51,8 @@ class Stiffness(Kind):
     """
 
     is_law: ClassVar[bool] = False
+    kind: str
+    """its [source](contact_stiffness.md)"""
 
     def source(self, path: Path) -> Source:
         """What the contact file at a path makes of it.
@@ -66,9 +68,13 @@ class Given(Stiffness):
 
     kind: Literal["given"]
     normal: Positive
+    """[N/m] c_N0"""
     tangential: OneOrTwo | None = None
+    """[N/m] c_R0; or two, along t1 and t2"""
     area: Positive | None = None
+    """[length_unit²] A_0, nominal area; needed for yield, heat, microslip and wear"""
     includes: Literal["surface", "bulk", "bulk+surface"] = "bulk"
+    """which compliance the numbers count"""
 
     def source(self, path: Path) -> Source:
         law = Penalty(value(self.normal))
@@ -80,12 +86,19 @@ class OfLayer(Stiffness):
 
     kind: Literal["layer"]
     young: Positive
+    """[Pa] E"""
     poisson: Poisson
+    """nu"""
     shear: Positive | None = None
+    """[Pa] G, if it is not E/2(1 + nu)"""
     thickness: PositiveLength
+    """l_0, depth of the layer"""
     area: Positive
+    """[length_unit²] A_0, nominal area; needed for yield, heat, microslip and wear"""
     boundary: Boundary = "stress-free"
+    """what holds the sides of the layer (3.1)"""
     density: Positive | None = None
+    """[kg/m3] for the limit of application"""
 
     def source(self, path: Path) -> Source:
         layer = Layer(Solid(self.young, self.poisson, self.shear), self.thickness, self.boundary, self.density)
@@ -98,13 +111,21 @@ class OfHertz(Stiffness):
 
     kind: Literal["hertz"]
     young: Positive
+    """[Pa] E, of the first body"""
     poisson: Poisson
+    """nu"""
     radii: Radii
+    """principal radii of the first body: inf is flat, negative is hollow"""
     young_2: Positive | None = None
+    """[Pa] of the second body; the first one's if not given"""
     poisson_2: Poisson | None = None
+    """nu, likewise"""
     radii_2: Radii = (math.inf, math.inf)
+    """of the second body"""
     angle: Number = 0.0
+    """[rad] of the second body's first axis from the first one's"""
     axis: Literal[0, 1] = 0
+    """of the ellipse, 0 or 1, that t1 lies along"""
 
     is_law: ClassVar[bool] = True
 
@@ -126,14 +147,23 @@ class OfCurve(Stiffness):
 
     kind: Literal["curve"]
     file: FileName
+    """columns of the curve, sought beside this file"""
     tangential: OneOrTwo | None = None
+    """[N/m] c_R0; or two, along t1 and t2"""
     columns: Columns = (1, 2)
+    """of displacement and force, counted from 1 or by name"""
     displacement_unit: Literal[tuple(LENGTHS)] = "um"  # type: ignore[valid-type]
+    """in the curve's file"""
     force_unit: Literal[tuple(FORCES)] = "N"  # type: ignore[valid-type]
+    """in the curve's file"""
     gap: bool = False
+    """the displacement of the file opens the contact"""
     noise: NotNegative = 0.0
+    """[N] by which the force may fall between neighbours; evened then"""
     area: Positive | None = None
+    """[length_unit²] A_0, nominal area; needed for yield, heat, microslip and wear"""
     includes: Literal["surface", "bulk", "bulk+surface"] = "bulk+surface"
+    """which compliance the numbers count"""
 
     is_law: ClassVar[bool] = True
 
@@ -150,8 +180,11 @@ class OfBasis(Stiffness):
 
     kind: Literal["basis"]
     file: FileName
+    """a modal file, sought beside this one"""
     interface: Name
+    """name of the contact in the modal file"""
     facing: Name | None = None
+    """the other contact of the same body that is closed at the same time"""
 
     def source(self, path: Path) -> Source:
         basis = read_basis(beside(path, self.file))

@@ -13,7 +13,7 @@ from ..contact.patch import Patch
 from ..continuation import SEARCH
 from ..continuation import peak as climbed
 from ..data import Array, ComplexArray, Compliance, ModalGroup, Rows
-from ..results.checks import UNCHECKED, Checks, exchanged
+from ..results.checks import BALANCE, EXCHANGED, UNCHECKED, Checks, exchanged
 from ..results.series import of_solutions, without_rounding
 from ..system.assembly import Assembly, ContactFace, Load, Output, preloaded_contact
 from ..system.component import Component
@@ -31,6 +31,11 @@ from .solver import newton as newton
 from .sweeps import FrequencyResponse, brackets, ends, inside, resonances, still
 
 
+ROUNDED = 1e-14
+"""Of the energy that the loads would exchange without what the contacts take off the motion, rounding leaves this:
+a stop of 1e12 N/m that a steady force keeps closed takes all but a millionth of it off, and is lossless."""
+
+
 @dataclass(frozen=True)
 class Operating:
     """A periodic motion of an assembly.
@@ -39,8 +44,9 @@ class Operating:
         Omega: rad/s. q: component -> (H + 1) arrays (m,) of complex amplitudes of its coordinates; the first one is the
             mean from the preloaded state. outputs: (w, H + 1) read-outs, m. relative: contact -> (k, W) displacement as
             the law measures it. force: contact -> (k, W) forces, N and N m. supplied, damped: J per cycle.
-        exchanged: J that loads and contacts would do and take were they in phase with the speed. kinetic: J, the
-            largest kinetic energy of every harmonic by itself, added up.
+        exchanged: J that loads and contacts would do and take were they in phase with the speed; not less than what
+            the rounding of the motions they are differences of would need. kinetic: J, the largest kinetic energy of
+            every harmonic by itself, added up.
         cycles: contact -> what its points do. checks: of all this.
     """
 
@@ -66,7 +72,8 @@ def operating(problem: Problem, point: Point) -> Operating:
     cycles = [g.point_cycles(u, at.period) for g, u in zip(p.groups, relative, strict=True)]
     beyond = at.along(forces)
     q, f = at.modal(point.x, beyond), at.amplitudes(beyond)
-    outputs, work = np.zeros((len(p.assembly.outputs), p.harmonics + 1), complex), np.zeros(4)
+    alone = at.coordinates(0 * beyond, p.share)
+    outputs, work, driven = np.zeros((len(p.assembly.outputs), p.harmonics + 1), complex), np.zeros(4), 0.0
     for hs in p.waves:
         for i, s in enumerate(p.slices):
             parts, own, F = [p.parts[h][i] for h in hs], np.array([q[h][i] for h in hs]), f[hs, s]
@@ -74,6 +81,7 @@ def operating(problem: Problem, point: Point) -> Operating:
             outputs[:, hs] += reduced.read(parts, own, F, share)
             if hs[0]:
                 work += reduced.work(parts, at.Omega, hs, own, F, share)
+                driven += reduced.work(parts, at.Omega, hs, np.array([alone[h][i] for h in hs]), 0 * F, share)[2]
     found = Operating(
         at.Omega,
         {m.name: [_own(p, i, h, q[h]) for h in range(p.harmonics + 1)] for i, m in enumerate(p.assembly.components)},
@@ -82,7 +90,8 @@ def operating(problem: Problem, point: Point) -> Operating:
         _by_contact(p, forces),
         float(work[0]),
         float(work[1]),
-        float(work[2]) + sum(float(exchanged(F, u).sum()) for F, u in zip(forces, relative, strict=True)),
+        max(float(work[2]) + sum(float(exchanged(F, u).sum()) for F, u in zip(forces, relative, strict=True)),
+            ROUNDED / EXCHANGED / BALANCE * float(driven)),
         float(work[3]),
         _by_contact(p, cycles),
     )

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from ..data import Indices
+from ..errors import of_file
 from ..files.store import ordinary
 from .raw import Damaged
 
@@ -19,14 +20,15 @@ class Card:
     """A keyword line and its data.
 
     Attributes:
-        keyword: in capitals, without the star. parameters: in capitals -> as written. lines: of data, without
-            comments. where: ``part.inp, line 12``.
+        keyword: in capitals, without the star. parameters: in capitals -> as written, INPUT a path.
+            lines: of data, without comments. where: ``part.inp, line 12``. place: with its path.
     """
 
     keyword: str
     parameters: dict[str, str] = field(default_factory=dict)
     lines: list[str] = field(default_factory=list)
     where: str = ""
+    place: str = ""
 
 
 def read_cards(path: Path) -> list[Card]:
@@ -35,57 +37,44 @@ def read_cards(path: Path) -> list[Card]:
     Raises:
         Damaged: an included file that cannot be read or includes itself.
     """
-    found: list[Card] = []
-    for where, line in _lines(path, (), path.parent):
+    found, files = list[Card](), list[Path]()
+    for file, number, line in _lines(path, (), path.parent):
         if line.startswith("*"):
-            if found:
-                _end(found[-1])
-            found.append(Card(line, where=where))
+            where = f", line {number}"
+            found.append(Card(line, where=file.name + where, place=f"{file}{where}"))
+            files.append(file)
         elif found and not found[-1].lines and found[-1].keyword.endswith(","):
             found[-1].keyword += line
         elif found:
             found[-1].lines.append(line)
-    if found:
-        _end(found[-1])
+    for card, file in zip(found, files, strict=True):
+        head = card.keyword
+        card.keyword, card.parameters = keyword(head), parameters(head)
+        if target := card.parameters.get("INPUT"):
+            card.parameters["INPUT"] = str(beside(file, target, path.parent))
     return found
 
 
-def _end(card: Card) -> None:
-    """A keyword line is whole: take it apart."""
-    head = card.keyword
-    card.keyword, card.parameters = keyword(head), parameters(head)
-
-
-def _lines(path: Path, within: tuple[Path, ...], home: Path) -> Iterator[tuple[str, str]]:
-    """Place and text of every line but comments and empty ones; data lines have no place."""
+def _lines(path: Path, within: tuple[Path, ...], home: Path) -> Iterator[tuple[Path, int, str]]:
+    """File, number and text of every line but comments and empty ones."""
     if path.resolve() in within:
         raise Damaged(f"the file includes itself by way of {path.name}")
     try:
         text = ordinary(path).read_text(encoding="utf-8", errors="replace")
     except OSError as error:
         raise Damaged(f"the included file {path} cannot be read ({error.strerror})") from None
-    name = f"{path.name}, "
     for number, line in enumerate(text.splitlines(), 1):
         line = line.strip()
-        if not line.startswith("*"):
-            if line:
-                yield "", line
-        elif line.startswith("**"):
+        if not line or line.startswith("**"):
             continue
-        elif re.match(r"\*INCLUDE\b", line, re.IGNORECASE):
-            yield from _included(path, line, f"{name}line {number}", within, home)
-        else:
-            yield f"{name}line {number}", line
-
-
-def _included(path: Path, line: str, where: str, within: tuple[Path, ...], home: Path) -> Iterator[tuple[str, str]]:
-    target = parameters(line).get("INPUT", "")
-    if not target:
-        raise Damaged(f"{where}: an *INCLUDE names no file")
-    try:
-        yield from _lines(beside(path, target, home), (*within, path.resolve()), home)
-    except Damaged as error:
-        raise Damaged(str(error) if re.match(r"[^,]+, line \d", str(error)) else f"{where}: {error}") from None
+        if not re.match(r"\*INCLUDE\b", line, re.IGNORECASE):
+            yield path, number, line
+            continue
+        with of_file(f"{path}, line {number}"):
+            target = parameters(line).get("INPUT", "")
+            if not target:
+                raise Damaged("an *INCLUDE names no file")
+            yield from _lines(beside(path, target, home), (*within, path.resolve()), home)
 
 
 def beside(path: Path, target: str, home: Path) -> Path:
@@ -94,9 +83,9 @@ def beside(path: Path, target: str, home: Path) -> Path:
     return near if near.is_file() or not (home / target).is_file() else home / target
 
 
-def data_of(path: Path, target: str) -> list[str]:
+def data_of(path: Path) -> list[str]:
     """Data lines of a file that a keyword's INPUT names."""
-    return [line for _, line in _lines(beside(path, target, path.parent), (path.resolve(),), path.parent)]
+    return [line for *_, line in _lines(path, (), path.parent)]
 
 
 def files_of(path: Path, within: tuple[Path, ...] = (), home: Path | None = None) -> list[Path]:

@@ -18,6 +18,7 @@ import numpy as np
 
 from ..data import Array, Equation, Link, RigidLink
 from ..elasticity import turned_strain
+from ..errors import of_file
 from .materials import isotropic_rows, orthotropic_row
 from .raw import (
     PRESTRESSED,
@@ -98,14 +99,12 @@ def read_cdb(path: Path) -> RawMesh:
         words = [word.strip() for word in lines[at].split("!")[0].split(",")]
         command = words[0].upper()
         archive.where = f"{path.name}, line {at + 1}"
-        if command in _BLOCKS:
-            at = _BLOCKS[command](archive, words, lines, at + 1)
-            continue
-        try:
+        with of_file(f"{path}, line {at + 1}"):
+            if command in _BLOCKS:
+                at = _BLOCKS[command](archive, words, lines, at + 1)
+                continue
             if command in _COMMANDS:
                 _COMMANDS[command](archive, words)
-        except Damaged as error:
-            raise Damaged(f"{archive.where}: {error}") from None
         if command in _NOT_READ:
             archive.lost.append(lost(archive.where, command))
         elif re.fullmatch(_LOADS, command):
@@ -169,11 +168,7 @@ def _read_nodes(archive: _Archive, words: list[str], lines: list[str], at: int) 
 
 def _read_elements(archive: _Archive, words: list[str], lines: list[str], at: int) -> int:
     if "COMPACT" in (word.upper() for word in words):
-        raise Damaged(
-            f"{archive.where}: EBLOCK is in the COMPACT form, which is not read; write the archive "
-            "again with "
-            "EBLOCK,19,SOLID (CDWRITE)"
-        )
+        raise Damaged("EBLOCK is in the COMPACT form; write the archive with EBLOCK,19,SOLID (CDWRITE)")
     fields = _widths(lines, at, "EBLOCK")
     solid = len(words) > 2 and words[2].upper() == "SOLID"
     announced = _whole(words[4], "EBLOCK") if solid and len(words) > 4 and words[4] else 0
@@ -377,9 +372,7 @@ def _read_displacement(archive: _Archive, words: list[str]) -> None:
     named = {name.upper(): name for name in archive.components}
     component = named.get(archive.selected if where.upper() == "ALL" else where.upper())
     if value.startswith("%"):
-        archive.held.left_out.append(
-            f"D,{where},{label} takes its displacement from the table {value}"
-        )
+        archive.held.left_out.append(f"D,{where},{label} takes its displacement from the table {value}")
     elif value and real(value, "D") != 0:
         archive.held.left_out.append(f"D,{where},{label} prescribes a displacement")
     elif component is not None:

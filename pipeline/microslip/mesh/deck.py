@@ -53,7 +53,7 @@ class Deck:
     Attributes:
         spaces: instance in capitals -> its place; "" is the assembly's own (or the whole of a flat file).
         links: constraints, contacts and loads, each with the instance it stands in, resolved at the end.
-        kinds: types of cells. where: place of the card that is read. lost: what counts and is not read, in words.
+        kinds: types of cells. card: that is read. lost: what counts and is not read, in words.
         system: (4, 3) axes and origin in which nodes are written, or None. ignored: keywords that are not used.
     """
 
@@ -65,14 +65,14 @@ class Deck:
     written: dict[str, str] = field(default_factory=dict)
     node_sets: dict[str, list[Indices]] = field(default_factory=dict)
     cell_sets: dict[str, list[Indices]] = field(default_factory=dict)
-    surfaces: list[tuple[str, str, list[list[str]], str, str]] = field(default_factory=list)
+    surfaces: list[tuple[str, str, list[list[str]], str, Card]] = field(default_factory=list)
     materials: dict[str, DeckConstants] = field(default_factory=dict)
     current: str = ""
     orientations: dict[str, Array | str] = field(default_factory=dict)
     sections: list[tuple[str, str, str, str, str]] = field(default_factory=list)
     temperatures: list[tuple[int, str, float]] = field(default_factory=list)
     held: list[tuple[str, str, str]] = field(default_factory=list)
-    where: str = ""
+    card: Card = field(default_factory=lambda: Card(""))
     not_held: list[str] = field(default_factory=list)
     step: int = 0
     renewed: int = -1

@@ -27,7 +27,7 @@ def _read_boundary(deck: Deck, parameters: dict[str, str], lines: list[str]) -> 
         words = [word.strip() for word in line.split(",")] + 3 * [""]
         try:
             directions = _HELD.get(words[1].upper()) or _zeros(words)
-            deck.held.append((words[0].strip('"'), directions, deck.where))
+            deck.held.append((words[0].strip('"'), directions, deck.card.place))
         except ValueError:
             deck.not_held.append(f"the line '{line[:60]}' of *BOUNDARY")
 
@@ -69,7 +69,7 @@ def _read_initial(deck: Deck, parameters: dict[str, str], lines: list[str]) -> N
     if parameters.get("TYPE", "").upper() == "TEMPERATURE":
         _read_temperature(deck, parameters, lines, column=0)
     elif parameters.get("TYPE", "").upper() in ("STRESS", "PLASTIC STRAIN"):
-        deck.lost.append(lost(deck.where, f"*INITIAL CONDITIONS, TYPE={parameters['TYPE'].upper()}"))
+        deck.lost.append(lost(deck.card.where, f"*INITIAL CONDITIONS, TYPE={parameters['TYPE'].upper()}"))
     else:
         deck.ignored.append(f"INITIAL CONDITIONS, TYPE={parameters.get('TYPE', '').upper()}")
 
@@ -90,12 +90,13 @@ def constraints(deck: Deck) -> Constraints:
     """What *BOUNDARY holds, its sets by the names they were written with."""
     held = Constraints(all_turned=deck.turned, left_out=list(deck.not_held))
     known = set(joined(deck.node_id).tolist())
-    for word, directions, where in deck.held:
+    for word, directions, place in deck.held:
         key, found = deck.key(deck.node_sets, word), deck.nodes(word)
         if found is None:
-            raise Damaged(f"{where}: *BOUNDARY names the node set '{word}', which is not defined")
+            text = f"*BOUNDARY names the node set '{word}', which is not defined"
+            raise Damaged(text, file=place)
         if key is None and not known.issuperset(found.tolist()):
-            raise Damaged(f"{where}: *BOUNDARY names the node {word}, which is not defined")
+            raise Damaged(f"*BOUNDARY names the node {word}, which is not defined", file=place)
         if key is not None:
             held.hold(deck.written[key], directions)
         else:

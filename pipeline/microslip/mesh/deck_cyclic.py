@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from ..data import Sector
+from ..errors import of_file
 from .cards import Card, numbers
 from .deck import Deck
 from .raw import Damaged, is_number, lost
@@ -28,15 +29,14 @@ def sector_of(deck: Deck) -> tuple[Sector | None, list[str]]:
     chosen = [tie for tie in ties if named in ("", tie[0].parameters.get("NAME", "").upper())]
     sectors, ends = model.parameters.get("N", ""), [v for row in _points(model) for v in row]
     if not is_number(sectors) or len(ends) != 6 or len(chosen) != 1:
-        raise Damaged(
-            f"{model.where}: *{MODEL} needs N, two points of its axis (six numbers) and the TIE of "
-            "its faces"
-        )
+        text = f"*{MODEL} needs N, two points of its axis (six numbers) and the TIE of its faces"
+        raise Damaged(text, file=model.place)
     tie, space = chosen[0]
     known = {name.upper(): name for name, *_ in deck.surfaces}
     keys = [deck.key(known, word, space) for line in tie.lines for word in line.split(",")[:2]]
     if len(keys) != 2 or None in keys:
-        raise Damaged(f"{tie.where}: *TIE, CYCLIC SYMMETRY names no two surfaces of the file")
+        text = "*TIE, CYCLIC SYMMETRY names no two surfaces of the file"
+        raise Damaged(text, file=tie.place)
     one, other = (known[str(key)] for key in keys)
     axis = [b - a for a, b in zip(ends[:3], ends[3:], strict=True)]
     picked = next((card.parameters for card in cards if card.keyword == CHOSEN), {})
@@ -53,7 +53,5 @@ def _cuts(card: Card) -> bool:
 
 def _points(model: Card) -> list[list[float]]:
     """Numbers of the data lines of the model."""
-    try:
+    with of_file(model.place):
         return numbers(model.lines, f"*{MODEL}")
-    except Damaged as error:
-        raise Damaged(f"{model.where}: {error}") from None

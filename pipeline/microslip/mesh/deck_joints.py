@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from ..data import Joint
+from ..errors import of_file
 from .cards import fields
 from .deck import Deck
 from .raw import Damaged, real
@@ -21,11 +22,11 @@ def joints_of(deck: Deck) -> list[Joint]:
         if card.keyword == "SURFACE INTERACTION":
             current = card.parameters.get("NAME", "").upper()
         elif card.keyword == "FRICTION" and card.lines:
-            value = real(card.lines[0].split(",")[0], f"{card.where}: *{card.keyword}")
-            if not 0 <= value < float("inf"):
-                raise Damaged(
-                    f"{card.where}: *FRICTION has the coefficient {value:g}; write one of 0 or more"
-                )
+            with of_file(card.place):
+                value = real(card.lines[0].split(",")[0], f"*{card.keyword}")
+                if not 0 <= value < float("inf"):
+                    text = f"*FRICTION has the coefficient {value:g}; write one of 0 or more"
+                    raise Damaged(text)
             friction[current] = value
     known = {name.upper(): name for name, *_ in deck.surfaces}
     laws = {card.parameters.get("NAME", "").upper() for card, _ in deck.links if card.keyword == "SURFACE INTERACTION"}
@@ -35,34 +36,27 @@ def joints_of(deck: Deck) -> list[Joint]:
             words = fields(line)[:2]
             keys = [deck.key(known, word, space) for word in words]
             if len(words) < 2 or None in keys:
-                raise Damaged(
-                    f"{card.where}: *CONTACT PAIR names '{line[:60]}', which are not two surfaces of the file"
-                )
+                text = f"*CONTACT PAIR names '{line[:60]}', which are not two surfaces of the file"
+                raise Damaged(text, file=card.place)
             law = card.parameters.get("INTERACTION", "").upper()
             if law and law not in laws:
-                raise Damaged(f"{card.where}: *CONTACT PAIR names the interaction '{law}', which is not defined")
+                text = f"*CONTACT PAIR names the interaction '{law}', which is not defined"
+                raise Damaged(text, file=card.place)
             mu = friction.get(law)
             found.append(Joint(f"{card.where}: *CONTACT PAIR", known[str(keys[0])], known[str(keys[1])], mu))
     return found
 
 
 def unread(deck: Deck) -> list[str]:
-    """What is said of contacts whose law is more than a coefficient of friction, or that are tied.
-    """
+    """What is said of contacts whose law is more than one coefficient, or that are tied."""
     said = []
     for card, _ in deck.links:
         if card.keyword == "FRICTION" and (card.parameters or len(card.lines) > 1):
             said.append(f"{card.where}: of *FRICTION only the first coefficient is read")
         if card.keyword == "SURFACE BEHAVIOR":
-            said.append(
-                f"{card.where}: *SURFACE BEHAVIOR is not read: a case guesses the stiffness by the "
-                "area"
-            )
+            said.append(f"{card.where}: *SURFACE BEHAVIOR is not read: a case guesses the stiffness by the area")
         if card.keyword == "CONTACT PAIR" and "TIED" in card.parameters:
-            said.append(
-                f"{card.where}: *CONTACT PAIR, TIED is taken as a contact with friction; write "
-                "*TIE for a tie"
-            )
+            said.append(f"{card.where}: *CONTACT PAIR, TIED is taken as a contact with friction; write *TIE for a tie")
     return said
 
 
@@ -78,7 +72,8 @@ def preloads_of(deck: Deck) -> list[tuple[str, float]]:
             continue
         nodes = deck.nodes(card.parameters.get("NODE", "-"), space)
         if nodes is None or len(nodes) != 1:
-            raise Damaged(f"{card.where}: *PRE-TENSION SECTION names no single NODE of the file")
+            text = "*PRE-TENSION SECTION names no single NODE of the file"
+            raise Damaged(text, file=card.place)
         forces = [force for node, force in _loads(deck) if node == nodes[0]]
         if forces:
             found.append((f"{card.where}: *PRE-TENSION SECTION", forces[-1]))
@@ -109,6 +104,7 @@ def _loads(deck: Deck) -> list[tuple[int, float]]:
             words = [word.strip() for word in line.split(",")]
             nodes = deck.nodes(words[0], space)
             if nodes is not None and len(words) > 2:
-                along = real(words[2], f"{card.where}: *{card.keyword}") if words[1] == "1" else 0.0
+                with of_file(card.place):
+                    along = real(words[2], f"*{card.keyword}") if words[1] == "1" else 0.0
                 found += [(int(node), along) for node in nodes]
     return found

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..data import Array, AverageLink, Equation, FaceTie, Indices, Link, RigidLink
+from ..errors import of_file
 from .cards import Card, fields
 from .deck import Deck
 from .raw import Damaged, Numbering, is_number, lost, real
@@ -75,10 +76,8 @@ def links_of(deck: Deck, numbering: Numbering, points: Array) -> tuple[list[Link
     cards = [(card, space) for card, space in deck.links if card.keyword in KEYWORDS]
     for number, (card, space) in enumerate(cards):
         following = cards[number + 1][0] if number + 1 < len(cards) else None
-        try:
+        with of_file(card.place):
             found += _MAKERS[card.keyword](reading, card, space, following)
-        except Damaged as error:
-            raise Damaged(f"{card.where}: {error}") from None
     return found, reading.left_out
 
 

@@ -18,7 +18,7 @@ def _read_material(deck: Deck, parameters: dict[str, str], lines: list[str]) -> 
     if not name:
         raise Damaged("a *MATERIAL has no name")
     deck.current = name.upper()
-    deck.materials[deck.current] = DeckConstants(name, deck.where)
+    deck.materials[deck.current] = DeckConstants(name, deck.card.place)
 
 
 def _of(deck: Deck, keyword: str) -> DeckConstants:
@@ -74,7 +74,7 @@ def _read_expansion(deck: Deck, parameters: dict[str, str], lines: list[str]) ->
 def _read_section(deck: Deck, parameters: dict[str, str], lines: list[str]) -> None:
     keys = ("ELSET", "MATERIAL", "ORIENTATION")
     words = [parameters.get(key, "") for key in keys]
-    deck.sections.append((words[0], words[1], words[2], "", deck.where))
+    deck.sections.append((words[0], words[1], words[2], "", deck.card.place))
 
 
 def _read_orientation(deck: Deck, parameters: dict[str, str], lines: list[str]) -> None:
@@ -106,24 +106,23 @@ def assign_materials(deck: Deck, raw: RawMesh) -> None:
         return
     raw.regions = [np.full(len(cells.ids), -1) for cells in deck.solids]
     known: dict[tuple[str, str], int] = {}
-    for name_of_set, material, orientation, space, where in deck.sections:
+    for name_of_set, material, orientation, space, place in deck.sections:
+        section = f"*SOLID SECTION, ELSET={name_of_set}"
         if material.upper() not in deck.materials:
-            raise Damaged(
-                f"{where}: *SOLID SECTION, ELSET={name_of_set} names the material '{material}', which is not defined"
-            )
+            text = f"{section} names the material '{material}', which is not defined"
+            raise Damaged(text, file=place)
         axes = deck.key(deck.orientations, orientation, space) if orientation else ""
         if axes is None:
-            raise Damaged(
-                f"{where}: *SOLID SECTION, ELSET={name_of_set} names the orientation '{orientation}', which is not "
-                "defined"
-            )
+            text = f"{section} names the orientation '{orientation}', which is not defined"
+            raise Damaged(text, file=place)
         key = (material.upper(), axes)
         if key not in known:
             known[key] = len(raw.materials)
             raw.materials.append(_deck_material(deck, key, name_of_set))
         chosen = deck.cells(name_of_set, space)
         if chosen is None:
-            raise Damaged(f"{where}: *SOLID SECTION names the element set '{name_of_set}', which is not defined")
+            text = f"*SOLID SECTION names the element set '{name_of_set}', which is not defined"
+            raise Damaged(text, file=place)
         for cells, region in zip(deck.solids, raw.regions, strict=True):
             region[np.isin(cells.ids, chosen)] = known[key]
     bare = [cells.ids[region < 0] for cells, region in zip(deck.solids, raw.regions, strict=True)]

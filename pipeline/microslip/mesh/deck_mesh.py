@@ -25,7 +25,7 @@ def _read_nodes(deck: Deck, parameters: dict[str, str], lines: list[str]) -> Non
     ids, points = _numbered_points(lines)
     ids = ids + deck.spaces[""].nodes
     deck.node_id.append(ids)
-    deck.node_where.append(deck.where)
+    deck.node_where.append(deck.card.place)
     points = _cartesian(points, parameters.get("SYSTEM", "R").upper()[:1] or "R")
     deck.points.append(points if deck.system is None else points @ deck.system[:3] + deck.system[3])
     if "NSET" in parameters:
@@ -88,7 +88,7 @@ def _read_elements(deck: Deck, parameters: dict[str, str], lines: list[str]) -> 
         raise Damaged(f"*ELEMENT, TYPE={kind} holds another number of nodes than its cells need")
     table, own = table.reshape(-1, count + 1), deck.spaces[""]
     nodes = (table[:, 1:] if not (solid and count == 27) else table[:, 1:][:, _BRICK27]) + own.nodes
-    cells = Cells(_SOLIDS[count] if solid else "facet", table[:, 0] + own.cells, nodes, kind, deck.where)
+    cells = Cells(_SOLIDS[count] if solid else "facet", table[:, 0] + own.cells, nodes, kind, deck.card.place)
     (deck.solids if solid else deck.facets).append(cells)
     if "ELSET" in parameters:
         deck.add(deck.cell_sets, parameters["ELSET"]).append(cells.ids)
@@ -143,7 +143,7 @@ def _read_surface(deck: Deck, parameters: dict[str, str], lines: list[str]) -> N
         for row in rows if kind == "ELEMENT" else ():
             if not re.fullmatch("|S[1-6]|SPOS|SNEG|E[1-4]|END[12]|EDGE", (side := [*row, ""][1]).upper()):
                 raise Damaged(f"*SURFACE, NAME={name} names the side '{side}', which no cell has")
-        deck.surfaces.append((name, kind, rows, "", deck.where))
+        deck.surfaces.append((name, kind, rows, "", deck.card))
         deck.written.setdefault(name.upper(), name)
 
 

@@ -7,6 +7,8 @@ import re
 import numpy as np
 
 from ..data import Indices
+from ..errors import of_file
+from .cards import Card
 from .deck import Deck
 from .raw import Damaged, Numbering, RawMesh, joined
 
@@ -19,33 +21,39 @@ _FACES: dict[str, tuple[tuple[int, ...], ...]] = {
 
 def add_surfaces(deck: Deck, raw: RawMesh, numbering: Numbering) -> None:
     """Facets of every surface, and points of those of nodes."""
-    for name, kind, rows, space, where in deck.surfaces:
-        if kind == "NODE":
-            _node_surface(deck, raw, numbering, name, rows, space, where)
-        elif kind == "ELEMENT":
-            _element_surface(deck, raw, name, rows, space, where)
-        elif kind in ("UNION", "INTERSECTION", "DIFFERENCE"):
-            _combined(raw, deck, name, kind, [word for row in rows for word in row if word], where)
+    for name, kind, rows, space, card in deck.surfaces:
+        with of_file(card.place):
+            if kind == "NODE":
+                _node_surface(deck, raw, numbering, name, rows, space)
+            elif kind == "ELEMENT":
+                _element_surface(deck, raw, name, rows, space, card)
+            elif kind in ("UNION", "INTERSECTION", "DIFFERENCE"):
+                _combined(raw, deck, name, kind, [word for row in rows for word in row if word])
 
 
 def _node_surface(
-    deck: Deck, raw: RawMesh, numbering: Numbering, name: str, rows: list[list[str]], space: str, where: str
+    deck: Deck,
+    raw: RawMesh,
+    numbering: Numbering,
+    name: str,
+    rows: list[list[str]],
+    space: str,
 ) -> None:
     for row in rows:
         found = deck.nodes(row[0], space)
         if found is None:
-            raise Damaged(f"{where}: the surface '{name}' names the node set '{row[0]}', which is not defined")
+            raise Damaged(f"the surface '{name}' names the node set '{row[0]}', which is not defined")
         if len(found):
             raw.add_set(name, found, numbering)
 
 
-def _combined(raw: RawMesh, deck: Deck, name: str, way: str, words: list[str], where: str) -> None:
+def _combined(raw: RawMesh, deck: Deck, name: str, way: str, words: list[str]) -> None:
     """A surface of others: all of their facets, those that they have in common, or those of the first alone."""
     parts = []
     for word in words:
         at, tail = deck.place(word)
         if not {at.prefix + tail, tail} & {known for known, *_ in deck.surfaces}:
-            raise Damaged(f"{where}: the surface '{name}' names the surface '{word}', which is not defined")
+            raise Damaged(f"the surface '{name}' names the surface '{word}', which is not defined")
         parts.append(raw.facets.get(at.prefix + tail) or raw.facets.get(tail) or [])
     if way == "UNION":
         raw.facets[name] = [block for part in parts for block in part]
@@ -56,16 +64,23 @@ def _combined(raw: RawMesh, deck: Deck, name: str, way: str, words: list[str], w
         raw.facets.setdefault(name, []).append(block[inside if way == "INTERSECTION" else ~inside])
 
 
-def _element_surface(deck: Deck, raw: RawMesh, name: str, rows: list[list[str]], space: str, where: str) -> None:
+def _element_surface(
+    deck: Deck,
+    raw: RawMesh,
+    name: str,
+    rows: list[list[str]],
+    space: str,
+    card: Card,
+) -> None:
     """Faces S1 ... S6 of cells given by number or set; without a face the free ones."""
     for row in rows:
         everything = joined(c.ids for c in (*deck.solids, *deck.facets))
         chosen = deck.cells(row[0], space) if row[0] else everything
         face = row[1].upper() if len(row) > 1 else ""
         if chosen is None:
-            raise Damaged(f"{where}: the surface '{name}' names the element set '{row[0]}', which is not defined")
+            raise Damaged(f"the surface '{name}' names the element set '{row[0]}', which is not defined")
         if not np.isin(chosen, everything).any():
-            raw.remarks.append(f"{where}: no cell that is read is '{row[0]}' of the surface '{name}'")
+            raw.remarks.append(f"{card.where}: no cell that is read is '{row[0]}' of the surface '{name}'")
         for cells in deck.solids:
             nodes = cells.nodes[np.isin(cells.ids, chosen)]
             sides = sides_of(cells.kind)
@@ -73,7 +88,7 @@ def _element_surface(deck: Deck, raw: RawMesh, name: str, rows: list[list[str]],
                 continue
             if re.fullmatch(r"S[1-6]", face):
                 if int(face[1]) > len(sides):
-                    raise Damaged(f"{where}: the surface '{name}' names the side {face} of cells {cells.written}")
+                    raise Damaged(f"the surface '{name}' names the side {face} of cells {cells.written}")
                 raw.facets.setdefault(name, []).append(nodes[:, list(sides[int(face[1]) - 1])])
             elif not face:
                 for corners in sorted({len(side) for side in sides}):

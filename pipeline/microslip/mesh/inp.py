@@ -8,13 +8,12 @@ cannot keep (generated nodes) is refused.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from ..data import Array, Indices
+from ..errors import of_file
 from . import deck_conditions, deck_materials, deck_mesh
 from .cards import Card, data_of, numbers, read_cards
 from .deck import Deck
@@ -48,13 +47,14 @@ def read_inp(path: Path) -> RawMesh:
     """
     found = outline(read_cards(path))
     whole = Deck()
-    parts = [(card, _part(path, found.parts, card, own)) for card, own in found.instances]
+    parts = [(card, _part(found.parts, card, own)) for card, own in found.instances]
     spaces = places([(card.parameters["NAME"], part) for card, part in parts])
     for (card, part), space in zip(parts, spaces, strict=False):
-        at = _told(card, lambda c: placement(numbers(c.lines, "*INSTANCE")))
+        with of_file(card.place):
+            at = placement(numbers(card.lines, "*INSTANCE"))
         place(whole, part, card.parameters["NAME"], at, space)
     whole.spaces[""] = spaces[-1]
-    _read(path, whole, found.rest)
+    _read(whole, found.rest)
     raw = _assembled(whole)
     raw.remarks += [
         *numbered([card.parameters["NAME"] for card, _ in parts], spaces),
@@ -79,9 +79,7 @@ def _prestressed(cards: list[Card]) -> list[str]:
     for card in cards:
         if card.keyword == "STEP":
             step = card
-            large = (
-                large or "NLGEOM" in step.parameters and step.parameters["NLGEOM"].upper() != "NO"
-            )
+            large = large or "NLGEOM" in step.parameters and step.parameters["NLGEOM"].upper() != "NO"
         elif card.keyword == "STATIC":
             stressed = True
         elif card.keyword in ("FREQUENCY", "COMPLEX FREQUENCY") and stressed:
@@ -132,46 +130,45 @@ def locking(raw: RawMesh, bricks: list[Indices]) -> float:
         return float(1 + 0.5 * np.median(sides.max(axis=0) / sides.min(axis=0)) ** 2)
 
 
-def _part(path: Path, parts: dict[str, list[Card]], instance: Card, own: list[Card]) -> Deck:
+def _part(parts: dict[str, list[Card]], instance: Card, own: list[Card]) -> Deck:
     """A part as an instance of it begins: with what the instance itself says besides."""
     name = instance.parameters.get("PART", "")
     if "LIBRARY" in instance.parameters or name.upper() not in {*parts, ""}:
-        raise Damaged(f"{instance.where}: *INSTANCE names the part '{name}', which the file does not define")
+        text = f"*INSTANCE names the part '{name}', which the file does not define"
+        raise Damaged(text, file=instance.place)
     if not name and not any(card.keyword == "NODE" for card in own):
-        raise Damaged(f"{instance.where}: the *INSTANCE names no PART and has no nodes of its own")
+        text = "the *INSTANCE names no PART and has no nodes of its own"
+        raise Damaged(text, file=instance.place)
     deck = Deck()
-    _read(path, deck, [*parts.get(name.upper(), ()), *own])
+    _read(deck, [*parts.get(name.upper(), ()), *own])
     return deck
 
 
-def _read(path: Path, deck: Deck, cards: list[Card]) -> None:
+def _read(deck: Deck, cards: list[Card]) -> None:
     """Take in cards one after the other."""
     for card in cards:
-        if card.keyword in _REFUSED:
-            raise Damaged(f"{card.where}: the file {_REFUSED[card.keyword]}; write out every node and cell")
-        if "INPUT" in card.parameters and card.keyword in (*LINKS, *JOINTS, *CYCLIC, *READERS):
-            card.lines = [*card.lines, *_told(card, lambda c: data_of(path, c.parameters.pop("INPUT")))]
-        if card.keyword in (*LINKS, *JOINTS, *CYCLIC):
-            deck.links.append((card, ""))
-        if card.keyword not in READERS:
-            if _COUNTS.fullmatch(card.keyword):
-                deck.lost.append(lost(card.where, f"*{card.keyword}"))
-            elif card.keyword not in (*_SILENT, *LINKS, *JOINTS, *CYCLIC):
-                deck.ignored.append(card.keyword)
-            continue
-        deck.where = card.where
-        _told(card, lambda c: READERS[c.keyword](deck, c.parameters, c.lines))
-        kind = card.parameters.get("TYPE", "").upper()
-        if card.keyword == "ELEMENT" and card.lines and not cell_type(kind) and kind != "DCOUP3D":
-            deck.lost.append(lost(card.where, f"*ELEMENT, TYPE={kind}"))
+        deck.card = card
+        with of_file(card.place):
+            _read_card(deck, card)
 
 
-def _told(card: Card, work: Callable[[Card], Any]) -> Any:
-    """What is made of a card; what is wrong with it is told with its place."""
-    try:
-        return work(card)
-    except Damaged as error:
-        raise Damaged(f"{card.where}: {error}") from None
+def _read_card(deck: Deck, card: Card) -> None:
+    if card.keyword in _REFUSED:
+        raise Damaged(f"the file {_REFUSED[card.keyword]}; write out every node and cell")
+    if "INPUT" in card.parameters and card.keyword in (*LINKS, *JOINTS, *CYCLIC, *READERS):
+        card.lines = [*card.lines, *data_of(Path(card.parameters.pop("INPUT")))]
+    if card.keyword in (*LINKS, *JOINTS, *CYCLIC):
+        deck.links.append((card, ""))
+    if card.keyword not in READERS:
+        if _COUNTS.fullmatch(card.keyword):
+            deck.lost.append(lost(card.where, f"*{card.keyword}"))
+        elif card.keyword not in (*_SILENT, *LINKS, *JOINTS, *CYCLIC):
+            deck.ignored.append(card.keyword)
+        return
+    READERS[card.keyword](deck, card.parameters, card.lines)
+    kind = card.parameters.get("TYPE", "").upper()
+    if card.keyword == "ELEMENT" and card.lines and not cell_type(kind) and kind != "DCOUP3D":
+        deck.lost.append(lost(card.where, f"*ELEMENT, TYPE={kind}"))
 
 
 _SILENT = {
@@ -210,7 +207,8 @@ def _assembled(deck: Deck) -> RawMesh:
     ids, count = np.unique(joined(raw.cell_id), return_counts=True)
     if (count > 1).any():
         twice = ids[count > 1][0]
-        raise Damaged(f"{_last(twice, raw.cell_id, [c.where for c in deck.solids])}cell {twice} is defined twice")
+        place = _last(twice, raw.cell_id, [c.where for c in deck.solids])
+        raise Damaged(f"cell {twice} is defined twice", file=place)
     assign_materials(deck, raw)
     assign_temperatures(deck, raw, numbering)
     for key, parts in deck.node_sets.items():
@@ -251,11 +249,12 @@ def _unique_nodes(deck: Deck) -> tuple[Indices, Array]:
     differs = (points != points[first][inverse]).any(axis=1) & np.isfinite(points).all(axis=1)
     if differs.any():
         twice = node_id[differs][0]
-        raise Damaged(f"{_last(twice, deck.node_id, deck.node_where)}node {twice} is there already, at another place")
+        place = _last(twice, deck.node_id, deck.node_where)
+        raise Damaged(f"node {twice} is there already, at another place", file=place)
     keep = np.sort(first)
     return node_id[keep], points[keep]
 
 
-def _last(number: int, numbers: list[Indices], where: list[str]) -> str:
-    """The last of the cards that have a number, as the beginning of a sentence."""
-    return [f"{place}: " for ids, place in zip(numbers, where, strict=True) if (ids == number).any()][-1]
+def _last(number: int, numbers: list[Indices], places: list[str]) -> str:
+    """Place of the last of the cards that have a number."""
+    return [place for ids, place in zip(numbers, places, strict=True) if (ids == number).any()][-1]

@@ -41,13 +41,15 @@ def outline(cards: list[Card]) -> Outline:
         _nested(card, opened)
         if card.keyword == "PART":
             if name in found.parts:
-                raise Damaged(f"{card.where}: the *PART '{card.parameters['NAME']}' is there twice")
+                text = f"the *PART '{card.parameters['NAME']}' is there twice"
+                raise Damaged(text, file=card.place)
             into = found.parts.setdefault(name, [])
         elif card.keyword == "INSTANCE":
             if not name:
-                raise Damaged(f"{card.where}: an *INSTANCE has no NAME")
+                raise Damaged("an *INSTANCE has no NAME", file=card.place)
             if name in names:
-                raise Damaged(f"{card.where}: the *INSTANCE '{card.parameters['NAME']}' is there twice; rename one")
+                text = f"the *INSTANCE '{card.parameters['NAME']}' is there twice; rename one"
+                raise Damaged(text, file=card.place)
             names.add(name)
             into = []
             found.instances.append((card, into))
@@ -76,12 +78,14 @@ def _nested(card: Card, opened: list[Card]) -> None:
     if card.keyword.startswith("END ") and card.keyword[4:] in _INSIDE and card.keyword != "END STEP":
         if last is None or last.keyword != card.keyword[4:]:
             told = f"; the *{last.keyword} of {last.where} has no *END {last.keyword}" if last else ""
-            raise Damaged(f"{card.where}: *{card.keyword} without a beginning{told}")
+            raise Damaged(f"*{card.keyword} without a beginning{told}", file=card.place)
         opened.pop()
     elif begins and last is not None and last.keyword != _INSIDE[card.keyword]:
-        raise Damaged(f"{last.where}: the *{last.keyword} has no *END {last.keyword} before {card.where}; add it")
+        text = f"the *{last.keyword} has no *END {last.keyword} before {card.where}; add it"
+        raise Damaged(text, file=last.place)
     elif begins and last is None and _INSIDE[card.keyword]:
-        raise Damaged(f"{card.where}: the *{card.keyword} stands outside of an *{_INSIDE[card.keyword]}")
+        text = f"the *{card.keyword} stands outside of an *{_INSIDE[card.keyword]}"
+        raise Damaged(text, file=card.place)
     elif begins and card.keyword != "STEP":
         opened.append(card)
 

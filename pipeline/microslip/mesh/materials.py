@@ -55,19 +55,20 @@ def in_si(found: DeckMaterial, system: str, zero: float = 0.0) -> Material:
     Raises:
         Damaged: impossible or none. Unread: it is of another kind, or lacks constants or density.
     """
-    at, line = f" of the cells '{found.where}'" if found.where else "", f"{found.line}: " if found.line else ""
+    at, line = f" of the cells '{found.where}'" if found.where else "", found.line or None
     if not found.name:
         raise Damaged(f"the cells '{found.where}' have no material" if found.where else "cells have no material")
     if found.refused:
         raise Unread(f"the material '{found.name}'{at} has {found.refused}")
     if found.elasticity is None:
-        raise Unread(
-            f"{line}the material '{found.name}'{at} has no elastic constants that are read (iso- or orthotropic)"
-        )
+        text = "has no elastic constants that are read (iso- or orthotropic)"
+        raise Unread(f"the material '{found.name}'{at} {text}", file=line)
     if found.density is None:
-        raise Unread(f"{line}the material '{found.name}'{at} has no density; give it one, no other can stand for it")
+        text = "has no density; give it one, no other can stand for it"
+        raise Unread(f"the material '{found.name}'{at} {text}", file=line)
     if not 0 < found.density < np.inf:
-        raise Unread(f"{line}the material '{found.name}'{at} has a density of {found.density:g}; correct it")
+        text = f"has a density of {found.density:g}; correct it"
+        raise Unread(f"the material '{found.name}'{at} {text}", file=line)
     if not (np.isfinite(found.expansion).all() and np.isfinite(found.elasticity).all()):
         raise Damaged(f"the material '{found.name}'{at} holds a number that is not finite")
     table = None if found.temperature is None else found.temperature + np.array([zero, 0.0])

@@ -20,8 +20,8 @@ NODES = {
 """Cell or facet type -> number of its nodes."""
 
 
-class Damaged(ValueError):
-    """A mesh file that contradicts itself or ends too early. The text says how, without the file's name."""
+class Damaged(UserError):
+    """A mesh file that contradicts itself or ends too early. file: with its line, if one does."""
 
 
 class Unread(Damaged):

@@ -71,15 +71,19 @@ def read_mesh(path: Path | str, unit: str, system: str | None = None, zero: floa
         mesh = _mesh_of(raw, UNITS[unit])
         return replace(mesh, materials=materials, regions=mesh.regions if materials else {})
     except Damaged as error:
-        raise _refused(path, str(error)) from error
+        raise _refused(path, error) from error
     except OSError as error:
         raise UserError(f"cannot be read ({error.strerror}); correct the path") from error
 
 
-def _refused(path: Path, text: str) -> UserError:
+def _refused(path: Path, error: Damaged) -> UserError:
     """What is wrong with a file, or with a line of it, and what to do."""
+    text = f"{error.args[0]}"
+    remedy = "" if "; " in text else "; correct it or write it again"
+    if error.file:
+        return UserError(text + remedy, file=error.file)
     told = text if text.startswith(f"{path.name}, ") else f"cannot be used: {text}"
-    return refused(path, told + ("" if "; " in text else "; correct it or write it again"))
+    return refused(path, told + remedy)
 
 
 _READERS: dict[str, Callable[[Path], RawMesh]] = {

@@ -59,7 +59,9 @@ def body_ranges(
                 thrice=settings.reduction != "eigenmodes",
             )  # fmt: skip
     except UserError as error:
-        raise UserError(str(error).replace("rotation.speeds_rpm", "rotation.range_rpm")) from error
+        if error.key == "rotation.speeds_rpm":
+            error.key = "rotation.range_rpm"
+        raise
     return {k: _range(body, k, common) for k, common in found.items()}
 
 

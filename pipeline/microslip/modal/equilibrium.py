@@ -293,7 +293,7 @@ def _newton(
             if step < 1 / 64:
                 if not isinstance(error, Unstable):
                     raise error from None
-                raise UserError(_unstable(model, speed, error.count)) from None
+                raise _unstable(model, speed, error.count) from None
             continue
         total += state.iterations
         report(f"static state: {100 * target:.0f} % of the load after {total} Newton steps")
@@ -362,12 +362,10 @@ def _factors_serve(steps: list[float]) -> bool:
     return bool(steps) and steps[-1] < 1e-3 and (len(steps) < 2 or steps[-1] <= 0.1 * steps[-2])
 
 
-def _unstable(model: BodyModel, speed: float, count: int) -> str:
+def _unstable(model: BodyModel, speed: float, count: int) -> UserError:
     why = "buckling or centrifugal divergence); lower the speed or the loads" if speed else "buckling); lower them"
-    return (
-        f"{what_loads(model, speed)}: at {rpm_text(speed)} the body is unstable (its stiffness has {count} "
-        f"negative directions: {why}"
-    )
+    text = f"the body is unstable (its stiffness has {count} negative directions: {why}"
+    return UserError(f"at {rpm_text(speed)} {text}", what_loads(model, speed))
 
 
 def what_loads(model: BodyModel, speed: float) -> str:

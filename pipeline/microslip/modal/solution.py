@@ -108,7 +108,7 @@ def search(
     try:
         found = eigen.search(pencil, wanted, shift, rigid=R if R.shape[1] else None)
     except eigen.Unstable as error:
-        raise UserError(_divergence(settings, speed, error.count, model, where)) from error
+        raise _divergence(settings, speed, error.count, model, where) from error
     refuse_unresolved(pencil, found, R.shape[1])
     return answered(settings, pencil, unknowns, R, shift, found, rows, bool(shift), floating)
 
@@ -252,22 +252,31 @@ def held_compliance(T: Array, reduced: Reduced, labels: tuple[str, ...] = ()) ->
     return held(T, labels, reduced.kind, reduced.K_r, reduced.omega, reduced.to_diagonal)
 
 
-def _divergence(settings: BodySettings, speed: float, count: int, model: BodyModel, where: str) -> str:
+def _divergence(
+    settings: BodySettings,
+    speed: float,
+    count: int,
+    model: BodyModel,
+    where: str,
+) -> UserError:
     if not speed and not model.loaded:
-        return (
-            f"mesh: the stiffness has {count} negative eigenvalues although nothing loads the body: its cells are too "
-            f"thin to be told from rounding (edges up to {longest_over_shortest(model.d.mesh):.0f} times as long as "
-            "the shortest of the cell), or parts of it hang together by a point or an edge only; refine the mesh, "
-            "check length_unit or join the parts"
+        return UserError(
+            f"the stiffness has {count} negative eigenvalues although nothing loads the body: its "
+            "cells are too thin to be told from rounding (edges up to "
+            f"{longest_over_shortest(model.d.mesh):.0f} times as long as the shortest of the "
+            "cell), or parts of it hang together by a point or an edge only; refine the mesh, "
+            "check length_unit or join the parts",
+            "mesh",
         )
     remedy = "lower the speed"
     if settings.rotation.prestress == "none" and speed:
         remedy += ', or use rotation.prestress = "nonlinear": without the stiffening by stress frequencies fall to zero'
     elif not speed:
         remedy = "it buckles under what loads it at rest: reduce that, or check the material"
-    return (
-        f"{what_loads(model, speed)}: at {rpm_text(speed)}{where and ', ' + where + ','} {count} "
-        f"eigenvalue{'s are' if count > 1 else ' is'} negative: the body diverges; {remedy}"
+    return UserError(
+        f"at {rpm_text(speed)}{where and ', ' + where + ','} {count} "
+        f"eigenvalue{'s are' if count > 1 else ' is'} negative: the body diverges; {remedy}",
+        what_loads(model, speed),
     )
 
 

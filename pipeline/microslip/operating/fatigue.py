@@ -14,17 +14,17 @@ from .stress import CycleStress, StressPeaks, cycle_stress, places, stress_peaks
 
 
 class MaterialLimits(Model):
-    """What the material bears, Pa. Keys of ``[material_limits]`` in case.toml.
-
-    fatigue_strength: amplitude at R = -1 (zero mean) that it endures for ever, of the part: size, surface and notches
-    that the mesh does not show counted already. tensile_strength: R_m, where the Goodman line meets zero amplitude.
-    yield_strength: R_p0.2, beyond which the largest stress must not go; left out if not given. name: for reports.
-    """
+    """What the material bears, of the body whose monitor is drawn."""
 
     fatigue_strength: Positive
+    """[Pa] amplitude that is endured for ever about a zero mean, of the part: size, surface and
+    notches that the mesh does not show counted already"""
     tensile_strength: Positive
+    """[Pa] ultimate, R_m, where the Goodman line meets zero amplitude"""
     yield_strength: Positive | None = None
+    """[Pa] R_p0.2; if given, the largest stress is held against it"""
     name: Name = "material"
+    """of the material"""
 
     @model_validator(mode="after")
     def _in_order(self) -> MaterialLimits:

@@ -48,23 +48,26 @@ ROUGHEST = 1e-3
 
 
 class Section(Model):
-    """A cross-section.
-
-    Attributes:
-        profile: radius of a circle, m (convex positive, hollow negative), coefficients of y^2, y^3, ... (1/m, ...), or
-            a file. width: of a circle or polynomial, m. noise: of a measured profile, m. mirror: axes that run the
-            other way in its file. between: y of it that are kept, m, after that. at: of the profile's origin from the
-            middle of the track or axle, m; there is no usual one where a profile is measured.
-    """
+    """A cross-section."""
 
     profile: Number | Annotated[Numbers, Field(min_length=1)] | FileName
+    """[m] radius of a circle, convex positive, hollow negative; coefficients of y^2, y^3, ...
+    (1/m, ...); or a [file](rolling.md#from-profiles-to-patches)"""
     width: Positive = WIDTH
+    """[m] of a circle or polynomial"""
     noise: Annotated[NotNegative, Field(le=1e-3)] = 0.0
+    """[m] standard deviation of a measured profile, by which it is smoothed"""
     mirror: Mirror = ""
+    """axes that run the other way in its file"""
     between: Annotated[tuple[Number, Number], BeforeValidator(_finite_vector)] | None = None
+    """[m] y of a file that are kept, after that"""
     at: Annotated[Positive, Field(le=BIGGEST)] = 0.75
+    """[m] of the profile's origin from the middle of the track or axle; **required** where a
+    profile is measured"""
     young: Positive = 2.1e11
+    """[Pa] E"""
     poisson: Poisson = 0.28
+    """nu"""
 
     @model_validator(mode="after")
     def _is_an_arc(self) -> Section:
@@ -97,29 +100,36 @@ class Section(Model):
 
 
 class Wheel(Section):
-    """radius: of the running circle, m."""
+    """A wheel."""
 
     radius: Annotated[Positive, Field(le=BIGGEST)]
+    """[m] of the running circle"""
 
 
 class Rail(Section):
-    """inclination: of the rail towards the track's middle, rad; a profile that is drawn canted has 0. With another one
-    the origin moves to the point that is highest then, and `at` is of that."""
+    """A rail."""
 
     inclination: Annotated[Number, Field(ge=-0.2, le=0.2)] = 0.0
+    """[rad] towards the track's middle; a profile that is drawn canted has 0. With another one
+    the origin moves to the point that is highest then, and `at` is of that"""
 
 
 class PoseOfCase(Model):
-    """lateral: to the right, m. yaw, roll: rad. speed: m/s. turning: of the axle, rad/s; it rolls if not given. side:
-    "both" is the whole axle, which rolls until both wheels carry the same; the curve is of the patch that carries most.
-    """
+    """Where the wheelset is and how it moves, in track axes."""
 
     lateral: Number = 0.0
+    """[m] to the right"""
     yaw: Annotated[Number, Field(ge=-0.2, le=0.2)] = 0.0
+    """[rad]"""
     roll: Annotated[Number, Field(ge=-0.2, le=0.2)] = 0.0
+    """[rad]"""
     speed: Positive = 20.0
+    """[m/s]"""
     turning: Positive | None = None
+    """[rad/s] of the axle; it rolls if not given"""
     side: Literal["left", "right", "both"] = "right"
+    """`both` is the whole axle, which rolls until both wheels carry the same; the curve is of
+    the patch that carries most"""
 
     @model_validator(mode="after")
     def _rolls(self) -> PoseOfCase:
@@ -129,16 +139,24 @@ class PoseOfCase(Model):
 
 
 class Creep(Model):
-    """What the curve runs over; the other creepages are those of the pose if not given. spin: 1/m."""
+    """What the curve runs over; creepages not given are those of the pose."""
 
     over: Literal["longitudinal", "lateral", "spin"] = "longitudinal"
+    """what the curve runs over"""
     start: Number = 0.0
+    """first creepage (spin: 1/m)"""
     stop: Number
+    """last one"""
     points: Annotated[int, Field(ge=2, le=100000)] = 61
+    """of the curve"""
     longitudinal: Number | None = None
+    """creepage; that of the pose if not given"""
     lateral: Number | None = None
+    """likewise"""
     spin: Number | None = None
+    """[1/m] likewise"""
     shown: Number | None = None
+    """whose tractions are drawn; the middle if not given"""
 
     @model_validator(mode="after")
     def _runs(self) -> Creep:
@@ -151,58 +169,71 @@ class Creep(Model):
 
 
 class Strips(Model):
-    """elements: along and across rolling. The rest as `strips.creep_forces`."""
+    """How a patch is divided and what it is made of, see `strips.creep_forces`."""
 
     elements: Annotated[tuple[Count, Count], BeforeValidator(_tuple)] = (20, 20)
+    """along and across rolling"""
     distribution: Distribution = "constant"
+    """of the bound of the traction over a strip"""
     coefficients: Coefficients = "table"
+    """Kalker's, from his table or the book's polynomials (6.4-26)"""
     spin: Spin = "kalker"
+    """with the third spring of Kalker, or the book's two"""
 
 
 class ModelOfCase(Strips):
-    """exact: states of the curve that are compared with exact half-spaces between the profiles themselves."""
+    """How a patch is divided and what it is made of, see `strips.creep_forces`."""
 
     exact: Annotated[int, Field(ge=0, le=1000)] = 5
+    """states of the curve that are compared with exact half-spaces between the profiles
+    themselves"""
 
 
 class TableOfCase(Model):
-    """points: of a table of creep forces, of the size below and above saturation, azimuth, polar angle, a/b; see
-    `table.CreepTable`. elements: of the strips it is made with."""
+    """A table of creep forces, see `table.CreepTable`."""
 
     points: Annotated[tuple[Fineness, Fineness, Fineness, Fineness, Fineness], BeforeValidator(_tuple)] = POINTS
+    """of the size below and above saturation, azimuth, polar angle, a/b"""
     elements: Annotated[tuple[Count, Count], BeforeValidator(_tuple)] = ELEMENTS
+    """of the strips it is made with"""
 
 
 class ContactsOfCase(Model):
-    """lateral, yaw: to either side of a table of contacts, m and rad. points: of the shift to one side, and of the yaw,
-    see `contact_table.ContactTable`; it is made for the vertical force of the case on each wheel."""
+    """A table of contacts, made for the vertical force of the case on each wheel, see
+    `contact_table.ContactTable`."""
 
     lateral: Annotated[Positive, Field(le=0.05)]
+    """[m] shift to either side"""
     yaw: Annotated[Positive, Field(le=0.2)]
+    """[rad] to either side"""
     points: Annotated[tuple[Count, Fineness], BeforeValidator(_tuple)] = SHIFTS
+    """of the shift to one side, and of the yaw"""
 
 
 class ElasticOfCase(Model):
-    """wheel, rail: bodies whose modal files are taken or made. face: their interface at the patch, t2 along rolling."""
+    """The bodies behind the patch."""
 
     wheel: Name = "wheel"
+    """body whose modal file is taken or made"""
     rail: Name = "rail"
+    """likewise"""
     face: Name = "patch"
+    """their interface at the patch, t2 along rolling"""
 
 
 class HeatOfCase(Model):
-    """Steel if not given; each a number, or two, of wheel and rail.
-
-    Attributes:
-        conductivity: W/(m K). density: kg/m^3. heat_capacity: J/(kg K). start: temperature before the contact, degrees
-            C. limit: rise above 20 degrees C at which friction would be gone, K; without it friction does not change.
-    """
+    """What conducts the heat of friction; steel if not given."""
 
     conductivity: OneOrTwo = 50.0
+    """[W/(m K)] one number, or two of wheel and rail"""
     density: OneOrTwo = 7850.0
+    """[kg/m3] likewise"""
     heat_capacity: OneOrTwo = 450.0
+    """[J/(kg K)] likewise"""
     start: Temperature | Annotated[tuple[Temperature, Temperature], BeforeValidator(_finite_vector)] = 20.0
+    """[°C] temperature before the contact, likewise"""
     limit: Positive | None = None
+    """[K] rise above 20 °C at which friction would be gone; without it friction does not change"""
 
     def made(self) -> Heat:
         keys = self.conductivity, self.density, self.heat_capacity, self.start
@@ -212,25 +243,24 @@ class HeatOfCase(Model):
 
 
 class WearOfBody(Model):
-    """coefficient: of wheel and rail each, worn volume over frictional work, m3/J."""
+    """What a passage wears."""
 
     coefficient: Positive
+    """[m3/J] of wheel and rail each, worn volume over frictional work"""
 
 
 class WearOfCase(WearOfBody):
-    """What a passage wears, and profiles that are renewed by it.
-
-    Attributes:
-        updates: of both profiles, 0 for none. passages: in all of them, of the wheel over every place of the rail and
-            of the rail under every place of the wheel. smoothing: standard deviation of the Gaussian that the contact
-            sees worn depths through, m. lateral: shifts of the wheelset that share the passages, m; that of the pose if
-            not given.
-    """
+    """What a passage wears, and profiles that are renewed by it."""
 
     updates: Annotated[int, Field(ge=0, le=1000)] = 0
+    """of both profiles, 0 for none"""
     passages: Positive | None = None
+    """in all of them, of the wheel over every place of the rail and of the rail under every
+    place of the wheel"""
     smoothing: Annotated[NotNegative, Field(le=WIDEST)] = 1e-3
+    """[m] standard deviation of the Gaussian that the contact sees worn depths through"""
     lateral: Numbers | None = None
+    """[m] shifts of the wheelset that share the passages; that of the pose if not given"""
 
     @model_validator(mode="after")
     def _renews(self) -> WearOfCase:
@@ -242,14 +272,18 @@ class WearOfCase(WearOfBody):
 
 
 class RollingCase(Model):
-    """friction: coefficient, or a table of a characteristic as in a contact file. vertical_force: N, on this wheel."""
+    """A wheel on a rail."""
 
     name: Name
+    """names the folder of the products, `build/NAME/`"""
     wheel: Wheel
     rail: Rail
     friction: Annotated[AnyFriction, _short("coulomb", "mu", AnyFriction)]
+    """coefficient, or a table of a characteristic as in a [contact.toml](contact_toml.md)"""
     roughness: Annotated[AnyRoughness | None, _short("polynomial", "R_Z", AnyRoughness)] = None
+    """[m] R_Z, or a table likewise"""
     vertical_force: NotNegative
+    """[N] on this wheel"""
     pose: PoseOfCase = PoseOfCase()
     creep: Creep
     model: ModelOfCase = ModelOfCase()

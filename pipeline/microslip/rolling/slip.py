@@ -23,37 +23,42 @@ ENOUGH = 18
 
 
 class TyreOfCase(Model):
-    """A wheel that stands on the ground in the static state of its modal file.
-
-    Attributes:
-        body: whose modal file is taken or made. contact: the closure by which it stands. interface: on the same face,
-            t2 along rolling. friction: coefficient. stiffness: of the row along rolling, per area, Pa/m. elements: of
-            the row. speed: m/s. rigid: whether the wheel is; else its mode that yields most along rolling gives way.
-    """
+    """A wheel that stands on the ground in the static state of its modal file."""
 
     body: Name
+    """whose modal file is taken or made"""
     contact: Name = "ground"
+    """the closure by which it stands"""
     interface: Name = "patch"
+    """on the same face, t2 along rolling"""
     friction: Positive
+    """coefficient"""
     stiffness: Positive
+    """[Pa/m] of the row along rolling, per area"""
     elements: Annotated[int, Field(ge=4, le=2000)] = 20
+    """of the row"""
     speed: Positive
+    """[m/s]"""
     rigid: bool = False
+    """whether the wheel is; else its mode that yields most along rolling gives way"""
 
 
 class Jumps(Model):
-    """targets: slips to which it jumps from 0, and from which back to 0. loads: shares of the static load to which the
-    load jumps at the slip shown. shown: slip whose jump is drawn."""
+    """Jumps of slip and load."""
 
     targets: Annotated[tuple[Slip, ...], BeforeValidator(_tuple), Field(min_length=2)]
+    """slips to which it jumps from 0, and from which back to 0"""
     loads: Annotated[tuple[NotNegative, ...], BeforeValidator(_tuple)] = (0.5, 1.5)
+    """shares of the static load to which the load jumps at the slip shown"""
     shown: Slip = 0.05
+    """slip whose jump is drawn"""
 
 
 class TyreCase(Model):
     """A tyre, and jumps."""
 
     name: Name
+    """names the folder of the products, `build/NAME/`"""
     tyre: TyreOfCase
     jumps: Jumps
 

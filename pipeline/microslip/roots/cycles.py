@@ -33,17 +33,21 @@ KEPT = "limit cycles"
 
 
 class Over(Model):
-    """A parameter of a map: keys of this case, dotted, which follow it, each with the factor that makes its value.
-
-    parameter: what its axis says, in unit. start, stop: its first and last value. points: of them, evenly spaced.
-    """
+    """A parameter of a map; two of these tables make one."""
 
     parameter: str
+    """what its axis says"""
     unit: str = ""
+    """of the parameter, on the axis"""
     keys: dict[str, Number]
+    """keys of this case, dotted, that follow the parameter, each with the factor that makes its
+    value"""
     start: Number
+    """of the parameter"""
     stop: Number
+    """above it"""
     points: Annotated[int, Field(ge=2, le=1000)] = 40
+    """values of it, evenly spaced"""
 
     @model_validator(mode="after")
     def _somewhere(self) -> Over:
@@ -55,21 +59,23 @@ class Over(Model):
 
 
 class Across(Over):
-    """A second parameter, at whose values limit cycles are followed as well, with so many harmonics."""
+    """A second parameter, at whose values limit cycles are followed as well."""
 
     points: Annotated[int, Field(ge=2, le=1000)] = 5
     harmonics: Annotated[int, Field(ge=1, le=200)] = 5
+    """of the balance along these branches"""
 
 
 class Cycle(Over):
-    """A parameter over which the limit cycles born at Hopf points are followed, with so many harmonics.
+    """A parameter over which the limit cycles born at Hopf points are followed."""
 
-    points: of a branch at most. accuracy: share of the amplitude to which three of its orbits are refined, that are
-    compared with a motion in time. across: a second parameter, at whose values they are followed as well.
-    """
-
+    points: Annotated[int, Field(ge=2, le=1000)] = 40
+    """of a branch at most"""
     harmonics: Annotated[int, Field(ge=1, le=200)] = 7
+    """of the balance along a branch"""
     accuracy: Annotated[Positive, Field(le=0.1)] = 1e-4
+    """share of the amplitude to which three orbits of a branch get harmonics, that are compared
+    with a motion in time and judged by their Floquet multipliers"""
     across: Across | None = None
 
 

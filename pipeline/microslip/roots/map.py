@@ -179,7 +179,7 @@ def _row(
     try:
         return mechanics.over(at, float(x.values[0]), float(x.values[-1])).at
     except UserError as error:
-        if not str(error).startswith("parameter:"):
+        if error.key != "parameter":
             raise
     like = sliding.points_moved(at(float(x.values[0])))
     return lambda p: sliding.of(at(p), like)

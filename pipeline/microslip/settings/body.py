@@ -51,6 +51,7 @@ from .numbers import (
     _float,
     _tuple,
     _whole,
+    is_length,
     named_once,
     only_one,
 )
@@ -61,21 +62,24 @@ GROUND = "ground"
 
 
 class FaceRule(Model):
-    """How a face of a CAD file or of a mesh is picked: exactly one of the ways.
-
-    cut: of a CAD file, the part of the surface inside the box, cut out of the faces that it has. touching: another file
-    of the same kind in the same coordinates, or the body's own deck, for what of it is not this
-    body; the part of the surface that lies on its surface, cut out of a CAD file, the facets of a
-    mesh whose middle lies there; of several such patches, those wholly in the box.
-    """
+    """How a face of a CAD file or of a mesh is picked: exactly one of the ways."""
 
     name: Name
+    """name of the face; several rules of one name add up"""
     label: str | None = None
+    """the surface's label in the CAD file, or a part of it"""
     colour: Annotated[tuple[Byte, Byte, Byte], BeforeValidator(_tuple)] | None = None
+    """the surface's colour, red, green, blue"""
     box: Box | None = None
+    """x, y, z of the low and of the high corner; what lies wholly inside"""
     cut: bool = False
+    """CAD: whether the box cuts: its part of the surface becomes a face of its own"""
     surfaces: Annotated[tuple[int, ...], BeforeValidator(_tuple)] | None = None
+    """numbers from the table of `microslip info FILE`"""
     touching: str | None = None
+    """another file of the same kind in the same coordinates, or the body's own deck (what of it
+    is not this body); where the two surfaces meet, cut out of a CAD file, of a mesh the facets
+    whose middle lies there; with box: inside it"""
 
     @model_validator(mode="after")
     def _one_way(self) -> FaceRule:
@@ -92,55 +96,78 @@ UnitSystem = Literal["m-kg-s", "mm-t-s", "mm-kg-ms", "in-lbf-s"]
 class MatrixFiles(Model):
     """Stiffness and mass that another program has assembled, the node and direction of every row, and positions.
 
-    A file that holds several matrices is written FILE#NAME. circulatory: what the stiffness holds beside its
-    symmetric part (friction, follower forces), any square matrix; modes are those of the symmetric part. Without nodes
-    every row is a generalised coordinate, and the supports are in the matrices.
+    Modes are those of the symmetric part of the stiffness.
     """
 
     stiffness: str
+    """K: FILE or FILE#NAME; .mtx, .mat, .h5, .npz, .op4, DMIG cards, .sti"""
     mass: str
+    """M, likewise"""
     damping: str | None = None
+    """C, likewise; instead of [damping]"""
     gyroscopic: str | None = None
+    """G, likewise, skew-symmetric, at the speed of rotation.speeds_rpm"""
     circulatory: str | None = None
+    """what the stiffness holds beside its symmetric part (friction, follower forces), any square
+    matrix; goes to N_r, see [stability](stability.md)"""
     dofs: str | None = None
+    """node and direction (1 to 6) of every row: lines `node.direction` or two columns; not
+    needed where the matrices name their rows, or where every node has three or six rows in
+    the order of `nodes`"""
     nodes: str | None = None
+    """number, x, y, z: .csv, .mat, .h5, GRID cards, or a mesh with its sets; without it every
+    row is a generalised coordinate and the supports are in the matrices"""
     units: UnitSystem | None = None
+    """of the matrices; m-kg-s, mm-t-s, in-lbf-s go without saying with m, mm, in"""
     grounded: bool = False
+    """the supports are in the matrices already"""
     superelement: bool = False
+    """rows without a node are the generalised coordinates of a superelement"""
     sets: dict[FaceName, Annotated[tuple[NodeNumber, ...], BeforeValidator(_tuple)]] = Field(default_factory=dict)
+    """table: name of a set = list of node numbers"""
 
 
 class MatrixTerm(Model):
-    """A matrix that scales with a parameter: factor (value / reference)^power times it is added to those of its role.
-
-    name: of the parameter; ``speed`` is the speed of rotation in rad/s, that of rotation.speeds_rpm. Any other one has
-    the value 1, or that of `values`.
-    """
+    """A matrix that scales with a parameter: factor (value / reference)^power times it is added to
+    those of its role."""
 
     role: Literal["stiffness", "mass", "damping", "gyroscopic", "circulatory"]
+    """matrix it is added to"""
     matrix: str
+    """FILE or FILE#NAME, times factor (value / reference)^power"""
     name: Name = "speed"
+    """of the parameter; speed is that of rotation.speeds_rpm, in rad/s, any other stands in
+    values"""
     power: Annotated[float, BeforeValidator(_float), Field(ge=-8, le=8)] = 1.0
+    """-1 for what falls with the speed, 0 for a constant matrix"""
     factor: Number = 1.0
+    """of the matrix"""
     reference: Positive = 1.0
+    """value of the parameter at which the matrix stands as it is"""
 
 
 class StabilitySettings(Model):
-    """Which roots of (s^2 M + s C + K) x = 0 are wanted: all with growth rates (1/s) and frequencies (Hz) from, to.
-
-    over: parameter of the diagram, with its first and last value in `range`. accuracy: relative, of the matrices'
-    entries. neutral: growth rates (1/s) below it are neither growth nor decay, whatever the accuracy.
-    """
+    """Which roots of (s^2 M + s C + K) x = 0 are wanted: all with growth rates and frequencies in
+    a window."""
 
     growth: Annotated[tuple[Number, Number], BeforeValidator(_finite_vector)] = (-100.0, 1000.0)
+    """[1/s] growth rates of the window of roots, from, to"""
     frequency: Annotated[tuple[NotNegative, NotNegative], BeforeValidator(_finite_vector)]
+    """[Hz] frequencies of the window, from, to"""
     over: Name = "speed"
+    """parameter of the diagram"""
     range: Annotated[tuple[Number, Number] | None, BeforeValidator(_finite_vector)] = None
+    """its first and last value, speed in rad/s; no diagram if not given"""
     points: Annotated[int, Field(ge=2, le=10000)] = 100
+    """number of values between them"""
     tolerance: Annotated[float, BeforeValidator(_float), Field(ge=1e-10, le=1e-2)] = 1e-7
+    """largest relative error of a root at the values held out from the basis"""
     accuracy: Annotated[float, BeforeValidator(_float), Field(ge=0, le=0.1)] = 1e-8
+    """relative, of the matrices' entries: decides which growth rates are neutral"""
     neutral: NotNegative = 0.0
+    """[1/s] growth rates below it are neutral whatever the accuracy"""
     certify: bool = True
+    """count the roots by the argument principle"""
 
     @model_validator(mode="after")
     def _has_area(self) -> StabilitySettings:
@@ -156,11 +183,17 @@ class Geometry(Model):
     """Where the body comes from: one of build (a script), cad (STEP, BREP, IGES), mesh (a file) or matrices."""
 
     build: str | None = None
+    """a Python file that draws the body with gmsh; one outside its folder, by a path or a link,
+    is refused"""
     cad: str | None = None
+    """a STEP, BREP or IGES file"""
     mesh: str | None = None
+    """a mesh file (.inp, .msh, .med, .unv, .vtu, ...) with named sets"""
     instances: Annotated[tuple[str, ...], BeforeValidator(_tuple)] = ()
+    """those instances of the deck that are this body; all if not given"""
     matrices: MatrixFiles | None = None
     parameters: dict[str, Any] = Field(default_factory=dict)
+    """table handed to the build file"""
     faces: Annotated[tuple[FaceRule, ...], BeforeValidator(_tuple)] = ()
 
     @model_validator(mode="after")
@@ -172,16 +205,17 @@ class Geometry(Model):
 
 
 class Meshing(Model):
-    """Target element size (length_unit) and local sizes by face name.
-
-    integration: of the stiffness; "reduced" is of bricks of 20 nodes, 8 points instead of 27, for what hardly changes
-    its volume.
-    """
+    """Target element size (length_unit) and local sizes by face name."""
 
     size: Annotated[Positive | None, LENGTH] = None
+    """size of the elements; chosen from the body where it is not given"""
     order: Annotated[Literal[1, 2], BeforeValidator(_whole)] = 2
+    """order of the elements; 1 is far too stiff in bending"""
     integration: Literal["full", "reduced"] = "full"
+    """of the stiffness; `"reduced"` takes 8 points in bricks of 20 nodes, which do not lock near
+    a Poisson's ratio of 0.5"""
     local: dict[str, Positive] = Field(default_factory=dict)
+    """[length_unit] table: name of a face = size there"""
 
 
 def _at_right_angles(axes: Array) -> bool:
@@ -194,15 +228,25 @@ class MaterialSettings(Model):
     """Isotropic (young, poisson) or orthotropic (young, poisson, shear as three numbers each, with axes)."""
 
     name: str = "material"
+    """for the report"""
     density: Positive
+    """[kg/m3]"""
     young: Positive | Positives
+    """[Pa] Young's modulus; orthotropic: E1, E2, E3"""
     poisson: Annotated[float, BeforeValidator(_float), Field(gt=-1, lt=0.5)] | Numbers
+    """Poisson's ratio; orthotropic: nu12, nu23, nu13"""
     shear: Positives | None = None
+    """[Pa] orthotropic only: G12, G23, G13"""
     axes: Annotated[tuple[Vector, Vector, Vector], BeforeValidator(_finite_vector)] | None = None
+    """orthotropic only: the material's three axes in body axes"""
     expansion: Number | Numbers = 0.0
+    """[1/K] thermal expansion, one or along the three material axes"""
     temperature: Positives | None = None
+    """[K] rising temperatures of `modulus_factor`"""
     modulus_factor: Positives | None = None
+    """factor on the moduli at those temperatures; linear between, constant outside"""
     unusual: bool = False
+    """silences the warnings about implausible units"""
 
     @model_validator(mode="after")
     def _consistent(self) -> MaterialSettings:
@@ -250,14 +294,14 @@ class MaterialSettings(Model):
 
 
 class ForeignMaterial(Model):
-    """The material stands elsewhere: in the mesh file itself, or in the matrices, which hold it already.
-
-    units: of the mesh file's numbers; those that go with length_unit if not given.
-    """
+    """The material stands elsewhere: in the mesh file, or in the matrices, which hold it."""
 
     source: Annotated[Literal["mesh", "matrices"], Field(alias="from")]
+    """the mesh file's own material, or materials"""
     units: UnitSystem | None = None
+    """of the mesh file; m-kg-s, mm-t-s, in-lbf-s go without saying with m, mm, in"""
     unusual: bool = False
+    """silences the warnings about implausible units"""
 
     @property
     def name(self) -> str:
@@ -277,10 +321,15 @@ class Temperature(Model):
     """Stress-free (reference) and actual temperature: uniform, a CSV file of x, y, z, T, or those of the mesh file."""
 
     source: Annotated[Literal["mesh"] | None, Field(alias="from")] = None
+    """both temperatures from the mesh file"""
     scale: Literal["C", "K"] = "C"
+    """of the mesh file's temperatures: °C or K"""
     reference: Positive = 293.15
+    """[K] free of thermal stress"""
     uniform: Positive | None = None
+    """[K] one temperature everywhere"""
     file: str | None = None
+    """[length_unit, K] CSV lines x, y, z, T; linear between, nearest outside"""
 
     @model_validator(mode="after")
     def _one_source(self) -> Temperature:
@@ -300,8 +349,11 @@ class Support(Model):
     """A face, or a point set, whose displacement is held in the named body directions."""
 
     face: FaceName
+    """face, or set of points, that is held"""
     directions: Directions = "xyz"
+    """body directions in which it is held"""
     rotations: bool | Directions = False
+    """hold rotations of its nodes too, all or some (matrices, reference nodes)"""
 
     @property
     def turns(self) -> list[int]:
@@ -314,9 +366,13 @@ class Cyclic(Model):
     """The body is one of `sectors` alike round the rotation axis; right is left turned by 2 pi / sectors."""
 
     sectors: Annotated[int, Field(ge=3, le=1000)]
+    """N, how many of this body make the ring"""
     left: FaceName = "cyclic_left"
+    """face towards the previous sector"""
     right: FaceName = "cyclic_right"
+    """face towards the next sector: the left one turned by 2 pi / N about the rotation axis"""
     nodal_diameters: NodalDiameters = "all"
+    """which to analyse, or all from 0 to N/2"""
 
     @model_validator(mode="after")
     def _possible(self) -> Cyclic:
@@ -341,23 +397,32 @@ class Cyclic(Model):
 
 
 class Rotation(Model):
-    """Rotation about an axis and the speeds to analyse.
-
-    prestress: ``nonlinear`` (equilibrium at speed by Newton, then the tangent), ``linear`` (one linear solution),
-    ``none`` (K as the book prints it in Eq. (2.3-29), with the softening term only: frequencies fall with speed).
-    """
+    """Rotation about an axis and the speeds to analyse."""
 
     axis: Direction = (0.0, 1.0, 0.0)
+    """direction of the rotor axis"""
     point: Point = (0.0, 0.0, 0.0)
+    """a point of the axis"""
     speeds_rpm: Numbers = (0.0,)
+    """[rpm] speeds to analyse, rising"""
     prestress: Literal["nonlinear", "linear", "none"] = "nonlinear"
+    """how the stiffness at speed is made, see [modes](modes.md#equilibrium-at-speed): equilibrium
+    by Newton, then the tangent; one linear solution; or as the book prints it (2.3-29), with the
+    softening term only, where frequencies fall with speed"""
     spin_softening: bool = True
+    """whether -Omega^2 M P is in K"""
     gyroscopic: bool = True
+    """whether the modes with gyroscopic coupling are computed at speed, see rotation.md"""
     engine_orders: Annotated[tuple[EngineOrder, ...], BeforeValidator(_tuple)] = ()
+    """lines of the Campbell diagram"""
     range_rpm: Annotated[tuple[NotNegative, NotNegative], BeforeValidator(_finite_vector)] | None = None
+    """[rpm] lowest and highest speed of one basis for all speeds between, see speeds.md"""
     range_points: Annotated[int, Field(ge=2, le=2000)] = 50
+    """speeds of the Campbell diagram over the range"""
     range_tolerance: Annotated[float, BeforeValidator(_float), Field(ge=1e-8, le=1e-2)] = 1e-4
+    """relative frequency error allowed at held-out speeds of the range"""
     range_stress: bool = False
+    """strain and stress modes at every speed of the range (large files)"""
 
     @model_validator(mode="after")
     def _sensible(self) -> Rotation:
@@ -372,10 +437,15 @@ class Load(Model):
     """A static load that acts at every speed: gravity (m/s2), pressure on a face (Pa), force on a face or point (N)."""
 
     kind: Literal["gravity", "pressure", "force"]
+    """a static load that acts at every speed"""
     face: FaceName | None = None
+    """of a pressure or a force"""
     point: Point | None = None
+    """of a force"""
     value: Number | None = None
+    """[Pa] of a pressure, positive into the body"""
     vector: Vector | None = None
+    """[m/s2 or N] of gravity or a force"""
 
     @model_validator(mode="after")
     def _complete(self) -> Load:
@@ -389,22 +459,30 @@ class Load(Model):
 
 
 class Closure(Model):
-    """Two faces that may touch in the static state, without friction; Newton finds where they do and how hard.
-
-    against: the face on the other side, or ``ground``, a rigid plane (through `point` with `normal` towards the body;
-    if not given, through the middle of the face).
-    """
+    """Two faces that may touch in the static state, without friction; Newton finds where they do
+    and how hard."""
 
     name: Name
+    """the contact's name in the modal file and the report"""
     face: FaceName
+    """face whose points are held apart from the other side (the finer meshed one)"""
     against: FaceName
+    """the face it meets, or `ground`, a rigid plane"""
     sector_shift: Annotated[Literal[-1, 0, 1], BeforeValidator(_whole)] = 0
+    """where that face is: next blade 1, previous -1, this body 0"""
     interference: Length = 0.0
+    """by how much the drawn faces overlap when assembled; negative: a further gap"""
     point: Point | None = None
+    """of the ground; the middle of the face if not given"""
     normal: Direction | None = None
+    """of the ground, towards the body; opposite to the face if not given"""
     modes: Literal["open", "closed"] = "open"
+    """`open`: the modes leave the contact to the friction law, its static force stays; `closed`:
+    they keep its stiffness along the normal, free to slide"""
     slide: PositiveLength | None = None
+    """how far the faces may slide on each other; 1.5 elements if not given"""
     penalty: Positive | None = None
+    """[Pa/m] only the number of iterations depends on it; chosen from the modulus if not given"""
 
     @model_validator(mode="after")
     def _sides(self) -> Closure:
@@ -418,29 +496,42 @@ class Closure(Model):
 
 
 class Bolt(Model):
-    """A tensioned bolt: `preload` (N) presses a face (under its head) and the face against it (under its nut).
-
-    against: ``ground`` for a bolt into something rigid, or the other half of a symmetric joint.
-    """
+    """A tensioned bolt: its preload presses a face (under its head) and the face against it (under
+    its nut)."""
 
     name: Name
+    """by which messages name it"""
     face: FaceName
+    """the ring under the head"""
     against: FaceName = "ground"
+    """the ring under the nut; `ground`: it goes into something rigid, or into the other half of a
+    symmetric joint"""
     preload: Positive
+    """[N] force of the bolt; keeps its direction"""
 
 
 class InterfaceSettings(Model):
     """A contact patch with the frame n, t1, t2; n points outwards."""
 
     name: Name
+    """by which cases name it"""
     face: FaceName
+    """the contact patch"""
     role: Literal["left", "right", "ground", "bolt", "load"] = "ground"
+    """see [conventions](conventions.md#frames)"""
     partner: str = ""
+    """name of the interface it faces"""
     sector_shift: Annotated[Literal[-1, 0, 1], BeforeValidator(_whole)] = 0
+    """where the partner is: next blade 1, previous -1, else 0"""
     t2: Direction | None = None
+    """direction whose projection on the patch becomes t2; if not given z, or y where the patch
+    lies across z"""
     normal: Direction | None = None
+    """outward normal of a list of nodes that does not tell it itself (matrices only)"""
     coordinates: Literal["rigid", "characteristic"] = "rigid"
+    """rigid: six; characteristic: six and the softest shapes of the patch"""
     count: Annotated[int, Field(ge=0, le=500)] = 0
+    """how many characteristic shapes"""
 
     @model_validator(mode="after")
     def _counted(self) -> InterfaceSettings:
@@ -455,12 +546,19 @@ class Excitation(Model):
     """Unit load: a force (N) at a point or over a face, `pressure` on a face (1 Pa), or `centrifugal` (1 rad2/s2)."""
 
     name: Name
+    """by which cases name it"""
     point: Point | None = None
+    """where a unit force acts"""
     node: NodeNumber | None = None
+    """or the number of a node in the mesh file"""
     face: FaceName | None = None
+    """or the face over which it is spread"""
     direction: Direction | None = None
+    """of the force; its length does not matter"""
     pressure: bool = False
+    """a unit pressure (1 Pa) on the face instead"""
     centrifugal: bool = False
+    """the centrifugal force on the whole body per (rad/s)^2 about the [rotation] axis"""
 
     @model_validator(mode="after")
     def _one_kind(self) -> Excitation:
@@ -480,13 +578,20 @@ class Monitor(Model):
     """Displacement read-out along body directions at a point, or the angle by which points turn about an axis."""
 
     name: Name
+    """by which cases name it"""
     point: Point | None = None
+    """where displacements are read"""
     node: NodeNumber | None = None
+    """or the number of a node in the mesh file"""
     directions: Directions = "xyz"
+    """body directions"""
     points: (
         Annotated[tuple[Point, ...], BeforeValidator(_tuple), Field(min_length=2, max_length=1000), LENGTH] | None
     ) = None
+    """or places that turn: read is the angle, rad, about `axis` of the rigid motion that fits
+    them best; two read the difference of their displacements over their distance"""
     axis: Direction | None = None
+    """of that angle, right-handed; neither its length nor its place matters"""
 
     @model_validator(mode="after")
     def _one_place(self) -> Monitor:
@@ -504,26 +609,37 @@ class Gauge(Model):
     """Strain gauge: normal strain along `direction` at a point."""
 
     name: Name
+    """by which cases name it"""
     point: Point
+    """where the strain is read"""
     direction: Direction
+    """of the strain gauge"""
 
 
 class Modes(Model):
-    """How many modes, or up to which frequency (Hz; count is then the upper limit)."""
+    """How many modes, or up to which frequency."""
 
     count: Annotated[int, Field(ge=1, le=2000)] = 20
+    """how many modes"""
     max_frequency: Positive | None = None
+    """[Hz] only modes below it; `count` is then the upper limit"""
     certify: bool = True
+    """prove by an inertia count that none is missing"""
     solver: Literal["auto", "pardiso", "superlu"] = "auto"
+    """sparse direct solver, see [platforms](platforms.md)"""
 
 
 class Damping(Model):
     """Modal damping: one ratio, a table of ratios per mode, or Rayleigh D = alpha M + beta K (Sextro Eq. (2.4-3))."""
 
     ratio: Ratio | None = None
+    """one damping ratio D for all modes"""
     table: Ratios | None = None
+    """a ratio per mode; the last one serves all further modes"""
     alpha: NotNegative | None = None
+    """[1/s] Rayleigh damping alpha M + beta K"""
     beta: NotNegative | None = None
+    """[s] Rayleigh damping"""
 
     @model_validator(mode="after")
     def _one_source(self) -> Damping:
@@ -556,12 +672,19 @@ class Output(Model):
     """What the modal file holds beside frequencies and rows."""
 
     shapes: bool = True
+    """mode shapes at all nodes"""
     patch_shapes: bool = True
+    """mode shapes at the points of contact and load faces"""
     gauss: bool = True
+    """strain and stress modes at integration points (the largest part of the file)"""
     nodal_stress: bool = True
+    """strain and stress modes smoothed to the nodes"""
     stiffening: bool = False
+    """whether the modal file holds how large rigid motion stiffens the body, see rotation.md"""
     stress_nodal_diameters: NodalDiameters = "all"
+    """nodal diameters whose stress modes are kept (a file grows by them)"""
     shape_nodal_diameters: NodalDiameters = "all"
+    """nodal diameters whose shapes, of body and patches, are kept"""
 
     @model_validator(mode="after")
     def _possible(self) -> Output:
@@ -582,12 +705,18 @@ class BodySettings(Model):
     """A whole body.toml."""
 
     name: Name
+    """names the products: `meshes/NAME.msh`, `build/NAME/`, of no other body of the name"""
     description: str = ""
+    """one line for the report"""
     length_unit: Literal["m", "cm", "mm", "um", "in", "ft"]
+    """unit of every length in this file and of the mesh or CAD file"""
     reduction: Literal["eigenmodes", "macneal", "rubin", "craig-bampton", "dual-craig-bampton", "massless-boundary"] = (
         "eigenmodes"
     )
+    """method of reduction, see reduction.md"""
     free: bool = False
+    """the body is meant to float; rigid motions are kept, [at speed](rotation.md#free-bodies)
+    too"""
     geometry: Geometry
     mesh: Meshing = Field(default_factory=Meshing)
     material: AnyMaterial
@@ -607,8 +736,12 @@ class BodySettings(Model):
     output: Output = Field(default_factory=Output)
     parameters: Annotated[tuple[MatrixTerm, ...], BeforeValidator(_tuple)] = ()
     values: dict[Name, Number] = Field(default_factory=dict)
+    """table: name of a parameter = its value, 1 if not given; the speed stands in
+    rotation.speeds_rpm"""
     stability: StabilitySettings | None = None
     note: str = ""
+    """a remark that `modes` and the report repeat; `import` says here what it left out of a mesh
+    file"""
 
     @model_validator(mode="before")
     @classmethod
@@ -703,17 +836,13 @@ def to_metres(model: Any, scale: float) -> Any:
         value = getattr(model, name)
         if name == "area":
             update[name] = _scaled(value, scale**2)
-        elif _is_length(field):
+        elif is_length(field):
             update[name] = _scaled(value, scale)
         elif name == "local":
             update[name] = {k: v * scale for k, v in value.items()}
         else:
             update[name] = to_metres(value, scale)
     return model.model_copy(update=update)
-
-
-def _is_length(field: Any) -> bool:
-    return LENGTH in field.metadata or f"'{LENGTH}'" in str(field.annotation)
 
 
 def _scaled(value: Any, scale: float) -> Any:

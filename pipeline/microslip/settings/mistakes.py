@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +11,7 @@ import numpy as np
 from pydantic import BaseModel, ValidationError
 
 from ..errors import UserError, of_file
-from .numbers import BEYOND, OfFile
+from .numbers import BEYOND, OfFile, keys_of
 
 _WORDS = {
     "float_type": "must be a number",
@@ -153,10 +153,14 @@ def _sentences(errors: list[Any], raw: dict[str, Any], model: type[BaseModel]) -
         yield f"{_written(table, raw)}: {', '.join(odd)} cannot stand beside {rest}; keep one of the two ways"
     for key, found in by_key.items():
         if found[0][1]["type"] != "extra_forbidden" and not (found[0][1]["type"] == "missing" and key in meant):
-            yield _sentence(key, found, raw)
+            unit, _ = known[key].get(key[-1] if key else "", ("", ""))
+            unit = unit if "length_unit" in model.model_fields else unit.replace("length_unit", "m")
+            said = _sentence(key, found, raw)
+            bare = not unit or not said.endswith((" add it", " correct it"))
+            yield said if bare else f"{said}, in {unit}"
 
 
-def _close(key: str, known: list[str]) -> list[str]:
+def _close(key: str, known: Iterable[str]) -> list[str]:
     """The known key that may be meant, if any; R_Z for Rz too."""
     plain = {k.replace("_", "").lower(): k for k in known}
     same = plain.get(key.replace("_", "").lower())
@@ -206,7 +210,7 @@ def _label(items: list[Any], number: int) -> str:
     return str(number)
 
 
-def _hint(key: tuple[Any, ...], close: list[str], known: list[str], model: type[BaseModel]) -> str:
+def _hint(key: tuple[Any, ...], close: list[str], known: Iterable[str], model: Any) -> str:
     if close:
         return f"did you mean '{close[0]}'?"
     homes = sorted(table for table, keys in _tables(model) if key[-1] in keys)
@@ -331,11 +335,12 @@ def _shown(value: Any) -> str:
     return text if len(text) <= 60 else text[:57] + "..."
 
 
-def _known_keys(model: Any, place: tuple[Any, ...], raw: Any = None) -> list[str]:
+def _known_keys(model: Any, place: tuple[Any, ...], raw: Any = None) -> dict[Any, tuple[str, str]]:
+    """Key -> unit and meaning, of the table at a place."""
     for number, step in enumerate(place):
         if isinstance(step, str) and step in getattr(model, "model_fields", {}):
             model = _chosen(model.model_fields[step].annotation, _at(raw, place[: number + 1])) or model
-    return [field.alias or name for name, field in getattr(model, "model_fields", {}).items()]
+    return keys_of(model) if hasattr(model, "model_fields") else {}
 
 
 def _chosen(annotation: Any, table: Any) -> Any:

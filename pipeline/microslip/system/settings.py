@@ -31,73 +31,105 @@ Six = Annotated[Numbers | Number, Field(union_mode="left_to_right")]
 
 
 class MassSettings(Model):
-    """A point mass: kg, place in m, directions it is free in."""
+    """A point mass."""
 
     name: Name
+    """of the component"""
     mass: NotNegative = 0.0
+    """[kg]"""
     at: Vector = (0.0, 0.0, 0.0)
+    """[m] where it is"""
     free: str = "xyz"
+    """directions it can move in, `x` or `xz`"""
 
 
 class BodyOfSystem(Model):
-    """A rigid body: inertia about its centre of mass, three principal values along x, y, z, kg m2."""
+    """A rigid body."""
 
     name: Name
+    """of the component"""
     mass: Positive
+    """[kg]"""
     inertia: Annotated[tuple[Positive, Positive, Positive], BeforeValidator(_finite_vector)]
+    """[kg m2] about its centre of mass, principal values along x, y, z"""
     at: Vector = (0.0, 0.0, 0.0)
+    """[m] centre of mass"""
     free: str | None = None
+    """directions it can move in, such as `x z ry`; all if not given"""
 
 
 class LinkSettings(Model):
     """What springs and dampers have in common."""
 
     between: Annotated[tuple[Name, Name], BeforeValidator(_tuple)]
+    """two components, or one and `ground`"""
     axis: Direction | None = None
+    """along which it acts; the line between the components if not given, or the one direction in
+    which one is free"""
     at: Vector | None = None
+    """[m] where it acts on both; at each component's centre if not given"""
 
 
 class SpringSettings(LinkSettings):
-    """One stiffness along the axis, three along x, y, z, or six."""
+    """A spring."""
 
     stiffness: Six
+    """[N/m or N m/rad] one number along the axis, three along x, y, z, or six with those about
+    them"""
 
 
 class DamperSettings(LinkSettings):
-    """One damping along the axis, three along x, y, z, or six."""
+    """A damper."""
 
     damping: Six
+    """[N s/m or N m s/rad] likewise"""
 
 
 class ContactOfSystem(Model):
-    """See `Contact`."""
+    """A place of a component where it rubs."""
 
     name: Name
+    """by which cases name it"""
     on: Name
+    """its component"""
     normal: Direction
+    """out of the component"""
     t2: Direction | None = None
+    """direction whose projection becomes t2; an axis at right angles if not given"""
     at: Vector | None = None
+    """[m] the component's centre if not given"""
     width: NotNegative = 0.0
+    """[m] of the patch along t1"""
     height: NotNegative = 0.0
+    """[m] of the patch along t2"""
     role: Literal["left", "right", "ground", "bolt"] = "ground"
+    """as of a body's [interface](body_toml.md#interfaces)"""
     partner: str = ""
+    """name of the interface it faces"""
 
 
 class ForceSettings(Model):
-    """See `Force`."""
+    """A unit force."""
 
     name: Name
+    """by which cases name it"""
     on: Name
+    """its component"""
     direction: Direction
+    """of the unit force; its length does not matter"""
     at: Vector | None = None
+    """[m] the component's centre if not given"""
 
 
 class MonitorSettings(Model):
-    """See `Monitor`."""
+    """Where displacements are read."""
 
     name: Name
+    """by which cases name it"""
     on: Name
+    """its component"""
     at: Vector | None = None
+    """[m] the component's centre if not given"""
 
 
 Square = Annotated[tuple[Numbers, ...], BeforeValidator(_tuple)]
@@ -107,15 +139,20 @@ class MatrixSettings(Model):
     """Rows of M, K and C over the free directions of the components, in their order."""
 
     mass: Square
+    """M"""
     stiffness: Square
+    """K"""
     damping: Square | None = None
+    """C"""
 
 
 class SystemSettings(Model):
     """A whole system.toml (SI, lengths in m)."""
 
     name: Name
+    """names the folder of the products, `build/NAME/`"""
     description: str = ""
+    """one line for the report"""
     masses: Annotated[tuple[MassSettings, ...], BeforeValidator(_tuple)] = ()
     bodies: Annotated[tuple[BodyOfSystem, ...], BeforeValidator(_tuple)] = ()
     springs: Annotated[tuple[SpringSettings, ...], BeforeValidator(_tuple)] = ()
@@ -125,6 +162,7 @@ class SystemSettings(Model):
     forces: Annotated[tuple[ForceSettings, ...], BeforeValidator(_tuple)] = ()
     monitors: Annotated[tuple[MonitorSettings, ...], BeforeValidator(_tuple)] = ()
     damping_ratio: Ratio = 0.0
+    """of every mode, added to what dampers make"""
 
     @model_validator(mode="after")
     def _names_once(self) -> SystemSettings:

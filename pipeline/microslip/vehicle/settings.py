@@ -28,77 +28,97 @@ Inertia = Annotated[tuple[Positive, Positive, Positive], BeforeValidator(_tuple)
 
 
 class VehicleOfCase(Model):
-    """A wheelset and its primary suspension to a frame that moves straight on.
-
-    Attributes:
-        load: of the axle on both rails as it stands, its own weight included, N. mass: of the wheelset, kg. inertia:
-            of roll, spin and yaw, kg m2. suspension_stiffness, suspension_damping: of each side, along x, y, z, N/m and
-            N s/m. suspension_at: of each side from the middle, m.
-    """
+    """A wheelset and its primary suspension to a frame that moves straight on."""
 
     load: Positive
+    """[N] of the axle on both rails as it stands, its own weight included"""
     mass: Positive
+    """[kg] of the wheelset"""
     inertia: Inertia
+    """[kg m2] of roll, spin and yaw"""
     suspension_stiffness: Three
+    """[N/m] of each side, along x, y, z"""
     suspension_damping: Three = (0.0, 0.0, 0.0)
+    """[N s/m] likewise"""
     suspension_at: Positive = 1.0
+    """[m] of each side from the middle"""
 
 
 class TrackOfCase(Model):
-    """What of a rail moves with a wheel. Attributes: mass: kg. stiffness: N/m. damping: N s/m. Of each rail."""
+    """What of each rail moves with a wheel."""
 
     mass: Positive
+    """[kg]"""
     stiffness: Positive
+    """[N/m]"""
     damping: NotNegative
+    """[N s/m]"""
 
 
 class RunningOfCase(Model):
-    """speed: m/s. turns: of the wheels. torque: on the axle, N m. reach: lateral, m, for which contacts are known.
-    places: over the circumference. creep: forces of the motion. speeds: at which growth is looked for, m/s."""
+    """How it runs."""
 
     speed: Positive
+    """[m/s]"""
     turns: Annotated[Positive, Field(le=1e9)]
+    """of the wheels"""
     torque: Number = 0.0
+    """[N m] on the axle"""
     reach: Annotated[Positive, Field(le=0.05)] = 0.006
+    """[m] lateral, for which contacts are known"""
     places: Annotated[int, Field(ge=24, le=1440)] = 180
+    """over the circumference"""
     creep: Literal["table", "strips", "linear"] = "table"
+    """forces of the motion, see [vehicle](unround_wheels.md#the-vehicle)"""
     speeds: Annotated[tuple[Positive, ...], BeforeValidator(_tuple)] = ()
+    """[m/s] at which growth is looked for"""
     orders: Annotated[int, Field(ge=1, le=100)] = 20
+    """up to which waves over the circumference are looked at"""
 
 
 class Unround(Model):
-    """A wave of a wheel's radius. Attributes: order: waves over the circumference. amplitude: m. angle: of the first
-    crest after the mark, rad."""
+    """A wave of a wheel's radius."""
 
     wheel: Literal["right", "left", "both"] = "both"
+    """whose"""
     order: Annotated[int, Field(ge=1, le=100)]
+    """waves over the circumference"""
     amplitude: Annotated[Positive, Field(le=5e-3)]
+    """[m]"""
     angle: Number = 0.0
+    """[rad] of the first crest after the mark"""
 
 
 class WearOfTurns(WearOfBody):
-    """tolerance: of the radius, of each jump over many turns, m. profile: whether wheels touch by the profile that they
-    have worn to, or by that of new ones."""
+    """What turns wear."""
 
     tolerance: Positive = 1e-7
+    """[m] of the radius, of each jump over many turns"""
     profile: Literal["renewed", "kept"] = "renewed"
+    """whether wheels touch by the profile that they have worn to, or by that of new ones"""
 
 
 class KinematicsOfCase(Model):
-    """file: what another program wrote of a wheel's running, see `kinematics.read_kinematics`. side: of the wheel.
-    turns: over which it wears. places: over the circumference."""
+    """How a wheel runs, from another program; see `kinematics.read_kinematics`."""
 
     file: FileName
+    """what another program wrote of a wheel's running, see
+    [kinematics](unround_wheels.md#kinematics-of-another-program)"""
     side: Literal["right", "left"] = "right"
+    """of the wheel"""
     turns: Annotated[Positive, Field(le=1e9)]
+    """over which it wears"""
     places: Annotated[int, Field(ge=24, le=1440)] = 180
+    """over the circumference"""
 
 
 class KinematicsCase(Model):
-    """friction: coefficient."""
+    """A wheel whose running is known."""
 
     name: Name
+    """names the folder of the products, `build/NAME/`"""
     friction: Positive
+    """coefficient"""
     wheel: Wheel
     rail: Rail
     kinematics: KinematicsOfCase
@@ -107,10 +127,12 @@ class KinematicsCase(Model):
 
 
 class VehicleCase(Model):
-    """friction: coefficient."""
+    """A small vehicle on unround wheels."""
 
     name: Name
+    """names the folder of the products, `build/NAME/`"""
     friction: Positive
+    """coefficient"""
     wheel: Wheel
     rail: Rail
     vehicle: VehicleOfCase

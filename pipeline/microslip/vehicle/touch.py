@@ -69,7 +69,7 @@ def touching(track: Track, load: float, reach: float, points: int = 33) -> Touch
         try:
             half.append(_standing(track, load, v))
         except UserError as error:
-            less = "" if str(error).startswith("running.reach") else "; or take a smaller running.reach"
+            less = "" if error.key == "running.reach" else "; or take a smaller running.reach"
             raise UserError(f"at {1e3 * v:.3g} mm of lateral displacement: {error}{less}") from error
     # what the right wheel has at y the left one has at -y, mirrored
     right = [_mirrored(one[1]) for one in half[:0:-1]] + [one[0] for one in half]
@@ -99,8 +99,9 @@ def _one(track: Track, load: float, y: float, roll: float, side: Side) -> tuple[
     found = patches(track, Pose(y, 0.0, roll), side, load)
     if len(found) > 1 and found[1].normal_force > 0.5 * found[0].normal_force:
         raise UserError(
-            f"running.reach: at {1e3 * y:.3g} mm the {side} wheel runs on two patches at once; a motion in time knows "
-            "one, so take less"
+            f"at {1e3 * y:.3g} mm the {side} wheel runs on two patches at once; a motion in time "
+            "knows one, so take less",
+            "running.reach",
         )
     return found[0], side
 

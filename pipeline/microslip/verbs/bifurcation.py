@@ -34,35 +34,45 @@ Values = Annotated[tuple[Number, ...], BeforeValidator(_finite_vector)]
 
 
 class Keys(Model):
-    """A diagram of equilibria and periodic orbits over a parameter, by `microslip bifurcate`.
-
-    name: of its files. parameter: what its axis says, in unit. keys: of this case, dotted, which follow the parameter,
-    each with the factor that makes its value of it; those that begin with ``system.`` are keys of the system.toml.
-    fixed: other keys and their values, of this diagram alone. start, stop: of the parameter. orbits: whether those born
-    at Hopf points are followed, doublings: how often from an orbit to the one of twice its period. attractors: values
-    of the parameter at which `starts` motions, drawn from `seed`, are left to themselves, to find what they lead to.
-    deflate: values at which orbits are looked for beside what is known. nodes: of an orbit, doubled with its period.
-    step: the longest, a share of start to stop. points: of a branch.
-    frequency: Hz of the first harmonic of the excitations, where there are any.
-    """
+    """A diagram of equilibria and periodic orbits over a parameter, by `microslip bifurcate`."""
 
     name: Name
+    """of the diagram's files"""
     parameter: str
+    """what its axis says"""
     unit: str = ""
+    """of the parameter, on the axis"""
     keys: dict[str, Number]
+    """keys of this case, dotted, that follow the parameter, each with the factor that makes its
+    value; `system.` begins those of a system.toml"""
     fixed: dict[str, Number] = {}
+    """other keys and their values, of this diagram alone"""
     start: Number
+    """of the parameter"""
     stop: Number
+    """of it; may be the smaller one"""
     orbits: bool = True
+    """whether the orbits born at Hopf points are followed"""
     doublings: Annotated[int, Field(ge=0, le=8)] = 1
+    """how often from an orbit on to that of twice its period"""
     attractors: Values = ()
+    """values of the parameter at which motions from many starts are left alone, to find orbits
+    that coexist"""
     starts: Annotated[int, Field(ge=1, le=10000)] = 64
+    """how many"""
     seed: Annotated[int, Field(ge=0)] = 0
+    """from which they are drawn"""
     deflate: Values = ()
+    """values of the parameter at which orbits, stable or not, are looked for beside all that is
+    known"""
     nodes: Annotated[int, Field(ge=4, le=1024)] = 32
+    """of an orbit, from which it is shot; doubled with its period"""
     step: Annotated[Positive, Field(le=0.5)] = 0.08
+    """the longest along a branch, a share of start to stop"""
     points: Annotated[int, Field(ge=2, le=100000)] = 400
+    """of a branch at most"""
     frequency: Positive | None = None
+    """[Hz] of the first harmonic of the excitations, where there are any"""
 
     @model_validator(mode="after")
     def _somewhere(self) -> Keys:

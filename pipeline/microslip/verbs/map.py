@@ -38,15 +38,14 @@ BESIDE = 3.0
 
 
 class Keys(Model):
-    """A map of the amplitude over frequency and normal force, by `microslip map`.
-
-    low, high: N, of the normal force; the smallest above 0 and the largest of the sweep if not given. forces: how many,
-    in equal ratios; more are added where the highest resonance is lowest. Frequencies are those of the sweep.
-    """
+    """A map of the amplitude over the sweep's frequencies and normal force, by `microslip map`."""
 
     low: Positive | None = None
+    """[N] the first normal force; the smallest above 0 of the sweep if not given"""
     high: Positive | None = None
+    """[N] the last; the largest of the sweep if not given"""
     forces: Annotated[int, Field(ge=3, le=10000)] = 16
+    """how many, in equal ratios; more are added beside the lowest resonance"""
 
     @model_validator(mode="after")
     def _rising(self) -> Keys:

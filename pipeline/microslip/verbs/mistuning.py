@@ -52,31 +52,36 @@ def _share(value: Any) -> Any:
 
 
 class ScatterKeys(Model):
-    """What differs from sector to sector of a ring.
-
-    of: ``frequency`` or ``damping`` of a body's modes, its ``mass``, ``added_mass`` (kg) at a monitor, ``modal_file``;
-    ``normal_force``, ``gap`` (m), ``friction`` or ``stiffness`` of a contact. deviation: standard deviation, a share of
-    the nominal value or in kg or m. distribution: of it; the median of ``lognormal`` is nominal. values: deviations
-    that are known, repeated round the ring; file: a .csv with the column ``deviation``, or ``frequency_Hz`` whose mean
-    is nominal; others: sector -> modal file beside the case. arrangement: of them, as ``given``, ``shuffled`` or
-    ``drawn`` in every sample. body, contact: whose, its interface. at: monitor of added_mass. together: correlation of
-    the modes of a body, 0 each alone. neighbours: correlation from a sector to the next one.
-    """
+    """What differs from sector to sector of a ring."""
 
     of: Literal[
         "frequency", "damping", "mass", "added_mass", "modal_file", "normal_force", "gap", "friction", "stiffness"
     ]
+    """of a body's modes, its mass, `added_mass` at a monitor or `modal_file`; or of a contact"""
     deviation: NotNegative = 0.0
+    """standard deviation, a share of the nominal value; of `added_mass` kg, of `gap` m"""
     distribution: Literal["normal", "lognormal", "uniform"] = "normal"
+    """the median of a lognormal one is nominal"""
     values: Annotated[tuple[Number, ...], BeforeValidator(_finite_vector)] = ()
+    """or deviations that are known, sector by sector; a shorter pattern is repeated"""
     file: str | None = None
+    """or a table with the column `deviation`, or `frequency_Hz`, whose mean is nominal; in the
+    order of its rows, or of its column `blade` or `sector`"""
     others: dict[str, str] = {}
+    """or sectors, from 0, that have another modal file, and the file (`{ 3 = "repaired.h5" }`),
+    of `modal_file`"""
     arrangement: Literal["given", "shuffled", "drawn"] = "given"
+    """of the known values: as given, in another order in every sample, or each drawn from them"""
     body: str | None = None
+    """whose; may be left out where there is one"""
     contact: str | None = None
+    """its interface; may be left out where there is one"""
     at: str | None = None
+    """monitor at which `added_mass` sits"""
     together: Annotated[Number, Field(ge=0, le=1)] = 1.0
+    """correlation between the modes of a body; 0: each alone"""
     neighbours: Annotated[Number, Field(ge=-1, le=1)] = 0.0
+    """correlation between a sector and the next one"""
 
     @model_validator(mode="after")
     def _one_of_three(self) -> ScatterKeys:
@@ -93,23 +98,23 @@ class ScatterKeys(Model):
 
 
 class Keys(Model):
-    """Samples of the whole ring with sectors that differ, by `microslip mistune`.
-
-    scatter: what differs. samples: at most. until: a run ends when the interval of the 95 % quantile is as narrow, half
-    of it over the quantile. rare: further samples, chosen by a linear ring, for the 99.9 % quantile. seed: of all
-    random numbers. stuck: contacts stick, which is linear. normal_force: N, of
-    the contacts that the sweep presses; the smallest of the sweep if not given. workers: processes,
-    as many as there are cores if not given; samples are the same for any number.
-    """
+    """Samples of the whole ring with sectors that differ, by `microslip mistune`."""
 
     scatter: Annotated[tuple[ScatterKeys, ...], BeforeValidator(_tuple), Field(min_length=1)]
     samples: Annotated[int, Field(ge=1, le=100000000)] = 100
+    """whole rings that are solved, at most"""
     until: Annotated[Positive, Field(le=1), BeforeValidator(_share)] | None = None
+    """ends when half of the interval of the 95 % quantile is that share of it"""
     rare: Annotated[int, Field(ge=0, le=1000000)] = 0
+    """further samples, chosen by a linear ring, for the 99.9 % quantile; none if 0"""
     seed: Annotated[int, Field(ge=0)] = 0
+    """of all random numbers; a sample depends on it and its number alone"""
     stuck: bool = False
+    """whether contacts stick, which is linear"""
     normal_force: NotNegative | None = None
+    """[N] of the contacts that the sweep presses; its smallest if not given"""
     workers: Annotated[int, Field(ge=1, le=1024)] | None = None
+    """processes; as many as there are cores if not given, samples are the same for any number"""
 
 
 def solve(q: Question) -> Answer:

@@ -42,18 +42,18 @@ Several = Annotated[tuple[Positive, ...], BeforeValidator(_several, json_schema_
 
 
 class RunUp(Model):
-    """An excitation whose frequency goes linearly from one to another, up or down.
-
-    start, stop: Hz, of the first harmonic. time: s, from one to the other. engine_order: of the first harmonic; the
-    rotation speed is the frequency over it, and centrifugal excitations (speed_rpm) follow its square. euler: bodies
-    that turn with it and feel its change as a load in their frame.
-    """
+    """An excitation whose frequency goes linearly from one to another, up or down."""
 
     start: Positive
+    """[Hz] of the first harmonic, instead of `frequency`"""
     stop: Positive
+    """[Hz] to here, up or down"""
     time: Positive
+    """[s] within this time"""
     engine_order: Annotated[int, Field(ge=1, le=1000)] = 1
+    """the rotation speed is the frequency over it; centrifugal loads follow its square"""
     euler: Annotated[tuple[str, ...], BeforeValidator(_tuple)] = ()
+    """bodies that turn with it, which feel its change as a load in their frame"""
 
     @model_validator(mode="after")
     def _apart(self) -> RunUp:
@@ -63,40 +63,44 @@ class RunUp(Model):
 
 
 class Release(Model):
-    """Where the bodies of a motion in time are let go.
-
-    displacement: of the coordinates of all bodies, those of their modes, one body after the other. velocity: of them.
-    mode: number of a mode of the bodies without their contacts. amplitude: of the first monitor in it.
-    """
+    """Where the bodies of a motion in time are let go."""
 
     displacement: Annotated[tuple[Number, ...], BeforeValidator(_finite_vector)] | None = None
+    """[m] where the bodies are let go, instead of `start`: coordinates of all of them, those of
+    their modes, one body after the other, zero if not given"""
     velocity: Annotated[tuple[Number, ...], BeforeValidator(_finite_vector)] | None = None
+    """[m/s] of these coordinates"""
     mode: Annotated[int, Field(ge=1)] | None = None
+    """or a mode of the bodies without their contacts, by its number from 1"""
     amplitude: Number | None = None
+    """[m] of the first monitor in that mode"""
 
 
 class Keys(Model):
     """The motion in time from a start, by `microslip orbit`.
 
-    frequency: Hz, or Omega: rad/s, of the first harmonic of the excitations: one, or several to look at one after the
-    other; or run_up, all of which is kept, in samples and steps of a period of its highest frequency. settle: periods
-    that are left to themselves. keep: periods that are kept. samples: of each. steps: of each, if not given as many as
-    the fastest motion with closed contacts needs. start: at rest, ``static`` under the steady
-    loads, ``rest`` as preloaded; or ``balance``, on the vibration that harmonic balance finds with the case's
-    harmonics. release: where the bodies are let go, instead of start. normal_force: N, of the
-    contacts that the sweep presses.
+    A run-up is kept whole, in samples and steps of a period of its highest frequency.
     """
 
     frequency: Several | None = None
+    """[Hz] of the first harmonic of the excitations: one or several, one motion each"""
     Omega: Several | None = None
+    """[rad/s] or so"""
     run_up: RunUp | None = None
     settle: Annotated[int, Field(ge=0, le=1000000)] = 300
+    """periods that are left to themselves"""
     keep: Annotated[int, Field(ge=1, le=100000)] = 40
+    """periods that are kept"""
     samples: Annotated[int, Field(ge=8, le=8192)] = 256
+    """of each that is kept"""
     steps: Annotated[int, Field(ge=1, le=100000000)] | None = None
+    """of each; if not given, 150 in a period of the fastest motion with closed contacts, and 512
+    at least"""
     start: Literal["static", "rest", "balance"] = "static"
+    """at rest under the steady loads, or as preloaded; or on the vibration of harmonic balance"""
     release: Release | None = None
     normal_force: NotNegative | None = None
+    """[N] of the contacts that the sweep presses"""
 
     @model_validator(mode="after")
     def _one_of_both(self) -> Keys:

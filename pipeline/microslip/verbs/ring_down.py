@@ -49,22 +49,25 @@ LOW = 30.0
 
 
 class Keys(Model):
-    """A vibration that dies away, by `microslip ring-down`.
-
-    frequency: Hz, at which the case is driven until its loads are taken off; the highest resonance in the sweep's band
-    if not given. amplitude: of the first read-out, m: the motion begins in the nonlinear mode instead, where that has
-    this amplitude. mode: number of the mode with sticking contacts that is compared, 1 the lowest; the one that answers
-    the excitation most in the sweep's band if not given. normal_force: N, instead of all those of the sweep. down_to:
-    share of the first amplitude at which it ends. periods: at most. samples: of a period.
-    """
+    """A vibration that dies away, by `microslip ring-down`."""
 
     frequency: Positive | None = None
+    """[Hz] at which the case is driven until its loads are taken off; the highest resonance in
+    the sweep's band if not given"""
     amplitude: Positive | None = None
+    """[m] of the first read-out: the motion begins in the nonlinear mode instead, where that has
+    it"""
     mode: Annotated[int, Field(ge=1, le=2000)] | None = None
+    """with sticking contacts, 1 the lowest, that is compared; the one that answers the excitation
+    most in the sweep's band if not given"""
     normal_force: NotNegative | None = None
+    """[N] instead of all those of the sweep"""
     down_to: Annotated[Positive, Field(le=0.5)] = 0.01
+    """share of the first amplitude at which it ends"""
     periods: Annotated[int, Field(ge=2 * WINDOW, le=1000000)] = 5000
+    """at most"""
     samples: Annotated[int, Field(ge=16, le=4096)] = 64
+    """of a period"""
 
 
 def solve(q: Question) -> Answer:

@@ -40,19 +40,20 @@ from ..system.assembly import Assembly
 
 
 class Keys(Model):
-    """Roots of the assembly about its steady sliding, by `microslip stability`: all that grow, and those of a window.
-
-    frequency: Hz and growth: 1/s, from and to, of the window. accuracy, neutral: as of a body's [stability]. over: two
-    parameters of a map of how many roots grow, and how fast the fastest. full: states of the map, evenly spread, at
-    which the unreduced matrices are counted as well. cycle: the limit cycles that follow.
-    """
+    """Roots of the assembly about its steady sliding, by `microslip stability`: all that grow, and
+    those of a window."""
 
     growth: Annotated[tuple[Number, Number], BeforeValidator(_finite_vector)] = (-1000.0, 10000.0)
+    """[1/s] from, to, of the roots that are wanted ([squeal](squeal.md))"""
     frequency: Pair
+    """[Hz] from, to"""
     accuracy: Annotated[Number, Field(ge=0, le=0.1)] = 1e-8
+    """relative, of the entries of the matrices: decides which growth rates are neutral"""
     neutral: NotNegative = 0.0
+    """[1/s] growth rates below it are neither growth nor decay"""
     over: Annotated[tuple[Over, ...], BeforeValidator(_tuple)] = ()
     full: Annotated[int, Field(ge=0, le=1000)] = 0
+    """states of the map, evenly spread, at which the unreduced matrices are counted as well"""
     cycle: Cycle | None = None
 
     @model_validator(mode="after")

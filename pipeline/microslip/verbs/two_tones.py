@@ -35,23 +35,29 @@ READ_AS = (
 
 
 class Keys(Model):
-    """Quasi-periodic vibration under loads of two frequencies without a common period, by `microslip two-tones`.
-
-    start: Hz, of the first tone; to stop in so many points, equally spaced. second: Hz, held, or ratio: of the second
-    to the first frequency; of excitations with ``tone = 2``, or where free of a self-excited vibration whose frequency
-    is not known: a guess within 15 %. harmonics: pairs (k1, k2) with |k1| + |k2| up to that are balanced. samples: of a
-    turn of the faster angle. turns: of it in the line along which contacts that remember are marched.
-    """
+    """Quasi-periodic vibration under loads of two frequencies without a common period, by
+    `microslip two-tones`."""
 
     start: Positive
+    """[Hz] of the first tone"""
     stop: Positive | None = None
+    """[Hz] if several points are asked for"""
     points: Annotated[int, Field(ge=1, le=100000)] = 1
+    """equally spaced"""
     second: Positive | None = None
+    """[Hz] of the second tone, of excitations with `tone = 2`, held; a guess within 15 % where it
+    is `free`"""
     ratio: Positive | None = None
+    """or of the second to the first frequency"""
     free: bool = False
+    """whether the second frequency is that of a vibration of its own, and not known"""
     harmonics: Annotated[int, Field(ge=1, le=60)] = 5
+    """pairs (k1, k2) with abs(k1) + abs(k2) up to that are balanced"""
     samples: Annotated[int, Field(ge=8, le=100000)] | None = None
+    """of a turn of the faster angle; 8 a harmonic and 32 at least if not given"""
     turns: Annotated[int, Field(ge=8, le=10000)] | None = None
+    """of the faster angle, at least, in the line along which contacts that remember are marched;
+    8 a harmonic and 32 at least if not given"""
 
     @model_validator(mode="after")
     def _two(self) -> Keys:
