@@ -18,7 +18,7 @@ from importlib import import_module
 from importlib.metadata import entry_points
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, TypeGuard
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -183,10 +183,7 @@ class Verb(NamedTuple):
 def verb_of(name: str) -> Verb:
     """The verb of an analysis, whose module is not loaded."""
     tree = ast.parse(file_of(name).read_text(encoding="utf-8"))
-    keys = {k.arg: k.value for call in ast.walk(tree) if _makes(call) for k in call.keywords}
+    made = [n.value for n in tree.body if isinstance(n, ast.Assign) and ast.unparse(n.targets[0]) == "ANALYSIS"]
+    keys = {k.arg: k.value for call in made for k in getattr(call, "keywords", ())}
     verb, options = (ast.literal_eval(keys[key]) if key in keys else None for key in ("verb", "options"))
     return Verb(verb or name.replace("_", "-"), ast.get_docstring(tree) or name, options or {})
-
-
-def _makes(node: ast.AST) -> TypeGuard[ast.Call]:
-    return isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == Analysis.__name__

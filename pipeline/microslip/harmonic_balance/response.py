@@ -30,7 +30,6 @@ from .solver import Report, solve, sweep
 from .solver import newton as newton
 from .sweeps import FrequencyResponse, brackets, ends, inside, resonances, still
 
-
 ROUNDED = 1e-14
 """Of the energy that the loads would exchange without what the contacts take off the motion, rounding leaves this:
 a stop of 1e12 N/m that a steady force keeps closed takes all but a millionth of it off, and is lossless."""
