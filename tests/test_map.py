@@ -25,6 +25,20 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
+def test_harmonics_that_follow_from_an_error_are_those_of_the_response(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """It took the three with which a response begins; without a response nothing is taken."""
+    auto = 'harmonics="auto"'
+    refused_command(["map", "case.toml", "--set", auto], capsys, "harmonics", "respond")
+    made = folder / "build" / "rung"
+    made.mkdir(parents=True)
+    (made / "response.json").write_text('{"harmonics": 14}')
+    job = CaseJob(folder / "case.toml", {}, made, [auto], swept=True)
+    assert job.settings.number_of_harmonics == job.raw["harmonics"] == 14
+    assert CaseJob(folder / "case.toml", {}, made, [auto]).settings.looks_for_harmonics
+
+
 @pytest.mark.slow
 def test_points_ridge_and_optimum(folder: Path, monkeypatch: pytest.MonkeyPatch, undrawn: None) -> None:
     """Interrupted, it goes on where it was; a point is that of the response in Python, the lowest place of its ridge
@@ -64,17 +78,3 @@ def test_mistakes_name_their_keys(folder: Path, capsys: pytest.CaptureFixture[st
     for key, value in (("forces", 1), ("low", -1.0), ("colour", 1)):
         refused_command(["map", "case.toml", "--set", f"map.{key}={value}"], capsys, f"map.{key}")
     refused_command(["map", "case.toml", "--set", "map.high=2.0", "--set", "map.low=3.0"], capsys, "high")
-
-
-def test_harmonics_that_follow_from_an_error_are_those_of_the_response(
-    folder: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    """It took the three with which a response begins; without a response nothing is taken."""
-    auto = 'harmonics="auto"'
-    refused_command(["map", "case.toml", "--set", auto], capsys, "harmonics", "respond")
-    made = folder / "build" / "rung"
-    made.mkdir(parents=True)
-    (made / "response.json").write_text('{"harmonics": 14}')
-    job = CaseJob(folder / "case.toml", {}, made, [auto], swept=True)
-    assert job.settings.number_of_harmonics == job.raw["harmonics"] == 14
-    assert CaseJob(folder / "case.toml", {}, made, [auto]).settings.looks_for_harmonics
