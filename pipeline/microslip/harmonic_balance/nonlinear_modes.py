@@ -190,6 +190,11 @@ def _only(problem: Problem) -> Linear:
     return problem.parts[1][0]
 
 
+SETTINGS = Settings(step=0.05, step_max=0.2, kink_step=0.05, resolution=1e-4, folds=False, branch_points=False)
+"""Contacts of many points have a kink at every sample of each of them: these are crossed in steps of 5 %, and located
+to 1e-4."""
+
+
 def backbone(
     problem: Problem, low: float, high: float, mode: int = 0, output: int = 0, asked: Sequence[float] = (),
     settings: Settings | None = None, report: Report = lambda _: None,
@@ -208,7 +213,7 @@ def backbone(
     curve = _Curve(replace(problem, stiffness=tuple(HELD * k for k in problem.stiffness), share=0.0), output)
     z, omega = curve.linear(problem, mode)
     curve.x_scale[:-2] *= _growth(problem, mode)
-    settings = settings or Settings(step=0.05, step_max=0.2, folds=False, branch_points=False)
+    settings = settings or SETTINGS
     bounds = np.log([low, high])
     settings = replace(settings, low=float(bounds[0]) - 1e-9, high=float(bounds[1]), targets=tuple(np.log(asked)))
     points, quantity = list[Point](), measured(problem.assembly, output)
