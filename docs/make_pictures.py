@@ -463,8 +463,7 @@ def contact_stiffness() -> None:
     """The shroud pressed step by step at speed: the picture of the verb `closure`."""
     chosen = (*COARSE_SHROUD[:2], "rotation.speeds_rpm=[3000.0]")
     job = open_job(ROOT / "geometry" / "shroud", ['name="shroud"', *chosen], BUILD)
-    _, picture = closure_stage(job, None, -0.2, 0.8, 6, 3000.0)
-    save(from_file(picture), "closure_curve")
+    save(from_file(closure_stage(job, None, -0.2, 0.8, 6, 3000.0).files[-1]), "closure_curve")
 
 
 def bolts() -> None:

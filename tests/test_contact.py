@@ -327,7 +327,7 @@ def test_stiffness_of_flat_blocks():
     solver, model = eigen.new_solver(), blocks()
     curve = contact_curve(model, "c", np.array([0.5e-5, 1e-5, 2e-5]), solver)
     np.testing.assert_allclose(curve.stiffness, E / 0.8, rtol=1e-4)
-    assert curve.table().splitlines()[0] == "approach_m,normal_force_N,stiffness_N_per_m,closed_share"
+    assert [*curve.columns] == ["approach_m", "normal_force_N", "stiffness_N_per_m", "closed_share"]
     with pytest.raises(UserError, match="the curve needs a closure of that name"):
         contact_curve(model, "d", np.array([1e-5, 2e-5]), solver)
     solver.close()

@@ -11,6 +11,7 @@ from test_ring_down import CASE, SYSTEM
 
 import microslip as ms
 from microslip.cli import main
+from microslip.stages.answer import CaseJob
 from microslip.verbs import map as of_map
 
 
@@ -22,6 +23,20 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     (tmp_path / "case.toml").write_text(swept)
     monkeypatch.chdir(tmp_path)
     return tmp_path
+
+
+def test_harmonics_that_follow_from_an_error_are_those_of_the_response(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """It took the three with which a response begins; without a response nothing is taken."""
+    auto = 'harmonics="auto"'
+    refused_command(["map", "case.toml", "--set", auto], capsys, "harmonics", "respond")
+    made = folder / "build" / "rung"
+    made.mkdir(parents=True)
+    (made / "response.json").write_text('{"harmonics": 14}')
+    job = CaseJob(folder / "case.toml", {}, made, [auto], swept=True)
+    assert job.settings.number_of_harmonics == job.raw["harmonics"] == 14
+    assert CaseJob(folder / "case.toml", {}, made, [auto]).settings.looks_for_harmonics
 
 
 @pytest.mark.slow

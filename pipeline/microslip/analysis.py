@@ -18,7 +18,7 @@ from importlib import import_module
 from importlib.metadata import entry_points
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, TypeGuard
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -79,14 +79,15 @@ class Answer:
     """What is answered.
 
     Attributes:
-        sentences: the result first. data: end of the files' names -> what they hold; the first one without an end.
-            diagrams: likewise. tables: pieces of the page (`report.page`). largest: amplitude of the first read-out, of
-            which is told whether it looks like a number in a wrong unit; None where the sentences
-            tell all that is to be said of the case. whole: whether nothing of it was lost.
-        files: other files by their names, below the folder of the answer -> what writes them;
-            pictures are shown on the page. moving: writes bodies that move below that folder, where
-            pictures are wanted. lines: of a table for the terminal. missing: what was asked for and is not
-            known, in words.
+        sentences: the result first. data: end of the files' names -> what they hold; the first one
+            without an end. diagrams: likewise. tables: pieces of the page (`report.page`). largest:
+            amplitude of the first read-out, of which is told whether it looks like a number in a
+            wrong unit; None where the sentences tell all that is to be said of the case. whole:
+            whether nothing of it was lost. missing: what was asked for and is not known, in words.
+        files: other files by their names, below the folder of the answer -> what writes them; PNG
+            files are made where pictures are wanted, and shown on the page. moving: writes bodies
+            that move below that folder, where pictures are wanted. lines: of a table for the
+            terminal.
     """
 
     sentences: Sequence[str]
@@ -182,10 +183,7 @@ class Verb(NamedTuple):
 def verb_of(name: str) -> Verb:
     """The verb of an analysis, whose module is not loaded."""
     tree = ast.parse(file_of(name).read_text(encoding="utf-8"))
-    keys = {k.arg: k.value for call in ast.walk(tree) if _makes(call) for k in call.keywords}
+    made = [n.value for n in tree.body if isinstance(n, ast.Assign) and ast.unparse(n.targets[0]) == "ANALYSIS"]
+    keys = {k.arg: k.value for call in made for k in getattr(call, "keywords", ())}
     verb, options = (ast.literal_eval(keys[key]) if key in keys else None for key in ("verb", "options"))
     return Verb(verb or name.replace("_", "-"), ast.get_docstring(tree) or name, options or {})
-
-
-def _makes(node: ast.AST) -> TypeGuard[ast.Call]:
-    return isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == Analysis.__name__

@@ -279,7 +279,7 @@ def closure(
     job = open_job(body, list(set_))
     with progress(f"closure of {job.settings.name}", quiet) as report:
         found = closure_stage(job, name, low, high, points, rpm, output, report)
-    _say("\n".join(map(str, found)), quiet)
+    _tell(found, quiet, "")
 
 
 @app.command

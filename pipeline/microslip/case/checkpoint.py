@@ -105,6 +105,15 @@ def as_found(settings: CaseSettings, folder: Path) -> CaseSettings:
         raise UserError(found_by, "harmonics") from None
 
 
+def followed(settings: CaseSettings, raw: dict[str, Any], folder: Path) -> tuple[CaseSettings, dict[str, Any]]:
+    """`as_found`, and the case as a table that says so."""
+    found = as_found(settings, folder)
+    if not settings.looks_for_harmonics:
+        return found, raw
+    own = {k: v for k, v in raw.items() if k != "harmonics_error"}
+    return found, own | {"harmonics": found.harmonics, "samples": found.sampled}
+
+
 def _standing(built: Built, name: str) -> list[str]:
     """Names under which a body stands in the assembly that is balanced, in coordinates of its modal file: N of a full
     ring, none of cyclic sectors that are joined there, whose coordinates are those of `system.disc`."""

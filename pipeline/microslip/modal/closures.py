@@ -12,7 +12,6 @@ from ..errors import UserError
 from ..fem.contact import ContactPair, Grip, Plane, gap_at, make_pair, node_values
 from ..fem.discretise import face_blocks, quadrature
 from ..fem.loads import traction
-from ..files.tables import columns_csv
 from ..linalg.eigen import DirectSolver
 from ..settings.body import GROUND, BodySettings, Closure
 from .boundary import require_face
@@ -178,10 +177,11 @@ class ContactCurve:
         """(k,) N/m, dF / d approach: differences of second order between the levels."""
         return np.gradient(self.force, self.approach)
 
-    def table(self) -> str:
-        """CSV."""
+    @property
+    def columns(self) -> dict[str, Array]:
+        """Column -> (k,) values."""
         found = {"approach_m": self.approach, "normal_force_N": self.force, "stiffness_N_per_m": self.stiffness}
-        return columns_csv({**found, "closed_share": self.closed_share}, 9)
+        return {**found, "closed_share": self.closed_share}
 
 
 def contact_curve(

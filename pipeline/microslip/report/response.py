@@ -329,6 +329,7 @@ _OVER = ("normal_force_N", "load")
 """Columns, besides those of `_EXACT`, that a curve runs over."""
 
 _UNITS = (
+    "m/s",
     "N",
     "Hz",
     "m",
@@ -386,7 +387,7 @@ def _column(key: str, factors: Factors) -> tuple[float, str]:
 
 def _label(key: str) -> str:
     """``normal_force_N`` -> ``normal force in N``."""
-    *words, last = key.replace("rad_s", "rad/s").split("_")
+    *words, last = re.sub(r"(rad|_m)_s$", r"\1/s", key).split("_")
     unit = "m/m" if last == "strain" else last
     return " ".join([*words, "in", unit] if words and unit in _UNITS else [*words, last])
 

@@ -25,6 +25,7 @@ def analysed(name: str, case: CaseJob) -> Written:
         UserError: the case asks for nothing, or for what cannot be.
     """
     one = analysis.analyses()[name]
+    case = replace(case, swept=one.swept)
     asked = case.settings.asked.get(name)
     if asked is None and one.needed:
         table = f"[[{name}]]" if one.several else f"[{name}]"

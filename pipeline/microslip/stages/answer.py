@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 from ..analysis import Answer, Drawing
 from ..basis import read_basis
-from ..case import CaseSettings, load_case
+from ..case import CaseSettings, checkpoint, load_case
 from ..case.assemble import Built, build
 from ..data import ModalBasis
 from ..errors import UserError, of_file
@@ -88,22 +88,23 @@ def written(answer: Answer, name: str, folder: Path, title: str, pictures: bool,
     Args:
         name: begins those that have no name of their own. case: begins the titles of diagrams.
     """
-    made, moving, begins = _data(name, answer, folder), list[Path](), "pictures/"
-    pictured = [file for file in answer.files if file.startswith(begins) and pictures]
-    for file, write in answer.files.items():
-        if file in pictured or not file.startswith(begins):
-            write(folder / file)
-    made += [folder / file for file in answer.files if not file.startswith(begins)]
-    shown = [folder / file for file in pictured]
+    wanted = {file: write for file, write in answer.files.items() if pictures or not file.endswith(".png")}
+    for file, write in wanted.items():
+        write(folder / file)
+    shown = [folder / file for file in wanted if file.endswith(".png")]
+    made = [*_data(name, answer, folder), *(folder / file for file in wanted if not file.endswith(".png"))]
+    moving: Sequence[Path] = ()
     if pictures:
-        shown += [drawn(d, folder / f"{begins}{_named(name, end)}.png", case) for end, d in answer.diagrams.items()]
-        moving = list(answer.moving(folder))
+        places = {folder / "pictures" / f"{_named(name, end)}.png": d for end, d in answer.diagrams.items()}
+        shown += [drawn(diagram, place, case) for place, diagram in places.items()]
+        moving = answer.moving(folder)
     shown += [path for path in moving if path.suffix == ".gif"]
     page = folder / f"{name}.html"
     store.write_text(page, answer_page(title, answer.sentences, shown, *answer.tables))
-    files = [page, *made, *dict.fromkeys([*shown, *moving])]
     whole = answer.whole and not answer.missing
-    return Written(files, [*answer.lines, *answer.sentences], whole, answer.missing)
+    return Written(
+        [page, *made, *dict.fromkeys([*shown, *moving])], [*answer.lines, *answer.sentences], whole, answer.missing
+    )
 
 
 def _named(name: str, end: str) -> str:
@@ -135,7 +136,8 @@ class CaseJob:
 
     Attributes:
         path: the case file. files: body of the case -> its modal file. folder: of the answer. assignments: keys that
-            have other values. force, report: see `Stage`. pictures: whether they are wanted.
+            have other values. force, report: see `Stage`. pictures: whether they are wanted. swept: whether it takes as
+            many harmonics as the response has, where their number follows from its error.
     """
 
     path: Path
@@ -145,10 +147,12 @@ class CaseJob:
     force: bool = False
     report: Report = lambda _: None
     pictures: bool = True
+    swept: bool = False
 
     @cached_property
     def _loaded(self) -> tuple[CaseSettings, dict[str, Any]]:
-        return load_case(self.path, list(self.assignments))
+        settings, raw = load_case(self.path, list(self.assignments))
+        return checkpoint.followed(settings, raw, self.folder) if self.swept else (settings, raw)
 
     @property
     def settings(self) -> CaseSettings:

@@ -97,11 +97,7 @@ class Case(Varied):
 
 def open_case(path: Path, files: Mapping[str, Path], folder: Path, assignments: Sequence[str] = ()) -> Case:
     """A case and its modal files."""
-    asked, raw = load_case(path, assignments)
-    settings = checkpoint.as_found(asked, folder)
-    if asked.looks_for_harmonics:
-        raw = {k: v for k, v in raw.items() if k != "harmonics_error"}
-        raw |= {"harmonics": settings.harmonics, "samples": settings.sampled}
+    _, raw = checkpoint.followed(*load_case(path, assignments), folder)
     return Case(path, raw, {name: read_basis(file) for name, file in files.items()}, folder)
 
 

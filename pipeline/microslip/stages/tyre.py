@@ -10,7 +10,8 @@ from ..basis import read_basis
 from ..data import ModalBasis
 from ..files.tables import csv_files
 from ..pictures.tyre import tyre_picture
-from ..report.page import Piece, number, say, table
+from ..report.page import say
+from ..report.response import number_tables
 from ..results import Journal
 from ..rolling.slip import Studied, load_tyre, study
 from .answer import RollJob, Written
@@ -41,22 +42,18 @@ def tyre_stage(job: RollJob) -> Written:
 
 def _answer(found: Studied, wheel: ModalBasis, case: str) -> Answer:
     slips, forces = found.steady
-    steady = {"slip": slips, "force_over_normal_force": forces}
-    tables = {"constants.csv": found.constants, "loads.csv": found.loads(), "steady.csv": steady}
+    tables = {
+        "loads.csv": found.loads(),
+        "constants.csv": found.constants,
+        "steady.csv": {"slip": slips, "force_over_normal_force": forces},
+    }
     drawn = {"pictures/tyre.png": partial(tyre_picture, found, title=case, wheel=wheel)}
-    pieces = [_loads(found), say(READ_AS, tone="note")]
+    pieces = [*number_tables({"loads.csv": tables["loads.csv"]}), say(READ_AS, tone="note")]
     return Answer(found.sentences(), tables=pieces, files=csv_files(tables, 8) | drawn)
 
 
 READ_AS = (
     "A row of point contacts along the middle of the patch, each with its share of the static pressure, is passed by "
     "the material (Sextro, 6.10). Time constants are of the exponential that fits the force best; the normal force "
-    "follows from the static state, large displacements and contact by Newton's method."
+    "follows from the static state, large displacements and contact by Newton's method. Reached: 1 - 1/e of the change."
 )
-
-
-def _loads(found: Studied) -> Piece:
-    columns = found.loads()
-    head = ["load jumps to its share", "patch then in mm", "force before in N", "after in N", "1 - 1/e of it after s"]
-    columns["patch_length_m"] = 1e3 * columns["patch_length_m"]
-    return table(head, [[number(v) for v in row] for row in zip(*columns.values(), strict=True)])

@@ -18,10 +18,10 @@ from ..case.assemble import Built
 from ..case.contacts import swept
 from ..case.problem import problem_of
 from ..errors import UserError, at, of_file
-from ..files.store import write_text
-from ..files.tables import columns_csv
+from ..files.tables import write_columns
 from ..pictures.orbit import chatter_picture, orbit_picture, portraits
-from ..report.page import Piece, fold, number, say, table
+from ..report.page import Piece
+from ..report.response import number_tables
 from ..settings.numbers import Model, NotNegative, Number, Positive, _finite_vector, _tuple
 from ..system.assembly import Assembly
 from ..time_domain import classification, equations, orbit, recorded, starts
@@ -125,11 +125,11 @@ def solve(q: Question) -> Answer:
     with of_file(q.varied.path):
         ran = recorded.run(file, _asked(q.asked, built), q.inputs, q.fresh, q.report)
     found: Named = [(one.name, one) for one in ran]
-    files: Files = {"orbit.csv": partial(_table, found)}
+    files: Files = {"orbit.csv": partial(write_columns, _columns(found), 8)}
     files["orbit.h5"] = lambda _: None  # is there
     return Answer(
         [*_notes(found), *_messages(found, built), *_doubted(found, built, q.asked)],
-        tables=_pieces(found),
+        tables=_shown(found),
         largest=None,
         whole=not any(np.isfinite(one.diverged) for _, one in found),
         files=files | _pictures(found, built.settings.name),
@@ -252,11 +252,18 @@ def _pictures(found: Named, case: str) -> Files:
     return {f"pictures/{name}": draw for name, draw in drawn.items()}
 
 
-def _table(found: Named, path: Path) -> None:
+def _columns(found: Named) -> dict[str, Any]:
     """A row a motion."""
     rows = [_row(one) for _, one in found]
-    columns = {key: np.array([row[key] for row in rows]) for key in rows[0]}
-    write_text(path, columns_csv(columns, 8))
+    return {key: np.array([row[key] for row in rows]) for key in rows[0]}
+
+
+def _shown(found: Named) -> list[Piece]:
+    """That table on the page, without what is known of no motion."""
+    kinds = [KIND.get(kind := classification.kind(one), kind) for _, one in found]
+    known = {key: values for key, values in _columns(found).items() if np.isfinite(values).any()}
+    shown = {"excited_by": [name for name, _ in found], "motion": kinds, **known}
+    return number_tables({"orbit.csv": shown})
 
 
 def _ends(one: Orbit) -> tuple[float, float]:
@@ -299,68 +306,6 @@ def _row(one: Orbit) -> dict[str, float]:
         "energy_balance": one.balance,
         "contact_energy_drift": one.drift,
     }
-
-
-# the page --------------------------------------------------------------------------------------
-
-
-def _pieces(found: Named) -> list[Piece]:
-    """A line a motion; all numbers below."""
-    rows = [(name, one, _row(one)) for name, one in found]
-    head = [key.replace("_", " ") for key in rows[0][2]]
-    numbers = table(head, [[number(float(v), 6) for v in row.values()] for *_, row in rows])
-    return [_lines(rows), say(READ_AS, tone="note"), fold("All numbers, as in orbit.csv", numbers)]
-
-
-def _lines(rows: Sequence[tuple[str, Orbit, Row]]) -> Piece:
-    """Columns that say nothing of any motion are left out."""
-    kinds = [classification.kind(one) for _, one, _ in rows]
-    columns = {
-        "excited by": [name for name, *_ in rows],
-        "motion": [KIND.get(kind, kind) for kind in kinds],
-        "period": [_count(row["repeats_after_periods"]) for *_, row in rows],
-        "impacts": [_rate(row["impacts_per_period"]) for *_, row in rows],
-        "slips": [_rate(row["slips_per_period"]) for *_, row in rows],
-        "moves": [one.of().sized(_largest(one, row)) for _, one, row in rows],
-        "speed": [_speed(one, row) for _, one, row in rows],
-        "force": [_with(row["largest_contact_force_N"], "N") for *_, row in rows],
-        "lost": [_with(row["lost_in_contacts_J_per_period"], "J") for *_, row in rows],
-        "Lyapunov": [_exponent(row) for *_, row in rows],
-        "error": [percent(e) if math.isfinite(e := row["estimated_error"]) else "" for *_, row in rows],
-    }
-    told = {head: cells for head, cells in columns.items() if any(cells)}
-    return table(list(told), list(zip(*told.values(), strict=True)))
-
-
-def _largest(one: Orbit, row: Row) -> float:
-    return max(abs(row[one.of().column(name)]) for name in ("smallest", "largest"))
-
-
-def _speed(one: Orbit, row: Row) -> str:
-    return f"{one.of().sized(row[one.of().column('largest_velocity') + '_s'])}/s"
-
-
-def _count(periods: float) -> str:
-    return f"{periods:.0f}" if periods else ""
-
-
-def _rate(value: float) -> str:
-    return number(value) if value else ""
-
-
-def _with(value: float, unit: str) -> str:
-    return f"{number(value)} {unit}" if math.isfinite(value) and value else ""
-
-
-def _exponent(row: Row) -> str:
-    value, around = row["lyapunov_exponent_1_s"], row["lyapunov_uncertainty_1_s"]
-    return f"{number(value, 3)} ± {number(around, 2)} 1/s" if math.isfinite(value) else ""
-
-
-READ_AS = (
-    "Period: after how many of the excitation it comes back. Impacts, slips and energy lost in contacts: in one "
-    "period of the excitation. Displacement, speed and contact force are the largest, and so is the Lyapunov exponent."
-)
 
 
 def _band(asked: Mapping[str, Any]) -> dict[str, float]:
