@@ -20,9 +20,13 @@ from .settings import CaseSettings, ContactSettings
 
 def problem_of(built: Built, normal: float | None, **finer: Any) -> Problem:
     """The balance of a case whose swept contacts a normal force (N) presses. finer: other settings of `problem.of`."""
-    s, assembly = built.settings, built.pressed(normal)
-    asked: dict[str, Any] = {"harmonics": s.balanced, **s.marching, "models": models_of(s, assembly)}
-    return balance.of(assembly, **{**asked, **finer})
+    return balanced(built.settings, built.pressed(normal), **finer)
+
+
+def balanced(settings: CaseSettings, assembly: Assembly, **finer: Any) -> Problem:
+    """The balance of any assembly as a case asks for it; finer: see `problem_of`."""
+    asked: dict[str, Any] = {"harmonics": settings.balanced, **settings.marching}
+    return balance.of(assembly, **{**asked, "models": models_of(settings, assembly), **finer})
 
 
 def models_of(settings: CaseSettings, assembly: Assembly) -> dict[int, Forces] | None:
