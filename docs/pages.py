@@ -601,6 +601,12 @@ MEANING_CASE: dict[str, tuple[str, str]] = {
     "two_tones.samples": ("", "of a turn of the faster angle; 8 a harmonic and 32 at least if not given"),
     "two_tones.turns": ("", "of the faster angle, at least, in the line along which contacts that remember are "
                         "marched; as many"),
+    "wear.coefficient": ("m3/J", "I_W: volume that both faces of a contact lose together, over their frictional work"),
+    "wear.hours": ("h", "of vibration"),
+    "wear.frequency": ("Hz", "the highest resonance in the sweep's band if not given, followed as it moves"),
+    "wear.normal_force": ("N", "instead of those of the sweep"),
+    "wear.tolerance": ("", "share of the largest depth by which a jump in time may differ from one of first order"),
+    "wear.jumps": ("", "at most"),
     "mistuning.samples": ("", "whole rings that are solved, at most"),
     "mistuning.until": ("", "ends when half of the interval of the 95 % quantile is that share of it"),
     "mistuning.rare": ("", "further samples, chosen by a linear ring, for the 99.9 % quantile; none if 0"),

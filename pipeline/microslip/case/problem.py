@@ -88,6 +88,19 @@ def normal_forces(built: Built, asked: Any = None) -> tuple[float, ...]:
     return (forces[0],)
 
 
+def forces_of(built: Built, asked: float | None) -> list[float | None]:
+    """Normal forces (N) of an analysis: the one asked for, else those of the sweep; None: all contacts have their own.
+
+    Raises:
+        UserError: one is asked for that presses nothing.
+    """
+    if any(swept(c) for c in built.settings.contacts):
+        return [*normal_forces(built)] or [None] if asked is None else [asked]
+    if asked is not None:
+        raise UserError("presses nothing: all contacts have a force or an interference; leave it out", "normal_force")
+    return [None]
+
+
 def _first_face(built: Built, c: ContactSettings) -> tuple[str, ModalGroup]:
     body, interface = built.settings.address(c.interface)
     return interface, built.bodies[body].group

@@ -16,14 +16,14 @@ from scipy.optimize import brentq
 
 from ..analysis import Analysis, Answer, Drawing, Question
 from ..case.assemble import Built
-from ..case.problem import balanced, normal_forces, pressed_by
+from ..case.problem import balanced, forces_of, pressed_by
 from ..case.settings import CaseSettings
 from ..contact.curved import apart
 from ..contact.heights import Tabulated, as_table, summed
 from ..contact.law import Law
 from ..contact.normal import Gapped, Rough
-from ..contact.point import OnNormal
 from ..contact.patch import pressing
+from ..contact.point import OnNormal
 from ..contact.portion import Portion
 from ..contact.wear import worn_law
 from ..continuation import peak as climbed
@@ -60,6 +60,9 @@ SHORTEST = 1e-6
 PANELS, COLUMNS = 6, 3
 """Contacts whose worn depth is drawn, the deepest first, and how many beside each other."""
 
+EVEN = 0.95
+"""Share of the largest depth from which on the colours of a patch begin at nothing."""
+
 
 class Keys(Model):
     """Wear of the contacts by the vibration, by `microslip wear`.
@@ -93,9 +96,8 @@ def solve(q: Question) -> Answer:
     """
     asked: Keys = q.asked
     built: Built = q.built
-    swept: list[float | None] = [*normal_forces(built)] if asked.normal_force is None else [asked.normal_force]
     courses = dict[float, Course]()
-    for force in swept or [None]:
+    for force in forces_of(built, asked.normal_force):
         wearing = Wearing(built.pressed(force), built.settings, asked.coefficient)
         pressed = pressed_by(built, wearing.problem(wearing.new)) if force is None else force
         courses[pressed] = _course(wearing, asked, partial(once, q.kept, f"normal force {pressed!r} N"), q.report)
@@ -108,7 +110,9 @@ def solve(q: Question) -> Answer:
         diagrams={
             "": Drawing(partial(draw, over, of), "wear by its vibration", (10.0, 6.0)),
             "depth": Drawing(
-                partial(draw_depth, depth), f"depth worn in {asked.hours:g} h", (10.0, 0.6 + 3.2 * _rows(depth))
+                partial(draw_depth, depth),
+                f"depth worn in {asked.hours:g} h",
+                (10.0, 0.6 + 3.2 * _rows(depth)),
             ),
         },
         largest=float(over["amplitude"].max()),
@@ -134,7 +138,8 @@ class Wearing:
     """An assembly whose contacts wear. Attributes: assembly: new. settings: of its case. coefficient: I_W, m3/J.
 
     Raises:
-        UserError: no contact, one without area, friction in none, a law that knows no approach.
+        UserError: no contact, one without area, friction in none, a law that knows no approach, a
+            rough surface in the book's mode, which has one for all points.
     """
 
     assembly: Assembly
@@ -147,6 +152,8 @@ class Wearing:
         for c in self.assembly.contacts:
             if not (c.patch.areas > 0).all():
                 raise UserError(f"contacts.{c.name}: has no area that could wear; give its width and height (m)")
+        if self.settings.mode == "book" and any(self.tables):
+            raise UserError('mode: "book" knows one rough surface for all points, and each wears; write mode = "aft"')
         if not any(_slides(c) for c in self.assembly.contacts):
             raise UserError("no contact of the case has friction, so that nothing wears; give one a friction above 0")
 
@@ -268,11 +275,16 @@ def _share(law: Any) -> Any:
 
 
 class Course(NamedTuple):
-    """Rows from new to worn, see `_vibrating`, with time (h). lost: why it ends early."""
+    """Rows from new to worn, see `_vibrating`, with time (h). lost: why it ends early.
+    overlaps: whether none of its contacts is pressed by a force."""
 
     wearing: Wearing
     rows: list[dict[str, Any]]
     lost: str
+
+    @property
+    def overlaps(self) -> bool:
+        return not any(c.preload[0] > 0 for c in self.wearing.assembly.contacts)
 
 
 Kept = Callable[[float, Callable[[], dict[str, Any]]], dict[str, Any]]
@@ -285,7 +297,7 @@ def _course(w: Wearing, asked: Keys, kept: Kept, report: Callable[[str], None]) 
     vibrates = partial(_vibrating, w, asked.frequency, band, report)
     rows, lost = [kept(0.0, partial(_begun, w, asked, vibrates))], ""
     while not lost and rows[-1]["time"] < asked.hours * (1 - SHORTEST):
-        report(f"{rows[-1]['time']:.4g} of {asked.hours:g} h worn, in {len(rows) - 1} jumps")
+        report(f"{rows[-1]['time']:.6g} of {asked.hours:g} h worn, in {len(rows) - 1} jumps")
         if len(rows) > asked.jumps:
             lost = f"{asked.jumps} jumps are over; give more jumps, or a larger tolerance"
             break
@@ -424,18 +436,30 @@ def _point(
 
 def _over_hours(courses: Mapping[float, Course], of: Quantity) -> Dataset:
     columns = {
-        "normal_force": ("N", "of the contacts that the sweep presses; else of the first contact, at rest and new"),
+        "normal_force": (
+            "N",
+            "of the contacts that the sweep presses; else of the first contact, at rest and new",
+        ),
         "time": ("h", "of vibration"),
         "frequency": ("Hz", "of the vibration: the resonance, or the one asked for"),
         "amplitude": (of.unit, "of the first read-out, 0-peak"),
-        "damping_ratio": ("1", "of all that is lost in a cycle: over 4 pi times the kinetic energy"),
-        "stress": ("Pa", "largest amplitude in the body that is read; nan where its modal file has none"),
+        "damping_ratio": (
+            "1",
+            "of all that is lost in a cycle: over 4 pi times the kinetic energy",
+        ),
+        "stress": (
+            "Pa",
+            "largest amplitude in the body that is read; nan where its modal file has none",
+        ),
         "area": ("m2", "nominal area of the points that touch, mean over the cycle"),
         "pressing": ("N", "normal forces of all contacts, mean over the cycle"),
         "largest_depth": ("m", "worn off both faces together"),
         "worn_volume": ("m3", "of all contacts"),
         "frictional_power": ("W", "of all contacts"),
-        "error": ("1", "of the jump that leads there: what differs from one of first order, over the largest depth"),
+        "error": (
+            "1",
+            "of the jump that leads there: what differs from one of first order, over the largest depth",
+        ),
     }
     rows = [_told(force, course.wearing, row) for force, course in courses.items() for row in course.rows]
     named = zip(columns.items(), np.array(rows).T, strict=True)
@@ -467,7 +491,16 @@ def _depths(courses: Mapping[float, Course]) -> Dataset:
         names = np.repeat([c.name for c in contacts], [len(c.patch.points) for c in contacts])
         places = np.concatenate([c.patch.points for c in contacts]).T
         pressures = (course.rows[i]["force"] / areas for i in (0, -1))
-        parts.append((np.full(len(areas), force), names, *places, areas, course.rows[-1]["depth"], *pressures))
+        parts.append(
+            (
+                np.full(len(areas), force),
+                names,
+                *places,
+                areas,
+                course.rows[-1]["depth"],
+                *pressures,
+            )
+        )
     told = [
         ("normal_force", "N", "of the contacts that the sweep presses"),
         ("contact", "1", "name"),
@@ -485,13 +518,16 @@ def _depths(courses: Mapping[float, Course]) -> Dataset:
 def _sentences(force: float, course: Course, asked: Keys, of: Quantity) -> list[str]:
     rows, w = course.rows, course.wearing
     new, last = rows[0], rows[-1]
-    begun = f"F_N = {force:.5g} N"
-    size, ratio = (of.sized(row["amplitude"]) for row in (new, last)), (percent(row["damping"]) for row in (new, last))
+    begun = f"F_N = {force:.5g} N" + (" when new" if course.overlaps else "")
+    size, ratio = (
+        (of.sized(row["amplitude"]) for row in (new, last)),
+        (percent(row["damping"]) for row in (new, last)),
+    )
     deepest = int(last["depth"].argmax())
     frequencies = " to ".join(f"{row['Omega'] / (2 * np.pi):.6g}" for row in (new, last))
     where = f"at {asked.frequency:g} Hz" if asked.frequency else f"resonance {frequencies} Hz"
     said = [
-        f"{begun}, new to {last['time']:.4g} h of vibration: amplitude {' to '.join(size)}, {where}, damping ratio "
+        f"{begun}, new to {last['time']:.6g} h of vibration: amplitude {' to '.join(size)}, {where}, damping ratio "
         f"{' to '.join(ratio)}; {1e9 * float(w.areas @ last['depth']):.4g} mm3 worn, "
         f"{METRES.sized(last['depth'][deepest])} at the deepest, in {counted(len(rows) - 1, 'jump')}."
     ]
@@ -501,8 +537,8 @@ def _sentences(force: float, course: Course, asked: Keys, of: Quantity) -> list[
         touches = np.array([bool((row["open"][own] < 1).any()) for row in rows])
         if touches[0] and not touches[-1]:
             since = rows[int(np.flatnonzero(touches)[-1]) + 1]["time"]
-            said.append(f"{begun}: contact '{c.name}' touches no more from {since:.4g} h on.")
-    return said + ([f"{begun}: it ends after {last['time']:.4g} h: {course.lost}."] if course.lost else [])
+            said.append(f"{begun}: contact '{c.name}' touches no more from {since:.6g} h on.")
+    return said + ([f"{begun}: it ends after {last['time']:.6g} h: {course.lost}."] if course.lost else [])
 
 
 def draw(over: Dataset, of: Quantity, figure: Figure) -> None:
@@ -537,7 +573,8 @@ def draw(over: Dataset, of: Quantity, figure: Figure) -> None:
         axes.ticklabel_format(useOffset=False)
         if name in ("area", "largest_depth", "damping_ratio", "pressing"):
             axes.set_ylim(bottom=0)
-    table[0, 0].legend(fontsize=8, frameon=False)
+    if np.ptp(over["normal_force"]):
+        table[0, 0].legend(fontsize=8, frameon=False)
 
 
 def _rows(depth: Dataset) -> int:
@@ -559,18 +596,22 @@ def draw_depth(depth: Dataset, figure: Figure) -> None:
     for axes in table.flat[len(patches) :]:
         axes.set_axis_off()
     for axes, (p, own) in zip(table.flat, patches, strict=False):
-        places, values = 1e3 * np.column_stack([depth[name][own] for name in ("t1", "t2")]), depth["depth"][own]
+        places, values = (
+            1e3 * np.column_stack([depth[name][own] for name in ("t1", "t2")]),
+            depth["depth"][own],
+        )
+        least, most = float(values.min()), max(float(values.max()), 1e-12)
+        least = least if least < EVEN * most else 0.0
         by, unit = METRES.shared(values)
         edges = grid_of(places)
-        how: dict[str, Any] = {"vmin": 0.0, "vmax": by * max(values.max(), 1e-12), "cmap": "viridis"}
+        how: dict[str, Any] = {"vmin": by * least, "vmax": by * most, "cmap": "viridis"}
         if edges is None:
             shown: Any = axes.scatter(*places.T, c=by * values, s=14, **how)
         else:
             shown = axes.pcolormesh(*edges, on_grid(places, by * values), **how)
         axes.set_aspect("equal")
         axes.set(xlabel="t1 in mm", ylabel="t2 in mm")
-        least, most = (f"{by * v:.3g}" for v in (values.min(), values.max()))
-        axes.set_title(f"{p[1]}, $F_N$ = {p[0]:.5g} N: {least} to {most} {unit}", fontsize=9)
+        axes.set_title(f"{p[1]}, $F_N$ = {p[0]:.5g} N", fontsize=9)
         figure.colorbar(shown, ax=axes, label=f"depth in {unit}", shrink=0.8)
 
 
