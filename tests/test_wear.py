@@ -1,4 +1,4 @@
-"""Wear by a vibration: closed forms of a point that slides, balances of energy and volume, order of the jumps."""
+"""Wear by a vibration: closed forms of points that slide, energy, order of the jumps."""
 
 from __future__ import annotations
 
@@ -81,11 +81,12 @@ def test_a_point_under_a_force_wears_evenly(case: Path) -> None:
     np.testing.assert_allclose(found["pressing"], FORCE, rtol=1e-9)
     np.testing.assert_allclose(np.ptp(found["amplitude"]), 0.0, atol=1e-12)
     way = 2 * slip(found, np.array([FORCE])) * DRIVEN * HOUR * found["time"]
-    np.testing.assert_allclose(found["largest_depth"], COEFFICIENT * MU * FORCE * way / AREA, rtol=2e-3)
+    exact = COEFFICIENT * MU * FORCE * way / AREA
+    np.testing.assert_allclose(found["largest_depth"], exact, rtol=2e-3)
 
 
 def test_a_point_that_overlaps_loses_its_preload(case: Path) -> None:
-    """dN/dt = -k_N I_W mu N 4 s f / A: an exponential where the slip is imposed, with the slip as it grows here."""
+    """dN/dt = -k_N I_W mu N 4 s f / A: an exponential if the slip stayed; here it grows."""
     found = worn(f"wear.frequency={DRIVEN}")
     force = found["pressing"]
     assert force[0] == pytest.approx(FORCE, rel=1e-6) and force[-1] < 0.3 * FORCE
@@ -107,8 +108,8 @@ def test_jumps_that_are_halved_leave_a_quarter_of_the_error(case: Path) -> None:
 
 
 def test_a_pressed_patch_wears_until_the_pressure_is_even(case: Path) -> None:
-    """Two points under one force: k_N (depth_2 - depth_1) = N_1 - N_2 falls by the rate k_N I_W mu 4 s f / A of one
-    point, and the total stays."""
+    """Two points under one force: k_N (depth_2 - depth_1) = N_1 - N_2 falls by the rate
+    k_N I_W mu 4 s f / A of one point, and the total stays."""
     (case / "case.toml").write_text(PRESSED.replace("points = [1, 1]", "points = [2, 1]"))
     w, asked = wearing(), Keys(coefficient=COEFFICIENT, hours=4.0)
     row = begun(w, Surface(np.array([0.0, 0.2 * FORCE / STIFFNESS]), np.zeros(0)))
@@ -125,7 +126,7 @@ def test_a_pressed_patch_wears_until_the_pressure_is_even(case: Path) -> None:
 
 
 def test_a_rough_point_wears_as_the_book_has_it(case: Path) -> None:
-    """Under a constant force V(u*) = F* (1 + t*), V of the new surface (3.3-21), and t* of the work by (3.9-10)."""
+    """Under a constant force V(u*) = F* (1 + t*), V of the new surface (3.3-21), t* by (3.9-10)."""
     (case / "case.toml").write_text(ROUGH)
     w = wearing()
     rows, roughness = [begun(w, w.new)], 4e-6
@@ -136,14 +137,15 @@ def test_a_rough_point_wears_as_the_book_has_it(case: Path) -> None:
     star = FORCE / (STIFFNESS * roughness)
     times = depth * AREA / (COEFFICIENT * FORCE) * COEFFICIENT * STIFFNESS / AREA
     assert times[-1] > 1.0
-    np.testing.assert_allclose(values(Polynomial(), "volume", u / roughness), star * (1 + times), rtol=2e-3)
+    volume = values(Polynomial(), "volume", u / roughness)
+    np.testing.assert_allclose(volume, star * (1 + times), rtol=2e-3)
 
 
 @pytest.mark.slow
-def test_a_resonance_is_followed_until_the_contact_is_lost(case: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """What is worn off is I_W times what the loads supply and the damper does not take. In the end the mass swings
-    alone: closed forms of its resonance, damping and amplitude. Interrupted, it goes on where it was, and the page
-    begins with what the table has."""
+def test_a_resonance_is_followed_until_the_contact_is_lost(case: Path) -> None:
+    """What is worn off is I_W times what the loads supply and the damper does not take. In the end
+    the mass swings alone: closed forms of its resonance, damping and amplitude. Interrupted, it
+    goes on where it was, and the page begins with what the table has."""
     asked = [
         "wear",
         "case.toml",
@@ -166,11 +168,12 @@ def test_a_resonance_is_followed_until_the_contact_is_lost(case: Path, capsys: p
         done.clear()
         patched.setattr(wear, "_jumped", lambda *given: done.append(1) or jumped(*given))
         assert main(asked) == 0
-    found, depth = (ms.load(case / "build" / "worn" / f"{name}.h5") for name in ("wear", "wear_depth"))
+    found, depth = ms.load("build/worn/wear.h5"), ms.load("build/worn/wear_depth.h5")
     assert len(done) == len(found) - 1 - 2
     f, X = found["frequency"], found["amplitude"]
     kinetic = 0.5 * MASS * (2 * np.pi * f * X) ** 2
-    taken = f * (4 * np.pi * found["damping_ratio"] * kinetic - np.pi * DAMPER * 2 * np.pi * f * X**2)
+    supplied = 4 * np.pi * found["damping_ratio"] * kinetic
+    taken = f * (supplied - np.pi * DAMPER * 2 * np.pi * f * X**2)
     volume = COEFFICIENT * integral(found, taken)
     half = volume < 0.5 * volume[-1]  # the jumps behind it are too long for the rule of the test
     np.testing.assert_allclose(found["worn_volume"][half], volume[half], rtol=1e-3)
@@ -185,13 +188,15 @@ def test_a_resonance_is_followed_until_the_contact_is_lost(case: Path, capsys: p
     table = np.genfromtxt(case / "build" / "worn" / "wear.csv", delimiter=",", names=True)
     np.testing.assert_allclose(table["largest_depth_m"], found["largest_depth"], rtol=1e-9)
     page = (case / "build" / "worn" / "wear.html").read_text()
-    assert f"amplitude {METRES.sized(X[0])} to {METRES.sized(X[-1])}, resonance {f[0]:.6g} to {f[-1]:.6g} Hz" in page
+    assert f"amplitude {METRES.sized(X[0])} to {METRES.sized(X[-1])}" in page
+    assert f"resonance {f[0]:.6g} to {f[-1]:.6g} Hz" in page
     assert "touches no more" in page
 
 
 def test_mistakes_name_their_keys(case: Path, capsys: pytest.CaptureFixture[str]) -> None:
     for key, value in (("coefficient", -1e-13), ("hours", 0), ("tolerance", 0.5), ("colour", 1)):
-        refused_command(["wear", "case.toml", "--set", f"wear.{key}={value}"], capsys, f"wear.{key}")
+        asked = ["wear", "case.toml", "--set", f"wear.{key}={value}"]
+        refused_command(asked, capsys, f"wear.{key}")
     (case / "case.toml").write_text(CASE.replace(f"coefficient = {COEFFICIENT}\n", ""))
     refused_command(["wear", "case.toml"], capsys, "wear.coefficient")
     (case / "case.toml").write_text(CASE[: CASE.index("[wear]")])
@@ -206,9 +211,17 @@ def test_mistakes_name_their_keys(case: Path, capsys: pytest.CaptureFixture[str]
         (CASE[CASE.index("[[contacts]]") : CASE.index("[sweep]")], "contacts = []\n", "contacts"),
         ("friction = 0.3", "friction = 0.0", "friction"),
         ("height = 20e-3", "", "area"),
+        ("hours = 8", "hours = 8\nnormal_force = 2.0", "wear.normal_force"),
         (f"interference = {FORCE / STIFFNESS}", 'normal_force = 1.0\nlaw = "jenkins"', "the law's"),
     ],
-    ids=["contacts are missing", "no contact", "no friction", "no area", "a force that is given"],
+    ids=[
+        "contacts are missing",
+        "no contact",
+        "no friction",
+        "no area",
+        "a force that presses nothing",
+        "a force that is given",
+    ],
 )
 def test_what_cannot_wear_is_refused(
     case: Path, capsys: pytest.CaptureFixture[str], before: str, after: str, words: str

@@ -1,12 +1,12 @@
-"""Wear of the contacts by the vibration of a case: resonance, damping, amplitude, stress, contact area and worn depth
-over hours."""
+"""Wear of the contacts by the vibration of a case, which changes with them: resonance, damping,
+amplitude, stress, contact area and worn depth over hours."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
-from itertools import cycle
+from itertools import chain, cycle
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import jax.numpy as jnp
@@ -34,7 +34,7 @@ from ..harmonic_balance.peak import highest
 from ..harmonic_balance.problem import Problem, moves_by
 from ..harmonic_balance.readout import WithOutput, measured
 from ..harmonic_balance.response import judged, operating, traced
-from ..harmonic_balance.solver import Point
+from ..harmonic_balance.solver import CONVERGED, Point
 from ..harmonic_balance.solver import solve as solved
 from ..operating.contact_maps import grid_of, on_grid
 from ..operating.stress import stress_peaks
@@ -67,10 +67,10 @@ EVEN = 0.95
 class Keys(Model):
     """Wear of the contacts by the vibration, by `microslip wear`.
 
-    coefficient: I_W, m3/J: volume that both faces of a contact lose together, over their frictional work. hours: of
-    vibration. frequency: Hz; the highest resonance in the sweep's band if not given, followed as it moves.
-    normal_force: N, instead of all those of the sweep. tolerance: of the largest depth, by which a jump in time may
-    differ from one of first order. jumps: at most.
+    coefficient: I_W, m3/J: volume that both faces of a contact lose together, over their frictional
+    work. hours: of vibration. frequency: Hz; the highest resonance in the sweep's band if not
+    given, followed as it moves. normal_force: N, instead of all those of the sweep. tolerance: of
+    the largest depth, by which a jump in time may differ from one of first order. jumps: at most.
     """
 
     coefficient: Positive
@@ -84,9 +84,10 @@ class Keys(Model):
 def solve(q: Question) -> Answer:
     """A course under every normal force; whole if each reaches the hours.
 
-    A point that slides gets deeper by I_W times its frictional work over its area (Sextro Eqs. (3.9-3) to (3.9-6)), the
-    work of a cycle of the vibration times the cycles of a jump: its faces begin to touch so much later. Of a rough
-    surface the heights wear, the highest first (3.9-8, `contact.wear.worn_law`).
+    A point that slides gets deeper by I_W times its frictional work over its area (Sextro Eqs.
+    (3.9-3) to (3.9-6)), the work of a cycle of the vibration times the cycles of a jump: its faces
+    begin to touch so much later. Of a rough surface the heights wear, the highest first (3.9-8,
+    `contact.wear.worn_law`).
 
     What presses stays. Under a normal force, of the contact or of the sweep, the faces come nearer
     as they wear: the total remains, and the points that are less worn take it over; they tilt and
@@ -100,34 +101,30 @@ def solve(q: Question) -> Answer:
     for force in forces_of(built, asked.normal_force):
         wearing = Wearing(built.pressed(force), built.settings, asked.coefficient)
         pressed = pressed_by(built, wearing.problem(wearing.new)) if force is None else force
-        courses[pressed] = _course(wearing, asked, partial(once, q.kept, f"normal force {pressed!r} N"), q.report)
+        kept = partial(once, q.kept, f"normal force {pressed!r} N")
+        courses[pressed] = _course(wearing, asked, kept, q.report)
     of = measured(built.assembly)
     over, depth = _over_hours(courses, of), _depths(courses)
-    lost = [course.lost for course in courses.values()]
+    size, worn = (10.0, 0.6 + 3.2 * _rows(depth)), f"depth worn in {asked.hours:g} h"
+    said = [_sentences(force, course, asked, of) for force, course in courses.items()]
     return Answer(
-        sentences=[words for force, course in courses.items() for words in _sentences(force, course, asked, of)],
+        sentences=list(chain(*said)),
         data={"": over, "depth": depth},
         diagrams={
             "": Drawing(partial(draw, over, of), "wear by its vibration", (10.0, 6.0)),
-            "depth": Drawing(
-                partial(draw_depth, depth),
-                f"depth worn in {asked.hours:g} h",
-                (10.0, 0.6 + 3.2 * _rows(depth)),
-            ),
+            "depth": Drawing(partial(draw_depth, depth), worn, size),
         },
         largest=float(over["amplitude"].max()),
-        whole=not any(lost),
+        whole=not any(course.lost for course in courses.values()),
     )
 
 
-# surfaces that wear ----------------------------------------------------------------------------------------------
+# surfaces that wear -----------------------------------------------------------------------------
 
 
 class Surface(NamedTuple):
-    """What is worn.
-
-    depth: (n,) m of all points, contact after contact. heights: (m,) x* of the strips of rough ones.
-    """
+    """What is worn: depth (n,) m of all points, contact after contact, and heights (m,), x* of the
+    strips of those that are rough."""
 
     depth: Array
     heights: Array
@@ -135,7 +132,10 @@ class Surface(NamedTuple):
 
 @dataclass(frozen=True)
 class Wearing:
-    """An assembly whose contacts wear. Attributes: assembly: new. settings: of its case. coefficient: I_W, m3/J.
+    """An assembly whose contacts wear.
+
+    Attributes:
+        assembly: new. settings: of its case. coefficient: I_W, m3/J.
 
     Raises:
         UserError: no contact, one without area, friction in none, a law that knows no approach, a
@@ -151,11 +151,11 @@ class Wearing:
             raise UserError("the case has no contacts, so that nothing wears; add [[contacts]]")
         for c in self.assembly.contacts:
             if not (c.patch.areas > 0).all():
-                raise UserError(f"contacts.{c.name}: has no area that could wear; give its width and height (m)")
+                raise UserError(f"contacts.{c.name}: has no area; give its width and height, m")
         if self.settings.mode == "book" and any(self.tables):
-            raise UserError('mode: "book" knows one rough surface for all points, and each wears; write mode = "aft"')
+            raise UserError('mode: "book" has one rough surface for all points; write mode = "aft"')
         if not any(_slides(c) for c in self.assembly.contacts):
-            raise UserError("no contact of the case has friction, so that nothing wears; give one a friction above 0")
+            raise UserError("no contact has friction, so that nothing wears; give one")
 
     @cached_property
     def areas(self) -> Array:
@@ -180,8 +180,9 @@ class Wearing:
         Raises:
             NotConverged: they do not carry what presses them.
         """
-        contacts = tuple(_pressed(c, law) for c, law in zip(self.assembly.contacts, self._laws(surface), strict=True))
-        return balanced(self.settings, replace(self.assembly, contacts=contacts), length=moves_by(self.assembly))
+        pairs = zip(self.assembly.contacts, self._laws(surface), strict=True)
+        worn = replace(self.assembly, contacts=tuple(_pressed(c, law) for c, law in pairs))
+        return balanced(self.settings, worn, length=moves_by(self.assembly))
 
     def after(self, surface: Surface, work: Array, force: Array) -> Surface:
         """Worn further by the frictional work (n,) J of every point, at (n,) N."""
@@ -189,15 +190,11 @@ class Wearing:
         for law, own in zip(self._laws(surface), self.slices, strict=True):
             if (normal := _rough(law)) is not None:
                 share = _share(law)
-                worn = worn_law(
-                    normal,
-                    work[own] / share,
-                    force[own] / share,
-                    self.coefficient,
-                    self.areas[own] / share,
-                )
+                whole = (work[own] / share, force[own] / share)
+                worn = worn_law(normal, *whole, self.coefficient, self.areas[own] / share)
                 heights.append(np.asarray(worn.heights.x).ravel())  # type: ignore[attr-defined]
-        return Surface(surface.depth + self.coefficient * work / self.areas, np.concatenate(heights))
+        depth = surface.depth + self.coefficient * work / self.areas
+        return Surface(depth, np.concatenate(heights))
 
     @cached_property
     def slices(self) -> list[slice]:
@@ -229,7 +226,8 @@ def _slides(c: Contact) -> bool:
 
 
 def _pressed(c: Contact, law: Law) -> Contact:
-    """A contact with a worn law; where a force presses it its faces come nearer until they carry that again.
+    """A contact with a worn law; where a force presses it, its faces come nearer until they carry
+    that again.
 
     Raises:
         NotConverged: no approach does.
@@ -254,8 +252,9 @@ def _rough(law: Any) -> Rough | None:
     """The rough surface of a law."""
     if isinstance(law, Rough):
         return law
-    inner = law.whole if isinstance(law, Portion) else law.normal if isinstance(law, OnNormal | Gapped) else None
-    return None if inner is None else _rough(inner)
+    if isinstance(law, Portion):
+        return _rough(law.whole)
+    return _rough(law.normal) if isinstance(law, OnNormal | Gapped) else None
 
 
 def _roughened(law: Any, heights: Tabulated) -> Any:
@@ -271,23 +270,28 @@ def _share(law: Any) -> Any:
     return np.asarray(law.share) * _share(law.whole) if isinstance(law, Portion) else 1.0
 
 
-# the course ------------------------------------------------------------------------------------------------------
+# the course --------------------------------------------------------------------------------------
+
+
+Row = dict[str, Any]
+"""A vibration and its surface, see `_vibrating`, as a journal keeps it."""
 
 
 class Course(NamedTuple):
-    """Rows from new to worn, see `_vibrating`, with time (h). lost: why it ends early.
-    overlaps: whether none of its contacts is pressed by a force."""
+    """Rows from new to worn, with their time (h). lost: why it ends early."""
 
     wearing: Wearing
-    rows: list[dict[str, Any]]
+    rows: list[Row]
     lost: str
 
     @property
     def overlaps(self) -> bool:
+        """Whether no contact is pressed by a force."""
         return not any(c.preload[0] > 0 for c in self.wearing.assembly.contacts)
 
 
-Kept = Callable[[float, Callable[[], dict[str, Any]]], dict[str, Any]]
+Kept = Callable[[float, Callable[[], Row]], Row]
+Vibrates = Callable[[Surface, Row | None], Row]
 
 
 def _course(w: Wearing, asked: Keys, kept: Kept, report: Callable[[str], None]) -> Course:
@@ -307,26 +311,27 @@ def _course(w: Wearing, asked: Keys, kept: Kept, report: Callable[[str], None]) 
     return Course(w, rows, lost)
 
 
-def _begun(w: Wearing, asked: Keys, vibrates: Callable[..., dict[str, Any]]) -> dict[str, Any]:
-    """The first row. Where the preload goes with the depth, a jump of twice the tolerance of the approach would have
-    that error; half of it is tried first.
+def _begun(w: Wearing, asked: Keys, vibrates: Vibrates) -> Row:
+    """The first row. Where the preload goes with the depth, a jump of twice the tolerance of the
+    approach would have that error; half of it is tried first.
 
     Raises:
         UserError: no vibration.
     """
-    found = vibrates(w.new, None)
-    if found["lost"]:
-        raise UserError(f"frequency: nothing to begin with: {found['lost']}; give another frequency")
-    rate = HOUR * w.coefficient * float((found["power"] / w.areas).max())
+    new = vibrates(w.new, None)
+    if new["lost"]:
+        raise UserError(f"nothing to begin with: {new['lost']}; give another one", "frequency")
+    rate = HOUR * w.coefficient * float((new["power"] / w.areas).max())
     jump = asked.hours
-    if rate > 0 and found["approach"] > 0:
-        jump = min(asked.tolerance * found["approach"] / rate, jump)
-    return {**found, "time": 0.0, "jump": jump, "error": 0.0}
+    if rate > 0 and new["approach"] > 0:
+        jump = min(asked.tolerance * new["approach"] / rate, jump)
+    return {**new, "time": 0.0, "jump": jump, "error": 0.0}
 
 
-def _jumped(w: Wearing, asked: Keys, vibrates: Callable[..., dict[str, Any]], row: dict[str, Any]) -> dict[str, Any]:
-    """The next row, by Heun's method: work and force of a jump are the means of those at its beginning and at its end,
-    as far as the work at its beginning tells; what this differs from a jump by the beginning alone is its error."""
+def _jumped(w: Wearing, asked: Keys, vibrates: Vibrates, row: Row) -> Row:
+    """The next row, by Heun's method: work and force of a jump are the means of those at its
+    beginning and at its end, as far as the beginning alone tells where that is; what the jump
+    differs from one by the beginning alone is its error."""
     surface, left = Surface(row["depth"], row["heights"]), asked.hours - row["time"]
     jump, why = min(row["jump"], left) if row["power"].any() else left, ""
     least = SHORTEST * jump
@@ -350,13 +355,12 @@ def _jumped(w: Wearing, asked: Keys, vibrates: Callable[..., dict[str, Any]], ro
     return {"lost": why or f"no jump keeps to the tolerance of {asked.tolerance:g}"}
 
 
-def _mean_force(*rows: Mapping[str, Any]) -> Array:
+def _mean_force(*rows: Row) -> Array:
     """(n,) N: all work over all ways."""
-    power, way = np.zeros_like(rows[0]["power"]), np.zeros_like(rows[0]["power"])
-    for row in rows:
-        power = power + row["power"]
-        way += np.divide(row["power"], row["force"], out=np.zeros_like(way), where=row["force"] > 0)
-    return np.divide(power, way, out=np.zeros_like(way), where=way > 0)
+    power = np.array([row["power"] for row in rows])
+    force = np.array([row["force"] for row in rows])
+    way = np.divide(power, force, out=np.zeros_like(power), where=force > 0).sum(axis=0)
+    return np.divide(power.sum(axis=0), way, out=np.zeros_like(way), where=way > 0)
 
 
 def _vibrating(
@@ -365,58 +369,54 @@ def _vibrating(
     band: Array,
     report: Callable[[str], None],
     surface: Surface,
-    near: Mapping[str, Any] | None,
-) -> dict[str, Any]:
-    """The vibration with a worn surface, as a journal keeps it; near: one with a surface that is less worn.
+    near: Row | None,
+) -> Row:
+    """The vibration with a worn surface; near: one with another surface.
 
-    power: (n,) W of friction. force: (n,) N, mean while it is closed. open: (n,) share of the cycle. damping: of all
-    that the loads supply in a cycle, over 4 pi times the kinetic energy: the ratio of a resonance. lost: why there is
-    none.
+    power: (n,) W of friction. force: (n,) N, mean while it is closed. open: (n,) share of the
+    cycle. damping: what the loads supply in a cycle over 4 pi times the kinetic energy, the ratio
+    of a resonance. approach: m, the largest in the mean over the cycle. lost: why there is none.
     """
-    state: dict[str, Any] = surface._asdict()
+    state: Row = surface._asdict()
     try:
         problem = w.problem(surface)
         point = _point(problem, frequency, band, near, report)
-        found = operating(problem, point) if point.converged else None
-        status = point.status if found is None else judged(point, found.checks).status
+        motion = operating(problem, point) if point.converged else None
+        status = point.status if motion is None else judged(point, motion.checks).status
     except NotConverged as error:
-        found, status = None, str(error)
-    if found is None or status != "converged":
+        motion, status = None, str(error)
+    if motion is None or status != CONVERGED:
         return {**state, "lost": status}
-    names, trace = [c.name for c in problem.assembly.contacts], traced(problem, found)
-    normal = np.concatenate([np.asarray(trace[name].force)[..., 0] for name in names], axis=1)
-    cycles, f = [found.cycles[name] for name in names], found.Omega / (2 * np.pi)
-    motion = motion_of_read(problem, [found])
+    contacts, trace = problem.assembly.contacts, traced(problem, motion)
+    normal = np.concatenate([np.asarray(trace[c.name].force)[..., 0] for c in contacts], axis=1)
+    cycles, f = [motion.cycles[c.name] for c in contacts], motion.Omega / (2 * np.pi)
+    mean = [c.patch.kinematics[:, 0] @ motion.relative[c.name][:, 0] for c in contacts]
+    read = motion_of_read(problem, [motion])
     return {
         **state,
         "lost": "",
         "x": point.x,
         "Omega": point.Omega,
-        "amplitude": abs(found.outputs[0, 1]),
-        "damping": found.supplied / (4 * np.pi * found.kinetic),
-        "stress": np.nan if motion is None else stress_peaks(motion, largest=False).amplitude[0],
+        "amplitude": abs(motion.outputs[0, 1]),
+        "damping": motion.supplied / (4 * np.pi * motion.kinetic),
+        "stress": np.nan if read is None else stress_peaks(read, largest=False).amplitude[0],
         "power": f * np.maximum(np.concatenate([c.by_slip for c in cycles]), 0.0),
         "open": np.concatenate([c.open for c in cycles]),
         "force": normal.sum(axis=0) / np.maximum((normal > 0).sum(axis=0), 1),
         "pressing": normal.mean(axis=0).sum(),
-        "approach": max(_deepest(c, found.relative[c.name]) for c in problem.assembly.contacts),
+        "approach": np.concatenate(mean).max(),
     }
-
-
-def _deepest(c: Contact, u: Array) -> float:
-    """m, the largest approach of a point in the mean over the cycle; u: (k, 2 H + 1)."""
-    return float((c.patch.kinematics[:, 0] @ u[:, 0]).max())
 
 
 def _point(
     problem: Problem,
     frequency: float | None,
     band: Array,
-    near: Mapping[str, Any] | None,
+    near: Row | None,
     report: Callable[[str], None],
 ) -> Point:
-    """At a frequency, or at the resonance: uphill from one near by, along the curve from any solution at its frequency
-    where there is none near it, and the highest in the band where that leads nowhere."""
+    """At a frequency, or at the resonance: uphill from one near by, from any other solution at its
+    frequency where none is beside it, and the highest in the band where that leads nowhere."""
     if frequency is not None:
         return solved(problem, 2 * np.pi * frequency, [] if near is None else [near["x"]])
     peak = None
@@ -424,63 +424,46 @@ def _point(
         large = max(problem.x_scale, float(np.abs(near["x"]).max()))
         problem = replace(problem, x_scale=large)  # steps along the curve are shares of the motion
         peak = climbed(WithOutput(problem), near["x"], near["Omega"])
-        if not peak.converged and (point := solved(problem, near["Omega"], [near["x"]])).converged:
-            peak = climbed(WithOutput(problem), point.x, point.Omega)
+        if not peak.converged:
+            beside = solved(problem, near["Omega"], [near["x"]])
+            if beside.converged:
+                peak = climbed(WithOutput(problem), beside.x, beside.Omega)
     if peak is None or not peak.converged:
         peak = highest(problem, band, report).peak
     return Point(peak.lam, peak.x, peak.status, 0.0, 0)
 
 
-# what is told ----------------------------------------------------------------------------------------------------
+# tables, sentences, diagrams ---------------------------------------------------------------------
+
+
+PRESSED_BY = "of the contacts that the sweep presses; else of the first one, at rest and new"
 
 
 def _over_hours(courses: Mapping[float, Course], of: Quantity) -> Dataset:
-    columns = {
-        "normal_force": (
-            "N",
-            "of the contacts that the sweep presses; else of the first contact, at rest and new",
-        ),
-        "time": ("h", "of vibration"),
-        "frequency": ("Hz", "of the vibration: the resonance, or the one asked for"),
-        "amplitude": (of.unit, "of the first read-out, 0-peak"),
-        "damping_ratio": (
-            "1",
-            "of all that is lost in a cycle: over 4 pi times the kinetic energy",
-        ),
-        "stress": (
-            "Pa",
-            "largest amplitude in the body that is read; nan where its modal file has none",
-        ),
-        "area": ("m2", "nominal area of the points that touch, mean over the cycle"),
-        "pressing": ("N", "normal forces of all contacts, mean over the cycle"),
-        "largest_depth": ("m", "worn off both faces together"),
-        "worn_volume": ("m3", "of all contacts"),
-        "frictional_power": ("W", "of all contacts"),
-        "error": (
-            "1",
-            "of the jump that leads there: what differs from one of first order, over the largest depth",
-        ),
-    }
-    rows = [_told(force, course.wearing, row) for force, course in courses.items() for row in course.rows]
-    named = zip(columns.items(), np.array(rows).T, strict=True)
-    return Dataset("wear", {name: Variable(v, unit, holds) for (name, (unit, holds)), v in named})
+    columns = [
+        ("normal_force", "N", PRESSED_BY),
+        ("time", "h", "of vibration"),
+        ("frequency", "Hz", "of the vibration: the resonance, or the one asked for"),
+        ("amplitude", of.unit, "of the first read-out, 0-peak"),
+        ("damping_ratio", "1", "of all that is lost in a cycle; over 4 pi times kinetic energy"),
+        ("stress", "Pa", "largest amplitude in the body that is read; nan without stress modes"),
+        ("area", "m2", "nominal area of the points that touch, mean over the cycle"),
+        ("pressing", "N", "normal forces of all contacts, mean over the cycle"),
+        ("largest_depth", "m", "worn off both faces together"),
+        ("worn_volume", "m3", "of all contacts"),
+        ("frictional_power", "W", "of all contacts"),
+        ("error", "1", "of the jump that leads there, against first order, over the largest depth"),
+    ]
+    each = [(force, c.wearing.areas, row) for force, c in courses.items() for row in c.rows]
+    rows = [(force, *_in_table(areas, row)) for force, areas, row in each]
+    return _dataset("wear", columns, np.array(rows).T)
 
 
-def _told(force: float, w: Wearing, row: Mapping[str, Any]) -> tuple[float, ...]:
-    return (
-        force,
-        row["time"],
-        row["Omega"] / (2 * np.pi),
-        row["amplitude"],
-        row["damping"],
-        row["stress"],
-        float(w.areas @ (1 - row["open"])),
-        row["pressing"],
-        row["depth"].max(),
-        float(w.areas @ row["depth"]),
-        row["power"].sum(),
-        row["error"],
-    )
+def _in_table(areas: Array, row: Row) -> tuple[float, ...]:
+    touching, volume = areas @ (1 - row["open"]), areas @ row["depth"]
+    frequency, depth, power = row["Omega"] / (2 * np.pi), row["depth"].max(), row["power"].sum()
+    moves = row["time"], frequency, row["amplitude"], row["damping"], row["stress"]
+    return *moves, touching, row["pressing"], depth, volume, power, row["error"]
 
 
 def _depths(courses: Mapping[float, Course]) -> Dataset:
@@ -488,21 +471,13 @@ def _depths(courses: Mapping[float, Course]) -> Dataset:
     parts = []
     for force, course in courses.items():
         contacts, areas = course.wearing.assembly.contacts, course.wearing.areas
+        places, last = np.concatenate([c.patch.points for c in contacts]), course.rows[-1]
         names = np.repeat([c.name for c in contacts], [len(c.patch.points) for c in contacts])
-        places = np.concatenate([c.patch.points for c in contacts]).T
-        pressures = (course.rows[i]["force"] / areas for i in (0, -1))
-        parts.append(
-            (
-                np.full(len(areas), force),
-                names,
-                *places,
-                areas,
-                course.rows[-1]["depth"],
-                *pressures,
-            )
-        )
-    told = [
-        ("normal_force", "N", "of the contacts that the sweep presses"),
+        pressures = course.rows[0]["force"] / areas, last["force"] / areas
+        where = np.full(len(areas), force), names, *places.T, areas
+        parts.append((*where, last["depth"], *pressures))
+    columns = [
+        ("normal_force", "N", PRESSED_BY),
         ("contact", "1", "name"),
         ("t1", "m", "place on the patch"),
         ("t2", "m", "place on the patch"),
@@ -511,38 +486,45 @@ def _depths(courses: Mapping[float, Course]) -> Dataset:
         ("pressure_new", "Pa", "mean while it is closed, at the beginning"),
         ("pressure", "Pa", "mean while it is closed, at the end"),
     ]
-    named = zip(told, (np.concatenate(column) for column in zip(*parts, strict=True)), strict=True)
-    return Dataset("wear_depth", {name: Variable(v, unit, holds) for (name, unit, holds), v in named})
+    return _dataset("wear_depth", columns, [np.concatenate(c) for c in zip(*parts, strict=True)])
+
+
+Columns = Sequence[tuple[str, str, str]]
+"""Name, unit and meaning of each."""
+
+
+def _dataset(kind: str, columns: Columns, values: Iterable[Array]) -> Dataset:
+    named = zip(columns, values, strict=True)
+    return Dataset(kind, {name: Variable(v, unit, holds) for (name, unit, holds), v in named})
 
 
 def _sentences(force: float, course: Course, asked: Keys, of: Quantity) -> list[str]:
     rows, w = course.rows, course.wearing
     new, last = rows[0], rows[-1]
     begun = f"F_N = {force:.5g} N" + (" when new" if course.overlaps else "")
-    size, ratio = (
-        (of.sized(row["amplitude"]) for row in (new, last)),
-        (percent(row["damping"]) for row in (new, last)),
-    )
-    deepest = int(last["depth"].argmax())
-    frequencies = " to ".join(f"{row['Omega'] / (2 * np.pi):.6g}" for row in (new, last))
-    where = f"at {asked.frequency:g} Hz" if asked.frequency else f"resonance {frequencies} Hz"
+    both = [(of.sized(r["amplitude"]), r["Omega"] / (2 * np.pi), r["damping"]) for r in (new, last)]
+    (size, f, ratio), (worn_size, worn_f, worn_ratio) = both
+    at = f"at {f:.6g} Hz" if asked.frequency else f"resonance {f:.6g} to {worn_f:.6g} Hz"
+    volume, deepest = 1e9 * (w.areas @ last["depth"]), METRES.sized(last["depth"].max())
     said = [
-        f"{begun}, new to {last['time']:.6g} h of vibration: amplitude {' to '.join(size)}, {where}, damping ratio "
-        f"{' to '.join(ratio)}; {1e9 * float(w.areas @ last['depth']):.4g} mm3 worn, "
-        f"{METRES.sized(last['depth'][deepest])} at the deepest, in {counted(len(rows) - 1, 'jump')}."
+        f"{begun}, new to {last['time']:.6g} h of vibration: amplitude {size} to {worn_size}, "
+        f"{at}, damping ratio {percent(ratio)} to {percent(worn_ratio)}; {volume:.4g} mm3 worn, "
+        f"{deepest} at the deepest, in {counted(len(rows) - 1, 'jump')}."
     ]
     if not last["depth"].any():
-        said = [f"{begun}: nothing slides, amplitude {of.sized(new['amplitude'])}, {where}, so that nothing wears."]
+        said = [f"{begun}: nothing slides at {f:.6g} Hz, amplitude {size}, so that nothing wears."]
     for c, own in zip(w.assembly.contacts, w.slices, strict=True):
         touches = np.array([bool((row["open"][own] < 1).any()) for row in rows])
         if touches[0] and not touches[-1]:
             since = rows[int(np.flatnonzero(touches)[-1]) + 1]["time"]
             said.append(f"{begun}: contact '{c.name}' touches no more from {since:.6g} h on.")
-    return said + ([f"{begun}: it ends after {last['time']:.6g} h: {course.lost}."] if course.lost else [])
+    if course.lost:
+        said.append(f"{begun}: it ends after {last['time']:.6g} h: {course.lost}.")
+    return said
 
 
 def draw(over: Dataset, of: Quantity, figure: Figure) -> None:
-    """Of every normal force, over hours: amplitude, frequency, damping, stress where it is known, depth, contact."""
+    """Of every normal force, over hours."""
     by, unit = of.shared(over["amplitude"])
     deep, micro = METRES.shared(over["largest_depth"])
     panels = [
@@ -560,15 +542,8 @@ def draw(over: Dataset, of: Quantity, figure: Figure) -> None:
         plain_axes(axes)
         for force, colour in zip(dict.fromkeys(over["normal_force"]), cycle(COLOURS)):
             own = over["normal_force"] == force
-            axes.plot(
-                over["time"][own],
-                scale * over[name][own],
-                ".-",
-                color=colour,
-                ms=4,
-                lw=1.2,
-                label=f"$F_N$ = {force:.5g} N",
-            )
+            line: Any = {"color": colour, "label": f"$F_N$ = {force:.5g} N"}
+            axes.plot(over["time"][own], scale * over[name][own], ".-", ms=4, lw=1.2, **line)
         axes.set(xlabel="hours", ylabel=label)
         axes.ticklabel_format(useOffset=False)
         if name in ("area", "largest_depth", "damping_ratio", "pressing"):
@@ -585,8 +560,9 @@ def _rows(depth: Dataset) -> int:
 def _patches(depth: Dataset) -> dict[tuple[float, str], Array]:
     """(normal force, contact) -> which points are its own, the deepest worn first."""
     normal, name = depth["normal_force"], depth["contact"]
-    found = {p: (normal == p[0]) & (name == p[1]) for p in dict.fromkeys(zip(normal, name, strict=True))}
-    return dict(sorted(found.items(), key=lambda one: -depth["depth"][one[1]].max()))
+    pairs = dict.fromkeys(zip(normal, name, strict=True))
+    points = {pair: (normal == pair[0]) & (name == pair[1]) for pair in pairs}
+    return dict(sorted(points.items(), key=lambda patch: -depth["depth"][patch[1]].max()))
 
 
 def draw_depth(depth: Dataset, figure: Figure) -> None:
@@ -596,10 +572,7 @@ def draw_depth(depth: Dataset, figure: Figure) -> None:
     for axes in table.flat[len(patches) :]:
         axes.set_axis_off()
     for axes, (p, own) in zip(table.flat, patches, strict=False):
-        places, values = (
-            1e3 * np.column_stack([depth[name][own] for name in ("t1", "t2")]),
-            depth["depth"][own],
-        )
+        places, values = 1e3 * np.column_stack([depth["t1"], depth["t2"]])[own], depth["depth"][own]
         least, most = float(values.min()), max(float(values.max()), 1e-12)
         least = least if least < EVEN * most else 0.0
         by, unit = METRES.shared(values)
