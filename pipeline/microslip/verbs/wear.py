@@ -507,7 +507,7 @@ def _sentences(force: float, course: Course, asked: Keys, of: Quantity) -> list[
     at = f"at {f:.6g} Hz" if asked.frequency else f"resonance {f:.6g} to {worn_f:.6g} Hz"
     volume, deepest = 1e9 * (w.areas @ last["depth"]), METRES.sized(last["depth"].max())
     said = [
-        f"{begun}, new to {last['time']:.6g} h of vibration: amplitude {size} to {worn_size}, "
+        f"{begun}, in {last['time']:.6g} h of vibration: amplitude {size} to {worn_size}, "
         f"{at}, damping ratio {percent(ratio)} to {percent(worn_ratio)}; {volume:.4g} mm3 worn, "
         f"{deepest} at the deepest, in {counted(len(rows) - 1, 'jump')}."
     ]
