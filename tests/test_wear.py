@@ -81,6 +81,8 @@ def test_a_point_under_a_force_wears_evenly(case: Path) -> None:
     np.testing.assert_allclose(found["pressing"], FORCE, rtol=1e-9)
     np.testing.assert_allclose(np.ptp(found["amplitude"]), 0.0, atol=1e-12)
     way = 2 * slip(found, np.array([FORCE])) * DRIVEN * HOUR * found["time"]
+    points = ms.load("build/worn/wear_depth.h5")
+    assert points["contact"].tolist() == ["sole"] and points["area"] == pytest.approx(AREA)
     exact = COEFFICIENT * MU * FORCE * way / AREA
     np.testing.assert_allclose(found["largest_depth"], exact, rtol=2e-3)
 

@@ -373,9 +373,10 @@ def _vibrating(
 ) -> Row:
     """The vibration with a worn surface; near: one with another surface.
 
-    power: (n,) W of friction. force: (n,) N, mean while it is closed. open: (n,) share of the
-    cycle. damping: what the loads supply in a cycle over 4 pi times the kinetic energy, the ratio
-    of a resonance. approach: m, the largest in the mean over the cycle. lost: why there is none.
+    power: (n,) W of friction along what slides. taken: W, all that contacts take. force: (n,) N,
+    mean while it is closed. open: (n,) share of the cycle. damping: what the loads supply in a
+    cycle over 4 pi times the kinetic energy, the ratio of a resonance. approach: m, the largest in
+    the mean over the cycle. lost: why there is no vibration.
     """
     state: Row = surface._asdict()
     try:
@@ -401,6 +402,7 @@ def _vibrating(
         "damping": motion.supplied / (4 * np.pi * motion.kinetic),
         "stress": np.nan if read is None else stress_peaks(read, largest=False).amplitude[0],
         "power": f * np.maximum(np.concatenate([c.by_slip for c in cycles]), 0.0),
+        "taken": f * sum(float(c.taken.sum()) for c in cycles),
         "open": np.concatenate([c.open for c in cycles]),
         "force": normal.sum(axis=0) / np.maximum((normal > 0).sum(axis=0), 1),
         "pressing": normal.mean(axis=0).sum(),
@@ -513,6 +515,9 @@ def _sentences(force: float, course: Course, asked: Keys, of: Quantity) -> list[
     ]
     if not last["depth"].any():
         said = [f"{begun}: nothing slides at {f:.6g} Hz, amplitude {size}, so that nothing wears."]
+        if new["taken"] > 0:
+            power = Quantity("W").sized(new["taken"])
+            said.append(f"{begun}: the contacts take {power} in creep, dampers or as area opens.")
     for c, own in zip(w.assembly.contacts, w.slices, strict=True):
         touches = np.array([bool((row["open"][own] < 1).any()) for row in rows])
         if touches[0] and not touches[-1]:
@@ -584,6 +589,7 @@ def draw_depth(depth: Dataset, figure: Figure) -> None:
             shown = axes.pcolormesh(*edges, on_grid(places, by * values), **how)
         axes.set_aspect("equal")
         axes.set(xlabel="t1 in mm", ylabel="t2 in mm")
+        axes.locator_params(nbins=5)
         axes.set_title(f"{p[1]}, $F_N$ = {p[0]:.5g} N", fontsize=9)
         figure.colorbar(shown, ax=axes, label=f"depth in {unit}", shrink=0.8)
 
