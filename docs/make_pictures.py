@@ -1149,6 +1149,18 @@ def ring_down() -> None:
         save(from_file(BUILD / "build" / "sample" / "pictures" / f"{name}.png"), name)
 
 
+def worn_vane() -> None:
+    """The sample vane between neighbours that it overlaps, whose contacts wear: over hours and over the patches."""
+    BUILD.mkdir(parents=True, exist_ok=True)
+    overlap = [f"contacts.{side}.interference=1e-4" for side in ("right", "left")]
+    band = ["sweep.start=250", "sweep.stop=450", "sweep.points=51"]
+    asked = ["name=worn-vane", *overlap, *band, "wear.coefficient=4e-14", "wear.hours=15000"]
+    with contextlib.chdir(BUILD):
+        typed(["wear", "sample", *(f"--set={one}" for one in asked)])
+    for name in ("wear", "wear_depth"):
+        save(from_file(BUILD / "build" / "worn-vane" / "pictures" / f"{name}.png"), f"vibration_{name}")
+
+
 def mistuning() -> None:
     """The mistuned ring with friction: amplification, envelopes beside first order, the worst sample, and a table."""
     import mistuning_study as study
@@ -1627,6 +1639,7 @@ STUDIES = {
         python,
         two_tones,
         ring_down,
+        worn_vane,
         mistuning,
         identification,
         stability,

@@ -222,6 +222,6 @@ def test_every_law_with_a_gap_begins_later() -> None:
     for law in laws:
         np.testing.assert_allclose(pressed(apart(law, h), u), pressed(law, u - h), rtol=1e-12)
     for law in (replace(laws[0], normal=Preload(jnp.asarray(10.0))), laws[3].under(10.0)):
-        refused("curvature: the law's normal force is given", apart, law, h)
+        refused("the law's normal force is given", apart, law, h)
     for radii in ((0.0, 1.0), (1.0, -2.0)):
         refused("curvature: radii of", gap, np.zeros((1, 2)), radii)

@@ -78,3 +78,4 @@ def test_mistakes_name_their_keys(folder: Path, capsys: pytest.CaptureFixture[st
     for key, value in (("forces", 1), ("low", -1.0), ("colour", 1)):
         refused_command(["map", "case.toml", "--set", f"map.{key}={value}"], capsys, f"map.{key}")
     refused_command(["map", "case.toml", "--set", "map.high=2.0", "--set", "map.low=3.0"], capsys, "high")
+    refused_command(["map", "case.toml", "--set", "contacts.sole.normal_force=3.0"], capsys, "presses nothing")

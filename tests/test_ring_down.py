@@ -89,6 +89,6 @@ def test_a_slider_rings_down_along_its_nonlinear_mode(case: Path, begun: list[st
 
 
 def test_mistakes_name_their_keys(case: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    for key, value in (("down_to", 2), ("periods", 1), ("amplitude", -1.0), ("colour", 1)):
+    for key, value in (("down_to", 2), ("periods", 1), ("amplitude", -1.0), ("colour", 1), ("normal_force", 2.0)):
         refused_command(["ring-down", "case.toml", "--set", f"ring_down.{key}={value}"], capsys, f"ring_down.{key}")
     assert not (case / "build" / "rung").exists()

@@ -16,7 +16,7 @@ from ..contact.point_laws import curve_point
 from ..contact.portion import portion
 from ..contact.solids import Solid
 from ..data import Array, Interface
-from ..errors import UserError
+from ..errors import UserError, at
 from ..system.nodal import Nodal
 from ..system.pairing import SLIVER, rigid_points
 from ..units import counted, percent
@@ -192,7 +192,10 @@ def pieces(c: ContactSettings, load: float | None) -> Patch:
 
 
 def _curved(c: ContactSettings, law: Law, points: Array) -> Law:
-    return law if c.curvature is None else apart(law, gap(points, c.curvature))
+    if c.curvature is None:
+        return law
+    with at("curvature"):
+        return apart(law, gap(points, c.curvature))
 
 
 def _fitted(c: ContactSettings, load: float | None) -> float:

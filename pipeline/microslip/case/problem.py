@@ -20,9 +20,13 @@ from .settings import CaseSettings, ContactSettings
 
 def problem_of(built: Built, normal: float | None, **finer: Any) -> Problem:
     """The balance of a case whose swept contacts a normal force (N) presses. finer: other settings of `problem.of`."""
-    s, assembly = built.settings, built.pressed(normal)
-    asked: dict[str, Any] = {"harmonics": s.balanced, **s.marching, "models": models_of(s, assembly)}
-    return balance.of(assembly, **{**asked, **finer})
+    return balanced(built.settings, built.pressed(normal), **finer)
+
+
+def balanced(settings: CaseSettings, assembly: Assembly, **finer: Any) -> Problem:
+    """The balance of any assembly as a case asks for it; finer: see `problem_of`."""
+    asked: dict[str, Any] = {"harmonics": settings.balanced, **settings.marching}
+    return balance.of(assembly, **{**asked, "models": models_of(settings, assembly), **finer})
 
 
 def models_of(settings: CaseSettings, assembly: Assembly) -> dict[int, Forces] | None:
@@ -82,6 +86,19 @@ def normal_forces(built: Built, asked: Any = None) -> tuple[float, ...]:
             "sweep.normal_forces",
         )
     return (forces[0],)
+
+
+def forces_of(built: Built, asked: float | None) -> list[float | None]:
+    """Normal forces (N) of an analysis: the one asked for, else those of the sweep; None: all contacts have their own.
+
+    Raises:
+        UserError: one is asked for that presses nothing.
+    """
+    if any(swept(c) for c in built.settings.contacts):
+        return [*normal_forces(built)] or [None] if asked is None else [asked]
+    if asked is not None:
+        raise UserError("presses nothing: all contacts have a force or an interference; leave it out", "normal_force")
+    return [None]
 
 
 def _first_face(built: Built, c: ContactSettings) -> tuple[str, ModalGroup]:

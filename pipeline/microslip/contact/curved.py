@@ -68,7 +68,7 @@ def apart(law: Law, gap: Array) -> Law:
     normal = getattr(whole, "normal", None)
     if isinstance(normal, Normal) and not isinstance(normal, Preload):
         return replace(whole, normal=Gapped(normal, jnp.asarray(gap, dtype=float)))
-    raise UserError("curvature: the law's normal force is given and not found from the approach; take another law")
+    raise UserError("the law's normal force is given and not found from the approach; take another law")
 
 
 @dataclass(frozen=True)

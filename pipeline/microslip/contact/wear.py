@@ -286,7 +286,7 @@ def from_energy_density(density: float) -> float:
 
 
 def dimensionless_time(
-    energy: np.ndarray, coefficient: float, normal: Rough, area: float, force: np.ndarray
+    energy: np.ndarray, coefficient: float, normal: Rough, area: np.ndarray | float, force: np.ndarray
 ) -> np.ndarray:
     """t* of a frictional work (J) under a normal force (N): I_W mu v c_N0 t / A_0 (3.9-10), mu v t = work / force."""
     return coefficient * np.asarray(energy) * np.asarray(normal.stiffness_0) / (area * np.asarray(force))
@@ -295,7 +295,9 @@ def dimensionless_time(
 # the closed loop of Fig. 3.9-4 ---------------------------------------------------------------------------------------
 
 
-def worn_law(normal: Rough, energy: np.ndarray, force: np.ndarray, coefficient: float, area: float) -> Rough:
+def worn_law(
+    normal: Rough, energy: np.ndarray, force: np.ndarray, coefficient: float, area: np.ndarray | float
+) -> Rough:
     """The rough law after frictional work at a normal force: a table of heights per point, of the exact course.
 
     The approach goes on being counted from where the NEW surface began to touch: a worn one begins later. Where the
@@ -304,10 +306,10 @@ def worn_law(normal: Rough, energy: np.ndarray, force: np.ndarray, coefficient: 
 
     Args:
         normal: new or worn. energy: (n,) J dissipated at each point. force: (n,) N at which it was; where it is 0
-            nothing wears. coefficient: I_W, m3/J. area: nominal area of a point, m2.
+            nothing wears. coefficient: I_W, m3/J. area: nominal area of a point, m2, or (n,) of each.
     """
     energy, force = np.broadcast_arrays(np.atleast_1d(np.asarray(energy, float)), np.asarray(force, float))
-    if not np.all(energy >= 0) or not np.all(force >= 0) or not coefficient >= 0 or not area > 0:
+    if not np.all(energy >= 0) or not np.all(force >= 0) or not coefficient >= 0 or not np.all(area > 0):
         raise UserError("wear: energy, force and coefficient must be 0 or more, and the area positive")
     table, n = as_table(normal.heights), len(energy)
     x, share = (np.broadcast_to(np.asarray(v), (n, np.shape(v)[-1])).copy() for v in (table.x, table.area_at))

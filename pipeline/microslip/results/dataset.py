@@ -112,7 +112,8 @@ def _read(path: Path) -> Dataset:
             array = file[name]
             axes = tuple(dimension.label for dimension in array.dims)
             unit, holds = str(array.attrs["unit"]), str(array.attrs["holds"])
-            variables[name] = Variable(np.asarray(array[()]), unit, holds, axes)
+            values = array.asstr()[()].astype(str) if array.dtype.kind == "S" else np.asarray(array[()])
+            variables[name] = Variable(values, unit, holds, axes)
         if len({len(v.values) for v in variables.values()}) > 1:
             raise ValueError("arrays of different lengths")
         return Dataset(str(file.attrs["kind"]), variables, json.loads(file.attrs["facts"]))

@@ -11,7 +11,7 @@ from pydantic import Field, model_validator
 
 from ..analysis import Analysis, Answer, Drawing, Question
 from ..case.assemble import Built
-from ..case.problem import normal_forces, problem_of
+from ..case.problem import forces_of, problem_of
 from ..continuation import NO_OPTIMUM, Peak
 from ..data import Array
 from ..errors import UserError
@@ -85,10 +85,13 @@ def _forces(q: Question) -> list[float]:
     """N, in equal ratios.
 
     Raises:
-        UserError: no range.
+        UserError: no range, or nothing that is pressed.
     """
     asked: Keys = q.asked
-    swept = [force for force in normal_forces(q.built) if force > 0]
+    given = forces_of(q.built, None)
+    if given == [None]:
+        raise UserError("a normal force presses nothing here: all contacts have their own; leave it out of one")
+    swept = [force for force in given if force]
     low = asked.low or min(swept, default=0.0)
     high = asked.high or max(swept, default=0.0)
     if not 0 < low < high:

@@ -16,7 +16,7 @@ from scipy.signal.windows import blackmanharris
 
 from ..analysis import Analysis, Answer, Drawing, Question
 from ..case.assemble import Built
-from ..case.problem import normal_forces, pressed_by, problem_of
+from ..case.problem import forces_of, pressed_by, problem_of
 from ..data import Array
 from ..errors import NotConverged, UserError
 from ..harmonic_balance import nonlinear_modes
@@ -74,8 +74,7 @@ def solve(q: Question) -> Answer:
     """A motion under every normal force; whole if none ends above `down_to`, and no nonlinear mode early."""
     asked: Keys = q.asked
     built: Built = q.built
-    swept: list[float | None] = [*normal_forces(built)] if asked.normal_force is None else [asked.normal_force]
-    forces = swept or [None]
+    forces = forces_of(built, asked.normal_force)
     quantity, kept = measured(built.assembly), dict[float, dict[str, Any]]()
     for number, force in enumerate(forces):
         problem = problem_of(built, force, form="relative")
