@@ -9,7 +9,7 @@ import pytest
 from refusals import refused
 
 import microslip as ms
-from microslip.case.problem import pressed_by, problem_of
+from microslip.case.problem import forces_of, pressed_by, problem_of
 from microslip.errors import NotConverged, UserError
 from microslip.harmonic_balance import nonlinear_modes
 from microslip.harmonic_balance import problem as balance
@@ -78,3 +78,14 @@ def test_modes_that_do_not_bend_are_refused() -> None:
     assert counted_from_1(problem, 2) == 1
     for system, mode in ((free, 0), (apart, 1)):
         assert refused((), ms.backbone, system, 1e-3, 1.0, mode=mode).startswith("mode: ")
+
+
+def test_forces_of_a_sweep_that_press_no_contact_are_said_to_and_give_one_answer() -> None:
+    """Three equal responses were called those of 20, 100 and 1000 N."""
+    rub = {"law": "smooth", "normal_stiffness": 2e5, "tangential_stiffness": 4e5, "friction": 0.2, "points": [1, 1]}
+    case = {"body": "vane", "excitation": "magnet", "amplitude": 1.0, "monitor": "probe", "modes": 1,
+            "sweep": {"start": 300.0, "stop": 400.0, "points": 3, "normal_forces": [20.0, 100.0, 1000.0]},
+            "contacts": [{"interface": "right", "interference": 1e-4, **rub}]}  # fmt: skip
+    built = ms.assemble(case, vane=ms.sample())
+    assert forces_of(built) == [None]
+    assert any("presses nothing" in words for words in built.messages)

@@ -26,7 +26,7 @@ from .points import (
     fitting_forces,
     follows_the_force,
 )
-from .settings import GROUND, CaseSettings, ContactSettings
+from .settings import GROUND, UNPRESSED, CaseSettings, ContactSettings
 from .thrown import thrown
 
 
@@ -128,11 +128,20 @@ def build(settings: CaseSettings, bases: Mapping[str, ModalBasis]) -> Built:
     messages += [*said, *messages_of(flowing, loads, settings.balanced, _blades(settings), settings.turning)]
     ring = Ring(settings.ring.blades, settings.base_order) if settings.ring else None
     outputs = _outputs(settings, bodies)
+    messages += _pressing_nothing(settings)
     messages += [_held(w) for w in outputs if _is_still(bodies[w.component], "monitor", w.monitor, w.label)]
     messages += [_in_zone(w) for w in outputs if _reads_singular(bodies[w.component].group, w.monitor)]
     assembly = Assembly(flowing, tuple(made), loads, outputs, ring, settings.stuck_ratios)
     said = list(dict.fromkeys(messages))
     return Built(settings, bodies, tuple(contacts), tuple(springs), assembly, tuple(said), fitted)
+
+
+def _pressing_nothing(settings: CaseSettings) -> list[str]:
+    """What is said of normal forces of a sweep that no contact takes."""
+    forces = settings.sweep.normal_forces
+    if not settings.contacts or forces in (None, UNPRESSED) or any(swept(c) for c in settings.contacts):
+        return []
+    return ["sweep.normal_forces presses nothing: every contact has a force or an interference of its own."]
 
 
 def _component(settings: CaseSettings, b: Loaded) -> Component:

@@ -57,7 +57,8 @@ def pressed_by(built: Built, problem: Problem) -> float:
 
 
 def normal_forces(built: Built, asked: Any = None) -> tuple[float, ...]:
-    """The forces asked for, or the one that the static state at speed has in every contact that the sweep presses.
+    """The forces asked for, or the one that the static state at speed has in every contact that the sweep presses; none
+    where it presses no contact.
 
     Args:
         asked: ``static``, or the sweep's own if None.
@@ -68,6 +69,8 @@ def normal_forces(built: Built, asked: Any = None) -> tuple[float, ...]:
     settings = built.settings
     asked = settings.sweep.normal_forces if asked is None else asked
     contacts = [c for c in settings.contacts if swept(c)]
+    if not contacts:
+        return ()
     if not isinstance(asked, str):
         return asked or ()
     found = [_static_force(*_first_face(built, c)) for c in contacts]
@@ -88,17 +91,18 @@ def normal_forces(built: Built, asked: Any = None) -> tuple[float, ...]:
     return (forces[0],)
 
 
-def forces_of(built: Built, asked: float | None) -> list[float | None]:
+def forces_of(built: Built, asked: float | None = None) -> list[float | None]:
     """Normal forces (N) of an analysis: the one asked for, else those of the sweep; None: all contacts have their own.
 
     Raises:
         UserError: one is asked for that presses nothing.
     """
-    if any(swept(c) for c in built.settings.contacts):
-        return [*normal_forces(built)] or [None] if asked is None else [asked]
-    if asked is not None:
+    forces = normal_forces(built)
+    if asked is None:
+        return [*forces] or [None]
+    if not forces:
         raise UserError("presses nothing: all contacts have a force or an interference; leave it out", "normal_force")
-    return [None]
+    return [asked]
 
 
 def _first_face(built: Built, c: ContactSettings) -> tuple[str, ModalGroup]:

@@ -19,7 +19,7 @@ from ..basis import read_basis
 from ..case import checkpoint, headline, load_case
 from ..case.assemble import Built
 from ..case.messages import lifts
-from ..case.problem import pressed_by, problem_of
+from ..case.problem import forces_of, pressed_by, problem_of
 from ..continuation import NO_OPTIMUM
 from ..data import Array
 from ..errors import UserError, in_its_file
@@ -101,14 +101,6 @@ def open_case(path: Path, files: Mapping[str, Path], folder: Path, assignments: 
     return Case(path, raw, {name: read_basis(file) for name, file in files.items()}, folder)
 
 
-def normal_forces(built: Built) -> tuple[float | None, ...]:
-    """Those of the sweep, N; None: every contact has its own."""
-    asked = built.settings.sweep.normal_forces
-    if isinstance(asked, str):
-        raise UserError(f'"{asked}" has one value; give numbers here', "sweep.normal_forces")
-    return asked or (None,)
-
-
 # nonlinear modes -----------------------------------------------------------------------------------------------------
 
 
@@ -131,8 +123,8 @@ def backbones(
 
     found: dict[float, Backbone] = {}
     built, of = case.plain, case.quantity
-    forces = [n for n in normal_forces(built) if n != 0] or normal_forces(built)
-    if 0.0 in normal_forces(built):
+    forces = [n for n in forces_of(built) if n != 0] or forces_of(built)
+    if 0.0 in forces_of(built):
         report("left out: a normal force of 0 N, under which nothing sticks")
     for count, asked in enumerate(forces, 1):
         problem = about_rest(problem_of(built, asked, form="relative"))[0]
@@ -200,7 +192,7 @@ def remarks_on_backbones(
         return []
     normal, best = max(known, key=lambda pair: float(pair[1].damping.max()))
     at, built, e = int(best.damping.argmax()), case.plain, None
-    asked = None if normal_forces(built) == (None,) else normal
+    asked = None if forces_of(built) == [None] else normal
     problem = nonlinear_modes.about_rest(problem_of(built, asked, form="relative"))[0]
     if headline.is_estimated(built, problem):
         report("error of harmonics and samples")
@@ -298,7 +290,7 @@ def optimum_over(
     from ..harmonic_balance.peak import optimum
 
     built = case.plain
-    forces = [n for n in normal_forces(built) if n is not None]
+    forces = [n for n in forces_of(built) if n is not None]
     if over == NORMAL_FORCE and len(forces) > 1:
         low = min(n for n in forces if n > 0) if low is None else low
         high = max(forces) if high is None else high
@@ -356,7 +348,7 @@ def remarks_on_optimum(found: Optimum, over: str, case: Case, report: Report = l
     said = headline.said_of(built.settings, f"The amplitude at {at}", e)
     if found.problem is not None and best.status == CONVERGED:
         said += verdict(found.problem, best.x, best.Omega, f"The motion at {at}")
-    forces = known if over == NORMAL_FORCE else [n for n in normal_forces(built) if n is not None]
+    forces = known if over == NORMAL_FORCE else [n for n in forces_of(built) if n is not None]
     largest = max(one.amplitude for one in known.values())
     return _told_of(said, headline.doubted(built, largest, max(forces, default=None)), report)
 
@@ -588,7 +580,7 @@ def stabilities(case: Case, report: Report = lambda _: None) -> dict[float, dict
     done, count = 0, sum(int(series.converged.sum()) for series in response.series)
     for series in response.series:
         normal = float(series.parameters["normal_force"])
-        problem = problem_of(built, normal if normal_forces(built) != (None,) else None)
+        problem = problem_of(built, normal if forces_of(built) != [None] else None)
         rows = found.setdefault(normal, {})
         for i in np.flatnonzero(series.converged):
             f = float(series.frequency[i])

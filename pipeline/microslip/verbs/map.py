@@ -88,7 +88,7 @@ def _forces(q: Question) -> list[float]:
         UserError: no range, or nothing that is pressed.
     """
     asked: Keys = q.asked
-    given = forces_of(q.built, None)
+    given = forces_of(q.built)
     if given == [None]:
         raise UserError("a normal force presses nothing here: all contacts have their own; leave it out of one")
     swept = [force for force in given if force]
