@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import re
+import tomllib
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -212,3 +214,13 @@ def test_a_case_says_where_its_harmonics_are_too_few():
         messages = _Left(built, None).out(problem, found, [], 8.0)
         assert len(messages) == count
         assert all(re.match(r"At F_N = 8 N the amplitude at (22|30) Hz .* harmonics", r) for r in messages)
+
+
+def test_shipped_cases_of_one_harmonic_say_so_in_their_first_line():
+    """What it leaves out is more than 5 % in most of them, so a person is to know it first."""
+    files = (Path(__file__).parents[1] / "pipeline/cases").glob("*.toml")
+    cases = {f: tomllib.loads(f.read_text()) for f in files}
+    of_one = [f for f, c in cases.items() if c.get("mode") == "book" or c.get("harmonics") == 1]
+    assert len(of_one) >= 11
+    silent = [f.name for f in of_one if "one harmonic" not in f.read_text().splitlines()[0].lower()]
+    assert not silent
