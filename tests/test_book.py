@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 import microslip
+from microslip.analysis import places, verb_of
 from microslip.case import load_case
 from microslip.contact.settings import load_contact
 from microslip.rolling.settings import load_rolling
@@ -128,7 +129,8 @@ def is_command(text: str) -> bool:
     figures = {p.stem.removeprefix("fig-") for p in (CASES / "contact").glob("fig-*.toml")}
     known = figures if verb == "contact" else cases | bodies | {"CASE"}
     there = rest[0] in known or (ROOT / rest[0]).is_file()
-    return there and holds(tree(PACKAGE / "cli.py").body, verb) is not None
+    verbs = {verb_of(name).name for name in places()}
+    return there and (verb in verbs or holds(tree(PACKAGE / "cli.py").body, verb) is not None)
 
 
 def exists(name: str) -> bool:

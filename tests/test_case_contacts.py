@@ -25,6 +25,7 @@ from microslip.case.assemble import build
 from microslip.case.checkpoint import files_of, of_points
 from microslip.case.contacts import memory_of
 from microslip.case.curves import curves
+from microslip.case.settings import case_model
 from microslip.cli import main
 from microslip.contact.curved import Line, foundation_of_line
 from microslip.contact.patch import pressure
@@ -57,7 +58,7 @@ GIVEN = {"kind": "given", "normal": 1e9, "tangential": 8e8}
 
 
 def made(raw: dict[str, Any], path: Path = PATH) -> CaseSettings:
-    return validate(CaseSettings, copy.deepcopy(raw), path)
+    return validate(case_model(), copy.deepcopy(raw), path)
 
 
 def two(second: dict[str, Any] | None = None, **contact: Any) -> dict[str, Any]:

@@ -20,6 +20,7 @@ from test_truncation import chain
 from microslip.basis import read_basis
 from microslip.case import CaseSettings
 from microslip.case.assemble import build
+from microslip.case.settings import case_model
 from microslip.contact.solids import mean_inverse_distance
 from microslip.data import Array, Compliance, ModalBasis, ModalGroup
 from microslip.harmonic_balance import reduced
@@ -228,7 +229,7 @@ def case(includes: str | None, normal: float, interface: str = "tip") -> CaseSet
     contact["law"] = "jenkins"
     if includes:
         contact["includes"] = includes
-    return CaseSettings.model_validate(
+    return case_model().model_validate(
         {
             "name": "block", "body": "bar", "excitation": "push", "monitor": "look", "contacts": [contact],
             "harmonics": 1,
@@ -293,7 +294,7 @@ def test_an_impact_on_modes_without_a_static_answer_is_warned_of(blocks: dict[st
     def told(method: str, contact: dict[str, object]) -> list[str]:
         raw = case(None, 1e9).model_dump(exclude_unset=True)
         raw |= {"contacts": [{"interface": "tip", "friction": 0.3, **contact}], "orbit": {"frequency": 500.0}}
-        messages = build(CaseSettings.model_validate(raw), {"bar": blocks[method]}).messages
+        messages = build(case_model().model_validate(raw), {"bar": blocks[method]}).messages
         return [words for words in messages if "no static answer" in words]
 
     soft = {"normal_stiffness": 1e10, "tangential_stiffness": 1e6, "law": "jenkins"}

@@ -14,9 +14,9 @@ from refusals import refused
 from touching import SECTORS, shrouded, together
 
 from microslip.basis import check_basis, read_basis, write_basis
-from microslip.case import CaseSettings
 from microslip.case.assemble import build
 from microslip.case.problem import normal_forces
+from microslip.case.settings import case_model
 from microslip.data import Mesh
 from microslip.errors import NotConverged, UserError
 from microslip.fem.contact import (
@@ -458,7 +458,7 @@ def test_case_takes_the_normal_force_of_the_static_state():
         "excitations": [{"name": "e", "point": point, "direction": [1.0, 0.0, 0.0]}],
     }  # fmt: skip
     contact = {"law": "jenkins", "normal_stiffness": 1e8, "tangential_stiffness": 1e7, "friction": 0.2}
-    case = CaseSettings.model_validate({
+    case = case_model().model_validate({
         "name": "c", "body": "test", "excitation": "e", "monitor": "m",
         "contacts": [{"interface": n, **contact} for n in sides],
         "sweep": {"start": 50.0, "stop": 60.0, "points": 3, "normal_forces": "static"},

@@ -13,7 +13,8 @@ from refusals import refused
 from rings import bladed_sector
 
 from microslip.basis import check_basis, read_basis, write_basis
-from microslip.case import CaseSettings, run_case
+from microslip.case import run_case
+from microslip.case.settings import case_model
 from microslip.fem.discretise import discretise, free_upper
 from microslip.linalg import eigen
 from microslip.modal.boundary import fixed_dofs
@@ -186,7 +187,7 @@ STIFF = {"normal_stiffness": 1e8, "tangential_stiffness": 1e8}  # N/m
 @pytest.mark.usefixtures("unjudged")
 def test_a_case_uses_the_rigid_coordinates_of_a_patch_that_has_more():
     """The friction response with six springs a patch is the same with and without further coordinates on the patch."""
-    case = CaseSettings.model_validate({
+    case = case_model().model_validate({
         "name": "c", "body": "test", "excitation": "push", "monitor": "look", "direction": "y",
         "contacts": [{"interface": "right", "law": "jenkins", "friction": 1, **STIFF}],
         "sweep": {"start": 3000.0, "stop": 5000.0, "points": 4, "normal_forces": [1e9]},

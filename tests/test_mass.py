@@ -17,7 +17,7 @@ from small import basis, beam, table
 from microslip.basis import read_basis
 from microslip.case import load_case, run_case
 from microslip.case.loaded import load_bodies
-from microslip.case.settings import BodyOfCase, CaseSettings
+from microslip.case.settings import BodyOfCase, case_model
 from microslip.case.surveys import _at_speed
 from microslip.case.thrown import normal_forces, thrown
 from microslip.cli import main
@@ -198,7 +198,7 @@ def test_a_damper_under_a_roof_presses_both_flanks() -> None:
 def test_along_an_engine_order_line_a_damper_is_pressed_by_the_load_of_each_speed() -> None:
     """As the square of the speed."""
     law = {"law": "smooth", "normal_stiffness": 1e6, "tangential_stiffness": 1e6, "friction": 0.3}
-    case = CaseSettings.model_validate({
+    case = case_model().model_validate({
         "name": "line", "bodies": [{"name": "damper", "pressed_at_rpm": 2700.0}], "excitation": "shaker",
         "monitor": "tip-probe", "contacts": [{"interface": face, **law} for face in ("left", "right")],
         "sweep": {"start": 1.0, "stop": 2.0},

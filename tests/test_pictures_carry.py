@@ -3,7 +3,7 @@
 Read from the code itself: of each number in a formatted string of `pictures/`, and of each that is
 given to a function which words numbers, the names are followed back, from function to function of
 the module, to where they come from. On the way there may be attributes, subscripts, choices, changes
-of the unit and counts, and a function of another room that the tables of `report/` or `stages/` are
+of the unit and counts, and a function of another room that the tables of `report/`, `stages/` or `verbs/` are
 made by as well. Everything else is arithmetic, which belongs to the room whose table the number
 stands in.
 """
@@ -61,7 +61,7 @@ def imported(tree: ast.AST) -> set[str]:
 @cache
 def of_tables() -> frozenset[str]:
     """Names that tables and pages are made by."""
-    files = [*(ROOM / "report").glob("*.py"), *(ROOM / "stages").glob("*.py")]
+    files = [f for room in ("report", "stages", "verbs") for f in (ROOM / room).glob("*.py")]
     return frozenset().union(*(imported(ast.parse(f.read_text(encoding="utf-8"))) for f in files))
 
 

@@ -10,7 +10,8 @@ from meshes import STEEL, body, brick
 from refusals import refused
 
 from microslip.basis import check_basis, read_basis, write_basis
-from microslip.case import CaseSettings, run_case
+from microslip.case import run_case
+from microslip.case.settings import case_model
 from microslip.fem.discretise import discretise, free_upper
 from microslip.linalg import eigen
 from microslip.modal.body_rows import body_rows
@@ -357,7 +358,7 @@ def test_hermitian_problems_reduce_as_their_real_twins(method):
 @pytest.mark.usefixtures("unjudged")
 def test_friction_response_is_the_same_through_every_method_that_is_statically_exact():
     """Peaks of a stuck block between rigid neighbours: MacNeal's residual, and coordinates without mass or of force."""
-    case = CaseSettings.model_validate({
+    case = case_model().model_validate({
         "name": "c", "body": "test", "excitation": "push", "monitor": "look", "direction": "y",
         "contacts": [
             {"interface": "tip", "law": "jenkins", "normal_stiffness": 1e9, "tangential_stiffness": 1e9, "friction": 1}

@@ -513,9 +513,10 @@ def test_info_check_and_export_of_a_cyclic_file(tmp_path: Path, capsys: pytest.C
 
 
 def test_a_case_of_a_cyclic_body_is_refused(tmp_path: Path) -> None:
-    from microslip.case import CaseSettings, run_case
+    from microslip.case import run_case
+    from microslip.case.settings import case_model
 
-    settings = CaseSettings.model_validate(
+    settings = case_model().model_validate(
         {
             "name": "c", "body": "sector", "excitation": "gas", "monitor": "tip", "direction": "y",
             "contacts": [

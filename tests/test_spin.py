@@ -15,7 +15,7 @@ from rings import AXIS, disc_sector, full_ring
 
 from microslip.basis.integrals import convected
 from microslip.case.assemble import build
-from microslip.case.settings import CaseSettings
+from microslip.case.settings import case_model
 from microslip.data import Array, ModalBasis, ModalGroup
 from microslip.modal.compute import modal_basis
 from microslip.modal.unreduced import unreduced
@@ -140,7 +140,7 @@ def assembled(contacts: list[dict], disc: ModalBasis) -> Assembly:
     bodies = [{"name": name, "turn": 180.0 * i} for i, name in enumerate(names)]
     case = {"name": "rubs", "bodies": [*bodies, {"name": "disc"}], "contacts": contacts, "damping": "modal"}
     case |= {"monitors": [{"monitor": "pin:read", "direction": "x"}], "stability": {"frequency": [0.0, 1000.0]}}
-    settings = validate(CaseSettings, case, "case")
+    settings = validate(case_model(), case, "case")
     return build(settings, dict.fromkeys(names, pin()) | {"disc": disc}).assembly
 
 

@@ -23,7 +23,7 @@ from touching import together
 
 from microslip import sliding
 from microslip.case.assemble import build
-from microslip.case.settings import CaseSettings
+from microslip.case.settings import case_model
 from microslip.data import Mesh, ModalBasis
 from microslip.linalg.quadratic import Window
 from microslip.modal.compute import modal_basis
@@ -132,7 +132,7 @@ def ours(bases: dict[str, ModalBasis], mu: float) -> Spectrum:
         "contacts": [contact], "monitors": [{"monitor": "disc:read", "direction": "z"}],
         "stability": {"frequency": [0.0, 7300.0]},
     }  # fmt: skip
-    assembly = build(CaseSettings.model_validate(case), bases).assembly
+    assembly = build(case_model().model_validate(case), bases).assembly
     equations = sliding.of(assembly)
     return spectrum(State(assembly, equations, sliding.equilibrium(equations)).matrices, WINDOW)
 
