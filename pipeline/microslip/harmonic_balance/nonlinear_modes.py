@@ -190,9 +190,8 @@ def _only(problem: Problem) -> Linear:
     return problem.parts[1][0]
 
 
-SETTINGS = Settings(step=0.05, step_max=0.2, kink_step=0.05, resolution=1e-4, folds=False, branch_points=False)
-"""Contacts of many points have a kink at every sample of each of them: these are crossed in steps of 5 %, and located
-to 1e-4."""
+SETTINGS = Settings(step=0.05, step_max=0.2, resolution=1e-4, folds=False, branch_points=False)
+"""Contacts of many points have a kink at every sample of each of them: these are located to 1e-4."""
 
 
 def backbone(
