@@ -123,8 +123,9 @@ def backbones(
 
     found: dict[float, Backbone] = {}
     built, of = case.plain, case.quantity
-    forces = [n for n in forces_of(built) if n != 0] or forces_of(built)
-    if 0.0 in forces_of(built):
+    asked_for = forces_of(built)
+    forces = [n for n in asked_for if n != 0] or asked_for
+    if 0.0 in asked_for:
         report("left out: a normal force of 0 N, under which nothing sticks")
     for count, asked in enumerate(forces, 1):
         problem = about_rest(problem_of(built, asked, form="relative"))[0]
