@@ -130,11 +130,14 @@ def _answer(q: Question, asked: Keys, settings: CaseSettings) -> Answer:
         said += [words for c in cycles.own for words in sentences_of(c, asked.cycle)]
         said += sentence_of_relief(cycles, asked.cycle)
         said += headline.doubted(q.built, cycles.largest)
+    drawable = any(basis.mesh.n_cells for basis in varied.bases.values())
     return Answer(
         said,
         tables=[
             *([_in_words(full, over)] if full and over else []),
-            *([say(OF_WAVES, tone="note")] if growing_ones(found) else []),
+            *([say(OF_MAP, tone="note")] if over else []),
+            *([say(OF_CYCLES, tone="note")] if asked.cycle else []),
+            *([say(OF_WAVES, tone="note")] if len(growing_ones(found)) and drawable else []),
             *root_table(found),
         ],
         largest=None,
@@ -297,6 +300,18 @@ def _in_words(full: Sequence[Compared], over: Map) -> Any:
     head = [over.x.title, over.y.title, "grow, reduced", "grow, unreduced", "relative difference"]
     return fold("States in unreduced matrices", table(head, rows))
 
+
+OF_MAP = (
+    "Map: colours count the roots that grow. Black lines: Hopf lines, where the fastest growth rate "
+    "is zero. Grey lines: growth rate in 1/s. Dots: states counted in the unreduced matrices as well."
+)
+
+OF_CYCLES = (
+    "Limit cycles: half of the way from the smallest to the largest value of the first read-out in "
+    "a period, from the Hopf point on. Supercritical: the limit cycle grows out of the equilibrium "
+    "softly; subcritical: it is reached by a jump. Dots: the same of a motion in time that began on "
+    "the orbit, in its last period. Over a second parameter each wall stands at one of its values."
+)
 
 OF_WAVES = (
     "Moving pictures: one period of a root that grows, without its growth. Its size is chosen; motion/ holds it for "
