@@ -92,13 +92,11 @@ class Album:
 
 def page(title: str, pieces: Iterable[Piece], sections: Mapping[str, Sequence[Piece]] | None = None) -> str:
     """The HTML of a page: pieces, then sections with links to them; sections with nothing inside are left out."""
-    told, pieces = {name: inside for name, inside in (sections or {}).items() if any(inside)}, list(pieces)
+    told = {name: inside for name, inside in (sections or {}).items() if any(inside)}
     text = _templates().get_template("page.html").render(title=title, pieces=pieces, sections=told)
-    return text.replace(_PROGRAM, _plotly() if 'class="curves"' in text else "", 1)
-
-
-_PROGRAM = "PROGRAM OF CURVES"
-"""Where it stands on a page that has some."""
+    if 'class="curves"' not in text:
+        return text
+    return text.replace("</body>", _templates().get_template("curves.html").render(program=_plotly()) + "</body>")
 
 
 @cache
