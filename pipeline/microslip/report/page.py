@@ -82,7 +82,7 @@ class Album:
             kind = "gif" if path.suffix.lower() == ".gif" else "png"
             picture = path.read_bytes()
             data = f"data:image/{kind};base64,{base64.b64encode(picture).decode()}"
-            curves = text_in(picture, CURVES).replace("</", "<\\/") if _plotly() else ""
+            curves = text_in(picture, CURVES).replace("<", "\\u003c") if _plotly() else ""
         return Piece("figure", data, caption, tone=tone, name=name, curves=curves)
 
     def begun(self, prefix: str, suffix: str = "", tone: str = "") -> list[Piece]:
@@ -94,9 +94,14 @@ def page(title: str, pieces: Iterable[Piece], sections: Mapping[str, Sequence[Pi
     """The HTML of a page: pieces, then sections with links to them; sections with nothing inside are left out."""
     told = {name: inside for name, inside in (sections or {}).items() if any(inside)}
     text = _templates().get_template("page.html").render(title=title, pieces=pieces, sections=told)
-    if 'class="curves"' not in text:
+    if 'class="curves"' not in text and 'class="body"' not in text:
         return text
     return text.replace("</body>", _templates().get_template("curves.html").render(program=_plotly()) + "</body>")
+
+
+def draws_curves() -> bool:
+    """Whether a page can have what is touched: the package plotly is installed."""
+    return bool(_plotly())
 
 
 @cache
