@@ -6,6 +6,7 @@ import csv
 import json
 import subprocess
 import sys
+import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
@@ -37,7 +38,7 @@ from microslip.harmonic_balance.stability import Stability
 from microslip.harmonic_balance.sweeps import ends, gaps
 from microslip.results import Journal, open_journal, read_response
 from microslip.stages.places import modal_files
-from microslip.time_domain.stepped import Settled, settled
+from microslip.time_domain.stepped import Settled, TimeIsOver, settled
 from microslip.time_domain.swept import Motions, Sweeps
 
 pytestmark = pytest.mark.usefixtures("undrawn", "unjudged")
@@ -138,6 +139,22 @@ def test_a_motion_from_rest_is_that_of_the_balance(case: Path) -> None:
     at_rest = settled(p.assembly, 110.0, 300)
     balanced = abs(operating(p, solve(p, 2 * np.pi * 110.0, [])).outputs[0, 1])
     assert at_rest.like(float(balanced), 0.01) and not at_rest.irregular and not at_rest.opens
+
+
+def test_a_motion_ends_with_its_time_and_portions_change_nothing(
+    case: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of contacts of 1e9 N/m, whose steps are many: cut in its first periods, before any look. With all the time it
+    is the same motion in portions of a period as in long ones."""
+    p = problem(case)
+    case.write_text(CASE.replace("1e6", "1e9"))
+    stiff, began = problem(case), time.process_time()
+    with pytest.raises(TimeIsOver):
+        settled(stiff.assembly, 110.0, 300, patience=1e-3)
+    assert time.process_time() - began < 10.0
+    whole = settled(p.assembly, 110.0, 300)
+    monkeypatch.setattr("microslip.time_domain.stepped.PORTION", 0.0)
+    assert settled(p.assembly, 110.0, 300).amplitude == whole.amplitude
 
 
 @pytest.fixture

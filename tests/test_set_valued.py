@@ -151,7 +151,6 @@ def test_what_cannot_be_is_refused() -> None:
     refused("only a motion in time", ms.harmonic_response, rigid, [0.1])
     ball = ms.structure(1.0, 0.0, steady={0: GRAVITY}, elements=[ms.stop(math.inf, HEIGHT)])
     refused('begin from "rest"', ms.integrate, ball, 1.0)
-    refused("cannot be integrated", ms.integrate, ball, 1.0, start="rest", method="reference")
     refused("only a rigid stop", ms.stop, 1e5, 0.0, restitution=0.5)
     refused("one side", ms.stop, math.inf, 0.1, both=True)
     refused("restitution", ms.stop, math.inf, 0.1, restitution=1.5)

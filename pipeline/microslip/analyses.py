@@ -378,8 +378,7 @@ def integrate(
     settle: Index = 100, keep: Count = 20,
     samples: Count = 256, steps: Count | None = None,
     start: Literal["static", "rest", "balance"] | Mapping[str, Any] = "static",
-    method: Literal["stepper", "reference"] = "stepper", tolerance: Positive = 1e-9, file: Path | Text | None = None,
-    report: Report = lambda _: None,
+    file: Path | Text | None = None, report: Report = lambda _: None,
 ) -> Orbit:  # fmt: skip
     """Motion in time under harmonic loads, from rest (Sextro, section 4.1).
 
@@ -399,8 +398,6 @@ def integrate(
             "velocity": ...}``, m and m/s, each of all coordinates or coordinate -> value, of bodies from modal files
             those of their modes; ``{"mode": 1, "amplitude": ...}``, of the first read-out in a mode of the bodies
             without their contacts.
-        method: ``reference`` is CVODE, an integrator for stiff equations that chooses its own steps by a relative
-            tolerance: slower, of laws that are differential equations, and what the stepper is proved on.
         file: samples are written there as they come and read when they are asked for, so that a long motion needs no
             more memory than a short one; a run that was killed is gone on with. report: is told what is under way.
 
@@ -410,8 +407,8 @@ def integrate(
 
     Raises:
         UserError: steps that are too few for the springs of the contacts; contacts that the start presses deeper than
-            steady loads do; a law that ``reference`` cannot integrate, a start or a file that it does not take.
-        NotConverged: no state of rest, or no vibration to start on, is found, or ``reference`` gave up.
+            steady loads do.
+        NotConverged: no state of rest, or no vibration to start on, is found.
 
     Examples:
         A mass that hits a stop once in every period:
@@ -421,24 +418,21 @@ def integrate(
         >>> ms.integrate(hammer, 1.5, unit="rad/s").repeats
         1
     """
-    from .time_domain import equations, orbit, recorded, reference, starts
+    from .time_domain import equations, orbit, recorded, starts
 
     assembly = whole_of(system)
     turn = 2 * np.pi * HERTZ[unit]
     found = equations.of(assembly, turn * frequency, None if second is None else turn * second)
     if second is not None and start == "balance":
         raise UserError('second: "balance" begins on a periodic vibration; take "static" or "rest"')
-    rest: Any = starts.released(found, start) if isinstance(start, Mapping) else start
-    if method == "reference":
-        if rest == "balance" or file is not None:
-            raise UserError('method: "reference" begins on no vibration, and writes no file; use the stepper')
-        return reference.run(found, settle, keep, samples, rest, tolerance, report)
     begin: orbit.Start | starts.Periodic
-    if start == "balance":
+    if isinstance(start, Mapping):
+        begin = starts.released(found, start)
+    elif start == "balance":
         many = IN_TIME if isinstance(system, Assembly) else None
         begin = starts.of_balance(found, balanced(system, many, many and 16 * many))
     else:
-        begin = rest
+        begin = start
     if file is None:
         return orbit.run(found, settle, keep, samples, steps, begin, report)
     asked = recorded.Asked(f"{frequency:.6g} {unit}", found, settle, keep, samples, steps, begin)

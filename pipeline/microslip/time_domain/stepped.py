@@ -3,6 +3,8 @@ stepped sweep, as on a shaker."""
 
 from __future__ import annotations
 
+import math
+import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
@@ -11,10 +13,11 @@ import jax.numpy as jnp
 import numpy as np
 
 from ..data import Array
+from ..interrupts import look
 from ..system.assembly import Assembly
 from . import equations, orbit, starts
 from . import samples as kept_samples
-from .bodies import Now
+from .bodies import Now, Seen
 from .contacts import untouched
 from .stepper import KINDS, Stepper
 
@@ -38,10 +41,12 @@ DYING = 0.8
 """Times what swings differed by at the last look, below which what is left of the start still dies
 away."""
 
+PORTION = 0.25
+"""s of CPU time, about, between two looks at what is left of it."""
+
 IRREGULAR = 0.15
 """Share of the largest swing by which that of a period may be less in a motion that counts as regular; small impacts
 among many points leave some hundredths. Half and twice of it give the quick tests the same answers."""
-
 
 BESIDE = 0.1
 """Share of the way back to where the last motion ended, by which one that begins on a solution of a
@@ -89,6 +94,43 @@ class Settled:
         return not after.like(self.amplitude, LOST) and (apart or not np.isfinite(after.swing))
 
 
+class TimeIsOver(Exception):
+    """A motion that has not settled within its time."""
+
+
+class _Clock:
+    """CPU time (s) that a motion may take, without the first period of each kind, which compiles."""
+
+    def __init__(self, stepper: Stepper, patience: float) -> None:
+        self.stepper, self.left = stepper, patience
+
+    def advanced(self, now: Now, steps: Array, periods: int) -> tuple[Now, Seen, Array]:
+        """As `Stepper.advanced` over some periods, in portions that take about `PORTION` each.
+
+        Raises:
+            TimeIsOver: before the last of them.
+        """
+        samples, listed, done, ahead = list[Seen](), list[Array](), 0, 1
+        each = 1 if len(steps) == SAMPLES else SAMPLES  # rows of a period
+        while done < periods:
+            if self.left <= 0:
+                raise TimeIsOver
+            look()
+            began = time.process_time()
+            now, seen, events, *_ = self.stepper.advanced(now, steps, ahead * each)
+            took = time.process_time() - began
+            self.left -= took if done else 0.0
+            samples.append(seen)
+            listed.append(events)
+            done += ahead
+            if not np.isfinite(seen.mechanical[-1]):
+                break
+            longer = int(np.clip(PORTION / max(took, 1e-6) * ahead, 1, orbit.FURTHER * ahead))
+            ahead = min(longer, periods - done)
+        joined = Seen(*(np.concatenate(parts) for parts in zip(*samples, strict=True)))
+        return now, joined, np.concatenate(listed)
+
+
 def settled(
     assembly: Assembly,
     frequency: float,
@@ -96,27 +138,29 @@ def settled(
     begin: Settled | None = None,
     balance: Callable[[equations.Equations], starts.Periodic] | None = None,
     known: Sequence[float] = (),
+    patience: float = math.inf,
 ) -> Settled:
     """The motion at a frequency (Hz), looked at until it does not change any more or `most` periods are over.
 
     Args:
         begin: where it begins; at rest under the steady loads if not given. balance: a periodic
             motion on which it begins instead, but for `BESIDE`. known: amplitudes of motions at
-            this frequency; one that has come to one of them has settled.
+            this frequency; one that has come to one of them has settled. patience: s of CPU time.
 
     Raises:
         UserError: what has no form in time, see `equations.of`. NotConverged: no rest is found.
+        TimeIsOver: it has not settled before.
     """
     e = equations.of(assembly, 2 * np.pi * frequency)
     steps = max(orbit.OF_PERIOD, int(np.ceil(OF_CONTACT * e.fastest / e.Omega)))
     each = orbit.steps_of_a_sample(e, SAMPLES, steps)
     stepper = Stepper(e, 2 * np.pi / e.Omega / (each * SAMPLES), accounts=False)
-    now = _begun(stepper, begin, balance(e) if balance else None)
+    now, clock = _begun(stepper, begin, balance(e) if balance else None), _Clock(stepper, patience)
     turning = 2 * np.exp(-2j * np.pi * np.arange(1, KEPT * SAMPLES + 1) / SAMPLES)
     unseen, known, varies = max(most // LOOKS - KEPT, 1), [*known, np.inf], np.inf
     for _ in range(LOOKS):
-        now = stepper.advanced(now, np.full(SAMPLES, each * SAMPLES), unseen)[0]
-        now, seen, events, *_ = stepper.advanced(now, np.full(KEPT * SAMPLES, each))
+        now = clock.advanced(now, np.full(SAMPLES, each * SAMPLES), unseen)[0]
+        now, seen, events = clock.advanced(now, np.full(KEPT * SAMPLES, each), KEPT)
         y = kept_samples.read(e, seen)[0]
         end = [np.asarray(x) for x in (now.y, *jax.tree_util.tree_leaves(now.held))]
         if len(y) < len(turning) or not np.isfinite(seen.mechanical[-1]):

@@ -19,7 +19,7 @@ from ..harmonic_balance.solver import CONVERGED, Point
 from ..results import Journal
 from ..results.names import exact
 from . import starts
-from .stepped import Settled, settled
+from .stepped import Settled, TimeIsOver, settled
 
 FEWEST, MOST = 300, 800
 """Periods at most that a motion is left to itself at a frequency, with much and with little
@@ -93,8 +93,8 @@ class Sweeps:
     """Sweeps in time about a gap (Hz, Hz) of a response under a normal force (N).
 
     patience: s of CPU time at the place, of which they take `SHARES`, that of an earlier run
-    counted, but not what compiles. journal:
-    keeps each motion; those of an earlier run are gone on with.
+    counted, but not what compiles; a motion that would take longer is cut. journal:
+    keeps each motion that is not; those of an earlier run are gone on with.
     """
 
     def __init__(
@@ -142,28 +142,21 @@ class Sweeps:
         rest = self._from_rest(on_two_motions(up, down))
         return Motions(up, down, rest, self.cut, self.spent)
 
-    def _over(self, way: str, f: float) -> bool:
-        """Whether the time is over that a way may take before a frequency (Hz)."""
-        over = self.spent > SHARES[way] * self.patience
-        if over and self.cut is None:
-            self.cut = way, f
-        return over
-
     def _from_rest(self, two: Sequence[tuple[Settled, Settled]]) -> list[Settled]:
         """Motions from rest where there are two, at some frequencies, and between those that lead
         to different ones."""
-        last, found = len(two) - 1, dict[int, Settled]()
+        last, motions = len(two) - 1, dict[int, Settled]()
         wanted = sorted({round(i * last / 3) for i in range(4)}) if two else []
         while wanted:
             for i in wanted:
-                if self._over(REST, two[i][0].frequency):
-                    return [found[i] for i in sorted(found)]
-                found[i] = self._at(REST, two[i][0].frequency)
-            known = sorted(found)
-            higher = [nearer(found[i], *two[i]) for i in known]
-            pairs = zip(known, known[1:], higher, higher[1:], strict=False)
-            wanted = [(i + j) // 2 for i, j, a, b in pairs if a != b and j > i + 1]
-        return [found[i] for i in sorted(found)]
+                if (motion := self._at(REST, two[i][0].frequency)) is None:
+                    return [motions[i] for i in sorted(motions)]
+                motions[i] = motion
+            seen = sorted(motions)
+            higher = [nearer(motions[i], *two[i]) for i in seen]
+            pairs = zip(pairwise(seen), pairwise(higher), strict=True)
+            wanted = [(i + j) // 2 for (i, j), (a, b) in pairs if a != b and j > i + 1]
+        return [motions[i] for i in sorted(motions)]
 
     def _way(
         self, way: str, frequency: Sequence[float], end: float, sign: float, motions: list[Settled]
@@ -172,9 +165,9 @@ class Sweeps:
         balance's beyond an end of the gap (Hz), where it ends."""
         alike = 0
         for f in frequency[:STEPS]:
-            if self._over(way, f):
+            if not (steps := self._on(way, f, motions[-1] if motions else None)):
                 break
-            motions = [*motions, *self._on(way, f, motions[-1] if motions else None)]
+            motions = [*motions, *steps]
             back = sign * (f - end) > 0 and motions[-1].like(self._balanced(f)[1])
             alike = alike + 1 if back else 0
             if alike == ALIKE or not np.isfinite(motions[-1].amplitude):
@@ -185,31 +178,43 @@ class Sweeps:
         """A step to a frequency (Hz). Where the motion is lost in it, the step is halved about the
         place: a sweep that is slow enough stays longer."""
         here = self._at(way, f, begin)
+        if here is None:
+            return []
         if begin is None or self._led(f, begin, here):
             return [here]
         steps = [begin, here]
         for _ in range(HALVINGS):
             i = int(np.argmax([a.distance(b) for a, b in pairwise(steps)]))
             middle = 0.5 * (steps[i].frequency + steps[i + 1].frequency)
-            if not steps[i].jumps_to(steps[i + 1]) or self._over(way, middle):
+            if not steps[i].jumps_to(steps[i + 1]):
                 break
-            steps.insert(i + 1, self._at(way, middle, steps[i]))
-        if len(steps) > 2 and steps[-2].jumps_to(here) and not self._over(way, f):
-            steps[-1] = self._at(way, f, steps[-2])  # the whole step may have thrown it off
+            if (motion := self._at(way, middle, steps[i])) is None:
+                break
+            steps.insert(i + 1, motion)
+        if len(steps) > 2 and steps[-2].jumps_to(here):  # the whole step may have thrown it off
+            steps[-1] = self._at(way, f, steps[-2]) or here
         return steps[1:]
 
-    def _at(self, way: str, f: float, begin: Settled | None = None) -> Settled:
-        """The motion at a frequency (Hz), as it was kept or integrated now."""
+    def _at(self, way: str, f: float, begin: Settled | None = None) -> Settled | None:
+        """The motion at a frequency (Hz), as it was kept or integrated now; None where the time is
+        over that its way may take."""
+        until = SHARES[way] * self.patience
         low, high = self.gap
         series = f"in time {way}, F_N = {exact(self.normal)} N, {low!r} to {high!r} Hz"
         series += f", after {begin.frequency!r} Hz" if begin else ""
         after = repr(begin.amplitude) if begin else ""
         row = self.journal.of(series).get(f, {}) if self.journal else {}
-        if row.get("after") != after:
-            self.report(f"motion in time, {way}, F_N = {self.normal:g} N: {f:.6g} Hz")
-            row = self._integrated(way, f, begin) | {"after": after}
-            if self.journal:
-                self.journal.keep(series, f, row)
+        try:
+            if self.spent > until:
+                raise TimeIsOver
+            if row.get("after") != after:
+                self.report(f"motion in time, {way}, F_N = {self.normal:g} N: {f:.6g} Hz")
+                row = self._integrated(way, f, begin, until - self.spent) | {"after": after}
+                if self.journal:
+                    self.journal.keep(series, f, row)
+        except TimeIsOver:
+            self.spent, self.cut = max(self.spent, until), self.cut or (way, f)
+            return None
         self.spent += row["took"]
         end = [np.asarray(row[f"end/{i}"]) for i in range(row["leaves"])]
         amplitude, swing, least = (row[name] for name in ("amplitude", "swing", "least"))
@@ -217,11 +222,16 @@ class Sweeps:
         self.seen.setdefault(f, []).extend([] if m.irregular else [m.amplitude])
         return m
 
-    def _integrated(self, way: str, f: float, begin: Settled | None) -> dict:
-        """What a journal keeps of a motion, with the CPU time (s) that it took beside compiling."""
+    def _integrated(self, way: str, f: float, begin: Settled | None, left: float) -> dict:
+        """What a journal keeps of a motion, with the CPU time (s) that it took beside compiling.
+
+        Raises:
+            TimeIsOver: more than is left (s).
+        """
         began, point = time.process_time(), None if way == REST else self._leading(f, begin)
         on = partial(starts.of_point, problem=self.problem, point=point) if point else None
-        m = settled(self.problem.assembly, f, self.periods, begin, on, self.seen.get(f, ()))
+        seen = self.seen.get(f, ())
+        m = settled(self.problem.assembly, f, self.periods, begin, on, seen, left)
         took = time.process_time() - began if self.compiled else 0.0
         self.compiled = True
         end = {f"end/{i}": x for i, x in enumerate(m.end)}
