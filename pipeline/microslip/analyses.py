@@ -182,8 +182,8 @@ def two_tones(
         free: the second frequency is that of a self-excited vibration, unknown, and ``second`` a guess within 15 %; no
             load has a second tone then. start: a motion in time to begin from then, of `integrate`; if not given 200
             periods of the first tone from rest, and a hundred that are kept.
-        harmonics: H: pairs (k1, k2) with |k1| + |k2| <= H are balanced. samples: of a turn of the faster angle, 8 H and
-            32 at least if not given. turns: of it in the line along which contacts that remember are marched; as many.
+        harmonics: H: pairs (k1, k2) with ``abs(k1) + abs(k2) <= H`` are balanced. samples: of a turn of the faster
+            angle, 8 H and 32 at least if not given. turns: of it in the line along which contacts that remember are marched; as many.
         kept: finished points of a run that did not end. report: is told what is under way.
 
     Returns:
