@@ -174,7 +174,7 @@ MISTAKES = (
     # bifurcation
     Mistake(
         "Floquet: pieces of a period in the wrong order",
-        "bifurcation/floquet.py",
+        "bifurcation/shooting.py",
         "found = piece @ found",
         "found = found @ piece",
         "test_bifurcation.py",

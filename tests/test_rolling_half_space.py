@@ -12,7 +12,7 @@ from microslip.contact.hertz import Hertz
 from microslip.contact.solids import Solid
 from microslip.data import Array
 from microslip.errors import UserError
-from microslip.rolling.half_space import Contact, linear_coefficients, pressed, rolled, shifted, steady_rolling
+from microslip.rolling.half_space import HalfSpaceContact, linear_coefficients, pressed, rolled, shifted, steady_rolling
 from microslip.rolling.half_space_influence import ALL, Grid, Pair, influence, influence_ahead, rectangle
 from microslip.rolling.half_space_normal import normal_contact
 
@@ -132,7 +132,7 @@ def test_bodies_apart_feel_nothing() -> None:
 # tangential --------------------------------------------------------------------------------------------------------
 
 
-def judged(c: Contact) -> None:
+def judged(c: HalfSpaceContact) -> None:
     """|p| <= g; no slip below it; slip against the traction at it."""
     size, slip, touching = np.hypot(*c.traction), np.hypot(*c.slip), c.touching
     assert (size <= c.bound * (1 + 1e-6) + 1e-3).all()

@@ -21,7 +21,7 @@ import numpy as np
 from ..continuation import NewtonSettings, Solution, newton
 from ..data import Array
 from .dynamics import Dynamics
-from .shooting import Orbit
+from .shooting import PeriodicOrbit
 
 SAMPLES_EACH = 4
 """Times of a period for each harmonic."""
@@ -65,7 +65,7 @@ def differentiated(c: Array) -> Array:
     return np.concatenate([np.zeros((1, c.shape[1])), turned])
 
 
-def of_orbit(orbit: Orbit, H: int, each: int = 32) -> Harmonics:
+def of_orbit(orbit: PeriodicOrbit, H: int, each: int = 32) -> Harmonics:
     """The harmonics of an orbit, by its samples."""
     x = orbit.sampled(max(each, -(-SAMPLES_EACH * H // len(orbit.x))))
     E = summed(H, np.arange(len(x)) / len(x))
@@ -166,7 +166,7 @@ class Balance:
         return R, A, over
 
 
-def balanced(orbit: Orbit, H: int, settings: NewtonSettings | None = None) -> tuple[Harmonics, Solution]:
+def balanced(orbit: PeriodicOrbit, H: int, settings: NewtonSettings | None = None) -> tuple[Harmonics, Solution]:
     """The orbit of H harmonics near another one, and how Newton's method found it."""
     begin = of_orbit(orbit, H)
     problem = Balance(orbit.system, begin, orbit.turns)
@@ -174,7 +174,7 @@ def balanced(orbit: Orbit, H: int, settings: NewtonSettings | None = None) -> tu
     return problem.orbit(found.x, orbit.p), found
 
 
-def distance(one: Harmonics, orbit: Orbit, each: int = 32) -> float:
+def distance(one: Harmonics, orbit: PeriodicOrbit, each: int = 32) -> float:
     """Largest difference of the two over a period, over the scales of the coordinates, at the shift in time at which it
     is least in the mean."""
     size = np.asarray(orbit.system.scale)

@@ -31,11 +31,11 @@ FEW = 3
 def equations(system: Dynamics, reference: Harmonics) -> Balance:
     """Of the orbits near a reference, in the fewest unknowns."""
     V = system.bends
-    return Balance(system, reference) if V is None or FEW * V.shape[1] > len(V) else Condensed(system, reference)
+    return Balance(system, reference) if V is None or FEW * V.shape[1] > len(V) else CondensedBalance(system, reference)
 
 
 @dataclass(frozen=True, eq=False)
-class Condensed(Balance):
+class CondensedBalance(Balance):
     """`Balance` with the unknowns z, (2 H + 1, r), and the frequency of a free orbit."""
 
     @property
@@ -113,7 +113,7 @@ class Condensed(Balance):
 class _Answer:
     """What follows from harmonics of z. Attributes: x: (k, n) those of all coordinates. angles: (N,) of the times."""
 
-    def __init__(self, problem: Condensed, z: Array, omega: float, p: float) -> None:
+    def __init__(self, problem: CondensedBalance, z: Array, omega: float, p: float) -> None:
         self.V, (self.E, self.P) = problem.V, problem._times
         N, n = len(self.E), len(self.V)
         self.angles = 2 * np.pi * problem.turns * np.arange(N) / N

@@ -14,16 +14,15 @@ import scipy.integrate
 from ..continuation import NewtonSettings, Settings, branch_off, follow, newton
 from ..data import Array, ComplexArray
 from ..harmonic_balance.accuracy import SAFETY
-from . import equilibria, floquet, flow
+from . import equilibria, flow
 from .balance import Harmonics, summed
 from .branches import LOST
 from .condensed import equations
-from .diagram import Asked, diagram
+from .diagram import DiagramPlan, diagram
 from .dynamics import Dynamics
 from .equilibria import Hopf
-from .orbits import extremes
-from .shooting import Orbit
-from .switching import OFF
+from .orbits import OFF, extremes
+from .shooting import PeriodicOrbit, is_stable
 
 Report = Callable[[str], None]
 
@@ -61,7 +60,7 @@ class Checked:
 
     @property
     def stable(self) -> bool:
-        return floquet.is_stable(self.multipliers)
+        return is_stable(self.multipliers)
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,7 +130,7 @@ def cycles(
     Raises:
         UserError: no equilibrium near x.
     """
-    still = diagram(system, x, Asked(start, stop, orbits=False))
+    still = diagram(system, x, DiagramPlan(start, stop, orbits=False))
     wanted = [h for h in still.hopf if band[0] <= h.omega <= band[1]]
     return [_born_at(system, h, harmonics, (start, stop), points, report) for h in wanted]
 
@@ -217,8 +216,8 @@ def refined(
     return orbit, error
 
 
-def multipliers(system: Dynamics, orbit: Harmonics) -> ComplexArray:
-    """Floquet multipliers of an orbit, the largest first, see `floquet.multipliers`.
+def cycle_multipliers(system: Dynamics, orbit: Harmonics) -> ComplexArray:
+    """Floquet multipliers of an orbit, the largest first, see `PeriodicOrbit.multipliers`.
 
     Steps of the flow follow the motion, which may be small, and not what leaves it: nodes are so many that a step from
     one to the next is short enough for the fastest root.
@@ -226,7 +225,7 @@ def multipliers(system: Dynamics, orbit: Harmonics) -> ComplexArray:
     period = 2 * np.pi / orbit.omega
     fastest = np.abs(equilibria.eigenvalues(system, orbit.at(np.zeros(1))[0], orbit.p)).max()
     nodes = flow.BLOCK * int(np.ceil(max(period * fastest / (FASTEST * flow.BLOCK), 1)))
-    return floquet.multipliers(Orbit(system, orbit.at(np.arange(nodes) / nodes), period, orbit.p))
+    return PeriodicOrbit(system, orbit.at(np.arange(nodes) / nodes), period, orbit.p).multipliers
 
 
 def checked(
@@ -236,7 +235,7 @@ def checked(
     if accuracy is None:
         return Checked(orbit, np.nan, *in_time(system, orbit), np.zeros(0, dtype=complex))
     fine, error = refined(system, orbit, accuracy, report=report)
-    return Checked(fine, error, *in_time(system, fine), multipliers(system, fine))
+    return Checked(fine, error, *in_time(system, fine), cycle_multipliers(system, fine))
 
 
 def _rate(system: Dynamics) -> Any:

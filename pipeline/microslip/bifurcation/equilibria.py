@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.linalg
 
-from ..continuation import Lost, Scaled, Segment, Settings, advance, root, start
+from ..continuation import Lost, Scaled, Segment, Settings, root
 from ..continuation.curve import State
 from ..data import Array, ComplexArray
 from ..errors import UserError
@@ -185,12 +185,3 @@ def lyapunov(system: Dynamics, x: Array, p: float, omega: float) -> float:
 def _eigenvector(J: Array, value: complex) -> ComplexArray:
     values, vectors = np.linalg.eig(J)
     return vectors[:, np.argmin(np.abs(values - value))]
-
-
-def first(system: Dynamics, x: Array, p: float, settings: Settings) -> State:
-    """The state from which equilibria are followed, `continuation.start`."""
-    return start(Still(system), x, p, settings)
-
-
-def next_one(system: Dynamics, state: State, settings: Settings) -> State:
-    return advance(Still(system), state, settings)

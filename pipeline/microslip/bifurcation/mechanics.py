@@ -29,7 +29,7 @@ EXACT = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
-class Over:
+class ParametricEquations:
     """The equations of an assembly over a parameter, as polynomials of Chebyshev in jax: all its numbers, which makes
     derivatives over the parameter exact.
 
@@ -54,7 +54,7 @@ class Over:
         return jax.tree_util.tree_unflatten(self.tree, [leaf(c) for c in self.series])
 
 
-def over(make: Make, low: float, high: float) -> Over:
+def over(make: Make, low: float, high: float) -> ParametricEquations:
     """The equations of assemblies over a parameter, at as many values of it as they need.
 
     Raises:
@@ -63,20 +63,18 @@ def over(make: Make, low: float, high: float) -> Over:
     like = sliding.points_moved(make(0.5 * (low + high)))
     for count in (5, 9, 17, 33, HIGHEST):
         x = np.cos(np.pi * (np.arange(count) + 0.5) / count)
-        found = [jax.tree_util.tree_flatten(sliding.of(make(_value(low, high, one)), like)) for one in x]
+        values = 0.5 * (low + high + (high - low) * x)
+        found = [jax.tree_util.tree_flatten(sliding.of(make(float(p)), like)) for p in values]
         if len({str(tree) for _, tree in found}) > 1:
             text = "laws of contacts change in kind with it; take another one, or a shorter range"
             raise UserError(text, "parameter")
         columns = zip(*(leaves for leaves, _ in found), strict=True)
         series = [_series(x, np.array([np.asarray(leaf) for leaf in leaves])) for leaves in columns]
-        if all(_is_short(c) for c in series):
-            return Over(low, high, found[0][1], [_cut(c) for c in series])
+        ends = [np.abs(c[-2:]).max(initial=0.0) <= EXACT * np.abs(c).max(initial=0.0) for c in series]
+        if all(ends):
+            return ParametricEquations(low, high, found[0][1], [_cut(c) for c in series])
     text = "the equations do not change smoothly with it; take a shorter range"
     raise UserError(text, "parameter")
-
-
-def _value(low: float, high: float, x: float) -> float:
-    return float(0.5 * (low + high + (high - low) * x))
 
 
 def _series(x: Array, values: Array) -> Array:
@@ -84,11 +82,6 @@ def _series(x: Array, values: Array) -> Array:
     angle = np.outer(np.arange(len(x)), np.arccos(x))
     weights = np.cos(angle) * np.where(np.arange(len(x)) == 0, 1.0, 2.0)[:, None] / len(x)
     return np.tensordot(weights, values, 1)
-
-
-def _is_short(series: Array) -> bool:
-    size = np.abs(series).max(initial=0.0)
-    return bool(np.abs(series[-2:]).max(initial=0.0) <= EXACT * size)
 
 
 def _cut(series: Array) -> Array:
@@ -129,7 +122,7 @@ def dynamics(make: Make, low: float, high: float, frequency: float | None = None
     return Dynamics(rate, tuple(labels), size(middle), high - low, driven, names, shown, units, bends(equations))
 
 
-def bends(equations: Over) -> Array:
+def bends(equations: ParametricEquations) -> Array:
     """(n, r) what moves the points of contacts, as displacements and as velocities, and what their laws remember."""
     every = jax.tree_util.tree_unflatten(equations.tree, equations.series)
     m = every.push.shape[-1]

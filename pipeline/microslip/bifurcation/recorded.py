@@ -12,8 +12,7 @@ from ..files import hdf5, store
 from ..files.hostile import reading, refuse_damaged
 from ..settings.arguments import checked
 from . import branches
-from .branches import Branch, Collected
-from .drawn import draw
+from .branches import Collected, DiagramBranch, draw
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -30,7 +29,7 @@ class Branches(Collected):
     name: str
     parameter: str
     unit: str
-    branches: tuple[Branch, ...]
+    branches: tuple[DiagramBranch, ...]
 
     def __len__(self) -> int:
         return len(self.branches)

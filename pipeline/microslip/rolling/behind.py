@@ -18,7 +18,7 @@ from ..data import Array, ModalGroup
 from ..errors import UserError
 from ..reduced.compliance import contact_share
 from .half_space_influence import ALL, Grid, Pair, influence
-from .wheelset import Patch
+from .wheelset import RollingPatch
 
 ROWS = {"normal": "u_n", "along": "u_t2", "across": "u_t1"}
 """Directions of the patch and rows of an interface whose t2 points along rolling."""
@@ -66,7 +66,7 @@ class Behind:
 
 
 def behind(
-    patch: Patch, bodies: Sequence[Solid], groups: Sequence[ModalGroup], face: str, methods: Sequence[str]
+    patch: RollingPatch, bodies: Sequence[Solid], groups: Sequence[ModalGroup], face: str, methods: Sequence[str]
 ) -> Behind:  # fmt: skip
     """Of a patch.
 
@@ -85,7 +85,9 @@ def behind(
     return Behind(local, held, rest)
 
 
-def _body(patch: Patch, face: str, name: str, solid: Solid, group: ModalGroup, method: str) -> tuple[Array, Array]:
+def _body(
+    patch: RollingPatch, face: str, name: str, solid: Solid, group: ModalGroup, method: str
+) -> tuple[Array, Array]:
     """(3,) of its modes, and of what is beside them."""
     if face not in group.interfaces:
         raise UserError(

@@ -9,9 +9,9 @@ import numpy as np
 from ..contact.solids import Solid
 from ..data import Array
 from ..errors import UserError
-from .half_space import Contact, steady_rolling
+from .half_space import HalfSpaceContact, steady_rolling
 from .half_space_influence import Grid, Pair
-from .wheelset import Patch
+from .wheelset import RollingPatch
 
 ELEMENTS = 44
 """Along and across; and twice as many, from which the answer is extrapolated: its error is of first order."""
@@ -35,7 +35,12 @@ class Exact(NamedTuple):
 
 
 def exact(
-    bodies: tuple[Solid, Solid], patch: Patch, across: tuple[Array, Array], friction: float, creep: Array, at: Array
+    bodies: tuple[Solid, Solid],
+    patch: RollingPatch,
+    across: tuple[Array, Array],
+    friction: float,
+    creep: Array,
+    at: Array,
 ) -> Exact:
     """Steady rolling at some states of a creep curve.
 
@@ -62,12 +67,12 @@ def exact(
 
 
 def _along(
-    pair: Pair, patch: Patch, across: tuple[Array, Array], friction: float, states: Array, wide: float, n: int
-) -> list[Contact]:
+    pair: Pair, patch: RollingPatch, across: tuple[Array, Array], friction: float, states: Array, wide: float, n: int
+) -> list[HalfSpaceContact]:
     """One state after the other, each begun at the last one."""
     grid = Grid.around(wide * patch.a, wide * patch.b, n, n)
     distance = patch.A * grid.x**2 + np.interp(grid.y, *across, left=FAR, right=FAR)
-    found: list[Contact] = []
+    found: list[HalfSpaceContact] = []
     for state in states:
         start = found[-1] if found else None
         found.append(steady_rolling(distance, grid, pair, friction, patch.normal_force, creepages=state, start=start))

@@ -42,7 +42,7 @@ Forces = Sequence[float | None]
 
 
 @dataclass(frozen=True)
-class Contact:
+class HalfSpaceContact:
     """What two half-spaces do to each other.
 
     Attributes:
@@ -115,7 +115,7 @@ class _Motion:
 @checked
 def pressed(
     distance: Reals, grid: Grid, pair: Pair, force: NotNegative | None = None, approach: Component | None = None
-) -> Contact:  # fmt: skip
+) -> HalfSpaceContact:  # fmt: skip
     """Bodies pressed together without friction.
 
     Args:
@@ -131,8 +131,8 @@ def pressed(
 def shifted(
     distance: Reals, grid: Grid, pair: Pair, friction: NotNegatives, force: NotNegative | None = None,
     approach: Component | None = None, shift: Vector = (0, 0, 0),
-    tangential: Forces = (None, None), before: Contact | None = None,
-) -> Contact:  # fmt: skip
+    tangential: Forces = (None, None), before: HalfSpaceContact | None = None,
+) -> HalfSpaceContact:  # fmt: skip
     """Bodies pressed together, then shifted without rolling (Cattaneo's problem).
 
     Args:
@@ -152,8 +152,8 @@ def shifted(
 def steady_rolling(
     distance: Reals, grid: Grid, pair: Pair, friction: NotNegatives, force: NotNegative | None = None,
     approach: Component | None = None, creepages: Vector = (0, 0, 0),
-    tangential: Forces = (None, None), start: Contact | None = None,
-) -> Contact:  # fmt: skip
+    tangential: Forces = (None, None), start: HalfSpaceContact | None = None,
+) -> HalfSpaceContact:  # fmt: skip
     """Steady rolling towards +x.
 
     Args:
@@ -170,10 +170,10 @@ def steady_rolling(
 
 @checked
 def rolled(
-    before: Contact, distance: Reals, friction: NotNegatives, force: NotNegative | None = None,
+    before: HalfSpaceContact, distance: Reals, friction: NotNegatives, force: NotNegative | None = None,
     approach: Component | None = None, creepages: Vector = (0, 0, 0),
     tangential: Forces = (None, None), step: Positive | None = None,
-) -> Contact:  # fmt: skip
+) -> HalfSpaceContact:  # fmt: skip
     """The next moment of transient rolling towards +x, in a frame that goes with the patch.
 
     Args:
@@ -198,8 +198,8 @@ def _rigid(grid: Grid, step: float) -> Array:
 
 def _contact(
     distance: ArrayLike, grid: Grid, pair: Pair, friction: ArrayLike, force: float | None, approach: float | None,
-    motion: _Motion | None, given: ArrayLike, tangential: Forces, start: Contact | None,
-) -> Contact:  # fmt: skip
+    motion: _Motion | None, given: ArrayLike, tangential: Forces, start: HalfSpaceContact | None,
+) -> HalfSpaceContact:  # fmt: skip
     """Pressure and traction in turns until both stay (Panagiotopoulos); like bodies need one turn."""
     h, mu, w = grid.field(distance, "distance"), grid.field(friction, "friction"), np.array(given, float)
     if w.shape != (3,):
@@ -211,7 +211,7 @@ def _contact(
         )
     whole = influence(grid, pair)
     none = np.zeros((2, grid.nx, grid.ny))
-    now = Contact(grid, pair, none[0], none, none, none[0], 0.0, w)
+    now = HalfSpaceContact(grid, pair, none[0], none, none, none[0], 0.0, w)
     if start is not None:
         now = replace(now, pressure=start.pressure, traction=start.traction, slip=start.slip * (start.pressure > 0))
     for _ in range(ITERATIONS):
@@ -234,7 +234,7 @@ def _inside(pressure: Array, grid: Grid) -> None:
         raise UserError("grid: the patch reaches the edge of the grid and is cut off; take a larger grid")
 
 
-def _sheared(now: Contact, motion: _Motion, tangential: Forces, warm: bool) -> Contact:
+def _sheared(now: HalfSpaceContact, motion: _Motion, tangential: Forces, warm: bool) -> HalfSpaceContact:
     """Tangential problem under a given pressure; the creepage follows where a force is given."""
     if len(tangential) != 2:
         raise UserError(f"tangential: is {tangential!r}; give F_x and F_y, N, None where the creepage is given")

@@ -25,11 +25,11 @@ from .kalker import Coefficients
 from .strips import (
     NAMES,
     Array,
+    CreepForces,
     Distribution,
-    Forces,
-    Grid,
     Poses,
     Spin,
+    StripGrid,
     Tractions,
     grid,
     over_elements,
@@ -51,7 +51,7 @@ class Warmed(Friction):
         return self.left * self.cold.highest(pressed, time)
 
 
-class Surface(NamedTuple):
+class RoughSurface(NamedTuple):
     """Of both bodies together. Attributes: heights. roughness: R_Z, m."""
 
     heights: Heights
@@ -64,7 +64,7 @@ def approach(a: Array, b: Array, force: Array, modulus: Array) -> Array:
     return 3 * force * K / (2 * np.pi * modulus * np.maximum(a, b))
 
 
-def sunk(surface: Surface, smooth: Array, depth: Array) -> tuple[Array, Array]:
+def sunk(surface: RoughSurface, smooth: Array, depth: Array) -> tuple[Array, Array]:
     """Springs, and how deep elements are pressed in, so that rough ones carry together what smooth ones did (3.3-21).
 
     Args:
@@ -107,7 +107,7 @@ class Elements(NamedTuple):
     springs: tuple[Array, Array]
 
 
-def _elements(pose: Poses, g: Grid, flat: Callable[[Array], Array]) -> Elements:
+def _elements(pose: Poses, g: StripGrid, flat: Callable[[Array], Array]) -> Elements:
     chord, width = g.chord[:, None], g.width[:, None]
     reach, across = flat(pose.a * chord), flat(pose.b * g.y[:, None])
     length, area = 2 * reach / len(g.x), flat(2 * pose.a * chord / len(g.x) * pose.b * width)
@@ -119,9 +119,9 @@ def _elements(pose: Poses, g: Grid, flat: Callable[[Array], Array]) -> Elements:
 
 @partial(program, static_argnames=("elements", "distribution"))
 def _marched(
-    pose: Poses, friction: Friction, speed: Array, left: Array, surface: Surface | None, depth: Array,
+    pose: Poses, friction: Friction, speed: Array, left: Array, surface: RoughSurface | None, depth: Array,
     elements: tuple[int, int], distribution: Distribution,
-) -> tuple[Forces, tuple[Array, ...]]:  # fmt: skip
+) -> tuple[CreepForces, tuple[Array, ...]]:  # fmt: skip
     """left: (nx, ny n) share of the friction, from the leading edge on. depth: (n,) approach of smooth bodies, m.
     Forces, and what `over_elements` takes."""
     g = grid(elements, distribution)
@@ -148,26 +148,26 @@ def _marched(
         slides = jnp.sum(slid**2, axis=0) > 1e-18 * jnp.sum(moved**2, axis=0)
         added = t[0], t[1], x * t[1] - e.across * t[0], work, jnp.where(slides, e.area, 0.0)
         shown = x, found.T[0] / e.area, *t / e.area, *(after.slipped - after.tangential)
-        return (after, t, Forces(*(s + a for s, a in zip(sum_, added, strict=True)))), shown
+        return (after, t, CreepForces(*(s + a for s, a in zip(sum_, added, strict=True)))), shown
 
     one = PointContact(normal(e.pressed, e.pressed), friction, *e.springs).init(ny * n)
     none = jnp.zeros(ny * n)
     changed = np.concatenate([[1.0], g.stiffness[1:] / g.stiffness[:-1]])
     pressed = (smooth, g.stiffness, changed, left, *(v.reshape(smooth.shape) for v in rough))
     per_element = tuple(map(jnp.asarray, (g.x, g.way, *pressed)))
-    start = one, jnp.stack([none, none]), Forces(*[none] * 5)
+    start = one, jnp.stack([none, none]), CreepForces(*[none] * 5)
     (last, t, sum_), found = jax.lax.scan(step, start, per_element)
     h = 0.5 * e.length  # to the trailing edge, as in `strips.forces`
     rigid = e.along, flat(pose.eta) - flat(pose.phi_y) * (e.reach - 0.5 * h)
     work = sum(f * (u - h * s) for f, u, s in zip(t, last.slipped - last.tangential, rigid, strict=True))
     sum_ = sum_._replace(power=sum_.power + 0.5 * work / e.length)
-    forces = Forces(*(v.reshape(ny, n).sum(axis=0) for v in sum_))
+    forces = CreepForces(*(v.reshape(ny, n).sum(axis=0) for v in sum_))
     fields = (jnp.moveaxis(v.reshape(-1, ny, n), 1, 0) for v in found)
     share = forces.sliding / (2 * pose.a * pose.b * float(g.chord @ g.width))
     return forces._replace(sliding=share), (*fields, e.length.reshape(ny, n))
 
 
-def _roughened(surface: Surface | None, depth: Array, g: Grid, smooth: Array) -> tuple[Array, Array]:
+def _roughened(surface: RoughSurface | None, depth: Array, g: StripGrid, smooth: Array) -> tuple[Array, Array]:
     """(nx, ny, n) normal springs of rough elements, N/m, and how deep they sink, m, under the forces of smooth ones."""
     if surface is None:
         return jnp.zeros_like(smooth), jnp.zeros_like(smooth)
@@ -175,9 +175,15 @@ def _roughened(surface: Surface | None, depth: Array, g: Grid, smooth: Array) ->
 
 
 def rolled_by_characteristic(
-    *given: ArrayLike, friction: Friction, speed: ArrayLike, left: Array | None = None, surface: Surface | None = None,
-    elements: tuple[int, int] = (20, 20), distribution: Distribution = "constant", **how: Any,
-) -> tuple[Forces, Tractions]:  # fmt: skip
+    *given: ArrayLike,
+    friction: Friction,
+    speed: ArrayLike,
+    left: Array | None = None,
+    surface: RoughSurface | None = None,
+    elements: tuple[int, int] = (20, 20),
+    distribution: Distribution = "constant",
+    **how: Any,
+) -> tuple[CreepForces, Tractions]:
     """Forces and tractions, see `forces_by_characteristic`.
 
     Args:
@@ -196,7 +202,7 @@ def rolled_by_characteristic(
     depth = approach(state[3], state[4], state[5], state[6] / (1 - state[7]))
     forces, fields = _marched(pose, friction, V, share, surface, depth, elements=elements, distribution=distribution)
     over = over_elements(Poses(*map(np.asarray, pose)), grid(elements, distribution), *fields)
-    return Forces(*map(np.asarray, forces)), over
+    return CreepForces(*map(np.asarray, forces)), over
 
 
 @checked
@@ -204,13 +210,13 @@ def forces_by_characteristic(
     xi: Reals, eta: Reals, phi: Reals, a: Positives, b: Positives, normal_force: Positives,
     friction: Friction, speed: Positives, shear: Positives, poisson: Poissons, *,
     elements: Resolution = (20, 20), distribution: Distribution = "constant",
-    coefficients: Coefficients = "table", spin: Spin = "kalker", surface: Surface | None = None,
-) -> Forces:  # fmt: skip
+    coefficients: Coefficients = "table", spin: Spin = "kalker", surface: RoughSurface | None = None,
+) -> CreepForces:  # fmt: skip
     """`strips.creep_forces` with a coefficient over the speed of sliding, and rough surfaces.
 
     Args:
-        friction: a characteristic of `contact.friction`. speed: of rolling, m/s. surface: `Surface` of both bodies'
-            heights and R_Z. The rest as there.
+        friction: a characteristic of `contact.friction`. speed: of rolling, m/s. surface: `RoughSurface` of both
+            bodies' heights and R_Z. The rest as there.
 
     Raises:
         UserError: see there; friction that is no characteristic.

@@ -11,10 +11,10 @@ import numpy as np
 from ..contact.friction import Friction
 from ..data import Array
 from ..interrupts import look
-from .laws import Surface, rolled_by_characteristic
-from .strips import BLOCK, Forces, Tractions, creep_forces, tractions
+from .laws import RoughSurface, rolled_by_characteristic
+from .strips import BLOCK, CreepForces, Tractions, creep_forces, tractions
 from .temperature import Conductor, conducted, falling, heat_share, settled
-from .wheelset import Drag, Patch, Track, states
+from .wheelset import Drag, RollingPatch, Track, states
 
 COLD = 20.0
 """degrees C at which a characteristic of friction holds."""
@@ -50,7 +50,7 @@ class States:
     """Of n states. Attributes: forces: (n,). hottest: (n,) largest temperature, degrees C, if asked. tractions: of
     those that are kept."""
 
-    forces: Forces
+    forces: CreepForces
     hottest: Array | None
     tractions: Tractions
 
@@ -62,7 +62,7 @@ def sources(t: Tractions, speed: Array) -> tuple[Array, Array]:
 
 def rolled(
     given: Array, friction: Friction, speed: Array, kept: Array, heat: Heat | None = None,
-    surface: Surface | None = None, **how: Any,
+    surface: RoughSurface | None = None, **how: Any,
 ) -> States:  # fmt: skip
     """Forces, heat and some of the tractions.
 
@@ -86,16 +86,16 @@ def rolled(
         some.append([v[np.isin(block, kept)] for v in t])
         if heat is not None:
             hottest.append(heat.temperature(*sources(t, speed[block]), speed[block]).max(axis=(1, 2)))
-    forces = Forces(*map(np.concatenate, zip(*parts, strict=True)))
+    forces = CreepForces(*map(np.concatenate, zip(*parts, strict=True)))
     held = Tractions(*map(np.concatenate, zip(*some, strict=True)))
     return States(forces, np.concatenate(hottest) if hottest else None, held)
 
 
-def drag(track: Track, friction: Friction, heat: Heat | None, surface: Surface | None, **how: Any) -> Drag:
+def drag(track: Track, friction: Friction, heat: Heat | None, surface: RoughSurface | None, **how: Any) -> Drag:
     """Of patches, as `rolled` has it, for the vertical balance of `wheelset.patches`."""
     warm = heat if heat is not None and heat.limit is not None else None
 
-    def across(found: list[Patch]) -> Array:
+    def across(found: list[RollingPatch]) -> Array:
         given, speed = states(track, found)
         if friction.constant and warm is None and surface is None:
             return creep_forces(*_with_constant(given, friction), **how).y
@@ -110,14 +110,14 @@ def _with_constant(given: Array, friction: Friction) -> list[Array]:
 
 
 def _rolled(
-    given: Array, friction: Friction, speed: Array, heat: Heat | None, surface: Surface | None, how: dict[str, Any]
-) -> tuple[Forces, Tractions]:  # fmt: skip
+    given: Array, friction: Friction, speed: Array, heat: Heat | None, surface: RoughSurface | None, how: dict[str, Any]
+) -> tuple[CreepForces, Tractions]:  # fmt: skip
     warm = heat is not None and heat.limit is not None
     if friction.constant and not warm and surface is None:
         of = _with_constant(given, friction)
         return creep_forces(*of, **how), tractions(*of, **how)
 
-    def march(left: Array | None = None) -> tuple[Forces, Tractions]:
+    def march(left: Array | None = None) -> tuple[CreepForces, Tractions]:
         return rolled_by_characteristic(*given, friction=friction, speed=speed, left=left, surface=surface, **how)
 
     if not warm:

@@ -21,8 +21,8 @@ from ..settings.toml import read_settings
 from .contact_table import POINTS as SHIFTS
 from .ellipse import combined
 from .kalker import Coefficients
-from .laws import Surface
-from .profiles import EVERYWHERE, WIDTH, Mirror, Profile, circle, has_arc, polynomial, read_profile
+from .laws import RoughSurface
+from .profiles import EVERYWHERE, WIDTH, CrossSection, Mirror, circle, has_arc, polynomial, read_profile
 from .rolled import Heat
 from .strips import Distribution, Spin
 from .table import ELEMENTS, POINTS
@@ -88,7 +88,7 @@ class Section(Model):
             )
         return self
 
-    def made(self, folder: Path, outward: float) -> Profile:
+    def made(self, folder: Path, outward: float) -> CrossSection:
         """outward: 1 if a convex profile falls to its sides (a rail), -1 if it rises (a wheel)."""
         if isinstance(self.profile, str):
             return read_profile(
@@ -356,7 +356,7 @@ class RollingCase(Model):
                 raise UserError("is 0 at all speeds; the creep force is a part of it, so give more than 0")
         return found
 
-    def surface(self, path: Path) -> Surface | None:
+    def surface(self, path: Path) -> RoughSurface | None:
         """Rough, if it is asked, of files beside the case's.
 
         Raises:
@@ -368,7 +368,7 @@ class RollingCase(Model):
             heights, R_Z = self.roughness.heights(path, 1.0)
             if R_Z > ROUGHEST:
                 raise UserError(f"R_Z = {float(R_Z):g} m is no roughness; give it in m, worn rails have 1e-5")
-        return Surface(heights, value(R_Z))
+        return RoughSurface(heights, value(R_Z))
 
     @property
     def solids(self) -> tuple[Solid, Solid]:

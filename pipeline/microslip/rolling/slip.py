@@ -75,7 +75,7 @@ def load_tyre(path: Path | str, assignments: Sequence[str] | None = None) -> tup
 
 
 @dataclass(frozen=True)
-class Row:
+class PatchRow:
     """The middle of the patch along rolling. Attributes: x: (k,) places, m. pressure: (k,) Pa, the mean over the width.
     middle, length: of the half ellipse that stands for it, m. share: (n,) of elements, from the leading edge on. force:
     of the patch, N. width: m."""
@@ -99,7 +99,7 @@ class Row:
         return int((np.abs(self.x - self.middle) < 0.5 * self.length).sum())
 
 
-def row(state: ContactState, along: Array, elements: int) -> Row:
+def row(state: ContactState, along: Array, elements: int) -> PatchRow:
     """Of a static contact: the half ellipse with the force, the centre and the second moment of its pressure.
 
     Args:
@@ -120,15 +120,15 @@ def row(state: ContactState, along: Array, elements: int) -> Row:
     edge = np.linspace(1, -1, elements + 1)
     share = -np.diff(np.arcsin(edge) + edge * np.sqrt(1 - edge**2)) / np.pi
     width = float(areas.sum()) / float(x[-1] - x[0])
-    return Row(x, p, float(state.centre @ along), length, share, state.normal_force, width)
+    return PatchRow(x, p, float(state.centre @ along), length, share, state.normal_force, width)
 
 
 @dataclass(frozen=True)
-class Studied:
+class TyreAnswer:
     """Attributes: row: of the static state. brush: with the structure. frequency: of its mode, Hz."""
 
     case: TyreCase
-    row: Row
+    row: PatchRow
     brush: Brush
     frequency: float
 
@@ -199,7 +199,7 @@ class Studied:
         ]
 
 
-def study(case: TyreCase, group: ModalGroup) -> Studied:
+def study(case: TyreCase, group: ModalGroup) -> TyreAnswer:
     """Jumps of a case whose body stands in a static state.
 
     Raises:
@@ -220,4 +220,4 @@ def study(case: TyreCase, group: ModalGroup) -> Studied:
         0.0 if t.rigid else float(yields[k]), float(group.omega[k]), max(float(group.damping_ratio[k]), 0.0),
         found.force,
     )  # fmt: skip
-    return Studied(case, found, brush, float(group.omega[k]) / (2 * np.pi))
+    return TyreAnswer(case, found, brush, float(group.omega[k]) / (2 * np.pi))

@@ -16,10 +16,10 @@ from .exact import Exact, exact
 from .fastsim import fastsim
 from .rolled import drag, rolled, sources
 from .settings import RollingCase
-from .strips import Forces, Tractions
+from .strips import CreepForces, Tractions
 from .temperature import speed_parameter
 from .wear import strip_depth
-from .wheelset import Drag, Patch, Pose, Track, across, axle, patches, states
+from .wheelset import Drag, Pose, RollingPatch, Track, across, axle, patches, states
 
 UNITS = {"longitudinal": "1", "lateral": "1", "spin": "1_per_m"}
 UNLIKE = 0.02
@@ -59,7 +59,7 @@ def without_rounding(values: Array, least: float) -> Array:
 
 
 @dataclass(frozen=True)
-class Studied:
+class RollingAnswer:
     """Attributes: patches: of the wheel, the most loaded first; none if it does not touch. creep: (3, n) xi, eta, phi
     of the curve. forces: (n,) of it. reference: some of its indices, |F|/(mu F_N) of the published FASTSIM there.
     exact: half-spaces at some states; missed: why there are none. shown: index of the state whose tractions these are.
@@ -68,14 +68,14 @@ class Studied:
 
     case: RollingCase
     track: Track
-    patches: list[Patch]
+    patches: list[RollingPatch]
     creep: Array
-    forces: Forces | None
+    forces: CreepForces | None
     reference: tuple[Array, Array] | None
     exact: Exact | None
     shown: int
     tractions: Tractions | None
-    of_pose: Forces | None
+    of_pose: CreepForces | None
     missed: str = ""
     highest: float = 0.0
     hottest: Array | None = None
@@ -276,7 +276,7 @@ class Studied:
                 'are off by as much, less with model.spin = "book".']  # fmt: skip
 
 
-def study(case: RollingCase, path: Path) -> Studied:
+def study(case: RollingCase, path: Path) -> RollingAnswer:
     """Patches, curve and tractions of a case; its files stand beside its own.
 
     Raises:
@@ -288,7 +288,7 @@ def study(case: RollingCase, path: Path) -> Studied:
     found, pose = _touching(case, track, drag(track, friction, heat, rough, **how))
     creep = _creep(case, found[0] if found else None)
     if not found:
-        return Studied(case, track, found, creep, None, None, None, 0, None, None)
+        return RollingAnswer(case, track, found, creep, None, None, None, 0, None, None)
     p, c = found[0], case.creep
     highest = float(np.max(friction.highest(jnp.ones(1))))
     over = creep[list(UNITS).index(c.over)]
@@ -297,7 +297,7 @@ def study(case: RollingCase, path: Path) -> Studied:
     n = len(over)
     kept = np.array([shown, *range(n, len(speed))])
     run = rolled(given, friction, speed, kept, heat, rough, **how)
-    forces, of_pose = (Forces(*(v[part] for v in run.forces)) for part in (slice(n), slice(n, None)))
+    forces, of_pose = (CreepForces(*(v[part] for v in run.forces)) for part in (slice(n), slice(n, None)))
     reference, beside, missed = None, None, ""
     if case.is_constant and rough is None:
         at = np.unique(np.linspace(0, n - 1, 13).astype(int))
@@ -305,7 +305,7 @@ def study(case: RollingCase, path: Path) -> Studied:
         reference = at, np.array([np.hypot(f.x, f.y) for f in totals]) / (highest * p.normal_force)
         beside, missed = _exact(case, track, pose, p, creep, np.hypot(forces.x, forces.y), highest)
     patch, of_patches = (Tractions(*(v[part] for v in run.tractions)) for part in (0, slice(1, None)))
-    return Studied(
+    return RollingAnswer(
         case,
         track,
         found,
@@ -323,7 +323,7 @@ def study(case: RollingCase, path: Path) -> Studied:
     )
 
 
-def _touching(case: RollingCase, track: Track, dragged: Drag) -> tuple[list[Patch], Pose]:
+def _touching(case: RollingCase, track: Track, dragged: Drag) -> tuple[list[RollingPatch], Pose]:
     """Patches, the one that carries most first, and the pose; an axle rolls until both wheels carry the same."""
     pose, side, vertical = case.posed(), case.pose.side, case.vertical_force
     if side != "both":
@@ -332,7 +332,7 @@ def _touching(case: RollingCase, track: Track, dragged: Drag) -> tuple[list[Patc
     return sorted([*left, *right], key=lambda p: -p.normal_force), pose
 
 
-def _states(track: Track, found: list[Patch], creep: Array) -> tuple[Array, Array]:
+def _states(track: Track, found: list[RollingPatch], creep: Array) -> tuple[Array, Array]:
     """(8, n + patches) what `rolled` is given, of the curve and of the pose, and their speeds, m/s."""
     given, speed = states(track, [found[0]] * creep.shape[1] + found)
     given[:3, : creep.shape[1]] = creep
@@ -340,7 +340,7 @@ def _states(track: Track, found: list[Patch], creep: Array) -> tuple[Array, Arra
 
 
 def _exact(
-    case: RollingCase, track: Track, pose: Pose, p: Patch, creep: Array, size: Array, friction: float
+    case: RollingCase, track: Track, pose: Pose, p: RollingPatch, creep: Array, size: Array, friction: float
 ) -> tuple[Exact | None, str]:  # fmt: skip
     """At so many states of the curve as the case wants, in equal steps of the (n,) force; why not if there is none."""
     way = np.cumsum(np.abs(np.diff(size, prepend=size[:1])))
@@ -353,7 +353,7 @@ def _exact(
         return None, str(error)
 
 
-def _creep(case: RollingCase, p: Patch | None) -> Array:
+def _creep(case: RollingCase, p: RollingPatch | None) -> Array:
     c = case.creep
     fixed = [c.longitudinal, c.lateral, c.spin]
     of_pose = [p.xi, p.eta, p.phi] if p else [0.0] * 3
@@ -362,7 +362,7 @@ def _creep(case: RollingCase, p: Patch | None) -> Array:
     return np.array(rows)
 
 
-def rows_of_patches(found: list[Patch]) -> tuple[list[str], list[list[float | str]]]:
+def rows_of_patches(found: list[RollingPatch]) -> tuple[list[str], list[list[float | str]]]:
     """Head and a row for each patch, as in patches.csv."""
     head = [
         *(f"{axis}_m" for axis in AXES),

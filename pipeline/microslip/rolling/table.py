@@ -7,6 +7,7 @@ them. With xi the sign of F_x turns, with eta and phi together those of F_y and 
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial, reduce
 from operator import mul
@@ -25,7 +26,7 @@ from ..settings import arguments
 from ..settings.arguments import Count, Index, wholes
 from .arguments import Frictions, Poisson, Positives, Reals, Resolution, joined
 from .kalker import Coefficients, creep_coefficients
-from .strips import BLOCK, NAMES, SLIPPERY, Distribution, Forces, Poses, creep_forces, forces, grid, posed
+from .strips import BLOCK, NAMES, SLIPPERY, CreepForces, Distribution, Poses, creep_forces, forces, grid, posed
 
 POINTS = (19, 36, 33, 39, 13)
 """Of the size of the pull below and above 1/2, its azimuth, its polar angle, a/b."""
@@ -103,10 +104,9 @@ class CreepTable:
         if not ((ratio >= least) & (ratio <= most)).all():
             worst = float(ratio.ravel()[np.argmax(np.abs(np.log(ratio)))])
             raise UserError(f"a, b: a/b is {worst:.4g}, and the table goes from {least:.4g} to {most:.4g}")
-        p = Poses(*map(np.asarray, posed(x, y, turn, a, b, held, np.ones_like(a), G, self.poisson, **self.how)))
-        stiff = p.stiffness_x * c**2 / held
-        at, signs = placed(np.stack([x, p.eta * p.stiffness_y / p.stiffness_x, c * p.phi_x]) * stiff, ratio)
-        at = np.stack([*at, np.log(ratio), np.log(p.stiffness_y / p.stiffness_x)]).reshape(5, -1)
+        p = posed(x, y, turn, a, b, held, np.ones_like(a), G, self.poisson, **self.how)
+        at, signs = placed(Poses(*map(np.asarray, p)), ratio)
+        at = at.reshape(5, -1)
         found = np.concatenate([self._between(at[:, i : i + BLOCK]) for i in range(0, at.shape[1], BLOCK)], axis=1)
         return found.reshape(3, *x.shape) * signs * held * np.stack([np.ones_like(c), np.ones_like(c), c])
 
@@ -147,16 +147,19 @@ def cubic(axis: Any, v: Any, ridge: Any = 0, xp: Any = np) -> tuple[Any, Any]:
     return first, xp.stack([reduce(mul, part) for part in parts], axis=1)
 
 
-def placed(pull: Any, ratio: Any, xp: Any = np) -> tuple[Any, Any]:
-    """Size, azimuth and polar angle of a (3, n) pull, and the signs of the forces that are tabulated for it; xp: numpy,
-    or jax.numpy in what is traced."""
-    u, v, w = pull
+def placed(p: Poses, ratio: Any, xp: Any = np) -> tuple[Any, Any]:
+    """(5, n) size, azimuth, polar angle, ln(a/b) and springs of poses under mu F_N, and (3, n) the signs of the forces
+    that are tabulated for them; ratio: a/b within the table. xp: numpy, or jax.numpy in what is traced."""
+    c = xp.sqrt(p.a * p.b)
+    pull = xp.stack([p.xi, p.eta * p.stiffness_y / p.stiffness_x, c * p.phi_x])
+    u, v, w = pull * (p.stiffness_x * c**2 / p.normal_force)
     r = xp.sqrt(u**2 + v**2 + ratio * w**2) / SATURATED
     forward, turned = xp.where(u < 0, -1.0, 1.0), xp.where(w < 0, -1.0, 1.0)
     root = ratio**0.25  # sqrt(a) where a b = 1, and 1/sqrt(b)
     polar = xp.arctan2(xp.hypot(u * root**2, v / root**2), xp.abs(w))
     azimuth = xp.arctan2(turned * v / root, xp.abs(u) * root)
-    return xp.stack([r / (1 + r), azimuth, polar]), xp.stack([forward, turned, turned])
+    at = [r / (1 + r), azimuth, polar, xp.log(ratio), xp.log(p.stiffness_y / p.stiffness_x)]
+    return xp.stack(at), xp.stack([forward, turned, turned])
 
 
 FAR = 1e4
@@ -177,7 +180,7 @@ def _pull(at: Array) -> Array:
 @partial(program, static_argnames=("elements", "distribution"))
 def _marched(
     pull: Array, ratio: Array, springs: Array, elements: tuple[int, int], distribution: Distribution
-) -> Forces:
+) -> CreepForces:
     """Forces over mu F_N of springs that are pulled, with a b and mu F_N of one."""
     a, one = ratio**0.5, ratio**0.0
     x, y = springs**-0.5, springs**0.5
@@ -255,14 +258,11 @@ def write_creep_table(path: Path | str, table: CreepTable) -> Path:
     """As HDF5: a dataset an axis, ``kalker``, ``values`` in whole steps and ``error``; complete or not at all."""
     step = np.abs(table.values).max() / FINEST
     g = grid(tuple(table.how["elements"]), table.how["distribution"])
-    with hdf5.sealed(path) as file:
-        file.attrs.update(format=FORMAT, poisson=table.poisson, checked=table.checked, values=", ".join(VALUES),
-                          step=step, spin_factor=2 * g.sprung / g.spun, error="mean, 95 % quantile, largest",
-                          meaning=str(CreepTable.__doc__), **table.how)  # fmt: skip
-        for name in (*AXES, "kalker", "error"):
-            hdf5.put(file, name, getattr(table, name))
-        hdf5.put(file, "values", np.rint(table.values / step).astype(np.int16))
-    return Path(path)
+    arrays = {name: getattr(table, name) for name in (*AXES, "kalker", "error")}
+    arrays["values"] = np.rint(table.values / step).astype(np.int16)
+    return write_table(path, arrays, format=FORMAT, poisson=table.poisson, checked=table.checked,
+                       values=", ".join(VALUES), step=step, spin_factor=2 * g.sprung / g.spun,
+                       error="mean, 95 % quantile, largest", meaning=str(CreepTable.__doc__), **table.how)  # fmt: skip
 
 
 @arguments.checked
@@ -272,9 +272,33 @@ def read_creep_table(path: Path | str) -> CreepTable:
     Raises:
         UserError: another file.
     """
-    with reading(ordinary(Path(path)), FORMAT, "", "write a table of creep forces with [table] in a case") as file:
-        parts = {name: file[name][()] for name in (*AXES, "kalker", "error")}
-        nx, ny = map(int, file.attrs["elements"])
-        how = {"elements": (nx, ny)} | {k: str(file.attrs[k]) for k in ("distribution", "coefficients")}
-        return CreepTable(**parts, values=file["values"][()] * float(file.attrs["step"]), how=how,
-                          poisson=float(file.attrs["poisson"]), checked=int(file.attrs["checked"]))  # fmt: skip
+    names = (*AXES, "kalker", "error", "values")
+    arrays, told = read_table(path, names, FORMAT, "write a table of creep forces with [table] in a case")
+    nx, ny = map(int, told["elements"])
+    how = {"elements": (nx, ny)} | {k: str(told[k]) for k in ("distribution", "coefficients")}
+    arrays["values"] = arrays["values"] * float(told["step"])
+    return CreepTable(**arrays, how=how, poisson=float(told["poisson"]), checked=int(told["checked"]))
+
+
+def write_table(path: Path | str, arrays: Mapping[str, Any], **told: Any) -> Path:
+    """A table for vehicle programs as HDF5, complete or not at all: arrays by their names, some of them in a group
+    (``group/name``), and what is told of it."""
+    with hdf5.sealed(path) as file:
+        file.attrs.update(told)
+        groups = {name: file.create_group(name) for name in dict.fromkeys(n.rpartition("/")[0] for n in arrays) if name}
+        for name, values in arrays.items():
+            above, _, own = name.rpartition("/")
+            hdf5.put(groups.get(above, file), own, np.asarray(values))
+    return Path(path)
+
+
+def read_table(
+    path: Path | str, names: Iterable[str], form: str, again: str
+) -> tuple[dict[str, Array], dict[str, Any]]:  # fmt: skip
+    """Arrays that `write_table` wrote, and what it told.
+
+    Raises:
+        UserError: another file, of which `again` says what to do.
+    """
+    with reading(ordinary(Path(path)), form, "", again) as file:
+        return {name: file[name][()] for name in names}, dict(file.attrs)

@@ -12,18 +12,18 @@ from ..contact.friction import Friction
 from ..data import Array
 from ..errors import UserError
 from .ellipse import ellipses
-from .laws import Surface
-from .profiles import Profile
+from .laws import RoughSurface
+from .profiles import CrossSection
 from .rolled import drag, rolled, sources
 from .settings import WIDEST, RollingCase
 from .wear import deposited, shortest_smoothing, smoothed, strip_depth
-from .wheelset import Patch, Track, patches, states
+from .wheelset import RollingPatch, Track, patches, states
 
 STRIP = 1e-4
 """m, of the profiles that wear."""
 
 
-class Body(NamedTuple):
+class WornProfile(NamedTuple):
     """A profile that wears. Attributes: y: (n,) of its strips, m. new: (n,) z before, m. into: 1 where z points into
     the body, a rail, -1 of a wheel. depth: (n,) worn off, along z, m."""
 
@@ -33,24 +33,24 @@ class Body(NamedTuple):
     depth: Array
 
     @staticmethod
-    def of(profile: Profile, into: float) -> Body:
+    def of(profile: CrossSection, into: float) -> WornProfile:
         y = np.arange(profile.y[0], profile.y[-1], STRIP)
-        return Body(y, profile.height(y), into, np.zeros_like(y))
+        return WornProfile(y, profile.height(y), into, np.zeros_like(y))
 
-    def profile(self, smoothing: float) -> Profile:
+    def profile(self, smoothing: float) -> CrossSection:
         """As the contact sees it: the worn depth smoothed."""
-        return Profile(self.y, self.new + self.into * smoothed(self.depth, STRIP, smoothing))
+        return CrossSection(self.y, self.new + self.into * smoothed(self.depth, STRIP, smoothing))
 
     def columns(self, smoothing: float) -> dict[str, Array]:
         """Of a table that is the profile, mm, and what is worn off."""
         return {"y_mm": 1e3 * self.y, "z_mm": 1e3 * self.profile(smoothing).z, "worn_mm": 1e3 * self.depth}
 
 
-class Strips(NamedTuple):
+class StripWork(NamedTuple):
     """What a passage does to the strips of a patch, y to the left. Attributes: patch. width: (n,) m. work: (n,) of
     friction per area, J/m2."""
 
-    patch: Patch
+    patch: RollingPatch
     width: Array
     work: Array
 
@@ -69,13 +69,13 @@ class Moment(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Wearing:
+class ProfileWear:
     """Attributes: wheel, rail: in the end. moments: before, and after every update. work: of friction between them, J
     per m of the way. smoothing: of the worn depth, m. least: with which no wave of it grows at the first update, m.
     approach: of new bodies, m."""
 
-    wheel: Body
-    rail: Body
+    wheel: WornProfile
+    rail: WornProfile
     moments: list[Moment]
     work: float
     smoothing: float
@@ -115,9 +115,9 @@ class Wearing:
 
 
 def wearing(
-    case: RollingCase, track: Track, friction: Friction, surface: Surface | None = None,
+    case: RollingCase, track: Track, friction: Friction, surface: RoughSurface | None = None,
     report: Callable[[str], None] = lambda _: None,
-) -> Wearing:  # fmt: skip
+) -> ProfileWear:  # fmt: skip
     """Updates of a case; wheel and rail are passed equally often.
 
     Raises:
@@ -125,7 +125,7 @@ def wearing(
     """
     asked = case.wear
     assert asked is not None and asked.passages is not None
-    bodies = [Body.of(track.wheel, -1.0), Body.of(track.rail, 1.0)]
+    bodies = [WornProfile.of(track.wheel, -1.0), WornProfile.of(track.rail, 1.0)]
     each, moments, work, least, approach = asked.passages / asked.updates, [], 0.0, 0.0, 0.0
     shifts = asked.lateral or (case.pose.lateral,)
     for k in range(asked.updates + 1):
@@ -142,10 +142,12 @@ def wearing(
         bodies = [_worn(body, runs, asked.coefficient * share, case.pose.side) for body in bodies]
         work += share * sum(float(one.width @ one.work) for one in runs)
         least = least or _shortest(runs, sum(body.depth.max() for body in bodies), track)
-    return Wearing(bodies[0], bodies[1], moments, work, asked.smoothing, least, approach)
+    return ProfileWear(bodies[0], bodies[1], moments, work, asked.smoothing, least, approach)
 
 
-def _run(case: RollingCase, track: Track, friction: Friction, surface: Surface | None, lateral: float) -> list[Strips]:
+def _run(
+    case: RollingCase, track: Track, friction: Friction, surface: RoughSurface | None, lateral: float
+) -> list[StripWork]:
     """A passage in a pose."""
     heat = case.heat.made() if case.heat else None
     how = case.model.model_dump(exclude={"exact"})
@@ -158,10 +160,12 @@ def _run(case: RollingCase, track: Track, friction: Friction, surface: Surface |
     given, speed = states(track, found)
     t = rolled(given, friction, speed, np.arange(len(found)), heat, surface, **how).tractions
     q, dx = sources(t, speed)
-    return [Strips(p, t.area[i, :, 0] / dx[i], strip_depth(q[i].T, dx[i], 1.0, speed[i])) for i, p in enumerate(found)]
+    return [
+        StripWork(p, t.area[i, :, 0] / dx[i], strip_depth(q[i].T, dx[i], 1.0, speed[i])) for i, p in enumerate(found)
+    ]
 
 
-def _worn(body: Body, runs: list[Strips], coefficient: float, side: str) -> Body:
+def _worn(body: WornProfile, runs: list[StripWork], coefficient: float, side: str) -> WornProfile:
     """After so many passages, of which the coefficient (m3/J) is the sum."""
     depth = body.depth.copy()
     turned = slice(None, None, -1 if side == "right" else 1)  # a profile's y runs to the field side
@@ -172,14 +176,14 @@ def _worn(body: Body, runs: list[Strips], coefficient: float, side: str) -> Body
     return body._replace(depth=depth)
 
 
-def _moment(passages: float, runs: list[Strips], bodies: list[Body]) -> Moment:
+def _moment(passages: float, runs: list[StripWork], bodies: list[WornProfile]) -> Moment:
     p = max((one.patch for one in runs), key=lambda p: p.pressure)
     wheel, rail = (body.depth for body in bodies)
     worn = STRIP * float(wheel.sum() + rail.sum())
     return Moment(passages, p.pressure, p.a, p.b, float(wheel.max()), float(rail.max()), worn)
 
 
-def _shortest(runs: list[Strips], depth: float, track: Track) -> float:
+def _shortest(runs: list[StripWork], depth: float, track: Track) -> float:
     """m: `wear.shortest_smoothing` of what an update takes, as the pressure's p_0 a follows the curvature (Hertz)."""
     p = max((one.patch for one in runs), key=lambda p: p.pressure)
     B = max(p.B, 1e-3 * p.A) * np.array([0.99, 1.01])

@@ -10,7 +10,7 @@ import jax.numpy as jnp
 
 from .braking import Braking
 from .contacts import Held, Yielding, times
-from .flow import Flow
+from .flow import BodyFlow
 from .inclusion import Meets
 from .ramp import Ramp
 from .spots import Spots
@@ -30,7 +30,7 @@ class Bodies(NamedTuple):
             `fourth`, group by group, see there; preload: (m,) accelerations by F_0.
     """
 
-    flow: Flow
+    flow: BodyFlow
     yielding: Yielding | None
     meets: Meets | None
     braking: Braking | None
@@ -50,7 +50,7 @@ class Bodies(NamedTuple):
     preload: Any
 
 
-class Now(NamedTuple):
+class MotionState(NamedTuple):
     """Where the motion is.
 
     Attributes:
@@ -79,7 +79,7 @@ class Now(NamedTuple):
 
 
 class Hardest(NamedTuple):
-    """The period in which steps missed most: how much, see `Now`, and when it began, s."""
+    """The period in which steps missed most: how much, see `MotionState`, and when it began, s."""
 
     missed: Any
     time: Any
@@ -92,8 +92,8 @@ class Listed(NamedTuple):
     rows: Any
 
 
-class Seen(NamedTuple):
-    """A sample: (m,) q and q', (c,) d and force, (6,) energies (see `Now`) and the bodies' own, J; time, s."""
+class Sample(NamedTuple):
+    """A sample: (m,) q and q', (c,) d and force, (6,) energies (see `MotionState`) and the bodies' own, J; time, s."""
 
     q: Any
     q_dot: Any

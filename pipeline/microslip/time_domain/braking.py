@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import jax
 import jax.numpy as jnp
 
-from .contacts import Group, Held, force_at, joined, moved, parts
+from .contacts import ContactGroup, Held, force_at, joined, moved, parts
 
 TURNS, NEWTON = 100, 8
 """Turns of `slowed` at most, and steps of Newton's method in each."""
@@ -26,7 +26,7 @@ class Braking(NamedTuple):
 
 
 def slowed(
-    groups: tuple[Group, ...], B: Braking, F_0: Any, d: Any, v: Any, dt: Any, held: Held
+    groups: tuple[ContactGroup, ...], B: Braking, F_0: Any, d: Any, v: Any, dt: Any, held: Held
 ) -> tuple[Any, Any]:  # fmt: skip
     """(c,) velocities of contacts after half a kick, and what is missing, m/s.
 
@@ -65,7 +65,7 @@ def slowed(
     return found, missed
 
 
-def _alone(g: Group, force: Any, state: Any, most: Any, place: Any, rate: Any, dt: Any) -> Any:
+def _alone(g: ContactGroup, force: Any, state: Any, most: Any, place: Any, rate: Any, dt: Any) -> Any:
     """(c n, 3) forces of a group whose points brake by themselves from forces, at coordinates and velocities (c, k)."""
     u, w = moved(g, place + g.offset), moved(g, rate)
     by_law = g.law.step(u, w, dt, state)[0]

@@ -20,10 +20,10 @@ import scipy.special
 
 from ..data import Array
 from ..units import counted, percent
-from .stepper import Now, Stepper
+from .stepper import MotionState, Stepper
 
 if TYPE_CHECKING:
-    from .equations import Equations
+    from .equations import MotionEquations
     from .orbit import Orbit
 
 APART = 1e-7
@@ -85,7 +85,7 @@ class Chatter:
     step: float
 
 
-def exponent(stepper: Stepper, now: Now, samples: int, each: int, periods: int, seed: int = 0) -> Exponent:
+def exponent(stepper: Stepper, now: MotionState, samples: int, each: int, periods: int, seed: int = 0) -> Exponent:
     """The largest Lyapunov exponent along the motion that goes on from a state, over so many periods.
 
     Args:
@@ -116,7 +116,7 @@ def exponent(stepper: Stepper, now: Now, samples: int, each: int, periods: int, 
     return mean(growth[ALIGNED:], 2 * np.pi / e.Omega)
 
 
-def sizes(e: Equations, blocks: int) -> Array:
+def sizes(e: MotionEquations, blocks: int) -> Array:
     """(b, 2 p) by which displacements and velocities of the modes are weighed in a separation, 1/s and 1."""
     weights = pace(e.omega2, e.Omega).reshape(blocks, -1)
     return np.concatenate([weights, np.ones_like(weights)], axis=1)
@@ -147,7 +147,7 @@ def whole(states: Any) -> str:
     return "No Lyapunov exponent: a law of these contacts remembers whole numbers, which cannot be varied a little."
 
 
-def between(now: Now, other: Now, share: Any, array: Callable[[Any], Any] = np.asarray) -> Now:
+def between(now: MotionState, other: MotionState, share: Any, array: Callable[[Any], Any] = np.asarray) -> MotionState:
     """A motion apart by a share of what the other is, memory of contacts included. array: of numpy or of jax."""
 
     def one(a: Any, b: Any) -> Any:

@@ -39,7 +39,7 @@ FEW = 4096
 """Numbers of a matrix up to which a product is faster as a sum that is compiled together with what surrounds it."""
 
 
-class Group(NamedTuple):
+class ContactGroup(NamedTuple):
     """Equal contacts, whose coordinates stand one after the other. law: of all of their points, on its ground. G: (c,
     n, 3, k) of each. offset: (c, k) where they stand at d = 0."""
 
@@ -108,7 +108,7 @@ def _unknown(law: Law, u: Any) -> Any:
     return jnp.isnan(law.overlap(u)).any()
 
 
-def untouched(groups: tuple[Group, ...]) -> Held:
+def untouched(groups: tuple[ContactGroup, ...]) -> Held:
     """Contacts that were never loaded, at u = 0."""
     d = jnp.zeros(sum(g.offset.size for g in groups))
     states = tuple(g.law.init(_count(g)) for g in groups)
@@ -117,11 +117,11 @@ def untouched(groups: tuple[Group, ...]) -> Held:
     return Held(d, d, states, points, points, none, none.astype(bool), zero, zero, zero, zero, zero)
 
 
-def _count(g: Group) -> int:
+def _count(g: ContactGroup) -> int:
     return int(g.G.shape[0] * g.G.shape[1])
 
 
-def parts(groups: tuple[Group, ...], d: Any) -> list[Any]:
+def parts(groups: tuple[ContactGroup, ...], d: Any) -> list[Any]:
     """(c, k) of each group."""
     found, begin = [], 0
     for g in groups:
@@ -130,17 +130,17 @@ def parts(groups: tuple[Group, ...], d: Any) -> list[Any]:
     return found
 
 
-def moved(g: Group, d: Any) -> Any:
+def moved(g: ContactGroup, d: Any) -> Any:
     """(c n, 3) of the points, by coordinates (c, k)."""
     return (g.G * d[:, None, None, :]).sum(axis=-1).reshape(-1, 3)
 
 
-def _contracted(g: Group, points: Any) -> Any:
+def _contracted(g: ContactGroup, points: Any) -> Any:
     """(c k,) forces of the coordinates."""
     return (g.G * points.reshape(*g.G.shape[:3], 1)).sum(axis=(1, 2)).reshape(-1)
 
 
-def force_at(groups: tuple[Group, ...], d: Any, v: Any, dt: Any, states: tuple[Any, ...]) -> tuple:
+def force_at(groups: tuple[ContactGroup, ...], d: Any, v: Any, dt: Any, states: tuple[Any, ...]) -> tuple:
     """Force (c,) at d with velocity v, states and points' forces of all groups."""
     after, points = [], []
     for g, state, at, rate in zip(groups, states, parts(groups, d), parts(groups, v), strict=True):
@@ -151,18 +151,18 @@ def force_at(groups: tuple[Group, ...], d: Any, v: Any, dt: Any, states: tuple[A
     return joined(groups, points), tuple(after), tuple(points)
 
 
-def joined(groups: tuple[Group, ...], points: Any) -> Any:
+def joined(groups: tuple[ContactGroup, ...], points: Any) -> Any:
     """(c,) forces of the coordinates, by those (c n, 3) of the points of all groups."""
     return jnp.concatenate([jnp.zeros(0), *(_contracted(g, f) for g, f in zip(groups, points, strict=True))])
 
 
-def slope_at(groups: tuple[Group, ...], d: Any, v: Any, dt: Any, states: tuple[Any, ...]) -> Any:
+def slope_at(groups: tuple[ContactGroup, ...], d: Any, v: Any, dt: Any, states: tuple[Any, ...]) -> Any:
     """(c, c) derivative of the force, point by point."""
     blocks = list[Any]()
     for g, state, at, rate in zip(groups, states, parts(groups, d), parts(groups, v), strict=True):
         u, w = moved(g, at + g.offset), moved(g, rate)
 
-        def along(direction: Any, g: Group = g, u: Any = u, w: Any = w, state: Any = state) -> Any:
+        def along(direction: Any, g: ContactGroup = g, u: Any = u, w: Any = w, state: Any = state) -> Any:
             tangent = jnp.broadcast_to(direction, u.shape)
             return jax.jvp(lambda x: g.law.step(x, w, dt, state)[0], (u,), (tangent,))[1]
 
@@ -171,7 +171,7 @@ def slope_at(groups: tuple[Group, ...], d: Any, v: Any, dt: Any, states: tuple[A
     return jax.scipy.linalg.block_diag(jnp.zeros((0, 0)), *blocks)
 
 
-def _placed(groups: tuple[Group, ...], bodies: Yielding, free: Any, v: Any, dt: Any, held: Held) -> tuple:
+def _placed(groups: tuple[ContactGroup, ...], bodies: Yielding, free: Any, v: Any, dt: Any, held: Held) -> tuple:
     """d (c,) of contacts that modes alone would have at `free`, where bodies yield at once; the residual, m; and what
     `force_at` says there. With the slope of sticking contacts first, with their own where that does not do."""
     enough = 1e-10 * jnp.abs(free).max() + 1e-17
@@ -200,7 +200,7 @@ def _placed(groups: tuple[Group, ...], bodies: Yielding, free: Any, v: Any, dt: 
 
 
 def answer(
-    groups: tuple[Group, ...], bodies: Yielding | None, free: Any, v: Any, dt: Any, held: Held, accounts: bool
+    groups: tuple[ContactGroup, ...], bodies: Yielding | None, free: Any, v: Any, dt: Any, held: Held, accounts: bool
 ) -> Held:  # fmt: skip
     """What contacts hold after a step of dt to where modes alone have them, `free` (c,), with velocities v.
 
@@ -215,15 +215,21 @@ def answer(
     return after._replace(d=d, force=force, missed=missed)
 
 
-def placed(groups: tuple[Group, ...], d: Any) -> tuple[Any, ...]:
+def placed(groups: tuple[ContactGroup, ...], d: Any) -> tuple[Any, ...]:
     """(c n, 3) of the points of each group."""
     return tuple(moved(g, at + g.offset) for g, at in zip(groups, parts(groups, d), strict=True))
 
 
 def told(
-    groups: tuple[Group, ...], places: tuple[Any, ...], dt: Any, held: Held, accounts: bool, states: tuple[Any, ...],
-    points: tuple[Any, ...], by_law: bool = True,
-) -> Held:  # fmt: skip
+    groups: tuple[ContactGroup, ...],
+    places: tuple[Any, ...],
+    dt: Any,
+    held: Held,
+    accounts: bool,
+    states: tuple[Any, ...],
+    points: tuple[Any, ...],
+    by_law: bool = True,
+) -> Held:
     """What contacts hold, with events and energies, d and force as before; by_law: whether set-valued laws say what
     they lose."""
     approach, slips, lost, stored = [jnp.zeros(0)], [jnp.zeros(0, bool)], jnp.zeros(()), jnp.zeros(())
@@ -248,7 +254,7 @@ def told(
 
 
 def rigid_answer(
-    groups: tuple[Group, ...], meets: Meets, bodies: Yielding | None, free: Any, ahead: Any, dt: Any, held: Held,
+    groups: tuple[ContactGroup, ...], meets: Meets, bodies: Yielding | None, free: Any, ahead: Any, dt: Any, held: Held,
     others: tuple, accounts: bool,
 ) -> Held:  # fmt: skip
     """What contacts hold, some of them set-valued, see `inclusion`. A point sticks where the coefficient at rest can
@@ -300,7 +306,7 @@ def slid(w: Any, free: Any) -> Any:
     return norm(w[:, 1:].T) > SLIDES * jnp.maximum(jnp.abs(w), jnp.abs(free))[:, 1:].max()
 
 
-def _asked(groups: tuple[Group, ...], i: int, back: Any, free: Any, ahead: Any, dt: Any, held: Held) -> tuple:
+def _asked(groups: tuple[ContactGroup, ...], i: int, back: Any, free: Any, ahead: Any, dt: Any, held: Held) -> tuple:
     """Of the points of a group: w_0, `pressed` and `first` of `inclusion.solve`, and (n, 2) the slopes of the ground
     under them that turn their way, and their force. back: see `Meets`; None of bodies that
     yield."""
@@ -321,11 +327,11 @@ def _asked(groups: tuple[Group, ...], i: int, back: Any, free: Any, ahead: Any, 
     return goes.at[:, 0].set(along), pressed, first, *slopes
 
 
-def _point(groups: tuple[Group, ...], i: int, d: Any) -> Any:
+def _point(groups: tuple[ContactGroup, ...], i: int, d: Any) -> Any:
     """(n, 3) m of the points of a group."""
     return moved(groups[i], parts(groups, d)[i] + groups[i].offset)
 
 
-def _held(g: Group, force: Any, way: Any, u: Any, dt: Any, state: Any) -> tuple[Any, Any]:
+def _held(g: ContactGroup, force: Any, way: Any, u: Any, dt: Any, state: Any) -> tuple[Any, Any]:
     """(n, 3) force and state of set-valued points after a step to u (n, 3) in which they slid by a way (n, 2)."""
     return g.law.slid(force, way, u, dt, state) if isinstance(g.law, Moving) else (force, state + way.T)

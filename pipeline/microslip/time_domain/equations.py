@@ -33,7 +33,7 @@ SEEN = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
-class Equations:
+class MotionEquations:
     """Real equations of motion in modal coordinates, M = 1, and rows of what is seen of them.
 
     Attributes:
@@ -179,7 +179,7 @@ def _stiffest(contact: Contact) -> Array:
     return found[int(np.argmax([np.trace(k) for k in found]))]
 
 
-def of(assembly: Assembly, Omega: float, second: float | None = None) -> Equations:
+def of(assembly: Assembly, Omega: float, second: float | None = None) -> MotionEquations:
     """The equations of an assembly driven at a frequency (rad/s); a sector that stands for a ring is unrolled.
 
     Loads of a second frequency (rad/s) count as a harmonic of the first one that is no whole number.
@@ -213,7 +213,7 @@ def of(assembly: Assembly, Omega: float, second: float | None = None) -> Equatio
     _can_press(assembly.contacts, D, _real(mean.residual, assembly))
     F_0 = np.concatenate([c.preload for c in assembly.contacts]) if assembly.contacts else np.zeros(0)
     B = _of_harmonics(parts, harmonics, lambda p: V.T @ p.load)
-    return Equations(
+    return MotionEquations(
         assembly, float(Omega), omega2, C, V, harmonics, B, D,
         _of_harmonics(parts, harmonics, lambda p: p.given), _real(mean.residual, assembly), F_0,
         _real(mean.output, assembly) @ V, _of_harmonics(parts, harmonics, lambda p: p.output_given),
@@ -279,7 +279,7 @@ def _of_harmonics(parts: dict[int, Linear], harmonics: Sequence[int], of: Callab
     return np.stack(columns, axis=1)
 
 
-def of_ramp(assembly: Assembly, ramp: Ramp) -> Equations:
+def of_ramp(assembly: Assembly, ramp: Ramp) -> MotionEquations:
     """The equations of an assembly whose loads' frequency changes.
 
     Loads in rad2/s2 (centrifugal) follow the square of the rotation speed. Matrices stay as they are: those of the

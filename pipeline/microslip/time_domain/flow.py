@@ -18,13 +18,13 @@ import numpy as np
 
 from ..data import Array
 from .contacts import times
-from .equations import Equations
+from .equations import MotionEquations
 
 TERMS = 14
 """Of the exponential's series, whose argument has a norm of 1/8 at most: the next one is below 1e-23."""
 
 
-class Flow(NamedTuple):
+class BodyFlow(NamedTuple):
     """Flows over tau 2^k, k = 0, 1, ..., of b blocks of p modes each, s = 2 p + n.
 
     Attributes:
@@ -38,14 +38,14 @@ class Flow(NamedTuple):
     length: Any
 
 
-def blocks(equations: Equations) -> tuple[int, int]:
+def blocks(equations: MotionEquations) -> tuple[int, int]:
     """Number of blocks and modes in each."""
     m = len(equations.omega2)
     coupled = np.abs(equations.C - np.diag(np.diag(equations.C))).any()
     return (1, m) if coupled else (m, 1)
 
 
-def flow(equations: Equations, tau: float, doublings: int) -> Flow:
+def flow(equations: MotionEquations, tau: float, doublings: int) -> BodyFlow:
     """Flows over tau (s) and its doublings: of what they add, as what is added in the shortest of steps would be lost
     in the last digits of 1."""
     b, p = blocks(equations)
@@ -60,7 +60,7 @@ def flow(equations: Equations, tau: float, doublings: int) -> Flow:
         found.append((grown, *works))
     moves, S, L = (np.array(x) for x in zip(*found, strict=True))
     stack = np.concatenate([(one + moves)[:, :, : 2 * p], S, L], axis=2).transpose(0, 2, 3, 1)
-    return Flow(np.ascontiguousarray(stack), equations.turned(length), length)
+    return BodyFlow(np.ascontiguousarray(stack), equations.turned(length), length)
 
 
 def flown(A: Any, y: Any, o: Any) -> Any:
@@ -77,7 +77,7 @@ def worked(A: Any, y: Any, o: Any) -> tuple[Any, Any]:
     return after[:n].T, (z * after[n:].reshape(2, *z.shape)).sum(axis=1)
 
 
-def _one_step(e: Equations, tau: float, b: int, p: int) -> tuple[Array, ...]:
+def _one_step(e: MotionEquations, tau: float, b: int, p: int) -> tuple[Array, ...]:
     """(b, s, s) what (q_b, v_b, o) grow by in one step, and both quadratic forms of it, of all blocks together."""
     s, q, v, o = 2 * p + e.turning.shape[0], slice(p), slice(p, 2 * p), slice(2 * p, None)
     at = np.arange(b * p).reshape(b, p)

@@ -20,8 +20,8 @@ from typing import Any, NamedTuple
 import jax
 import jax.numpy as jnp
 
-from .bodies import Bodies, Now, Options, exponent
-from .contacts import Group, Held, joined, times, told
+from .bodies import Bodies, MotionState, Options, exponent
+from .contacts import ContactGroup, Held, joined, times, told
 from .flow import flown, worked
 from .spots import by_modes, to_modes
 
@@ -42,7 +42,7 @@ SLOW = 0.03
 """Over the fastest frequency, s: laws that follow the motion more quickly would make steps too short."""
 
 
-class Answer(NamedTuple):
+class StageForces(NamedTuple):
     """push: (b, p) accelerations. Group by group forces: (c n, 3) N, rates: (k, n) of what is remembered, places and
     speeds: (c n, 3) m and m/s of the points."""
 
@@ -53,7 +53,7 @@ class Answer(NamedTuple):
     speeds: tuple[Any, ...]
 
 
-class Bent(NamedTuple):
+class Bending(NamedTuple):
     """bent: (b, p) second differences of the accelerations in the last step, m/s4, slope: how they change, m/s5; h: s,
     that step. curl: how they change otherwise, m/s6."""
 
@@ -63,7 +63,7 @@ class Bent(NamedTuple):
     curl: Any
 
 
-def begun(groups: tuple[Group, ...], B: Bodies, now: Now) -> Now:
+def begun(groups: tuple[ContactGroup, ...], B: Bodies, now: MotionState) -> MotionState:
     """With what the contacts remember, and their forces by that."""
     x = tuple(
         g.law.memory(f, s).reshape(g.law.remembers, len(f)) if g.law.remembers else jnp.zeros((0, len(f)))
@@ -71,17 +71,17 @@ def begun(groups: tuple[Group, ...], B: Bodies, now: Now) -> Now:
     )
     first = _answer(groups, B, now.y, now.o, x, now.time)
     held = now.held._replace(forces=first.forces)
-    straight = Bent(0 * first.push, 0 * first.push, jnp.zeros(()), jnp.zeros(()))
+    straight = Bending(0 * first.push, 0 * first.push, jnp.zeros(()), jnp.zeros(()))
     return now._replace(push=first.push, held=held, memory=(x, first.rates, straight), level=jnp.full(2, 1, int))
 
 
-def leapt(now: Now) -> Now:
+def leapt(now: MotionState) -> MotionState:
     """After a leap: contacts that were open all along remember nothing, and what comes is met as it was last time."""
     nothing = jax.tree_util.tree_map(jnp.zeros_like, now.memory)
     return now._replace(memory=nothing, level=jnp.broadcast_to(now.level[1], 2))
 
 
-def _answer(groups: tuple[Group, ...], B: Bodies, y: Any, o: Any, x: tuple[Any, ...], time: Any) -> Answer:
+def _answer(groups: tuple[ContactGroup, ...], B: Bodies, y: Any, o: Any, x: tuple[Any, ...], time: Any) -> StageForces:
     """What contacts say where the bodies are, (b, 2 p)."""
     q, v = (part.reshape(-1) for part in jnp.split(y, 2, axis=1))
     moves, push, found = times(B.rate, o), B.preload, []
@@ -90,10 +90,12 @@ def _answer(groups: tuple[Group, ...], B: Bodies, y: Any, o: Any, x: tuple[Any, 
         force, rate = g.law.rates(u.T, w.T, own, time, B.flow.length[0])
         push -= to_modes(spots, force)
         found.append((force, rate, u.T, w.T))
-    return Answer(push.reshape(B.omega2.shape), *zip(*found, strict=True))
+    return StageForces(push.reshape(B.omega2.shape), *zip(*found, strict=True))
 
 
-def step(options: Options, groups: tuple[Group, ...], B: Bodies, k: Any, now: Now) -> tuple[Any, Now]:
+def step(
+    options: Options, groups: tuple[ContactGroup, ...], B: Bodies, k: Any, now: MotionState
+) -> tuple[Any, MotionState]:
     """Whether 2^k steps were done, and where the motion is then; where they were not, what is to be tried."""
     p, h, half = B.omega2.shape[1], B.flow.length[k], B.flow.length[k - 1]
     x, rates, _ = now.memory
@@ -143,14 +145,14 @@ def _norm(x: Any) -> Any:
     return jnp.sqrt(jnp.sum(x**2))
 
 
-def _missed(h: Any, now: Now, middle: Any, four: Any, five: Any) -> tuple[Bent, Any, Any]:
+def _missed(h: Any, now: MotionState, middle: Any, four: Any, five: Any) -> tuple[Bending, Any, Any]:
     """How N is bent in a step; what the step misses of velocities by third order, and by a kink."""
     before, between = now.memory[2], 0.5 * (h + now.memory[2].h)
     bent = (now.push - middle + five) / h**2
     as_before = [0.0, before.bent, before.bent + between * before.slope]
     odd = jnp.min(jnp.stack([_norm(bent - expected) for expected in as_before]))
     kink = h**3 / 3 * jnp.maximum(odd - 2 * before.curl * between**2, odd / SMOOTH)
-    return Bent(bent, (bent - before.bent) / between, h, odd / between**2), h / 6 * _norm(four - five), kink
+    return Bending(bent, (bent - before.bent) / between, h, odd / between**2), h / 6 * _norm(four - five), kink
 
 
 def _judged(options: Options, k: Any, level: Any, missed: Any, enough: Any) -> tuple[Any, Any]:
@@ -174,7 +176,9 @@ def _gone(stack: Any, y: Any, oscillators: tuple[Any, Any], kicks: tuple[Any, An
     return y, jnp.concatenate([works, work[None]]).sum(axis=1)
 
 
-def _held(options: Options, groups: tuple[Group, ...], h: Any, now: Now, last: Answer, x: tuple[Any, ...]) -> Held:
+def _held(
+    options: Options, groups: tuple[ContactGroup, ...], h: Any, now: MotionState, last: StageForces, x: tuple[Any, ...]
+) -> Held:
     """What contacts hold: their state as their law's own step tells it, with the memory that was integrated; of their
     coordinates see `at_sample`."""
     states = list[Any]()
@@ -184,7 +188,7 @@ def _held(options: Options, groups: tuple[Group, ...], h: Any, now: Now, last: A
     return told(groups, last.places, h, now.held, options.accounts, tuple(states), last.forces)
 
 
-def at_sample(groups: tuple[Group, ...], B: Bodies, now: Now) -> Held:
+def at_sample(groups: tuple[ContactGroup, ...], B: Bodies, now: MotionState) -> Held:
     """With what contacts hold in their coordinates, which no step asks for."""
     q, _ = jnp.split(now.y, 2, axis=1)
     d = times(B.D, q.reshape(-1)) + times(B.D_o, now.o)

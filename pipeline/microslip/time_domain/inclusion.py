@@ -84,7 +84,7 @@ def within(x: Any, pressed: Any, mu: Any) -> Any:
     return jnp.concatenate([normal[:, None], kept[:, None] * x[:, 1:]], axis=1)
 
 
-class Asked(NamedTuple):
+class InclusionStep(NamedTuple):
     """What a step asks of points. M, mu, pressed: see `solve`. reach: (p, 3) m, w_0, and 0 of points that do not meet.
     meet: (p, 3), 1 of those that do."""
 
@@ -163,6 +163,6 @@ def solve(M: Meets, w_0: Any, mu: Any, pressed: Any, first: Any) -> tuple[Any, A
             the sliding way (p,). pressed: see `within`. first: (p, 3) N to begin with.
     """
     meets = jnp.isfinite(w_0[:, :1]) * jnp.ones(3)
-    asked = Asked(M, jnp.where(jnp.isfinite(w_0), w_0, 0.0), meets, mu, pressed)
+    asked = InclusionStep(M, jnp.where(jnp.isfinite(w_0), w_0, 0.0), meets, mu, pressed)
     f = asked.found(meets * first)
     return f, asked.motion(f), jnp.abs(ratio(asked.residual(f), M.r)).max(initial=0.0)

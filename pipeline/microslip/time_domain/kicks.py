@@ -10,13 +10,13 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 
-from .bodies import Bodies, Now, Options, by_force, exponent
+from .bodies import Bodies, MotionState, Options, by_force, exponent
 from .braking import slowed
-from .contacts import Group, Held, answer, force_at, rigid_answer, times
+from .contacts import ContactGroup, Held, answer, force_at, rigid_answer, times
 from .flow import flown, worked
 
 
-def step(options: Options, groups: tuple[Group, ...], B: Bodies, n: Any, now: Now) -> Now:
+def step(options: Options, groups: tuple[ContactGroup, ...], B: Bodies, n: Any, now: MotionState) -> MotionState:
     """n steps, of which more than one only where no contact is met in them."""
     p = B.omega2.shape[1]
     dt = B.flow.length[0] * n
@@ -53,7 +53,7 @@ def _flown(options: Options, B: Bodies, n: Any, y: Any, o: Any) -> tuple[Any, An
     return (jax.lax.while_loop(lambda c: c[0] > 0, on, first) if options.leaps else on(first))[1:]
 
 
-def _driven(options: Options, B: Bodies, now: Now, o: Any, dt: Any) -> tuple[Any, Any]:
+def _driven(options: Options, B: Bodies, now: MotionState, o: Any, dt: Any) -> tuple[Any, Any]:
     """(n,) o after a step, and o' there, where o turns or, in a run-up, is driven."""
     if options.ramp is None:
         return o, times(B.rate, o)
@@ -63,9 +63,18 @@ def _driven(options: Options, B: Bodies, now: Now, o: Any, dt: Any) -> tuple[Any
 
 
 def answered(
-    options: Options, groups: tuple[Group, ...], B: Bodies, q: Any, v_free: Any, half: Any, o: Any, moves: Any, dt: Any,
-    held: Held, share: float = 1.0,
-) -> tuple[Held, Any]:  # fmt: skip
+    options: Options,
+    groups: tuple[ContactGroup, ...],
+    B: Bodies,
+    q: Any,
+    v_free: Any,
+    half: Any,
+    o: Any,
+    moves: Any,
+    dt: Any,
+    held: Held,
+    share: float = 1.0,
+) -> tuple[Held, Any]:
     """What contacts hold where the bodies are, and (b, p) their accelerations of the modes.
 
     Args:

@@ -15,8 +15,8 @@ import jax.numpy as jnp
 
 from ..programs import inner, program
 from . import fourth, kicks
-from .bodies import Bodies, Hardest, Listed, Now, Options, Seen, exponent
-from .contacts import Group, Held, moved, parts, times, untouched
+from .bodies import Bodies, Hardest, Listed, MotionState, Options, Sample, exponent
+from .contacts import ContactGroup, Held, moved, parts, times, untouched
 
 LEAST = 4
 """Shortest steps that are leapt over at once; nearer to a contact they are gone one by one."""
@@ -29,7 +29,9 @@ ROUNDING = 1e-6
 
 
 @partial(inner, static_argnums=0)
-def begun(options: Options, groups: tuple[Group, ...], B: Bodies, y: Any, o: Any, held: Held | None) -> Now:
+def begun(
+    options: Options, groups: tuple[ContactGroup, ...], B: Bodies, y: Any, o: Any, held: Held | None
+) -> MotionState:
     """At time 0, bodies at y (b, 2 p), the contacts there from what they held, or never touched before."""
     q, v = jnp.split(y, 2, axis=1)
     dt, moves = B.flow.length[0], times(B.rate, o)
@@ -37,7 +39,7 @@ def begun(options: Options, groups: tuple[Group, ...], B: Bodies, y: Any, o: Any
     held, push = kicks.answered(options, groups, B, q, v, 0 * v, o, moves, dt, before, 0.5)
     zero, none = jnp.zeros(()), jnp.zeros((4, sum(len(g.G) for g in groups)))
     energy = jnp.zeros(6).at[4].set(held.stored)
-    now = Now(y, o, zero, push, held, energy, held.missed, none.astype(bool), none, (), jnp.zeros(2, int), zero)
+    now = MotionState(y, o, zero, push, held, energy, held.missed, none.astype(bool), none, (), jnp.zeros(2, int), zero)
     return typed(fourth.begun(groups, B, now) if options.halvings else now)
 
 
@@ -49,9 +51,16 @@ def typed(traced: Any) -> Any:
 
 @partial(program, static_argnums=(0, 1))
 def run(
-    options: Options, events: int, groups: tuple[Group, ...], B: Bodies, now: Now, each: Any, s: Any, rows: Any,
+    options: Options,
+    events: int,
+    groups: tuple[ContactGroup, ...],
+    B: Bodies,
+    now: MotionState,
+    each: Any,
+    s: Any,
+    rows: Any,
     steps: Any,
-) -> tuple[Now, Listed, Seen, Any, Hardest]:  # fmt: skip
+) -> tuple[MotionState, Listed, Sample, Any, Hardest]:
     """Rows of so many steps each, of which each (room,) is a sample, the first again after the last of s; as many as
     are asked for, or until numbers are infinite.
 
@@ -70,10 +79,10 @@ def run(
         left, now = jax.lax.while_loop(lambda c: (c[0] > 0) & ~c[1].met.any(), lambda c: step(*c), (left, now))
         return left, now._replace(met=jnp.zeros_like(now.met)), _noted(now, listed)
 
-    def look(now: Now) -> Seen:
+    def look(now: MotionState) -> Sample:
         q, v = now.y[:, :p], now.y[:, p:]
         bodies = 0.5 * jnp.sum(v**2 + B.omega2 * q**2)
-        return Seen(q.reshape(-1), v.reshape(-1), now.held.d, now.held.force, now.energy, bodies, now.time)
+        return Sample(q.reshape(-1), v.reshape(-1), now.held.d, now.held.force, now.energy, bodies, now.time)
 
     def row(carried: tuple) -> tuple:
         i, steps, _, now, listed, seen, hardest = carried
@@ -104,7 +113,9 @@ def oscillators(options: Options, B: Bodies, time: Any) -> Any:
     return jnp.concatenate([jnp.ones(1), jnp.stack([jnp.cos(angle), jnp.sin(angle)], axis=1).reshape(-1)])
 
 
-def one_step(options: Options, groups: tuple[Group, ...], B: Bodies, left: Any, now: Now) -> tuple[Any, Now]:
+def one_step(
+    options: Options, groups: tuple[ContactGroup, ...], B: Bodies, left: Any, now: MotionState
+) -> tuple[Any, MotionState]:
     """A step, or a leap over as many as no contact is met in, of those that are left; and what is left then."""
     free = _free(groups, B, now) if options.leaps else jnp.zeros((), int)
     far = jnp.clip(free, 1, left)
@@ -112,10 +123,10 @@ def one_step(options: Options, groups: tuple[Group, ...], B: Bodies, left: Any, 
         return left - far, _told(B, far, now, kicks.step(options, groups, B, far, now))
     near = jnp.minimum(now.level[0], exponent(left))
 
-    def leap(now: Now) -> tuple[Any, Now]:
+    def leap(now: MotionState) -> tuple[Any, MotionState]:
         return far, _told(B, far, now, fourth.leapt(kicks.step(options, groups, B, far, now)))
 
-    def step(now: Now) -> tuple[Any, Now]:
+    def step(now: MotionState) -> tuple[Any, MotionState]:
         done, after = fourth.step(options, groups, B, near, now)
         return jnp.where(done, 1 << near, 0), _told(B, 1 << near, now, after, done)
 
@@ -123,7 +134,7 @@ def one_step(options: Options, groups: tuple[Group, ...], B: Bodies, left: Any, 
     return left - done, after
 
 
-def _free(groups: tuple[Group, ...], B: Bodies, now: Now) -> Any:
+def _free(groups: tuple[ContactGroup, ...], B: Bodies, now: MotionState) -> Any:
     """Steps in which no point of contact can close its gap: an even number, of `DIGITS` binary digits."""
     p = B.omega2.shape[1]
     z = now.y - times(B.steady, now.o)
@@ -152,13 +163,13 @@ def _unmet(overlap: Any, u: Any, w: Any, fastest: Any, bent: Any) -> Any:
     return jnp.where((past <= 0) & (deep <= 0), jnp.maximum(ahead, sure), sure)
 
 
-def _told(B: Bodies, n: Any, now: Now, after: Now, done: Any = True) -> Now:
+def _told(B: Bodies, n: Any, now: MotionState, after: MotionState, done: Any = True) -> MotionState:
     """With the events of n short steps, if they were done."""
     met, at = _met(now, after.held, B.flow.length[0] * n)
     return typed(after._replace(met=met & done, at=at))
 
 
-def _met(before: Now, held: Held, dt: Any) -> tuple[Any, Any]:
+def _met(before: MotionState, held: Held, dt: Any) -> tuple[Any, Any]:
     """(4, contacts) events of a step and when: where the deepest point of a contact passes zero; where sliding begins
     and ends in it."""
     a, b = before.held.approach, held.approach
@@ -168,7 +179,7 @@ def _met(before: Now, held: Held, dt: Any) -> tuple[Any, Any]:
     return jnp.stack(met), before.time + dt * jnp.stack([share, share, half, half])
 
 
-def _noted(now: Now, listed: Listed) -> Listed:
+def _noted(now: MotionState, listed: Listed) -> Listed:
     kind, contact = jnp.meshgrid(jnp.arange(4.0), jnp.arange(1.0 * now.met.shape[1]), indexing="ij")
     place = listed.count + jnp.cumsum(now.met.reshape(-1)).reshape(now.met.shape) - 1
     rows = jnp.stack([now.at, contact, kind], axis=-1)

@@ -20,10 +20,10 @@ from ..errors import UserError
 from ..interrupts import look
 from ..programs import program
 from . import classification, loop
-from .bodies import Bodies, Now, Options
+from .bodies import Bodies, MotionState, Options
 from .classification import Exponent
-from .contacts import Group
-from .equations import Equations
+from .contacts import ContactGroup
+from .equations import MotionEquations
 from .orbit import REPEATS, comes_back, refuse_behind, steps_of_a_sample
 from .stepper import Stepper
 
@@ -41,7 +41,7 @@ class Reached:
             they were asked for; nan where a motion ceases to be finite.
     """
 
-    equations: Equations
+    equations: MotionEquations
     steps: int
     q: Array
     v: Array
@@ -110,7 +110,13 @@ class Reached:
 
 
 def run(
-    e: Equations, x: Array, x_dot: Array, settle: int, keep: int, steps: int | None = None, exponents: bool = False
+    e: MotionEquations,
+    x: Array,
+    x_dot: Array,
+    settle: int,
+    keep: int,
+    steps: int | None = None,
+    exponents: bool = False,
 ) -> Reached:
     """What starts (n, m0) of the assembly's coordinates lead to; contacts come there on a straight way from u = 0.
 
@@ -139,7 +145,7 @@ def run(
     shape = (len(x), stepper.bodies.omega2.shape[0], -1)
     y = np.concatenate([(x @ to_modes.T).reshape(shape), (x_dot @ to_modes.T).reshape(shape)], axis=2)
     counts = np.array([settle * each, each]) * 2**stepper.options.halvings
-    ends, closes, last = np.zeros((len(x), keep, *y.shape[1:])), np.zeros(len(x), int), list[Now]()
+    ends, closes, last = np.zeros((len(x), keep, *y.shape[1:])), np.zeros(len(x), int), list[MotionState]()
     for i, start in enumerate(y):
         look()
         o = e.oscillators(0.0)
@@ -150,7 +156,9 @@ def run(
     return replace(reached, exponents=_exponents(stepper, last, reached.size, each, periods)) if periods else reached
 
 
-def _exponents(stepper: Stepper, last: Sequence[Now], size: float, each: int, periods: int) -> tuple[Exponent, ...]:
+def _exponents(
+    stepper: Stepper, last: Sequence[MotionState], size: float, each: int, periods: int
+) -> tuple[Exponent, ...]:
     """Of the motions that go on from where they are, `last`."""
     if told := classification.whole(last[0].held.states):
         raise UserError(f"exponents: {told}")
@@ -172,13 +180,13 @@ def _exponents(stepper: Stepper, last: Sequence[Now], size: float, each: int, pe
 
 @partial(program, static_argnums=(0, 1))
 def _one(
-    options: Options, keep: int, groups: tuple[Group, ...], B: Bodies, y: Any, o: Any, counts: Any
-) -> tuple[Any, Any, Now]:
+    options: Options, keep: int, groups: tuple[ContactGroup, ...], B: Bodies, y: Any, o: Any, counts: Any
+) -> tuple[Any, Any, MotionState]:
     """(keep, b, 2 p) after every period that is kept, how many impacts were in them, and where the motion is then."""
     on = partial(_further, options, groups, B)
     now, _ = on(loop.begun(options, groups, B, y, o, None), counts[0])
 
-    def period(now: Now, _: None) -> tuple[Now, tuple[Any, Any]]:
+    def period(now: MotionState, _: None) -> tuple[MotionState, tuple[Any, Any]]:
         now, closes = on(now, counts[1])
         return now, (now.y, closes)
 
@@ -186,7 +194,9 @@ def _one(
     return ends, jnp.sum(closes), now
 
 
-def _further(options: Options, groups: tuple[Group, ...], B: Bodies, now: Now, count: Any) -> tuple[Now, Any]:
+def _further(
+    options: Options, groups: tuple[ContactGroup, ...], B: Bodies, now: MotionState, count: Any
+) -> tuple[MotionState, Any]:
     """So many steps, and the impacts in them; o is there again what it was, so that rounding does not add up."""
 
     def step(carried: tuple) -> tuple:
@@ -200,12 +210,19 @@ def _further(options: Options, groups: tuple[Group, ...], B: Bodies, now: Now, c
 
 @partial(program, static_argnums=(0, 1))
 def _grown(
-    options: Options, periods: int, groups: tuple[Group, ...], B: Bodies, last: Now, count: Any, scale: Any, way: Any
+    options: Options,
+    periods: int,
+    groups: tuple[ContactGroup, ...],
+    B: Bodies,
+    last: MotionState,
+    count: Any,
+    scale: Any,
+    way: Any,
 ) -> Any:
     """(periods,) logarithms by which a separation grows in each, brought back to its size after every one."""
     apart = jnp.linalg.norm(scale * way)
 
-    def period(carried: tuple[Now, Now], _: None) -> tuple[tuple[Now, Now], Any]:
+    def period(carried: tuple[MotionState, MotionState], _: None) -> tuple[tuple[MotionState, MotionState], Any]:
         now, other = (_further(options, groups, B, one, count)[0] for one in carried)
         size = jnp.linalg.norm(scale * (other.y - now.y))
         other = loop.typed(classification.between(now, other, apart / size, jnp.asarray))

@@ -17,7 +17,7 @@ from ..interrupts import look
 from ..system.assembly import Assembly
 from . import equations, orbit, starts
 from . import samples as kept_samples
-from .bodies import Now, Seen
+from .bodies import MotionState, Sample
 from .contacts import untouched
 from .stepper import KINDS, Stepper
 
@@ -58,13 +58,13 @@ ends of the bistable motion of the tests."""
 
 
 @dataclass(frozen=True, eq=False)
-class Settled:
+class SettledMotion:
     """What a motion is at a frequency when it has been left to itself.
 
     Attributes:
         frequency: Hz. amplitude: 0-peak of the first harmonic of the first read-out over `KEPT` periods, in its unit.
             swing: half of what it spans in the wildest of them, and least: in the calmest. opens: whether a contact
-            does. end: where it is after whole periods: (b, 2 p) as `Now.y`, then all that contacts
+            does. end: where it is after whole periods: (b, 2 p) as `MotionState.y`, then all that contacts
             hold.
     """
 
@@ -84,11 +84,11 @@ class Settled:
         """Whether another amplitude is its own, to a share of the larger one."""
         return abs(self.amplitude - amplitude) <= within * max(self.amplitude, amplitude)
 
-    def distance(self, other: Settled) -> float:
+    def distance(self, other: SettledMotion) -> float:
         """Of amplitudes; infinite where one of them is no number."""
         return float(np.nan_to_num(abs(self.amplitude - other.amplitude), nan=np.inf))
 
-    def jumps_to(self, after: Settled) -> bool:
+    def jumps_to(self, after: SettledMotion) -> bool:
         """Whether the motion is lost in a step: amplitude and swings are other ones."""
         apart = after.swing < self.least or self.swing < after.least
         return not after.like(self.amplitude, LOST) and (apart or not np.isfinite(after.swing))
@@ -104,13 +104,13 @@ class _Clock:
     def __init__(self, stepper: Stepper, patience: float) -> None:
         self.stepper, self.left = stepper, patience
 
-    def advanced(self, now: Now, steps: Array, periods: int) -> tuple[Now, Seen, Array]:
+    def advanced(self, now: MotionState, steps: Array, periods: int) -> tuple[MotionState, Sample, Array]:
         """As `Stepper.advanced` over some periods, in portions that take about `PORTION` each.
 
         Raises:
             TimeIsOver: before the last of them.
         """
-        samples, listed, done, ahead = list[Seen](), list[Array](), 0, 1
+        samples, listed, done, ahead = list[Sample](), list[Array](), 0, 1
         each = 1 if len(steps) == SAMPLES else SAMPLES  # rows of a period
         while done < periods:
             if self.left <= 0:
@@ -127,7 +127,7 @@ class _Clock:
                 break
             longer = int(np.clip(PORTION / max(took, 1e-6) * ahead, 1, orbit.FURTHER * ahead))
             ahead = min(longer, periods - done)
-        joined = Seen(*(np.concatenate(parts) for parts in zip(*samples, strict=True)))
+        joined = Sample(*(np.concatenate(parts) for parts in zip(*samples, strict=True)))
         return now, joined, np.concatenate(listed)
 
 
@@ -135,11 +135,11 @@ def settled(
     assembly: Assembly,
     frequency: float,
     most: int,
-    begin: Settled | None = None,
-    balance: Callable[[equations.Equations], starts.Periodic] | None = None,
+    begin: SettledMotion | None = None,
+    balance: Callable[[equations.MotionEquations], starts.PeriodicStart] | None = None,
     known: Sequence[float] = (),
     patience: float = math.inf,
-) -> Settled:
+) -> SettledMotion:
     """The motion at a frequency (Hz), looked at until it does not change any more or `most` periods are over.
 
     Args:
@@ -164,7 +164,7 @@ def settled(
         y = kept_samples.read(e, seen)[0]
         end = [np.asarray(x) for x in (now.y, *jax.tree_util.tree_leaves(now.held))]
         if len(y) < len(turning) or not np.isfinite(seen.mechanical[-1]):
-            return Settled(frequency, np.nan, np.nan, np.nan, True, end)
+            return SettledMotion(frequency, np.nan, np.nan, np.nan, True, end)
         spans = 0.5 * np.ptp(y.reshape(KEPT, SAMPLES), axis=1)
         amplitude, before, varies = float(abs(np.mean(turning * y))), varies, float(np.ptp(spans))
         spread = varies / max(spans.max(), 1e-300)
@@ -174,10 +174,10 @@ def settled(
             break
         known[-1] = amplitude
     opens = bool((events[:, 2] == KINDS.index("opens")).any())
-    return Settled(frequency, amplitude, float(spans.max()), float(spans.min()), opens, end)
+    return SettledMotion(frequency, amplitude, float(spans.max()), float(spans.min()), opens, end)
 
 
-def _begun(stepper: Stepper, begin: Settled | None, balance: starts.Periodic | None) -> Now:
+def _begun(stepper: Stepper, begin: SettledMotion | None, balance: starts.PeriodicStart | None) -> MotionState:
     """At rest, where a motion ended, or on a periodic one, a little on the way to where the other
     ended."""
     if balance is not None:

@@ -23,11 +23,11 @@ from ..errors import UserError
 from ..harmonic_balance.forces import repeated
 from ..programs import program
 from . import fourth, loop
-from .bodies import Bodies, Hardest, Now, Options, Seen
+from .bodies import Bodies, Hardest, MotionState, Options, Sample
 from .braking import Braking
-from .contacts import Group, Held, Yielding, force_at, gapes, slope_at, untouched
-from .equations import Equations
-from .flow import Flow, blocks, flow
+from .contacts import ContactGroup, Held, Yielding, force_at, gapes, slope_at, untouched
+from .equations import MotionEquations
+from .flow import BodyFlow, blocks, flow
 from .ground import moving
 from .inclusion import Meets, meets
 from .spots import Spots, spots
@@ -53,13 +53,13 @@ class Stepper:
             order: of its steps, 2 or 4; of 4 only where every law says how its force changes in time.
     """
 
-    equations: Equations
+    equations: MotionEquations
     tau: float
     accounts: bool = True
     order: int = 4
 
     @cached_property
-    def groups(self) -> tuple[Group, ...]:
+    def groups(self) -> tuple[ContactGroup, ...]:
         contacts, found = self.equations.contacts, []
         for same in self.same:
             patch = contacts[same[0]].patch
@@ -68,7 +68,7 @@ class Stepper:
             if (ground := contacts[same[0]].ground) is not None:
                 law = moving(law, ground, np.tile(patch.points, (len(same), 1)))
             G = np.broadcast_to(patch.kinematics, (len(same), *patch.kinematics.shape))
-            found.append(Group(law, G, offset))
+            found.append(ContactGroup(law, G, offset))
         return _sent(tuple(found))
 
     @cached_property
@@ -108,7 +108,7 @@ class Stepper:
         fine = replace(self, tau=self.tau / 2)
         for name in ("groups", "same", "rows", "numbers", "options", "_fixed"):
             fine.__dict__[name] = getattr(self, name)
-        fine.__dict__["_flow"] = Flow(*(x[:-1] for x in self._flows))
+        fine.__dict__["_flow"] = BodyFlow(*(x[:-1] for x in self._flows))
         return fine
 
     @cached_property
@@ -118,11 +118,11 @@ class Stepper:
         return _sent(fixed._replace(flow=self._flow, meets=meets, braking=self._braking, enough=enough))
 
     @cached_property
-    def _flow(self) -> Flow:
-        return Flow(*(x[1:] for x in self._flows))
+    def _flow(self) -> BodyFlow:
+        return BodyFlow(*(x[1:] for x in self._flows))
 
     @cached_property
-    def _flows(self) -> Flow:
+    def _flows(self) -> BodyFlow:
         """Those of half the step too, the shortest first."""
         e, shorter = self.equations, self.options.halvings + 1
         doublings = shorter
@@ -170,7 +170,7 @@ class Stepper:
         ends = np.cumsum([g.G.shape[0] * g.G.shape[1] for g in self.groups])[:-1]
         return Braking(0.5 * self.tau * D @ D.T, tuple(np.split(most, ends)))
 
-    def _meets(self, flows: Flow) -> Meets | None:
+    def _meets(self, flows: BodyFlow) -> Meets | None:
         """Of set-valued points, see `inclusion`.
 
         Raises:
@@ -223,7 +223,7 @@ class Stepper:
         spots = np.concatenate([np.zeros((0, 3, len(e.D))), *(G for G, _ in self._spots)])
         return spots @ e.D[self.rows], spots @ e.D_o[self.rows]
 
-    def start(self, q: Array, v: Array, held: Held | None = None) -> Now:
+    def start(self, q: Array, v: Array, held: Held | None = None) -> MotionState:
         """At time 0, at rest or moving, from modal coordinates (m,) and velocities; contacts come there on a straight
         way from what they held, from u = 0 if it is not given."""
         e = self.equations
@@ -232,14 +232,14 @@ class Stepper:
         return loop.begun(self.options, self.groups, self.bodies, y, e.oscillators(0.0), held)
 
     def run(
-        self, now: Now, steps: Array, rows: int | None = None, events: int = EVENTS
-    ) -> tuple[Now, Seen, Array, int]:
+        self, now: MotionState, steps: Array, rows: int | None = None, events: int = EVENTS
+    ) -> tuple[MotionState, Sample, Array, int]:
         """`advanced`, without its hardest row."""
         return self.advanced(now, steps, rows, events)[:4]
 
     def advanced(
-        self, now: Now, steps: Array, rows: int | None = None, events: int = EVENTS
-    ) -> tuple[Now, Seen, Array, int, Hardest]:
+        self, now: MotionState, steps: Array, rows: int | None = None, events: int = EVENTS
+    ) -> tuple[MotionState, Sample, Array, int, Hardest]:
         """So many rows further, all samples if it is not said, the i-th after steps[i modulo s] of tau, (s,); compiled
         anew for another power of two above s alone. It ends early where numbers become infinite, in the last sample
         then.
@@ -260,7 +260,7 @@ class Stepper:
         told = np.array(np.asarray(listed.rows)[: min(count, events)])
         told[:, 1] = self.numbers[told[:, 1].astype(int)] if len(told) else 0
         last = np.arange(max(int(i) - s, 0), int(i)) % s
-        seen = Seen._make(np.asarray(x)[last] for x in seen)
+        seen = Sample._make(np.asarray(x)[last] for x in seen)
         return now, seen._replace(d=seen.d[:, back], force=seen.force[:, back]), told, count, hardest
 
 

@@ -19,7 +19,7 @@ from ..harmonic_balance.solver import CONVERGED, Point
 from ..results import Journal
 from ..results.names import exact
 from . import starts
-from .stepped import Settled, TimeIsOver, settled
+from .stepped import SettledMotion, TimeIsOver, settled
 
 FEWEST, MOST = 300, 800
 """Periods at most that a motion is left to itself at a frequency, with much and with little
@@ -53,18 +53,20 @@ SAME = 0.05
 frequency. Half and twice of it give the quick tests the same answers."""
 
 
-class Motions(NamedTuple):
+class SweptMotions(NamedTuple):
     """Swept upwards and downwards, in that order, and each from rest; the way and the frequency
     (Hz) before which the time was over, None: it was enough; spent: s of it."""
 
-    up: Sequence[Settled] = ()
-    down: Sequence[Settled] = ()
-    rest: Sequence[Settled] = ()
+    up: Sequence[SettledMotion] = ()
+    down: Sequence[SettledMotion] = ()
+    rest: Sequence[SettledMotion] = ()
     cut: tuple[str, float] | None = None
     spent: float = 0.0
 
 
-def on_two_motions(up: Sequence[Settled], down: Sequence[Settled]) -> list[tuple[Settled, Settled]]:
+def on_two_motions(
+    up: Sequence[SettledMotion], down: Sequence[SettledMotion]
+) -> list[tuple[SettledMotion, SettledMotion]]:
     """The lower and the higher motion where two sweeps are on different ones, by frequency."""
     known = {m.frequency: m for m in up}
     pairs = [(known[m.frequency], m) for m in down if m.frequency in known]
@@ -73,7 +75,7 @@ def on_two_motions(up: Sequence[Settled], down: Sequence[Settled]) -> list[tuple
     return sorted(found, key=lambda pair: pair[0].frequency)
 
 
-def nearer(m: Settled, low: Settled, high: Settled) -> bool:
+def nearer(m: SettledMotion, low: SettledMotion, high: SettledMotion) -> bool:
     """Whether a motion is the higher one of two."""
     return abs(m.amplitude - high.amplitude) < abs(m.amplitude - low.amplitude)
 
@@ -123,7 +125,7 @@ class Sweeps:
         }
         self.seen = {f: [amplitude] for f, (_, amplitude) in self.balanced.items()}
 
-    def motions(self) -> Motions:
+    def motions(self) -> SweptMotions:
         """All of them, or those for which the time was enough.
 
         Raises:
@@ -140,12 +142,12 @@ class Sweeps:
         further = [f for f in above if f > max(back)]
         up, _ = self._way(UP, [*back, *further], high, 1.0, down[-1:] if fell else [])
         rest = self._from_rest(on_two_motions(up, down))
-        return Motions(up, down, rest, self.cut, self.spent)
+        return SweptMotions(up, down, rest, self.cut, self.spent)
 
-    def _from_rest(self, two: Sequence[tuple[Settled, Settled]]) -> list[Settled]:
+    def _from_rest(self, two: Sequence[tuple[SettledMotion, SettledMotion]]) -> list[SettledMotion]:
         """Motions from rest where there are two, at some frequencies, and between those that lead
         to different ones."""
-        last, motions = len(two) - 1, dict[int, Settled]()
+        last, motions = len(two) - 1, dict[int, SettledMotion]()
         wanted = sorted({round(i * last / 3) for i in range(4)}) if two else []
         while wanted:
             for i in wanted:
@@ -159,8 +161,8 @@ class Sweeps:
         return [motions[i] for i in sorted(motions)]
 
     def _way(
-        self, way: str, frequency: Sequence[float], end: float, sign: float, motions: list[Settled]
-    ) -> tuple[list[Settled], bool]:
+        self, way: str, frequency: Sequence[float], end: float, sign: float, motions: list[SettledMotion]
+    ) -> tuple[list[SettledMotion], bool]:
         """A stepped sweep that goes on from motions, and whether it has come back to the harmonic
         balance's beyond an end of the gap (Hz), where it ends."""
         alike = 0
@@ -174,7 +176,7 @@ class Sweeps:
                 break
         return motions, alike == ALIKE
 
-    def _on(self, way: str, f: float, begin: Settled | None) -> list[Settled]:
+    def _on(self, way: str, f: float, begin: SettledMotion | None) -> list[SettledMotion]:
         """A step to a frequency (Hz). Where the motion is lost in it, the step is halved about the
         place: a sweep that is slow enough stays longer."""
         here = self._at(way, f, begin)
@@ -195,7 +197,7 @@ class Sweeps:
             steps[-1] = self._at(way, f, steps[-2]) or here
         return steps[1:]
 
-    def _at(self, way: str, f: float, begin: Settled | None = None) -> Settled | None:
+    def _at(self, way: str, f: float, begin: SettledMotion | None = None) -> SettledMotion | None:
         """The motion at a frequency (Hz), as it was kept or integrated now; None where the time is
         over that its way may take."""
         until = SHARES[way] * self.patience
@@ -218,11 +220,11 @@ class Sweeps:
         self.spent += row["took"]
         end = [np.asarray(row[f"end/{i}"]) for i in range(row["leaves"])]
         amplitude, swing, least = (row[name] for name in ("amplitude", "swing", "least"))
-        m = Settled(f, amplitude, swing, least, bool(row["opens"]), end)
+        m = SettledMotion(f, amplitude, swing, least, bool(row["opens"]), end)
         self.seen.setdefault(f, []).extend([] if m.irregular else [m.amplitude])
         return m
 
-    def _integrated(self, way: str, f: float, begin: Settled | None, left: float) -> dict:
+    def _integrated(self, way: str, f: float, begin: SettledMotion | None, left: float) -> dict:
         """What a journal keeps of a motion, with the CPU time (s) that it took beside compiling.
 
         Raises:
@@ -238,7 +240,7 @@ class Sweeps:
         numbers = {name: getattr(m, name) for name in ("amplitude", "swing", "least", "opens")}
         return numbers | end | {"leaves": len(end), "took": took}
 
-    def _leading(self, f: float, begin: Settled | None) -> Point | None:
+    def _leading(self, f: float, begin: SettledMotion | None) -> Point | None:
         """The solution of the harmonic balance to begin on: at the first frequency (Hz), and while
         the motion is its, on the same side of the gap."""
         if begin is None:
@@ -249,7 +251,7 @@ class Sweeps:
         leads = same_side and before is not None and begin.like(before[1], SAME)
         return self._balanced(f)[0] if leads else None
 
-    def _led(self, f: float, begin: Settled, here: Settled) -> bool:
+    def _led(self, f: float, begin: SettledMotion, here: SettledMotion) -> bool:
         """Whether a motion stays the harmonic balance's in a step to a frequency (Hz), however far
         its amplitude goes."""
         leads = self._leading(f, begin) is not None

@@ -49,9 +49,7 @@ def of_table(table: CreepTable) -> Creep:
     ) -> tuple[Array, Array, Array]:  # fmt: skip
         held, c, ratio = friction * force, jnp.sqrt(a * b), jnp.clip(a / b, least, most)
         p = strips.poses(xi, eta, phi, a, b, held, jnp.ones_like(a), shear, table.poisson, **table.how)
-        pull = jnp.stack([xi, p.eta * p.stiffness_y / p.stiffness_x, c * p.phi_x]) * p.stiffness_x * c**2 / held
-        three, signs = placed(pull, ratio, jnp)
-        at = [*three, jnp.log(ratio), jnp.log(p.stiffness_y / p.stiffness_x)]
+        at, signs = placed(p, ratio, jnp)
         weights = [
             cubic(axis, v, ridge if k == 0 else 0, jnp) for k, (axis, v) in enumerate(zip(axes, at, strict=True))
         ]

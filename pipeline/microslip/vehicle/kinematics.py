@@ -17,7 +17,7 @@ from ..files import store
 from ..results import Journal
 from ..rolling.wear import smoothed
 from ..rolling.wheelset import Pose, Side, Track, patches
-from .motion import Contacts
+from .motion import WheelContacts
 from .settings import KinematicsCase, track_of, worn_tracks
 from .wearing import (
     FIRST,
@@ -134,7 +134,7 @@ def _sound(k: Kinematics) -> None:
         raise UserError("is of less than a turn of the wheel; give one at the least")
 
 
-class Places:
+class ContactPlaces:
     """Equal angles of the wheel in each whole turn of a file, from its angle 0 on, and the contacts there; arrays
     (places, turns of the file).
 
@@ -168,11 +168,11 @@ class Places:
         return p.a, p.b, p.on_wheel, p.angle, p.normal_force, p.approach
 
     @cached_property
-    def new(self) -> Contacts:
+    def new(self) -> WheelContacts:
         """Of new wheels: read straight between lateral places, grown with the force."""
         a, b, on_wheel, incline, static, _ = (np.interp(self.y, self.lateral, v) for v in self.shape)
         grown = (self.force / static) ** (1 / 3)
-        return Contacts(self.xi, self.eta, self.phi, a * grown, b * grown, self.force, on_wheel, self.speed,
+        return WheelContacts(self.xi, self.eta, self.phi, a * grown, b * grown, self.force, on_wheel, self.speed,
                         self.force * np.cos(incline))  # fmt: skip
 
     def _own(self, tracks: Iterable[Track]) -> Array:
@@ -195,7 +195,7 @@ class Places:
         """m, see `wearing.deepest`."""
         return 0.5 * float(self.shape[-1].min())
 
-    def worn(self, tracks: Callable[[Array], Track], depth: Array) -> Contacts:
+    def worn(self, tracks: Callable[[Array], Track], depth: Array) -> WheelContacts:
         """On a wheel of which (places, n) m are worn: by how much each patch, under its own force and on the profile
         across that its place has, differs from that of a new wheel."""
         found, new, on = self._own(tracks(d) for d in depth), self._own_new, self.new
@@ -229,11 +229,11 @@ class Passed:
 
 
 @dataclass(frozen=True, eq=False)
-class Given:
+class GivenWheel:
     """A wheel whose running is given, which its wear changes by the profile alone. Attributes: places. tread. elastic:
     friction, shear, poisson. tracks: see `settings.worn_tracks`; None: as a new wheel."""
 
-    places: Places
+    places: ContactPlaces
     tread: Tread
     elastic: tuple[float, float, float]
     tracks: Callable[[Array], Track] | None
@@ -257,7 +257,7 @@ class Given:
             friction.append(float(self.tread.work(one, *self.elastic)[0]))
         return Passed(turns, depth, np.mean(taken, axis=0)[None], np.array(each), np.array([np.mean(friction)]))
 
-    def _contacts(self, depth: Array) -> Contacts:
+    def _contacts(self, depth: Array) -> WheelContacts:
         """Raises:
         LeavesTheRail: a groove that is deeper than half of the approach; where the wheel touches is not known.
         """
@@ -281,13 +281,13 @@ class Given:
         return now.friction
 
 
-def _turns(on: Contacts) -> list[Contacts]:
+def _turns(on: WheelContacts) -> list[WheelContacts]:
     """(places, 1) of each turn of a file."""
-    return [Contacts(*(c[:, n : n + 1] for c in on)) for n in range(on.xi.shape[1])]
+    return [WheelContacts(*(c[:, n : n + 1] for c in on)) for n in range(on.xi.shape[1])]
 
 
 @dataclass(frozen=True)
-class Recorded:
+class KinematicsAnswer:
     """Wear of a wheel by given kinematics, which it does not change.
 
     Attributes:
@@ -296,7 +296,7 @@ class Recorded:
     """
 
     case: KinematicsCase
-    wheel: Given
+    wheel: GivenWheel
     history: list[tuple[Passed, Jump]]
     ended: str
 
@@ -354,17 +354,17 @@ class Recorded:
 
 def recorded(
     case: KinematicsCase, folder: Path, report: Callable[[str], None] = lambda _: None, journal: Journal | None = None
-) -> Recorded:
+) -> KinematicsAnswer:
     """Wear of a case whose files stand in a folder.
 
     Args:
         journal: where finished jumps are kept, and known ones found.
 
     Raises:
-        UserError: see `read_kinematics` and `Places`.
+        UserError: see `read_kinematics` and `ContactPlaces`.
     """
     k, track, asked = read_kinematics(folder / case.kinematics.file), track_of(case, folder), case.kinematics
-    places, kept = Places(k, track, asked.side, asked.places), case.wear.profile == "kept"
+    places, kept = ContactPlaces(k, track, asked.side, asked.places), case.wear.profile == "kept"
     y = spread(places.new.on_wheel, float(places.new.b.max()))
     if not kept:  # a groove widens the contact
         more = int(np.ceil(places.new.b.max() / STRIP))
@@ -372,8 +372,8 @@ def recorded(
     way = 2 * np.pi * track.radius / asked.places
     t = Tread(y, way, case.wear.coefficient, case.model.model_dump(), (1,) if asked.side == "right" else (-1,))
     elastic = case.friction, track.elastic.shear, track.elastic.poisson
-    wheel = Given(places, t, elastic, None if kept else worn_tracks(track, y))
+    wheel = GivenWheel(places, t, elastic, None if kept else worn_tracks(track, y))
     first = asked.turns if kept else min(FIRST, asked.turns)
     report("wear by jumps over many turns")
     history, ended = worn(wheel, Passed.of, asked.turns, case.wear.tolerance, first, report, journal)
-    return Recorded(case, wheel, history, ended)
+    return KinematicsAnswer(case, wheel, history, ended)

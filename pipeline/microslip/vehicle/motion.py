@@ -17,7 +17,7 @@ import numpy as np
 
 from ..programs import program
 from .creep import Creep, linear
-from .touch import Touch, at, touched
+from .touch import WheelTouch, at, touched
 
 Array = Any
 Q = 6
@@ -41,7 +41,7 @@ class Vehicle(NamedTuple):
     load: float
     torque: float
     speed: float
-    over: Touch
+    over: WheelTouch
     reach: float
     each: float
     friction: float
@@ -49,7 +49,7 @@ class Vehicle(NamedTuple):
     poisson: float
 
 
-class Contacts(NamedTuple):
+class WheelContacts(NamedTuple):
     """Of both wheels, (..., 2), right first: states of rolling as `rolling.strips.creep_forces` takes them, and where.
 
     Attributes:
@@ -71,7 +71,7 @@ LEAST = 1e-6
 """Of the static load: below this a wheel counts as off its rail."""
 
 
-def _pressed(v: Vehicle, q: Array, out: Array) -> tuple[Array, Touch]:
+def _pressed(v: Vehicle, q: Array, out: Array) -> tuple[Array, WheelTouch]:
     """(2,) vertical approach of wheels that are out of round by (2,) m, and where they touch."""
     t = at(v.over, v.reach, q[0])
     down = q[1] - t.height + t.arm * (q[2] - t.roll) - q[4:6] + 0.5 * q[3] ** 2 * t.slope * t.arm
@@ -83,7 +83,7 @@ def _contact_energy(q: Array, v: Vehicle, out: Array) -> Array:
     return jnp.sum(t.spring * jnp.maximum(p, 0.0) ** 2.5) / 2.5
 
 
-def _slip(moved: Array, v: Vehicle, q: Array, out: Array, t: Touch) -> tuple[Array, Array, Array]:
+def _slip(moved: Array, v: Vehicle, q: Array, out: Array, t: WheelTouch) -> tuple[Array, Array, Array]:
     """(2,) velocities of the wheels on their rails, forward and to the left, m/s, and turn about their normals."""
     u, turning = moved[:Q], moved[Q]
     c = 1 / jnp.sqrt(1 + t.slope**2)
@@ -94,7 +94,7 @@ def _slip(moved: Array, v: Vehicle, q: Array, out: Array, t: Touch) -> tuple[Arr
     return v.speed - rim - u[3] * t.across, -(c * across + t.slope * c * down), spin
 
 
-def contacts(v: Vehicle, x: Array, out: Array) -> Contacts:
+def contacts(v: Vehicle, x: Array, out: Array) -> WheelContacts:
     """At one state (13,) of wheels that are out of round by (2,) m."""
     q, moved = x[:Q], x[Q:]
     p, t = _pressed(v, q, out)
@@ -103,7 +103,7 @@ def contacts(v: Vehicle, x: Array, out: Array) -> Contacts:
     grown = (normal / v.each) ** (1 / 3)
     mean = 0.5 * (v.speed + moved[Q] * (t.radius + out))
     xi, eta, phi = (s / mean for s in _slip(moved, v, q, out, t))
-    return Contacts(xi, eta, phi, t.a * grown, t.b * grown, normal, t.on_wheel, mean, vertical)
+    return WheelContacts(xi, eta, phi, t.a * grown, t.b * grown, normal, t.on_wheel, mean, vertical)
 
 
 def rates(v: Vehicle, creep: Creep, x: Array, out: Array, rise: Array) -> tuple[Array, Array]:
@@ -138,19 +138,19 @@ def energy(v: Vehicle, x: Array, out: Array) -> Array:
     return motion + 0.5 * q @ v.stiffness @ q - v.load * q[1] + _contact_energy(q, v, out)
 
 
-class Turn(NamedTuple):
-    """A turn of the wheels. Attributes: end: (13,). states: (n, 13) at n equal angles. on: `Contacts` there, (n, 2).
-    work: (4,) of `rates`, J. time: s."""
+class WheelTurn(NamedTuple):
+    """A turn of the wheels. Attributes: end: (13,). states: (n, 13) at n equal angles. on: `WheelContacts` there,
+    (n, 2). work: (4,) of `rates`, J. time: s."""
 
     end: Array
     states: Array
-    on: Contacts
+    on: WheelContacts
     work: Array
     time: Array
 
 
 @partial(program, static_argnames=("creep", "every"))
-def turned(v: Vehicle, creep: Creep, start: Array, out: Array, rise: Array, every: int) -> Turn:
+def turned(v: Vehicle, creep: Creep, start: Array, out: Array, rise: Array, every: int) -> WheelTurn:
     """One turn by the method of Runge and Kutta of fourth order.
 
     Args:
@@ -178,7 +178,7 @@ def turned(v: Vehicle, creep: Creep, start: Array, out: Array, rise: Array, ever
     end, passed = jax.lax.scan(step, jnp.concatenate([start, jnp.zeros(5)]), (three(out), three(rise)))
     states = passed[::every]
     on = jax.vmap(lambda x, o: contacts(v, x, o))(states, out[:: 2 * every])
-    return Turn(end[:STATES], states, on, end[STATES:-1], end[-1])
+    return WheelTurn(end[:STATES], states, on, end[STATES:-1], end[-1])
 
 
 @partial(program, static_argnames=("creep",))
@@ -187,7 +187,7 @@ def _linearised(v: Vehicle, creep: Creep, x: Array) -> tuple[Array, Array]:
     return rates(v, creep, x, none, none)[0], jax.jacfwd(lambda x: rates(v, creep, x, none, none)[0])(x)
 
 
-def sunk(t: Touch, each: float, stiffness: Array) -> tuple[float, float]:
+def sunk(t: WheelTouch, each: float, stiffness: Array) -> tuple[float, float]:
     """How deep, m, wheelset and rails stand under the load of each wheel, where `t` is that of no shift."""
     rail = each / float(stiffness[4, 4])
     return float(t.height[0]) + (each / float(t.spring[0])) ** (2 / 3) + rail, rail

@@ -14,14 +14,14 @@ from ..contact.keys import FileName
 from ..contact.solids import Solid
 from ..data import Array
 from ..rolling.ellipse import combined
-from ..rolling.profiles import Profile
+from ..rolling.profiles import CrossSection
 from ..rolling.settings import Rail, Strips, TableOfCase, WearOfBody, Wheel
 from ..rolling.wheelset import Track
 from ..settings.numbers import Model, Name, NotNegative, Number, Positive, _tuple
 from ..settings.toml import read_settings
 from ..system.lumped import Body, Link, System
 from .motion import Vehicle, sunk
-from .touch import Touch, touched, touching
+from .touch import WheelTouch, touched, touching
 
 Three = Annotated[tuple[NotNegative, NotNegative, NotNegative], BeforeValidator(_tuple)]
 Inertia = Annotated[tuple[Positive, Positive, Positive], BeforeValidator(_tuple)]
@@ -171,7 +171,7 @@ class VehicleCase(Model):
         return Vehicle(M, C, K, spin, self.vehicle.load + held, self.running.torque, self.running.speed, found.over,
                        found.reach, each, self.friction, elastic.shear, elastic.poisson)  # fmt: skip
 
-    def profiles(self, folder: Path, y: Array) -> Callable[[Array], Touch] | None:
+    def profiles(self, folder: Path, y: Array) -> Callable[[Array], WheelTouch] | None:
         """Depth (n,) m on strips about y (n,) m of both wheels' profile -> where they touch; see `made`."""
         if self.wear.profile == "kept":
             return None
@@ -218,7 +218,7 @@ def worn_tracks(track: Track, y: Array) -> Callable[[Array], Track]:
 
     def worn(depth: Array) -> Track:
         height = new - np.interp(fine, y, depth, left=0.0, right=0.0)
-        return replace(track, wheel=Profile(fine, height, track.wheel.name))
+        return replace(track, wheel=CrossSection(fine, height, track.wheel.name))
 
     return worn
 

@@ -19,8 +19,8 @@ from .wearing import (
     FIRST,
     Jump,
     LeavesTheRail,
-    Now,
-    Rolling,
+    Running,
+    RunningVehicle,
     columns_of,
     deepest,
     error_of,
@@ -49,15 +49,15 @@ FASTEST = 200.0
 
 
 @dataclass(frozen=True)
-class Studied:
+class VehicleAnswer:
     """Attributes: history: running and the jump to it, from new wheels on. ended: why it ends early, or nothing.
     speeds, grown: (n,) m/s and (n, orders) share per turn by which the waves of the wheel that is looked at grow.
     wheel: its index. critical: speed of hunting, m/s. table: of creep forces, if one was used."""
 
     case: VehicleCase
     vehicle: Vehicle
-    rolling: Rolling
-    history: list[tuple[Now, Jump]]
+    rolling: RunningVehicle
+    history: list[tuple[Running, Jump]]
     ended: str
     speeds: Array
     grown: Array
@@ -181,7 +181,7 @@ class Studied:
 
 def study(
     case: VehicleCase, folder: Path, report: Callable[[str], None] = lambda _: None, journal: Journal | None = None
-) -> Studied:
+) -> VehicleAnswer:
     """Wear of a case whose files stand in a folder.
 
     Args:
@@ -199,11 +199,11 @@ def study(
         )
     creep, table = _creep(case, v, report)
     t = tread(v, case.running.places, case.wear.coefficient, case.model.model_dump())
-    r = Rolling.of(v, creep, t, case.shape(), case.profiles(folder, t.y))
+    r = RunningVehicle.of(v, creep, t, case.shape(), case.profiles(folder, t.y))
     report("wear by jumps over many turns")
     turns = case.running.turns
     try:
-        history, ended = worn(r, Now.of, turns, case.wear.tolerance, min(FIRST, turns), report, journal)
+        history, ended = worn(r, Running.of, turns, case.wear.tolerance, min(FIRST, turns), report, journal)
     except LeavesTheRail as stop:
         raise UserError(f"running, unround: already on new wheels {stop}; run slower or give less") from stop
     wheel = int(np.abs(r.shape).max(axis=0).argmax())
@@ -211,7 +211,7 @@ def study(
     speeds = [s for s, g in zip(case.running.speeds, grown, strict=True) if g is not None]
     table_of = np.array([g for g in grown if g is not None]).reshape(len(speeds), case.running.orders)
     critical = critical_speed(v, 1.0, FASTEST)
-    return Studied(case, v, r, history, ended, np.array(speeds), table_of, wheel, critical, table)
+    return VehicleAnswer(case, v, r, history, ended, np.array(speeds), table_of, wheel, critical, table)
 
 
 def _creep(case: VehicleCase, v: Vehicle, report: Callable[[str], None]) -> tuple[Creep, CreepTable | None]:
@@ -230,7 +230,7 @@ SPEEDS = "speeds"
 
 
 def _all_grown(
-    case: VehicleCase, r: Rolling, wheel: int, report: Callable[[str], None], journal: Journal | None
+    case: VehicleCase, r: RunningVehicle, wheel: int, report: Callable[[str], None], journal: Journal | None
 ) -> list[Array | None]:
     """Of each speed (orders,) per turn; None where it does not run."""
     known = {} if journal is None else journal.of(SPEEDS)
@@ -245,7 +245,9 @@ def _all_grown(
     return found
 
 
-def _grown(case: VehicleCase, r: Rolling, speed: float, wheel: int, report: Callable[[str], None]) -> Array | None:
+def _grown(
+    case: VehicleCase, r: RunningVehicle, speed: float, wheel: int, report: Callable[[str], None]
+) -> Array | None:
     """(orders,) per turn; None where it does not run."""
     report(f"growth at {speed:g} m/s")
     at = r.vehicle._replace(speed=speed)
@@ -253,7 +255,7 @@ def _grown(case: VehicleCase, r: Rolling, speed: float, wheel: int, report: Call
         report(f"warning: the wheelset hunts at {speed:g} m/s, which is left out")
         return None
     try:
-        r = Rolling.of(at, r.creep, r.tread, np.zeros_like(r.shape), r.profile)
+        r = RunningVehicle.of(at, r.creep, r.tread, np.zeros_like(r.shape), r.profile)
         return growth(r, np.arange(1, case.running.orders + 1), SMALL, wheel)
     except LeavesTheRail as stop:
         report(f"warning: at {speed:g} m/s {stop}; it is left out")
