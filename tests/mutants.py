@@ -190,7 +190,7 @@ MISTAKES = (
     ),
     Mistake(
         "condensed orbits: sign of the sines",
-        "bifurcation/condensed.py",
+        "bifurcation/balance.py",
         "found[2 * h - 1], found[2 * h] = part.real, -part.imag",
         "found[2 * h - 1], found[2 * h] = part.real, part.imag",
         "test_condensed.py",

@@ -38,8 +38,7 @@ from microslip.harmonic_balance.stability import Stability
 from microslip.harmonic_balance.sweeps import ends, gaps
 from microslip.results import Journal, open_journal, read_response
 from microslip.stages.places import modal_files
-from microslip.time_domain.stepped import SettledMotion, TimeIsOver, settled
-from microslip.time_domain.swept import Sweeps, SweptMotions
+from microslip.time_domain.swept import SettledMotion, Sweeps, SweptMotions, TimeIsOver, settled
 
 pytestmark = pytest.mark.usefixtures("undrawn", "unjudged")
 
@@ -151,7 +150,7 @@ def test_a_motion_ends_with_its_time_and_portions_change_nothing(case: Path, mon
         settled(stiff.assembly, 110.0, 300, patience=1e-3)
     assert time.process_time() - began < 10.0
     whole = settled(p.assembly, 110.0, 300)
-    monkeypatch.setattr("microslip.time_domain.stepped.PORTION", 0.0)
+    monkeypatch.setattr("microslip.time_domain.swept.PORTION", 0.0)
     assert settled(p.assembly, 110.0, 300).amplitude == whole.amplitude
 
 

@@ -6,8 +6,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from microslip.bifurcation.balance import Balance, Harmonics
-from microslip.bifurcation.condensed import CondensedBalance, equations
+from microslip.bifurcation.balance import Balance, CondensedBalance, Harmonics, equations
 from microslip.bifurcation.dynamics import Dynamics
 from microslip.continuation import NewtonSettings, newton
 

@@ -22,8 +22,7 @@ from microslip.contact.solids import Solid
 from microslip.errors import UserError
 from microslip.pictures.rolling import stretched
 from microslip.rolling.behind import even
-from microslip.rolling.laws import RoughSurface
-from microslip.rolling.rolled import COLD
+from microslip.rolling.laws import COLD, RoughSurface
 from microslip.rolling.settings import load_rolling
 from microslip.rolling.study import RollingAnswer, rows_of_patches, study
 from microslip.rolling.temperature import falling

@@ -24,8 +24,7 @@ from microslip.fem.loads import pressure
 from microslip.fem.operators import stiffness
 from microslip.linalg import eigen
 from microslip.modal.equilibrium import equilibrium, make_model
-from microslip.rolling.brush import Brush, fitted, jump, parabola, reached
-from microslip.rolling.slip import TyreAnswer, row
+from microslip.rolling.tyre import Brush, TyreAnswer, fitted, jump, parabola, reached, row
 from microslip.stages.job import open_job
 from microslip.stages.modal import modes_stage
 

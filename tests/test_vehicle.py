@@ -21,8 +21,8 @@ from microslip.results import Journal, open_journal, read_journal
 from microslip.rolling.table import creep_table
 from microslip.rolling.wheelset import Pose, patches
 from microslip.vehicle import motion, wearing
-from microslip.vehicle.creep import linear, of_strips, of_table
 from microslip.vehicle.kinematics import GivenWheel, read_kinematics, recorded
+from microslip.vehicle.motion import linear, of_strips, of_table
 from microslip.vehicle.settings import VehicleCase, load_kinematics, load_vehicle, track_of
 from microslip.vehicle.study import VehicleAnswer, _went
 

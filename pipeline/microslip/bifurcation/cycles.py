@@ -15,9 +15,8 @@ from ..continuation import NewtonSettings, Settings, branch_off, follow, newton
 from ..data import Array, ComplexArray
 from ..harmonic_balance.accuracy import SAFETY
 from . import equilibria, flow
-from .balance import Harmonics, summed
+from .balance import Harmonics, equations, summed
 from .branches import LOST
-from .condensed import equations
 from .diagram import DiagramPlan, diagram
 from .dynamics import Dynamics
 from .equilibria import Hopf

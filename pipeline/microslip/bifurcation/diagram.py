@@ -127,24 +127,28 @@ def diagram(
     """
     prepare()
     work = _Work(system, asked, kept, keep, report)
+    points: tuple[Hopf, ...] = ()
     if system.frequency is not None:
         _doublings(work, work.add(DRIVEN, lambda: _driven(work, x)), asked.doublings)
         for p in asked.deflate:
             _beside(work, p, [np.asarray(x, dtype=float)])
-        return Diagram(system, tuple(work.found), (), (), tuple(work.deflated), tuple(work.messages))
-    still = work.add(EQUILIBRIA, lambda: _equilibria(system, x, asked))
-    points = tuple(_hopf(system, still, i) for i in still.of_kind("Hopf"))
-    if asked.orbits:
-        for i, point in enumerate(points, 1):
-            if not _is_known(work, point):
-                _born_at(work, f"orbits {i}", point)
-        for p in asked.attractors:
-            _coexisting(work, still, p)
-        for p in asked.deflate:
-            _beside(work, p, _resting(work, still, p))
-    return Diagram(
-        system, tuple(work.found), points, tuple(work.seen), tuple(work.deflated), tuple(work.messages)
-    )  # fmt: skip
+    else:
+        still = work.add(EQUILIBRIA, lambda: _equilibria(system, x, asked))
+        points = tuple(_hopf(system, still, i) for i in still.of_kind("Hopf"))
+        if asked.orbits:
+            _orbits(work, still, points)
+    return Diagram(system, tuple(work.found), points, tuple(work.seen), tuple(work.deflated), tuple(work.messages))
+
+
+def _orbits(work: _Work, still: DiagramBranch, points: Sequence[Hopf]) -> None:
+    """The branches of orbits of a free system."""
+    for i, point in enumerate(points, 1):
+        if not _is_known(work, point):
+            _born_at(work, f"orbits {i}", point)
+    for p in work.asked.attractors:
+        _coexisting(work, still, p)
+    for p in work.asked.deflate:
+        _beside(work, p, _resting(work, still, p))
 
 
 DRIVEN = "driven"

@@ -22,8 +22,7 @@ from ..harmonic_balance.response import HarmonicResponse
 from ..harmonic_balance.stability import Settings as Multipliers
 from ..harmonic_balance.stability import Stability, orbit, stability
 from ..results import Journal
-from ..time_domain.stepped import SettledMotion
-from ..time_domain.swept import DOWN, REST, SAME, UP, Sweeps, on_two_motions
+from ..time_domain.swept import DOWN, REST, SAME, UP, SettledMotion, Sweeps, on_two_motions
 from ..units import Quantity, percent
 from .assemble import build
 from .curves import Followed, Keep, curves

@@ -19,8 +19,7 @@ from ..harmonic_balance.response import HarmonicResponse, unsolved
 from ..harmonic_balance.sweeps import overhanging
 from ..results.checks import UNCERTAIN, cause
 from ..results.names import apart
-from ..time_domain.stepped import SettledMotion
-from ..time_domain.swept import nearer
+from ..time_domain.swept import SettledMotion, nearer
 from ..units import Quantity, counted, percent
 from .assemble import Built
 from .problem import book_models

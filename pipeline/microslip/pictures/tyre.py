@@ -10,8 +10,7 @@ import numpy as np
 
 from ..data import Array, ModalBasis
 from ..mesh import boundary_facets
-from ..rolling.brush import jump
-from ..rolling.slip import TyreAnswer
+from ..rolling.tyre import TyreAnswer, jump
 from .plots import COLOURS, empty_figure, plain_axes, save_figure
 from .scene import element_sides
 

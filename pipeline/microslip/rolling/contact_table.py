@@ -200,16 +200,12 @@ def forces(
     given = pose, speed, turning, friction, (xi, eta, phi), table.shear, table.poisson, weights[-1]
 
     def at(more: Array) -> WheelForces:
-        return _rolled(_pressed(patches, jnp.where(load > 0, more, 0.0)), *given)
+        more = jnp.where(load > 0, more, 0.0)[..., None]
+        wide, force = jnp.cbrt(more), patches.normal_force * more
+        a, b, pressure = (v * wide for v in (patches.a, patches.b, patches.pressure))
+        return _rolled(patches._replace(a=a, b=b, pressure=pressure, normal_force=force), *given)
 
     return _balanced(at, jnp.maximum(load, EMPTY), load / table.load)
-
-
-def _pressed(p: Patches, more: Array) -> Patches:
-    """By normal forces that are so many times (n, 2) as large."""
-    more = more[..., None]
-    wide = jnp.cbrt(more)
-    return p._replace(a=p.a * wide, b=p.b * wide, pressure=p.pressure * wide, normal_force=p.normal_force * more)
 
 
 def _balanced(at: Callable[[Array], WheelForces], load: Array, first: Array) -> WheelForces:

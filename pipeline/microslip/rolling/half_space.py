@@ -18,6 +18,7 @@ from pydantic import Field
 
 from ..data import Array, Flags
 from ..errors import UserError
+from ..interrupts import look
 from ..settings.arguments import Vector, checked
 from ..settings.numbers import Component, NotNegative, Positive
 from .arguments import NotNegatives, Poisson, Reals
@@ -32,7 +33,6 @@ from .half_space_influence import (
     influence_ahead,
     influence_change,
 )
-from .half_space_normal import normal_contact
 from .half_space_tangential import TOLERANCE, Shear, tractions
 
 ITERATIONS = 50
@@ -122,7 +122,7 @@ def pressed(
         distance: undeformed distance h(x, y) of the surfaces, broadcasts to (nx, ny), m. force: N, or approach: m.
 
     Raises:
-        UserError: see `half_space_normal.normal_contact`; the patch reaches the edge of the grid.
+        UserError: see `normal_contact`; the patch reaches the edge of the grid.
     """
     return _contact(distance, grid, pair, 0.0, force, approach, None, (0, 0, 0), (None, None), None)
 
@@ -217,7 +217,9 @@ def _contact(
     for _ in range(ITERATIONS):
         lift = whole(now.traction, NORMAL, TANGENTIAL)[0] if pair.mismatch else 0.0
         pressure, approach_now = normal_contact(h + lift, whole, grid.area, force, approach, start=now.pressure)
-        _inside(pressure, grid)
+        sides = [pressure[0], pressure[-1], *((pressure[:, 0], pressure[:, -1]) if grid.ny > 1 else ())]
+        if any(side.any() for side in sides):  # a grid of one row is two-dimensional
+            raise UserError("grid: the patch reaches the edge of the grid and is cut off; take a larger grid")
         pressed_now = replace(now, pressure=pressure, approach=approach_now, bound=mu * pressure)
         then = pressed_now if motion is None else _sheared(pressed_now, motion, tangential, start is not None)
         moved = max(np.abs(a - b).max() for a, b in ((then.traction, now.traction), (then.pressure, now.pressure)))
@@ -225,13 +227,6 @@ def _contact(
         if not pair.mismatch or motion is None or moved <= 10 * TOLERANCE * pressure.max():
             return now
     raise UserError(f"distance: pressure and traction have not settled after {ITERATIONS} turns; K is too large")
-
-
-def _inside(pressure: Array, grid: Grid) -> None:
-    """A patch that reaches the edge is cut off; a grid of one row is two-dimensional."""
-    sides = [pressure[0], pressure[-1], *((pressure[:, 0], pressure[:, -1]) if grid.ny > 1 else ())]
-    if any(side.any() for side in sides):
-        raise UserError("grid: the patch reaches the edge of the grid and is cut off; take a larger grid")
 
 
 def _sheared(now: HalfSpaceContact, motion: _Motion, tangential: Forces, warm: bool) -> HalfSpaceContact:
@@ -280,3 +275,91 @@ def _coefficients(ratio: float, poisson: float, n: int) -> Array:
     of_x, of_y, of_spin = np.array(found) * grid.area
     size = (np.count_nonzero(patch) * grid.area / np.pi) ** 0.5  # of the ellipse that the elements cover
     return np.array([of_x[0] / size**2, of_y[1] / size**2, of_spin[1] / size**3, of_spin[2] / size**4])
+
+
+# which elements touch, and how hard: conjugate gradients with p >= 0, for any undeformed distance
+
+SETTLED, MOST = 1e-10, 2000
+"""Change of the pressure over the largest one at which it has settled, and iterations at most."""
+
+
+def normal_contact(
+    distance: Array, influence: Influence, area: float, force: float | None = None, approach: float | None = None,
+    start: Array | None = None,
+) -> tuple[Array, float]:  # fmt: skip
+    """Pressure that closes the distance where it acts: p >= 0, e = h - approach + u_n >= 0, p e = 0.
+
+    Conjugate gradients on the elements that touch; those whose pressure turns negative let go, those that overlap
+    join (Polonsky and Keer, Wear 231, 1999; Vollebregt, J. Comput. Phys. 257, 2014).
+
+    Args:
+        distance: (nx, ny) undeformed distance h of the surfaces, m. influence: of the grid. area: of an element, m^2.
+            force: N, or approach: m, one of the two. start: a pressure to begin with, Pa.
+
+    Returns:
+        Pressure (nx, ny), Pa, and approach, m. No contact: zeros.
+
+    Raises:
+        UserError: neither or both of force and approach, no convergence.
+    """
+    if (force is None) == (approach is None):
+        raise UserError("force, approach: give one of the two, the other follows")
+    touching_at = float(distance.min())
+    if force == 0 or (approach is not None and approach <= touching_at):
+        return np.zeros(distance.shape), touching_at if approach is None else approach
+    load = None if force is None else force / area
+    pressure = _first(distance, influence, load, approach) if start is None or not np.any(start > 0) else start.copy()
+    return _gradients(distance, influence, pressure, load, approach)
+
+
+def _first(distance: Array, influence: Influence, load: float | None, approach: float | None) -> Array:
+    """As if the elements did not feel each other, or all of them shared the load."""
+    if load is not None:
+        return np.full(distance.shape, load / distance.size)
+    return np.maximum(approach - distance, 0) / influence(_unit(distance.shape), NORMAL, NORMAL).max()
+
+
+def _unit(shape: tuple[int, ...]) -> Array:
+    unit = np.zeros((1, *shape))
+    unit[0, shape[0] // 2, shape[1] // 2] = 1
+    return unit
+
+
+def _gradients(
+    distance: Array, influence: Influence, pressure: Array, load: float | None, approach: float | None
+) -> tuple[Array, float]:  # fmt: skip
+    def deformation(p: Array) -> Array:
+        return influence(p[None], NORMAL, NORMAL)[0]
+
+    single = float(deformation(_unit(distance.shape)[0]).max())
+    if load is not None:
+        pressure *= load / pressure.sum()
+    direction, before, fresh = np.zeros_like(distance), 1.0, True
+    for _ in range(MOST):
+        look()
+        touching = pressure > 0
+        gap = deformation(pressure) + distance
+        level = float(gap[touching].mean()) if load is not None else float(approach)  # type: ignore[arg-type]
+        gap -= level
+        here = float((gap[touching] ** 2).sum())
+        direction = np.where(touching, gap + (0 if fresh else here / before) * direction, 0)
+        answer = deformation(direction)
+        if load is not None:
+            answer -= answer[touching].mean()
+        curvature = float((answer * direction)[touching].sum())
+        joining = ~touching & (gap < 0)
+        if curvature > 0:
+            length = float((gap * direction)[touching].sum()) / curvature
+        elif joining.any():  # those that touch are at rest among themselves
+            length = 1 / single
+        else:
+            return pressure, level
+        moved = np.maximum(np.where(touching, pressure - length * direction, 0), 0)
+        moved[joining] = -length * gap[joining]
+        fresh, before = bool(joining.any()), here
+        if load is not None:
+            moved *= load / moved.sum()
+        change, pressure = np.abs(moved - pressure).max(), moved
+        if change <= SETTLED * pressure.max() and not fresh:
+            return pressure, level
+    raise UserError(f"distance: the pressure has not settled after {MOST} iterations; take a finer grid")

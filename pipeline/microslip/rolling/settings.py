@@ -21,9 +21,8 @@ from ..settings.toml import read_settings
 from .contact_table import POINTS as SHIFTS
 from .ellipse import combined
 from .kalker import Coefficients
-from .laws import RoughSurface
+from .laws import Heat, RoughSurface
 from .profiles import EVERYWHERE, WIDTH, CrossSection, Mirror, circle, has_arc, polynomial, read_profile
-from .rolled import Heat
 from .strips import Distribution, Spin
 from .table import ELEMENTS, POINTS
 from .temperature import Conductor

@@ -14,11 +14,11 @@ from ..data import Array
 from ..errors import UserError
 from .exact import Exact, exact
 from .fastsim import fastsim
-from .rolled import drag, rolled, sources
+from .laws import drag, rolled
 from .settings import RollingCase
 from .strips import CreepForces, Tractions
 from .temperature import speed_parameter
-from .wear import strip_depth
+from .wear import strip_work
 from .wheelset import Drag, Pose, RollingPatch, Track, across, axle, patches, states
 
 UNITS = {"longitudinal": "1", "lateral": "1", "spin": "1_per_m"}
@@ -184,11 +184,9 @@ class RollingAnswer:
         t, wear = self.pose_tractions, self.case.wear
         if t is None or wear is None:
             return {}
-        speed = np.array([p.speed for p in self.patches])
-        q, dx = sources(t, speed)
-        work = np.stack([strip_depth(s.T, d, 1.0, v) for s, d, v in zip(q, dx, speed, strict=True)])
+        width, work = strip_work(t)
         patch = np.broadcast_to(np.arange(1, len(work) + 1)[:, None], work.shape)
-        columns = {"patch": patch, "y_left_m": t.y[..., 0], "width_m": t.area[..., 0] / dx, "work_J_per_m2": work,
+        columns = {"patch": patch, "y_left_m": t.y[..., 0], "width_m": width, "work_J_per_m2": work,
                    "depth_m": wear.coefficient * work}  # fmt: skip
         return {name: values.ravel() for name, values in columns.items()}
 
@@ -293,7 +291,8 @@ def study(case: RollingCase, path: Path) -> RollingAnswer:
     highest = float(np.max(friction.highest(jnp.ones(1))))
     over = creep[list(UNITS).index(c.over)]
     shown = int(np.abs(over - (0.5 * (c.start + c.stop) if c.shown is None else c.shown)).argmin())
-    given, speed = _states(track, found, creep)
+    given, speed = states(track, [p] * creep.shape[1] + found)  # of the curve, and of the pose
+    given[:3, : creep.shape[1]] = creep
     n = len(over)
     kept = np.array([shown, *range(n, len(speed))])
     run = rolled(given, friction, speed, kept, heat, rough, **how)
@@ -330,13 +329,6 @@ def _touching(case: RollingCase, track: Track, dragged: Drag) -> tuple[list[Roll
         return patches(track, pose, side, vertical, dragged), pose
     left, right, pose = axle(track, pose, 2 * vertical, even=True, friction=dragged)
     return sorted([*left, *right], key=lambda p: -p.normal_force), pose
-
-
-def _states(track: Track, found: list[RollingPatch], creep: Array) -> tuple[Array, Array]:
-    """(8, n + patches) what `rolled` is given, of the curve and of the pose, and their speeds, m/s."""
-    given, speed = states(track, [found[0]] * creep.shape[1] + found)
-    given[:3, : creep.shape[1]] = creep
-    return given, speed
 
 
 def _exact(

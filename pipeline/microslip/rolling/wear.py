@@ -16,6 +16,7 @@ from ..errors import UserError
 from ..settings.arguments import Rows, checked
 from ..settings.numbers import NotNegative, Positive
 from .arguments import Positives
+from .strips import Tractions
 
 
 @checked
@@ -38,6 +39,13 @@ def depth_along(source: Rows, dx: Positives, coefficient: NotNegative, speed: Po
 def strip_depth(source: Array, dx: float, coefficient: float, speed: float) -> Array:
     """(ny,) m that one run-over takes off each strip, Sextro Eq. (6.8-6); see `depth_along`."""
     return depth_along(source, dx, coefficient, speed)[0]
+
+
+def strip_work(t: Tractions) -> tuple[Array, Array]:
+    """(n, ny) m widths of the strips of n patches, and the work of friction over each in a passage, J/m^2: times a
+    coefficient of wear what it takes off (6.8-6)."""
+    length = t.x[..., 1] - t.x[..., 0]
+    return t.area[..., 0] / length, (t.power * length[..., None]).sum(axis=-1)
 
 
 def deposited(depth: Array, dy: float | Array, middle: float, y: Array) -> Array:

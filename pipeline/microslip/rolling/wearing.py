@@ -12,11 +12,10 @@ from ..contact.friction import Friction
 from ..data import Array
 from ..errors import UserError
 from .ellipse import ellipses
-from .laws import RoughSurface
+from .laws import RoughSurface, drag, rolled
 from .profiles import CrossSection
-from .rolled import drag, rolled, sources
 from .settings import WIDEST, RollingCase
-from .wear import deposited, shortest_smoothing, smoothed, strip_depth
+from .wear import deposited, shortest_smoothing, smoothed, strip_work
 from .wheelset import RollingPatch, Track, patches, states
 
 STRIP = 1e-4
@@ -159,10 +158,7 @@ def _run(
         raise UserError("wear: the wheel does not touch the rail, so nothing wears; correct pose or vertical_force")
     given, speed = states(track, found)
     t = rolled(given, friction, speed, np.arange(len(found)), heat, surface, **how).tractions
-    q, dx = sources(t, speed)
-    return [
-        StripWork(p, t.area[i, :, 0] / dx[i], strip_depth(q[i].T, dx[i], 1.0, speed[i])) for i, p in enumerate(found)
-    ]
+    return [StripWork(*each) for each in zip(found, *strip_work(t), strict=True)]
 
 
 def _worn(body: WornProfile, runs: list[StripWork], coefficient: float, side: str) -> WornProfile:

@@ -194,12 +194,12 @@ def _drag(track: Track, friction: float | Drag) -> Drag:
         return friction
     if friction == 0:
         return lambda found: np.zeros(len(found))
-    return lambda found: _by_strips(track, found, friction)
 
+    def by_strips(found: list[RollingPatch]) -> Array:
+        xi, eta, phi, a, b, force, shear, poisson = states(track, found)[0]
+        return creep_forces(xi, eta, phi, a, b, force, friction, shear, poisson).y
 
-def _by_strips(track: Track, found: list[RollingPatch], friction: float) -> Array:
-    xi, eta, phi, a, b, force, shear, poisson = states(track, found)[0]
-    return creep_forces(xi, eta, phi, a, b, force, friction, shear, poisson).y
+    return by_strips
 
 
 def states(track: Track, found: list[RollingPatch]) -> tuple[Array, Array]:
@@ -229,7 +229,8 @@ def _carried(track: Track, pose: Pose, sides: tuple[str, ...], vertical: float, 
     for turn in range(30):
         height = _height(track, gaps, load)
         found = [_touching(track, pose, s, g, height) for s, g in zip(sides, gaps, strict=True)]
-        lift = _lifts(found, drag)
+        drags = iter(drag([p for of in found for p in of]))
+        lift = [sum(p.lifted(float(next(drags))) for p in of) for of in found]
         normal = sum(p.lifted(0.0) for of in found for p in of)
         if not sum(lift) > 0 or load > HELD_DOWN * vertical:
             break
@@ -249,12 +250,6 @@ BALANCED = 1e-8
 """Of the vertical force."""
 HELD_DOWN = 1e3
 """Times the vertical force: more is no balance."""
-
-
-def _lifts(found: list[list[RollingPatch]], drag: Drag) -> list[float]:
-    """N, upward, of all forces on each wheel."""
-    drags = iter(drag([p for of in found for p in of]))
-    return [sum(p.lifted(float(next(drags))) for p in of) for of in found]
 
 
 def _height(track: Track, gaps: list[Gap], vertical: float) -> float:

@@ -13,7 +13,7 @@ from ..pictures.tyre import tyre_picture
 from ..report.page import say
 from ..report.response import number_tables
 from ..results import Journal
-from ..rolling.slip import TyreAnswer, load_tyre, study
+from ..rolling.tyre import TyreAnswer, load_tyre, study
 from .answer import RollJob, Written
 from .job import open_job
 from .modal import modes_stage

@@ -111,14 +111,11 @@ def _unknown(law: Law, u: Any) -> Any:
 def untouched(groups: tuple[ContactGroup, ...]) -> Held:
     """Contacts that were never loaded, at u = 0."""
     d = jnp.zeros(sum(g.offset.size for g in groups))
-    states = tuple(g.law.init(_count(g)) for g in groups)
-    points = tuple(jnp.zeros((_count(g), 3)) for g in groups)
+    counts = [int(g.G.shape[0] * g.G.shape[1]) for g in groups]
+    states = tuple(g.law.init(n) for g, n in zip(groups, counts, strict=True))
+    points = tuple(jnp.zeros((n, 3)) for n in counts)
     none, zero = jnp.zeros(sum(len(g.G) for g in groups)), jnp.zeros(())
     return Held(d, d, states, points, points, none, none.astype(bool), zero, zero, zero, zero, zero)
-
-
-def _count(g: ContactGroup) -> int:
-    return int(g.G.shape[0] * g.G.shape[1])
 
 
 def parts(groups: tuple[ContactGroup, ...], d: Any) -> list[Any]:
@@ -135,11 +132,6 @@ def moved(g: ContactGroup, d: Any) -> Any:
     return (g.G * d[:, None, None, :]).sum(axis=-1).reshape(-1, 3)
 
 
-def _contracted(g: ContactGroup, points: Any) -> Any:
-    """(c k,) forces of the coordinates."""
-    return (g.G * points.reshape(*g.G.shape[:3], 1)).sum(axis=(1, 2)).reshape(-1)
-
-
 def force_at(groups: tuple[ContactGroup, ...], d: Any, v: Any, dt: Any, states: tuple[Any, ...]) -> tuple:
     """Force (c,) at d with velocity v, states and points' forces of all groups."""
     after, points = [], []
@@ -153,7 +145,9 @@ def force_at(groups: tuple[ContactGroup, ...], d: Any, v: Any, dt: Any, states: 
 
 def joined(groups: tuple[ContactGroup, ...], points: Any) -> Any:
     """(c,) forces of the coordinates, by those (c n, 3) of the points of all groups."""
-    return jnp.concatenate([jnp.zeros(0), *(_contracted(g, f) for g, f in zip(groups, points, strict=True))])
+    each = zip(groups, points, strict=True)
+    forces = [(g.G * f.reshape(*g.G.shape[:3], 1)).sum(axis=(1, 2)).reshape(-1) for g, f in each]
+    return jnp.concatenate([jnp.zeros(0), *forces])
 
 
 def slope_at(groups: tuple[ContactGroup, ...], d: Any, v: Any, dt: Any, states: tuple[Any, ...]) -> Any:
@@ -293,7 +287,11 @@ def rigid_answer(
         f, w, missed, _ = jax.lax.scan(further, begin, length=2)[0]
     slipped = jnp.where(slid(w, ways)[:, None], w[:, 1:], 0.0)
     for i, force, way in zip(spots, jnp.split(f, ends), jnp.split(slipped, ends), strict=True):
-        points[i], states[i] = _held(groups[i], force, way, _point(groups, i, free), dt, held.states[i])
+        law = groups[i].law
+        if isinstance(law, Moving):
+            points[i], states[i] = law.slid(force, way, _point(groups, i, free), dt, held.states[i])
+        else:
+            points[i], states[i] = force, held.states[i] + way.T
     force = joined(groups, points)
     d = free if bodies is None else free - times(bodies.R, force)
     by_law = bodies is not None
@@ -332,6 +330,69 @@ def _point(groups: tuple[ContactGroup, ...], i: int, d: Any) -> Any:
     return moved(groups[i], parts(groups, d)[i] + groups[i].offset)
 
 
-def _held(g: ContactGroup, force: Any, way: Any, u: Any, dt: Any, state: Any) -> tuple[Any, Any]:
-    """(n, 3) force and state of set-valued points after a step to u (n, 3) in which they slid by a way (n, 2)."""
-    return g.law.slid(force, way, u, dt, state) if isinstance(g.law, Moving) else (force, state + way.T)
+# friction that follows the velocity alone: solved for in every half kick, so that its slope sets no limit to the step;
+# the velocity after the kick is that before it, less what the friction at that velocity takes in it
+
+TURNS, NEWTON = 100, 8
+"""Turns of `slowed` at most, and steps of Newton's method in each."""
+
+
+class Braking(NamedTuple):
+    """slowing: (c, c) m/s per N that half a kick changes the contacts' velocities by. most: (points,) of it that each
+    point may count on, group by group."""
+
+    slowing: Any
+    most: tuple[Any, ...]
+
+
+def slowed(
+    groups: tuple[ContactGroup, ...], B: Braking, F_0: Any, d: Any, v: Any, dt: Any, held: Held
+) -> tuple[Any, Any]:  # fmt: skip
+    """(c,) velocities of contacts after half a kick, and what is missing, m/s.
+
+    v: before that kick. Newton's method from what the last force leaves; where that does not do, from turns in which
+    each point brakes by itself, as if all that yields were its own, from where the others leave it (forward and
+    backward steps: P. L. Lions, B. Mercier, SIAM J. Numer. Anal. 16, 1979).
+    """
+    enough = 1e-10 * jnp.abs(v).max() + 1e-18
+
+    def left(force: Any) -> Any:
+        return v - B.slowing @ (force - F_0)
+
+    def missing(at: Any) -> Any:
+        return at - left(force_at(groups, d, at, dt, held.states)[0])
+
+    def newton(carried: tuple) -> tuple:
+        i, at, r = carried
+        at = at - jnp.linalg.solve(jax.jacfwd(missing)(at), r)
+        return i + 1, at, missing(at)
+
+    def unsolved(carried: tuple) -> Any:
+        return (jnp.abs(carried[2]).max() > enough) & (carried[0] < NEWTON)
+
+    def refined(at: Any) -> tuple:
+        _, at, r = jax.lax.while_loop(unsolved, newton, (0, at, missing(at)))
+        return at, jnp.nan_to_num(jnp.abs(r).max(), nan=jnp.inf)
+
+    def turn(carried: tuple) -> tuple:
+        i, at, forces, _, _ = carried
+        alone = zip(groups, forces, held.states, B.most, parts(groups, d), parts(groups, at), strict=True)
+        after = tuple(_alone(g, f, state, y, place, rate, dt) for g, f, state, y, place, rate in alone)
+        at = left(joined(groups, after))
+        return i + 1, at, after, *refined(at)
+
+    at = left(held.force)
+    begin = (0, at, held.forces, *refined(at))
+    *_, found, missed = jax.lax.while_loop(lambda c: (c[4] > enough) & (c[0] < TURNS), turn, begin)
+    return found, missed
+
+
+def _alone(g: ContactGroup, force: Any, state: Any, most: Any, place: Any, rate: Any, dt: Any) -> Any:
+    """(c n, 3) forces of a group whose points brake by themselves from forces, at coordinates and velocities (c, k)."""
+    u, w = moved(g, place + g.offset), moved(g, rate)
+    by_law = g.law.step(u, w, dt, state)[0]
+    if not g.law.brakes:
+        return by_law
+    trial = w.at[:, 1:].add(most[:, None] * force[:, 1:])
+    held = (trial - g.law.slowed(u, trial, dt, state, most))[:, 1:] / jnp.where(most > 0, most, 1.0)[:, None]
+    return jnp.concatenate([by_law[:, :1], held], axis=1)

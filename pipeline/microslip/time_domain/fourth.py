@@ -20,10 +20,9 @@ from typing import Any, NamedTuple
 import jax
 import jax.numpy as jnp
 
-from .bodies import Bodies, MotionState, Options, exponent
+from .bodies import Bodies, MotionState, Options, by_modes, exponent, to_modes
 from .contacts import ContactGroup, Held, joined, times, told
 from .flow import flown, worked
-from .spots import by_modes, to_modes
 
 HALVINGS = 10
 """Of a step, of which the shortest flow is half a step: where contacts change it is a 512th at least."""

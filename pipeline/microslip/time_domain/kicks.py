@@ -11,8 +11,7 @@ import jax
 import jax.numpy as jnp
 
 from .bodies import Bodies, MotionState, Options, by_force, exponent
-from .braking import slowed
-from .contacts import ContactGroup, Held, answer, force_at, rigid_answer, times
+from .contacts import ContactGroup, Held, answer, force_at, rigid_answer, slowed, times
 from .flow import flown, worked
 
 
@@ -94,7 +93,9 @@ def answered(
     force, *others = force_at(groups, free, v, dt, held.states)
     ahead = free
     if B.yielding is None:
-        ahead = _ahead(B, q, v_free + share * dt * (by_force(B, force) + times(B.loads, o)), o)
+        v = v_free + share * dt * (by_force(B, force) + times(B.loads, o))
+        then = flown(B.flow.stack[0][: q.shape[1]], jnp.concatenate([q, v], axis=1), o)  # after another step
+        ahead = times(B.D, then.T.reshape(-1)) + times(B.D_o, times(B.flow.turn[0], o))
     else:
         free = free + times(B.yielding.R, B.F_0)
     points = B.meets if B.yielding is not None else B.meets._replace(A=share * B.meets.A, r=B.meets.r / share)
@@ -106,9 +107,3 @@ def answered(
         now, then = (times(B.D, (v_free + part * dt * whole).reshape(-1)) + given for part in (0.25, share - 0.25))
         held = held._replace(lost=held.lost + owed + jnp.sum(rigid * now), owed=jnp.sum(rigid * then))
     return held, push
-
-
-def _ahead(B: Bodies, q: Any, v: Any, o: Any) -> Any:
-    """(c,) of the contact coordinates after another step."""
-    then = flown(B.flow.stack[0][: q.shape[1]], jnp.concatenate([q, v], axis=1), o)
-    return times(B.D, then.T.reshape(-1)) + times(B.D_o, times(B.flow.turn[0], o))

@@ -665,15 +665,11 @@ def _separations(stepper: Stepper, a: MotionState, b: MotionState, samples: int,
         return np.zeros(0)
     b = classification.between(a, b, APART * size / apart)
     begin, rows = APART * size, np.full(samples, samples * each)
-    one, other = (_phases(stepper, stepper.run(now, rows, periods)[1]) for now in (a, b))
+    runs, pace = [stepper.run(now, rows, periods)[1] for now in (a, b)], np.sqrt(np.abs(stepper.equations.omega2))
+    one, other = (np.concatenate([seen.q * pace, seen.q_dot], axis=1) for seen in runs)
     if len(one) != len(other):  # one of them became infinite
         return np.zeros(0)
     return np.linalg.norm(one - other, axis=1) / begin
-
-
-def _phases(stepper: Stepper, seen: Sample) -> Array:
-    """(s, 2 m) modal displacements times their frequencies, and velocities."""
-    return np.concatenate([seen.q * np.sqrt(np.abs(stepper.equations.omega2)), seen.q_dot], axis=1)
 
 
 def steps_of_a_sample(e: MotionEquations, samples: int, steps: int | None) -> int:
@@ -702,24 +698,24 @@ def begun(e: MotionEquations, start: Start) -> tuple[Array, Array]:
         NotConverged: Newton's method finds no rest under the steady loads. UserError: no such
             start, or one behind a rigid stop.
     """
-    q, v = _begun(e, start)
+    if isinstance(start, Released):
+        q, v = start.q, start.v
+    elif start in ("static", "rest"):
+        q, v = _at_rest(e, start == "static"), np.zeros(len(e.omega2))
+    else:
+        raise UserError(f"start: '{start}' is none of static, rest, balance")
     refuse_behind(e, q)
     return q, v
 
 
-def _begun(e: MotionEquations, start: Start) -> tuple[Array, Array]:
-    if isinstance(start, Released):
-        return start.q, start.v
-    zero, tight = np.zeros(len(e.omega2)), [c.offset[0] > 0 and not c.preload.any() for c in e.contacts]
-    if start == "rest":
-        if any(tight) and not e.R.any():
-            _refuse_penetration(e, _static(e))
-        return zero, zero
-    if start != "static":
-        raise UserError(f"start: '{start}' is none of static, rest, balance")
-    if not e.still[0].any() and not any(tight) and not any(map(_closed, e.contacts)):
-        return zero, zero  # preloads are in balance there
-    return _static(e), zero
+def _at_rest(e: MotionEquations, loaded: bool) -> Array:
+    """(m,) under the steady loads, or as preloaded."""
+    tight = any(c.offset[0] > 0 and not c.preload.any() for c in e.contacts)
+    if loaded and (e.still[0].any() or tight or any(map(_closed, e.contacts))):
+        return _static(e)
+    if not loaded and tight and not e.R.any():
+        _refuse_penetration(e, _static(e))
+    return np.zeros(len(e.omega2))  # preloads are in balance there
 
 
 def _closed(contact: Contact) -> bool:
@@ -733,22 +729,18 @@ def _closed(contact: Contact) -> bool:
 def refuse_behind(e: MotionEquations, q: Array) -> None:
     """Raise `UserError` where bodies of modes alone begin at q (m,) behind what is rigid: nothing
     would bring them out. Waves of the ground are left out."""
-    for c, u in zip(e.contacts, _places(e, e.D @ q + e.D_o @ e.oscillators(0.0)), strict=True):
+    parts = np.split(e.D @ q + e.D_o @ e.oscillators(0.0), np.cumsum([c.patch.count for c in e.contacts])[:-1])
+    for c, d in zip(e.contacts, parts, strict=False):
         law = c.patch.law
         if e.R.any() or not isinstance(law, SetValued) or law.normal is not None or (c.ground and c.ground.waves):
             continue
+        u = c.patch.kinematics @ (d + c.offset)
         deep = float(np.max(u[:, 0] - np.asarray(law.gap), initial=0.0))
         if deep > BEHIND:
             raise UserError(
                 f"start: begins {deep:.4g} m behind {c.name}, which is rigid; let the bodies go where its gap is open, "
                 "or correct the gap"
             )
-
-
-def _places(e: MotionEquations, d: Array) -> list[Array]:
-    """(n, 3) m of the points of each contact, of its coordinates (c,)."""
-    parts = np.split(d, np.cumsum([c.patch.count for c in e.contacts])[:-1])
-    return [c.patch.kinematics @ (x + c.offset) for c, x in zip(e.contacts, parts, strict=False)]
 
 
 def _refuse_penetration(e: MotionEquations, q: Array) -> None:

@@ -11,7 +11,6 @@ import h5py
 import numpy as np
 
 from ..contact.elements import Spring
-from ..contact.patch import Patch
 from ..data import Array
 from ..files.hdf5 import put
 from ..harmonic_balance.readout import measured
@@ -127,7 +126,10 @@ class Announced:
 def announced(name: str, e: MotionEquations, samples: int) -> Announced:
     """Of equations, with so many samples of a period."""
     outputs, patches = e.assembly.outputs, {id(c.patch): c.patch for c in e.contacts}
-    alike = {i: (_rubs(patch), gapes(patch)) for i, patch in patches.items()}
+    alike = dict[int, tuple[tuple[bool, ...], bool]]()
+    for key, patch in patches.items():
+        rubs = (np.abs(patch.kinematics[:, 1:]).max(axis=(0, 1)) > 0) & (not isinstance(patch.law, Spring))
+        alike[key] = tuple(map(bool, rubs)), gapes(patch)
     return Announced(
         name=name,
         Omega=e.Omega,
@@ -152,11 +154,6 @@ def read_announced(group: h5py.Group) -> Announced:
         touching=tuple(ContactFacts(name, tuple(tangential), opens) for name, tangential, opens in contacts),
         samples=int(told["samples_per_period"]),
     )
-
-
-def _rubs(patch: Patch) -> tuple[bool, ...]:
-    plane = np.abs(patch.kinematics[:, 1:]).max(axis=(0, 1)) > 0
-    return tuple(map(bool, plane & (not isinstance(patch.law, Spring))))
 
 
 @dataclass

@@ -23,14 +23,12 @@ from ..errors import UserError
 from ..harmonic_balance.forces import repeated
 from ..programs import program
 from . import fourth, loop
-from .bodies import Bodies, Hardest, MotionState, Options, Sample
-from .braking import Braking
-from .contacts import ContactGroup, Held, Yielding, force_at, gapes, slope_at, untouched
+from .bodies import Bodies, Hardest, MotionState, Options, Sample, Spots, spots
+from .contacts import Braking, ContactGroup, Held, Yielding, force_at, gapes, slope_at, untouched
 from .equations import MotionEquations
 from .flow import BodyFlow, blocks, flow
 from .ground import moving
 from .inclusion import Meets, meets
-from .spots import Spots, spots
 
 EVENTS = 8192
 """Events that one call of the loop keeps; of more, only their number is known."""

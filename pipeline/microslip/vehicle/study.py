@@ -12,8 +12,7 @@ from ..data import Array
 from ..errors import UserError
 from ..results import Journal
 from ..rolling.table import CreepTable, creep_table
-from .creep import Creep, linear, of_strips, of_table
-from .motion import Vehicle, critical_speed, hunting, roots, steady
+from .motion import Creep, Vehicle, critical_speed, hunting, linear, of_strips, of_table, roots, steady
 from .settings import VehicleCase
 from .wearing import (
     FIRST,

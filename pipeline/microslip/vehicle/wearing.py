@@ -16,7 +16,7 @@ from ..errors import UserError
 from ..interrupts import look
 from ..results import Journal
 from ..rolling.strips import creep_forces, tractions
-from ..rolling.wear import deposited, smoothed
+from ..rolling.wear import deposited, smoothed, strip_work
 from .motion import LEAST, Q, Vehicle, WheelContacts, WheelTurn, resampled, steady, steps_of_a_turn, turned
 from .touch import WheelTouch, touched
 
@@ -39,8 +39,7 @@ class Tread:
     def taken(self, on: WheelContacts, friction: float, shear: float, poisson: float) -> Array:
         """(wheels, places, n) m that passing each place once takes off (6.8-6); on: (places, wheels)."""
         t = tractions(*_flat(on), friction, shear, poisson, **self.how)
-        width = t.area[..., 0] / (t.x[..., 1] - t.x[..., 0])
-        depth = self.coefficient * (t.power * t.area).sum(axis=-1) / width
+        width, work = strip_work(t)
         middle = np.asarray(on.on_wheel).T.ravel()
         loaded = np.asarray(on.vertical).T.ravel() > 0
         outward = np.repeat(
@@ -48,7 +47,7 @@ class Tread:
         )  # the strips' y runs to the left, the profile's to the field side
         found = [
             deposited(d[::s], w[::s], m, self.y) if touches else np.zeros_like(self.y)
-            for d, w, m, s, touches in zip(depth, width, middle, outward, loaded, strict=True)
+            for d, w, m, s, touches in zip(self.coefficient * work, width, middle, outward, loaded, strict=True)
         ]
         return np.reshape(found, (len(self.sides), -1, len(self.y)))
 
