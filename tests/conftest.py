@@ -157,6 +157,14 @@ unjudged_file = pytest.fixture(_unjudged, scope="module", name="unjudged_file")
 
 
 @pytest.fixture
+def untried(monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest) -> None:
+    """A quick test that looks at the sentence which refuses a file has it read at once, not in a process of its own
+    first (0.7 s), as files without a seal are. Damage that is drawn is tried there as a user's is."""
+    if request.config.getoption("markexpr") == "not slow":
+        monkeypatch.setattr("microslip.files.hostile.trial", lambda *_, **__: "")
+
+
+@pytest.fixture
 def unestimated(monkeypatch: pytest.MonkeyPatch) -> None:
     """A slow test whose subject is not the error that harmonics leave does without its estimate as well."""
     monkeypatch.setattr("microslip.case.headline.is_estimated", lambda *_, **__: False)

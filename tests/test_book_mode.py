@@ -16,7 +16,7 @@ from microslip.contact.friction import Coulomb, StaticSliding
 from microslip.contact.harmonics import force_alone
 from microslip.contact.heights import Cut, Exponential, Linear, Polynomial, Smooth
 from microslip.contact.hertz import Hertz
-from microslip.contact.law import values
+from microslip.contact.law import value, values
 from microslip.contact.normal import Gapped, Greenwood, Penalty, Preload, Rough
 from microslip.contact.patch import Patch, equilibrium, grid
 from microslip.contact.point import PointContact
@@ -560,8 +560,8 @@ def test_points_that_begin_to_touch_later() -> None:
     """A gap per point in front of a law: of a spring its own gap; of a rough layer what each point has apart, 1e-12."""
     h = np.linspace(0, 3e-6, 12)
     plain, friction, c = number(C_N0 / 12), Coulomb(number(MU)), number(C_R0 / 12)
-    gapped = book.book_patch(patch(PointContact(Gapped(Penalty(plain), jnp.asarray(h)), friction, c)))
-    own = book.book_patch(patch(PointContact(Penalty(plain, jnp.asarray(h)), friction, c)))
+    gapped = book.book_patch(patch(PointContact(Gapped(Penalty(plain), value(h)), friction, c)))
+    own = book.book_patch(patch(PointContact(Penalty(plain, value(h)), friction, c)))
     u = motion(3)
     np.testing.assert_array_equal(gapped.force(u), own.force(u))
     whole = patch(apart(rough(12), h))

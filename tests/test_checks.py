@@ -7,7 +7,6 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
-import jax.numpy as jnp
 import numpy as np
 import pytest
 from test_harmonic_balance_time import cantilever, group, held
@@ -17,6 +16,7 @@ from test_response_stage import CASE, SAMPLES, respond
 from microslip.basis import read_basis
 from microslip.cli import main
 from microslip.contact.friction import Coulomb
+from microslip.contact.law import value
 from microslip.contact.normal import Penalty
 from microslip.contact.point import PointContact
 from microslip.continuation import Settings
@@ -157,7 +157,7 @@ def test_why_a_point_fails(monkeypatch: pytest.MonkeyPatch) -> None:
     """Newton's method at its limit, and of contacts that stay apart."""
     one = np.ones(1)
     rows = {"face": np.outer([1, 0, 0, 0, 0, 0], one), "push": one, "tip": one}
-    law = PointContact(Penalty(jnp.asarray(1.0), jnp.asarray(1e3)), Coulomb(jnp.asarray(0.3)), jnp.asarray(1.0))
+    law = PointContact(Penalty(value(1.0), value(1e3)), Coulomb(value(0.3)), value(1.0))
     gaping = held(group(one, rows, 0.025), law, [0], np.zeros(1), np.zeros(1), 0.3)
     newton = solver.newton
     monkeypatch.setattr(solver, "newton", lambda *a, **k: replace(newton(*a, **k), status="60 steps"))

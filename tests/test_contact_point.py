@@ -49,7 +49,7 @@ def third(law, u):
 
 
 def value(number):
-    return jnp.asarray(float(number))
+    return jnp.asarray(number, dtype=float)
 
 
 JENKINS = PointContact(Preload(value(N0)), Coulomb(value(MU)), value(K))

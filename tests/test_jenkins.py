@@ -35,7 +35,7 @@ def test_six_springs_are_those_of_an_even_patch(slider: int) -> None:
     np.testing.assert_allclose(stuck_stiffness(patch, np.zeros(6)), six, rtol=1e-12, atol=1e-6)
 
 
-@pytest.mark.parametrize("slider", [1, 2])
+@pytest.mark.parametrize("slider", [1, pytest.param(2, marks=pytest.mark.slow)])
 def test_one_harmonic_is_the_closed_form(slider: int) -> None:
     """A block pushed along the sliders, so that they slide as one; the error falls with the square of the samples."""
     springs = [Spring("ground", "block", (4e5, 3e5, 2e5))]

@@ -9,7 +9,6 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
-import jax.numpy as jnp
 import numpy as np
 import pytest
 from small import beam, table
@@ -23,8 +22,9 @@ from microslip.case.assemble import build
 from microslip.case.edges import rising
 from microslip.case.problem import problem_of
 from microslip.contact.friction import Coulomb
+from microslip.contact.law import value
 from microslip.contact.normal import Preload
-from microslip.contact.patch import Patch
+from microslip.contact.patch import Patch, grid
 from microslip.contact.point import PointContact
 from microslip.harmonic_balance import accuracy, checkpoint, refinement, response
 from microslip.harmonic_balance import problem as balance
@@ -56,7 +56,7 @@ class Stop(Exception):
 
 @pytest.fixture(scope="module")
 def problem() -> balance.Problem:
-    return balance.of(sector(6, 1, push=0.5), **(FINE | {"harmonics": 1, "samples": 48}))
+    return balance.of(sector(6, 1, push=0.5), **(FINE | {"harmonics": 1}))
 
 
 def free(*resonances: float) -> Assembly:
@@ -64,7 +64,7 @@ def free(*resonances: float) -> Assembly:
     one = np.ones(len(resonances))
     rows = {"face": np.zeros((6, len(one))), "push": one, "tip": one}
     body = group(2 * np.pi * np.array(resonances), rows, 0.01)
-    return replace(held(body, Cubic(jnp.asarray(0.0)), [1], np.zeros(1), np.zeros(1), 0.3), contacts=())
+    return replace(held(body, Cubic(value(0.0)), [1], np.zeros(1), np.zeros(1), 0.3), contacts=())
 
 
 def pairs(peaks: list[response.Resonance]) -> list[tuple[float, float]]:
@@ -110,7 +110,7 @@ def block(folder: Path) -> balance.Problem:
 
 def brittle(_: Path) -> balance.Problem:
     """An oscillator whose law has no value where it swings by more than a metre."""
-    return spring(Brittle(jnp.asarray(0.0)))
+    return spring(Brittle(value(0.0)))
 
 
 @pytest.mark.parametrize(
@@ -145,8 +145,8 @@ def test_a_sweep_with_points_that_fail_is_the_same_bit_by_bit_after_interrupts(
             found, peaks, again = answer("points", impatient)
             break
     assert runs > 5
-    for name, value in vars(whole).items():
-        np.testing.assert_array_equal(getattr(found, name), value, err_msg=name)
+    for name, kept in vars(whole).items():
+        np.testing.assert_array_equal(getattr(found, name), kept, err_msg=name)
     np.testing.assert_equal([p._asdict() for p in peaks], [p._asdict() for p in tops])
     np.testing.assert_equal(again, rows)
 
@@ -205,7 +205,7 @@ def softening(harmonics: int) -> balance.Problem:
     """q'' + 0.05 q' + q - 0.004 q^3 = 0.3 cos t, which leans to lower frequencies."""
     one = np.ones(1)
     rows = {"face": np.outer([0, 1, 0, 0, 0, 0], one), "push": one, "tip": one}
-    soft = held(group(one, rows, 0.025), Cubic(jnp.asarray(-0.004)), [1], np.zeros(1), np.zeros(1), 0.3)
+    soft = held(group(one, rows, 0.025), Cubic(value(-0.004)), [1], np.zeros(1), np.zeros(1), 0.3)
     return balance.of(soft, harmonics, 64, length=1.0)
 
 
@@ -245,14 +245,12 @@ def test_displacement_by_residual_shapes_is_what_the_monitor_reads() -> None:
     stored = basis.groups[0, 0]
     assert has_residual(stored, basis.reduction)
     group = in_modes(stored)
-    from test_operating import linear_patch
-
-    patch, _ = linear_patch((2, 2))
+    patch = Patch("right", *grid(0.012, 0.004, (3, 2)), sector(6, 1).contacts[0].patch.law)
     contact = preloaded_contact("rub", patch, ContactFace("small", "right"), None, normal=100.0)
     component = Component("small", {0: group}, residual_share=np.ones(len(group.compliance.labels)))
     outputs = tuple(Output("small", "tip-probe", f"u_{x}") for x in "xyz")
     assembly = Assembly((component,), (contact,), (Load("small", "shaker", 300.0),), outputs)
-    problem = balance.of(assembly, harmonics=3, samples=48)
+    problem = balance.of(assembly, harmonics=3, samples=FINE["samples"], cycles=FINE["cycles"])
     point = solve(problem, 2 * np.pi * 400.0, [])
     assert point.converged
     found = response.operating(problem, point)
@@ -280,7 +278,7 @@ def test_directions_of_a_monitor_that_are_not_neighbours(tmp_path: Path) -> None
         [Contact("sole", "b", (0, 0, -1))], [Force("f", "b", (1, 2, 0))], [Monitor("p0", "a"), Monitor("p1", "b")],
         ratio=0.02,
     ).basis().groups[0, 0]  # fmt: skip
-    law = PointContact(Preload(jnp.asarray(1e4)), Coulomb(jnp.asarray(0.5)), jnp.asarray(5e3))  # which sticks
+    law = PointContact(Preload(value(1e4)), Coulomb(value(0.5)), value(5e3))  # which sticks
     along, T = np.array([[[0.0], [1.0], [0.0]]]), group.interfaces["sole"].rows[1:2]
     patch, none = Patch("sole", np.zeros((1, 2)), np.ones(1), law, along), np.zeros(1)
     rub = Rub("rub", patch, ContactFace("pair", "sole", np.eye(6)[1:2], rows={0: T}), None, none, none)

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from functools import cache
 
-import jax.numpy as jnp
 import numpy as np
 import pytest
 from refusals import refused
 
 from microslip.contact.friction import Coulomb
+from microslip.contact.law import value
 from microslip.contact.normal import Penalty
 from microslip.contact.patch import Patch
 from microslip.contact.point import PointContact
@@ -33,7 +33,7 @@ def ring(blades: int) -> Stuck:
         "blade", [Body("tip", 1.0, free="x y")], [Spring("ground", "tip", (1e6, 2.2e6, 1.0))], faces,
         [Force("gas", "tip", (1, 0.4, 0))], [Monitor("tip", "tip")], ratio=0.002,
     ).basis()  # fmt: skip
-    law = PointContact(Penalty(jnp.asarray(2e4)), Coulomb(jnp.asarray(0.3)), jnp.asarray(1e4))
+    law = PointContact(Penalty(value(2e4)), Coulomb(value(0.3)), value(1e4))
     facing = across(np.diag([1.0, 1, 1]), np.diag([-1.0, -1, 1]))
     sides = ContactFace("blade", "right"), ContactFace("blade", "left", facing, 1)
     contact = preloaded_contact("shroud", Patch("right", np.zeros((1, 2)), np.array([1e-6]), law), *sides, normal=20.0)

@@ -11,7 +11,6 @@ import tomllib
 from dataclasses import replace
 from pathlib import Path
 
-import jax.numpy as jnp
 import matplotlib
 import meshio
 import numpy as np
@@ -23,6 +22,7 @@ import microslip as ms
 from microslip.case import load_case, run_case
 from microslip.contact.elements import Polynomial, Stop
 from microslip.contact.friction import Coulomb
+from microslip.contact.law import value
 from microslip.contact.patch import Patch
 from microslip.continuation import Settings
 from microslip.errors import UserError
@@ -411,7 +411,7 @@ def test_a_host_can_keep_its_process(host):
 
 def test_a_law_from_another_process_makes_jax_ready_and_leaves_what_the_host_chose(tmp_path):
     """As a worker of an ensemble gets it: 0.3 in double precision; the host's threads, folder and limits stay."""
-    (tmp_path / "law").write_bytes(pickle.dumps(Coulomb(jnp.asarray(0.3))))
+    (tmp_path / "law").write_bytes(pickle.dumps(Coulomb(value(0.3))))
     code = """import json, os, pathlib, pickle
 law = pickle.loads(pathlib.Path(os.environ["XDG_CACHE_HOME"], "../law").read_bytes())
 import jax

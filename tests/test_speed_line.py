@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import jax.numpy as jnp
 import numpy as np
 import pytest
 from refusals import refused
 from test_speed_range import TOP, ranged
 
 from microslip.contact.friction import Coulomb
+from microslip.contact.law import value
 from microslip.contact.normal import Penalty
 from microslip.contact.patch import Patch, grid
 from microslip.contact.point import PointContact
@@ -29,7 +29,7 @@ ORDER = 4
 def rubbing(push: float = 1e4) -> Assembly:
     """A blade whose tip rubs on a wall, pushed by a pressure."""
     places, areas = grid(0.02, 0.003, (3, 1))
-    law = PointContact(Penalty(jnp.asarray(1e6 / 3)), Coulomb(jnp.asarray(0.3)), jnp.asarray(5e5 / 3))
+    law = PointContact(Penalty(value(1e6 / 3)), Coulomb(value(0.3)), value(5e5 / 3))
     wall = preloaded_contact("wall", Patch("tip", places, areas, law), ContactFace("blade", "tip"), None, normal=1.0)
     component = Component("blade", {0: ranged().groups[0, 0]})
     return Assembly((component,), (wall,), (Load("blade", "gas", push),), (Output("blade", "end", "u_x"),))

@@ -372,7 +372,7 @@ def test_what_a_motion_reaches_is_all_that_changes():
     """A patch of 8 points, some of which slide: the map of everything, column by column, has the same largest
     multipliers as the map on what perturbations of the motion reach; a slider that sticks all the time adds 1s, one
     that slides adds how it forgets offsets across its path, along which nothing moves here."""
-    law = PointContact(Penalty(value(1e5)), Coulomb(value(0.3)), jnp.asarray([3e4] * 4 + [3e3] * 3 + [1e-3]))
+    law = PointContact(Penalty(value(1e5)), Coulomb(value(0.3)), value([3e4] * 4 + [3e3] * 3 + [1e-3]))
     places = np.column_stack([np.linspace(-0.01, 0.01, 8), np.zeros(8)])
     problem = one_mode(
         law, 8.0, [0.0, 2.5], [1e5, 1e4], [10.0, 4.0], (0, 1), length=1e-4, samples=128,

@@ -136,7 +136,7 @@ def test_the_worst_engine_order_in_stress_and_its_best_normal_force(ring: Path) 
         return problem_of(build(settings, {"blade": stressed()}), 1e4)
 
     found = [
-        replace(envelope.over_orders(partial(driven, push=push), [1, 2], (200.0, 420.0), 45), normal_force=push)
+        replace(envelope.over_orders(partial(driven, push=push), [1, 2], (200.0, 420.0), 15), normal_force=push)
         for push in (2.0, 1.0)
     ]
     for r in found:

@@ -740,6 +740,7 @@ def test_what_sticks_begins_no_slip_by_rounding() -> None:
     assert found.count("slips") == 0 and found.count("sticks") == 0
 
 
+@pytest.mark.usefixtures("untried")
 def test_what_is_no_whole_file_of_one_motion_is_refused(tmp_path: Path) -> None:
     path = orbit.run(equations.of(hitting(SLIPS, normal=0.5), 300.0), 0, 1, 64).save(tmp_path / "motion.h5")
     data = path.read_bytes()

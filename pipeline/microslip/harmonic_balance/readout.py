@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from .. import continuation
+from ..continuation import SEARCH, Peak, Settings
 from ..data import Array, ComplexArray
 from ..system.assembly import Assembly
 from ..units import METRES, Quantity
@@ -132,3 +134,10 @@ class WithOutput:
             at = self.problem.at(Omega)
             self._kept = (key, Omega, at, *at.forces(x))
         return self._kept[2:]
+
+
+def climbed(problem: Problem, x: Array, Omega: float, settings: Settings = SEARCH) -> Peak:
+    """The peak of the first read-out uphill from a motion x (size,) at Omega (rad/s), along the curve;
+    its steps are shares of the motion where that is large."""
+    large = max(problem.x_scale, float(np.abs(x).max(initial=0.0)))
+    return continuation.peak(WithOutput(replace(problem, x_scale=large)), x, Omega, settings)

@@ -11,7 +11,6 @@ import scipy.optimize
 
 from ..contact.patch import Patch
 from ..continuation import SEARCH
-from ..continuation import peak as climbed
 from ..data import Array, ComplexArray, Compliance, ModalGroup, Rows
 from ..results.checks import BALANCE, EXCHANGED, UNCHECKED, Checks, exchanged
 from ..results.series import of_solutions, without_rounding
@@ -23,7 +22,7 @@ from . import reduced
 from .checks import checks, judged
 from .point_cycles import Cycle, Traced
 from .problem import Problem
-from .readout import WithOutput, measured
+from .readout import climbed, measured
 from .solver import CONVERGED as CONVERGED
 from .solver import Point as Point
 from .solver import Report, solve, sweep
@@ -338,7 +337,7 @@ def highest(problem: Problem, response: HarmonicResponse, bracket: tuple[int, in
     if _closed_in(tried):
         return near, height
     band = replace(SEARCH, low=2 * np.pi * float(f[0]), high=2 * np.pi * float(f[-1]))
-    found = climbed(WithOutput(problem), near.x, near.Omega, band)
+    found = climbed(problem, near.x, near.Omega, band)
     if found.converged and band.low < found.lam < band.high and amplitude(found.lam / (2 * np.pi), found.x) >= height:
         return tried[-1]
     return near, height
