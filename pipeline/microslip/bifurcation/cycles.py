@@ -14,6 +14,7 @@ import scipy.integrate
 from ..continuation import NewtonSettings, Settings, branch_off, follow, newton
 from ..data import Array, ComplexArray
 from ..harmonic_balance.accuracy import SAFETY
+from ..progress import Report
 from . import equilibria, flow
 from .balance import Harmonics, equations, summed
 from .branches import LOST
@@ -22,8 +23,6 @@ from .dynamics import Dynamics
 from .equilibria import Hopf
 from .orbits import OFF, extremes
 from .shooting import PeriodicOrbit, is_stable
-
-Report = Callable[[str], None]
 
 PERIODS = 5
 """Of a motion in time that an orbit is checked by."""

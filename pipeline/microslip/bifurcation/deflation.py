@@ -12,7 +12,7 @@ and run through any number of times, or an equilibrium, which has every period: 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -21,6 +21,7 @@ import scipy.interpolate
 
 from ..continuation import Equations, NewtonSettings, newton
 from ..data import Array
+from ..progress import Report
 from .dynamics import Dynamics
 from .orbits import OrbitPoint
 from .shooting import PeriodicOrbit, Shooting
@@ -131,7 +132,7 @@ class Deflated:
 
 def coexisting(
     system: Dynamics, p: float, still: Sequence[Array], orbits: Sequence[PeriodicOrbit], nodes: int,
-    report: Callable[[str], None] = lambda _: None,
+    report: Report = lambda _: None,
 ) -> list[OrbitPoint]:  # fmt: skip
     """Periodic orbits at p that are none of the known ones, with their multipliers.
 

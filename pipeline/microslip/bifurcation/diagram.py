@@ -14,6 +14,7 @@ from ..continuation.curve import State
 from ..data import Array
 from ..errors import UserError
 from ..process import prepare
+from ..progress import Report
 from ..units import counted
 from . import deflation, equilibria, flow, orbits
 from .basin import Attractor, attractors
@@ -25,7 +26,6 @@ from .shooting import PeriodicOrbit, Shooting
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-Report = Callable[[str], None]
 Kept = Callable[[str], DiagramBranch | None]
 """A finished branch of a name, if there is one."""
 

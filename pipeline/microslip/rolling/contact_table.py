@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike
 
 from ..errors import UserError
 from ..programs import program
+from ..progress import Report
 from ..settings import arguments
 from ..settings.arguments import Count, Index, wholes
 from ..settings.numbers import Positive
@@ -304,7 +305,7 @@ def _mean(values: Array, weights: tuple[Array, ...]) -> Array:
 @arguments.checked
 def contact_table(
     track: Track, load: Positive, lateral: Positive, yaw: Positive, *, points: Annotated[Any, wholes(4, 2)] = POINTS,
-    checked: Count = 100, seed: Index = 0, report: Callable[[str], None] = lambda _: None,
+    checked: Count = 100, seed: Index = 0, report: Report = lambda _: None,
 ) -> ContactTable:  # fmt: skip
     """A table over poses, and its error at random ones.
 
@@ -334,7 +335,7 @@ LEAST = 1e-3
 
 def _found(
     track: Track, load: float, lateral: Array, yaw: Array, rolls: Array | None = None, friction: float = 0.0,
-    report: Callable[[str], None] = lambda _: None,
+    report: Report = lambda _: None,
 ) -> tuple[Patches, Array, Array]:  # fmt: skip
     """`Patches` (n, 2, k) of n poses, both as right wheels, the left one's of the mirrored pose; roll and down (n,)."""
     found, roll = [], 0.0

@@ -152,7 +152,7 @@ def placed(p: Poses, ratio: Any, xp: Any = np) -> tuple[Any, Any]:
     that are tabulated for them; ratio: a/b within the table. xp: numpy, or jax.numpy in what is traced."""
     c = xp.sqrt(p.a * p.b)
     pull = xp.stack([p.xi, p.eta * p.stiffness_y / p.stiffness_x, c * p.phi_x])
-    u, v, w = pull * (p.stiffness_x * c**2 / p.normal_force)
+    u, v, w = pull * p.stiffness_x * c**2 / p.normal_force
     r = xp.sqrt(u**2 + v**2 + ratio * w**2) / SATURATED
     forward, turned = xp.where(u < 0, -1.0, 1.0), xp.where(w < 0, -1.0, 1.0)
     root = ratio**0.25  # sqrt(a) where a b = 1, and 1/sqrt(b)

@@ -44,8 +44,8 @@ def strip_depth(source: Array, dx: float, coefficient: float, speed: float) -> A
 def strip_work(t: Tractions) -> tuple[Array, Array]:
     """(n, ny) m widths of the strips of n patches, and the work of friction over each in a passage, J/m^2: times a
     coefficient of wear what it takes off (6.8-6)."""
-    length = t.x[..., 1] - t.x[..., 0]
-    return t.area[..., 0] / length, (t.power * length[..., None]).sum(axis=-1)
+    width = t.area[..., 0] / (t.x[..., 1] - t.x[..., 0])
+    return width, (t.power * t.area).sum(axis=-1) / width
 
 
 def deposited(depth: Array, dy: float | Array, middle: float, y: Array) -> Array:

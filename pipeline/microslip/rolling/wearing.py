@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -11,6 +10,7 @@ import numpy as np
 from ..contact.friction import Friction
 from ..data import Array
 from ..errors import UserError
+from ..progress import Report
 from .ellipse import ellipses
 from .laws import RoughSurface, drag, rolled
 from .profiles import CrossSection
@@ -115,7 +115,7 @@ class ProfileWear:
 
 def wearing(
     case: RollingCase, track: Track, friction: Friction, surface: RoughSurface | None = None,
-    report: Callable[[str], None] = lambda _: None,
+    report: Report = lambda _: None,
 ) -> ProfileWear:  # fmt: skip
     """Updates of a case; wheel and rail are passed equally often.
 

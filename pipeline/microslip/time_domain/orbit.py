@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -22,6 +22,7 @@ from ..data import Array
 from ..errors import NotConverged, UserError
 from ..files.hdf5 import put, sealed
 from ..interrupts import look
+from ..progress import Report
 from ..settings.mistakes import bounded, numbered
 from ..system.assembly import Contact
 from ..units import METRES, UNIT_OF_FREQUENCY, Quantity, counted, hertz
@@ -38,7 +39,6 @@ from .stepper import KINDS, Stepper, static_force
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-Report = Callable[[str], None]
 Start = Literal["static", "rest"] | Released
 
 FORMAT = "microslip-orbit"

@@ -11,7 +11,7 @@ from __future__ import annotations
 import contextlib
 import json
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -27,13 +27,14 @@ from ..files.hostile import DAMAGE, inspect, refuse_damaged, short
 from ..files.store import complete_or_absent, fingerprint, ordinary, put_in_place, refused
 from ..harmonic_balance import solved
 from ..harmonic_balance.nonlinear_modes import Backbone
+from ..progress import Report
 from ..results.dataset import Dataset, is_dataset, read_dataset
 from ..results.series import Series
 from ..results.tones import TwoTones, is_of_tones, read_tones
 from ..settings.arguments import checked
 from . import orbit
 from .equations import MotionEquations
-from .orbit import FORMAT, FORMAT_VERSION, Orbit, Report, Start, head, read_ended, tell
+from .orbit import FORMAT, FORMAT_VERSION, Orbit, Start, head, read_ended, tell
 from .samples import STRIP, UNITS, KeptSamples, Where, announced, read_announced, sizes, units_with
 from .starts import PeriodicStart
 
@@ -225,9 +226,7 @@ def _beside(path: Path, what: str) -> Path:
 
 
 @contextlib.contextmanager
-def recording(
-    path: Path, inputs: str, plan: Sequence[Integration], fresh: bool, report: Callable[[str], None]
-) -> Iterator[Recording]:
+def recording(path: Path, inputs: str, plan: Sequence[Integration], fresh: bool, report: Report) -> Iterator[Recording]:
     """A file of motions to be filled, from where it was left; at the end, where all motions have, it takes its name.
 
     Args:

@@ -24,6 +24,7 @@ from ..harmonic_balance.refinement import between
 from ..harmonic_balance.response import HarmonicResponse, operating
 from ..harmonic_balance.solver import CONVERGED, Point
 from ..interrupts import look
+from ..progress import Report
 from ..results import Journal
 from ..results.names import exact
 from ..system.assembly import Assembly
@@ -294,7 +295,7 @@ class Sweeps:
         found: HarmonicResponse,
         gap: tuple[float, float],
         normal: float,
-        report: Callable[[str], None],
+        report: Report,
         patience: float,
         journal: Journal | None = None,
     ) -> None:

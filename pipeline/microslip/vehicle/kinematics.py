@@ -14,6 +14,7 @@ import numpy as np
 from ..data import Array
 from ..errors import UserError, at, in_its_file
 from ..files import store
+from ..progress import Report
 from ..results import Journal
 from ..rolling.wear import smoothed
 from ..rolling.wheelset import Pose, Side, Track, patches
@@ -353,7 +354,7 @@ class KinematicsAnswer:
 
 
 def recorded(
-    case: KinematicsCase, folder: Path, report: Callable[[str], None] = lambda _: None, journal: Journal | None = None
+    case: KinematicsCase, folder: Path, report: Report = lambda _: None, journal: Journal | None = None
 ) -> KinematicsAnswer:
     """Wear of a case whose files stand in a folder.
 

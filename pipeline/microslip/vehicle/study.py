@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -10,6 +9,7 @@ import numpy as np
 
 from ..data import Array
 from ..errors import UserError
+from ..progress import Report
 from ..results import Journal
 from ..rolling.table import CreepTable, creep_table
 from .motion import Creep, Vehicle, critical_speed, hunting, linear, of_strips, of_table, roots, steady
@@ -179,7 +179,7 @@ class VehicleAnswer:
 
 
 def study(
-    case: VehicleCase, folder: Path, report: Callable[[str], None] = lambda _: None, journal: Journal | None = None
+    case: VehicleCase, folder: Path, report: Report = lambda _: None, journal: Journal | None = None
 ) -> VehicleAnswer:
     """Wear of a case whose files stand in a folder.
 
@@ -213,7 +213,7 @@ def study(
     return VehicleAnswer(case, v, r, history, ended, np.array(speeds), table_of, wheel, critical, table)
 
 
-def _creep(case: VehicleCase, v: Vehicle, report: Callable[[str], None]) -> tuple[Creep, CreepTable | None]:
+def _creep(case: VehicleCase, v: Vehicle, report: Report) -> tuple[Creep, CreepTable | None]:
     if case.running.creep == "linear":
         return linear, None
     if case.running.creep == "strips":
@@ -229,7 +229,7 @@ SPEEDS = "speeds"
 
 
 def _all_grown(
-    case: VehicleCase, r: RunningVehicle, wheel: int, report: Callable[[str], None], journal: Journal | None
+    case: VehicleCase, r: RunningVehicle, wheel: int, report: Report, journal: Journal | None
 ) -> list[Array | None]:
     """Of each speed (orders,) per turn; None where it does not run."""
     known = {} if journal is None else journal.of(SPEEDS)
@@ -244,9 +244,7 @@ def _all_grown(
     return found
 
 
-def _grown(
-    case: VehicleCase, r: RunningVehicle, speed: float, wheel: int, report: Callable[[str], None]
-) -> Array | None:
+def _grown(case: VehicleCase, r: RunningVehicle, speed: float, wheel: int, report: Report) -> Array | None:
     """(orders,) per turn; None where it does not run."""
     report(f"growth at {speed:g} m/s")
     at = r.vehicle._replace(speed=speed)

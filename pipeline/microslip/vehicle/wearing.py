@@ -14,6 +14,7 @@ import numpy as np
 from ..data import Array
 from ..errors import UserError
 from ..interrupts import look
+from ..progress import Report
 from ..results import Journal
 from ..rolling.strips import creep_forces, tractions
 from ..rolling.wear import deposited, smoothed, strip_work
@@ -352,7 +353,7 @@ JUMPS = "jumps"
 
 def worn(
     r: Wears[S], of: Callable[[Mapping[str, Any]], S], turns: float, tolerance: float, first: float,
-    report: Callable[[str], None], journal: Journal | None,
+    report: Report, journal: Journal | None,
 ) -> tuple[list[tuple[S, Jump]], str]:  # fmt: skip
     """All of `jumps`, each kept in a journal and found there, and why they end early, or nothing.
 
