@@ -164,15 +164,19 @@ class Balance:
             j = np.flatnonzero(changes[i])
             parts = P.T[:, :, None] * (J[:, i, j] - mean[i, j])
             found[:, i][:, :, j] -= np.tensordot(parts, E, (1, 0)).swapaxes(1, 2)
-        size = len(x)
-        R, A, over = np.zeros(size), np.zeros((size, size)), np.zeros(size)
-        R[: k * n], A[: k * n, : k * n] = (omega * moving - P.T @ f).ravel(), found.reshape(k * n, k * n)
-        over[: k * n] = (change * moving - P.T @ slope).ravel()
-        if self.free:
-            phase = (self.reference.slopes / np.asarray(self.system.scale) ** 2).ravel()
-            A[: k * n, -1], A[-1, : k * n] = moving.ravel(), phase
-            R[-1] = phase @ (c - self.reference.c).ravel()
-        return R, A, over
+        phase = (self.reference.slopes / np.asarray(self.system.scale) ** 2).ravel()
+        R, over = (omega * moving - P.T @ f).ravel(), (change * moving - P.T @ slope).ravel()
+        return self._with_phase(R, found.reshape(k * n, k * n), over, moving.ravel(), phase, c - self.reference.c)
+
+    def _with_phase(
+        self, R: Array, A: Array, over: Array, faster: Array, phase: Array, off: Array
+    ) -> tuple[Array, Array, Array]:
+        """Equations of a free orbit have a further unknown, its frequency, over which they change by `faster`, and the
+        condition that orbits which are `off` the reference have its phase."""
+        if not self.free:
+            return R, A, over
+        A = np.block([[A, faster[:, None]], [phase, np.zeros(1)]])
+        return np.append(R, phase @ off.ravel()), A, np.append(over, 0.0)
 
 
 def balanced(orbit: PeriodicOrbit, H: int, settings: NewtonSettings | None = None) -> tuple[Harmonics, Solution]:
@@ -270,17 +274,11 @@ class CondensedBalance(Balance):
         at = _Answer(self, z, omega, lam)
         own = at.x + (z - at.x @ self.V) @ self.V.T  # where f is as linear as said
         slope = np.asarray(self._over(E @ own, float(lam), at.angles))
-        R, A, over = np.zeros(len(x)), np.zeros((len(x), len(x))), np.zeros(len(x))
-        R[: k * r] = (z - at.x @ self.V).ravel()
-        A[: k * r, : k * r] = np.eye(k * r) - at.derivative.reshape(k * r, k * r)
         faster = at.through(differentiated(at.x)).ravel()
-        over[: k * r] = change * faster - at.through(P.T @ slope).ravel()
-        if self.free:
-            size = np.asarray(self.system.scale)
-            phase = ((self.reference.slopes / size**2) @ self.V).ravel()
-            A[: k * r, -1], A[-1, : k * r] = faster, phase
-            R[-1] = phase @ (z - self.reference.c @ self.V).ravel()
-        return R, A, over
+        R, A = (z - at.x @ self.V).ravel(), np.eye(k * r) - at.derivative.reshape(k * r, k * r)
+        over = change * faster - at.through(P.T @ slope).ravel()
+        phase = ((self.reference.slopes / np.asarray(self.system.scale) ** 2) @ self.V).ravel()
+        return self._with_phase(R, A, over, faster, phase, z - self.reference.c @ self.V)
 
 
 class _Answer:

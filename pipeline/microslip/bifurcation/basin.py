@@ -83,10 +83,10 @@ def _closed(
     if not np.isfinite(way).all() or np.ptp(way / size, axis=0).max() < 10 * BACK:
         return []
     for one in known:
-        lasts = int(np.ceil(one.period / step))
-        if np.abs(_extremes(way[-lasts - 1 :]) - _extremes(one.sampled(2))).max() < 3 * BACK * size.max():
-            if np.abs(np.ptp(way[-lasts - 1 :], axis=0) - np.ptp(one.sampled(2), axis=0)).max() < BACK * size.max():
-                return [one]
+        last, sampled = way[-int(np.ceil(one.period / step)) - 1 :], one.sampled(2)
+        ends = np.abs(_extremes(last) - _extremes(sampled)).max() < 3 * BACK * size.max()
+        if ends and np.abs(np.ptp(last, axis=0) - np.ptp(sampled, axis=0)).max() < BACK * size.max():
+            return [one]
     away = np.abs((way - way[0]) / size).max(axis=1)
     back = [i for i in range(2, len(away) - 1)
             if away[i] <= away[i - 1] and away[i] <= away[i + 1] and away[i] < 0.1 * away[:i].max()]  # fmt: skip

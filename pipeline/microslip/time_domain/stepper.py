@@ -155,9 +155,11 @@ class Stepper:
         """Of steps of fourth order, group by group."""
         if not self.options.halvings:
             return ()
-        ends = np.cumsum([g.G.shape[0] * g.G.shape[1] for g in self.groups])[:-1]
         rest = np.concatenate([np.einsum("cnik,ck->cni", g.G, g.offset).reshape(-1, 3) for g in self.groups])
-        return tuple(spots(*parts) for parts in zip(*(np.split(x, ends) for x in (*self._points, rest)), strict=True))
+        return tuple(spots(*parts) for parts in zip(*map(self._by_group, (*self._points, rest)), strict=True))
+
+    def _by_group(self, of_points: Array) -> list[Array]:
+        return np.split(of_points, np.cumsum([g.G.shape[0] * g.G.shape[1] for g in self.groups])[:-1])
 
     @property
     def _braking(self) -> Braking | None:
@@ -165,8 +167,7 @@ class Stepper:
             return None
         D, moved = self.equations.D[self.rows], self._points[0][:, 1:].reshape(-1, len(self.equations.omega2))
         most = 0.5 * self.tau * np.abs(moved @ moved.T).sum(axis=1).reshape(-1, 2).max(axis=1, initial=0.0)
-        ends = np.cumsum([g.G.shape[0] * g.G.shape[1] for g in self.groups])[:-1]
-        return Braking(0.5 * self.tau * D @ D.T, tuple(np.split(most, ends)))
+        return Braking(0.5 * self.tau * D @ D.T, tuple(self._by_group(most)))
 
     def _meets(self, flows: BodyFlow) -> Meets | None:
         """Of set-valued points, see `inclusion`.
@@ -174,7 +175,8 @@ class Stepper:
         Raises:
             UserError: they stand beside other laws on bodies that yield, or some yield and some do not.
         """
-        e, rigid = self.equations, np.array([r for G, r in self._spots for _ in G], dtype=bool)
+        e, points = self.equations, [np.full(g.G.shape[0] * g.G.shape[1], g.rigid) for g in self.groups]
+        rigid = np.concatenate([np.zeros(0, dtype=bool), *points])
         if not rigid.any():
             return None
         if not e.R.any():
@@ -193,7 +195,7 @@ class Stepper:
                 f"contacts {names}: restitution: is for bodies of modes alone; these yield beside them, and what "
                 "comes back is theirs: leave it out"
             )
-        rows = np.concatenate([G for G, _ in self._spots]).reshape(-1, len(e.D))
+        rows = self._rows.reshape(-1, len(e.D))
         yields, moves = rows @ e.R[np.ix_(self.rows, self.rows)] @ rows.T, np.abs(rows).any(axis=1)
         if np.diag(yields)[moves].min() <= 1e-9 * np.diag(yields).max():
             raise UserError(
@@ -203,23 +205,16 @@ class Stepper:
         return meets(yields)
 
     @cached_property
-    def _spots(self) -> list[tuple[Array, bool]]:
-        """Of each contact as the loop has them: (n, 3, c) of its points, and whether its law is set-valued."""
-        begin, found = 0, []
-        for g in self.groups:
-            for G in np.asarray(g.G):
-                rows = np.zeros((*G.shape[:2], len(self.rows)))
-                rows[:, :, begin : begin + G.shape[2]] = G
-                found.append((rows, g.rigid))
-                begin += G.shape[2]
-        return found
+    def _rows(self) -> Array:
+        """(points, 3, c): motion of all points by the contact coordinates, as the loop has them."""
+        each = [np.asarray(G).reshape(-1, G.shape[-1]) for g in self.groups for G in g.G]
+        rows = scipy.linalg.block_diag(np.zeros((0, 0)), *each)
+        return np.asarray(rows.reshape(len(rows) // 3, 3, len(self.rows)))
 
     @property
     def _points(self) -> tuple[Array, Array]:
         """(points, 3, m) and (points, 3, n): motion of all points by modes and by what the loads move beside them."""
-        e = self.equations
-        spots = np.concatenate([np.zeros((0, 3, len(e.D))), *(G for G, _ in self._spots)])
-        return spots @ e.D[self.rows], spots @ e.D_o[self.rows]
+        return self._rows @ self.equations.D[self.rows], self._rows @ self.equations.D_o[self.rows]
 
     def start(self, q: Array, v: Array, held: Held | None = None) -> MotionState:
         """At time 0, at rest or moving, from modal coordinates (m,) and velocities; contacts come there on a straight

@@ -18,6 +18,7 @@ from ..progress import Report
 from ..results import Journal
 from ..rolling.wear import smoothed
 from ..rolling.wheelset import Pose, Side, Track, patches
+from ..settings.mistakes import is_number
 from .motion import WheelContacts
 from .settings import KinematicsCase, track_of, worn_tracks
 from .wearing import (
@@ -27,6 +28,7 @@ from .wearing import (
     Jump,
     LeavesTheRail,
     Tread,
+    WearState,
     columns_of,
     error_of,
     filtered,
@@ -100,16 +102,13 @@ def _numbers(row: list[str], head: list[str]) -> list[float]:
             f"has {len(row)} cells and the first line {len(head)}; write decimal points, and commas between "
             "the columns alone"
         )
-    found = []
+    numbers = []
     for column in (*NEEDED, *GIVEN):
-        cell = row[head.index(column)] if head.index(column) < len(row) else ""
-        try:
-            found.append(float(cell))
-        except ValueError:
-            found.append(np.nan)
-        if not np.isfinite(found[-1]):
-            raise UserError(f"{column}: '{cell.strip()}' is no finite number; leave out what is not known")
-    return found
+        cell = row[head.index(column)].strip()
+        if not (is_number(cell) and np.isfinite(float(cell))):
+            raise UserError(f"{column}: '{cell}' is no finite number; leave out what is not known")
+        numbers.append(float(cell))
+    return numbers
 
 
 def _sound(k: Kinematics) -> None:
@@ -205,24 +204,16 @@ class ContactPlaces:
 
 
 @dataclass(frozen=True, eq=False)
-class Passed:
-    """What the turns of a file do at one amount of wear.
+class Passed(WearState):
+    """What the turns of a file do at one amount of wear; depth: (1, places, strips), taken in their mean.
 
     Attributes:
-        turns: so far. depth: (1, places, strips) m worn. taken: m in one turn, in the mean over those of the file.
-            each: (turns of the file, places) m where a new wheel's contact runs, of each of them. friction: (1,) J in
+        each: (turns of the file, places) m where a new wheel's contact runs, of each of them. friction: (1,) J in
             one turn, in the mean.
     """
 
-    turns: float
-    depth: Array
-    taken: Array
     each: Array
     friction: Array
-
-    def point(self) -> dict[str, Any]:
-        """Names -> arrays, for a journal."""
-        return vars(self)
 
     @staticmethod
     def of(point: Mapping[str, Any]) -> Passed:

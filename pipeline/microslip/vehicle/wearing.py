@@ -105,15 +105,25 @@ TURNS = 40
 
 
 @dataclass(frozen=True, eq=False)
-class Running:
-    """Running at one amount of wear. Attributes: turns: so far. depth: (2, places, n) m. radius: (places, 2) deviation
-    that the contacts see, m. one: a turn. taken: (2, places, n) m in it. start, map_: for the next one."""
+class WearState:
+    """What wears. Attributes: turns: so far. depth: (wheels, places, n) m. taken: in one turn, m."""
 
     turns: float
     depth: Array
+    taken: Array
+
+    def point(self) -> dict[str, Any]:
+        """Names -> arrays, for a journal."""
+        return vars(self)
+
+
+@dataclass(frozen=True, eq=False)
+class Running(WearState):
+    """Running at one amount of wear. Attributes: radius: (places, 2) deviation that the contacts see, m. one: a turn.
+    start, map_: for the next one."""
+
     radius: Array
     one: WheelTurn
-    taken: Array
     start: Array
     map_: Array | None
 
@@ -189,7 +199,7 @@ class RunningVehicle:
         radius = filtered(r.shape - r.tread.seen(depth - told, on), half, float(v.over.radius.mean()))
         one, x, map_ = r.periodic(x, radius, map_)
         taken = r.tread.taken(one.on, v.friction, v.shear, v.poisson)
-        return Running(turns, depth, radius, one, taken, x, map_)
+        return Running(turns, depth, taken, radius, one, x, map_)
 
     def seen(self, depth: Array, now: Running) -> Array:
         """(places, 2) m that a running sees of it."""
@@ -270,18 +280,6 @@ class Jump:
     volume: Array
     work: Array
     waves: Array
-
-
-class WearState(Protocol):
-    """Of what wears. Attributes: turns: so far. depth: (wheels, places, n) m. taken: in one turn, m."""
-
-    @property
-    def turns(self) -> float: ...
-    @property
-    def depth(self) -> Array: ...
-    @property
-    def taken(self) -> Array: ...
-    def point(self) -> dict[str, Any]: ...
 
 
 S = TypeVar("S", bound=WearState)
