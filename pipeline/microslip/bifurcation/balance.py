@@ -155,18 +155,18 @@ class Balance:
         f, J, slope = map(np.asarray, self._rates(E @ c, float(lam), angles))
         D = differentiated(np.eye(k))
         moving = differentiated(c)
-        found = np.zeros((k, n, k, n))
-        found[:, range(n), :, range(n)] += omega * D
+        J_c = np.zeros((k, n, k, n))
+        J_c[:, range(n), :, range(n)] += omega * D
         mean = J.mean(axis=0)
-        found[range(k), :, range(k), :] -= mean
+        J_c[range(k), :, range(k), :] -= mean
         changes = np.ptp(J, axis=0) > 1e-13 * np.abs(J).max()
         for i in np.flatnonzero(changes.any(axis=1)):
             j = np.flatnonzero(changes[i])
             parts = P.T[:, :, None] * (J[:, i, j] - mean[i, j])
-            found[:, i][:, :, j] -= np.tensordot(parts, E, (1, 0)).swapaxes(1, 2)
+            J_c[:, i][:, :, j] -= np.tensordot(parts, E, (1, 0)).swapaxes(1, 2)
         phase = (self.reference.slopes / np.asarray(self.system.scale) ** 2).ravel()
         R, over = (omega * moving - P.T @ f).ravel(), (change * moving - P.T @ slope).ravel()
-        return self._with_phase(R, found.reshape(k * n, k * n), over, moving.ravel(), phase, c - self.reference.c)
+        return self._with_phase(R, J_c.reshape(k * n, k * n), over, moving.ravel(), phase, c - self.reference.c)
 
     def _with_phase(
         self, R: Array, A: Array, over: Array, faster: Array, phase: Array, off: Array
@@ -183,8 +183,8 @@ def balanced(orbit: PeriodicOrbit, H: int, settings: NewtonSettings | None = Non
     """The orbit of H harmonics near another one, and how Newton's method found it."""
     begin = of_orbit(orbit, H)
     problem = Balance(orbit.system, begin, orbit.turns)
-    found = newton(problem, problem.unknowns(begin), orbit.p, settings)
-    return problem.orbit(found.x, orbit.p), found
+    solution = newton(problem, problem.unknowns(begin), orbit.p, settings)
+    return problem.orbit(solution.x, orbit.p), solution
 
 
 def distance(one: Harmonics, orbit: PeriodicOrbit, each: int = 32) -> float:
@@ -223,8 +223,8 @@ class CondensedBalance(Balance):
 
     @property
     def x_scale(self) -> Array:
-        own = np.abs(self.V).T @ np.asarray(self.system.scale) / np.abs(self.V).sum(axis=0)
-        scale = np.tile(own, len(self.reference.c))
+        sizes = np.abs(self.V).T @ np.asarray(self.system.scale) / np.abs(self.V).sum(axis=0)
+        scale = np.tile(sizes, len(self.reference.c))
         return np.append(scale, self.reference.omega) if self.free else scale
 
     @cached_property
@@ -299,7 +299,7 @@ class _Answer:
     @cached_property
     def rows(self) -> ComplexArray:
         """(H + 1, r, n) V^T (i h omega - A)^-1."""
-        return np.array([scipy.linalg.lu_solve(one, self.V.astype(complex), trans=1).T for one in self.factors])
+        return np.array([scipy.linalg.lu_solve(factors, self.V.astype(complex), trans=1).T for factors in self.factors])
 
     def through(self, g: Array) -> Array:
         """(k, r) harmonics of z under those of a right-hand side (k, n)."""
@@ -309,17 +309,17 @@ class _Answer:
     def derivative(self) -> Array:
         """(k, r, k, r) of V^T x over z."""
         k, r, N = self.E.shape[1], self.V.shape[1], len(self.E)
-        found = np.zeros((k, r, k, r))
+        D = np.zeros((k, r, k, r))
         flat = self.slopes.transpose(1, 0, 2).reshape(len(self.V), N * r)
         for h, rows in enumerate(self.rows):
             each = (rows @ flat).reshape(r, N, r)
             cosine = self.P[:, 2 * h - 1] - 1j * self.P[:, 2 * h] if h else self.P[:, 0]
             part = np.einsum("ajb,jc->acb", each, cosine[:, None] * self.E, optimize=True)
             if h:
-                found[2 * h - 1], found[2 * h] = part.real, -part.imag
+                D[2 * h - 1], D[2 * h] = part.real, -part.imag
             else:
-                found[0] = part.real
-        return found
+                D[0] = part.real
+        return D
 
 
 def _complex(c: Array) -> ComplexArray:
@@ -328,6 +328,6 @@ def _complex(c: Array) -> ComplexArray:
 
 
 def _real(c: ComplexArray) -> Array:
-    found = np.zeros((2 * len(c) - 1, c.shape[1]))
-    found[0], found[1::2], found[2::2] = c[0].real, c[1:].real, -c[1:].imag
-    return found
+    harmonics = np.zeros((2 * len(c) - 1, c.shape[1]))
+    harmonics[0], harmonics[1::2], harmonics[2::2] = c[0].real, c[1:].real, -c[1:].imag
+    return harmonics

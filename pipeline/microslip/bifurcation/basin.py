@@ -57,21 +57,21 @@ def attractors(system: Dynamics, centre: Array, p: float, count: int, seed: int,
         look()
         seen.append(np.asarray(run(seen[-1], p, slow / EACH, 0.0)))
     ways = np.swapaxes(np.array(seen), 0, 1)
-    found: list[PeriodicOrbit] = []
+    orbits_found: list[PeriodicOrbit] = []
     counts: list[int] = []
     swings: list[Array] = []
     for way in ways:
-        for orbit in _closed(system, way, p, slow / EACH, nodes, found):
-            same = next((i for i, one in enumerate(found) if alike(one, orbit)), None)
+        for orbit in _closed(system, way, p, slow / EACH, nodes, orbits_found):
+            same = next((i for i, orbit_before in enumerate(orbits_found) if alike(orbit_before, orbit)), None)
             if same is None:
-                found.append(orbit)
+                orbits_found.append(orbit)
                 counts.append(1)
                 last = way[-int(np.ceil(orbit.period * EACH / slow)) - 1 :]
                 largest, smallest = extremes(system.seen(last, p), closed=False)
                 swings.append(0.5 * (largest - smallest))
             else:
                 counts[same] += 1
-    return [Attractor(o, n / count, y) for o, n, y in zip(found, counts, swings, strict=True)]
+    return [Attractor(o, n / count, y) for o, n, y in zip(orbits_found, counts, swings, strict=True)]
 
 
 def _closed(
@@ -82,11 +82,11 @@ def _closed(
     size = np.asarray(system.scale)
     if not np.isfinite(way).all() or np.ptp(way / size, axis=0).max() < 10 * BACK:
         return []
-    for one in known:
-        last, sampled = way[-int(np.ceil(one.period / step)) - 1 :], one.sampled(2)
+    for orbit_before in known:
+        last, sampled = way[-int(np.ceil(orbit_before.period / step)) - 1 :], orbit_before.sampled(2)
         ends = np.abs(_extremes(last) - _extremes(sampled)).max() < 3 * BACK * size.max()
         if ends and np.abs(np.ptp(last, axis=0) - np.ptp(sampled, axis=0)).max() < BACK * size.max():
-            return [one]
+            return [orbit_before]
     away = np.abs((way - way[0]) / size).max(axis=1)
     back = [i for i in range(2, len(away) - 1)
             if away[i] <= away[i - 1] and away[i] <= away[i + 1] and away[i] < 0.1 * away[:i].max()]  # fmt: skip

@@ -110,14 +110,14 @@ class DiagramBranch:
 
 def of_orbits(name: str, born: str, ended: str, found: list[OrbitPoint], each: int = 8) -> DiagramBranch:
     """A branch of periodic orbits, read at so many times a node."""
-    orbits = [one.orbit for one in found]
+    orbits = [point.orbit for point in found]
     ends = [extremes(o.system.seen(o.sampled(each), o.p)) for o in orbits]
     return DiagramBranch(
         name, born, ended, orbits[0].turns, orbits[0].system.named,
         np.array([o.p for o in orbits]), np.array([o.period for o in orbits]), np.array([o.x for o in orbits]),
         np.array([largest for largest, _ in ends]), np.array([smallest for _, smallest in ends]),
-        np.array([one.multipliers for one in found]), np.array([one.stable for one in found]),
-        np.array([one.kind for one in found]), orbits[0].system.units,
+        np.array([point.multipliers for point in found]), np.array([point.stable for point in found]),
+        np.array([point.kind for point in found]), orbits[0].system.units,
     )  # fmt: skip
 
 
@@ -125,8 +125,8 @@ def joined(back: DiagramBranch, forth: DiagramBranch) -> DiagramBranch:
     """Two branches that begin at the same point, as one: the first one from its end to its beginning, then the second.
     It ended as both did."""
     both: dict[str, Any] = {key: np.concatenate([getattr(back, key)[:0:-1], getattr(forth, key)]) for key in ARRAYS}
-    said = [one.ended for one in (back, forth)]
-    ended = next((words for words in said if words.startswith(LOST)), f"{said[0]}; {said[1]}")
+    ends = [branch.ended for branch in (back, forth)]
+    ended = next((words for words in ends if words.startswith(LOST)), f"{ends[0]}; {ends[1]}")
     return replace(forth, ended=ended, **both)
 
 
@@ -136,10 +136,10 @@ class Collected:
     branches: tuple[DiagramBranch, ...]
 
     def __getitem__(self, name: str) -> DiagramBranch:
-        known = {b.name: b for b in self.branches}
-        if name not in known:
-            raise UserError(f"branch '{name}': there are {', '.join(known)}")
-        return known[name]
+        by_name = {b.name: b for b in self.branches}
+        if name not in by_name:
+            raise UserError(f"branch '{name}': there are {', '.join(by_name)}")
+        return by_name[name]
 
     def at(self, kind: str) -> dict[str, Array]:
         """Branch -> values of the parameter at its points of a kind: ``Hopf``, ``fold``, ``period doubling``,
@@ -162,16 +162,16 @@ class Collected:
 
 def columns(branch: DiagramBranch) -> dict[str, Any]:
     """Column -> values of a table."""
-    found: dict[str, Any] = {"branch": np.array([branch.name] * len(branch)), "kind": branch.kind,
+    table: dict[str, Any] = {"branch": np.array([branch.name] * len(branch)), "kind": branch.kind,
                              "parameter": branch.parameter, "stable": branch.stable.astype(int),
                              "period_s": branch.period}  # fmt: skip
     for i, name in enumerate(branch.outputs):
         column = Quantity(branch.units[i]).column if branch.units else str
         for what in ("largest", "smallest"):
-            found[column(f"{name.replace(' ', '_')}_{what}")] = getattr(branch, what)[:, i]
+            table[column(f"{name.replace(' ', '_')}_{what}")] = getattr(branch, what)[:, i]
     first = np.abs(branch.multipliers).max(axis=1, initial=0.0)
     decisive = branch.multipliers[:, 0] if branch.multipliers.shape[1] else np.zeros(len(branch), complex)
-    return found | {"multiplier_real": decisive.real, "multiplier_imaginary": decisive.imag} | (
+    return table | {"multiplier_real": decisive.real, "multiplier_imaginary": decisive.imag} | (
         {} if branch.still else {"multiplier_size": first}
     )  # fmt: skip
 

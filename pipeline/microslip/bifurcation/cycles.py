@@ -147,8 +147,8 @@ def _born_at(
     first = branch_off(problem, problem.unknowns(problem.reference), hopf.p, (problem.way(way), 0.0), asked)
     orbits, ended = list[Harmonics](), ""
     for state in follow(problem, first, asked):
-        for one in state.found:
-            orbit = problem.orbit(one.x, one.lam)
+        for point in state.found:
+            orbit = problem.orbit(point.x, point.lam)
             orbits.append(orbit)
         ended = state.status
         report(f"limit cycle {len(orbits)} of {points}, {state.y[-1] * system.parameter_scale:.6g}")
@@ -165,14 +165,20 @@ def in_time(system: Dynamics, orbit: Harmonics, periods: int = PERIODS) -> tuple
 
     turns = np.append((np.arange(periods)[:, None] + TURNS).ravel(), periods)
     times = turns * 2 * np.pi / orbit.omega
-    own = orbit.at(turns) / size
+    motion = orbit.at(turns) / size
     run = scipy.integrate.solve_ivp(
-        rate, (0.0, times[-1]), own[0], method="DOP853", t_eval=times, rtol=FINE, atol=FINE * np.ptp(own, axis=0).max()
+        rate,
+        (0.0, times[-1]),
+        motion[0],
+        method="DOP853",
+        t_eval=times,
+        rtol=FINE,
+        atol=FINE * np.ptp(motion, axis=0).max(),
     )
     if not run.success:
         return float("inf"), np.full(len(system.named), np.nan)
     seen = system.seen(run.y.T[-len(TURNS) :] * size, orbit.p)
-    return float(np.abs(run.y.T - own).max() / (np.ptp(own, axis=0).max() / 2)), _swing(seen)
+    return float(np.abs(run.y.T - motion).max() / (np.ptp(motion, axis=0).max() / 2)), _swing(seen)
 
 
 def _turns(orbit: Harmonics) -> Array:
@@ -201,10 +207,10 @@ def refined(
         c = np.zeros((2 * H + 1, system.count))
         c[: len(orbit.c)] = orbit.c
         problem = equations(system, replace(orbit, c=c))
-        found = newton(problem, problem.unknowns(problem.reference), orbit.p, NewtonSettings(last_resort=False))
-        if not found.converged:
+        solution = newton(problem, problem.unknowns(problem.reference), orbit.p, NewtonSettings(last_resort=False))
+        if not solution.converged:
             return orbit, np.inf
-        orbit = problem.orbit(found.x, orbit.p)
+        orbit = problem.orbit(solution.x, orbit.p)
         turns = np.arange(4 * H) / (4 * H)
         y = orbit.at(turns) / size
         change = np.abs(summed(H, turns) @ (orbit.c - c) / size).max() / (np.ptp(y, axis=0).max() / 2)

@@ -142,18 +142,21 @@ def coexisting(
     Args:
         still: (n,) equilibria, or of a driven system a point from which guesses begin. orbits: known at p.
     """
-    known = [*(KnownSolution(system, still=x) for x in still), *(KnownSolution(system, orbit=one) for one in orbits)]
-    found, left, tried = list[OrbitPoint](), list(_first(system, p, known, nodes)), 0
+    known = [
+        *(KnownSolution(system, still=x) for x in still),
+        *(KnownSolution(system, orbit=orbit) for orbit in orbits),
+    ]
+    points, left, tried = list[OrbitPoint](), list(_first(system, p, known, nodes)), 0
     while left and tried < GUESSES:
         guess, tried = left.pop(0), tried + 1
-        one = _another(guess, [k for k in known if k.orbit or system.frequency is None])
-        report(f"deflation at {p:.6g}: {len(found)} orbits from {tried} guesses, {len(left)} left")
-        if one is not None:
-            found.append(OrbitPoint(one, "target"))
-            place = KnownSolution(system, orbit=one)
+        orbit = _another(guess, [k for k in known if k.orbit or system.frequency is None])
+        report(f"deflation at {p:.6g}: {len(points)} orbits from {tried} guesses, {len(left)} left")
+        if orbit is not None:
+            points.append(OrbitPoint(orbit, "target"))
+            place = KnownSolution(system, orbit=orbit)
             left += _between(place, known, nodes)
             known.append(place)
-    return found
+    return points
 
 
 def _another(guess: PeriodicOrbit, known: Sequence[KnownSolution]) -> PeriodicOrbit | None:
@@ -167,12 +170,12 @@ def _another(guess: PeriodicOrbit, known: Sequence[KnownSolution]) -> PeriodicOr
     once = _shortened(problem.orbit(solution.x, guess.p))
     again = Shooting(guess.system, once, guess.period)
     solution = newton(again, again.unknowns(once), guess.p, TRIES)
-    one = again.orbit(solution.x, guess.p)
-    if not solution.converged or one.period < 1e-3 * guess.period:
+    orbit = again.orbit(solution.x, guess.p)
+    if not solution.converged or orbit.period < 1e-3 * guess.period:
         return None
-    swings = np.ptp(one.x / np.asarray(one.system.scale), axis=0).max() > NEAR
-    new = all(place.distance(one.x, one.period)[0] > NEAR**2 for place in known)
-    return one if swings and new else None
+    swings = np.ptp(orbit.x / np.asarray(orbit.system.scale), axis=0).max() > NEAR
+    new = all(place.distance(orbit.x, orbit.period)[0] > NEAR**2 for place in known)
+    return orbit if swings and new else None
 
 
 def _shortened(orbit: PeriodicOrbit) -> PeriodicOrbit:

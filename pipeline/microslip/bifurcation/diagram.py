@@ -186,41 +186,43 @@ def _coexisting(work: _Work, still: DiagramBranch, p: float) -> None:
     system, asked = work.system, work.asked
     work.report(f"{asked.starts} motions at {p:.6g}")
     centre = still.x[int(np.argmin(np.abs(still.parameter - p))), 0]
-    found = attractors(system, centre, p, asked.starts, asked.seed, asked.nodes)
-    work.seen += found
-    if (others := asked.starts - round(sum(a.share for a in found) * asked.starts)) > 0:
+    stable_orbits = attractors(system, centre, p, asked.starts, asked.seed, asked.nodes)
+    work.seen += stable_orbits
+    if (others := asked.starts - round(sum(a.share for a in stable_orbits) * asked.starts)) > 0:
         words = f"of {asked.starts} motions {others} came to rest, or to no periodic motion that was recognised"
         work.messages.append(f"at {p:.6g}: {words}")
-    _new_ones(work, "attractor", [a.orbit for a in found])
+    _new_ones(work, "attractor", [a.orbit for a in stable_orbits])
 
 
 def _beside(work: _Work, p: float, still: Sequence[Array]) -> None:
     """The branches of orbits that deflation finds at p beside equilibria and attractors, and that are on none which is
     known."""
     known = [a.orbit for a in work.seen if a.orbit.p == p]
-    found = deflation.coexisting(work.system, p, still, known, work.asked.nodes, work.report)
-    work.deflated += found
-    _new_ones(work, "orbit", [one.orbit for one in found])
+    points = deflation.coexisting(work.system, p, still, known, work.asked.nodes, work.report)
+    work.deflated += points
+    _new_ones(work, "orbit", [point.orbit for point in points])
 
 
 def _resting(work: _Work, still: DiagramBranch, p: float) -> list[Array]:
     """The equilibria (n,) at p."""
     x, away = still.x[:, 0], still.parameter - p
     near = np.flatnonzero(away[:-1] * away[1:] <= 0)
-    found = [newton(equilibria.Still(work.system), x[i], p) for i in near]
+    solutions = [newton(equilibria.Still(work.system), x[i], p) for i in near]
     unlike: list[Array] = []
-    for one in (s.x for s in found if s.converged):
-        if all(np.abs((one - y) / work.system.scale).max() > deflation.NEAR for y in unlike):
-            unlike.append(one)
+    for x_new in (s.x for s in solutions if s.converged):
+        if all(np.abs((x_new - y) / work.system.scale).max() > deflation.NEAR for y in unlike):
+            unlike.append(x_new)
     return unlike
 
 
 def _new_ones(work: _Work, what: str, found: Sequence[PeriodicOrbit]) -> None:
     """Branches through orbits that are on none which is known."""
-    for number, one in enumerate(found, 1):
-        if not any(_passes(b, one) for b in work.found):
-            name = f"{what} {number} at {one.p:.6g}"
-            branch = work.add(name, partial(_both_ways, name, f"{what} at {one.p:.6g}", one, work.asked, work.report))
+    for number, orbit in enumerate(found, 1):
+        if not any(_passes(b, orbit) for b in work.found):
+            name = f"{what} {number} at {orbit.p:.6g}"
+            branch = work.add(
+                name, partial(_both_ways, name, f"{what} at {orbit.p:.6g}", orbit, work.asked, work.report)
+            )
             _doublings(work, branch, work.asked.doublings)
 
 
@@ -229,14 +231,14 @@ def _passes(branch: DiagramBranch, orbit: PeriodicOrbit) -> bool:
     if branch.still:
         return False
     y = orbit.system.seen(orbit.sampled(), orbit.p)
-    own = np.concatenate([y.max(axis=0), y.min(axis=0)])
+    extremes_of = np.concatenate([y.max(axis=0), y.min(axis=0)])
     size = float(np.ptp(y, axis=0).max())
     away = branch.parameter - orbit.p
     for i in np.flatnonzero(away[:-1] * away[1:] <= 0):
         u = away[i] / (away[i] - away[i + 1]) if away[i] != away[i + 1] else 0.0
         period = (1 - u) * branch.period[i] + u * branch.period[i + 1]
         ends = np.concatenate([branch.largest, branch.smallest], axis=1)
-        apart = np.abs((1 - u) * ends[i] + u * ends[i + 1] - own).max() / size
+        apart = np.abs((1 - u) * ends[i] + u * ends[i + 1] - extremes_of).max() / size
         if abs(period / orbit.period - 1) < CLOSE and apart < CLOSE:
             return True
     return False
@@ -343,17 +345,17 @@ def followed(
     name: str, born: str, problem: Shooting, state: State, settings: Settings, report: Report = lambda _: None
 ) -> DiagramBranch:  # fmt: skip
     """A branch of orbits to its end."""
-    found, ended = list[orbits.OrbitPoint](), ""
+    points, ended = list[orbits.OrbitPoint](), ""
     try:
         for more, status in orbits.follow(problem, state, settings):
-            found += more
+            points += more
             ended = status
-            if found:
-                report(f"{name}: {len(found)} of {settings.points} points, {found[-1].orbit.p:.6g}")
+            if points:
+                report(f"{name}: {len(points)} of {settings.points} points, {points[-1].orbit.p:.6g}")
     except (Lost, FloatingPointError) as error:
         ended = f"stuck: {error or 'the orbit was lost'}"
-    if not found:
+    if not points:
         x = problem.reference.x
         at = orbits.OrbitPoint(problem.reference, "start")
         return of_orbits(name, born, ended or f"no start from {len(x)} nodes", [at])
-    return of_orbits(name, born, ended, found)
+    return of_orbits(name, born, ended, points)

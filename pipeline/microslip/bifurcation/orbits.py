@@ -57,8 +57,8 @@ def doubled_at(orbit: PeriodicOrbit, settings: Settings) -> tuple[Shooting, Stat
     ways = [first]
     for piece in orbit.derivatives[:-1]:
         ways.append(piece @ ways[-1])
-    one = np.array(ways)
-    way: Array = np.concatenate([one, -one])
+    half = np.array(ways)
+    way: Array = np.concatenate([half, -half])
     way = way / np.sqrt(np.mean((way / np.asarray(orbit.system.scale)) ** 2) * orbit.system.count)
     twice = np.concatenate([orbit.x, orbit.x]) + OFF * way
     guess = PeriodicOrbit(orbit.system, twice, 2 * orbit.period, orbit.p, 2 * orbit.turns)
@@ -99,15 +99,15 @@ def follow(problem: Shooting, state: State, settings: Settings) -> Iterator[tupl
         if state.status.startswith("stuck"):
             yield [], state.status
             return
-        found = [OrbitPoint(problem.orbit(p.x, p.lam), p.kind) for p in state.found]
-        last = found[-1] if found else here
-        passed = _passed(problem, previous, state, here, last, settings) if found else []
+        points = [OrbitPoint(problem.orbit(p.x, p.lam), p.kind) for p in state.found]
+        last = points[-1] if points else here
+        passed = _passed(problem, previous, state, here, last, settings) if points else []
         passed = [one for one in passed if settings.low <= one.orbit.p <= settings.high]
         ended = state.status or _collapsed(problem, here.orbit, last.orbit)
         if ended == COLLAPSED:
             yield [], ended
             return
-        yield sorted([*passed, *found], key=lambda one: _ahead(problem, previous, one)), ended
+        yield sorted([*passed, *points], key=lambda one: _ahead(problem, previous, one)), ended
         here = last
         problem = replace(problem, reference=here.orbit)
 
@@ -147,7 +147,7 @@ def _passed(
 ) -> list[OrbitPoint]:  # fmt: skip
     """Period doublings and torus points between two neighbouring states."""
     segment = Segment(before.y, after.y, before.tangent, after.tangent, False)
-    found = []
+    points = []
     for kind, test in TESTS.items():
         if test(first.multipliers) * test(last.multipliers) >= 0:
             continue
@@ -156,12 +156,12 @@ def _passed(
             return test(_found(problem, y, "regular").multipliers)
 
         try:
-            one = _found(problem, root(Scaled(problem), segment, settings, value)[0], kind)
+            point = _found(problem, root(Scaled(problem), segment, settings, value)[0], kind)
         except Lost:
             continue
-        if kind != "torus" or _is_torus(one.multipliers):
-            found.append(one)
-    return found
+        if kind != "torus" or _is_torus(point.multipliers):
+            points.append(point)
+    return points
 
 
 def _collapsed(problem: Shooting, before: PeriodicOrbit, after: PeriodicOrbit) -> str:

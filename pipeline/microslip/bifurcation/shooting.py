@@ -38,22 +38,22 @@ class PeriodicOrbit:
 
     def sampled(self, each: int = 8) -> Array:
         """(m each, n) at equal times of one period."""
-        found = flow.samples(self.system, self.x, self.p, self.period, self.turns, each)
-        return np.asarray(found.reshape(-1, self.system.count))
+        x = flow.samples(self.system, self.x, self.p, self.period, self.turns, each)
+        return np.asarray(x.reshape(-1, self.system.count))
 
     @cached_property
     def derivatives(self) -> Array:
         """(m, n, n) of the ends of the pieces over their beginnings."""
-        found = flow.pieces(self.system, self.x, self.p, self.period, self.turns)
-        return np.asarray(found.dx[:, :, : self.system.count])
+        ends = flow.pieces(self.system, self.x, self.p, self.period, self.turns)
+        return np.asarray(ends.dx[:, :, : self.system.count])
 
     @cached_property
     def monodromy(self) -> Array:
         """(n, n) derivative of where a period leads, over the first node."""
-        found = np.eye(self.system.count)
+        product = np.eye(self.system.count)
         for piece in self.derivatives:
-            found = piece @ found
-        return found
+            product = piece @ product
+        return product
 
     @cached_property
     def multipliers(self) -> ComplexArray:

@@ -109,6 +109,6 @@ def even(solid: Solid, along: float, across: float) -> Array:
     across (Boussinesq and Cerruti, Love 1929)."""
     grid = Grid.around(along / 2, across / 2, FINE, FINE)
     of = influence(grid, Pair.of(solid, Solid(np.inf, 0.3)))
-    one = np.full((1, FINE, FINE), 1 / (along * across))
-    means = [of(one, slice(i, i + 1), slice(i, i + 1)).mean() for i in range(ALL.stop)]
+    traction = np.full((1, FINE, FINE), 1 / (along * across))
+    means = [of(traction, slice(i, i + 1), slice(i, i + 1)).mean() for i in range(ALL.stop)]
     return np.array([means[2], *means[:2]])

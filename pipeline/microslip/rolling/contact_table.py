@@ -387,17 +387,17 @@ def _cells(p: Patches) -> Array:
 def _judged(table: ContactTable, track: Track, checked: int, seed: int) -> ContactTable:
     """With its error at random poses."""
     lateral, yaw = np.random.default_rng(seed).uniform(-1, 1, size=(2, checked)) * table.reach[:, None]
-    one, none = np.ones(checked), np.zeros(checked)
-    read = table.forces(lateral, yaw, one, MU)
+    ones, none = np.ones(checked), np.zeros(checked)
+    read = table.forces(lateral, yaw, ones, MU)
     if read.jumps.all():
         return table._replace(checked=2 * checked, jumping=1.0)
     p, roll, down = _found(track, table.load, lateral, yaw, read.roll, MU)
-    pose, free = (lateral, yaw, roll, down), one / table.radius
-    exact = _exact(_mirrored(p), pose, one, free, MU * one, (none,) * 3, table.shear, table.poisson, read.jumps)
+    pose, free = (lateral, yaw, roll, down), ones / table.radius
+    exact = _exact(_mirrored(p), pose, ones, free, MU * ones, (none,) * 3, table.shear, table.poisson, read.jumps)
     exact = jax.device_get(exact)
-    told = [_told(of, table.load) for of in (read, exact)]
-    off = [np.abs(v - w) for v, w in zip(*told, strict=True)]
-    off[1] /= told[1][1]
+    quantities = [_told(of, table.load) for of in (read, exact)]
+    off = [np.abs(v - w) for v, w in zip(*quantities, strict=True)]
+    off[1] /= quantities[1][1]
     off[3] = off[3].max(axis=-1)
     good = np.array([v[~read.jumps] for v in off])
     error = np.stack([good.mean(axis=1), np.quantile(good, 0.95, axis=1), good.max(axis=1)], axis=1)

@@ -61,7 +61,7 @@ def exact(
                 raise
             if wide == WIDE[-1]:
                 raise UserError(f"the patch is more than {wide:g} times as wide as Hertz' ellipse") from error
-    less, more = (np.array([[*c.force[:2], c.moment] for c in one]).T for one in (coarse, fine))
+    less, more = (np.array([[*c.force[:2], c.moment] for c in contacts]).T for contacts in (coarse, fine))
     x, y, moment = 2 * more - less
     return Exact(at, x, y, moment, float(max(c.pressure.max() for c in fine)))
 
@@ -72,8 +72,10 @@ def _along(
     """One state after the other, each begun at the last one."""
     grid = Grid.around(wide * patch.a, wide * patch.b, n, n)
     distance = patch.A * grid.x**2 + np.interp(grid.y, *across, left=FAR, right=FAR)
-    found: list[HalfSpaceContact] = []
+    contacts: list[HalfSpaceContact] = []
     for state in states:
-        start = found[-1] if found else None
-        found.append(steady_rolling(distance, grid, pair, friction, patch.normal_force, creepages=state, start=start))
-    return found
+        start = contacts[-1] if contacts else None
+        contacts.append(
+            steady_rolling(distance, grid, pair, friction, patch.normal_force, creepages=state, start=start)
+        )
+    return contacts

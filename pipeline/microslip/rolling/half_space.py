@@ -192,8 +192,8 @@ def rolled(
 
 def _rigid(grid: Grid, step: float) -> Array:
     """(3, 2, nx, ny) rigid slip per creepage; of spin a sixth of the step ahead of the centre, as CONTACT takes it."""
-    one = np.ones((grid.nx, grid.ny))
-    return np.array([[one, 0 * one], [0 * one, one], [-grid.y * one, (grid.x + step / 6) * one]])
+    ones = np.ones((grid.nx, grid.ny))
+    return np.array([[ones, 0 * ones], [0 * ones, ones], [-grid.y * ones, (grid.x + step / 6) * ones]])
 
 
 def _contact(
@@ -222,9 +222,9 @@ def _contact(
             raise UserError("grid: the patch reaches the edge of the grid and is cut off; take a larger grid")
         pressed_now = replace(now, pressure=pressure, approach=approach_now, bound=mu * pressure)
         then = pressed_now if motion is None else _sheared(pressed_now, motion, tangential, start is not None)
-        moved = max(np.abs(a - b).max() for a, b in ((then.traction, now.traction), (then.pressure, now.pressure)))
+        change = max(np.abs(a - b).max() for a, b in ((then.traction, now.traction), (then.pressure, now.pressure)))
         now, start = then, then
-        if not pair.mismatch or motion is None or moved <= 10 * TOLERANCE * pressure.max():
+        if not pair.mismatch or motion is None or change <= 10 * TOLERANCE * pressure.max():
             return now
     raise UserError(f"distance: pressure and traction have not settled after {ITERATIONS} turns; K is too large")
 
@@ -242,9 +242,9 @@ def _sheared(now: HalfSpaceContact, motion: _Motion, tangential: Forces, warm: b
     rigid = np.tensordot(now.motion, motion.rigid, 1) + past
     problem = Shear(motion.operator, now.grid, rigid, now.bound, motion.rigid[wanted], sums)
     traction, slip, amounts = tractions(problem, now.traction - problem.push * now.slip if warm else None)
-    found = now.motion.copy()
-    found[wanted] += amounts
-    return replace(now, traction=traction, slip=slip * now.touching, motion=found)
+    motion_then = now.motion.copy()
+    motion_then[wanted] += amounts
+    return replace(now, traction=traction, slip=slip * now.touching, motion=motion_then)
 
 
 @checked
@@ -268,11 +268,11 @@ def _coefficients(ratio: float, poisson: float, n: int) -> Array:
     grid, pair = Grid.around(ratio**0.5, ratio**-0.5, n, n), Pair(1.0, poisson)
     patch = (grid.x**2 / ratio + grid.y**2 * ratio < 1) * 1e6
     none = np.zeros((0, 2, n, n))
-    found = []
+    sums = []
     for rigid in _rigid(grid, grid.dx):
         p, _, _ = tractions(Shear(lambda g: influence_change(g, pair), grid, rigid, patch, none, np.zeros(0)))
-        found.append((-p[0].sum(), -p[1].sum(), (p[0] * grid.y - p[1] * grid.x).sum()))
-    of_x, of_y, of_spin = np.array(found) * grid.area
+        sums.append((-p[0].sum(), -p[1].sum(), (p[0] * grid.y - p[1] * grid.x).sum()))
+    of_x, of_y, of_spin = np.array(sums) * grid.area
     size = (np.count_nonzero(patch) * grid.area / np.pi) ** 0.5  # of the ellipse that the elements cover
     return np.array([of_x[0] / size**2, of_y[1] / size**2, of_spin[1] / size**3, of_spin[2] / size**4])
 
@@ -354,12 +354,12 @@ def _gradients(
             length = 1 / single
         else:
             return pressure, level
-        moved = np.maximum(np.where(touching, pressure - length * direction, 0), 0)
-        moved[joining] = -length * gap[joining]
+        pressure_then = np.maximum(np.where(touching, pressure - length * direction, 0), 0)
+        pressure_then[joining] = -length * gap[joining]
         fresh, before = bool(joining.any()), here
         if load is not None:
-            moved *= load / moved.sum()
-        change, pressure = np.abs(moved - pressure).max(), moved
+            pressure_then *= load / pressure_then.sum()
+        change, pressure = np.abs(pressure_then - pressure).max(), pressure_then
         if change <= SETTLED * pressure.max() and not fresh:
             return pressure, level
     raise UserError(f"distance: the pressure has not settled after {MOST} iterations; take a finer grid")

@@ -102,10 +102,10 @@ class TangentProblem:
 
         size = (right.size, right.size)
         matrix, inverse = (LinearOperator(size, matvec=f, dtype=np.float32) for f in (apply, precondition))
-        found, _ = gmres(
+        free_part, _ = gmres(
             matrix, (right / largest).astype(np.float32).ravel(), M=inverse, rtol=accuracy, restart=60, maxiter=4
         )
-        return self.free(largest * found.reshape(right.shape).astype(float))
+        return self.free(largest * free_part.reshape(right.shape).astype(float))
 
     @cached_property
     def _single(self) -> TangentProblem:

@@ -200,27 +200,27 @@ DECIMAL_COMMA = re.compile(r"\d,\d.*[;\t ]\s*[-+]?\d|\d[;\t ]\s*[-+]?\d+,\d")
 
 def _header(lines: list[str]) -> tuple[float, Array, Array]:
     """Unit in m, signs and shifts of y and z, as a ``.prr`` or ``.prw`` tells them."""
-    told = dict.fromkeys(("shift.y", "shift.z", "mirror.y", "mirror.z", "rotate"), 0.0) | {"units.len.f": 1e3}
+    header = dict.fromkeys(("shift.y", "shift.z", "mirror.y", "mirror.z", "rotate"), 0.0) | {"units.len.f": 1e3}
     for line in lines:
         key, equals, value = (part.strip() for part in line.partition("="))
-        if equals and key in told and is_number(value):
-            told[key] = float(value)
-    if told["rotate"]:
+        if equals and key in header and is_number(value):
+            header[key] = float(value)
+    if header["rotate"]:
         raise UserError("rotate is not read; turn the points, or set inclination in the case")
-    if not told["units.len.f"] > 0:
+    if not header["units.len.f"] > 0:
         raise UserError("units.len.f must be greater than 0; 1000 says that the points are in mm")
-    sign = 1 - 2 * np.array([told["mirror.y"], told["mirror.z"]])
-    return 1 / told["units.len.f"], sign, np.array([told["shift.y"], told["shift.z"]])
+    sign = 1 - 2 * np.array([header["mirror.y"], header["mirror.z"]])
+    return 1 / header["units.len.f"], sign, np.array([header["shift.y"], header["shift.z"]])
 
 
 def _miniprof(lines: list[str]) -> list[str]:
     """Points as "y z" of a file of MiniProf: keys or free text before, what begins with a quotation mark left out."""
     lines = [line for line in lines if not line.startswith('"')]
-    told = dict(line.split("=", 1) for line in lines if "=" in line)
+    keys = dict(line.split("=", 1) for line in lines if "=" in line)
     for key in ("XOffset", "YOffset", "Tilt"):
-        if is_number(told.get(key, "")) and float(told[key]):
+        if is_number(keys.get(key, "")) and float(keys[key]):
             raise UserError(f"{key} is not read; save the profile with {key} applied to its points")
-    names = [name.strip() for name in told.get("ColumnDef", "X,Y").split(",")]
+    names = [name.strip() for name in keys.get("ColumnDef", "X,Y").split(",")]
     if not {"X", "Y"} <= set(names):
         raise UserError("ColumnDef names no X and Y; save the profile with both")
     rows = [line.split() for line in lines]

@@ -350,10 +350,10 @@ class RollingCase(Model):
             UserError: a file that is none, no friction.
         """
         with at("friction"):
-            found = self.friction.friction(path, None, None)
-            if not np.max(found.highest(jnp.ones(1))) > 0:
+            friction = self.friction.friction(path, None, None)
+            if not np.max(friction.highest(jnp.ones(1))) > 0:
                 raise UserError("is 0 at all speeds; the creep force is a part of it, so give more than 0")
-        return found
+        return friction
 
     def surface(self, path: Path) -> RoughSurface | None:
         """Rough, if it is asked, of files beside the case's.

@@ -239,8 +239,8 @@ def blended(L: Array, creep: Array, a: Array, b: Array, held: Array) -> Array:
     limit = jnp.maximum(held, TINY) / of_force * jnp.sqrt(L[0] ** 2 + L[1] ** 2)
     w = jnp.minimum(1.0, jnp.sqrt(creep[0] ** 2 + creep[1] ** 2 + TINY) / limit / 3)
     square = jnp.stack([creep[0], creep[1], creep[2] * (3 * jnp.pi / 32) * a]) ** 2
-    one = (jnp.sum(square, axis=0) + TINY) / (jnp.sum(square / L, axis=0) + TINY / L[0])
-    return (1 - w) * L + w * one
+    mean = (jnp.sum(square, axis=0) + TINY) / (jnp.sum(square / L, axis=0) + TINY / L[0])
+    return (1 - w) * L + w * mean
 
 
 SLIPPERY = 1e-12

@@ -122,35 +122,37 @@ class RollingAnswer:
         """What a reader came for."""
         if not self.patches or self.forces is None:
             return ["The wheel does not touch the rail: all forces are zero."]
-        p, told = self.patches[0], []
+        p, sentences = self.patches[0], []
         sides = sorted({q.side for q in self.patches})
         if len(self.patches) > 1:
             who = "The wheel touches the rail" if len(sides) == 1 else "The wheels touch the rails"
             where = "" if len(sides) == 1 else f", on the {p.side} rail"
-            told.append(f"{who} in {len(self.patches)} patches; the curve is of the most loaded{where}.")
-        told += [self._felt(side, "the wheel" if len(sides) == 1 else f"the {side} wheel") for side in sides]
-        told.append(
+            sentences.append(f"{who} in {len(self.patches)} patches; the curve is of the most loaded{where}.")
+        sentences += [self._felt(side, "the wheel" if len(sides) == 1 else f"the {side} wheel") for side in sides]
+        sentences.append(
             f"The patch is {2e3 * p.a:.3g} mm long and {2e3 * p.b:.3g} mm wide, under {p.normal_force:.5g} N with at "
             f"most {p.pressure / 1e6:.4g} MPa."
         )
         most = np.hypot(self.forces.x, self.forces.y) / self.held
         at = int(most.argmax())
-        told.append(f"The largest creep force is {most[at]:.4g} mu F_N, at a {self.case.creep.over} "
+        sentences.append(f"The largest creep force is {most[at]:.4g} mu F_N, at a {self.case.creep.over} "
                     f"{'creepage' if self.case.creep.over != 'spin' else 'value'} of {self.over[at]:.4g}.")  # fmt: skip
         if self.reference is not None:
             i, other = self.reference
             off = np.abs(np.hypot(self.forces.x, self.forces.y)[i] / self.held - other).max()
-            told.append(
+            sentences.append(
                 f"FASTSIM as published, at {len(i)} points of the curve, is at most {100 * off:.2g} % of mu F_N away."
             )
         elif self.case.is_constant:
-            told.append("FASTSIM and exact half-spaces know no roughness, so that neither stands beside this curve.")
+            sentences.append(
+                "FASTSIM and exact half-spaces know no roughness, so that neither stands beside this curve."
+            )
         else:
-            told.append(
+            sentences.append(
                 f"mu is the highest coefficient, {self.highest:.4g}; FASTSIM and exact half-spaces know none that "
                 "changes, so that neither stands beside this curve."
             )
-        return [*told, *self._inclined(), *self._beside_exact(), *self._heated(), *self._worn(), *self.warnings()]
+        return [*sentences, *self._inclined(), *self._beside_exact(), *self._heated(), *self._worn(), *self.warnings()]
 
     def _felt(self, side: str, name: str) -> str:
         rows = [row for row in self.generalised()[1] if row[1] == "wheel"]
@@ -223,34 +225,34 @@ class RollingAnswer:
 
     def warnings(self) -> list[str]:
         """What a person should doubt."""
-        told, wheel, rail = [], self.case.wheel, self.case.rail
+        warnings, wheel, rail = [], self.case.wheel, self.case.rail
         doubts = [plausible.modulus("wheel.young", wheel.young), plausible.modulus("rail.young", rail.young)]
         doubts.append(plausible.wheel_load(self.case.vertical_force, wheel.radius))
         doubts += [plausible.stress("The patch", q.pressure, min(wheel.young, rail.young)) for q in self.patches[:1]]
-        told += [f"warning: {text}" for text in doubts if text]
+        warnings += [f"warning: {text}" for text in doubts if text]
         if self.highest > STEEPEST:
-            told.append(f"warning: friction is {self.highest:g}; steel on steel has 0.05 to 0.6.")
+            warnings.append(f"warning: friction is {self.highest:g}; steel on steel has 0.05 to 0.6.")
         beta = mismatch(*self.case.solids)
         if abs(beta) > UNLIKE:
-            told.append(
+            warnings.append(
                 f"warning: wheel and rail are unlike (Dundurs' beta {beta:.2g}): their pressure alone shears them, "
                 "which strips, FASTSIM and Kalker's coefficients leave out and exact half-spaces do not."
             )
         if self.of_pose is not None and (self.case.heat or self.case.wear):
-            told += [*self._slow(), *self._unbalanced()]
+            warnings += [*self._slow(), *self._unbalanced()]
         for k, p in enumerate(self.patches):
             if p.conformal:
-                told.append(
+                warnings.append(
                     f"warning: patch {k + 1}: wheel and rail conform: it is {2e3 * p.b:.3g} mm wide, too wide for its "
                     "radii of curvature, so that neither body is a half-space and the numbers are a guess."
                 )
             ends = ((p.on_wheel, self.track.wheel.y), (p.on_rail, self.track.rail.y))
             if any(not y[0] <= middle - p.b <= middle + p.b <= y[-1] for middle, y in ends):
-                told.append(
+                warnings.append(
                     f"warning: patch {k + 1}, {2e3 * p.b:.3g} mm wide, reaches beyond the end of a profile, where its "
                     "shape is not known and the patch taken for an ellipse; give a wider profile (width)."
                 )
-        return told
+        return warnings
 
     def _slow(self) -> list[str]:
         """The temperatures are of sources that move fast."""
@@ -283,15 +285,15 @@ def study(case: RollingCase, path: Path) -> RollingAnswer:
     track, friction = case.track(path.parent), case.characteristic(path)
     heat = case.heat.made() if case.heat else None
     rough, how = case.surface(path), case.model.model_dump(exclude={"exact"})
-    found, pose = _touching(case, track, drag(track, friction, heat, rough, **how))
-    creep = _creep(case, found[0] if found else None)
-    if not found:
-        return RollingAnswer(case, track, found, creep, None, None, None, 0, None, None)
-    p, c = found[0], case.creep
+    touching, pose = _touching(case, track, drag(track, friction, heat, rough, **how))
+    creep = _creep(case, touching[0] if touching else None)
+    if not touching:
+        return RollingAnswer(case, track, touching, creep, None, None, None, 0, None, None)
+    p, c = touching[0], case.creep
     highest = float(np.max(friction.highest(jnp.ones(1))))
     over = creep[list(UNITS).index(c.over)]
     shown = int(np.abs(over - (0.5 * (c.start + c.stop) if c.shown is None else c.shown)).argmin())
-    given, speed = states(track, [p] * creep.shape[1] + found)  # of the curve, and of the pose
+    given, speed = states(track, [p] * creep.shape[1] + touching)  # of the curve, and of the pose
     given[:3, : creep.shape[1]] = creep
     n = len(over)
     kept = np.array([shown, *range(n, len(speed))])
@@ -307,7 +309,7 @@ def study(case: RollingCase, path: Path) -> RollingAnswer:
     return RollingAnswer(
         case,
         track,
-        found,
+        touching,
         creep,
         forces,
         reference,

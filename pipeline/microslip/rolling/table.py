@@ -107,8 +107,8 @@ class CreepTable:
         p = posed(x, y, turn, a, b, held, np.ones_like(a), G, self.poisson, **self.how)
         at, signs = placed(Poses(*map(np.asarray, p)), ratio)
         at = at.reshape(5, -1)
-        found = np.concatenate([self._between(at[:, i : i + BLOCK]) for i in range(0, at.shape[1], BLOCK)], axis=1)
-        return found.reshape(3, *x.shape) * signs * held * np.stack([np.ones_like(c), np.ones_like(c), c])
+        values = np.concatenate([self._between(at[:, i : i + BLOCK]) for i in range(0, at.shape[1], BLOCK)], axis=1)
+        return values.reshape(3, *x.shape) * signs * held * np.stack([np.ones_like(c), np.ones_like(c), c])
 
     def sentence(self) -> str:
         """What it is worth."""
@@ -128,10 +128,10 @@ class CreepTable:
         for (first, weight), many in zip(parts, shape, strict=True):
             index = (index * many)[:, :, None] + (first[:, None] + np.arange(weight.shape[1]))[:, None, :]
             index = index.reshape(at.shape[1], -1)
-        found = self.values.reshape(3, -1)[:, index]
+        near = self.values.reshape(3, -1)[:, index]
         for _, weight in parts[::-1]:
-            found = np.einsum("knip,np->kni", found.reshape(3, at.shape[1], -1, weight.shape[1]), weight)
-        return found[..., 0]
+            near = np.einsum("knip,np->kni", near.reshape(3, at.shape[1], -1, weight.shape[1]), weight)
+        return near[..., 0]
 
 
 def cubic(axis: Any, v: Any, ridge: Any = 0, xp: Any = np) -> tuple[Any, Any]:
@@ -182,9 +182,9 @@ def _marched(
     pull: Array, ratio: Array, springs: Array, elements: tuple[int, int], distribution: Distribution
 ) -> CreepForces:
     """Forces over mu F_N of springs that are pulled, with a b and mu F_N of one."""
-    a, one = ratio**0.5, ratio**0.0
+    a, ones = ratio**0.5, ratio**0.0
     x, y = springs**-0.5, springs**0.5
-    pose = Poses(pull[0] / x, pull[1] / y, pull[2] / x, pull[2] / y, a, 1 / a, one, one, x, y)
+    pose = Poses(pull[0] / x, pull[1] / y, pull[2] / x, pull[2] / y, a, 1 / a, ones, ones, x, y)
     return forces(pose, elements, distribution)
 
 
@@ -241,11 +241,11 @@ def _missed(table: CreepTable, checked: int, seed: int) -> Array:
     """(3, 3) mean, 95 % quantile and largest error at random states, spread evenly over the axes."""
     low, high = (np.array([axis[i] for axis in table.axes[:4]])[:, None] for i in (0, -1))
     at = low + (high - low) * np.random.default_rng(seed).uniform(size=(4, checked))
-    a, one = np.exp(0.5 * at[3]), np.ones(checked)
+    a, ones = np.exp(0.5 * at[3]), np.ones(checked)
     c = np.asarray(creep_coefficients(a**2, table.poisson, table.how["coefficients"]))
     xi, eta, phi = _pull(at) / c[:3]
-    f = creep_forces(xi, eta, phi, a, 1 / a, one, one, 1.0, table.poisson, **table.how)
-    error = np.abs(table.forces(xi, eta, phi, a, 1 / a, one, one, 1.0) - np.stack([f.x, f.y, f.moment]))
+    f = creep_forces(xi, eta, phi, a, 1 / a, ones, ones, 1.0, table.poisson, **table.how)
+    error = np.abs(table.forces(xi, eta, phi, a, 1 / a, ones, ones, 1.0) - np.stack([f.x, f.y, f.moment]))
     return np.stack([error.mean(axis=1), np.quantile(error, 0.95, axis=1), error.max(axis=1)], axis=1)
 
 

@@ -149,8 +149,8 @@ def jump(brush: Brush, before: float, after: float, force: float, lengths: float
     """Time after a jump of the slip (s), and the force, N, both from the moment of the jump on; steady before it."""
     n = int(np.ceil(lengths * len(brush.share)))
     slip = np.concatenate([np.full(n, before), np.full(n, after)])
-    found = brush.carried(slip, force)[n - 1 :]
-    return brush.step * np.arange(n + 1), found
+    force_after = brush.carried(slip, force)[n - 1 :]
+    return brush.step * np.arange(n + 1), force_after
 
 
 def reached(time: Array, force: Array) -> float:
@@ -307,9 +307,9 @@ class TyreAnswer:
         for name, brush in (("", self.brush), ("rigid_", rigid)):
             for way in ("up", "down"):
                 ends = [(0.0, s) if way == "up" else (s, 0.0) for s in targets]
-                found = [jump(brush, first, last, self.row.force) for first, last in ends]
-                columns[f"{name}{way}_fitted_s"] = np.array([fitted(*f) for f in found])
-                columns[f"{name}{way}_reached_s"] = np.array([reached(*f) for f in found])
+                jumps = [jump(brush, first, last, self.row.force) for first, last in ends]
+                columns[f"{name}{way}_fitted_s"] = np.array([fitted(*f) for f in jumps])
+                columns[f"{name}{way}_reached_s"] = np.array([reached(*f) for f in jumps])
         return columns
 
     def loads(self) -> dict[str, Array]:
@@ -323,8 +323,8 @@ class TyreAnswer:
             normal = self.row.force * np.concatenate([np.ones(n), np.full(n, share)])
             force = b.carried(np.full(2 * n, s), normal)[n - 1 :]
             time = b.step * np.arange(n + 1)
-            moved = abs(force[-1] - force[0]) > 1e-9 * self.row.force
-            rows.append([share, longer * b.length, force[0], force[-1], reached(time, force) if moved else np.nan])
+            changes = abs(force[-1] - force[0]) > 1e-9 * self.row.force
+            rows.append([share, longer * b.length, force[0], force[-1], reached(time, force) if changes else np.nan])
         names = ("load_share", "patch_length_m", "force_before_N", "force_after_N", "reached_s")
         return dict(zip(names, np.array(rows).reshape(-1, len(names)).T, strict=True))
 

@@ -95,22 +95,22 @@ class ProfileWear:
         )
 
     def warnings(self) -> list[str]:
-        told, last = [], self.moments[-1]
+        warnings, last = [], self.moments[-1]
         if self.smoothing < self.least:
             smooth = (
                 f"smooth over {1e3 * self.least:.2g} mm or more (wear.smoothing), or " if self.least <= WIDEST else ""
             )
-            told.append(
+            warnings.append(
                 f"warning: an update takes so much that waves of the worn profile amplify themselves: {smooth}"
                 "take more updates (wear.updates)."
             )
         if last.wheel + last.rail > self.approach:
-            told.append(
+            warnings.append(
                 f"warning: the grooves of wheel and rail are together {1e3 * (last.wheel + last.rail):.2g} mm deep, "
                 f"more than the bodies approach each other, {1e3 * self.approach:.2g} mm: no ellipse is what touches "
                 "in them, and the numbers are a guess; take fewer passages, or share them over shifts (wear.lateral)."
             )
-        return told
+        return warnings
 
 
 def wearing(
@@ -132,14 +132,14 @@ def wearing(
             report(f"profiles that wear: {k} of {asked.updates} updates")
         wheel, rail = (body.profile(asked.smoothing) for body in bodies)
         seen = replace(track, wheel=wheel, rail=rail)
-        runs = [one for lateral in shifts for one in _run(case, seen, friction, surface, lateral)]
+        runs = [strips for lateral in shifts for strips in _run(case, seen, friction, surface, lateral)]
         moments.append(_moment(k * each, runs, bodies))
-        approach = approach or max(one.patch.approach for one in runs)
+        approach = approach or max(strips.patch.approach for strips in runs)
         if k == asked.updates:
             break
         share = each / len(shifts)
         bodies = [_worn(body, runs, asked.coefficient * share, case.pose.side) for body in bodies]
-        work += share * sum(float(one.width @ one.work) for one in runs)
+        work += share * sum(float(strips.width @ strips.work) for strips in runs)
         least = least or _shortest(runs, sum(body.depth.max() for body in bodies), track)
     return ProfileWear(bodies[0], bodies[1], moments, work, asked.smoothing, least, approach)
 
@@ -173,7 +173,7 @@ def _worn(body: WornProfile, runs: list[StripWork], coefficient: float, side: st
 
 
 def _moment(passages: float, runs: list[StripWork], bodies: list[WornProfile]) -> Moment:
-    p = max((one.patch for one in runs), key=lambda p: p.pressure)
+    p = max((strips.patch for strips in runs), key=lambda p: p.pressure)
     wheel, rail = (body.depth for body in bodies)
     worn = STRIP * float(wheel.sum() + rail.sum())
     return Moment(passages, p.pressure, p.a, p.b, float(wheel.max()), float(rail.max()), worn)
@@ -181,7 +181,7 @@ def _moment(passages: float, runs: list[StripWork], bodies: list[WornProfile]) -
 
 def _shortest(runs: list[StripWork], depth: float, track: Track) -> float:
     """m: `wear.shortest_smoothing` of what an update takes, as the pressure's p_0 a follows the curvature (Hertz)."""
-    p = max((one.patch for one in runs), key=lambda p: p.pressure)
+    p = max((strips.patch for strips in runs), key=lambda p: p.pressure)
     B = max(p.B, 1e-3 * p.A) * np.array([0.99, 1.01])
     e = ellipses(p.A, B, p.normal_force, track.elastic.modulus)
     gain = float(np.diff(np.log(e.pressure * e.a))[0] / (2 * np.diff(B)[0]))

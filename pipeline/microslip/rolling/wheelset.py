@@ -281,8 +281,8 @@ def across(track: Track, pose: Pose, side: str, patch: RollingPatch) -> tuple[Ar
     """(k,) places across a patch, ascending in its y, and the distances of both surfaces there along its normal, m."""
     left = side == "left"
     gap = _gap(track, _seen(pose, side))
-    known = np.isfinite(gap.gap)
-    y_w, arc, opened = gap.on_wheel[known], np.cumsum(gap.arc[known]), gap.gap[known]
+    finite = np.isfinite(gap.gap)
+    y_w, arc, opened = gap.on_wheel[finite], np.cumsum(gap.arc[finite]), gap.gap[finite]
     place = arc - np.interp(patch.on_wheel, y_w, arc)
     apart = (opened - np.interp(patch.on_wheel, y_w, opened)) * np.cos(patch.angle)
     return (place, apart) if left else (-place[::-1], apart[::-1])
@@ -331,8 +331,8 @@ def _gap(track: Track, pose: Pose) -> Gap:
     step = np.gradient(y)
     arc = step / np.cos(incline)
     slope = np.gradient(gap) * np.cos(incline) / arc
-    known = np.flatnonzero(np.isfinite(slope))
-    return Gap(y_w, x, y, z, gap, r, np.interp(np.arange(len(slope)), known, slope[known]), arc, step)
+    finite = np.flatnonzero(np.isfinite(slope))
+    return Gap(y_w, x, y, z, gap, r, np.interp(np.arange(len(slope)), finite, slope[finite]), arc, step)
 
 
 class Pressed(NamedTuple):
@@ -372,10 +372,10 @@ def _stretch(track: Track, gap: Gap, run: Array, level: float) -> Pressed:
     A = cosine / (2 * float(np.interp(at, np.arange(len(gap.y)), gap.radius)))
 
     B = float(_curvature(gap, at, _half_width(gap, at, A, approach)))
-    one = ellipses(A, max(B, CONFORMAL * A), 1.0, track.elastic.modulus)
-    grown = float(approach / one.approach)
-    axes = float(one.a) * grown**0.5, float(one.b) * grown**0.5
-    return Pressed(at, angle, A, B, grown**1.5, *axes, approach, float(one.pressure) * grown**0.5)
+    unit = ellipses(A, max(B, CONFORMAL * A), 1.0, track.elastic.modulus)
+    grown = float(approach / unit.approach)
+    axes = float(unit.a) * grown**0.5, float(unit.b) * grown**0.5
+    return Pressed(at, angle, A, B, grown**1.5, *axes, approach, float(unit.pressure) * grown**0.5)
 
 
 def _half_width(gap: Gap, at: float, A: float, approach: float) -> float:

@@ -153,20 +153,20 @@ def exponent(x: Any) -> Any:
 def spots(D: Array, D_o: Array, rest: Array) -> Spots:
     """Of points with motions D (n, 3, m) and D_o (n, 3, j), that rest at (n, 3)."""
     n, _, m = D.shape
-    own = [np.flatnonzero(row.any(axis=0)) for row in D]
-    s = max(map(len, own))
+    modes_of = [np.flatnonzero(row.any(axis=0)) for row in D]
+    s = max(map(len, modes_of))
     given = D_o.transpose(2, 1, 0), rest.T
     if SPARSE * s > m:
         return Spots(D.transpose(1, 0, 2).reshape(3 * n, m), None, None, *given)
     columns, few = np.zeros((s, n), int), np.zeros((s, 3, n))
     stands = list[list[int]]([] for _ in range(m))
-    for i, modes in enumerate(own):
+    for i, modes in enumerate(modes_of):
         columns[: len(modes), i], few[: len(modes), :, i] = modes, D[i][:, modes].T
         for row, mode in enumerate(modes):
             stands[mode].append(row * n + i)
     back = np.full((max(map(len, stands)), m), s * n)
-    for j, found in enumerate(stands):
-        back[: len(found), j] = found
+    for j, places in enumerate(stands):
+        back[: len(places), j] = places
     return Spots(few, columns, back, *given)
 
 

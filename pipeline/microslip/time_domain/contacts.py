@@ -120,11 +120,11 @@ def untouched(groups: tuple[ContactGroup, ...]) -> Held:
 
 def parts(groups: tuple[ContactGroup, ...], d: Any) -> list[Any]:
     """(c, k) of each group."""
-    found, begin = [], 0
+    each, begin = [], 0
     for g in groups:
-        found.append(d[begin : begin + g.offset.size].reshape(g.offset.shape))
+        each.append(d[begin : begin + g.offset.size].reshape(g.offset.shape))
         begin += g.offset.size
-    return found
+    return each
 
 
 def moved(g: ContactGroup, d: Any) -> Any:
@@ -188,8 +188,8 @@ def _placed(groups: tuple[ContactGroup, ...], bodies: Yielding, free: Any, v: An
         return i + 1, missing(d - jnp.linalg.solve(J, r))
 
     first = missing(free - times(bodies.R, held.force - bodies.F_0))
-    _, found = jax.lax.while_loop(partial(wanted, CHORDS), chord, (0, first))
-    _, (d, r, there) = jax.lax.while_loop(partial(wanted, ITERATIONS), newton, (0, found))
+    _, chorded = jax.lax.while_loop(partial(wanted, CHORDS), chord, (0, first))
+    _, (d, r, there) = jax.lax.while_loop(partial(wanted, ITERATIONS), newton, (0, chorded))
     return d, jnp.abs(r).max(), there
 
 
@@ -383,8 +383,8 @@ def slowed(
 
     at = left(held.force)
     begin = (0, at, held.forces, *refined(at))
-    *_, found, missed = jax.lax.while_loop(lambda c: (c[4] > enough) & (c[0] < TURNS), turn, begin)
-    return found, missed
+    *_, velocity, missed = jax.lax.while_loop(lambda c: (c[4] > enough) & (c[0] < TURNS), turn, begin)
+    return velocity, missed
 
 
 def _alone(g: ContactGroup, force: Any, state: Any, most: Any, place: Any, rate: Any, dt: Any) -> Any:
@@ -394,5 +394,5 @@ def _alone(g: ContactGroup, force: Any, state: Any, most: Any, place: Any, rate:
     if not g.law.brakes:
         return by_law
     trial = w.at[:, 1:].add(most[:, None] * force[:, 1:])
-    held = (trial - g.law.slowed(u, trial, dt, state, most))[:, 1:] / jnp.where(most > 0, most, 1.0)[:, None]
-    return jnp.concatenate([by_law[:, :1], held], axis=1)
+    braked = (trial - g.law.slowed(u, trial, dt, state, most))[:, 1:] / jnp.where(most > 0, most, 1.0)[:, None]
+    return jnp.concatenate([by_law[:, :1], braked], axis=1)

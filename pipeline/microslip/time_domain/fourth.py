@@ -83,13 +83,13 @@ def leapt(now: MotionState) -> MotionState:
 def _answer(groups: tuple[ContactGroup, ...], B: Bodies, y: Any, o: Any, x: tuple[Any, ...], time: Any) -> StageForces:
     """What contacts say where the bodies are, (b, 2 p)."""
     q, v = (part.reshape(-1) for part in jnp.split(y, 2, axis=1))
-    moves, push, found = times(B.rate, o), B.preload, []
-    for g, spots, own in zip(groups, B.spots, x, strict=True):
+    moves, push, answers = times(B.rate, o), B.preload, []
+    for g, spots, memory in zip(groups, B.spots, x, strict=True):
         u, w = by_modes(spots, q, o) + spots.rest, by_modes(spots, v, moves)
-        force, rate = g.law.rates(u.T, w.T, own, time, B.flow.length[0])
+        force, rate = g.law.rates(u.T, w.T, memory, time, B.flow.length[0])
         push -= to_modes(spots, force)
-        found.append((force, rate, u.T, w.T))
-    return StageForces(push.reshape(B.omega2.shape), *zip(*found, strict=True))
+        answers.append((force, rate, u.T, w.T))
+    return StageForces(push.reshape(B.omega2.shape), *zip(*answers, strict=True))
 
 
 def step(
@@ -181,9 +181,9 @@ def _held(
     """What contacts hold: their state as their law's own step tells it, with the memory that was integrated; of their
     coordinates see `at_sample`."""
     states = list[Any]()
-    for g, u, w, state, own in zip(groups, last.places, last.speeds, now.held.states, x, strict=True):
+    for g, u, w, state, memory in zip(groups, last.places, last.speeds, now.held.states, x, strict=True):
         _, after = g.law.step(u, w, h, state)
-        states.append((g.law.recalled(after, own) if g.law.remembers else None) or after)
+        states.append((g.law.recalled(after, memory) if g.law.remembers else None) or after)
     return told(groups, last.places, h, now.held, options.accounts, tuple(states), last.forces)
 
 

@@ -65,8 +65,8 @@ def meets(A: Any, back: Any = 0.0) -> Meets:
 def over_waves(M: Meets, slope: Any, lean: Any) -> Meets:
     """Of points over waves, whose way along the normal is w_N + slope . w_T, and whose force pushes by f_N lean; slope
     and lean (p, 2) are the same where what the ground takes it gives."""
-    own = jnp.broadcast_to(jnp.eye(3), (len(slope), 3, 3))
-    way, force = own.at[:, 0, 1:].set(slope), own.at[:, 0, 1:].set(lean)
+    identity = jnp.broadcast_to(jnp.eye(3), (len(slope), 3, 3))
+    way, force = identity.at[:, 0, 1:].set(slope), identity.at[:, 0, 1:].set(lean)
     A = M.A.reshape(len(slope), 3, len(slope), 3)
 
     def turned(left: Any, right: Any) -> Any:
@@ -77,8 +77,8 @@ def over_waves(M: Meets, slope: Any, lean: Any) -> Meets:
 
 def within(x: Any, pressed: Any, mu: Any) -> Any:
     """(p, 3) the projection of x: (p, 3); pressed: (p,) N of points that others press, nan of those that press."""
-    own = jnp.isnan(pressed)
-    normal = jnp.where(own, jnp.maximum(x[:, 0], 0.0), jnp.where(own, 0.0, pressed))
+    presses = jnp.isnan(pressed)
+    normal = jnp.where(presses, jnp.maximum(x[:, 0], 0.0), jnp.where(presses, 0.0, pressed))
     limit, size = mu * normal, norm(x[:, 1:].T)
     kept = jnp.where(size > limit, ratio(limit, size), 1.0)
     return jnp.concatenate([normal[:, None], kept[:, None] * x[:, 1:]], axis=1)

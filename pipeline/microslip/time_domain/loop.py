@@ -92,11 +92,11 @@ def run(
         now = now._replace(o=oscillators(options, B, steps * B.flow.length[0]))
         if options.halvings:
             now = now._replace(held=fourth.at_sample(groups, B, now))
-        found = look(now)
-        kept = jax.tree_util.tree_map(lambda all_of, one: all_of.at[i % s].set(one), seen, found)
+        sample = look(now)
+        kept = jax.tree_util.tree_map(lambda all_of, one: all_of.at[i % s].set(one), seen, sample)
         rise = now.missed - before.missed
         hardest = Hardest(*(jnp.where(rise > hardest[0], *x) for x in zip((rise, before.time), hardest, strict=True)))
-        return i + 1, steps, jnp.isfinite(found.mechanical), now, listed, kept, hardest
+        return i + 1, steps, jnp.isfinite(sample.mechanical), now, listed, kept, hardest
 
     listed = Listed(jnp.zeros((), int), jnp.zeros((events, 3)))
     seen = jax.tree_util.tree_map(lambda one: jnp.zeros((len(each), *one.shape)), look(now))
@@ -143,8 +143,8 @@ def _free(groups: tuple[ContactGroup, ...], B: Bodies, now: MotionState) -> Any:
     w = times(B.D, now.y[:, p:].reshape(-1)) + times(B.D_o, times(B.rate, now.o))
     begin, free = 0, []
     for g, u, rate in zip(groups, now.held.places, parts(groups, w), strict=True):
-        own = slice(begin, begin + len(u))
-        free.append(_unmet(g.law.overlap, u, moved(g, rate), fastest[own], bent[own]))
+        points = slice(begin, begin + len(u))
+        free.append(_unmet(g.law.overlap, u, moved(g, rate), fastest[points], bent[points]))
         begin += len(u)
     most = jnp.minimum(jnp.min(jnp.concatenate(free)) / B.flow.length[0], 2.0 ** (len(B.flow.length) - 1))
     last = jnp.maximum(exponent(jnp.maximum(most, 1.0)) - (DIGITS - 1), 1)

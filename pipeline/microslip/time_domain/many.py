@@ -49,8 +49,8 @@ class Reached:
     exponents: tuple[Exponent, ...] = ()
 
     def __repr__(self) -> str:
-        found = [f"{int((self.attractor == i).sum())} {self._told(i)}" for i in np.unique(self.attractor)]
-        return f"<Reached: {len(self.q)} starts; {'; '.join(found)}>"
+        counts = [f"{int((self.attractor == i).sum())} {self._told(i)}" for i in np.unique(self.attractor)]
+        return f"<Reached: {len(self.q)} starts; {'; '.join(counts)}>"
 
     def _told(self, attractor: int) -> str:
         if attractor < 0:
@@ -97,16 +97,16 @@ class Reached:
     def attractor(self) -> Array:
         """(n,) number of the periodic motion that a start has reached, from 0 in the order of the starts: two are one
         if their points after a period coincide as closely as a motion with itself. Below zero: `OPEN`, `DIVERGED`."""
-        found, known = np.full(len(self.points), OPEN), list[Array]()
+        numbers, orbits = np.full(len(self.points), OPEN), list[Array]()
         for i, (z, p) in enumerate(zip(self.points, self.repeats, strict=True)):
             if not np.isfinite(z).all():
-                found[i] = DIVERGED
+                numbers[i] = DIVERGED
             elif p:
-                near = [np.abs(one - z[:, -1:]).max(axis=0).min() <= 2 * REPEATS * self.size for one in known]
-                found[i] = near.index(True) if any(near) else len(known)
+                near = [np.abs(orbit - z[:, -1:]).max(axis=0).min() <= 2 * REPEATS * self.size for orbit in orbits]
+                numbers[i] = near.index(True) if any(near) else len(orbits)
                 if not any(near):
-                    known.append(z[:, -p:])
-        return found
+                    orbits.append(z[:, -p:])
+        return numbers
 
 
 def run(
@@ -160,8 +160,8 @@ def _exponents(
     stepper: Stepper, last: Sequence[MotionState], size: float, each: int, periods: int
 ) -> tuple[Exponent, ...]:
     """Of the motions that go on from where they are, `last`."""
-    if told := classification.whole(last[0].held.states):
-        raise UserError(f"exponents: {told}")
+    if unseparable := classification.whole(last[0].held.states):
+        raise UserError(f"exponents: {unseparable}")
     e, stepper = stepper.equations, replace(stepper, order=2)
     scale = classification.sizes(e, last[0].y.shape[0])
     way = np.random.default_rng(0).standard_normal(scale.shape) / scale
@@ -170,11 +170,11 @@ def _exponents(
     for now in last:
         look()
         count = classification.ALIGNED + periods
-        found = _grown(stepper.options, count, stepper.groups, stepper.bodies, now, each, scale, way)
-        growth = np.asarray(found)[classification.ALIGNED :]
-        known = np.isfinite(growth).all()
+        growths = _grown(stepper.options, count, stepper.groups, stepper.bodies, now, each, scale, way)
+        growth = np.asarray(growths)[classification.ALIGNED :]
+        finite = np.isfinite(growth).all()
         none = Exponent(float("nan"), float("nan"), 0)
-        exponents.append(classification.mean(growth, 2 * np.pi / e.Omega) if known else none)
+        exponents.append(classification.mean(growth, 2 * np.pi / e.Omega) if finite else none)
     return tuple(exponents)
 
 

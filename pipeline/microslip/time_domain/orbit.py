@@ -229,8 +229,8 @@ class Orbit(Ended, Announced):
             raise UserError(f"kind: '{kind}' is none of {', '.join(KINDS)}")
         if contact is not None:
             numbered("contact", contact, len(self.touching), "contact")
-        own = self.events[:, 2] == KINDS.index(kind)
-        return self.events[own if contact is None else own & (self.events[:, 1] == contact), 0]
+        chosen = self.events[:, 2] == KINDS.index(kind)
+        return self.events[chosen if contact is None else chosen & (self.events[:, 1] == contact), 0]
 
     def count(self, kind: str, contact: int | None = None) -> int:
         """Number of those events."""
@@ -288,32 +288,32 @@ class Orbit(Ended, Announced):
             if len(y) and (high := float(np.abs(y[0]).max())) > top:
                 top, at = high, float(w[np.abs(y[0]).argmax()]) / (2 * np.pi)
         way = "up" if last > first else "down"
-        said = f"run-{way} from {hertz(first / 2 / np.pi, self.shown)} to {hertz(last / 2 / np.pi, self.shown)}"
-        return f"{said}, largest at {hertz(at, self.shown)}" if self.labels else said
+        sentence = f"run-{way} from {hertz(first / 2 / np.pi, self.shown)} to {hertz(last / 2 / np.pi, self.shown)}"
+        return f"{sentence}, largest at {hertz(at, self.shown)}" if self.labels else sentence
 
     @property
     def drift(self) -> float:
         """Share of the energy that passed through the contacts by which what they store and lost differs from it."""
         gone, passed, first = 0.0, Range(), None
         ground = Range()
-        for contacts, moved, stored, lost in self._energies("contacts", "ground", "stored", "lost"):
-            left = contacts + moved - stored - lost
+        for contacts, by_ground, stored, lost in self._energies("contacts", "ground", "stored", "lost"):
+            left = contacts + by_ground - stored - lost
             first = left[0] if first is None else first
             gone = np.maximum(gone, np.abs(left - first).max())
             passed.see(contacts)
-            ground.see(moved)
+            ground.see(by_ground)
         most = max(passed.width, ground.width)
         return float(gone / most) if most else 0.0
 
     @property
     def balance(self) -> float:
         """Largest deviation of the bodies' energy from what they got, a share of what was given or is there at most."""
-        left, given, most = Range(), Range(), 0.0
+        left, gained, most = Range(), Range(), 0.0
         for mechanical, supplied, damped, contacts in self._energies("mechanical", "given", "damped", "contacts"):
             left.see(mechanical - supplied + damped + contacts)
-            given.see(supplied)
+            gained.see(supplied)
             most = max(most, float(np.abs(mechanical).max(initial=0.0)))
-        size = max(most, given.width)
+        size = max(most, gained.width)
         return left.width / size if size else 0.0
 
     def _energies(self, *names: str) -> Iterator[list[Array]]:
@@ -378,7 +378,7 @@ class Orbit(Ended, Announced):
             axes: of matplotlib, new ones with a legend if not given. read_out: its number.
         """
         numbered("read_out", read_out, len(self.labels), "read-out")
-        own = axes is None
+        alone = axes is None
         if axes is None:
             import matplotlib.pyplot as plt
 
@@ -388,7 +388,7 @@ class Orbit(Ended, Announced):
         axes.plot(by * y, rate * v, color="#0b4f9c", linewidth=0.7)
         axes.plot(by * y[last], rate * v[last], "o", color="#c8382c", markersize=4, label="after every period")
         axes.set(xlabel=f"{self.labels[read_out]} in {unit}", ylabel=f"velocity in {per_second}/s")
-        if own:
+        if alone:
             axes.legend(fontsize=8, loc="lower left", bbox_to_anchor=(0.0, 1.0), frameon=False)
         return axes
 
@@ -568,24 +568,24 @@ def _divergence(stepper: Stepper, before: MotionState, seen: Sample, kept: KeptS
 
 def _warnings(equations: MotionEquations, kept: KeptSamples, worst: float) -> tuple[str, ...]:
     """What a reader must know. worst: m, of the contacts that yield at once."""
-    said = []
+    warnings = []
     if any(H.any() for c in equations.assembly.components for H in c.loss.values()):
-        said.append(
+        warnings.append(
             f"Loss factors (structural damping) have no form in time: dampers that take as much at "
             f"{hertz(equations.Omega / (2 * np.pi))} stand for them, and take h times as much in the h-th harmonic, "
             "where a harmonic balance does not; with modal damping both mean the same."
         )
     if names := [c.name for c in equations.contacts if saws(c.patch.law)]:
-        said.append(
+        warnings.append(
             f"Static friction above the sliding one ({', '.join(names)}): a point without mass sticks again as soon as "
             "it has slipped, so sliding friction saws between both values, with teeth that hang on the step; "
             'write law = "set-valued" or "rate", or friction that falls with the speed.'
         )
     if worst > UNSOLVED * kept.widest:
-        said.append(f"Contacts were not solved for in every step, to {worst:.2g} m at worst; take more steps.")
+        warnings.append(f"Contacts were not solved for in every step, to {worst:.2g} m at worst; take more steps.")
     if kept.missed:
-        said.append(f"{counted(kept.missed, 'event')} more than are listed, and counted, happened.")
-    return tuple(said)
+        warnings.append(f"{counted(kept.missed, 'event')} more than are listed, and counted, happened.")
+    return tuple(warnings)
 
 
 @dataclass(frozen=True)
@@ -607,13 +607,13 @@ class Again:
 
 def _again(stepper: Stepper, begin: MotionState, samples: int, each: int) -> Again:
     e, steppers = stepper.equations, ((stepper, each), (stepper.halved(), 2 * each))
-    (one, seen, *_), (other, fine, *_) = (s.run(begin, np.full(samples, k)) for s, k in steppers)
-    missed, swing = float(one.missed) - float(begin.missed), math.sqrt(2 * seen.mechanical.max(initial=0.0))
+    (end, seen, *_), (fine_end, fine, *_) = (s.run(begin, np.full(samples, k)) for s, k in steppers)
+    missed, swing = float(end.missed) - float(begin.missed), math.sqrt(2 * seen.mechanical.max(initial=0.0))
     if not np.isfinite(seen.mechanical[-1] + fine.mechanical[-1]):
-        return Again((one, other), math.inf, 1.0, missed, swing)
+        return Again((end, fine_end), math.inf, 1.0, missed, swing)
     y, exact, order = read(e, seen), read(e, fine), 4 if stepper.options.halvings else 2
     differ = float(np.abs(y - exact).max(initial=0.0)) * 2**order / (2**order - 1)
-    return Again((one, other), differ, float(np.abs(exact).max(initial=0.0)), missed, swing)
+    return Again((end, fine_end), differ, float(np.abs(exact).max(initial=0.0)), missed, swing)
 
 
 def _error(
@@ -627,14 +627,18 @@ def _error(
     of those that were done, tells what all periods leave, each as much as the hardest.
     """
     last = _again(stepper, now, samples, each)
-    known = last if last.differ * last.missed > 0 else _again(stepper, first, samples, each)
-    if not math.isfinite(last.differ + known.differ):
+    missed = last if last.differ * last.missed > 0 else _again(stepper, first, samples, each)
+    if not math.isfinite(last.differ + missed.differ):
         return 1.0, ""
-    size, periods = last.size or known.size or 1.0, min(AFTER, done // 8, samples)
-    told = known.differ / known.missed if known.differ * known.missed > 0 else size / (last.swing or known.swing or 1.0)
-    worst = told * float(hardest.missed)
+    size, periods = last.size or missed.size or 1.0, min(AFTER, done // 8, samples)
+    leaves = (
+        missed.differ / missed.missed
+        if missed.differ * missed.missed > 0
+        else size / (last.swing or missed.swing or 1.0)
+    )
+    worst = leaves * float(hardest.missed)
     parts = _separations(stepper, *last.ends, samples, each, periods)
-    parts = parts if len(parts) else _separations(stepper, *known.ends, samples, each, periods)
+    parts = parts if len(parts) else _separations(stepper, *missed.ends, samples, each, periods)
     half = len(parts) // 2
     if not half or not np.isfinite(parts).all():
         return min(1.0, max(last.differ, worst) / size * done), ""
@@ -666,10 +670,10 @@ def _separations(stepper: Stepper, a: MotionState, b: MotionState, samples: int,
     b = classification.between(a, b, APART * size / apart)
     begin, rows = APART * size, np.full(samples, samples * each)
     runs, pace = [stepper.run(now, rows, periods)[1] for now in (a, b)], np.sqrt(np.abs(stepper.equations.omega2))
-    one, other = (np.concatenate([seen.q * pace, seen.q_dot], axis=1) for seen in runs)
-    if len(one) != len(other):  # one of them became infinite
+    phases, neighbour = (np.concatenate([seen.q * pace, seen.q_dot], axis=1) for seen in runs)
+    if len(phases) != len(neighbour):  # one of them became infinite
         return np.zeros(0)
-    return np.linalg.norm(one - other, axis=1) / begin
+    return np.linalg.norm(phases - neighbour, axis=1) / begin
 
 
 def steps_of_a_sample(e: MotionEquations, samples: int, steps: int | None) -> int:

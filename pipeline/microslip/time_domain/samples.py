@@ -57,8 +57,8 @@ def of_period(e: MotionEquations, seen: Sample) -> dict[str, Array]:
 def read(e: MotionEquations, seen: Sample) -> Array:
     """(w, s) read-outs."""
     q, force, o = np.asarray(seen.q), np.asarray(seen.force), e.oscillators(np.asarray(seen.time))
-    found = q @ e.output.T - (force - e.F_0) @ e.output_residual.T + o @ e.output_given.T
-    return without_rounding(found, e.output, q).T
+    outputs = q @ e.output.T - (force - e.F_0) @ e.output_residual.T + o @ e.output_given.T
+    return without_rounding(outputs, e.output, q).T
 
 
 def without_rounding(found: Array, output: Array, q: Array) -> Array:
@@ -73,10 +73,10 @@ def energies(e: MotionEquations, seen: Sample) -> dict[str, Array]:
     """`ENERGIES`, see `Orbit`: preloads count as loads, and what bodies hold beside their modes as theirs."""
     named = dict(zip(("given", "damped", "contacts", "lost", "stored", "ground"), seen.energy.T, strict=True))
     more, preloads = seen.force - e.F_0, seen.d @ e.F_0
-    beside = 0.5 * np.einsum("sc,cd,sd->s", more, e.R, more)
+    yielded = 0.5 * np.einsum("sc,cd,sd->s", more, e.R, more)
     named["given"] = named["given"] + preloads
-    named["contacts"] = named["contacts"] + preloads - beside
-    return {"mechanical": seen.mechanical + beside, **named}
+    named["contacts"] = named["contacts"] + preloads - yielded
+    return {"mechanical": seen.mechanical + yielded, **named}
 
 
 def sizes(e: MotionEquations) -> dict[str, int]:

@@ -148,14 +148,14 @@ def of_balance(e: MotionEquations, problem: Problem, point: Point | None = None)
 
 def of_point(e: MotionEquations, problem: Problem, point: Point) -> PeriodicStart:
     """A solution of a harmonic balance of the same assembly, whatever it leaves out."""
-    found, contacts = operating(problem, point), e.contacts
-    bodies = [np.concatenate(parts) for parts in zip(*found.q.values(), strict=True)]
+    vibration, contacts = operating(problem, point), e.contacts
+    bodies = [np.concatenate(parts) for parts in zip(*vibration.q.values(), strict=True)]
     M = e.assembly.joined(1).M.real
-    q = np.array([e.shapes.T @ (M @ one) for one in bodies])
+    q = np.array([e.shapes.T @ (M @ body) for body in bodies])
     turns = 1j * e.Omega * np.arange(len(q))
-    relative = [found.relative[c.name].copy() for c in contacts]
-    for one, c in zip(relative, contacts, strict=True):
-        one[:, 0] -= c.offset
+    relative = [vibration.relative[c.name].copy() for c in contacts]
+    for body, c in zip(relative, contacts, strict=True):
+        body[:, 0] -= c.offset
     d = np.concatenate(relative) if relative else np.zeros((0, problem.coefficients))
     return PeriodicStart(q.sum(axis=0).real, (turns @ q).real, d)
 

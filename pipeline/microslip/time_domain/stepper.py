@@ -58,7 +58,7 @@ class Stepper:
 
     @cached_property
     def groups(self) -> tuple[ContactGroup, ...]:
-        contacts, found = self.equations.contacts, []
+        contacts, groups = self.equations.contacts, []
         for same in self.same:
             patch = contacts[same[0]].patch
             offset = np.array([contacts[i].offset for i in same])
@@ -66,16 +66,16 @@ class Stepper:
             if (ground := contacts[same[0]].ground) is not None:
                 law = moving(law, ground, np.tile(patch.points, (len(same), 1)))
             G = np.broadcast_to(patch.kinematics, (len(same), *patch.kinematics.shape))
-            found.append(ContactGroup(law, G, offset))
-        return _sent(tuple(found))
+            groups.append(ContactGroup(law, G, offset))
+        return _sent(tuple(groups))
 
     @cached_property
     def same(self) -> list[list[int]]:
         """Numbers of the contacts, those of one patch object on the same ground together."""
-        found: dict[tuple, list[int]] = {}
+        alike: dict[tuple, list[int]] = {}
         for i, c in enumerate(self.equations.contacts):
-            found.setdefault((id(c.patch), c.ground), []).append(i)
-        return list(found.values())
+            alike.setdefault((id(c.patch), c.ground), []).append(i)
+        return list(alike.values())
 
     @cached_property
     def rows(self) -> Array:
@@ -250,11 +250,11 @@ class Stepper:
             self.options, events, self.groups, self.bodies, now, each, s, s if rows is None else rows, fine * done
         )
         count, back = int(listed.count), np.argsort(self.rows)
-        told = np.array(np.asarray(listed.rows)[: min(count, events)])
-        told[:, 1] = self.numbers[told[:, 1].astype(int)] if len(told) else 0
+        events_listed = np.array(np.asarray(listed.rows)[: min(count, events)])
+        events_listed[:, 1] = self.numbers[events_listed[:, 1].astype(int)] if len(events_listed) else 0
         last = np.arange(max(int(i) - s, 0), int(i)) % s
         seen = Sample._make(np.asarray(x)[last] for x in seen)
-        return now, seen._replace(d=seen.d[:, back], force=seen.force[:, back]), told, count, hardest
+        return now, seen._replace(d=seen.d[:, back], force=seen.force[:, back]), events_listed, count, hardest
 
 
 @program

@@ -258,11 +258,11 @@ def on_two_motions(
     up: Sequence[SettledMotion], down: Sequence[SettledMotion]
 ) -> list[tuple[SettledMotion, SettledMotion]]:
     """The lower and the higher motion where two sweeps are on different ones, by frequency."""
-    known = {m.frequency: m for m in up}
-    pairs = [(known[m.frequency], m) for m in down if m.frequency in known]
+    upwards = {m.frequency: m for m in up}
+    pairs = [(upwards[m.frequency], m) for m in down if m.frequency in upwards]
     pairs = [(a, b) for a, b in pairs if not a.like(b.amplitude)]
-    found = [(a, b) if a.amplitude < b.amplitude else (b, a) for a, b in pairs]
-    return sorted(found, key=lambda pair: pair[0].frequency)
+    ordered = [(a, b) if a.amplitude < b.amplitude else (b, a) for a, b in pairs]
+    return sorted(ordered, key=lambda pair: pair[0].frequency)
 
 
 def nearer(m: SettledMotion, low: SettledMotion, high: SettledMotion) -> bool:
@@ -275,7 +275,7 @@ def _periods(problem: Problem, gap: tuple[float, float]) -> int:
     and free."""
     part = problem.assembly.joined(1)
     pairs = [(part, problem.assembly.stiffness), (free(part), np.zeros((0, 0)))]
-    f, D = (np.concatenate([of(one, k) for one, k in pairs]) for of in (stuck, stuck_damping))
+    f, D = (np.concatenate([of(part_of, k) for part_of, k in pairs]) for of in (stuck, stuck_damping))
     about = D[(f > 0.5 * gap[0]) & (f < 2 * gap[1]) & (D > 0)]
     wanted = FORGOTTEN / (2 * np.pi * about.min(initial=1.0))
     return int(np.clip(wanted, FEWEST, MOST))

@@ -90,9 +90,9 @@ def read_kinematics(path: Path) -> Kinematics:
             numbers += [_numbers(row, head)] if row else []
     if len(numbers) < 8:
         raise UserError(f"has {len(numbers)} rows of numbers; give eight at the least")
-    found = Kinematics(*np.array(numbers).T)
-    _sound(found)
-    return found
+    kinematics = Kinematics(*np.array(numbers).T)
+    _sound(kinematics)
+    return kinematics
 
 
 def _numbers(row: list[str], head: list[str]) -> list[float]:
@@ -178,13 +178,13 @@ class ContactPlaces:
     def _own(self, tracks: Iterable[Track]) -> Array:
         """(3, places, turns of the file) half axes and place on the wheel of every single patch, m; tracks: of each
         place."""
-        found = np.empty((3, *self.y.shape))
+        patches_worn = np.empty((3, *self.y.shape))
         for n, track in enumerate(tracks):
             for i, y in enumerate(self.y[n]):
                 a, b, on_wheel, _, static, _ = self._patch(track, y, self.new.vertical[n, i])
                 grown = (self.force[n, i] / static) ** (1 / 3)
-                found[:, n, i] = a * grown, b * grown, on_wheel
-        return found
+                patches_worn[:, n, i] = a * grown, b * grown, on_wheel
+        return patches_worn
 
     @cached_property
     def _own_new(self) -> Array:
@@ -198,8 +198,8 @@ class ContactPlaces:
     def worn(self, tracks: Callable[[Array], Track], depth: Array) -> WheelContacts:
         """On a wheel of which (places, n) m are worn: by how much each patch, under its own force and on the profile
         across that its place has, differs from that of a new wheel."""
-        found, new, on = self._own(tracks(d) for d in depth), self._own_new, self.new
-        (a, b, _), shift = found / new, found[2] - new[2]
+        patches_worn, new, on = self._own(tracks(d) for d in depth), self._own_new, self.new
+        (a, b, _), shift = patches_worn / new, patches_worn[2] - new[2]
         return on._replace(a=a * on.a, b=b * on.b, on_wheel=on.on_wheel + shift)
 
 
@@ -322,26 +322,28 @@ class KinematicsAnswer:
         volume, work = sum(np.array([(j.volume[0], j.work[0]) for _, j in self.history]))
         orders = orders_of(depth[:, None], len(depth) // 8)[:, 0]
         n = int(orders.argmax())
-        told = [
+        sentences = [
             f"After {now.turns:.4g} turns, by {files} of the file, {1e6 * depth.mean():.4g} um "
             f"are worn where the contact runs, {1e9 * volume:.4g} mm3 in all: the coefficient times the work of "
             f"friction, {work / now.turns if now.turns else now.friction[0]:.4g} J a turn.",
         ]
         less = max(uncertain(self.history)[n, 0], np.nan_to_num(error).max())
         if orders[n] > less:
-            told.append(
+            sentences.append(
                 f"Over the circumference it differs by {1e6 * np.ptp(depth):.4g} um; order {n + 1} is largest, "
                 f"{1e6 * orders[n]:.3g} um."
             )
         else:
-            told.append(f"Over the circumference it differs by no more than its error, {1e6 * less:.2g} um.")
+            sentences.append(f"Over the circumference it differs by no more than its error, {1e6 * less:.2g} um.")
         if self.wheel.tracks is not None:
-            told.append(error_of(self.history))
+            sentences.append(error_of(self.history))
         if files == 1:
-            told.append("warning: the file holds one whole turn, so that no error can be told of the jump over many.")
+            sentences.append(
+                "warning: the file holds one whole turn, so that no error can be told of the jump over many."
+            )
         else:
-            told.append(f"Turns of the file differ: its standard error is at most {1e6 * error.max():.2g} um.")
-        return [*told, f"warning: it ends there: {self.ended}."] if self.ended else told
+            sentences.append(f"Turns of the file differ: its standard error is at most {1e6 * error.max():.2g} um.")
+        return [*sentences, f"warning: it ends there: {self.ended}."] if self.ended else sentences
 
 
 def recorded(

@@ -46,8 +46,8 @@ def of_strips(**how: Any) -> Creep:
 
     def forces(*given: Array) -> tuple[Array, Array, Array]:
         pose = strips.poses(*(jnp.broadcast_to(v, given[0].shape) for v in given), **how)
-        found = strips.forces(pose, how.get("elements", (20, 20)), how.get("distribution", "constant"))
-        return found.x, found.y, found.moment
+        creep = strips.forces(pose, how.get("elements", (20, 20)), how.get("distribution", "constant"))
+        return creep.x, creep.y, creep.moment
 
     return forces
 
@@ -76,10 +76,10 @@ def of_table(table: CreepTable) -> Creep:
 def _between(values: Array, weights: list[tuple[Array, Array]], i: int) -> Array:
     """(3,) values at the place i."""
     first = [jnp.int32(0), *(first[i].astype(jnp.int32) for first, _ in weights)]
-    found = jax.lax.dynamic_slice(values, first, [len(values), *(w.shape[1] for _, w in weights)])
+    near = jax.lax.dynamic_slice(values, first, [len(values), *(w.shape[1] for _, w in weights)])
     for _, weight in reversed(weights):
-        found = found @ weight[i]
-    return found
+        near = near @ weight[i]
+    return near
 
 
 class Vehicle(NamedTuple):
@@ -274,8 +274,8 @@ def roots(v: Vehicle) -> tuple[Array, Array]:
 def hunting(v: Vehicle) -> complex:
     """The root that grows fastest of those whose motion is mostly lateral and yaw, 1/s."""
     values, shapes = roots(v)
-    moved = shapes[Q : 2 * Q]
-    of_each = np.abs(moved) ** 2 * np.diag(v.mass)[:, None]
+    velocities = shapes[Q : 2 * Q]
+    of_each = np.abs(velocities) ** 2 * np.diag(v.mass)[:, None]
     lateral = of_each[[0, 3]].sum(axis=0) > 0.5 * of_each.sum(axis=0)
     chosen = values[lateral & (values.imag >= 0)]
     return complex(chosen[chosen.real.argmax()])

@@ -164,12 +164,13 @@ class VehicleCase(Model):
         track = track_of(self, folder)
         elastic = track.elastic
         each = 0.5 * self.vehicle.load
-        found = touching(track, each, self.running.reach)
+        contacts = touching(track, each, self.running.reach)
         M, C, K = self.lumped().matrices()
         _, spin, _ = self.vehicle.inertia
-        held = K[1, 1] * sunk(touched(found.over, found.reach, 0.0), each, K)[0]  # of the suspension, as it has sunk
-        return Vehicle(M, C, K, spin, self.vehicle.load + held, self.running.torque, self.running.speed, found.over,
-                       found.reach, each, self.friction, elastic.shear, elastic.poisson)  # fmt: skip
+        # what the suspension takes, as it has sunk
+        held = K[1, 1] * sunk(touched(contacts.over, contacts.reach, 0.0), each, K)[0]
+        return Vehicle(M, C, K, spin, self.vehicle.load + held, self.running.torque, self.running.speed, contacts.over,
+                       contacts.reach, each, self.friction, elastic.shear, elastic.poisson)  # fmt: skip
 
     def profiles(self, folder: Path, y: Array) -> Callable[[Array], WheelTouch] | None:
         """Depth (n,) m on strips about y (n,) m of both wheels' profile -> where they touch; see `made`."""

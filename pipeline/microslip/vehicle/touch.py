@@ -86,24 +86,24 @@ def _standing(track: Track, load: float, y: float) -> list[tuple[float, ...]]:
     """A `WheelTouch` of numbers of each wheel, at one displacement."""
     roll = 0.0
     for _ in range(6):
-        found = [_one(track, load, y, roll, "right"), _one(track, load, y, roll, "left")]
-        (right, _), (left, _) = found
+        patches_of = [_one(track, load, y, roll, "right"), _one(track, load, y, roll, "left")]
+        (right, _), (left, _) = patches_of
         change = (right.axle[1] - left.axle[1]) / (right.place[1] - left.place[1])
         roll += change
         if abs(change) < 1e-9:
             break
-    return [_touch(track, p, roll, y) for p, _ in found]
+    return [_touch(track, p, roll, y) for p, _ in patches_of]
 
 
 def _one(track: Track, load: float, y: float, roll: float, side: Side) -> tuple[RollingPatch, str]:
-    found = patches(track, Pose(y, 0.0, roll), side, load)
-    if len(found) > 1 and found[1].normal_force > 0.5 * found[0].normal_force:
+    contacts = patches(track, Pose(y, 0.0, roll), side, load)
+    if len(contacts) > 1 and contacts[1].normal_force > 0.5 * contacts[0].normal_force:
         raise UserError(
             f"at {1e3 * y:.3g} mm the {side} wheel runs on two patches at once; a motion in time "
             "knows one, so take less",
             "running.reach",
         )
-    return found[0], side
+    return contacts[0], side
 
 
 def _touch(track: Track, p: RollingPatch, roll: float, y: float) -> tuple[float, ...]:

@@ -46,11 +46,11 @@ class Tread:
         outward = np.repeat(
             [-s for s in self.sides], on.xi.shape[0]
         )  # the strips' y runs to the left, the profile's to the field side
-        found = [
+        depths = [
             deposited(d[::s], w[::s], m, self.y) if touches else np.zeros_like(self.y)
             for d, w, m, s, touches in zip(self.coefficient * work, width, middle, outward, loaded, strict=True)
         ]
-        return np.reshape(found, (len(self.sides), -1, len(self.y)))
+        return np.reshape(depths, (len(self.sides), -1, len(self.y)))
 
     def work(self, on: WheelContacts, friction: float, shear: float, poisson: float) -> Array:
         """(wheels,) J of friction in a turn, from the forces."""
@@ -329,7 +329,7 @@ def jumps(
         if error > tolerance and not fixed:
             size *= max(0.2, 0.9 * (tolerance / error) ** 0.5)
             continue
-        work = [size * 0.5 * r.work(one) for one in (now, then)]
+        work = [size * 0.5 * r.work(state) for state in (now, then)]
         now = r.at(now.depth + size * mean, now.turns + size, then)
         waves = orders_of(off, len(off) // 2)
         jump = Jump(now.turns, size, error, t.volume(size * mean), work[0] + work[1], waves)
