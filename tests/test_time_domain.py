@@ -41,7 +41,7 @@ from microslip.system import Body, Contact, Force, Monitor, Spring, System
 from microslip.system.assembly import Assembly, ContactFace, Load, Output, Ring, preloaded_contact
 from microslip.system.component import Component
 from microslip.time_domain import classification, equations, loop, orbit, recorded, samples, starts
-from microslip.time_domain.stepper import Sample, Stepper
+from microslip.time_domain.stepper import Snapshot, Stepper
 
 pytestmark = pytest.mark.usefixtures("undrawn")
 
@@ -307,7 +307,7 @@ def test_velocities_of_what_yields_beside_the_modes() -> None:
     for n in (100, 200):
         t = np.linspace(0.0, 1.0, n)
         none, force = np.zeros((n, 2)), np.sin(5 * t)[:, None] * np.ones(6)
-        seen = Sample(none, none, np.zeros((n, 6)), force, np.zeros((n, 6)), np.zeros(n), t)
+        seen = Snapshot(none, none, np.zeros((n, 6)), force, np.zeros((n, 6)), np.zeros(n), t)
         still = samples.of_period(e, seen._replace(force=0 * force))["velocity"][0]
         told = samples.of_period(e, seen)["velocity"][0] - still
         off.append(np.abs(told + e.output_residual[0].sum() * 5 * np.cos(5 * t))[1:-1].max())

@@ -83,7 +83,7 @@ class Diagram(Collected):
 
 
 @dataclass(eq=False)
-class _Work:
+class _DiagramWork:
     """A diagram on its way."""
 
     system: Dynamics
@@ -126,7 +126,7 @@ def diagram(
         UserError: there is no equilibrium, or no orbit of a driven system, near x.
     """
     prepare()
-    work = _Work(system, asked, kept, keep, report)
+    work = _DiagramWork(system, asked, kept, keep, report)
     points: tuple[Hopf, ...] = ()
     if system.frequency is not None:
         _doublings(work, work.add(DRIVEN, lambda: _driven(work, x)), asked.doublings)
@@ -140,7 +140,7 @@ def diagram(
     return Diagram(system, tuple(work.found), points, tuple(work.seen), tuple(work.deflated), tuple(work.messages))
 
 
-def _orbits(work: _Work, still: DiagramBranch, points: Sequence[Hopf]) -> None:
+def _orbits(work: _DiagramWork, still: DiagramBranch, points: Sequence[Hopf]) -> None:
     """The branches of orbits of a free system."""
     for i, point in enumerate(points, 1):
         if not _is_known(work, point):
@@ -158,7 +158,7 @@ LEFT = 60
 """Periods that a driven motion is left alone before an orbit is looked for where it is."""
 
 
-def _driven(work: _Work, x: Array) -> DiagramBranch:
+def _driven(work: _DiagramWork, x: Array) -> DiagramBranch:
     """The orbits of the period of what drives, from where a motion from x is after `LEFT` of them."""
     system, asked = work.system, work.asked
     assert system.frequency is not None
@@ -181,7 +181,7 @@ def _driven(work: _Work, x: Array) -> DiagramBranch:
     return followed(DRIVEN, "start", problem, state, asked.settings, work.report)
 
 
-def _coexisting(work: _Work, still: DiagramBranch, p: float) -> None:
+def _coexisting(work: _DiagramWork, still: DiagramBranch, p: float) -> None:
     """The branches of attractors at p that are on none which is known."""
     system, asked = work.system, work.asked
     work.report(f"{asked.starts} motions at {p:.6g}")
@@ -194,7 +194,7 @@ def _coexisting(work: _Work, still: DiagramBranch, p: float) -> None:
     _new_ones(work, "attractor", [a.orbit for a in stable_orbits])
 
 
-def _beside(work: _Work, p: float, still: Sequence[Array]) -> None:
+def _beside(work: _DiagramWork, p: float, still: Sequence[Array]) -> None:
     """The branches of orbits that deflation finds at p beside equilibria and attractors, and that are on none which is
     known."""
     known = [a.orbit for a in work.seen if a.orbit.p == p]
@@ -203,7 +203,7 @@ def _beside(work: _Work, p: float, still: Sequence[Array]) -> None:
     _new_ones(work, "orbit", [point.orbit for point in points])
 
 
-def _resting(work: _Work, still: DiagramBranch, p: float) -> list[Array]:
+def _resting(work: _DiagramWork, still: DiagramBranch, p: float) -> list[Array]:
     """The equilibria (n,) at p."""
     x, away = still.x[:, 0], still.parameter - p
     near = np.flatnonzero(away[:-1] * away[1:] <= 0)
@@ -215,7 +215,7 @@ def _resting(work: _Work, still: DiagramBranch, p: float) -> list[Array]:
     return unlike
 
 
-def _new_ones(work: _Work, what: str, found: Sequence[PeriodicOrbit]) -> None:
+def _new_ones(work: _DiagramWork, what: str, found: Sequence[PeriodicOrbit]) -> None:
     """Branches through orbits that are on none which is known."""
     for number, orbit in enumerate(found, 1):
         if not any(_passes(b, orbit) for b in work.found):
@@ -300,14 +300,14 @@ def _hopf(system: Dynamics, still: DiagramBranch, i: int) -> Hopf:
     return equilibria.hopf(system, still.x[i, 0], float(still.parameter[i]), float(omega))
 
 
-def _is_known(work: _Work, point: Hopf) -> bool:
+def _is_known(work: _DiagramWork, point: Hopf) -> bool:
     """Whether a branch of orbits has ended at the Hopf point."""
     ends = [b for b in work.found if not b.still and b.ended == orbits.COLLAPSED]
     return any(abs(b.parameter[-1] - point.p) < 1e-2 * work.system.parameter_scale
                and abs(b.period[-1] * point.omega / (2 * np.pi) - 1) < 1e-2 for b in ends)  # fmt: skip
 
 
-def _born_at(work: _Work, name: str, point: Hopf) -> None:
+def _born_at(work: _DiagramWork, name: str, point: Hopf) -> None:
     def make() -> DiagramBranch:
         begun = orbits.born_at(work.system, point, work.asked.nodes, work.asked.settings)
         return followed(name, f"Hopf point at {point.p:.6g}", *begun, work.asked.settings, work.report)
@@ -315,7 +315,7 @@ def _born_at(work: _Work, name: str, point: Hopf) -> None:
     _doublings(work, work.add(name, make), work.asked.doublings)
 
 
-def _doublings(work: _Work, parent: DiagramBranch, levels: int) -> None:
+def _doublings(work: _DiagramWork, parent: DiagramBranch, levels: int) -> None:
     """The orbits of twice the period at every period doubling by which a branch gains or loses its stability, and so
     on: those of orbits that are unstable on both sides are left, they are many and nothing comes to them."""
     places = [i for i in parent.of_kind("period doubling") if parent.stable[max(i - 1, 0) : i + 2 : 2].any()]

@@ -46,7 +46,7 @@ ROUGHEST = 1e-3
 """m: R_Z above this is given in another unit."""
 
 
-class Section(Model):
+class SectionKeys(Model):
     """A cross-section."""
 
     profile: Number | Annotated[Numbers, Field(min_length=1)] | FileName
@@ -69,7 +69,7 @@ class Section(Model):
     """nu"""
 
     @model_validator(mode="after")
-    def _is_an_arc(self) -> Section:
+    def _is_an_arc(self) -> SectionKeys:
         measured = isinstance(self.profile, str)
         idle = [key for key in (("width",) if measured else ("mirror", "noise", "between")) if getattr(self, key)]
         if asked := [key for key in idle if key in self.model_fields_set]:
@@ -98,14 +98,14 @@ class Section(Model):
         return circle(outward * self.profile, self.width)
 
 
-class Wheel(Section):
+class Wheel(SectionKeys):
     """A wheel."""
 
     radius: Annotated[Positive, Field(le=BIGGEST)]
     """[m] of the running circle"""
 
 
-class Rail(Section):
+class Rail(SectionKeys):
     """A rail."""
 
     inclination: Annotated[Number, Field(ge=-0.2, le=0.2)] = 0.0
@@ -167,7 +167,7 @@ class Creep(Model):
         return self
 
 
-class Strips(Model):
+class StripKeys(Model):
     """How a patch is divided and what it is made of, see `strips.creep_forces`."""
 
     elements: Annotated[tuple[Count, Count], BeforeValidator(_tuple)] = (20, 20)
@@ -180,7 +180,7 @@ class Strips(Model):
     """with the third spring of Kalker, or the book's two"""
 
 
-class ModelOfCase(Strips):
+class ModelOfCase(StripKeys):
     """How a patch is divided and what it is made of, see `strips.creep_forces`."""
 
     exact: Annotated[int, Field(ge=0, le=1000)] = 5

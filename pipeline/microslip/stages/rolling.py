@@ -16,7 +16,7 @@ from ..report.page import Piece, number, say, table
 from ..results import Journal
 from ..rolling.behind import ROWS, Behind, behind
 from ..rolling.contact_table import ContactTable, contact_table, write_contact_table
-from ..rolling.settings import RollingCase, Section, load_rolling
+from ..rolling.settings import RollingCase, SectionKeys, load_rolling
 from ..rolling.study import RollingAnswer, rows_of_patches, study
 from ..rolling.table import creep_table, write_creep_table
 from ..rolling.wearing import ProfileWear, wearing
@@ -54,7 +54,7 @@ def _bodies(case: RollingCase, case_path: Path, report: Report) -> list[Path]:
 
 
 @in_its_file
-def _of_one_material(case_path: Path, key: str, job: Job, section: Section) -> None:
+def _of_one_material(case_path: Path, key: str, job: Job, section: SectionKeys) -> None:
     """A body and the half-space that stands for its contact, of which one is taken out and the other put in."""
     own = [getattr(job.settings.material, name, None) for name in ("young", "poisson")]
     asked = [section.young, section.poisson]

@@ -115,7 +115,7 @@ class Listed(NamedTuple):
     rows: Any
 
 
-class Sample(NamedTuple):
+class Snapshot(NamedTuple):
     """A sample: (m,) q and q', (c,) d and force, (6,) energies (see `MotionState`) and the bodies' own, J; time, s."""
 
     q: Any

@@ -15,7 +15,7 @@ import jax.numpy as jnp
 
 from ..programs import inner, program
 from . import fourth, kicks
-from .bodies import Bodies, Hardest, Listed, MotionState, Options, Sample, exponent
+from .bodies import Bodies, Hardest, Listed, MotionState, Options, Snapshot, exponent
 from .contacts import ContactGroup, Held, moved, parts, times, untouched
 
 LEAST = 4
@@ -60,7 +60,7 @@ def run(
     s: Any,
     rows: Any,
     steps: Any,
-) -> tuple[MotionState, Listed, Sample, Any, Hardest]:
+) -> tuple[MotionState, Listed, Snapshot, Any, Hardest]:
     """Rows of so many steps each, of which each (room,) is a sample, the first again after the last of s; as many as
     are asked for, or until numbers are infinite.
 
@@ -79,10 +79,10 @@ def run(
         left, now = jax.lax.while_loop(lambda c: (c[0] > 0) & ~c[1].met.any(), lambda c: step(*c), (left, now))
         return left, now._replace(met=jnp.zeros_like(now.met)), _noted(now, listed)
 
-    def look(now: MotionState) -> Sample:
+    def look(now: MotionState) -> Snapshot:
         q, v = now.y[:, :p], now.y[:, p:]
         bodies = 0.5 * jnp.sum(v**2 + B.omega2 * q**2)
-        return Sample(q.reshape(-1), v.reshape(-1), now.held.d, now.held.force, now.energy, bodies, now.time)
+        return Snapshot(q.reshape(-1), v.reshape(-1), now.held.d, now.held.force, now.energy, bodies, now.time)
 
     def row(carried: tuple) -> tuple:
         i, steps, _, now, listed, seen, hardest = carried

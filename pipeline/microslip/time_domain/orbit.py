@@ -27,7 +27,7 @@ from ..settings.mistakes import bounded, numbered
 from ..system.assembly import Contact
 from ..units import METRES, UNIT_OF_FREQUENCY, Quantity, counted, hertz
 from . import classification
-from .bodies import Hardest, MotionState, Sample
+from .bodies import Hardest, MotionState, Snapshot
 from .classification import Exponent
 from .equations import MotionEquations
 from .ground import steps_of_waves
@@ -550,11 +550,11 @@ def _exponent(
     return classification.exponent(stepper, now, samples, each, periods)
 
 
-def _divergence(stepper: Stepper, before: MotionState, seen: Sample, kept: KeptSamples | None) -> tuple[float, str]:
+def _divergence(stepper: Stepper, before: MotionState, seen: Snapshot, kept: KeptSamples | None) -> tuple[float, str]:
     """When a motion became infinite, s, and why; what is finite of its last period is kept."""
     finite = np.isfinite(np.asarray(seen.mechanical))
     whole = int(np.argmin(finite))
-    sound = Sample._make(np.asarray(x)[:whole] for x in seen)
+    sound = Snapshot._make(np.asarray(x)[:whole] for x in seen)
     if kept is not None and whole:
         kept.keep(of_period(stepper.equations, sound), np.zeros((0, 3)), 0)
     when = float(sound.time[-1]) if whole else float(before.time)

@@ -15,7 +15,7 @@ from ..data import Array
 from ..files.hdf5 import put
 from ..harmonic_balance.readout import measured
 from ..harmonic_balance.reduced import READS
-from .bodies import Hardest, MotionState, Sample
+from .bodies import Hardest, MotionState, Snapshot
 from .contacts import gapes
 from .equations import MotionEquations
 from .stepper import KINDS
@@ -42,9 +42,9 @@ Where = tuple[MotionState, Hardest]
 """Where a motion is, and the hardest period of it so far."""
 
 
-def of_period(e: MotionEquations, seen: Sample) -> dict[str, Array]:
+def of_period(e: MotionEquations, seen: Snapshot) -> dict[str, Array]:
     """Name -> (rows, s) or (s,) of samples."""
-    seen = Sample._make(map(np.asarray, seen))
+    seen = Snapshot._make(map(np.asarray, seen))
     rates = seen.q_dot @ e.output.T + e.rates(seen.time) @ e.output_given.T
     if e.output_residual.any() and len(seen.time) > 1:  # what yields at once has no velocity of its own
         rates = rates - np.gradient(seen.force @ e.output_residual.T, seen.time, axis=0)
@@ -54,7 +54,7 @@ def of_period(e: MotionEquations, seen: Sample) -> dict[str, Array]:
     return dict(zip(UNITS, columns, strict=True))
 
 
-def read(e: MotionEquations, seen: Sample) -> Array:
+def read(e: MotionEquations, seen: Snapshot) -> Array:
     """(w, s) read-outs."""
     q, force, o = np.asarray(seen.q), np.asarray(seen.force), e.oscillators(np.asarray(seen.time))
     outputs = q @ e.output.T - (force - e.F_0) @ e.output_residual.T + o @ e.output_given.T
@@ -69,7 +69,7 @@ def without_rounding(found: Array, output: Array, q: Array) -> Array:
     return np.where(np.abs(found).max(axis=0, initial=0.0) <= least, 0.0, found)
 
 
-def energies(e: MotionEquations, seen: Sample) -> dict[str, Array]:
+def energies(e: MotionEquations, seen: Snapshot) -> dict[str, Array]:
     """`ENERGIES`, see `Orbit`: preloads count as loads, and what bodies hold beside their modes as theirs."""
     named = dict(zip(("given", "damped", "contacts", "lost", "stored", "ground"), seen.energy.T, strict=True))
     more, preloads = seen.force - e.F_0, seen.d @ e.F_0

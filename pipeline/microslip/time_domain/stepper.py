@@ -23,7 +23,7 @@ from ..errors import UserError
 from ..harmonic_balance.forces import repeated
 from ..programs import program
 from . import fourth, loop
-from .bodies import Bodies, Hardest, MotionState, Options, Sample, Spots, spots
+from .bodies import Bodies, Hardest, MotionState, Options, Snapshot, Spots, spots
 from .contacts import Braking, ContactGroup, Held, Yielding, force_at, gapes, slope_at, untouched
 from .equations import MotionEquations
 from .flow import BodyFlow, blocks, flow
@@ -226,13 +226,13 @@ class Stepper:
 
     def run(
         self, now: MotionState, steps: Array, rows: int | None = None, events: int = EVENTS
-    ) -> tuple[MotionState, Sample, Array, int]:
+    ) -> tuple[MotionState, Snapshot, Array, int]:
         """`advanced`, without its hardest row."""
         return self.advanced(now, steps, rows, events)[:4]
 
     def advanced(
         self, now: MotionState, steps: Array, rows: int | None = None, events: int = EVENTS
-    ) -> tuple[MotionState, Sample, Array, int, Hardest]:
+    ) -> tuple[MotionState, Snapshot, Array, int, Hardest]:
         """So many rows further, all samples if it is not said, the i-th after steps[i modulo s] of tau, (s,); compiled
         anew for another power of two above s alone. It ends early where numbers become infinite, in the last sample
         then.
@@ -253,7 +253,7 @@ class Stepper:
         events_listed = np.array(np.asarray(listed.rows)[: min(count, events)])
         events_listed[:, 1] = self.numbers[events_listed[:, 1].astype(int)] if len(events_listed) else 0
         last = np.arange(max(int(i) - s, 0), int(i)) % s
-        seen = Sample._make(np.asarray(x)[last] for x in seen)
+        seen = Snapshot._make(np.asarray(x)[last] for x in seen)
         return now, seen._replace(d=seen.d[:, back], force=seen.force[:, back]), events_listed, count, hardest
 
 

@@ -29,7 +29,7 @@ from ..results import Journal
 from ..results.names import exact
 from ..system.assembly import Assembly
 from . import equations, orbit, starts
-from .bodies import MotionState, Sample
+from .bodies import MotionState, Snapshot
 from .contacts import untouched
 from .samples import read
 from .stepper import KINDS, Stepper
@@ -117,13 +117,13 @@ class _Clock:
     def __init__(self, stepper: Stepper, patience: float) -> None:
         self.stepper, self.left = stepper, patience
 
-    def advanced(self, now: MotionState, steps: Array, periods: int) -> tuple[MotionState, Sample, Array]:
+    def advanced(self, now: MotionState, steps: Array, periods: int) -> tuple[MotionState, Snapshot, Array]:
         """As `Stepper.advanced` over some periods, in portions that take about `PORTION` each.
 
         Raises:
             TimeIsOver: before the last of them.
         """
-        samples, listed, done, ahead = list[Sample](), list[Array](), 0, 1
+        samples, listed, done, ahead = list[Snapshot](), list[Array](), 0, 1
         each = 1 if len(steps) == SAMPLES else SAMPLES  # rows of a period
         while done < periods:
             if self.left <= 0:
@@ -140,7 +140,7 @@ class _Clock:
                 break
             longer = int(np.clip(PORTION / max(took, 1e-6) * ahead, 1, orbit.FURTHER * ahead))
             ahead = min(longer, periods - done)
-        joined = Sample(*(np.concatenate(parts) for parts in zip(*samples, strict=True)))
+        joined = Snapshot(*(np.concatenate(parts) for parts in zip(*samples, strict=True)))
         return now, joined, np.concatenate(listed)
 
 

@@ -15,7 +15,7 @@ from ..contact.solids import Solid
 from ..data import Array
 from ..rolling.ellipse import combined
 from ..rolling.profiles import CrossSection
-from ..rolling.settings import Rail, Strips, TableOfCase, WearOfBody, Wheel
+from ..rolling.settings import Rail, StripKeys, TableOfCase, WearOfBody, Wheel
 from ..rolling.wheelset import Track
 from ..settings.numbers import Model, Name, NotNegative, Number, Positive, _tuple
 from ..settings.toml import read_settings
@@ -123,7 +123,7 @@ class KinematicsCase(Model):
     rail: Rail
     kinematics: KinematicsOfCase
     wear: WearOfTurns
-    model: Strips = Strips()
+    model: StripKeys = StripKeys()
 
 
 class VehicleCase(Model):
@@ -140,7 +140,7 @@ class VehicleCase(Model):
     running: RunningOfCase
     unround: Annotated[tuple[Unround, ...], BeforeValidator(_tuple)] = ()
     wear: WearOfTurns
-    model: Strips = Strips()
+    model: StripKeys = StripKeys()
     table: TableOfCase = TableOfCase(points=(8, 10, 17, 17, 7), elements=(20, 20))
 
     @model_validator(mode="after")
