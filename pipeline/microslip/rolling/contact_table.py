@@ -441,4 +441,5 @@ def read_contact_table(path: Path | str) -> ContactTable:
     names = [*of_wheels, *(f"patches/{name}" for name in Patches._fields)]
     arrays, _ = read_table(path, names, FORMAT, "write a table of contacts with [contacts] in a case")
     patches = Patches(*(arrays[f"patches/{name}"] for name in Patches._fields))
-    return ContactTable(patches=patches, **{name: arrays[name] for name in of_wheels})
+    rest: dict[str, Any] = {name: arrays[name] for name in of_wheels}
+    return ContactTable(patches=patches, **rest)

@@ -14,7 +14,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from ..data import Array
-from .contacts import Braking, Held, Yielding, times
+from .contacts import Braking, ContactGroup, Held, Yielding, times
 from .flow import BodyFlow
 from .inclusion import Meets
 from .ramp import Ramp
@@ -43,7 +43,7 @@ class Bodies(NamedTuple):
     """What the loop reads of the equations, as jax arrays in blocks of modes.
 
     Attributes:
-        flow. yielding: see `contacts`. meets: of set-valued points, None: there are none.
+        groups: of contacts. flow. yielding: see `contacts`. meets: of set-valued points, None: there are none.
             braking: of friction that follows the velocity alone, None: there is none. F_0: (c,). D: (c, m) and
             D_o (c, n): d of the contact coordinates. rate: (n, n) o' over o. kick: (m, c) velocities per force.
         omega2: (b, p). steady: (b, 2 p, n) of the periodic motion without contacts. reach: (points,) norm of their
@@ -53,6 +53,7 @@ class Bodies(NamedTuple):
             `fourth`, group by group, see there; preload: (m,) accelerations by F_0.
     """
 
+    groups: tuple[ContactGroup, ...]
     flow: BodyFlow
     yielding: Yielding | None
     meets: Meets | None

@@ -21,7 +21,7 @@ import jax
 import jax.numpy as jnp
 
 from .bodies import Bodies, MotionState, Options, by_modes, exponent, to_modes
-from .contacts import ContactGroup, Held, joined, times, told
+from .contacts import Held, joined, times, told
 from .flow import flown, worked
 
 HALVINGS = 10
@@ -62,13 +62,13 @@ class Bending(NamedTuple):
     curl: Any
 
 
-def begun(groups: tuple[ContactGroup, ...], B: Bodies, now: MotionState) -> MotionState:
+def begun(B: Bodies, now: MotionState) -> MotionState:
     """With what the contacts remember, and their forces by that."""
     x = tuple(
         g.law.memory(f, s).reshape(g.law.remembers, len(f)) if g.law.remembers else jnp.zeros((0, len(f)))
-        for g, f, s in zip(groups, now.held.forces, now.held.states, strict=True)
+        for g, f, s in zip(B.groups, now.held.forces, now.held.states, strict=True)
     )
-    first = _answer(groups, B, now.y, now.o, x, now.time)
+    first = _answer(B, now.y, now.o, x, now.time)
     held = now.held._replace(forces=first.forces)
     straight = Bending(0 * first.push, 0 * first.push, jnp.zeros(()), jnp.zeros(()))
     return now._replace(push=first.push, held=held, memory=(x, first.rates, straight), level=jnp.full(2, 1, int))
@@ -80,11 +80,11 @@ def leapt(now: MotionState) -> MotionState:
     return now._replace(memory=nothing, level=jnp.broadcast_to(now.level[1], 2))
 
 
-def _answer(groups: tuple[ContactGroup, ...], B: Bodies, y: Any, o: Any, x: tuple[Any, ...], time: Any) -> StageForces:
+def _answer(B: Bodies, y: Any, o: Any, x: tuple[Any, ...], time: Any) -> StageForces:
     """What contacts say where the bodies are, (b, 2 p)."""
     q, v = (part.reshape(-1) for part in jnp.split(y, 2, axis=1))
     moves, push, answers = times(B.rate, o), B.preload, []
-    for g, spots, memory in zip(groups, B.spots, x, strict=True):
+    for g, spots, memory in zip(B.groups, B.spots, x, strict=True):
         u, w = by_modes(spots, q, o) + spots.rest, by_modes(spots, v, moves)
         force, rate = g.law.rates(u.T, w.T, memory, time, B.flow.length[0])
         push -= to_modes(spots, force)
@@ -92,9 +92,7 @@ def _answer(groups: tuple[ContactGroup, ...], B: Bodies, y: Any, o: Any, x: tupl
     return StageForces(push.reshape(B.omega2.shape), *zip(*answers, strict=True))
 
 
-def step(
-    options: Options, groups: tuple[ContactGroup, ...], B: Bodies, k: Any, now: MotionState
-) -> tuple[Any, MotionState]:
+def step(options: Options, B: Bodies, k: Any, now: MotionState) -> tuple[Any, MotionState]:
     """Whether 2^k steps were done, and where the motion is then; where they were not, what is to be tried."""
     p, h, half = B.omega2.shape[1], B.flow.length[k], B.flow.length[k - 1]
     x, rates, _ = now.memory
@@ -116,15 +114,15 @@ def step(
         return tuple(a + share * sum(r) for a, *r in zip(x, *by, strict=True))
 
     free, first = on(now.y, now.o), pushed(now.push)
-    two = _answer(groups, B, free + half * first, o[0], grown(half, rates), now.time + half)
-    three = _answer(groups, B, kick(free, half * two.push), o[0], grown(half, two.rates), now.time + half)
+    two = _answer(B, free + half * first, o[0], grown(half, rates), now.time + half)
+    three = _answer(B, kick(free, half * two.push), o[0], grown(half, two.rates), now.time + half)
     end = on(free, o[0]) + h * pushed(three.push)
-    four = _answer(groups, B, end, o[1], grown(h, three.rates), now.time + h)
+    four = _answer(B, end, o[1], grown(h, three.rates), now.time + h)
     kicks = (h / 6 * now.push, h / 3 * (two.push + three.push), h / 6 * four.push)
     y, energy = _gone(stack, now.y, (now.o, o[0]), kicks)
     x = grown(h / 6, rates, two.rates, two.rates, three.rates, three.rates, four.rates)
-    last = _answer(groups, B, y, o[1], x, now.time + h)
-    held = _held(options, groups, h, now, last, x)
+    last = _answer(B, y, o[1], x, now.time + h)
+    held = _held(options, B, h, now, last, x)
     size = _norm(jnp.concatenate([y[:, p:], jnp.sqrt(jnp.abs(B.omega2)) * y[:, :p]])) + 1e-300
     bent, third, kink = _missed(h, now, two.push + three.push, four.push, last.push)
     third = third / size
@@ -175,20 +173,18 @@ def _gone(stack: Any, y: Any, oscillators: tuple[Any, Any], kicks: tuple[Any, An
     return y, jnp.concatenate([works, work[None]]).sum(axis=1)
 
 
-def _held(
-    options: Options, groups: tuple[ContactGroup, ...], h: Any, now: MotionState, last: StageForces, x: tuple[Any, ...]
-) -> Held:
+def _held(options: Options, B: Bodies, h: Any, now: MotionState, last: StageForces, x: tuple[Any, ...]) -> Held:
     """What contacts hold: their state as their law's own step tells it, with the memory that was integrated; of their
     coordinates see `at_sample`."""
     states = list[Any]()
-    for g, u, w, state, memory in zip(groups, last.places, last.speeds, now.held.states, x, strict=True):
+    for g, u, w, state, memory in zip(B.groups, last.places, last.speeds, now.held.states, x, strict=True):
         _, after = g.law.step(u, w, h, state)
         states.append((g.law.recalled(after, memory) if g.law.remembers else None) or after)
-    return told(groups, last.places, h, now.held, options.accounts, tuple(states), last.forces)
+    return told(B.groups, last.places, h, now.held, options.accounts, tuple(states), last.forces)
 
 
-def at_sample(groups: tuple[ContactGroup, ...], B: Bodies, now: MotionState) -> Held:
+def at_sample(B: Bodies, now: MotionState) -> Held:
     """With what contacts hold in their coordinates, which no step asks for."""
     q, _ = jnp.split(now.y, 2, axis=1)
     d = times(B.D, q.reshape(-1)) + times(B.D_o, now.o)
-    return now.held._replace(d=d, force=joined(groups, now.held.forces))
+    return now.held._replace(d=d, force=joined(B.groups, now.held.forces))

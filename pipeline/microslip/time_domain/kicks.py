@@ -11,11 +11,11 @@ import jax
 import jax.numpy as jnp
 
 from .bodies import Bodies, MotionState, Options, by_force, exponent
-from .contacts import ContactGroup, Held, answer, force_at, rigid_answer, slowed, times
+from .contacts import Held, answer, force_at, rigid_answer, slowed, times
 from .flow import flown, worked
 
 
-def step(options: Options, groups: tuple[ContactGroup, ...], B: Bodies, n: Any, now: MotionState) -> MotionState:
+def step(options: Options, B: Bodies, n: Any, now: MotionState) -> MotionState:
     """n steps, of which more than one only where no contact is met in them."""
     p = B.omega2.shape[1]
     dt = B.flow.length[0] * n
@@ -24,7 +24,7 @@ def step(options: Options, groups: tuple[ContactGroup, ...], B: Bodies, n: Any, 
     y, o, (given, taken) = _flown(options, B, n, now.y.at[:, p:].set(v), now.o)
     q, v_free = y[:, :p], y[:, p:]
     o, moves = _driven(options, B, now, o, dt)
-    held, push = answered(options, groups, B, q, v_free, touched + pushed, o, moves, dt, now.held)
+    held, push = answered(options, B, q, v_free, touched + pushed, o, moves, dt, now.held)
     work = jnp.zeros(())
     after = 0.5 * dt * push, 0.5 * dt * times(B.loads, o)
     for contacts, loads, mean in ((touched, pushed, 0.5 * (now.y[:, p:] + v)), (*after, v_free + 0.5 * sum(after))):
@@ -63,7 +63,6 @@ def _driven(options: Options, B: Bodies, now: MotionState, o: Any, dt: Any) -> t
 
 def answered(
     options: Options,
-    groups: tuple[ContactGroup, ...],
     B: Bodies,
     q: Any,
     v_free: Any,
@@ -86,11 +85,11 @@ def answered(
     unbraked = jnp.zeros(())
     if B.braking is not None and share == 1.0:
         before = times(B.D, v_free.reshape(-1)) + given
-        v, unbraked = slowed(groups, B.braking, B.F_0, free, before, dt, held)
+        v, unbraked = slowed(B.groups, B.braking, B.F_0, free, before, dt, held)
     if B.meets is None:
-        held = answer(groups, B.yielding, free, v, dt, held, options.accounts)
+        held = answer(B.groups, B.yielding, free, v, dt, held, options.accounts)
         return held._replace(missed=held.missed + dt * unbraked), by_force(B, held.force)
-    force, *others = force_at(groups, free, v, dt, held.states)
+    force, *others = force_at(B.groups, free, v, dt, held.states)
     ahead = free
     if B.yielding is None:
         v = v_free + share * dt * (by_force(B, force) + times(B.loads, o))
@@ -100,7 +99,7 @@ def answered(
         free = free + times(B.yielding.R, B.F_0)
     points = B.meets if B.yielding is not None else B.meets._replace(A=share * B.meets.A, r=B.meets.r / share)
     owed = held.owed
-    held = rigid_answer(groups, points, B.yielding, free, ahead, dt, held, tuple(others), options.accounts)
+    held = rigid_answer(B.groups, points, B.yielding, free, ahead, dt, held, tuple(others), options.accounts)
     push = by_force(B, held.force)
     if B.yielding is None and options.accounts:
         whole, rigid = push + times(B.loads, o), 0.5 * dt * (held.force - force)

@@ -16,7 +16,7 @@ import jax.numpy as jnp
 from ..programs import inner, program
 from . import fourth, kicks
 from .bodies import Bodies, Hardest, Listed, MotionState, Options, Snapshot, exponent
-from .contacts import ContactGroup, Held, moved, parts, times, untouched
+from .contacts import Held, moved, parts, times, untouched
 
 LEAST = 4
 """Shortest steps that are leapt over at once; nearer to a contact they are gone one by one."""
@@ -29,18 +29,16 @@ ROUNDING = 1e-6
 
 
 @partial(inner, static_argnums=0)
-def begun(
-    options: Options, groups: tuple[ContactGroup, ...], B: Bodies, y: Any, o: Any, held: Held | None
-) -> MotionState:
+def begun(options: Options, B: Bodies, y: Any, o: Any, held: Held | None) -> MotionState:
     """At time 0, bodies at y (b, 2 p), the contacts there from what they held, or never touched before."""
     q, v = jnp.split(y, 2, axis=1)
     dt, moves = B.flow.length[0], times(B.rate, o)
-    before = held or untouched(groups)
-    held, push = kicks.answered(options, groups, B, q, v, 0 * v, o, moves, dt, before, 0.5)
-    zero, none = jnp.zeros(()), jnp.zeros((4, sum(len(g.G) for g in groups)))
+    before = held or untouched(B.groups)
+    held, push = kicks.answered(options, B, q, v, 0 * v, o, moves, dt, before, 0.5)
+    zero, none = jnp.zeros(()), jnp.zeros((4, sum(len(g.G) for g in B.groups)))
     energy = jnp.zeros(6).at[4].set(held.stored)
     now = MotionState(y, o, zero, push, held, energy, held.missed, none.astype(bool), none, (), jnp.zeros(2, int), zero)
-    return typed(fourth.begun(groups, B, now) if options.halvings else now)
+    return typed(fourth.begun(B, now) if options.halvings else now)
 
 
 def typed(traced: Any) -> Any:
@@ -53,7 +51,6 @@ def typed(traced: Any) -> Any:
 def run(
     options: Options,
     events: int,
-    groups: tuple[ContactGroup, ...],
     B: Bodies,
     now: MotionState,
     each: Any,
@@ -72,7 +69,7 @@ def run(
         were; the row in which steps missed most.
     """
     p = B.omega2.shape[1]
-    step = partial(one_step, options, groups, B)
+    step = partial(one_step, options, B)
 
     def on(carried: tuple) -> tuple:
         left, now, listed = carried
@@ -91,7 +88,7 @@ def run(
         steps = steps + count
         now = now._replace(o=oscillators(options, B, steps * B.flow.length[0]))
         if options.halvings:
-            now = now._replace(held=fourth.at_sample(groups, B, now))
+            now = now._replace(held=fourth.at_sample(B, now))
         sample = look(now)
         kept = jax.tree_util.tree_map(lambda all_of, one: all_of.at[i % s].set(one), seen, sample)
         rise = now.missed - before.missed
@@ -113,28 +110,26 @@ def oscillators(options: Options, B: Bodies, time: Any) -> Any:
     return jnp.concatenate([jnp.ones(1), jnp.stack([jnp.cos(angle), jnp.sin(angle)], axis=1).reshape(-1)])
 
 
-def one_step(
-    options: Options, groups: tuple[ContactGroup, ...], B: Bodies, left: Any, now: MotionState
-) -> tuple[Any, MotionState]:
+def one_step(options: Options, B: Bodies, left: Any, now: MotionState) -> tuple[Any, MotionState]:
     """A step, or a leap over as many as no contact is met in, of those that are left; and what is left then."""
-    free = _free(groups, B, now) if options.leaps else jnp.zeros((), int)
+    free = _free(B, now) if options.leaps else jnp.zeros((), int)
     far = jnp.clip(free, 1, left)
     if not options.halvings:
-        return left - far, _told(B, far, now, kicks.step(options, groups, B, far, now))
+        return left - far, _told(B, far, now, kicks.step(options, B, far, now))
     near = jnp.minimum(now.level[0], exponent(left))
 
     def leap(now: MotionState) -> tuple[Any, MotionState]:
-        return far, _told(B, far, now, fourth.leapt(kicks.step(options, groups, B, far, now)))
+        return far, _told(B, far, now, fourth.leapt(kicks.step(options, B, far, now)))
 
     def step(now: MotionState) -> tuple[Any, MotionState]:
-        done, after = fourth.step(options, groups, B, near, now)
+        done, after = fourth.step(options, B, near, now)
         return jnp.where(done, 1 << near, 0), _told(B, 1 << near, now, after, done)
 
     done, after = jax.lax.cond(free >= LEAST, leap, step, now) if options.leaps else step(now)
     return left - done, after
 
 
-def _free(groups: tuple[ContactGroup, ...], B: Bodies, now: MotionState) -> Any:
+def _free(B: Bodies, now: MotionState) -> Any:
     """Steps in which no point of contact can close its gap: an even number, of `DIGITS` binary digits."""
     p = B.omega2.shape[1]
     z = now.y - times(B.steady, now.o)
@@ -142,7 +137,7 @@ def _free(groups: tuple[ContactGroup, ...], B: Bodies, now: MotionState) -> Any:
     fastest, bent = (swings * by_swing + steady for by_swing, steady in (B.reach, B.bends))
     w = times(B.D, now.y[:, p:].reshape(-1)) + times(B.D_o, times(B.rate, now.o))
     begin, free = 0, []
-    for g, u, rate in zip(groups, now.held.places, parts(groups, w), strict=True):
+    for g, u, rate in zip(B.groups, now.held.places, parts(B.groups, w), strict=True):
         points = slice(begin, begin + len(u))
         free.append(_unmet(g.law.overlap, u, moved(g, rate), fastest[points], bent[points]))
         begin += len(u)

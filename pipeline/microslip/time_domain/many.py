@@ -22,7 +22,6 @@ from ..programs import program
 from . import classification, loop
 from .bodies import Bodies, MotionState, Options
 from .classification import Exponent
-from .contacts import ContactGroup
 from .equations import MotionEquations
 from .orbit import REPEATS, comes_back, refuse_behind, steps_of_a_sample
 from .stepper import Stepper
@@ -149,7 +148,7 @@ def run(
     for i, start in enumerate(y):
         look()
         o = e.oscillators(0.0)
-        ends[i], closes[i], now = _one(stepper.options, keep, stepper.groups, stepper.bodies, start, o, counts)
+        ends[i], closes[i], now = _one(stepper.options, keep, stepper.bodies, start, o, counts)
         last.append(now)
     q, v = (part.reshape(len(x), keep, -1) for part in np.split(ends, 2, axis=3))
     reached = Reached(e, each, q, v, closes)
@@ -170,7 +169,7 @@ def _exponents(
     for now in last:
         look()
         count = classification.ALIGNED + periods
-        growths = _grown(stepper.options, count, stepper.groups, stepper.bodies, now, each, scale, way)
+        growths = _grown(stepper.options, count, stepper.bodies, now, each, scale, way)
         growth = np.asarray(growths)[classification.ALIGNED :]
         finite = np.isfinite(growth).all()
         none = Exponent(float("nan"), float("nan"), 0)
@@ -179,12 +178,10 @@ def _exponents(
 
 
 @partial(program, static_argnums=(0, 1))
-def _one(
-    options: Options, keep: int, groups: tuple[ContactGroup, ...], B: Bodies, y: Any, o: Any, counts: Any
-) -> tuple[Any, Any, MotionState]:
+def _one(options: Options, keep: int, B: Bodies, y: Any, o: Any, counts: Any) -> tuple[Any, Any, MotionState]:
     """(keep, b, 2 p) after every period that is kept, how many impacts were in them, and where the motion is then."""
-    on = partial(_further, options, groups, B)
-    now, _ = on(loop.begun(options, groups, B, y, o, None), counts[0])
+    on = partial(_further, options, B)
+    now, _ = on(loop.begun(options, B, y, o, None), counts[0])
 
     def period(now: MotionState, _: None) -> tuple[MotionState, tuple[Any, Any]]:
         now, closes = on(now, counts[1])
@@ -194,14 +191,12 @@ def _one(
     return ends, jnp.sum(closes), now
 
 
-def _further(
-    options: Options, groups: tuple[ContactGroup, ...], B: Bodies, now: MotionState, count: Any
-) -> tuple[MotionState, Any]:
+def _further(options: Options, B: Bodies, now: MotionState, count: Any) -> tuple[MotionState, Any]:
     """So many steps, and the impacts in them; o is there again what it was, so that rounding does not add up."""
 
     def step(carried: tuple) -> tuple:
         left, now, closes = carried
-        left, now = loop.one_step(options, groups, B, left, now)
+        left, now = loop.one_step(options, B, left, now)
         return left, now, closes + jnp.sum(now.met[0])
 
     _, after, closes = jax.lax.while_loop(lambda c: c[0] > 0, step, (count, now, jnp.zeros((), int)))
@@ -212,7 +207,6 @@ def _further(
 def _grown(
     options: Options,
     periods: int,
-    groups: tuple[ContactGroup, ...],
     B: Bodies,
     last: MotionState,
     count: Any,
@@ -223,7 +217,7 @@ def _grown(
     apart = jnp.linalg.norm(scale * way)
 
     def period(carried: tuple[MotionState, MotionState], _: None) -> tuple[tuple[MotionState, MotionState], Any]:
-        now, other = (_further(options, groups, B, one, count)[0] for one in carried)
+        now, other = (_further(options, B, one, count)[0] for one in carried)
         size = jnp.linalg.norm(scale * (other.y - now.y))
         other = loop.typed(classification.between(now, other, apart / size, jnp.asarray))
         return (now, other), jnp.log(size / apart)

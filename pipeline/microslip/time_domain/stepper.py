@@ -113,7 +113,8 @@ class Stepper:
     def bodies(self) -> Bodies:
         enough = np.array(fourth.MISSED * (self.tau * self.equations.fastest) ** 4)
         fixed, meets = self._fixed, self._meets(self._flow)
-        return _sent(fixed._replace(flow=self._flow, meets=meets, braking=self._braking, enough=enough))
+        sent = _sent(fixed._replace(flow=self._flow, meets=meets, braking=self._braking, enough=enough))
+        return sent._replace(groups=self.groups)
 
     @cached_property
     def _flow(self) -> BodyFlow:
@@ -148,7 +149,7 @@ class Stepper:
         yielding = Yielding(R, e.yields[np.ix_(rows, rows)], F_0) if R.any() else None
         arrays = (F_0, D, D_o, e.turning, e.omega2.reshape(b, p), steady, reach, bends, loads, -D.T, np.zeros(()))
         harmonics = e.Omega * np.array(e.harmonics, dtype=float)
-        return Bodies._make((None, yielding, None, None, *arrays, harmonics, self._moved, D.T @ F_0))
+        return Bodies._make(((), None, yielding, None, None, *arrays, harmonics, self._moved, D.T @ F_0))
 
     @property
     def _moved(self) -> tuple[Spots, ...]:
@@ -222,7 +223,7 @@ class Stepper:
         e = self.equations
         b, p = blocks(e)
         y = np.concatenate([np.reshape(q, (b, p)), np.reshape(v, (b, p))], axis=1)
-        return loop.begun(self.options, self.groups, self.bodies, y, e.oscillators(0.0), held)
+        return loop.begun(self.options, self.bodies, y, e.oscillators(0.0), held)
 
     def run(
         self, now: MotionState, steps: Array, rows: int | None = None, events: int = EVENTS
@@ -247,7 +248,7 @@ class Stepper:
         each = np.zeros(max(FEWEST, 1 << (s - 1).bit_length()), int)
         each[:s] = fine * np.asarray(steps)
         now, listed, seen, i, hardest = loop.run(
-            self.options, events, self.groups, self.bodies, now, each, s, s if rows is None else rows, fine * done
+            self.options, events, self.bodies, now, each, s, s if rows is None else rows, fine * done
         )
         count, back = int(listed.count), np.argsort(self.rows)
         events_listed = np.array(np.asarray(listed.rows)[: min(count, events)])
