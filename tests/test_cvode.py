@@ -19,7 +19,7 @@ from microslip.contact.patch import Patch
 from microslip.contact.regularised import MassContact
 from microslip.system.assembly import Assembly
 from microslip.time_domain import equations, orbit
-from microslip.time_domain.equations import Equations
+from microslip.time_domain.equations import MotionEquations
 from microslip.time_domain.stepper import Stepper
 
 pytest.importorskip("sksundae")
@@ -30,7 +30,7 @@ BOOK_44 = MassContact(
 )  # fmt: skip
 
 
-def rubbing(law: Law) -> Equations:
+def rubbing(law: Law) -> MotionEquations:
     """The mass of section 4.2, pressed, and rubbed in two directions until it slides and lifts off."""
     touching = Patch("stop", np.zeros((1, 2)), np.ones(1), law)
     return equations.of(hitting(touching, normal=0.5, push=1.5), 300.0)

@@ -357,7 +357,8 @@ except ms.UserError as error:
     refusal = str(error)
 sentences, after = ms.prepare(compiler=False, cache=False), process()
 print(json.dumps({
-    "imported": [a == b for a, b in zip(before, imported)], "started": started, "refusal": refusal, "sentences": len(sentences),
+    "imported": [a == b for a, b in zip(before, imported)], "started": started, "refusal": refusal,
+    "sentences": len(sentences),
     "options": [k for k in after[1] if after[1][k] != before[1][k]], "rest": [before[i] == after[i] for i in (0, 2, 3)],
 }))
 """

@@ -425,7 +425,7 @@ def integrate(
     found = equations.of(assembly, turn * frequency, None if second is None else turn * second)
     if second is not None and start == "balance":
         raise UserError('second: "balance" begins on a periodic vibration; take "static" or "rest"')
-    begin: orbit.Start | starts.Periodic
+    begin: orbit.Start | starts.PeriodicStart
     if isinstance(start, Mapping):
         begin = starts.released(found, start)
     elif start == "balance":
@@ -435,7 +435,7 @@ def integrate(
         begin = start
     if file is None:
         return orbit.run(found, settle, keep, samples, steps, begin, report)
-    asked = recorded.Asked(f"{frequency:.6g} {unit}", found, settle, keep, samples, steps, begin)
+    asked = recorded.Integration(f"{frequency:.6g} {unit}", found, settle, keep, samples, steps, begin)
     return recorded.run(file, [asked], report=report)[0]
 
 
@@ -516,7 +516,7 @@ def run_up(
     found = equations.of_ramp(whole_of(system), ramp)
     if file is None:
         return orbit.run(found, 0, ramp.periods, samples, steps, begin, report)
-    asked = recorded.Asked(f"{start:.6g} to {stop:.6g} {unit}", found, 0, ramp.periods, samples, steps, begin)
+    asked = recorded.Integration(f"{start:.6g} to {stop:.6g} {unit}", found, 0, ramp.periods, samples, steps, begin)
     return recorded.run(file, [asked], report=report)[0]
 
 
@@ -589,7 +589,7 @@ def bifurcate(
     if len(begin) != made.count:
         raise UserError(f"bifurcate: x: has {len(begin)} numbers; the system has {made.count}")
     made.check(begin, start)
-    asked = diagram.Asked(
+    asked = diagram.DiagramPlan(
         start, stop, orbits, doublings, nodes, step, points, tuple(attractors), starts, deflate=tuple(deflate)
     )
     return diagram.diagram(made, begin, asked, report=report)
