@@ -18,8 +18,10 @@ from typing import Any
 import jax
 import numpy as np
 
+from .. import series
 from ..continuation import NewtonSettings, Solution, newton
 from ..data import Array
+from ..series import derivative
 from .dynamics import Dynamics
 from .shooting import Orbit
 
@@ -47,22 +49,12 @@ class Harmonics:
     @property
     def slopes(self) -> Array:
         """(2 H + 1, n) of the derivative over t'."""
-        return differentiated(self.c)
+        return derivative(len(self.c)) @ self.c
 
 
 def summed(H: int, turns: Array) -> Array:
     """(s, 2 H + 1) E at times in periods (s,)."""
-    angle = 2 * np.pi * np.outer(turns, np.arange(1, H + 1))
-    waves = np.stack([np.cos(angle), np.sin(angle)], axis=-1).reshape(len(turns), -1)
-    return np.concatenate([np.ones((len(turns), 1)), waves], axis=1)
-
-
-def differentiated(c: Array) -> Array:
-    """D c."""
-    h = np.arange(1, len(c) // 2 + 1)[:, None]
-    pairs = c[1:].reshape(len(h), 2, -1)
-    turned = np.stack([h * pairs[:, 1], -h * pairs[:, 0]], axis=1).reshape(len(c) - 1, -1)
-    return np.concatenate([np.zeros((1, c.shape[1])), turned])
+    return series.summed(2 * np.pi * np.outer(turns, np.arange(1, H + 1)))
 
 
 def of_orbit(orbit: Orbit, H: int, each: int = 32) -> Harmonics:
@@ -144,8 +136,8 @@ class Balance:
         omega, change = (float(x[-1]), 0.0) if self.free else self._driven(lam)
         angles = 2 * np.pi * self.turns * np.arange(len(E)) / len(E)
         f, J, slope = map(np.asarray, self._rates(E @ c, float(lam), angles))
-        D = differentiated(np.eye(k))
-        moving = differentiated(c)
+        D = derivative(k)
+        moving = D @ c
         found = np.zeros((k, n, k, n))
         found[:, range(n), :, range(n)] += omega * D
         mean = J.mean(axis=0)

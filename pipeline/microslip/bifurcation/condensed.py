@@ -21,7 +21,8 @@ import numpy as np
 import scipy.linalg
 
 from ..data import Array, ComplexArray
-from .balance import Balance, Harmonics, differentiated
+from ..series import derivative
+from .balance import Balance, Harmonics
 from .dynamics import Dynamics
 
 FEW = 3
@@ -100,7 +101,7 @@ class Condensed(Balance):
         R, A, over = np.zeros(len(x)), np.zeros((len(x), len(x))), np.zeros(len(x))
         R[: k * r] = (z - at.x @ self.V).ravel()
         A[: k * r, : k * r] = np.eye(k * r) - at.derivative.reshape(k * r, k * r)
-        faster = at.through(differentiated(at.x)).ravel()
+        faster = at.through(derivative(len(at.x)) @ at.x).ravel()
         over[: k * r] = change * faster - at.through(P.T @ slope).ravel()
         if self.free:
             size = np.asarray(self.system.scale)

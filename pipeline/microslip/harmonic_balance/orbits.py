@@ -20,7 +20,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from ..contact.law import settings
-from ..data import Array, ComplexArray
+from ..data import Array
 from ..programs import inner
 from .tables import Spline, Table, fitted, in_chunks, kept, read, refined
 
@@ -178,28 +178,6 @@ def _settled(A: Array, B: Array, samples: int = 128) -> Array:
         if not len(open_):
             break
     return F
-
-
-def exact(eta: Array, zeta: Array) -> ComplexArray:
-    """(2, n) K_eta*, K_zeta* of orbits with half-axes eta_A* >= zeta_A* >= 0, computed and not looked up; of lines the
-    limit of thin ellipses."""
-    A, B = np.asarray(eta, dtype=float), np.asarray(zeta, dtype=float)
-    found, slides = np.ones((2, len(A)), dtype=complex), A > 1
-    A, B = A[slides], np.maximum(B, THINNEST * A)[slides]
-    parts = _harmonics(A, B)
-    found[:, slides] = (parts[::2] + 1j * parts[1::2]) / np.stack([A, B])
-    return found
-
-
-def _harmonics(A: Array, B: Array) -> Array:
-    """(4, n) harmonics of any orbits beyond A = 1: smooth ones by the smooth method, the others by the return map."""
-    found = np.zeros((4, len(A)))
-    never = (A < 50) & (A > _longest_sticking(B / A) * (1 - 1e-9))
-    if never.any():
-        found[:, never] = _never_sticking(A[never], B[never])
-    if not never.all():
-        found[:, ~never] = sticking(A[~never], B[~never])
-    return found
 
 
 def _never_sticking(A: Array, B: Array) -> Array:

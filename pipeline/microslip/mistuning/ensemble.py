@@ -164,18 +164,20 @@ def run(
     tuned = of_ring(asked, asked.tuned.whole, -1)
     if not np.isfinite(tuned.top.amplitude):
         raise UserError("mistuning: the tuned ring has no solution in the band; see what microslip respond says of it")
-    found = Ensemble(
-        asked, tuned, np.zeros((0, len(COLUMNS))), Envelope.empty(len(asked.frequency), tuned.top.amplitude)
-    )
-    found = _kept(file, inputs, found) if file is not None else found
+    rows, envelope = np.zeros((0, len(COLUMNS))), Envelope.empty(len(asked.frequency), tuned.top.amplitude)
+    known = _left(file, inputs)
+    if known.keys() >= {"rows", "sums", "bins", "grids"} and known["rows"].ndim == 2:
+        rows = known["rows"]
+        envelope = Envelope(envelope.unit, known["sums"], known["bins"], list(known["grids"]))
+    found = Ensemble(asked, tuned, rows, envelope)
     if len(found) > samples:
         found.rows, found.envelope = found.rows[:samples], found.envelope.first(samples)
     workers = workers or min(_cores(), -(-samples // EACH))
     with _computed(asked, workers, executor) as of:
         while len(found) < samples and not _narrow(found, until):
             _more(found, of, min(samples, _next(len(found), EACH * workers)), until, samples, report)
-            if file is not None:
-                _keep(file, inputs, found)
+            e = found.envelope
+            _keep(file, inputs, rows=found.rows, sums=e.sums, bins=e.bins, grids=np.array(e.grids))
     if len(found) < samples:
         report(f"{len(found)} of {len(found)} samples{_told(found)}, the rest was not needed")
     return found
@@ -256,29 +258,16 @@ def choose(
     every = np.array([linear(asked.deviations(FIRST + i)) for i in range(rare.EACH * samples)])
     pi = rare.chances(every, samples, RARE, told, int(known.sum()))
     chosen, inputs = rare.chosen(pi, asked.seed), f"{inputs} {len(found)} {samples}"
-    high = _read(file, inputs)
+    high = _left(file, inputs).get("high", np.zeros(0))
     workers = workers or _cores()
     with _computed(asked, workers, executor) as of:
         while len(high) < len(chosen):
             part = chosen[len(high) : len(high) + EACH * workers]
             high = np.append(high, [one.top.amplitude for one in of([FIRST + int(i) for i in part])])
             report(f"{len(high)} of {len(chosen)} chosen samples")
-            if file is not None:
-                with store.complete_or_absent(file) as temporary:
-                    np.savez(temporary, high=high, inputs=np.array(inputs))
+            _keep(file, inputs, high=high)
     solved = np.isfinite(high)
     return rare.estimate(high[solved] / found.tuned.top.amplitude, pi[chosen][solved], len(pi), RARE, told)
-
-
-def _read(file: Path | None, inputs: str) -> Array:
-    """Amplitudes of chosen samples that a run with the same inputs has left."""
-    try:
-        if file is not None and file.is_file():
-            with np.load(store.ordinary(file), allow_pickle=False) as known:
-                return np.array(known["high"]) if str(known["inputs"]) == inputs else np.zeros(0)
-    except (OSError, ValueError, KeyError):
-        pass
-    return np.zeros(0)
 
 
 def _missed(share: float) -> str:
@@ -358,21 +347,19 @@ def _one(number: int) -> Sample:
     return sample(_own, number)
 
 
-def _keep(file: Path, inputs: str, found: Ensemble) -> None:
-    e = found.envelope
-    with store.complete_or_absent(file) as temporary:
-        np.savez(temporary, rows=found.rows, sums=e.sums, bins=e.bins, grids=np.array(e.grids), inputs=np.array(inputs))
+def _keep(file: Path | None, inputs: str, **arrays: Array) -> None:
+    if file is not None:
+        with store.complete_or_absent(file) as temporary:
+            np.savez(temporary, **arrays, inputs=np.array(inputs))  # type: ignore[arg-type]
 
 
-def _kept(file: Path, inputs: str, found: Ensemble) -> Ensemble:
-    """What a run with the same inputs has left, or what was given."""
-    if not file.is_file():
-        return found
+def _left(file: Path | None, inputs: str) -> dict[str, Array]:
+    """The arrays that a run with the same inputs has left; none where there is none."""
     try:
-        with np.load(store.ordinary(file), allow_pickle=False) as known:
-            if str(known["inputs"]) == inputs and len(known["rows"].shape) == 2:
-                envelope = Envelope(found.envelope.unit, known["sums"], known["bins"], list(known["grids"]))
-                return Ensemble(found.asked, found.tuned, known["rows"].copy(), envelope)
+        if file is not None and file.is_file():
+            with np.load(store.ordinary(file), allow_pickle=False) as known:
+                if str(known["inputs"]) == inputs:
+                    return {name: np.array(known[name]) for name in known.files}
     except (OSError, ValueError, KeyError):
-        return found
-    return found
+        pass
+    return {}

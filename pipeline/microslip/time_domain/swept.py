@@ -13,9 +13,8 @@ import numpy as np
 
 from ..harmonic_balance.problem import Problem
 from ..harmonic_balance.reduced import stuck, stuck_damping, untouched
-from ..harmonic_balance.refinement import between
-from ..harmonic_balance.response import HarmonicResponse, operating
-from ..harmonic_balance.solver import CONVERGED, Point
+from ..harmonic_balance.response import HarmonicResponse, between, operating
+from ..harmonic_balance.solver import Point
 from ..results import Journal
 from ..results.names import exact
 from . import starts
@@ -115,7 +114,7 @@ class Sweeps:
         self.step = float(np.median(np.diff(self.asked)))
         self.periods = _periods(problem, gap)
         self.balanced = {
-            float(f): (Point(2 * np.pi * f, x, CONVERGED, 0.0, 0), float(amplitude))
+            float(f): (Point(2 * np.pi * f, x), float(amplitude))
             for f, x, amplitude, good in zip(
                 found.frequency, found.x, np.abs(found.monitor), found.converged, strict=True
             )
