@@ -132,21 +132,19 @@ class Coupling:
         k = stiffness * self.unit
         k = k @ np.linalg.inv(np.eye(len(k)) + self.residual @ k)
         K = self.K + self.rows.conj().T @ k @ self.rows
-        return np.sqrt(np.maximum(_eigenvalues(0.5 * (K + K.conj().T), self.M), 0.0)) / (2 * np.pi)
+        K = 0.5 * (K + K.conj().T)
+        try:
+            values = scipy.linalg.eigh(K, self.M, eigvals_only=True)
+        except np.linalg.LinAlgError:  # coordinates without mass: the finite ones
+            inverse = scipy.linalg.eigh(self.M, K, eigvals_only=True)
+            values = 1 / inverse[inverse > 1e-14 * inverse.max()][::-1]
+        return np.sqrt(np.maximum(values, 0.0)) / (2 * np.pi)
 
     @property
     def scale(self) -> float:
         """N/m, what the highest mode has at a contact."""
         moved = np.einsum("am,ab,bm->m", self.rows.conj(), self.unit, self.rows).real
         return float(np.abs(np.diag(self.K)).max() / max(moved.max(initial=0.0), 1e-300))
-
-
-def _eigenvalues(K: Array, M: Array) -> Array:
-    try:
-        return scipy.linalg.eigh(K, M, eigvals_only=True)
-    except np.linalg.LinAlgError:  # coordinates without mass: the finite ones
-        inverse = scipy.linalg.eigh(M, K, eigvals_only=True)
-        return 1 / inverse[inverse > 1e-14 * inverse.max()][::-1]
 
 
 def coupling(assembly: Assembly, index: int, ratio: float) -> Coupling:

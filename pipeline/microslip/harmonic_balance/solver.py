@@ -14,13 +14,13 @@ from .. import continuation
 from ..data import Array, largest
 from ..errors import NotConverged, UserError
 from ..interrupts import look
+from ..progress import Report as Report
 from ..settings.mistakes import bounded
 from ..units import hertz
 from . import pseudo_transient
 from .forces import AFT
 from .problem import AWAY, NO_NUMBER, AtFrequency, Problem
 
-Report = Callable[[str], None]
 CONVERGED = "converged"
 TURNS = "turns back"
 FROM_ABOVE = "nor from the frequency above"

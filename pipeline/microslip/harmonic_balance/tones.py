@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
@@ -12,6 +12,7 @@ import scipy.optimize
 from ..continuation import CONVERGED, newton
 from ..data import Array, largest
 from ..errors import UserError
+from ..progress import Report
 from ..results.journal import Journal, once
 from ..results.tones import TwoTones
 from ..series import Torus, commensurate, differentiated, summed
@@ -20,8 +21,6 @@ from ..units import hertz
 from . import reduced
 from .readout import measured
 from .two_tone import Stacked, TwoTone
-
-Report = Callable[[str], None]
 
 SMALLEST = 1.0 / 64
 """Share of the loads by which a solution is led from little load to the whole one at least."""

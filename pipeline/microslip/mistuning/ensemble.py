@@ -19,6 +19,7 @@ from ..errors import UserError
 from ..files import store
 from ..interrupts import look
 from ..process import prepare
+from ..progress import Report
 from ..settings.mistakes import whole
 from ..units import counted, percent
 from . import rare
@@ -28,8 +29,6 @@ from .ring import positive
 from .samples import Asked, Sample, again, of_ring, sample
 from .scatter import OF_CONTACTS
 from .statistics import Envelope, Quantile, quantile
-
-Report = Callable[[str], None]
 
 COLUMNS = "amplitude", "frequency_Hz", "sector", "localisation", "missed", "unsolved", "at_end", "stress_Pa", "strain"
 """Of a sample, after its number."""
@@ -191,7 +190,12 @@ def _more(
     made, told, judged = list[list[float]](), _told(found), _next(len(found))
     for number, one in zip(range(len(found) + 1, end + 1), of(range(len(found), end)), strict=True):
         found.envelope.add(one.grid)
-        made.append(_row(one))
+        solved, top = np.isfinite(one.top.amplitude), one.top
+        unsolved = np.isnan(one.grid).all(axis=1).sum()  # what the search added elsewhere in vain is in `missed`
+        made.append(
+            [top.amplitude, top.frequency, top.output, one.localisation if solved else np.nan, top.missed,
+             unsolved, top.at_end, one.stress, one.strain]  # fmt: skip
+        )
         report(f"{number} of {samples} samples{told}")
         if number in (judged, end):
             found.rows, made, judged = np.vstack([found.rows, made]), [], _next(number)
@@ -273,14 +277,6 @@ def choose(
 def _missed(share: float) -> str:
     why = "it jumps or bends there, or the sweep is coarse; give the sweep more points"
     return f"up to {percent(share)} higher between two points: {why}."
-
-
-def _row(one: Sample) -> list[float]:
-    top = one.top
-    solved = np.isfinite(top.amplitude)
-    unsolved = np.isnan(one.grid).all(axis=1).sum()  # points that the search added elsewhere in vain are in `missed`
-    return [top.amplitude, top.frequency, top.output, one.localisation if solved else np.nan, top.missed,
-            unsolved, top.at_end, one.stress, one.strain]  # fmt: skip
 
 
 def _narrow(found: Ensemble, until: float | None) -> bool:

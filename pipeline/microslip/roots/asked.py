@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -18,12 +18,11 @@ from ..files import hdf5
 from ..linalg import quadratic
 from ..linalg.parametric import Family, family_of_group
 from ..linalg.quadratic import Quadratic, Window
+from ..progress import Report
 from ..ring.resonances import speeds_of
 from ..settings.mistakes import unfit
 from .diagram import Diagram, diagram
 from .spectrum import Spectrum, spectrum
-
-Report = Callable[[str], None]
 
 
 def roots_of(

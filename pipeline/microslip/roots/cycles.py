@@ -20,12 +20,12 @@ from ..bifurcation.dynamics import Dynamics
 from ..bifurcation.equilibria import Hopf
 from ..data import Array
 from ..errors import at
+from ..progress import Report
 from ..results import Journal
 from ..results.journal import once
 from ..settings.numbers import Model, Number, Positive
 from ..system.assembly import Assembly
 
-Report = Callable[[str], None]
 Under = Callable[[Mapping[str, float], str], Assembly]
 """The assembly of a case with other values of keys; the key that says so."""
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -13,12 +13,11 @@ from ..linalg import quadratic
 from ..linalg.parametric import Family
 from ..linalg.quadratic import Window
 from ..linalg.sampled import Sampled, sampled
+from ..progress import Report
 from .drawing import Shown, new_axes, over
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-
-Report = Callable[[str], None]
 
 
 @dataclass(frozen=True, repr=False)

@@ -15,14 +15,13 @@ from ..data import Array, largest
 from ..errors import NotConverged, UserError
 from ..linalg import quadratic
 from ..linalg.quadratic import Quadratic, Window
+from ..progress import Report
 from ..results.journal import Journal, once
 from ..system.assembly import Assembly
 from .drawing import Shown, new_axes, states
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-
-Report = Callable[[str], None]
 
 
 @dataclass(frozen=True)

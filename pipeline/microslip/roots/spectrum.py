@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -12,12 +11,11 @@ from ..data import Array
 from ..linalg import quadratic, winding
 from ..linalg.quadratic import Quadratic, Roots, Window
 from ..linalg.winding import Count
+from ..progress import Report
 from .drawing import Shown, new_axes, plane
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-
-Report = Callable[[str], None]
 
 DEVIATIONS = 3.0
 """Standard deviations of a growth rate, by the accuracy of the matrices, within which its sign is not decided."""
