@@ -212,8 +212,8 @@ def restored(problem: Problem, row: dict[str, Any]) -> tuple[Point, Operating]:
     names = [c.name for c in problem.assembly.contacts]
     cycles = {}
     for name in names:
-        points: list[Any] = [np.array([row[f"contacts/{name}/{key}"]]) for key in SUMS + MEANS]
-        cycles[name] = Cycle(*points, unsteady=row[f"contacts/{name}/unsteady"])
+        kept: list[Any] = [np.array([row[f"contacts/{name}/{key}"]]) for key in SUMS + MEANS]
+        cycles[name] = Cycle(*kept, *[row[f"contacts/{name}/unsteady"]])
     a, q = problem.assembly, {}
     for m in a.components:
         sizes = [m.at(a.index(h)).group.n_modes for h in range(problem.harmonics + 1)]

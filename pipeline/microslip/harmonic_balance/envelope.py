@@ -9,7 +9,7 @@ speed, contacts are pressed by what presses them there, and the steady loads are
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import KW_ONLY, dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -54,9 +54,10 @@ class OverOrders:
     failed: Indices
     stress: Array
     stressed_at: Array
-    missing: Sequence[str] = field(kw_only=True, default=())
-    quantity: Quantity = field(kw_only=True, default=METRES)
-    normal_force: float = field(kw_only=True, default=float("nan"))
+    _: KW_ONLY
+    missing: Sequence[str] = ()
+    quantity: Quantity = METRES
+    normal_force: float = np.nan
 
     @property
     def lost(self) -> Array:
@@ -157,8 +158,8 @@ class Largest:
     amplitude: float
     failed: int
     missing: str = ""
-    stress: float = float("nan")
-    stressed_at: float = float("nan")
+    stress: float = np.nan
+    stressed_at: float = np.nan
 
 
 def largest_resonance(problem: Problem, frequency: Array, report: Report = lambda _: None) -> Largest:
@@ -216,7 +217,8 @@ class Envelope:
     monitor: ComplexArray
     converged: Array
     iterations: Array
-    quantity: Quantity = field(kw_only=True, default=METRES)
+    _: KW_ONLY
+    quantity: Quantity = METRES
 
     @property
     def low(self) -> Array:

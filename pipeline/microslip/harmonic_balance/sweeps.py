@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import KW_ONLY, dataclass, field
+from functools import partial
 from typing import Any, TypeVar
 
 import numpy as np
@@ -32,13 +33,14 @@ class FrequencyResponse:
     slip: Array
     dissipated: Array
     converged: Array
-    quantity: Quantity = field(kw_only=True, default=METRES)
-    supplied: Array = field(kw_only=True, default_factory=lambda: np.zeros(0))
-    damped: Array = field(kw_only=True, default_factory=lambda: np.zeros(0))
-    balance: Array = field(kw_only=True, default_factory=lambda: np.zeros(0))
-    counted: Array = field(kw_only=True, default_factory=lambda: np.zeros(0))
-    motion: Array = field(kw_only=True, default_factory=lambda: np.zeros(0))
-    added: Array = field(kw_only=True, default_factory=lambda: np.zeros(0, dtype=bool))
+    _: KW_ONLY
+    quantity: Quantity = METRES
+    supplied: Array = field(default_factory=partial(np.zeros, 0))
+    damped: Array = field(default_factory=partial(np.zeros, 0))
+    balance: Array = field(default_factory=partial(np.zeros, 0))
+    counted: Array = field(default_factory=partial(np.zeros, 0))
+    motion: Array = field(default_factory=partial(np.zeros, 0))
+    added: Array = field(default_factory=partial(np.zeros, 0, dtype=bool))
 
     @property
     def asked(self) -> Array:
