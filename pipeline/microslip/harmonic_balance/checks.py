@@ -40,7 +40,8 @@ def _apart(problem: Problem, found: Operating) -> float:
     for m in problem.assembly.components:
         sides |= _moving(problem, m, found)
     for i, contact in enumerate(problem.assembly.contacts):
-        G, seen = contact.patch.kinematics, amplitudes(found.relative[contact.name].T).T
+        G = contact.patch.kinematics
+        seen = np.ascontiguousarray(amplitudes(found.relative[contact.name].T).T)
         seen[:, 0] -= contact.offset
         (first, most), (second, other) = sides[i, 0], sides.get((i, 1), (0.0, 0.0))
         away = max(away, largest(G @ (first - second - seen)))
@@ -97,7 +98,7 @@ def forces_on(
         if side.rows is not None:  # a patch that deforms has no rows of the compliance
             continue
         contact, F = a.contacts[i], found.force[a.contacts[i].name]
-        at = amplitudes(F.T)[harmonic] - (0.0 if harmonic else contact.preload)
+        at = amplitudes(F.T)[harmonic] if harmonic else F[:, 0] - contact.preload
         six = np.conj(side.frame.T * side.phase(index, a.blades)) @ at * (1.0 if second else -1.0)
         for label, value in zip(side.labels, six, strict=True):
             if label in place:

@@ -143,9 +143,10 @@ class LinearisedRing:
     def _of_part(self, i: int, h: int) -> tuple[ComplexArray, ComplexArray]:
         """A part's dynamic stiffness with contacts of the stiffness taken into it, and what of it they feel."""
         p, w = self.at.problem, h * self.at.Omega
-        part = p.parts[h][i]
-        P, _, _, stiff = taken_in(part, p.stiffness[i])
-        return (stiff - w**2 * part.M + 1j * w * part.C).astype(complex), P @ part.rows
+        part, k = p.parts[h][i], p.stiffness[i]
+        P, T = taken_in(part, k)[0], part.rows
+        A = part.stiff - w**2 * part.M + 1j * w * part.C + T.conj().T @ k @ P @ T
+        return A.astype(complex), P @ T
 
 
 def number(p: Problem, tuned: Tuned, scatter: Scatter, sector: int) -> int:
