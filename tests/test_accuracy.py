@@ -167,7 +167,7 @@ def test_too_few_harmonics_of_a_slider_are_told():
     known = error(problem, start.x, start.Omega)
     assert enough(problem, start, tolerance=1.01 * known.readout, first=known).reached
     assert not enough(problem, start, tolerance=0.99 * known.readout, most=4, first=known).reached
-    (message,) = _Left(built, None).out(problem, harmonic_response(problem, np.array([17.0]), np.ones(1)), [], 8.0)
+    (message,) = _Left(built, None).out(problem, harmonic_response(problem, np.array([17.0])), [], 8.0)
     assert "At F_N = 8 N the amplitude at 17 Hz" in message and "(too " in message and "at most" in message
 
 
@@ -213,7 +213,7 @@ def test_a_case_says_where_its_harmonics_are_too_few():
     built = SimpleNamespace(settings=SimpleNamespace(ring=None, mode="aft"))
     for harmonics, count in ((1, 1), (12, 0)):
         problem = opening(harmonics)
-        found = harmonic_response(problem, np.array([22.0, 30.0]), np.ones(1))
+        found = harmonic_response(problem, np.array([22.0, 30.0]))
         messages = _Left(built, None).out(problem, found, [], 8.0)
         assert len(messages) == count
         assert all(re.match(r"At F_N = 8 N the amplitude at (22|30) Hz .* harmonics", r) for r in messages)

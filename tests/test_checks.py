@@ -118,7 +118,7 @@ def test_a_wrong_solution_is_not_called_converged(what: str, monkeypatch: pytest
         missing = 1e-3 * (np.arange(4) == ("supplied", "damped").index(what))
         monkeypatch.setattr(reduced, "work", lambda *given: tuple(np.array(work(*given)) + missing * work(*given)[0]))
     problem = balance.of(cantilever(), 1, 64, length=0.0125)
-    found = response.harmonic_response(problem, np.array([0.6]), np.ones(1))
+    found = response.harmonic_response(problem, np.array([0.6]))
     assert [cause(status) for status in found.status] == ["read-out" if what == "read-out" else "energy"]
 
 
@@ -127,7 +127,7 @@ def test_too_few_samples_are_no_convergence() -> None:
     counted = []
     for samples in (8, 64):
         problem = balance.of(cantilever(), 1, samples, length=0.0125)
-        found = response.harmonic_response(problem, np.array([0.62]), np.ones(1))
+        found = response.harmonic_response(problem, np.array([0.62]))
         counted.append(float(np.abs(found.counted).max()))
         assert found.converged.all() == (counted[-1] <= COUNTED)
     assert counted[0] > COUNTED and counted[1] < 0.005

@@ -154,7 +154,7 @@ def bouncing(flights: np.ndarray, contact: float, stays: float) -> Orbit:
     opens = np.cumsum([0.0, *(flights[:-1] + contact)])
     closes = opens + flights
     rows = [[t, 0, 0] for t in closes] + [[t, 0, 1] for t in (*opens, closes[-1] + stays)]
-    return replace(made, events=np.array(sorted(rows)))
+    return replace(made, arrays={**made.arrays, "event": np.array(sorted(rows))})
 
 
 def test_rebounds_that_come_to_rest_are_found_and_counted() -> None:
@@ -192,7 +192,7 @@ def test_what_happens_a_period_is_counted_over_whole_repetitions() -> None:
         at = np.arange(first, 8, 3) + 0.6
         taken = np.searchsorted(at, made.time / made.period).astype(float)
         events = np.array([[t * made.period, 0, 0] for t in at])
-        found = replace(made, energy={**made.energy, "lost": taken}, events=events)
+        found = replace(made, arrays={**made.arrays, "energy_lost": taken, "event": events})
         assert classification.lost(found) == pytest.approx(1 / 3) == found.impacts
 
 

@@ -60,7 +60,7 @@ def test_one_harmonic_is_the_closed_form(slider: int) -> None:
         contact = preloaded_contact("rub", four(held, slider), ContactFace("block", "rub"), None, normal=2.0)
         loads, outputs = (Load("block", "push"),), (Output("block", "tip", "u_y" if slider == 1 else "u_x"),)
         problem = balance.of(Assembly((Component("block", {0: group}),), (contact,), loads, outputs), 1, samples)
-        found = harmonic_response(problem, f, np.array([held]))
+        found = harmonic_response(problem, f)
         assert found.converged.all()
         errors.append(np.abs(found.monitor - closed.monitor).max() / np.abs(closed.monitor).max())
     assert errors[1] < 2e-3 and errors[0] > 8 * errors[1]

@@ -381,7 +381,7 @@ def swept(assembly=None, frequency=(5.0,), **more):
     from microslip.harmonic_balance import problem
     from microslip.harmonic_balance.response import harmonic_response
 
-    return harmonic_response(problem.of(assembly or rubbed(), **more), np.array(frequency, dtype=float), LIMIT)
+    return harmonic_response(problem.of(assembly or rubbed(), **more), np.array(frequency, dtype=float))
 
 
 def one(mass=1.0, k=1.0, axis=None, normal=(0, 0, 1), direction=(1, 0, 0), inertia=None, at=(0, 0, 0), ratio=0.0):

@@ -41,7 +41,7 @@ from microslip.system import Body, Contact, Force, Monitor, Spring, System
 from microslip.system.assembly import Assembly, ContactFace, Load, Output, Ring, preloaded_contact
 from microslip.system.component import Component
 from microslip.time_domain import classification, equations, loop, orbit, recorded, samples, starts
-from microslip.time_domain.stepper import Seen, Stepper
+from microslip.time_domain.stepper import Snapshot, Stepper
 
 pytestmark = pytest.mark.usefixtures("undrawn")
 
@@ -308,7 +308,7 @@ def test_velocities_of_what_yields_beside_the_modes() -> None:
     for n in (100, 200):
         t = np.linspace(0.0, 1.0, n)
         none, force = np.zeros((n, 2)), np.sin(5 * t)[:, None] * np.ones(6)
-        seen = Seen(none, none, np.zeros((n, 6)), force, np.zeros((n, 6)), np.zeros(n), t)
+        seen = Snapshot(none, none, np.zeros((n, 6)), force, np.zeros((n, 6)), np.zeros(n), t)
         still = samples.of_period(e, seen._replace(force=0 * force))["velocity"][0]
         told = samples.of_period(e, seen)["velocity"][0] - still
         off.append(np.abs(told + e.output_residual[0].sum() * 5 * np.cos(5 * t))[1:-1].max())
@@ -763,10 +763,10 @@ def test_a_run_that_is_ended_goes_on_with_the_same_bits(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, at: int
 ) -> None:
     """While it settles, while samples are kept, and after the last one; two motions in the file, one of them whole."""
-    for module in (samples, orbit):
+    for module in (recorded, orbit):
         monkeypatch.setattr(module, "PAUSE", 0.0)
     e = equations.of(hitting(SLIPS, normal=0.5, push=1.5), 300.0)
-    asked = [recorded.Asked(name, e, 16, 14, 64, 1024) for name in ("first", "second")]
+    asked = [recorded.Integration(name, e, 16, 14, 64, 1024) for name in ("first", "second")]
     seen: list[str] = []
 
     def killing(text: str) -> None:
@@ -792,8 +792,9 @@ def test_a_run_that_is_ended_goes_on_with_the_same_bits(
 
 def test_another_motion_is_begun_anew(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Where the one that was left is of another frequency."""
-    monkeypatch.setattr(samples, "PAUSE", 0.0)
-    one, other = (recorded.Asked("it", equations.of(hitting(SLIPS, 0.5), w), 0, 12, 64, 1024) for w in (300.0, 310.0))
+    monkeypatch.setattr(recorded, "PAUSE", 0.0)
+    asked = [(equations.of(hitting(SLIPS, 0.5), w), 0, 12, 64, 1024) for w in (300.0, 310.0)]
+    one, other = (recorded.Integration("it", *each) for each in asked)
 
     def killing(text: str) -> None:
         raise Killed
@@ -809,7 +810,7 @@ def test_a_long_motion_needs_no_more_memory_than_a_short_one(tmp_path: Path) -> 
     e, peaks = equations.of(hitting(BOOK), 64.32), []
     for keep in (4, 128):
         tracemalloc.start()
-        found = recorded.run(tmp_path / f"{keep}.h5", [recorded.Asked("it", e, 0, keep, 1024, 1024)])[0]
+        found = recorded.run(tmp_path / f"{keep}.h5", [recorded.Integration("it", e, 0, keep, 1024, 1024)])[0]
         assert found.balance < 1e-8 and found.said
         peaks.append(tracemalloc.get_traced_memory()[1])
         tracemalloc.stop()
@@ -817,7 +818,7 @@ def test_a_long_motion_needs_no_more_memory_than_a_short_one(tmp_path: Path) -> 
     assert peaks[1] < 0.5 * whole and (tmp_path / "128.h5").stat().st_size > whole
 
 
-def sizes_of(e: equations.Equations) -> list[int]:
+def sizes_of(e: equations.MotionEquations) -> list[int]:
     rows = samples.sizes(e)
     return [rows.get(name, 1) for name in samples.UNITS]
 
@@ -854,9 +855,9 @@ import sys
 import numpy as np
 from microslip.time_domain import equations, orbit, recorded, samples
 import microslip as ms
-samples.PAUSE = orbit.PAUSE = 0.0
+recorded.PAUSE = orbit.PAUSE = 0.0
 slider = ms.structure(1.0, 1.0, 0.02, force={0: 0.3}, elements=[ms.jenkins(1.0, 0.2)])
-asked = recorded.Asked("it", equations.of(slider, 0.8), 5, 400, 16, 512)
+asked = recorded.Integration("it", equations.of(slider, 0.8), 5, 400, 16, 512)
 recorded.run(sys.argv[1], [asked], report=lambda text: print(text, flush=True))
 """
 
@@ -873,7 +874,7 @@ def test_a_killed_process_leaves_what_the_next_one_goes_on_with(tmp_path: Path) 
             process.kill()
         assert not (tmp_path / "orbit.h5").exists()
     e, told = equations.of(system("slider")[0], 0.8), list[str]()
-    recorded.run(tmp_path / "orbit.h5", [recorded.Asked("it", e, 5, 400, 16, 512)], report=told.append)
+    recorded.run(tmp_path / "orbit.h5", [recorded.Integration("it", e, 5, 400, 16, 512)], report=told.append)
     assert "goes on from" in told[0]
     same(orbit.run(e, 5, 400, 16, 512), ms.load(tmp_path / "orbit.h5"))
 

@@ -22,15 +22,15 @@ from cyclopts import App, CycloptsError, Parameter
 from . import __version__, interrupts
 from .errors import NotConverged, UserError
 from .progress import announced, progress
+from .settings.meant import case_file, meant
 
 if TYPE_CHECKING:
     from .analysis import Verb
     from .basis.checks import Check
     from .data import ModalBasis
     from .results import Response
-    from .stages.answer import CaseJob, Written
+    from .stages.answer import Written
     from .stages.following import Case
-    from .stages.stage import Report
 
 os.environ.setdefault("NUMPY_MADVISE_HUGEPAGE", "0")  # read by numpy when it is loaded: the system zeroes whole huge
 # pages, which costs more than they save (0.7 of 8.6 CPU seconds of the modes of 60,000 degrees of freedom)
@@ -223,7 +223,6 @@ def run(
     """
     from .analysis import places
     from .basis import read_basis
-    from .settings.meant import meant
     from .stages.job import holds_a_case_alone, open_job, system_file
     from .stages.places import is_case, is_rolling, is_tyre
     from .stages.response import Wanted
@@ -335,7 +334,7 @@ def respond(
     from .stages.response import Wanted, response_of_case
     from .stages.stage import folder_of_case
 
-    case = _case_file(case)
+    case = case_file(case)
     if over is not None:
         _survey(case, basis, over.replace("-", "_"), set_, force, quiet)
         return
@@ -375,7 +374,7 @@ def identify(
         case: a case.toml with [identification], or the folder that holds it.
         basis: the modal file, as for respond.
     """
-    _survey(_case_file(case), basis, "identification", set_, force, quiet)
+    _survey(case_file(case), basis, "identification", set_, force, quiet)
 
 
 def _survey(case: Path, basis: Path | None, kind: str, set_: Sequence[str], force: bool, quiet: bool) -> None:
@@ -384,24 +383,6 @@ def _survey(case: Path, basis: Path | None, kind: str, set_: Sequence[str], forc
     with progress(f"{kind.replace('_', ' ')} of {case}", quiet) as report:
         found = survey_stage(case, basis, kind, list(set_), force, report)
     _tell(found, quiet, f"{found.missing}; {{page}} holds what was found")
-
-
-def _case_job(
-    case: Path, set_: Sequence[str], force: bool, report: Report, no_pictures: bool, basis: Path | None = None
-) -> CaseJob:
-    """A case on its way. basis: see respond; modal files are made where they are not up to date if not given."""
-    from .case import load_case
-    from .stages.answer import CaseJob
-    from .stages.places import existing_files, modal_files
-    from .stages.stage import folder_of_case
-
-    settings, _ = load_case(case, list(set_))
-    folder = folder_of_case(case, settings.name)
-    if basis is not None:
-        files = existing_files(settings, basis, Path("."))
-    else:
-        files = modal_files(settings, Path("."), report)
-    return CaseJob(case, files, folder, set_, force, report, not no_pictures)
 
 
 def _tell(found: Written, quiet: bool, lost: str) -> None:
@@ -432,7 +413,7 @@ def roll(
     from .stages.tyre import tyre_stage
     from .stages.vehicle import kinematics_stage, vehicle_stage
 
-    case = _case_file(case)
+    case = case_file(case)
     kinds = ((is_vehicle, vehicle_stage), (is_kinematics, kinematics_stage), (is_tyre, tyre_stage))
     stage = next((stage for is_kind, stage in kinds if is_kind(case)), rolling_stage)
     with progress(f"roll {case}", quiet) as report:
@@ -452,7 +433,6 @@ def stability(
             whose contacts slide, with [stability].
         speed: of a modal file, or a body with a mesh: which of its speeds, counted from 0; the first if not given.
     """
-    from .settings.meant import meant
     from .stages.places import is_case
     from .stages.stability import stability_stage
 
@@ -487,7 +467,7 @@ def backbone(
     from .files.store import making
     from .stages import following
 
-    case = _case_file(case)
+    case = case_file(case)
     with progress(f"backbone {case}", quiet) as report:
         opened = _followed(case, basis, set_)
         with making(opened.folder / "backbone.csv", report):
@@ -520,7 +500,7 @@ def optimum(
     from .files.store import making
     from .stages import following
 
-    case = _case_file(case)
+    case = case_file(case)
     over = "normal_force" if over == "normal-force" else over  # as respond has it
     with progress(f"optimum {case}", quiet) as report:
         opened = _followed(case, basis, set_)
@@ -534,16 +514,6 @@ def optimum(
         _say(file, quiet)
     if why := following.missed(found, over):
         raise NotConverged(why)
-
-
-def _case_file(case: Path) -> Path:
-    """A case.toml, the one in a folder, of a name or of products, or the one that travels with the package."""
-    from .settings.meant import meant
-
-    if str(case) == "sample" and not case.exists():
-        return PACKAGE / "samples" / "case.toml"
-    case = meant(case, case=True)
-    return case / "case.toml" if case.is_dir() else case
 
 
 def _followed(case: Path, basis: Path | None, assignments: Sequence[str]) -> Case:
@@ -925,9 +895,10 @@ def _analyse(
     """The answer of an analysis."""
     from .analysis import analyses
     from .stages.analysing import analysed
+    from .stages.answer import case_job
 
     with progress(f"{verb} {case}", quiet) as report:
-        found = analysed(name, _case_job(case, set_, force, report, no_pictures, basis))
+        found = analysed(name, case_job(case, basis, set_, force, report, not no_pictures))
     _tell(found, quiet, f"{analyses()[name].lost}; {{page}} says which and why")
 
 
@@ -939,7 +910,7 @@ def _verb(name: str, said: Verb) -> Callable[..., None]:
         force: Force = False, quiet: Quiet = False, **keys: str | None,
     ) -> None:  # fmt: skip
         more = [f"{name}.{key}={value}" for key, value in keys.items() if value is not None]
-        _analyse(name, said.name, _case_file(case), basis, no_pictures, [*set_, *more], force, quiet)
+        _analyse(name, said.name, case_file(case), basis, no_pictures, [*set_, *more], force, quiet)
 
     of = inspect.signature(verb, eval_str=True)
     kept = [p for p in of.parameters.values() if p.kind is not p.VAR_KEYWORD]
