@@ -619,6 +619,7 @@ def turning_sample(folder: Path) -> None:
     write_basis(folder / "basis.h5", replace(basis, groups={(0, 0): with_angle}))
 
 
+@pytest.mark.usefixtures("unestimated")
 @pytest.mark.parametrize(("name", "kind", "of"), [
     ("root", "gauges", Quantity("1")), pytest.param("twist", "angles", Quantity("rad"), marks=pytest.mark.slow),
 ])  # fmt: skip
