@@ -93,6 +93,7 @@ def computed(told: list[str]) -> list[str]:
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("unestimated")
 def test_interrupted_and_resumed(folder: Path) -> None:
     """Ctrl-C at the sixth point: five are kept, and readable; the next call computes four, and the peak."""
 
@@ -210,6 +211,7 @@ def test_read_outs_share_a_picture_where_they_are_few_and_of_one_unit() -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("unestimated")
 def test_what_was_spoiled_is_made_again(folder: Path) -> None:
     """A table cut short, edited, gone; pictures, pages, HDF5 and VTU alike: the same bytes as before, and no point is
     computed twice."""
@@ -369,6 +371,7 @@ def count(points: Path) -> int:
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("unestimated")
 def test_another_normal_force_adds_and_another_friction_begins_anew(folder: Path) -> None:
     few = CASE.replace("points = 9", "points = 3")
     (folder / "case.toml").write_text(few)
@@ -616,6 +619,7 @@ def turning_sample(folder: Path) -> None:
     write_basis(folder / "basis.h5", replace(basis, groups={(0, 0): with_angle}))
 
 
+@pytest.mark.usefixtures("unestimated")
 @pytest.mark.parametrize(("name", "kind", "of"), [
     ("root", "gauges", Quantity("1")), pytest.param("twist", "angles", Quantity("rad"), marks=pytest.mark.slow),
 ])  # fmt: skip
@@ -650,6 +654,7 @@ def test_a_strain_gauge_is_strain_everywhere_and_an_angle_is_rad(
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("unestimated")
 def test_the_axis_of_a_strain_gauge_says_so(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The response's picture and the comparison with the book's mode."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -735,6 +740,7 @@ def test_what_jenkins_elements_do_not_follow_is_told(folder: Path) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("unestimated")
 def test_a_coarse_sweep_is_told_where_it_matters(folder: Path) -> None:
     """A message beside a resonance in the band, none where the band has none."""
     assert any("is wide against a resonance with sticking" in t for t in respond(folder, "sweep.points=3")[0])
