@@ -153,7 +153,14 @@ def changed(problem: Problem, at: Reading, solved: Solve) -> Error:
     Args:
         solved: finds the solution of a finer problem from a start x (size,).
     """
-    sampled, first = _resolved(problem, at, solved)
+    samples = DENSER * samples_of(problem)
+    while True:  # until one sample lies where each contact sticks
+        sampled = finer(problem, problem.harmonics, samples, seldom=True)
+        first = solved(sampled, at.x)
+        known = np.isfinite(first.read)
+        if not known or not samples or samples > FINEST or not _blind(sampled, first.x, first.Omega):
+            break
+        samples *= 2
     larger = finer(sampled, more(problem.harmonics), seldom=True)
     second = solved(larger, np.concatenate([first.x, np.zeros(larger.size - problem.size)]))
     by_samples = by_harmonics = np.inf
@@ -169,18 +176,6 @@ def changed(problem: Problem, at: Reading, solved: Solve) -> Error:
 def _read(problem: Problem, x: Array, Omega: float, output: int) -> float:
     at = problem.at(Omega)
     return abs(amplitude(at, x, *at.forces(x), output).value)
-
-
-def _resolved(problem: Problem, at: Reading, solved: Solve) -> tuple[Problem, Reading]:
-    """With more samples, as many as it takes for one to lie where each contact sticks, and its solution."""
-    samples = DENSER * samples_of(problem)
-    while True:
-        sampled = finer(problem, problem.harmonics, samples, seldom=True)
-        found = solved(sampled, at.x)
-        known = np.isfinite(found.read)
-        if not known or not samples or samples > FINEST or not _blind(sampled, found.x, found.Omega):
-            return sampled, found
-        samples *= 2
 
 
 def _blind(problem: Problem, x: Array, Omega: float) -> bool:
