@@ -96,16 +96,16 @@ class Tuned:
                 else:
                     heavier.append((name, s, values[:, 0]))
                 continue
-            for at, own in ((f"{name}_{j}", own) for j, own in enumerate(values)):
+            for j, own in enumerate(values):
+                at = f"{name}_{j}"
                 if s.of == "modal_file":
                     components[at] = replace(self._made(s, own), name=at, aerodynamic=components[at].aerodynamic)
                 elif s.of in OF_BLADES:
                     components[at] = deviated(components[at], s, own)
                 else:
                     contacts[at] = _met(contacts[at], s, float(own[0]))
-            for c in self.pressed_by.get(name, ()) if s.of == "mass" else ():
-                for at, own in ((f"{c}_{j}", own) for j, own in enumerate(values)):
-                    contacts[at] = _pressed(contacts[at], float(own[0]))
+                for c in self.pressed_by.get(name, ()) if s.of == "mass" else ():
+                    contacts[f"{c}_{j}"] = _pressed(contacts[f"{c}_{j}"], float(own[0]))
         for m in self.sector.components:
             if m.name in discs:
                 components[m.name] = subset.mistuned(m, discs[m.name])
