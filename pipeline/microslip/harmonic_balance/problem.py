@@ -8,7 +8,7 @@ with the number of its blades, not with its cube.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from itertools import product
@@ -45,6 +45,14 @@ RELATIVE_AT_MOST = 8
 
 Tried = list[tuple[Array, Array, Any]]
 """Of every group of contacts the displacements (n, k, W) that were tried, the forces, and what is known of them."""
+
+
+def grouped(keys: Iterable[Any]) -> list[list[int]]:
+    """Numbers of equal keys, in the order of the first of each."""
+    found: dict[Any, list[int]] = {}
+    for i, key in enumerate(keys):
+        found.setdefault(key, []).append(i)
+    return list(found.values())
 
 
 @dataclass(frozen=True, eq=False)
@@ -225,19 +233,15 @@ class Problem:
     @cached_property
     def waves(self) -> list[list[int]]:
         """The mean, and the harmonics by the wave of the ring that the components move in."""
-        found: dict[int, list[int]] = {}
-        for h in range(1, self.harmonics + 1):
-            found.setdefault(self.assembly.index(h), []).append(h)
-        return [[0], *found.values()]
+        alike = grouped(self.assembly.index(h + 1) for h in range(self.harmonics))
+        return [[0], *([h + 1 for h in own] for own in alike)]
 
     @cached_property
     def alike(self) -> list[tuple[Indices, Indices]]:
         """Of n parts with as many coordinates their numbers, and (n, c) these."""
-        found: dict[int, list[int]] = {}
-        for i, s in enumerate(self.slices):
-            found.setdefault(s.stop - s.start, []).append(i)
-        begins = np.array(self.begins)
-        return [(np.array(parts), begins[parts, None] + np.arange(c)) for c, parts in found.items()]
+        begins, counts = np.array(self.begins), [part.count for part in self.parts[0]]
+        each = grouped(counts)
+        return [(np.array(parts), begins[parts, None] + np.arange(counts[parts[0]])) for parts in each]
 
     @cached_property
     def kind(self) -> list[tuple[int, int]]:
@@ -356,13 +360,11 @@ class Problem:
     @cached_property
     def driven(self) -> list[tuple[Indices, list[Driven]]]:
         """Parts by their numbers, and by harmonics whose matrices are the same, what moves the coordinates of them."""
-        found: dict[Any, list[int]] = {}
-        for parts, _ in self.alike:
-            for i in parts:
-                key = tuple((tuple(d.harmonics), d.given.shape) for d in self.eliminated[i].driven)
-                found.setdefault(key, []).append(int(i))
-        each = [(parts, zip(*(self.eliminated[i].driven for i in parts), strict=True)) for parts in found.values()]
-        return [(np.array(parts), [Driven.of(together) for together in own]) for parts, own in each]
+        order = np.concatenate([parts for parts, _ in self.alike])
+        moved = [self.eliminated[i].driven for i in order]
+        kinds = grouped(tuple((tuple(d.harmonics), d.given.shape) for d in own) for own in moved)
+        each = [(order[same], zip(*(moved[i] for i in same), strict=True)) for same in kinds]
+        return [(parts, [Driven.of(together) for together in own]) for parts, own in each]
 
     @cached_property
     def _softer(self) -> Problem:
@@ -690,11 +692,9 @@ def of(
     together = together or assembly.stuck_damping is not None or bool(assembly.flow)
     contacts = assembly.contacts
     begins, where = _numbered(assembly, together)
-    groups, alike = [], dict[Any, list[int]]()
-    for i, c in enumerate(contacts):
-        kind = id(c.patch) if models else by_hand.alike(c.patch)
-        alike.setdefault((kind, c.second is None), []).append(i)
-    for same in alike.values():
+    kind: Callable[[Any], Any] = id if models else by_hand.alike
+    groups = []
+    for same in grouped((kind(c.patch), c.second is None) for c in contacts):
         patches = [contacts[i].patch for i in same]
         model = (models or {}).get(same[0]) or by_hand.model(patches, samples, cycles, periodicity)
         first = np.array([where[i, 0] for i in same])

@@ -191,13 +191,14 @@ def _said(points: Sequence[TwoTonePoint], b: TwoTone) -> tuple[str, ...]:
 
 class _Shown(NamedTuple):
     """Of the mean and every pair: parts, |k . omega|, amplitudes of bodies q and contact forces F, conjugate where the
-    frequency is negative; (P + 1,) signs."""
+    frequency is negative; (P + 1,) signs. force: (W, c) of the contacts."""
 
     parts: list[Any]
     w: Array
     q: list[Any]
     F: list[Any]
     sign: Array
+    force: Array
 
 
 def _shown(b: TwoTone, p: TwoTonePoint) -> _Shown:
@@ -208,7 +209,7 @@ def _shown(b: TwoTone, p: TwoTonePoint) -> _Shown:
     F, g = stacked.complex(force), stacked.complex(force - v @ b.problem.stiffness[0].T)
     q = [one.modal - one.modal_compliance @ own for one, own in zip(views, g, strict=True)]
     parts = [b.parts[0, 0], *(b.linear(k)[0] for k in b.torus.pairs)]
-    return _Shown(parts, np.append(0.0, np.abs(w)), q, list(F), stacked.sign)
+    return _Shown(parts, np.append(0.0, np.abs(w)), q, list(F), stacked.sign, force)
 
 
 def _amplitudes(b: TwoTone, p: TwoTonePoint) -> Array:
@@ -226,10 +227,8 @@ def _powers(b: TwoTone, p: TwoTonePoint) -> list[float]:
             done, lost, *_ = reduced.work([part], float(w), [1], q[None], F[None])
             supplied[int(k[0] == 0)] += done * w / (2 * np.pi)
             damped += lost * w / (2 * np.pi)
-    v = b.displacement(p.x)
-    into = b.forces(v, p.first, p.second, slopes=False)[0]
-    speed = differentiated(b.torus.frequencies(p.first, p.second)) @ v
-    exchanged = 0.5 * float((into[1:] * speed[1:]).sum())
+    speed = differentiated(b.torus.frequencies(p.first, p.second)) @ b.displacement(p.x)
+    exchanged = 0.5 * float((s.force[1:] * speed[1:]).sum())
     return [*supplied, damped, exchanged, b.lost(p.x, p.first)]
 
 
