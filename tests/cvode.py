@@ -23,8 +23,9 @@ import numpy as np
 
 from microslip.data import Array
 from microslip.time_domain.contacts import joined, moved, parts
-from microslip.time_domain.equations import Equations
+from microslip.time_domain.equations import MotionEquations
 from microslip.time_domain.orbit import Orbit, Start, begun
+from microslip.time_domain.samples import announced
 from microslip.time_domain.stepper import Stepper
 
 MOST = 50_000_000
@@ -47,7 +48,7 @@ class Rates:
     """z' of z = (q, v, x, works) as compiled functions of time and z, of laws that are differential equations
     (`Law.remembers`), on bodies that yield by their modes alone."""
 
-    equations: Equations
+    equations: MotionEquations
 
     @cached_property
     def stepper(self) -> Stepper:
@@ -130,7 +131,9 @@ class Rates:
         return lambda t, z: np.asarray(found(t, z))
 
 
-def run(e: Equations, keep: int, samples: int, start: Start = "rest", settle: int = 0, tolerance: float = 1e-9) -> Orbit:
+def run(
+    e: MotionEquations, keep: int, samples: int, start: Start = "rest", settle: int = 0, tolerance: float = 1e-9
+) -> Orbit:
     """Motion in time from a start: see `orbit.run`. Impacts and separations are found as roots; slips and sticks are
     not counted. `Orbit.steps` are evaluations of a period."""
     rates, period = Rates(e), 2 * np.pi / e.Omega
@@ -177,13 +180,25 @@ def _orbit(rates: Rates, found: Any, samples: int, steps: int, begin: float) -> 
     o, preloads = e.oscillators(t), e.F_0 @ d
     given, damped, contacts = z[:, -WORKS:].T
     nothing = np.full(len(t), np.nan)
-    mechanical = 0.5 * np.sum(v**2 + e.omega2 * q**2, axis=1)
-    energy = {"mechanical": mechanical, "given": given + preloads, "damped": damped, "contacts": contacts + preloads}
-    return Orbit(
-        e, tuple(f"{w.monitor} {w.label}" for w in e.assembly.outputs), samples, steps, t,
-        (q @ e.output.T + o @ e.output_given.T).T, (v @ e.output.T + o @ (e.output_given @ e.turning).T).T, q.T, v.T, d,
-        force, energy | {"stored": nothing, "lost": nothing, "ground": nothing}, _events(found, begin),
-    )  # fmt: skip
+    arrays = {
+        "time": t,
+        "angular_frequency": np.full(len(t), e.Omega),
+        "displacement": (q @ e.output.T + o @ e.output_given.T).T,
+        "velocity": (v @ e.output.T + o @ (e.output_given @ e.turning).T).T,
+        "modal_displacement": q.T,
+        "modal_velocity": v.T,
+        "contact_displacement": d,
+        "contact_force": force,
+        "event": _events(found, begin),
+        "energy_mechanical": 0.5 * np.sum(v**2 + e.omega2 * q**2, axis=1),
+        "energy_given": given + preloads,
+        "energy_damped": damped,
+        "energy_contacts": contacts + preloads,
+        "energy_stored": nothing,
+        "energy_lost": nothing,
+        "energy_ground": nothing,
+    }
+    return Orbit(arrays=arrays, model=e, steps=steps, **vars(announced("by CVODE", e, samples)))
 
 
 def _events(found: Any, begin: float) -> Array:

@@ -174,7 +174,7 @@ MISTAKES = (
     # bifurcation
     Mistake(
         "Floquet: pieces of a period in the wrong order",
-        "bifurcation/floquet.py",
+        "bifurcation/shooting.py",
         "found = piece @ found",
         "found = found @ piece",
         "test_bifurcation.py",
@@ -190,7 +190,7 @@ MISTAKES = (
     ),
     Mistake(
         "condensed orbits: sign of the sines",
-        "bifurcation/condensed.py",
+        "bifurcation/balance.py",
         "found[2 * h - 1], found[2 * h] = part.real, -part.imag",
         "found[2 * h - 1], found[2 * h] = part.real, part.imag",
         "test_condensed.py",

@@ -159,7 +159,10 @@ def test_harmonics_are_added_to_a_slider():
 def test_too_few_harmonics_of_a_slider_are_told():
     """One where a Jenkins element slides is remarked on, and enough for whoever asks for no more."""
     built = SimpleNamespace(settings=SimpleNamespace(ring=None, mode="aft"))
-    problem = sliding(1)
+    rows = {"face": np.outer([0, 1, 0, 0, 0, 0], np.ones(1)), "push": np.ones(1), "tip": np.ones(1)}
+    body = group(np.array([100.0]), rows, 0.02)
+    slides = held(body, jenkins(2e4, 0.3, 2.0), [1], np.zeros(1), np.zeros(1), 1.0)
+    problem = balance.of(slides, 1, 64, length=3e-5)  # programs of the random systems
     start = readout(problem, 17.0)[0]
     known = error(problem, start.x, start.Omega)
     assert enough(problem, start, tolerance=1.01 * known.readout, first=known).reached

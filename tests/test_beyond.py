@@ -37,8 +37,7 @@ from microslip.harmonic_balance.stability import Stability
 from microslip.harmonic_balance.sweeps import ends, gaps
 from microslip.results import Journal, open_journal, read_response
 from microslip.stages.places import modal_files
-from microslip.time_domain.stepped import Settled, TimeIsOver, settled
-from microslip.time_domain.swept import Motions, Sweeps
+from microslip.time_domain.swept import SettledMotion, Sweeps, SweptMotions, TimeIsOver, settled
 
 pytestmark = pytest.mark.usefixtures("undrawn", "unjudged")
 
@@ -74,10 +73,10 @@ def test_where_a_sweep_ends_is_no_resonance(
     np.testing.assert_allclose(gaps(found, [p for p, turn in zip(peaks, turns, strict=True) if not turn]), beside)
 
 
-def motion(frequency: float, amplitude: float, opens: bool = False, least: float = 1.0) -> Settled:
+def motion(frequency: float, amplitude: float, opens: bool = False, least: float = 1.0) -> SettledMotion:
     """In µm; least: of its swings, over the largest."""
     a = 1e-6 * amplitude
-    return Settled(frequency, a, a, least * a, opens, None)  # type: ignore[arg-type]
+    return SettledMotion(frequency, a, a, least * a, opens, None)  # type: ignore[arg-type]
 
 
 def test_what_is_said_of_two_motions() -> None:
@@ -140,9 +139,7 @@ def test_a_motion_from_rest_is_that_of_the_balance(case: Path) -> None:
     assert at_rest.like(float(balanced), 0.01) and not at_rest.irregular and not at_rest.opens
 
 
-def test_a_motion_ends_with_its_time_and_portions_change_nothing(
-    case: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_motion_ends_with_its_time_and_portions_change_nothing(case: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Of contacts of 1e9 N/m, whose steps are many: cut in its first periods, before any look. With all the time it
     is the same motion in portions of a period as in long ones."""
     p = problem(case)
@@ -152,7 +149,7 @@ def test_a_motion_ends_with_its_time_and_portions_change_nothing(
         settled(stiff.assembly, 110.0, 300, patience=1e-3)
     assert time.process_time() - began < 10.0
     whole = settled(p.assembly, 110.0, 300)
-    monkeypatch.setattr("microslip.time_domain.stepped.PORTION", 0.0)
+    monkeypatch.setattr("microslip.time_domain.swept.PORTION", 0.0)
     assert settled(p.assembly, 110.0, 300).amplitude == whole.amplitude
 
 
@@ -186,7 +183,7 @@ class Bistable:
         now = SimpleNamespace(process_time=lambda: self.clock)
         monkeypatch.setattr("microslip.time_domain.swept.time", now)
 
-    def __call__(self, _: object, f: float, *more: object) -> Settled:
+    def __call__(self, _: object, f: float, *more: object) -> SettledMotion:
         if len(self.asked) == self.ends:
             raise KeyboardInterrupt
         begin = more[1]
@@ -194,10 +191,10 @@ class Bistable:
         self.asked.append(f)
         was_high = begin is not None and begin.amplitude > 5e-6 or more[2] is not None and f > 121
         a = 1e-5 if f > 102 and (was_high or f > 121) else 1e-6
-        return Settled(f, a, a, a, a > 5e-6, [np.array([[a, 0.0]]), np.array([True])])
+        return SettledMotion(f, a, a, a, a > 5e-6, [np.array([[a, 0.0]]), np.array([True])])
 
 
-def sweeps(case: Path, patience: float, journal: Journal | None = None) -> Motions:
+def sweeps(case: Path, patience: float, journal: Journal | None = None) -> SweptMotions:
     """Of the bistable motion about a jump at 121 Hz; the balance knows the lower one below, the
     higher one above."""
     f = np.arange(90.0, 141.0, 4.0)
@@ -212,7 +209,7 @@ def sweeps(case: Path, patience: float, journal: Journal | None = None) -> Motio
     return Sweeps(p, found, (120.9, 121.1), 10.0, lambda _: None, patience, journal).motions()
 
 
-def table(motions: Sequence[Settled]) -> list[tuple[float, float, bool]]:
+def table(motions: Sequence[SettledMotion]) -> list[tuple[float, float, bool]]:
     return [(m.frequency, m.amplitude, m.opens) for m in motions]
 
 

@@ -271,9 +271,9 @@ CASE = {"body": "vane", "excitation": "magnet", "amplitude": 2.0, "monitor": "pr
 
 
 def sample_case():
-    """That of the sample, with few points."""
+    """That of the sample, with few points and samples."""
     text = (ms.sample().parent / "case.toml").read_text(encoding="utf-8")
-    return text.replace("points = [6, 3]", "points = [2, 2]")
+    return "samples = 24\n" + text.replace("points = [6, 3]", "points = [2, 2]")
 
 
 def rubbing(**contact):
@@ -357,7 +357,8 @@ except ms.UserError as error:
     refusal = str(error)
 sentences, after = ms.prepare(compiler=False, cache=False), process()
 print(json.dumps({
-    "imported": [a == b for a, b in zip(before, imported)], "started": started, "refusal": refusal, "sentences": len(sentences),
+    "imported": [a == b for a, b in zip(before, imported)], "started": started, "refusal": refusal,
+    "sentences": len(sentences),
     "options": [k for k in after[1] if after[1][k] != before[1][k]], "rest": [before[i] == after[i] for i in (0, 2, 3)],
 }))
 """

@@ -183,8 +183,9 @@ def two_tones(
         free: the second frequency is that of a self-excited vibration, unknown, and ``second`` a guess within 15 %; no
             load has a second tone then. start: a motion in time to begin from then, of `integrate`; if not given 200
             periods of the first tone from rest, and a hundred that are kept.
-        harmonics: H: pairs (k1, k2) with |k1| + |k2| <= H are balanced. samples: of a turn of the faster angle, 8 H and
-            32 at least if not given. turns: of it in the line along which contacts that remember are marched; as many.
+        harmonics: H: pairs (k1, k2) with ``abs(k1) + abs(k2) <= H`` are balanced. samples: of a turn of the faster
+            angle, 8 H and 32 at least if not given. turns: of it in the line along which contacts that remember are
+            marched; as many.
         kept: finished points of a run that did not end. report: is told what is under way.
 
     Returns:
@@ -426,7 +427,7 @@ def integrate(
     found = equations.of(assembly, turn * frequency, None if second is None else turn * second)
     if second is not None and start == "balance":
         raise UserError('second: "balance" begins on a periodic vibration; take "static" or "rest"')
-    begin: orbit.Start | starts.Periodic
+    begin: orbit.Start | starts.PeriodicStart
     if isinstance(start, Mapping):
         begin = starts.released(found, start)
     elif start == "balance":
@@ -436,7 +437,7 @@ def integrate(
         begin = start
     if file is None:
         return orbit.run(found, settle, keep, samples, steps, begin, report)
-    asked = recorded.Asked(f"{frequency:.6g} {unit}", found, settle, keep, samples, steps, begin)
+    asked = recorded.Integration(f"{frequency:.6g} {unit}", found, settle, keep, samples, steps, begin)
     return recorded.run(file, [asked], report=report)[0]
 
 
@@ -517,7 +518,7 @@ def run_up(
     found = equations.of_ramp(whole_of(system), ramp)
     if file is None:
         return orbit.run(found, 0, ramp.periods, samples, steps, begin, report)
-    asked = recorded.Asked(f"{start:.6g} to {stop:.6g} {unit}", found, 0, ramp.periods, samples, steps, begin)
+    asked = recorded.Integration(f"{start:.6g} to {stop:.6g} {unit}", found, 0, ramp.periods, samples, steps, begin)
     return recorded.run(file, [asked], report=report)[0]
 
 
@@ -590,7 +591,7 @@ def bifurcate(
     if len(begin) != made.count:
         raise UserError(f"bifurcate: x: has {len(begin)} numbers; the system has {made.count}")
     made.check(begin, start)
-    asked = diagram.Asked(
+    asked = diagram.DiagramPlan(
         start, stop, orbits, doublings, nodes, step, points, tuple(attractors), starts, deflate=tuple(deflate)
     )
     return diagram.diagram(made, begin, asked, report=report)

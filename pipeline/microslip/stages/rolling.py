@@ -16,10 +16,10 @@ from ..report.page import Piece, number, say, table
 from ..results import Journal
 from ..rolling.behind import ROWS, Behind, behind
 from ..rolling.contact_table import ContactTable, contact_table, write_contact_table
-from ..rolling.settings import RollingCase, Section, load_rolling
-from ..rolling.study import Studied, rows_of_patches, study
+from ..rolling.settings import RollingCase, SectionKeys, load_rolling
+from ..rolling.study import RollingAnswer, rows_of_patches, study
 from ..rolling.table import creep_table, write_creep_table
-from ..rolling.wearing import Wearing, wearing
+from ..rolling.wearing import ProfileWear, wearing
 from .answer import RollJob, Written
 from .job import Job, open_job
 from .modal import modes_stage
@@ -54,7 +54,7 @@ def _bodies(case: RollingCase, case_path: Path, report: Report) -> list[Path]:
 
 
 @in_its_file
-def _of_one_material(case_path: Path, key: str, job: Job, section: Section) -> None:
+def _of_one_material(case_path: Path, key: str, job: Job, section: SectionKeys) -> None:
     """A body and the half-space that stands for its contact, of which one is taken out and the other put in."""
     own = [getattr(job.settings.material, name, None) for name in ("young", "poisson")]
     asked = [section.young, section.poisson]
@@ -93,7 +93,7 @@ def _answer(case: RollingCase, path: Path, bodies: list[Path], _: Journal, repor
     )
 
 
-def _behind(found: Studied, bodies: list[Path]) -> Behind | None:
+def _behind(found: RollingAnswer, bodies: list[Path]) -> Behind | None:
     elastic = found.case.elastic
     if elastic is None or not found.patches:
         return None
@@ -102,27 +102,27 @@ def _behind(found: Studied, bodies: list[Path]) -> Behind | None:
     return behind(found.patches[0], found.case.solids, groups, elastic.face, methods)
 
 
-def _contacts(found: Studied, report: Report) -> ContactTable | None:
+def _contacts(found: RollingAnswer, report: Report) -> ContactTable | None:
     asked = found.case.contacts
     if asked is None:
         return None
     return contact_table(found.track, found.case.vertical_force, **asked.model_dump(), report=report)
 
 
-def _wearing(found: Studied, path: Path, report: Report) -> Wearing | None:
+def _wearing(found: RollingAnswer, path: Path, report: Report) -> ProfileWear | None:
     if found.case.wear is None or not found.case.wear.updates:
         return None
     return wearing(found.case, found.track, found.case.characteristic(path), found.case.surface(path), report)
 
 
-def _worn_tables(worn: Wearing) -> Files:
+def _worn_tables(worn: ProfileWear) -> Files:
     """Over the passages, and both profiles as tables in mm that a case takes."""
     tables = {"wearing.csv": worn.columns()}
     tables |= {f"{name}_worn.csv": getattr(worn, name).columns(worn.smoothing) for name in ("wheel", "rail")}
     return csv_files(tables, 10)
 
 
-def _tables(found: Studied) -> Files:
+def _tables(found: RollingAnswer) -> Files:
     rows = {"patches.csv": rows_of_patches(found.patches)}
     made: Files = {}
     if found.forces is not None:
@@ -131,7 +131,7 @@ def _tables(found: Studied) -> Files:
     return made | {name: partial(store.write_text, text=rows_csv(*of)) for name, of in rows.items()}
 
 
-def _pictures(found: Studied, worn: Wearing | None, case: str) -> Files:
+def _pictures(found: RollingAnswer, worn: ProfileWear | None, case: str) -> Files:
     drawn: Files = {
         "pictures/creep.png": partial(curve_picture, found, title=f"{case}: creep curve"),
         "pictures/tractions.png": partial(traction_picture, found, title=case),
@@ -141,7 +141,7 @@ def _pictures(found: Studied, worn: Wearing | None, case: str) -> Files:
     return drawn
 
 
-def _in_paraview(found: Studied, folder: Path) -> list[Path]:
+def _in_paraview(found: RollingAnswer, folder: Path) -> list[Path]:
     if found.forces is None or found.tractions is None or not find_spec("meshio"):
         return []
     write_tractions_vtu(found.tractions, file := folder / "tractions.vtu")
@@ -155,7 +155,7 @@ READ_AS = (
 )
 
 
-def _patches(found: Studied) -> Piece:
+def _patches(found: RollingAnswer) -> Piece:
     head = ["y on the rail in mm", "angle in mrad", "a, b in mm", "normal force in N", "pressure in MPa",
             "creepages", "spin in 1/m"]  # fmt: skip
     rows = [

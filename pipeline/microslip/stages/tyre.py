@@ -13,7 +13,7 @@ from ..pictures.tyre import tyre_picture
 from ..report.page import say
 from ..report.response import number_tables
 from ..results import Journal
-from ..rolling.slip import Studied, load_tyre, study
+from ..rolling.tyre import TyreAnswer, load_tyre, study
 from .answer import RollJob, Written
 from .job import open_job
 from .modal import modes_stage
@@ -40,7 +40,7 @@ def tyre_stage(job: RollJob) -> Written:
     return job.answer(stage, case.name, raw, files, "unsteady rolling", solve)
 
 
-def _answer(found: Studied, wheel: ModalBasis, case: str) -> Answer:
+def _answer(found: TyreAnswer, wheel: ModalBasis, case: str) -> Answer:
     slips, forces = found.steady
     tables = {
         "loads.csv": found.loads(),

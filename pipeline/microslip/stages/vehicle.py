@@ -9,7 +9,7 @@ from ..files.tables import csv_files
 from ..pictures.vehicle import circumference_picture, growth_picture, recorded_picture
 from ..report.page import say
 from ..results import Journal
-from ..rolling.settings import Section
+from ..rolling.settings import SectionKeys
 from ..vehicle.kinematics import recorded
 from ..vehicle.settings import KinematicsCase, VehicleCase, load_kinematics, load_vehicle
 from ..vehicle.study import study
@@ -42,7 +42,7 @@ def kinematics_stage(job: RollJob) -> Written:
     return job.answer(stage, case.name, raw, files, "wear of a wheel", solve)
 
 
-def _profiles(*sections: Section) -> list[str]:
+def _profiles(*sections: SectionKeys) -> list[str]:
     """Files of the profiles."""
     return [s.profile for s in sections if isinstance(s.profile, str)]
 
