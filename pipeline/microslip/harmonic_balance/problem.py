@@ -329,9 +329,9 @@ class Problem:
             views = [one.at(Omega) for one in self.eliminated]
         else:
             views = [reduced.joined(poles, Omega) for poles in self._poles]
-        known = [view for view in views if view is not None]
-        if len(known) == len(views):
-            both = self.stacked(known) if self._poles is None else tuple(known)
+        finite = [view for view in views if view is not None]
+        if len(finite) == len(views):
+            both = self.stacked(finite) if self._poles is None else tuple(finite)
             return AtFrequency(self, Omega, both)
         softer = self._softer
         return AtFrequency(softer, Omega, softer.stacked([one.directly(Omega) for one in softer.eliminated]))
@@ -474,8 +474,8 @@ class AtFrequency:
     def tried(self, x: Array, near: Tried | None = None) -> tuple[Array, Tried]:
         """`residual`, and what it is of. near: of a motion near by."""
         moved = self._moved(x)
-        known = [k for *_, k in near] if near else [None] * len(moved)
-        pairs = zip(moved, known, strict=True)
+        before = [k for *_, k in near] if near else [None] * len(moved)
+        pairs = zip(moved, before, strict=True)
         tried = [(u, *g.near(u, self.period, k)) for (g, u), k in pairs]
         return self.residual_of(x, self.along([F for _, F, _ in tried])), tried
 
@@ -726,10 +726,10 @@ def _no_stiffer(part: Linear, stiffness: Array) -> Array:
     if not elastic.size:
         return stiffness
     yields = (np.abs(part.rows @ shapes) ** 2 / np.maximum(squares, elastic.min())).sum(axis=1)
-    over = np.diag(stiffness) * (yields + np.diag(part.residual)) / STIFFER
-    if not (over > 1).any():
+    excess = np.diag(stiffness) * (yields + np.diag(part.residual)) / STIFFER
+    if not (excess > 1).any():
         return stiffness
-    less = 1 / np.sqrt(np.maximum(over, 1.0))
+    less = 1 / np.sqrt(np.maximum(excess, 1.0))
     return stiffness * less * less[:, None]
 
 
@@ -754,12 +754,12 @@ RIGID = 1e-9
 
 def _eliminated(assembly: Assembly, harmonics: int, together: bool) -> tuple[tuple[Linear, ...], ...]:
     """`eliminated` in the harmonics 0 to H; those of one wave that nothing drives are the same."""
-    driven, known = {0, *(x.harmonic for x in assembly.loads)}, dict[Any, tuple[Linear, ...]]()
+    driven, made = {0, *(x.harmonic for x in assembly.loads)}, dict[Any, tuple[Linear, ...]]()
     kinds = [(True, h) if h in driven else (False, assembly.index(h)) for h in range(harmonics + 1)]
     for h, kind in enumerate(kinds):
-        if kind not in known:
-            known[kind] = eliminated(assembly, h, together)
-    return tuple(known[kind] for kind in kinds)
+        if kind not in made:
+            made[kind] = eliminated(assembly, h, together)
+    return tuple(made[kind] for kind in kinds)
 
 
 def eliminated(assembly: Assembly, harmonic: int, together: bool) -> tuple[Linear, ...]:
@@ -784,9 +784,9 @@ def moves_by(assembly: Assembly) -> float:
     gapes, how far the loads move the stiffest."""
     pairs = [(abs(float(c.preload[0])) * 0.3, float(np.diag(c.stiffness)[:2][-1])) for c in assembly.contacts]
     gaps = [-float(c.offset[0]) for c in assembly.contacts]
-    told = [c.length for c in assembly.contacts if c.length]
-    moved = max([*(limit / k for limit, k in pairs if k), *gaps, *told], default=0.0)
-    if moved <= 0:
+    lengths = [c.length for c in assembly.contacts if c.length]
+    reach = max([*(limit / k for limit, k in pairs if k), *gaps, *lengths], default=0.0)
+    if reach <= 0:
         stiffest = max((float(np.diag(c.stiffness)[:3].max()) for c in assembly.contacts), default=0.0)
-        moved = max((abs(x.amplitude) for x in assembly.loads), default=0.0) / stiffest if stiffest else 0.0
-    return max(moved, 1e-9)
+        reach = max((abs(x.amplitude) for x in assembly.loads), default=0.0) / stiffest if stiffest else 0.0
+    return max(reach, 1e-9)
