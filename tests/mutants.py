@@ -249,7 +249,7 @@ MISTAKES = (
     ),
     Mistake(
         "run-up: sign of the Euler force",
-        "modal/run_up.py",
+        "modal/invariants.py",
         'euler = -np.einsum("nia,ni->a"',
         'euler = np.einsum("nia,ni->a"',
         "test_gyroscopic.py",
