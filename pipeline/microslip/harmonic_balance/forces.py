@@ -18,9 +18,8 @@ import numpy as np
 
 from ..contact.harmonics import CHUNK, CHUNK_ALONE, force_harmonics, force_near, fourier
 from ..contact.law import Law, point_axes
-from ..contact.patch import Patch
+from ..contact.patch import Patch, thinned
 from ..contact.periodic import Known, periodic, unknown, with_slopes
-from ..contact.thinned import thinned
 from ..data import Array
 from ..programs import often, program, seldom
 from .point_cycles import Cycle, Traced, derivative, needs_rate, traced
