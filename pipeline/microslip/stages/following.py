@@ -8,7 +8,7 @@ from __future__ import annotations
 import csv
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cached_property, lru_cache, partial
 from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
@@ -222,9 +222,11 @@ def unreached(found: Mapping[float, Backbone]) -> str:
 def write_backbones(found: Mapping[float, Backbone], case: Case, remarks: Sequence[str] = ()) -> list[Path]:
     """``backbone.csv``, ``pictures/backbone.png`` and ``backbone.html``. remarks: see `remarks_on_backbones`."""
     from ..pictures.following import backbone_plot
+    from ..pictures.plots import save
 
     title, picture = _title(case, "nonlinear mode"), case.folder / "pictures" / "backbone.png"
-    files = [_backbone_table(found, case), backbone_plot(found, title, picture, case.quantity)]
+    draw = partial(backbone_plot, found, title, of=case.quantity)
+    files = [_backbone_table(found, case), save(draw, picture)]
     said = [_backbone_message(normal, one, case.quantity) for normal, one in sorted(found.items())]
     return [*files, _page(case, "backbone", title, [*said, *remarks], files)]
 
@@ -364,13 +366,15 @@ def write_optimum(
     """``optimum.csv``: the highest resonance at every value and the optimum; ``pictures/optimum.png``;
     ``optimum.html``. beside: see `found_before`. remarks: more sentences of the page."""
     from ..pictures.following import optimum_plot
+    from ..pictures.plots import save
 
     files, title = [_optimum_table(found.found, over, case, found)], _title(case, "highest resonance and optimum")
     if any(one.status == CONVERGED for one in found.found.values()):
         label = over.replace("_", " ") + (unit_of(over) and f" in{unit_of(over)}")
         picture = case.folder / "pictures" / "optimum.png"
         good = {value: valid(one, case) for value, one in found.found.items()}
-        files.append(optimum_plot(found, label, title, picture, case.quantity, case.name, beside, good))
+        more: dict[str, Any] = {"of": case.quantity, "name": case.name, "others": beside, "valid": good}
+        files.append(save(partial(optimum_plot, found, label, title, **more), picture))
     said = [
         f"{told(found, over, case)}.",
         *([f"{why}."] if (why := missed(found, over)) else []),
@@ -595,9 +599,11 @@ def stabilities(case: Case, report: Report = lambda _: None) -> dict[float, dict
 def write_stabilities(found: Mapping[float, Mapping[float, Stability]], case: Case) -> list[Path]:
     """``stability.csv`` and ``pictures/stability.png``."""
     from ..pictures.following import stability_plot
+    from ..pictures.plots import save
 
     picture = case.folder / "pictures" / "stability.png"
-    return [_stability_table(found, case), stability_plot(found, _title(case, "stability"), picture)]
+    draw = partial(stability_plot, found, _title(case, "stability"))
+    return [_stability_table(found, case), save(draw, picture)]
 
 
 def _stability_table(found: Mapping[float, Mapping[float, Stability]], case: Case) -> Path:

@@ -19,7 +19,7 @@ from ..harmonic_balance import solved
 from ..harmonic_balance.nonlinear_modes import Backbone
 from ..results.dataset import Dataset, is_dataset, read_dataset
 from ..results.series import Series
-from ..results.tones import TwoTones, is_of_tones, read_tones
+from ..results.tones import KIND, TwoTones
 from ..settings.arguments import checked
 from ..units import UNIT_OF_FREQUENCY
 from . import orbit, samples
@@ -185,10 +185,9 @@ def load(path: Path | str) -> Series | Backbone | Recorded | TwoTones | Dataset:
     Raises:
         UserError: no such file, or one of several series or motions.
     """
-    if is_of_tones(path):
-        return read_tones(path)
     if is_dataset(path):
-        return read_dataset(path)
+        data = read_dataset(path)
+        return TwoTones.of_data(data) if data.kind == KIND else data
     if not samples.is_of_motions(path):
         return solved.load(path)
     found = read_orbits(path)
