@@ -51,7 +51,7 @@ def there(place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.fixture
 def figures(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> list[Any]:
     """What would be drawn in an empty folder."""
-    from microslip.pictures import following as drawing
+    from microslip.pictures import plots as drawing
 
     made: list[Any] = []
     monkeypatch.setattr(drawing, "save_figure", lambda figure, path: made.append(figure) or path)

@@ -31,8 +31,8 @@ if TYPE_CHECKING:
 GROUP = "microslip.analysis"
 
 
-Files = dict[str, Callable[[Path], Any]]
-"""Names below the folder of an answer -> what writes them."""
+Files = dict[str, Callable[[Any], Any]]
+"""Names below the folder of an answer -> what writes them there; of a PNG, what draws it into a figure."""
 
 
 class Data(Protocol):
@@ -86,10 +86,9 @@ class Answer:
             amplitude of the first read-out, of which is told whether it looks like a number in a
             wrong unit; None where the sentences tell all that is to be said of the case. whole:
             whether nothing of it was lost. missing: what was asked for and is not known, in words.
-        files: other files by their names, below the folder of the answer -> what writes them; PNG
-            files are made where pictures are wanted, and shown on the page. moving: writes bodies
-            that move below that folder, where pictures are wanted. lines: of a table for the
-            terminal.
+        files: see `Files`; PNG files are made where pictures are wanted, and shown on the page.
+            moving: writes bodies that move below that folder, where pictures are wanted. lines: of
+            a table for the terminal.
     """
 
     sentences: Sequence[str]

@@ -17,7 +17,7 @@ from ..data import ModalBasis
 from ..errors import UserError
 from ..files import store
 from ..files.tables import columns_csv
-from ..pictures.plots import empty_figure, save_figure
+from ..pictures.plots import empty_figure, save, save_figure
 from ..report.page import answer_page
 from ..results import Journal, open_journal
 from .checkpoint import inputs_of
@@ -96,7 +96,7 @@ def written(answer: Answer, name: str, folder: Path, title: str, pictures: bool,
     """
     wanted = {file: write for file, write in answer.files.items() if pictures or not file.endswith(".png")}
     for file, write in wanted.items():
-        write(folder / file)
+        save(write, folder / file) if file.endswith(".png") else write(folder / file)
     shown = [folder / file for file in wanted if file.endswith(".png")]
     made = [*_data(name, answer, folder), *(folder / file for file in wanted if not file.endswith(".png"))]
     moving: Sequence[Path] = ()
