@@ -29,8 +29,7 @@ if TYPE_CHECKING:
     from .basis.checks import Check
     from .data import ModalBasis
     from .results import Response
-    from .stages.answer import CaseJob, Written
-    from .stages.stage import Report
+    from .stages.answer import Written
 
 os.environ.setdefault("NUMPY_MADVISE_HUGEPAGE", "0")  # read by numpy when it is loaded: the system zeroes whole huge
 # pages, which costs more than they save (0.7 of 8.6 CPU seconds of the modes of 60,000 degrees of freedom)
@@ -350,13 +349,10 @@ def respond(
             wanted = Wanted("none" if no_stress else stresses, not no_pictures)
             table, converged = running.respond(case, basis, list(set_), force, report, log=log, wanted=wanted)
         if stability:
-            from .stages.answer import CaseJob
+            from .stages.analysing import open_case
             from .stages.multipliers import stability_of_points
-            from .stages.places import existing_files
 
-            settings, _ = load_case(case, list(set_))
-            files = existing_files(settings, basis, Path("."))
-            job = CaseJob(case, files, table.parent, set_, force, report, not no_pictures, swept=True)
+            job = open_case(case, set_, force, report, not no_pictures, basis)
             found = stability_of_points(job)
     for line in map(sentence, pairs if compare_book else ()):
         _say(line, quiet)
@@ -381,29 +377,12 @@ def identify(
 
 
 def _survey(case: Path, basis: Path | None, kind: str, set_: Sequence[str], force: bool, quiet: bool) -> None:
+    from .stages.analysing import open_case
     from .stages.surveying import survey_stage
 
     with progress(f"{kind.replace('_', ' ')} of {case}", quiet) as report:
-        found = survey_stage(case, basis, kind, list(set_), force, report)
+        found = survey_stage(open_case(case, set_, force, report, basis=basis), kind)
     _tell(found, quiet, f"{found.missing}; {{page}} holds what was found")
-
-
-def _case_job(
-    case: Path, set_: Sequence[str], force: bool, report: Report, no_pictures: bool, basis: Path | None = None
-) -> CaseJob:
-    """A case on its way. basis: see respond; modal files are made where they are not up to date if not given."""
-    from .case import load_case
-    from .stages.answer import CaseJob
-    from .stages.places import existing_files, modal_files
-    from .stages.stage import folder_of_case
-
-    settings, _ = load_case(case, list(set_))
-    folder = folder_of_case(case, settings.name)
-    if basis is not None:
-        files = existing_files(settings, basis, Path("."))
-    else:
-        files = modal_files(settings, Path("."), report)
-    return CaseJob(case, files, folder, set_, force, report, not no_pictures)
 
 
 def _tell(found: Written, quiet: bool, lost: str) -> None:
@@ -839,10 +818,11 @@ def _analyse(
 ) -> None:  # fmt: skip
     """The answer of an analysis."""
     from .analysis import analyses
-    from .stages.analysing import analysed
+    from .stages.analysing import analysed, open_case
 
     with progress(f"{verb} {case}", quiet) as report:
-        found = analysed(name, _case_job(case, set_, force, report, no_pictures, basis))
+        job = open_case(case, set_, force, report, not no_pictures, basis, make=True)
+        found = analysed(name, job)
     _tell(found, quiet, f"{found.missing or analyses()[name].lost}; {{page}} says which and why")
 
 

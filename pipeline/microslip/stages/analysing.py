@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -12,7 +12,7 @@ from typing import Any
 
 from .. import analysis
 from ..analysis import Analysis, Answer, Question
-from ..case import headline
+from ..case import headline, load_case
 from ..case.assemble import Built, build
 from ..case.settings import case_model
 from ..data import Mesh, ModalBasis
@@ -27,8 +27,33 @@ from ..system.settings import load_system
 from .answer import CaseJob, Written, made
 from .job import open_job
 from .meshing import load_mesh, mesh_stage
-from .places import find_body, lumped
-from .stage import Stage, hash_of_code
+from .places import existing_files, find_body, lumped, modal_files
+from .stage import Report, Stage, folder_of_case, hash_of_code
+
+
+def open_case(
+    path: Path,
+    assignments: Sequence[str] = (),
+    force: bool = False,
+    report: Report = lambda _: None,
+    pictures: bool = True,
+    basis: Path | None = None,
+    make: bool = False,
+) -> CaseJob:
+    """A case on its way, in build/<case>/.
+
+    Args:
+        basis: see `running.respond`. make: modal files where they are not up to date, if it is not
+        given.
+
+    Raises:
+        UserError: mistakes of the case, modal files that are not there.
+    """
+    settings, _ = load_case(path, list(assignments))
+    folder, here = folder_of_case(path, settings.name), Path(".")
+    made = make and basis is None
+    files = modal_files(settings, here, report) if made else existing_files(settings, basis, here)
+    return CaseJob(path, files, folder, assignments, force, report, pictures)
 
 
 def analysed(name: str, case: CaseJob) -> Written:
@@ -67,7 +92,7 @@ def _answer(one: Analysis, asked: Any, stage: Stage, case: CaseJob, journal: Jou
         raise
     if answer.largest is None:
         return answer
-    of_case = [*built.messages, *headline.doubted(built, answer.largest)]
+    of_case = [*built.messages, *headline.doubted(built, answer.largest, **answer.judged)]
     return replace(answer, sentences=[*answer.sentences, *of_case])
 
 

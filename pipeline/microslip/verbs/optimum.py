@@ -31,7 +31,7 @@ from ..harmonic_balance.response import NOT_FOUND
 from ..harmonic_balance.solver import CONVERGED
 from ..report.response import number_tables
 from ..results.journal import once
-from ..settings.numbers import Model, Number
+from ..settings.numbers import Model, Number, _tuple
 from ..units import METRES, Quantity, percent
 
 OF_CONTACTS = ("normal_stiffness", "tangential_stiffness", "friction", "roughness")
@@ -81,7 +81,7 @@ class Keys(Model):
     points: Annotated[int, Field(ge=2, le=10000)] = 6
     """values from one end to the other at which a sweep looks for it first"""
     beside: Annotated[
-        tuple[str, ...], BeforeValidator(lambda v: (v,) if isinstance(v, str) else tuple(v))
+        tuple[str, ...], BeforeValidator(lambda v: (v,) if isinstance(v, str) else _tuple(v))
     ] = ()
     """cases, or folders of their products, whose optimum over the same setting was found before,
     drawn on the same picture"""
