@@ -140,8 +140,7 @@ def _run(
     """`run_case` with a number of harmonics; tolerance: of their error, if it is looked at."""
     bases = basis if isinstance(basis, Mapping) else {b.name: basis for b in settings.components}
     built = build(settings, bases)
-    sweep = settings.sweep
-    frequency = np.linspace(sweep.start, sweep.stop, sweep.points)
+    frequency = settings.sweep.grid
     forces = normal_forces(built)
     left = _Left(built, tolerance)
     _book_can(built)

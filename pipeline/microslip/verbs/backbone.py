@@ -201,9 +201,9 @@ def unreached(modes: Mapping[float, Backbone]) -> str:
 
 
 ANALYSIS = Analysis(
-    name="backbone",
-    asks=Keys,
-    solve=solve,
+    "backbone",
+    Keys,
+    solve,
     lost="a nonlinear mode ends early",
     options=("mode", "low", "high"),
 )

@@ -242,9 +242,9 @@ def beside(found: Diagram, p: float) -> str:
 
 
 ANALYSIS = Analysis(
-    name="bifurcation",
-    asks=Keys,
-    solve=solve,
+    "bifurcation",
+    Keys,
+    solve,
     lost="some branches could not be followed to their end",
     needed="keys, start and stop",
     swept=False,

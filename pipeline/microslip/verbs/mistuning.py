@@ -171,11 +171,9 @@ def asked_of(built: Built, asked: Keys) -> Asked:
     pressed = {name: tuple(c.name for c in sector.contacts if name in _ends(c)) for name in thrown}
     tuned = Tuned(sector, pressed)
     tuned.check(scatter)
-    sweep = settings.sweep
-    frequency = np.linspace(sweep.start, sweep.stop, sweep.points)
     balance = {"harmonics": settings.balanced, **settings.marching}
     models = partial(book_models, strips=settings.strips) if settings.mode == "book" else None
-    return Asked(tuned, scatter, frequency, asked.seed, balance, asked.stuck, models)
+    return Asked(tuned, scatter, settings.sweep.grid, asked.seed, balance, asked.stuck, models)
 
 
 def _ends(contact: Contact) -> set[str]:
@@ -401,9 +399,9 @@ def _highest(found: Ensemble) -> Piece:
 
 
 ANALYSIS = Analysis(
-    name="mistuning",
-    asks=Keys,
-    solve=solve,
+    "mistuning",
+    Keys,
+    solve,
     lost="some samples have no solution; samples.csv has no amplitude for them",
     needed="scatter = [{ of, deviation }]",
     verb="mistune",

@@ -24,7 +24,7 @@ from ..files.store import ordinary
 from ..files.tables import write_columns
 from ..harmonic_balance import peak
 from ..harmonic_balance.growing import verdict
-from ..harmonic_balance.peak import HighestPeak, Optimum, Top
+from ..harmonic_balance.peak import HighestPeak, Make, Optimum, Top
 from ..harmonic_balance.problem import Problem
 from ..harmonic_balance.readout import measured
 from ..harmonic_balance.response import NOT_FOUND
@@ -117,30 +117,32 @@ def search(q: Question) -> Optimum:
         raise UserError(
             "no contact is pressed by the sweep's normal forces; there is nothing to change"
         )
-    if (
-        over != NORMAL_FORCE
-    ):  # what is wrong with the key, or at an end, is said before anything is computed
+    if over == NORMAL_FORCE:
+        make = under_forces(built, low, high)
+    else:  # what is wrong with the key, or at an end, is said before anything is computed
         _refuse_contacts(over, built)
         for value in (low, high):
             _with(q, value)
-    between = float(np.sqrt(low * high)) if over == NORMAL_FORCE else forces[-1] if forces else None
-    length = problem_of(built, between).length
-
-    @lru_cache(maxsize=64)
-    def make(value: float) -> Problem:
-        if over == NORMAL_FORCE:
-            return problem_of(built, value, length=length)
-        return problem_of(_with(q, value), forces[-1] if forces else None, length=length)
+        normal = forces[-1] if forces else None
+        length = problem_of(built, normal).length
+        make = lru_cache(maxsize=64)(
+            lambda value: problem_of(_with(q, value), normal, length=length)
+        )
 
     def look(value: float, problem: Problem) -> Top:
         return kept_top(
             once(q.kept, RESONANCE, value, lambda: row_of(peak.highest(problem, band, q.report)))
         )
 
-    sweep = built.settings.sweep
-    band = 2 * np.pi * np.linspace(sweep.start, sweep.stop, sweep.points)
+    band = 2 * np.pi * built.settings.sweep.grid
     values = (np.linspace if signed else np.geomspace)(low, high, asked.points)
     return peak.optimum(make, values.tolist(), band, report=q.report, look=look)
+
+
+def under_forces(built: Built, low: float, high: float) -> Make:
+    """The balance of a case under a normal force (N) between two, its scale the same for all."""
+    length = problem_of(built, float(np.sqrt(low * high))).length
+    return lru_cache(maxsize=64)(partial(problem_of, built, length=length))
 
 
 def _ends(asked: Keys, forces: Sequence[float], signed: bool) -> tuple[float, float]:
@@ -444,9 +446,9 @@ def missed(found: Optimum, over: str) -> str:
 
 
 ANALYSIS = Analysis(
-    name="optimum",
-    asks=Keys,
-    solve=solve,
+    "optimum",
+    Keys,
+    solve,
     lost="it is not known where the resonance is lowest",
     options=("over", "low", "high", "points", "beside"),
     files=lambda asked: [str(_left_by(name).resolve()) for name in asked.beside],

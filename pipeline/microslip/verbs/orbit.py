@@ -313,9 +313,9 @@ def _band(asked: Mapping[str, Any]) -> dict[str, float]:
 
 
 ANALYSIS = Analysis(
-    name="orbit",
-    asks=Keys,
-    solve=solve,
+    "orbit",
+    Keys,
+    solve,
     lost="a motion diverged",
     needed="frequency (Hz), Omega (rad/s) or run_up",
     swept=False,
