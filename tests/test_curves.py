@@ -25,8 +25,7 @@ from microslip.harmonic_balance.response import operating
 from microslip.harmonic_balance.solver import newton, solve
 from microslip.results import read_response
 from microslip.stages import surveying
-from microslip.stages.analysing import open_case
-from microslip.stages.answer import Written
+from microslip.stages.answer import Written, case_job
 from microslip.system import Body, Contact, Force, Monitor, Spring, System
 
 pytestmark = pytest.mark.usefixtures("undrawn", "unjudged")
@@ -108,7 +107,7 @@ def test_over_the_frequency(case: Path, capsys: pytest.CaptureFixture[str]) -> N
 
 
 def survey(case: Path, *assignments: str, **how: Any) -> Written:
-    return surveying.survey_stage(open_case(case, assignments, **how), "frequency")
+    return surveying.survey_stage(case_job(case, None, assignments, make=False, **how), "frequency")
 
 
 @pytest.mark.slow

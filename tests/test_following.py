@@ -93,12 +93,12 @@ def test_backbone(capsys: pytest.CaptureFixture[str]) -> None:
 
 
 def one_point(folder: Path, monkeypatch: pytest.MonkeyPatch, points: int) -> None:
-    """The sled on one point, one harmonic, few samples; its case in a folder of its own."""
+    """The sled on one point, one harmonic; its case in a folder of its own."""
     monkeypatch.chdir(folder)
     write_basis(folder / "basis.h5", sled())
     one = CASE.replace("points = [4, 2]", "points = [1, 1]").replace("harmonics = 2", "harmonics = 1")
     one = one.replace("points = 25", f"points = {points}").replace("[5.0, 1e5]", "[40.0]")
-    one = one.replace("samples = 32", "samples = 16")
+    one = one.replace("samples = 32", "samples = 64")  # as in test_curves: one program
     one = one.replace("start = 35.0\nstop = 200.0", "start = 60.0\nstop = 100.0")
     (folder / "case.toml").write_text(one)
 
@@ -194,7 +194,7 @@ def test_the_error_of_a_backbone_is_what_more_harmonics_and_samples_change(
     exact = float(np.interp(amplitude, whole.amplitude, whole.damping))
     off = found.damping[at] / exact - 1
     assert abs(off) < e.readout and e.likely() == pytest.approx(off, rel=0.34)
-    followed = {40.0: backbone.Followed(found, coarse, mode)}
+    followed = {40.0: backbone.FollowedMode(found, coarse, mode)}
     assert backbone.remarks(followed, built, print)[0].startswith("The damping ratio at ")
 
 

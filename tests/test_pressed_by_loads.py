@@ -30,7 +30,8 @@ def pressed(force: float, **contact: Any) -> Any:
     law = {"normal_stiffness": NORMAL, "tangential_stiffness": TANGENTIAL, "includes": "surface", "friction": 0.3}
     patch = {"width": 0.01, "height": 0.01, "points": [2, 2]}
     case = {
-        "monitor": "held:a", "direction": "x", "harmonics": 1, "bodies": [{"name": "held"}, {"name": "loose"}],
+        "monitor": "held:a", "direction": "x", "harmonics": 1, "samples": 24,
+        "bodies": [{"name": "held"}, {"name": "loose"}],
         "excitations": [{"row": "held:push", "amplitude": 1.0},
                         {"row": "loose:press", "amplitude": force, "harmonic": 0}],
         "contacts": [{"interface": "held:face", "against": "loose:face", "interference": 0.0,

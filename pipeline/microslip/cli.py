@@ -23,6 +23,7 @@ from cyclopts import App, CycloptsError, Parameter
 from . import __version__, interrupts
 from .errors import NotConverged, UserError
 from .progress import announced, progress
+from .settings.meant import case_file, meant
 
 if TYPE_CHECKING:
     from .analysis import Verb
@@ -222,7 +223,6 @@ def run(
     """
     from .analysis import places
     from .basis import read_basis
-    from .settings.meant import meant
     from .stages.job import holds_a_case_alone, open_job, system_file
     from .stages.places import is_case, rolls
     from .stages.response import Wanted
@@ -334,7 +334,7 @@ def respond(
     from .stages.response import Wanted, response_of_case
     from .stages.stage import folder_of_case
 
-    case = _case_file(case)
+    case = case_file(case)
     if over is not None:
         _survey(case, basis, over.replace("-", "_"), set_, force, quiet)
         return
@@ -349,10 +349,10 @@ def respond(
             wanted = Wanted("none" if no_stress else stresses, not no_pictures)
             table, converged = running.respond(case, basis, list(set_), force, report, log=log, wanted=wanted)
         if stability:
-            from .stages.analysing import open_case
+            from .stages.answer import case_job
             from .stages.multipliers import stability_of_points
 
-            job = open_case(case, set_, force, report, not no_pictures, basis)
+            job = case_job(case, basis, set_, force, report, not no_pictures, make=False)
             found = stability_of_points(job)
     for line in map(sentence, pairs if compare_book else ()):
         _say(line, quiet)
@@ -373,15 +373,15 @@ def identify(
         case: a case.toml with [identification], or the folder that holds it.
         basis: the modal file, as for respond.
     """
-    _survey(_case_file(case), basis, "identification", set_, force, quiet)
+    _survey(case_file(case), basis, "identification", set_, force, quiet)
 
 
 def _survey(case: Path, basis: Path | None, kind: str, set_: Sequence[str], force: bool, quiet: bool) -> None:
-    from .stages.analysing import open_case
+    from .stages.answer import case_job
     from .stages.surveying import survey_stage
 
     with progress(f"{kind.replace('_', ' ')} of {case}", quiet) as report:
-        found = survey_stage(open_case(case, set_, force, report, basis=basis), kind)
+        found = survey_stage(case_job(case, basis, set_, force, report, make=False), kind)
     _tell(found, quiet, f"{found.missing}; {{page}} holds what was found")
 
 
@@ -409,7 +409,7 @@ def roll(
     """
     from .stages.rolling import roll_stage
 
-    case = _case_file(case)
+    case = case_file(case)
     with progress(f"roll {case}", quiet) as report:
         found = roll_stage(case, Path("build"), set_, force, report, not no_pictures)
     _tell(found, quiet, "the run ended early; {page} says why, and holds what was found")
@@ -427,7 +427,6 @@ def stability(
             whose contacts slide, with [stability].
         speed: of a modal file, or a body with a mesh: which of its speeds, counted from 0; the first if not given.
     """
-    from .settings.meant import meant
     from .stages.places import is_case
     from .stages.stability import stability_stage
 
@@ -441,16 +440,6 @@ def stability(
     with progress(f"stability {path}", quiet) as report:
         found = stability_stage(path, list(set_), force, report, not no_pictures, speed)
     _tell(found, quiet, "roots in the window are missing; {page} says what")
-
-
-def _case_file(case: Path) -> Path:
-    """A case.toml, the one in a folder, of a name or of products, or the one that travels with the package."""
-    from .settings.meant import meant
-
-    if str(case) == "sample" and not case.exists():
-        return PACKAGE / "samples" / "case.toml"
-    case = meant(case, case=True)
-    return case / "case.toml" if case.is_dir() else case
 
 
 @app.command
@@ -818,11 +807,11 @@ def _analyse(
 ) -> None:  # fmt: skip
     """The answer of an analysis."""
     from .analysis import analyses
-    from .stages.analysing import analysed, open_case
+    from .stages.analysing import analysed
+    from .stages.answer import case_job
 
     with progress(f"{verb} {case}", quiet) as report:
-        job = open_case(case, set_, force, report, not no_pictures, basis, make=True)
-        found = analysed(name, job)
+        found = analysed(name, case_job(case, basis, set_, force, report, not no_pictures))
     _tell(found, quiet, f"{found.missing or analyses()[name].lost}; {{page}} says which and why")
 
 
@@ -835,7 +824,7 @@ def _verb(name: str, said: Verb) -> Callable[..., None]:
     ) -> None:  # fmt: skip
         given = {key: values[0] if len(values) == 1 else json.dumps(values) for key, values in keys.items() if values}
         more = [f"{name}.{key}={value}" for key, value in given.items()]
-        _analyse(name, said.name, _case_file(case), basis, no_pictures, [*set_, *more], force, quiet)
+        _analyse(name, said.name, case_file(case), basis, no_pictures, [*set_, *more], force, quiet)
 
     of = inspect.signature(verb, eval_str=True)
     kept = [p for p in of.parameters.values() if p.kind is not p.VAR_KEYWORD]

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..bifurcation.branches import Branch
+from ..bifurcation.branches import DiagramBranch
 from ..bifurcation.diagram import Diagram
 from ..units import Quantity
 from .plots import COLOURS, empty_figure, plain_axes, save_figure, single_panel
@@ -43,7 +43,7 @@ def portraits_picture(found: Diagram, path: Path, title: str, unit: str) -> Path
     return save_figure(figure, path)
 
 
-def _portraits(found: Diagram, branch: Branch, axes: Axes, parameter_unit: str) -> None:
+def _portraits(found: Diagram, branch: DiagramBranch, axes: Axes, parameter_unit: str) -> None:
     for k, i in enumerate(dict.fromkeys(np.linspace(0, len(branch) - 1, SHOWN).round().astype(int).tolist())):
         orbit = branch.orbit(found.system, i)
         y = found.system.seen(orbit.sampled(16), orbit.p)[:, 0]

@@ -10,8 +10,8 @@ import numpy as np
 from ..data import Array
 from ..exchange import vtu
 from ..rolling.strips import Tractions
-from ..rolling.study import Studied
-from ..rolling.wearing import Wearing
+from ..rolling.study import RollingAnswer
+from ..rolling.wearing import ProfileWear
 from .plots import COLOURS, empty_figure, plain_axes, save_figure, single_panel
 
 if TYPE_CHECKING:
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 LABELS = {"longitudinal": "longitudinal creepage", "lateral": "lateral creepage", "spin": "spin in 1/m"}
 
 
-def curve_picture(found: Studied, path: Path, title: str) -> Path:
+def curve_picture(found: RollingAnswer, path: Path, title: str) -> Path:
     """Creep forces over the friction that is held; the published FASTSIM and exact half-spaces at some points."""
     assert found.forces is not None
     figure, axes = single_panel(8.0, 4.8)
@@ -42,7 +42,7 @@ def curve_picture(found: Studied, path: Path, title: str) -> Path:
     return save_figure(figure, path)
 
 
-def traction_picture(found: Studied, path: Path, title: str) -> Path:
+def traction_picture(found: RollingAnswer, path: Path, title: str) -> Path:
     """Tractions over the patch, and along its middle strip."""
     assert found.tractions is not None
     t, mu = found.tractions, found.highest
@@ -85,7 +85,7 @@ def stretched(size: Array) -> float:
     return NARROW / slender if slender < NARROW else min(1 / (NARROW * slender), 1.0)
 
 
-def wearing_picture(worn: Wearing, path: Path, title: str) -> Path:
+def wearing_picture(worn: ProfileWear, path: Path, title: str) -> Path:
     """What is worn off both profiles, and the largest pressure over the passages."""
     figure = empty_figure(9.6, 4.2)
     left, right = figure.subplots(1, 2)

@@ -10,8 +10,7 @@ import numpy as np
 
 from ..data import Array, ModalBasis
 from ..mesh import boundary_facets
-from ..rolling.brush import jump
-from ..rolling.slip import Studied
+from ..rolling.tyre import TyreAnswer, jump
 from .plots import COLOURS, empty_figure, plain_axes, save_figure
 from .scene import element_sides
 
@@ -22,7 +21,7 @@ TO_ITS_SIDE = 1e-6
 """Of the wheel's size: points that near to its outermost plane are of its side."""
 
 
-def tyre_picture(found: Studied, path: Path, title: str, wheel: ModalBasis | None = None) -> Path:
+def tyre_picture(found: TyreAnswer, path: Path, title: str, wheel: ModalBasis | None = None) -> Path:
     """Four panels, and beside them the wheel of a modal file as it stands, whole and near its patch."""
     figure = empty_figure(9.6 if wheel is None else 13.6, 6.4)
     if wheel is None:
@@ -68,7 +67,7 @@ def tyre_picture(found: Studied, path: Path, title: str, wheel: ModalBasis | Non
     return save_figure(figure, path)
 
 
-def _standing(figure: SubFigure, found: Studied, wheel: ModalBasis) -> None:
+def _standing(figure: SubFigure, found: TyreAnswer, wheel: ModalBasis) -> None:
     """Mesh of the wheel's side at rest and deformed, in its true size."""
     from matplotlib.collections import LineCollection
 

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..vehicle.kinematics import Recorded
-from ..vehicle.study import WHEELS, Studied
+from ..vehicle.kinematics import KinematicsAnswer
+from ..vehicle.study import WHEELS, VehicleAnswer
 from .plots import COLOURS, empty_figure, plain_axes, save_figure
 
 if TYPE_CHECKING:
@@ -19,7 +19,7 @@ SHOWN = 6
 """Orders that are drawn at the most: those that are largest at the end, as far as the axis shows them."""
 
 
-def circumference_picture(found: Studied, path: Path, title: str) -> Path:
+def circumference_picture(found: VehicleAnswer, path: Path, title: str) -> Path:
     """Of the wheel that is out of round most: radius, normal force and wear of the first turn."""
     name, columns = WHEELS[found.wheel], found.circumference()
     figure = empty_figure(8.0, 6.4)
@@ -41,11 +41,11 @@ def circumference_picture(found: Studied, path: Path, title: str) -> Path:
     return save_figure(figure, path)
 
 
-def _mean(found: Studied) -> float:
+def _mean(found: VehicleAnswer) -> float:
     return 1e6 * float(found.history[-1][0].radius[:, found.wheel].mean())
 
 
-def recorded_picture(found: Recorded, path: Path, title: str) -> Path:
+def recorded_picture(found: KinematicsAnswer, path: Path, title: str) -> Path:
     """Normal force and wear over the circumference, by given kinematics."""
     columns = found.circumference()
     figure = empty_figure(8.0, 4.6)
@@ -59,7 +59,7 @@ def recorded_picture(found: Recorded, path: Path, title: str) -> Path:
     return save_figure(figure, path)
 
 
-def growth_picture(found: Studied, path: Path, title: str) -> Path:
+def growth_picture(found: VehicleAnswer, path: Path, title: str) -> Path:
     """Amplitudes of the largest orders over the distance; growth of all orders over the speed, where asked."""
     figure = empty_figure(9.6 if len(found.speeds) else 6.4, 4.4)
     panels = figure.subplots(1, 2 if len(found.speeds) else 1, squeeze=False)[0]
@@ -78,7 +78,7 @@ def growth_picture(found: Studied, path: Path, title: str) -> Path:
     return save_figure(figure, path)
 
 
-def _over_speed(found: Studied, figure: Figure, axes: Axes) -> None:
+def _over_speed(found: VehicleAnswer, figure: Figure, axes: Axes) -> None:
     grown = 1e6 / found.way * found.grown
     most = float(np.abs(grown).max())
     orders = np.arange(1, found.orders + 1)

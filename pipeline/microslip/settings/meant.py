@@ -44,5 +44,14 @@ def meant(path: Path, root: Path = Path("."), case: bool = False) -> Path:
     raise UserError(f"{path}: there is no {what} here or of this name; {said}")
 
 
+def case_file(case: Path, root: Path = Path(".")) -> Path:
+    """A case.toml: itself, the one in a folder, of a name or of products, or ``sample``, which travels with the
+    package."""
+    if str(case) == "sample" and not case.exists():
+        return Path(__file__).parents[1] / "samples" / "case.toml"
+    case = meant(case, root, case=True)
+    return case / "case.toml" if case.is_dir() else case
+
+
 PRODUCTS = ("basis.h5", "response.h5", "response.csv", "report.html", "response.html")
 """Files in build/NAME that stand for the case or body that they are made of."""

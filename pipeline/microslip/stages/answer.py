@@ -21,7 +21,8 @@ from ..pictures.plots import empty_figure, save_figure
 from ..report.page import answer_page
 from ..results import Journal, open_journal
 from .checkpoint import inputs_of
-from .stage import Made, Report, Stage, hash_of_code
+from .places import existing_files, modal_files
+from .stage import Made, Report, Stage, folder_of_case, hash_of_code
 
 
 class Written(NamedTuple):
@@ -64,10 +65,10 @@ def made(
     Args:
         inputs: what it depends on, besides pictures. title: of the page. case: begins the titles of diagrams.
     """
-    points, depends = stage.product.with_suffix(".points"), {**inputs, "code": hash_of_code(stage.code)}
+    points = stage.product.with_suffix(".points")
 
     def work() -> Written:
-        with open_journal(points, store.hash_settings(depends), {"case": case}, stage.force) as journal:
+        with open_journal(points, depends(stage, inputs), {"case": case}, stage.force) as journal:
             try:
                 answer = solve(journal)
             except UserError:
@@ -80,6 +81,11 @@ def made(
     found = answered(stage, {**inputs, "pictures": pictures}, work)
     points.unlink(missing_ok=True)
     return found
+
+
+def depends(stage: Stage, inputs: Mapping[str, Any]) -> str:
+    """Hash of all that the finished parts of an answer depend on."""
+    return store.hash_settings({**inputs, "code": hash_of_code(stage.code)})
 
 
 def written(answer: Answer, name: str, folder: Path, title: str, pictures: bool, case: str = "") -> Written:
@@ -176,3 +182,16 @@ class CaseJob:
     def inputs(self) -> dict[str, Any]:
         """What the answer depends on, besides pictures."""
         return inputs_of(self.raw, self.settings, self.files)
+
+
+def case_job(
+    case: Path, basis: Path | None = None, assignments: Sequence[str] = (), force: bool = False,
+    report: Report = lambda _: None, pictures: bool = True, root: Path = Path("."), make: bool = True,
+) -> CaseJob:  # fmt: skip
+    """A case on its way. basis: of its only body; if not given its modal files are made where they are not up to date,
+    or, unless `make`, have to be there. root: where paths begin."""
+    settings, _ = load_case(case, list(assignments))
+    folder = folder_of_case(case, settings.name, root / "build")
+    made = make and basis is None
+    files = modal_files(settings, root, report) if made else existing_files(settings, basis, root)
+    return CaseJob(case, files, folder, assignments, force, report, pictures)

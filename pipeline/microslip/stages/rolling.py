@@ -20,11 +20,11 @@ from ..pictures.vehicle import circumference_picture, growth_picture, recorded_p
 from ..report.page import Piece, number, say, table
 from ..report.response import number_tables
 from ..results import Journal
-from ..rolling import slip
+from ..rolling import tyre
 from ..rolling.behind import ROWS, Behind, behind
 from ..rolling.contact_table import contact_table, write_contact_table
-from ..rolling.settings import RollingCase, Section, load_rolling
-from ..rolling.study import Studied, rows_of_patches, study
+from ..rolling.settings import RollingCase, SectionKeys, load_rolling
+from ..rolling.study import RollingAnswer, rows_of_patches, study
 from ..rolling.table import creep_table, write_creep_table
 from ..rolling.wearing import wearing
 from ..vehicle import kinematics
@@ -37,7 +37,7 @@ from .places import TYRE, WHEEL_AND_RAIL, find_body, keys_of
 from .stage import Report, Stage, folder_of_case
 
 
-class Kind(NamedTuple):
+class RollingKind(NamedTuple):
     """What rolls.
 
     Attributes:
@@ -93,7 +93,7 @@ def _bodies(named: Mapping[str, str], case: Any, path: Path, report: Report) -> 
 
 
 @in_its_file
-def _of_one_material(case_path: Path, key: str, job: Job, section: Section) -> None:
+def _of_one_material(case_path: Path, key: str, job: Job, section: SectionKeys) -> None:
     """A body and the half-space that stands for its contact, of which one is taken out and the
     other put in."""
     own = [getattr(job.settings.material, name, None) for name in ("young", "poisson")]
@@ -154,7 +154,7 @@ def _wheel_on_rail(
     return Answer(said, tables=notes, files=files, moving=in_paraview)
 
 
-def _behind(found: Studied, bodies: list[Path]) -> Behind | None:
+def _behind(found: RollingAnswer, bodies: list[Path]) -> Behind | None:
     elastic = found.case.elastic
     if elastic is None or not found.patches:
         return None
@@ -163,7 +163,7 @@ def _behind(found: Studied, bodies: list[Path]) -> Behind | None:
     return behind(found.patches[0], found.case.solids, groups, elastic.face, methods)
 
 
-def _tables(found: Studied) -> Files:
+def _tables(found: RollingAnswer) -> Files:
     rows = {"patches.csv": rows_of_patches(found.patches)}
     made: Files = {}
     if found.forces is not None:
@@ -185,7 +185,7 @@ OF_PATCHES = (
 )
 
 
-def _patches(found: Studied) -> Piece:
+def _patches(found: RollingAnswer) -> Piece:
     head = ["y on the rail in mm", "angle in mrad", "a, b in mm", "normal force in N", "pressure in MPa",
             "creepages", "spin in 1/m"]  # fmt: skip
     rows = [
@@ -235,10 +235,10 @@ OF_ANGLES = (
 )
 
 
-def _tyre(case: slip.TyreCase, _: Path, bodies: list[Path], __: Journal, report: Report) -> Answer:
+def _tyre(case: tyre.TyreCase, _: Path, bodies: list[Path], __: Journal, report: Report) -> Answer:
     report("jumps of slip and load")
     wheel = read_basis(bodies[0])
-    found = slip.study(case, wheel.groups[0, 0])
+    found = tyre.study(case, wheel.groups[0, 0])
     slips, forces = found.steady
     tables = {
         "loads.csv": found.loads(),
@@ -269,19 +269,19 @@ def _elastic(case: RollingCase) -> dict[str, str]:
 
 
 KINDS = (
-    Kind(
+    RollingKind(
         WHEEL_AND_RAIL | {"vehicle"}, "unround", "unround wheels", load_vehicle,
         lambda _: {}, _profiles, _unround,
     ),
-    Kind(
+    RollingKind(
         WHEEL_AND_RAIL | {"kinematics"}, "unround", "wear of a wheel", load_kinematics,
         lambda _: {}, lambda case: [*_profiles(case), case.kinematics.file], _recorded,
     ),
-    Kind(
-        TYRE, "tyre", "unsteady rolling", slip.load_tyre,
+    RollingKind(
+        TYRE, "tyre", "unsteady rolling", tyre.load_tyre,
         lambda case: {"": case.tyre.body}, lambda _: (), _tyre,
     ),
-    Kind(
+    RollingKind(
         WHEEL_AND_RAIL, "rolling", "rolling contact", load_rolling,
         _elastic, lambda case: case.files, _wheel_on_rail,
     ),

@@ -23,9 +23,8 @@ from ..pictures.roots import over_picture, plane_picture
 from ..report.page import fold, table
 from ..report.roots import root_table, table_lines
 from ..ring.resonances import speeds_of
-from ..roots.asked import window_of
+from ..roots.asked import window_of, write_roots
 from ..roots.diagram import diagram
-from ..roots.recorded import write_roots
 from ..roots.spectrum import spectrum
 from ..settings.body import StabilitySettings
 from ..units import rpm_text

@@ -30,8 +30,7 @@ from .checkpoint import Checkpoint
 from .stage import Report, Stage
 
 if TYPE_CHECKING:
-    from ..harmonic_balance.envelope import Envelope, OverOrders
-    from ..harmonic_balance.speed_line import SpeedResponse
+    from ..harmonic_balance.envelope import Envelope, OverOrders, SpeedResponse
 
 Bases = Mapping[str, ModalBasis]
 Tables = Mapping[str, Mapping[str, Array]]

@@ -46,7 +46,7 @@ class Keys(Model):
     """[m] largest amplitude; thirty times that if not given"""
 
 
-class Followed(NamedTuple):
+class FollowedMode(NamedTuple):
     """A nonlinear mode, the balance that it is of, and its number, 0 the lowest."""
 
     mode: Backbone
@@ -59,7 +59,7 @@ def solve(q: Question) -> Answer:
     from ..pictures.following import backbone_plot
 
     built: Built = q.built
-    asked_for, found = forces_of(built), dict[float, Followed]()
+    asked_for, found = forces_of(built), dict[float, FollowedMode]()
     forces = [force for force in asked_for if force != 0] or asked_for
     if 0.0 in asked_for:
         q.report("left out: a normal force of 0 N, under which nothing sticks")
@@ -74,7 +74,7 @@ def solve(q: Question) -> Answer:
             0.0,
             partial(_row, q.asked, problem, number, q.report),
         )
-        found[normal] = Followed(_of_row(row, of), problem, number)
+        found[normal] = FollowedMode(_of_row(row, of), problem, number)
         q.report(
             f"F_N = {normal:g} N: mode {number + 1}, {checked(largest(found[normal].mode.checks))}"
         )
@@ -174,7 +174,7 @@ def _sentence(normal: float, one: Backbone, of: Quantity) -> str:
     return said + ("." if one.status == REACHED else f"; it ends early: {one.status}.")
 
 
-def remarks(found: Mapping[float, Followed], built: Built, report: Any) -> list[str]:
+def remarks(found: Mapping[float, FollowedMode], built: Built, report: Any) -> list[str]:
     """How uncertain the largest damping ratio is for want of harmonics, and what looks like a
     number in a wrong unit."""
     known = [(n, one) for n, one in found.items() if len(one.mode.damping) and not one.mode.failing]

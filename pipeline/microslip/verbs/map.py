@@ -18,7 +18,7 @@ from ..errors import UserError
 from ..harmonic_balance.peak import Optimum, Top, optimum, top_of
 from ..harmonic_balance.problem import Problem
 from ..harmonic_balance.readout import measured
-from ..harmonic_balance.refinement import filled_response
+from ..harmonic_balance.response import filled_response
 from ..pictures.plots import plain_numbers
 from ..results import Journal
 from ..results.dataset import Dataset, Variable
@@ -98,7 +98,7 @@ def _forces(q: Question) -> list[float]:
 
 def _responded(problem: Problem, band: Array, report: Any) -> dict[str, Any]:
     """A response and its highest resonance, as a journal keeps them."""
-    response = filled_response(problem, band, np.zeros(len(problem.assembly.contacts)), report)
+    response = filled_response(problem, band, report)
     return {
         "frequency": response.frequency,
         "amplitude": np.where(response.converged, np.abs(response.monitor), np.nan),
