@@ -21,7 +21,6 @@ from ..continuation import NO_OPTIMUM, Peak
 from ..data import Array
 from ..errors import UserError
 from ..files.store import ordinary
-from ..files.tables import write_columns
 from ..harmonic_balance import peak
 from ..harmonic_balance.growing import verdict
 from ..harmonic_balance.peak import HighestPeak, Make, Optimum, Top
@@ -30,9 +29,11 @@ from ..harmonic_balance.readout import measured
 from ..harmonic_balance.response import NOT_FOUND
 from ..harmonic_balance.solver import CONVERGED
 from ..report.response import number_tables
+from ..results.dataset import Dataset, Variable
 from ..results.journal import once
 from ..settings.numbers import Model, Number, _tuple
 from ..units import METRES, Quantity, percent
+from .backbone import amplitude_name
 
 OF_CONTACTS = ("normal_stiffness", "tangential_stiffness", "friction", "roughness")
 """Keys of a contact that may change in all of them at once."""
@@ -220,8 +221,7 @@ def answer(
     from ..pictures.following import optimum_plot
 
     of, case = measured(built.assembly), built.settings.name
-    columns = columns_of(found, over, built)
-    files: Files = {TABLE: partial(write_columns, columns, 10)}
+    data, files = dataset_of(found, over, built), Files()
     if any(one.status == CONVERGED for one in found.found.values()):
         label = over.replace("_", " ") + (unit_of(over) and f" in{unit_of(over)}")
         title = f"{case}: highest resonance and optimum"
@@ -237,38 +237,52 @@ def answer(
     said += [_lowest_of(name, values, over, of) for name, values in beside.items()]
     return Answer(
         [*said, *remarks],
-        tables=number_tables({TABLE: columns}),
+        data={"": data},
+        tables=number_tables({TABLE: data.columns()}),
         largest=None,
         files=files,
         missing=why,
     )
 
 
-def columns_of(found: Optimum, over: str, built: Built) -> dict[str, Any]:
-    """A row a value, and the optimum; where no resonance is known its cells are empty."""
+def dataset_of(found: Optimum, over: str, built: Built) -> Dataset:
+    """A row a value, and the optimum; NaN where no resonance is known."""
     each = found.found.items()
-    shown = [
-        (v, r, RESONANCE + doubt(r, built) if r.status == CONVERGED else r.status) for v, r in each
+    rows = [
+        (v, one, RESONANCE + doubt(one, built) if one.status == CONVERGED else one.status)
+        for v, one in each
     ]
     if found.resonance.status == CONVERGED:
         what = f"optimum: {found.status}" if is_optimum(found) else f"lowest: {found.status}"
         what = "lowest: the setting hardly matters" if hardly(found) else what
-        shown.append((found.parameter, found.resonance, what))
-    rows = []
-    for v, r, what in shown:
-        place = (
-            (f"{r.Omega / 2 / np.pi:.10g}", f"{r.amplitude:.8g}")
-            if r.status == CONVERGED
-            else ("", "")
-        )
-        rows.append((f"{v:.10g}", *place, what))
-    return dict(zip(_head(over, measured(built.assembly)), zip(*rows, strict=True), strict=True))
+        rows.append((found.parameter, found.resonance, what))
+    return _table(over, measured(built.assembly), rows)
 
 
-def _head(over: str, of: Quantity) -> list[str]:
-    """Headings of the table, with their units where they are known."""
-    unit = unit_of(over).strip().replace("/", "_")
-    return [f"{over}_{unit}".removesuffix("_"), "frequency_Hz", of.column("amplitude"), "what"]
+def _table(over: str, of: Quantity, rows: Sequence[tuple[float, HighestPeak, str]] = ()) -> Dataset:
+    """Of a value, the resonance there and what it is, each."""
+    numbers = np.array(
+        [
+            (v, one.Omega / (2 * np.pi), one.amplitude)
+            if one.status == CONVERGED
+            else (v, *UNKNOWN)
+            for v, one, _ in rows
+        ]
+    ).reshape(-1, 3)
+    value, frequency, amplitude = numbers.T
+    unit, name = UNITS.get(over.rpartition(".")[2], "1"), amplitude_name(of)
+    return Dataset(
+        "optimum",
+        {
+            over: Variable(value, unit, "of the setting"),
+            "frequency": Variable(frequency, "Hz", "of the highest resonance"),
+            name: Variable(amplitude, of.unit, "of the first read-out there, 0-peak"),
+            "what": Variable(np.array([what for *_, what in rows], str), "1", "it is"),
+        },
+    )
+
+
+UNKNOWN = np.nan, np.nan
 
 
 def unit_of(over: str) -> str:
@@ -302,7 +316,7 @@ def found_before(names: Sequence[str], over: str, of: Quantity) -> dict[str, Arr
                 "beside",
             )
         head, *rows = csv.reader(ordinary(file).read_text(encoding="utf-8").splitlines())
-        if head != (asked := _head(over, of)):
+        if head != (asked := list(_table(over, of).columns())):
             raise UserError(
                 f"holds {', '.join(head)}, not {', '.join(asked)}; name another case", file=file
             )
