@@ -194,7 +194,7 @@ def test_the_error_of_a_backbone_is_what_more_harmonics_and_samples_change(
     exact = float(np.interp(amplitude, whole.amplitude, whole.damping))
     off = found.damping[at] / exact - 1
     assert abs(off) < e.readout and e.likely() == pytest.approx(off, rel=0.34)
-    followed = {40.0: backbone.Followed(found, coarse, mode)}
+    followed = {40.0: backbone.FollowedMode(found, coarse, mode)}
     assert backbone.remarks(followed, built, print)[0].startswith("The damping ratio at ")
 
 

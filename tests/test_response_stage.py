@@ -28,7 +28,7 @@ from microslip.files import store
 from microslip.results import read_response
 from microslip.stages import response as making
 from microslip.stages import running
-from microslip.stages.answer import CaseJob
+from microslip.stages.answer import CaseJob, case_job
 from microslip.stages.surveying import survey_stage
 from microslip.units import METRES, Quantity
 
@@ -592,7 +592,7 @@ def test_as_many_harmonics_as_the_error_asks_for(folder: Path) -> None:
             raise KeyboardInterrupt
 
     with pytest.raises(UserError, match=r'"auto" is found by microslip respond .*; run it first, or give a number'):
-        survey_stage(folder / "case.toml", None, "load")
+        survey_stage(case_job(folder / "case.toml", make=False), "load")
     with pytest.raises(KeyboardInterrupt):
         respond(folder, report=impatient)
     (said,) = [t for t in begun if "an error of about" in t]

@@ -22,6 +22,7 @@ from microslip.data import ModalBasis, StressSet
 from microslip.harmonic_balance import envelope, identification, response
 from microslip.harmonic_balance.envelope import Envelope
 from microslip.harmonic_balance.problem import Problem
+from microslip.stages.answer import case_job
 from microslip.stages.surveying import _ranges_sentences, survey_stage
 
 RING = """
@@ -202,7 +203,7 @@ def test_surveys_that_are_interrupted_leave_what_was_finished(ring: Path) -> Non
                 raise KeyboardInterrupt
 
         with pytest.raises(KeyboardInterrupt):
-            survey_stage(ring, None, kind, ["sweep.points=5"], report=report)
+            survey_stage(case_job(ring, None, ["sweep.points=5"], report=report, make=False), kind)
         assert not Path(f"build/ring/{kind}.json").exists()
     assert rows("build/ring/orders.csv")["engine_order"].tolist() == [1]
     assert rows("build/ring/ranges_combinations.csv")["combination"].tolist() == [1]

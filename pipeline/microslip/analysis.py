@@ -84,8 +84,9 @@ class Answer:
         sentences: the result first. data: end of the files' names -> what they hold; the first one
             without an end. diagrams: likewise. tables: pieces of the page (`report.page`). largest:
             amplitude of the first read-out, of which is told whether it looks like a number in a
-            wrong unit; None where the sentences tell all that is to be said of the case. whole:
-            whether nothing of it was lost. missing: what was asked for and is not known, in words.
+            wrong unit; None where the sentences tell all that is to be said of the case. judged:
+            what else `case.headline.doubted` looks at. whole: whether nothing of it was lost.
+            missing: what was asked for and is not known, in words.
         files: see `Files`; PNG files are made where pictures are wanted, and shown on the page.
             moving: writes bodies that move below that folder, where pictures are wanted. lines: of
             a table for the terminal.
@@ -96,6 +97,7 @@ class Answer:
     diagrams: Mapping[str, Drawing] = field(default_factory=dict)
     tables: Sequence[Any] = ()
     largest: float | None = 0.0
+    judged: Mapping[str, Any] = field(default_factory=dict)
     whole: bool = True
     files: Files = field(default_factory=dict)
     moving: Callable[[Path], Sequence[Path]] = lambda _: ()

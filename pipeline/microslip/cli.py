@@ -349,13 +349,10 @@ def respond(
             wanted = Wanted("none" if no_stress else stresses, not no_pictures)
             table, converged = running.respond(case, basis, list(set_), force, report, log=log, wanted=wanted)
         if stability:
-            from .stages.answer import CaseJob
+            from .stages.answer import case_job
             from .stages.multipliers import stability_of_points
-            from .stages.places import existing_files
 
-            settings, _ = load_case(case, list(set_))
-            files = existing_files(settings, basis, Path("."))
-            job = CaseJob(case, files, table.parent, set_, force, report, not no_pictures, swept=True)
+            job = case_job(case, basis, set_, force, report, not no_pictures, make=False)
             found = stability_of_points(job)
     for line in map(sentence, pairs if compare_book else ()):
         _say(line, quiet)
@@ -380,10 +377,11 @@ def identify(
 
 
 def _survey(case: Path, basis: Path | None, kind: str, set_: Sequence[str], force: bool, quiet: bool) -> None:
+    from .stages.answer import case_job
     from .stages.surveying import survey_stage
 
     with progress(f"{kind.replace('_', ' ')} of {case}", quiet) as report:
-        found = survey_stage(case, basis, kind, list(set_), force, report)
+        found = survey_stage(case_job(case, basis, set_, force, report, make=False), kind)
     _tell(found, quiet, f"{found.missing}; {{page}} holds what was found")
 
 
@@ -442,8 +440,6 @@ def stability(
     with progress(f"stability {path}", quiet) as report:
         found = stability_stage(path, list(set_), force, report, not no_pictures, speed)
     _tell(found, quiet, "roots in the window are missing; {page} says what")
-
-
 
 
 @app.command

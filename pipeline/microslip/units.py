@@ -95,7 +95,7 @@ class Quantity:
 
     def column(self, name: str) -> str:
         """Name of a column: ``amplitude`` -> ``amplitude_m``, ``amplitude_rad``, ``amplitude_strain``."""
-        return f"{name}_{_COLUMNS.get(self.unit, self.unit)}"
+        return f"{name}_{_COLUMNS.get(self.unit, self.unit).replace('/', '_')}"
 
     @property
     def said(self) -> str:

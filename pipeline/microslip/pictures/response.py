@@ -104,7 +104,7 @@ def _curves(
     free = result.free
     if w.number:
         read = replace(built.assembly, outputs=built.assembly.outputs[w.number :])
-        grid = np.linspace(result.settings.sweep.start, result.settings.sweep.stop, result.settings.sweep.points)
+        grid = result.settings.sweep.grid
         free = free_response(replace(built, assembly=read), grid)
     axes.plot(free.frequency, by * np.abs(free.monitor), color="0.6", lw=1, ls=style, label=f"no contact{of}")
     words, lifts = dict(zip(sorted(result.responses), apart(sorted(result.responses)), strict=True)), False

@@ -35,8 +35,7 @@ from .stage import Report, Stage, hash_of_code
 
 
 def analysed(name: str, case: CaseJob) -> Written:
-    """The answer to what a case asks for in the table of an analysis, made where it is not up to
-    date.
+    """The answer to what a case asks for in the table of an analysis, made where it is not up to date.
 
     Raises:
         UserError: the case asks for nothing, or for what cannot be.
@@ -104,16 +103,14 @@ def _answer(one: Analysis, asked: Any, stage: Stage, case: CaseJob, journal: Jou
     inputs = {**case.inputs, "case": others, "code": hash_of_code(stage.code)}
     own = store.hash_settings(inputs)
     try:
-        answer = one.solve(
-            Question(asked, built, journal, case.report, varied, case.folder, own, case.force)
-        )
+        answer = one.solve(Question(asked, built, journal, case.report, varied, case.folder, own, case.force))
     except UserError as error:
         if error.file is None:
             error.key = ".".join(filter(None, (one.name, error.key)))
         raise
     if answer.largest is None:
         return answer
-    of_case = [*built.messages, *headline.doubted(built, answer.largest)]
+    of_case = [*built.messages, *headline.doubted(built, answer.largest, **answer.judged)]
     return replace(answer, sentences=[*answer.sentences, *of_case])
 
 

@@ -186,11 +186,12 @@ class CaseJob:
 
 def case_job(
     case: Path, basis: Path | None = None, assignments: Sequence[str] = (), force: bool = False,
-    report: Report = lambda _: None, pictures: bool = True, root: Path = Path("."),
+    report: Report = lambda _: None, pictures: bool = True, root: Path = Path("."), make: bool = True,
 ) -> CaseJob:  # fmt: skip
-    """A case on its way. basis: of its only body; its modal files are made where they are not up to date if not given.
-    root: where paths begin."""
+    """A case on its way. basis: of its only body; if not given its modal files are made where they are not up to date,
+    or, unless `make`, have to be there. root: where paths begin."""
     settings, _ = load_case(case, list(assignments))
     folder = folder_of_case(case, settings.name, root / "build")
-    files = modal_files(settings, root, report) if basis is None else existing_files(settings, basis, root)
+    made = make and basis is None
+    files = modal_files(settings, root, report) if made else existing_files(settings, basis, root)
     return CaseJob(case, files, folder, assignments, force, report, pictures)

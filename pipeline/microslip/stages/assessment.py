@@ -27,7 +27,6 @@ from .stage import Report
 
 if TYPE_CHECKING:
     from ..operating.contact_maps import ContactMap
-    from ..progress import Report
 
 ENDLESS = MaterialLimits(fatigue_strength=1e29, tensile_strength=1e30)
 """Limits of a case that gives none: the worst place is then that of the largest amplitude."""

@@ -68,12 +68,13 @@ def import_file(
     """
     if not ordinary(file).is_file():
         raise UserError(f"{file}: there is no such file; correct the path")
-    from ..exchange.measured import holds_modes
-
     unit = length_unit(unit, file)
     name = name or body_name((folder.resolve().name if folder else "") or file.stem)
-    if file.suffix.lower() in _UNIVERSAL and holds_modes(file):
-        return _measured(file, (folder or Path(name)) / "basis.h5", unit, name)
+    if file.suffix.lower() in _UNIVERSAL:
+        from ..exchange.measured import holds_modes
+
+        if holds_modes(file):
+            return _measured(file, (folder or Path(name)) / "basis.h5", unit, name)
     target = (folder or Path(name)) / "body.toml"
     refuse_taken(target)
     kind = suffix_of(file)

@@ -4,6 +4,7 @@ picture and a page."""
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -34,6 +35,7 @@ def stability_of_points(case: CaseJob) -> Written:
     Raises:
         UserError: a sector that stands for a ring, whose sectors may part company; the book's mode.
     """
+    case = replace(case, swept=True)
     ring = case.settings.ring
     if ring is not None and ring.model == "sector":
         raise UserError(

@@ -37,7 +37,7 @@ from .places import TYRE, WHEEL_AND_RAIL, find_body, keys_of
 from .stage import Report, Stage, folder_of_case
 
 
-class Kind(NamedTuple):
+class RollingKind(NamedTuple):
     """What rolls.
 
     Attributes:
@@ -269,19 +269,19 @@ def _elastic(case: RollingCase) -> dict[str, str]:
 
 
 KINDS = (
-    Kind(
+    RollingKind(
         WHEEL_AND_RAIL | {"vehicle"}, "unround", "unround wheels", load_vehicle,
         lambda _: {}, _profiles, _unround,
     ),
-    Kind(
+    RollingKind(
         WHEEL_AND_RAIL | {"kinematics"}, "unround", "wear of a wheel", load_kinematics,
         lambda _: {}, lambda case: [*_profiles(case), case.kinematics.file], _recorded,
     ),
-    Kind(
+    RollingKind(
         TYRE, "tyre", "unsteady rolling", tyre.load_tyre,
         lambda case: {"": case.tyre.body}, lambda _: (), _tyre,
     ),
-    Kind(
+    RollingKind(
         WHEEL_AND_RAIL, "rolling", "rolling contact", load_rolling,
         _elastic, lambda case: case.files, _wheel_on_rail,
     ),

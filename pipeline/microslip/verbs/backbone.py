@@ -15,13 +15,13 @@ from ..case import headline
 from ..case.assemble import Built
 from ..case.problem import forces_of, pressed_by, problem_of
 from ..errors import UserError
-from ..files.tables import write_columns
 from ..harmonic_balance import nonlinear_modes
 from ..harmonic_balance.nonlinear_modes import REACHED, RIGID, Backbone
 from ..harmonic_balance.problem import Problem
 from ..harmonic_balance.readout import measured
 from ..report.response import number_tables
 from ..results.checks import Checks, checked, largest
+from ..results.dataset import Dataset, Variable
 from ..results.journal import once
 from ..settings.numbers import Model, Positive
 from ..units import Quantity
@@ -29,8 +29,6 @@ from ..units import Quantity
 SPREAD = 30.0
 """From so small a part of the amplitude at which contacts begin to slide to so many times as
 much."""
-
-TABLE = "backbone.csv"
 
 
 class Keys(Model):
@@ -46,7 +44,7 @@ class Keys(Model):
     """[m] largest amplitude; thirty times that if not given"""
 
 
-class Followed(NamedTuple):
+class FollowedMode(NamedTuple):
     """A nonlinear mode, the balance that it is of, and its number, 0 the lowest."""
 
     mode: Backbone
@@ -59,7 +57,7 @@ def solve(q: Question) -> Answer:
     from ..pictures.following import backbone_plot
 
     built: Built = q.built
-    asked_for, found = forces_of(built), dict[float, Followed]()
+    asked_for, found = forces_of(built), dict[float, FollowedMode]()
     forces = [force for force in asked_for if force != 0] or asked_for
     if 0.0 in asked_for:
         q.report("left out: a normal force of 0 N, under which nothing sticks")
@@ -74,24 +72,22 @@ def solve(q: Question) -> Answer:
             0.0,
             partial(_row, q.asked, problem, number, q.report),
         )
-        found[normal] = Followed(_of_row(row, of), problem, number)
+        found[normal] = FollowedMode(_of_row(row, of), problem, number)
         q.report(
             f"F_N = {normal:g} N: mode {number + 1}, {checked(largest(found[normal].mode.checks))}"
         )
     found, of = dict(sorted(found.items())), measured(built.assembly)
     modes = {normal: one.mode for normal, one in found.items()}
-    columns, title = _columns(modes, of), f"{built.settings.name}: nonlinear mode"
+    data, title = dataset_of(modes, of), f"{built.settings.name}: nonlinear mode"
     return Answer(
         [
             *(_sentence(normal, mode, of) for normal, mode in modes.items()),
             *remarks(found, built, q.report),
         ],
-        tables=number_tables({TABLE: columns}),
+        data={"": data},
+        tables=number_tables({"backbone.csv": data.columns()}),
         largest=None,
-        files={
-            TABLE: partial(write_columns, columns, 10),
-            "pictures/backbone.png": lambda path: backbone_plot(modes, title, path, of),
-        },
+        files={"pictures/backbone.png": lambda path: backbone_plot(modes, title, path, of)},
         missing=unreached(modes),
     )
 
@@ -149,14 +145,28 @@ def _of_row(row: Mapping[str, Any], of: Quantity) -> Backbone:
     return Backbone(**stored, checks=tuple(Checks(*one) for one in checks), quantity=of)
 
 
-def _columns(modes: Mapping[float, Backbone], of: Quantity) -> dict[str, Any]:
-    rows = [
-        (f"{normal:g}", f"{a:.8g}", f"{f:.10g}", f"{d:.8g}")
-        for normal, one in modes.items()
-        for a, f, d in zip(one.amplitude, one.frequency, one.damping, strict=True)
-    ]
-    head = "normal_force_N", of.column("amplitude"), "frequency_Hz", "damping_ratio"
-    return dict(zip(head, zip(*rows, strict=True) if rows else [()] * 4, strict=True))
+def dataset_of(modes: Mapping[float, Backbone], of: Quantity) -> Dataset:
+    """A row a point, one nonlinear mode after the other."""
+    every = list(modes.values())
+    normal = np.repeat(list(modes), [len(one.amplitude) for one in every])
+    amplitude, frequency, damping = (
+        np.concatenate([getattr(one, name) for one in every])
+        for name in ("amplitude", "frequency", "damping")
+    )
+    return Dataset(
+        "backbone",
+        {
+            "normal_force": Variable(normal, "N", "of the contacts that the sweep presses"),
+            amplitude_name(of): Variable(amplitude, of.unit, "of the first read-out, 0-peak"),
+            "frequency": Variable(frequency, "Hz", "of the nonlinear mode"),
+            "damping_ratio": Variable(damping, "1", "of the nonlinear mode"),
+        },
+    )
+
+
+def amplitude_name(of: Quantity) -> str:
+    """Of a variable whose column says what it measures."""
+    return of.column("amplitude") if of.unit == "1" else "amplitude"
 
 
 def _sentence(normal: float, one: Backbone, of: Quantity) -> str:
@@ -174,7 +184,7 @@ def _sentence(normal: float, one: Backbone, of: Quantity) -> str:
     return said + ("." if one.status == REACHED else f"; it ends early: {one.status}.")
 
 
-def remarks(found: Mapping[float, Followed], built: Built, report: Any) -> list[str]:
+def remarks(found: Mapping[float, FollowedMode], built: Built, report: Any) -> list[str]:
     """How uncertain the largest damping ratio is for want of harmonics, and what looks like a
     number in a wrong unit."""
     known = [(n, one) for n, one in found.items() if len(one.mode.damping) and not one.mode.failing]
@@ -201,9 +211,9 @@ def unreached(modes: Mapping[float, Backbone]) -> str:
 
 
 ANALYSIS = Analysis(
-    name="backbone",
-    asks=Keys,
-    solve=solve,
+    "backbone",
+    Keys,
+    solve,
     lost="a nonlinear mode ends early",
     options=("mode", "low", "high"),
 )

@@ -3,7 +3,7 @@ optimal normal force."""
 
 from __future__ import annotations
 
-from functools import cache, partial
+from functools import partial
 from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
@@ -11,7 +11,7 @@ from pydantic import Field, model_validator
 
 from ..analysis import Analysis, Answer, Drawing, Question
 from ..case.assemble import Built
-from ..case.problem import forces_of, problem_of
+from ..case.problem import forces_of
 from ..continuation import NO_OPTIMUM
 from ..data import Array
 from ..errors import UserError
@@ -25,7 +25,7 @@ from ..results.dataset import Dataset, Variable
 from ..results.journal import once
 from ..settings.numbers import Model, Positive
 from ..units import Quantity
-from .optimum import kept_top, row_of
+from .optimum import kept_top, row_of, under_forces
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -58,12 +58,8 @@ class Keys(Model):
 def solve(q: Question) -> Answer:
     """A response under every normal force; whole if each has a resonance that is known."""
     built: Built = q.built
-    values, band = _forces(q), _band(built)
-    length = problem_of(built, float(np.sqrt(values[0] * values[-1]))).length
-
-    @cache
-    def make(force: float) -> Problem:
-        return problem_of(built, force, length=length)
+    values, band = _forces(q), built.settings.sweep.grid
+    make = under_forces(built, values[0], values[-1])
 
     def look(force: float, problem: Problem) -> Top:
         return kept_top(once(q.kept, KEPT, force, partial(_responded, problem, band, q.report)))
@@ -98,11 +94,6 @@ def _forces(q: Question) -> list[float]:
     if not 0 < low < high:
         raise UserError(f"low: from {low:g} to {high:g} N there is no range; give low and high, the smaller one first")
     return [float(force) for force in np.geomspace(low, high, asked.forces)]
-
-
-def _band(built: Built) -> Array:
-    sweep = built.settings.sweep
-    return np.linspace(sweep.start, sweep.stop, sweep.points)
 
 
 def _responded(problem: Problem, band: Array, report: Any) -> dict[str, Any]:
@@ -189,4 +180,4 @@ def draw(ridge: Dataset, points: Dataset, of: Quantity, figure: Figure) -> None:
     figure.colorbar(shades, label=f"amplitude in {unit} (0-peak); grey: no solution")
 
 
-ANALYSIS = Analysis(name="map", asks=Keys, solve=solve, lost="a resonance is not known under every normal force")
+ANALYSIS = Analysis("map", Keys, solve, lost="a resonance is not known under every normal force")

@@ -21,18 +21,19 @@ from ..continuation import NO_OPTIMUM, Peak
 from ..data import Array
 from ..errors import UserError
 from ..files.store import ordinary
-from ..files.tables import write_columns
 from ..harmonic_balance import peak
 from ..harmonic_balance.growing import verdict
-from ..harmonic_balance.peak import HighestPeak, Optimum, Top
+from ..harmonic_balance.peak import HighestPeak, Make, Optimum, Top
 from ..harmonic_balance.problem import Problem
 from ..harmonic_balance.readout import measured
 from ..harmonic_balance.response import NOT_FOUND
 from ..harmonic_balance.solver import CONVERGED
 from ..report.response import number_tables
+from ..results.dataset import Dataset, Variable
 from ..results.journal import once
-from ..settings.numbers import Model, Number
+from ..settings.numbers import Model, Number, _tuple
 from ..units import METRES, Quantity, percent
+from .backbone import amplitude_name
 
 OF_CONTACTS = ("normal_stiffness", "tangential_stiffness", "friction", "roughness")
 """Keys of a contact that may change in all of them at once."""
@@ -81,7 +82,7 @@ class Keys(Model):
     points: Annotated[int, Field(ge=2, le=10000)] = 6
     """values from one end to the other at which a sweep looks for it first"""
     beside: Annotated[
-        tuple[str, ...], BeforeValidator(lambda v: (v,) if isinstance(v, str) else tuple(v))
+        tuple[str, ...], BeforeValidator(lambda v: (v,) if isinstance(v, str) else _tuple(v))
     ] = ()
     """cases, or folders of their products, whose optimum over the same setting was found before,
     drawn on the same picture"""
@@ -117,30 +118,32 @@ def search(q: Question) -> Optimum:
         raise UserError(
             "no contact is pressed by the sweep's normal forces; there is nothing to change"
         )
-    if (
-        over != NORMAL_FORCE
-    ):  # what is wrong with the key, or at an end, is said before anything is computed
+    if over == NORMAL_FORCE:
+        make = under_forces(built, low, high)
+    else:  # what is wrong with the key, or at an end, is said before anything is computed
         _refuse_contacts(over, built)
         for value in (low, high):
             _with(q, value)
-    between = float(np.sqrt(low * high)) if over == NORMAL_FORCE else forces[-1] if forces else None
-    length = problem_of(built, between).length
-
-    @lru_cache(maxsize=64)
-    def make(value: float) -> Problem:
-        if over == NORMAL_FORCE:
-            return problem_of(built, value, length=length)
-        return problem_of(_with(q, value), forces[-1] if forces else None, length=length)
+        normal = forces[-1] if forces else None
+        length = problem_of(built, normal).length
+        make = lru_cache(maxsize=64)(
+            lambda value: problem_of(_with(q, value), normal, length=length)
+        )
 
     def look(value: float, problem: Problem) -> Top:
         return kept_top(
             once(q.kept, RESONANCE, value, lambda: row_of(peak.highest(problem, band, q.report)))
         )
 
-    sweep = built.settings.sweep
-    band = 2 * np.pi * np.linspace(sweep.start, sweep.stop, sweep.points)
+    band = 2 * np.pi * built.settings.sweep.grid
     values = (np.linspace if signed else np.geomspace)(low, high, asked.points)
     return peak.optimum(make, values.tolist(), band, report=q.report, look=look)
+
+
+def under_forces(built: Built, low: float, high: float) -> Make:
+    """The balance of a case under a normal force (N) between two, its scale the same for all."""
+    length = problem_of(built, float(np.sqrt(low * high))).length
+    return lru_cache(maxsize=64)(partial(problem_of, built, length=length))
 
 
 def _ends(asked: Keys, forces: Sequence[float], signed: bool) -> tuple[float, float]:
@@ -218,8 +221,7 @@ def answer(
     from ..pictures.following import optimum_plot
 
     of, case = measured(built.assembly), built.settings.name
-    columns = columns_of(found, over, built)
-    files: Files = {TABLE: partial(write_columns, columns, 10)}
+    data, files = dataset_of(found, over, built), Files()
     if any(one.status == CONVERGED for one in found.found.values()):
         label = over.replace("_", " ") + (unit_of(over) and f" in{unit_of(over)}")
         title = f"{case}: highest resonance and optimum"
@@ -235,38 +237,52 @@ def answer(
     said += [_lowest_of(name, values, over, of) for name, values in beside.items()]
     return Answer(
         [*said, *remarks],
-        tables=number_tables({TABLE: columns}),
+        data={"": data},
+        tables=number_tables({TABLE: data.columns()}),
         largest=None,
         files=files,
         missing=why,
     )
 
 
-def columns_of(found: Optimum, over: str, built: Built) -> dict[str, Any]:
-    """A row a value, and the optimum; where no resonance is known its cells are empty."""
+def dataset_of(found: Optimum, over: str, built: Built) -> Dataset:
+    """A row a value, and the optimum; NaN where no resonance is known."""
     each = found.found.items()
-    shown = [
-        (v, r, RESONANCE + doubt(r, built) if r.status == CONVERGED else r.status) for v, r in each
+    rows = [
+        (v, one, RESONANCE + doubt(one, built) if one.status == CONVERGED else one.status)
+        for v, one in each
     ]
     if found.resonance.status == CONVERGED:
         what = f"optimum: {found.status}" if is_optimum(found) else f"lowest: {found.status}"
         what = "lowest: the setting hardly matters" if hardly(found) else what
-        shown.append((found.parameter, found.resonance, what))
-    rows = []
-    for v, r, what in shown:
-        place = (
-            (f"{r.Omega / 2 / np.pi:.10g}", f"{r.amplitude:.8g}")
-            if r.status == CONVERGED
-            else ("", "")
-        )
-        rows.append((f"{v:.10g}", *place, what))
-    return dict(zip(_head(over, measured(built.assembly)), zip(*rows, strict=True), strict=True))
+        rows.append((found.parameter, found.resonance, what))
+    return _table(over, measured(built.assembly), rows)
 
 
-def _head(over: str, of: Quantity) -> list[str]:
-    """Headings of the table, with their units where they are known."""
-    unit = unit_of(over).strip().replace("/", "_")
-    return [f"{over}_{unit}".removesuffix("_"), "frequency_Hz", of.column("amplitude"), "what"]
+def _table(over: str, of: Quantity, rows: Sequence[tuple[float, HighestPeak, str]] = ()) -> Dataset:
+    """Of a value, the resonance there and what it is, each."""
+    numbers = np.array(
+        [
+            (v, one.Omega / (2 * np.pi), one.amplitude)
+            if one.status == CONVERGED
+            else (v, *UNKNOWN)
+            for v, one, _ in rows
+        ]
+    ).reshape(-1, 3)
+    value, frequency, amplitude = numbers.T
+    unit, name = UNITS.get(over.rpartition(".")[2], "1"), amplitude_name(of)
+    return Dataset(
+        "optimum",
+        {
+            over: Variable(value, unit, "of the setting"),
+            "frequency": Variable(frequency, "Hz", "of the highest resonance"),
+            name: Variable(amplitude, of.unit, "of the first read-out there, 0-peak"),
+            "what": Variable(np.array([what for *_, what in rows], str), "1", "it is"),
+        },
+    )
+
+
+UNKNOWN = np.nan, np.nan
 
 
 def unit_of(over: str) -> str:
@@ -300,7 +316,7 @@ def found_before(names: Sequence[str], over: str, of: Quantity) -> dict[str, Arr
                 "beside",
             )
         head, *rows = csv.reader(ordinary(file).read_text(encoding="utf-8").splitlines())
-        if head != (asked := _head(over, of)):
+        if head != (asked := list(_table(over, of).columns())):
             raise UserError(
                 f"holds {', '.join(head)}, not {', '.join(asked)}; name another case", file=file
             )
@@ -444,9 +460,9 @@ def missed(found: Optimum, over: str) -> str:
 
 
 ANALYSIS = Analysis(
-    name="optimum",
-    asks=Keys,
-    solve=solve,
+    "optimum",
+    Keys,
+    solve,
     lost="it is not known where the resonance is lowest",
     options=("over", "low", "high", "points", "beside"),
     files=lambda asked: [str(_left_by(name).resolve()) for name in asked.beside],

@@ -347,9 +347,9 @@ def _axis(over: Over) -> str:
 
 
 ANALYSIS = Analysis(
-    name="stability",
-    asks=Keys,
-    solve=solve,
+    "stability",
+    Keys,
+    solve,
     lost="not all was found, roots in the window or limit cycles",
     needed="frequency = [0.0, HIGHEST] in Hz",
     swept=False,
