@@ -302,7 +302,7 @@ def test_patience_that_ends_is_told_and_more_of_it_goes_on(case: Path, capsys: p
     assert ends in said and "--set sweep.patience=0.002, which goes on from there" in said
     assert not rows and "not known" in summary["beyond"][0] and summary["resonances"]
     more, further, after = run(10.0)
-    assert said.count("motion in time, ") == 1 and more.count("motion in time, ") >= len(further) > 0
+    assert said.count("motion in time, ") <= 2 and more.count("motion in time, ") >= len(further) > 0
     assert ends not in more and after["resonances"] == summary["resonances"]
 
 
