@@ -31,8 +31,7 @@ from microslip.continuation import Branch, Settings
 from microslip.harmonic_balance import FrequencyResponse
 from microslip.harmonic_balance.checkpoint import resumed_curve
 from microslip.harmonic_balance.families import followed, of_frequency
-from microslip.harmonic_balance.refinement import filled_response
-from microslip.harmonic_balance.response import operating
+from microslip.harmonic_balance.response import filled_response, operating
 from microslip.harmonic_balance.solver import solve, sweep
 from microslip.harmonic_balance.stability import Stability
 from microslip.harmonic_balance.sweeps import ends, gaps
@@ -341,7 +340,7 @@ def test_the_curve_and_its_stability_end_with_the_time_of_their_place(case: Path
     settings, _ = load_case(case, [])
     lies = {"lifting": lifting()}
     f, p = np.linspace(118.0, 126.0, 5), problem(case)
-    found = filled_response(p, f, np.ones(1))
+    found = filled_response(p, f)
     low, high = [motion(x, 1) for x in f], [motion(x, 10) for x in f]
 
     @contextmanager

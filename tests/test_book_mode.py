@@ -7,6 +7,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from ellipses import exact
 from refusals import refused
 from test_assembly import sector
 
@@ -112,7 +113,7 @@ def computed() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     A, e = 1 / np.sin(0.5 * rng.uniform(0.02, np.pi, 400)) ** 2, rng.uniform(0.0, 1.0, 400) ** 2
     n = len(SIZES)
     A, e = np.concatenate([SIZES, SIZES, A]), np.concatenate([np.full(n, 1e-5), np.ones(n), np.maximum(e, 1e-3)])
-    return A, e * A, orbits.exact(A, e * A)
+    return A, e * A, exact(A, e * A)
 
 
 @pytest.mark.slow
@@ -142,8 +143,8 @@ def test_orbits_that_stick_circles_at_the_limit_and_lines() -> None:
     """One stiffness while nothing slides, without a division of nothing by nothing; a line is the thinnest ellipse."""
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        assert (orbits.exact(np.array([0.0, 0.5, 1.0, 1.0]), np.array([0.0, 0.0, 1.0, 0.0])) == 1).all()
-        found = orbits.exact(np.array([2.0, 2.0]), np.array([0.0, 2 * orbits.THINNEST]))
+        assert (exact(np.array([0.0, 0.5, 1.0, 1.0]), np.array([0.0, 0.0, 1.0, 0.0])) == 1).all()
+        found = exact(np.array([2.0, 2.0]), np.array([0.0, 2 * orbits.THINNEST]))
     assert np.allclose(found[:, 0], found[:, 1], rtol=1e-9, atol=0)
 
 

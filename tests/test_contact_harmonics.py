@@ -8,13 +8,14 @@ import pytest
 
 from microslip.contact import EXAMPLES
 from microslip.contact.friction import Coulomb
-from microslip.contact.harmonics import force_alone, force_harmonics, force_near, fourier
+from microslip.contact.harmonics import force_alone, force_harmonics, force_near
 from microslip.contact.heights import Polynomial, tabulated
 from microslip.contact.law import march, value
 from microslip.contact.normal import Preload, Rough
 from microslip.contact.periodic import RECALL, periodic, unknown
 from microslip.contact.point import PointContact
 from microslip.contact.wear import worn_law
+from microslip.series import fourier
 
 ROUGH = EXAMPLES["rough point"]
 NEAR = jax.jit(force_near, static_argnames=("samples", "count", "chunk"))

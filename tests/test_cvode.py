@@ -56,7 +56,10 @@ SYSTEMS = {
 }
 
 
-@pytest.mark.parametrize("name", SYSTEMS)
+SLOW = ("rubs and is damped", "element with a mass")
+
+
+@pytest.mark.parametrize("name", [pytest.param(n, marks=pytest.mark.slow) if n in SLOW else n for n in SYSTEMS])
 def test_the_stepper_comes_to_what_the_reference_says(name: str) -> None:
     """With the order of its laws: with half the steps it is further away."""
     made, steps, most = SYSTEMS[name]
@@ -82,7 +85,7 @@ def test_bodies_alone_move_exactly() -> None:
     assert found.balance < 1e-6 and t[0] == pytest.approx(2 * np.pi * (3 + 1 / 256))
 
 
-@pytest.mark.parametrize("ratio", [0.05, 0.3, 0.7])
+@pytest.mark.parametrize("ratio", [0.3, *(pytest.param(r, marks=pytest.mark.slow) for r in (0.05, 0.7))])
 def test_a_viscous_contact_throws_back_what_its_closed_form_says(ratio: float) -> None:
     """By the reference to its tolerance, by the stepper of first order: the damper begins with a jump."""
     k, speed = 3e5, 0.1

@@ -38,7 +38,7 @@ def test_folds_over_the_frequency() -> None:
     np.testing.assert_allclose(folds, [1.462616, 1.156018], rtol=1e-6)
     np.testing.assert_allclose(back[::-1], folds, rtol=1e-7)
     assert np.count_nonzero(np.diff(np.sign(up.lam - 1.3))) == 3 and "Hz" in told[-1]
-    at = response.of_points(problem, family.points(up)[::20], np.zeros(1))
+    at = response.of_points(problem, family.points(up)[::20])
     assert at.converged.all() and np.abs(at.frequency - up.lam[::20] / family.unit).max() < 1e-12
 
 
@@ -54,7 +54,7 @@ def test_contacts_that_nothing_presses_give_the_scale_by_their_gap_or_the_load(g
     found = followed(family)
     assert found.status.startswith("bound") and len(found.points) < 1000
     if not gap:
-        tip = np.abs(response.of_points(problem, family.points(found), np.ones(1)).monitor)
+        tip = np.abs(response.of_points(problem, family.points(found)).monitor)
         assert found.lam[np.argmax(tip)] == pytest.approx(2 / (1 + 0.5**0.5), rel=2e-3)
 
 

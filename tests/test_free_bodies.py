@@ -198,7 +198,7 @@ def test_slow_time_rests_at_solutions_and_leads_to_them() -> None:
 
 def test_a_damper_that_slides_as_a_whole_is_found() -> None:
     """Contacts so stiff and undamped, and held so softly, that Newton's method wanders from the sticking contacts."""
-    problem = coarse(wedge(100.0, hold=5.0), 7)
+    problem = coarse(wedge(100.0, hold=5.0))
     assert pseudo_transient.serves(problem) and not pseudo_transient.unheld(problem)
     for f in (90.0, 105.0):
         point = solve(problem, 2 * np.pi * f, [])

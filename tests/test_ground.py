@@ -221,6 +221,7 @@ def test_the_picture_of_a_motion_has_the_loss_of_its_table(
     assert any("force in N" in axes.get_ylabel() for axes in figure.axes)  # its loops are drawn
 
 
+@pytest.mark.slow
 def test_many_points_that_creep_together_carry_what_one_does() -> None:
     """Four points of a rigid patch, each with a quarter, on ground without waves: the turns of the braking agree."""
     friction = Exponential(value(0.8), value(0.55), value(100.0))

@@ -14,7 +14,6 @@ from closed_forms.beams import beam_element
 from integrator import Start, Steady, extrapolated, steady
 
 from microslip.contact.friction import Coulomb
-from microslip.contact.harmonics import fourier
 from microslip.contact.law import Law, settings, value
 from microslip.contact.normal import Penalty, Preload
 from microslip.contact.patch import Patch, grid
@@ -24,6 +23,7 @@ from microslip.harmonic_balance import problem as balance
 from microslip.harmonic_balance import response
 from microslip.harmonic_balance.response import Operating
 from microslip.harmonic_balance.solver import solve
+from microslip.series import fourier
 from microslip.system import Body, Force, Monitor, Spring, System
 from microslip.system import Contact as Face
 from microslip.system.assembly import Assembly, Contact, ContactFace, Load, Output, across, preloaded_contact

@@ -15,7 +15,7 @@ from small import beam, table
 from test_assembly import FINE, sector
 from test_curves import CASE, lifting
 from test_harmonic_balance_time import Cubic, cantilever, group, held
-from test_refinement import ONE, Brittle, spring
+from test_refinement import Brittle, spring
 
 from microslip.case import load_case
 from microslip.case.assemble import build
@@ -26,7 +26,7 @@ from microslip.contact.law import value
 from microslip.contact.normal import Preload
 from microslip.contact.patch import Patch, grid
 from microslip.contact.point import PointContact
-from microslip.harmonic_balance import accuracy, checkpoint, refinement, response
+from microslip.harmonic_balance import accuracy, checkpoint, response
 from microslip.harmonic_balance import problem as balance
 from microslip.harmonic_balance.accuracy import judged
 from microslip.harmonic_balance.checkpoint import labels, record, restored, resumed_response
@@ -84,10 +84,10 @@ def test_an_interrupted_sweep_goes_on_where_it_was(problem: balance.Problem, tmp
     for _ in range(4):
         with open_journal(tmp_path / "points", "abc", HEAD) as journal:
             try:
-                found, peaks = resumed_response(problem, FREQUENCY, np.ones(1), journal, SERIES, impatient)
+                found, peaks = resumed_response(problem, FREQUENCY, journal, SERIES, impatient)
             except Stop:
                 continue
-    whole = refinement.filled_response(problem, FREQUENCY, np.ones(1))
+    whole = response.filled_response(problem, FREQUENCY)
     computed = [t for t in told if "of 16 frequencies" in t]
     assert len(computed) == len(FREQUENCY) + 3  # the three that were under way are begun once more, no other
     assert list(dict.fromkeys(computed)) == [f"{i + 1} of 16 frequencies: {f:.6g} Hz" for i, f in enumerate(FREQUENCY)]
@@ -134,7 +134,7 @@ def test_a_sweep_with_points_that_fail_is_the_same_bit_by_bit_after_interrupts(
 
     def answer(name: str, report: Callable[[str], None]) -> tuple[Any, ...]:
         with open_journal(tmp_path / name, "abc", HEAD) as journal:
-            found, peaks = resumed_response(problem, frequency, ONE, journal, SERIES, report)
+            found, peaks = resumed_response(problem, frequency, journal, SERIES, report)
             return found, peaks, journal.of(SERIES)
 
     whole, tops, rows = answer("whole", lambda _: None)
@@ -155,7 +155,7 @@ def test_nothing_is_computed_twice(tmp_path: Path) -> None:
     problem, told = balance.of(cantilever(), 1, 64, length=0.0125), list[str]()
     for series in (SERIES, SERIES, "normal force 30 N"):
         with open_journal(tmp_path / "points", "abc", HEAD) as journal:
-            resumed_response(problem, np.linspace(0.5, 0.8, 3), np.ones(1), journal, series, told.append)
+            resumed_response(problem, np.linspace(0.5, 0.8, 3), journal, series, told.append)
     computed = [t.split(": ")[1] for t in told if " of 3 frequencies" in t]
     assert computed == 2 * ["0.5 Hz", "0.65 Hz", "0.8 Hz"]
     assert len([t for t in told if "a mode between" in t]) == 2
@@ -172,7 +172,7 @@ def test_a_peak_on_a_point_of_the_sweep_is_a_point_still(tmp_path: Path, monkeyp
     monkeypatch.setattr(checkpoint, "highest", top)
     for frequency in 2 * [np.array([2.0, 2.125, 2.25, 2.375])]:
         with open_journal(tmp_path / "points", "abc", HEAD) as journal:
-            found, peaks = resumed_response(problem, frequency, np.ones(0), journal, SERIES, told.append)
+            found, peaks = resumed_response(problem, frequency, journal, SERIES, told.append)
     assert peaks[0][0] in found.frequency and found.converged.all()
     assert len([t for t in told if " of 4 frequencies" in t]) == 4 and len([t for t in told if "peak near" in t]) == 1
 
@@ -183,10 +183,10 @@ def test_a_resonance_beside_the_end_of_a_sweep_is_found(frequency: np.ndarray, t
     problem, told = balance.of(free(2.2), 1, 16, length=0.01), []
     for _ in range(2):
         with open_journal(tmp_path / "points", "abc", HEAD) as journal:
-            found, peaks = resumed_response(problem, frequency, np.ones(0), journal, SERIES, told.append)
+            found, peaks = resumed_response(problem, frequency, journal, SERIES, told.append)
         np.testing.assert_allclose(pairs(peaks), [(2.2, 50 / (2 * np.pi * 2.2) ** 2 * 0.3)], rtol=1e-3)
     assert len([t for t in told if "peak near" in t]) == 1
-    alone = response.harmonic_response(problem, frequency, np.ones(0))
+    alone = response.harmonic_response(problem, frequency)
     assert rising({1.0: found}, {1.0: pairs(peaks)}) == [] and len(rising({1.0: alone}, {1.0: []})) == 1
 
 
@@ -196,7 +196,7 @@ def test_a_search_that_found_no_peak_is_not_made_again(tmp_path: Path) -> None:
     for _ in range(2):
         with open_journal(tmp_path / "points", "abc", HEAD) as journal:
             frequency = np.array([1.0, 1.5, 2.0])
-            found = resumed_response(problem, frequency, np.ones(0), journal, SERIES, told.append)
+            found = resumed_response(problem, frequency, journal, SERIES, told.append)
             assert found[1] == []
     assert len([t for t in told if t == "peak near 2 Hz"]) == 1
 
@@ -214,7 +214,7 @@ def test_a_coarse_sweep_and_a_fine_one_have_the_same_overhanging_peak() -> None:
     Both climb to the same peak: 1e-6."""
     problem, peaks = softening(3), []
     for points, past in ((7, False), (97, True)):
-        found = response.harmonic_response(problem, np.linspace(0.6, 1.1, points) / (2 * np.pi), np.ones(1))
+        found = response.harmonic_response(problem, np.linspace(0.6, 1.1, points) / (2 * np.pi))
         peaks += pairs(response.refined_peaks(problem, found))
         assert bool(overhanging(found, peaks[-1:])) == past
     np.testing.assert_allclose(peaks[0], peaks[1], rtol=1e-6)
@@ -231,7 +231,7 @@ def test_what_is_kept_is_the_point(problem: balance.Problem) -> None:
     for a, b in zip(same.q["blade"], found.q["blade"], strict=True):
         np.testing.assert_array_equal(a, b)
     whole = response_of(HEAD, {SERIES: {60.0: record(problem, point, found)}}).one(normal_force=20.0)
-    assert labels(problem) == {"monitors/tip": ["u_x"]}
+    assert labels(problem.assembly) == {"monitors/tip": ["u_x"]}
     np.testing.assert_array_equal(whole.monitor("tip")[0], found.outputs)
 
 
@@ -285,10 +285,10 @@ def test_directions_of_a_monitor_that_are_not_neighbours(tmp_path: Path) -> None
     outputs = tuple(Output("pair", name, label) for name, label in READ)
     pair = Assembly((Component("pair", {0: group}),), (rub,), (Load("pair", "f"),), outputs)
     problem = balance.of(pair, harmonics=1, samples=16)
-    head = HEAD | {"labels": labels(problem)}
+    head = HEAD | {"labels": labels(problem.assembly)}
     for count in (2, 4):
         with open_journal(tmp_path / "points", "abc", head) as journal:
-            found, _ = resumed_response(problem, np.linspace(9.0, 12.0, count), np.ones(1), journal, SERIES)
+            found, _ = resumed_response(problem, np.linspace(9.0, 12.0, count), journal, SERIES)
         told = read_response(tmp_path / "points")
     assert told.labels == {"monitors/p0": ("u_x", "u_y"), "monitors/p1": ("u_x",)}
     for f, watched in zip(found.frequency, found.outputs, strict=True):
@@ -320,7 +320,7 @@ def test_rows_of_several_members_with_a_monitor_of_one_name() -> None:
 def test_the_error_of_an_overhanging_resonance_is_that_of_its_own_motion() -> None:
     """Beside the peak the sweep came along a lower motion; one harmonic leaves out as much of the peak as more show."""
     problem = softening(1)
-    found = response.harmonic_response(problem, np.linspace(0.6, 1.1, 97) / (2 * np.pi), np.ones(1))
+    found = response.harmonic_response(problem, np.linspace(0.6, 1.1, 97) / (2 * np.pi))
     (peak,) = response.refined_peaks(problem, found)
     assert overhanging(found, [(peak.frequency, peak.amplitude)])
     errors = {one.point.Omega: (one.error, one.bound) for one in judged(problem, found, [peak])}
@@ -334,7 +334,7 @@ def test_estimates_of_errors_are_kept(tmp_path: Path, monkeypatch: pytest.Monkey
     """Stopped before each of them and asked once more: each is computed once, and bit by bit what
     it is without a journal; also that of a peak that is not found again."""
     problem = softening(1)
-    found = response.harmonic_response(problem, np.linspace(0.6, 1.1, 13) / (2 * np.pi), np.ones(1))
+    found = response.harmonic_response(problem, np.linspace(0.6, 1.1, 13) / (2 * np.pi))
     (peak,) = response.refined_peaks(problem, found)
     lost = peak._replace(frequency=0.999 * peak.frequency, x=np.full_like(peak.x, np.nan))
     whole, calls = judged(problem, found, [peak, lost]), list[str]()

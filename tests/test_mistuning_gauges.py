@@ -15,7 +15,7 @@ from microslip.contact.patch import Patch
 from microslip.contact.point import PointContact
 from microslip.mistuning.gauges import Stuck, blades_from_gauges
 from microslip.mistuning.ring import Tuned
-from microslip.mistuning.samples import Sticking
+from microslip.mistuning.samples import StickingRing
 from microslip.mistuning.scatter import Scatter
 from microslip.system import Body, Contact, Force, Monitor, Spring, System
 from microslip.system.assembly import Assembly, ContactFace, Load, Output, across, preloaded_contact
@@ -50,7 +50,7 @@ def test_the_model_is_that_of_a_sample():
     """A ring of which a sample is made, factorised afresh, to rounding; on, beside and above its resonances."""
     stuck, d = ring(5), np.random.default_rng(1).normal(0, 0.02, 5)
     s = Scatter("frequency", deviation=0.02)
-    sample = Sticking(stuck.tuned.mistuned([(s, np.repeat(d[:, None], 2, axis=1))]))
+    sample = StickingRing(stuck.tuned.mistuned([(s, np.repeat(d[:, None], 2, axis=1))]))
     for f in (150.0, 162.0, 236.0):
         assert np.allclose(np.abs(stuck.amplitudes(f, d)[0]), sample(f), rtol=1e-10)
 

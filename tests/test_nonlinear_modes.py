@@ -194,8 +194,8 @@ def test_a_body_of_one_mode_without_damping():
     """Its only eigenvalue is its own geometric mean; what the contacts see is finite beside it."""
     problem = sliding(ratio=0.0)
     seen = problem.eliminated[0].at(150.0)
-    assert np.isfinite(seen.compliance).all()
-    assert seen.compliance[0, 1, 0, 0] == pytest.approx(1 / (3e4 - 150.0**2), rel=1e-12)
+    assert np.isfinite(seen[..., 1:]).all()
+    assert seen[0, 1, 0, 1] == pytest.approx(1 / (3e4 - 150.0**2), rel=1e-12)
 
 
 def test_mistakes():

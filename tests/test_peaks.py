@@ -22,10 +22,9 @@ from microslip.continuation import NO_OPTIMUM, Settings, extremum, lowest, peak,
 from microslip.harmonic_balance import peak as peaks
 from microslip.harmonic_balance.peak import highest, optimum, resonance
 from microslip.harmonic_balance.readout import amplitude
-from microslip.harmonic_balance.refinement import filled_response
-from microslip.harmonic_balance.response import of_body, operating, refined_peaks
+from microslip.harmonic_balance.response import filled_response, of_body, operating, refined_peaks
 from microslip.harmonic_balance.solver import solve, sweep
-from microslip.stages.following import missed, optimum_message
+from microslip.verbs.optimum import missed, optimum_message
 
 
 @dataclass(frozen=True)
@@ -351,7 +350,7 @@ def test_a_resonance_narrower_than_a_step_is_found_as_a_response_finds_it():
     patch, band = rough_patch((3, 2), 4e5), 2 * np.pi * np.linspace(28, 48, 6)
     problem = of_body(g, (patch,), np.array([1e4]), force, watched, harmonics=2, samples=32, length=1e-5)
     top = highest(problem, band)
-    response = filled_response(problem, band / (2 * np.pi), np.zeros(1))
+    response = filled_response(problem, band / (2 * np.pi))
     best = max(refined_peaks(problem, response), key=lambda one: one.amplitude)
     assert np.sqrt(top.peak.value) == pytest.approx(best.amplitude, rel=1e-12)
     part, k = problem.parts[1][0], problem.stiffness[0]

@@ -271,9 +271,9 @@ CASE = {"body": "vane", "excitation": "magnet", "amplitude": 2.0, "monitor": "pr
 
 
 def sample_case():
-    """That of the sample, with few points."""
+    """That of the sample, with few points and samples."""
     text = (ms.sample().parent / "case.toml").read_text(encoding="utf-8")
-    return text.replace("points = [6, 3]", "points = [2, 2]")
+    return "samples = 24\n" + text.replace("points = [6, 3]", "points = [2, 2]")
 
 
 def rubbing(**contact):

@@ -35,7 +35,7 @@ def test_a_ball_comes_to_rest_after_infinitely_many_impacts() -> None:
     rest, errors = first * (1 + RESTITUTION) / (1 - RESTITUTION), []
     for tau in (1e-4, 2.5e-5):
         s = Stepper(ball, tau)
-        _, seen, events, _ = s.run(s.start(np.zeros(1), np.zeros(1)), np.full(100, round(0.02 / tau)))
+        _, seen, events, _ = s.run(s.start(np.zeros(1), np.zeros(1)), np.full(64, round(0.032 / tau)))
         found = events[events[:, 2] == 0, 0]
         errors.append(max(np.abs(found[:20] - impacts).max(), abs(found[-1] - rest)))
         assert abs(seen.q[-1, 0] - HEIGHT) < 1e-7 and abs(seen.q_dot[-1, 0]) < 1e-9
@@ -169,7 +169,7 @@ def test_nothing_begins_behind_what_is_rigid() -> None:
         behind = f"start: begins {0.1 if gap < 0 else 0.4} m behind stop 1"
         refused(behind, ms.integrate, swing, 0.2, start=start)
     refused("0.4 m behind stop 1", ms.integrate_many, swing, 0.2, [[0.0], [0.5]], [[0.0], [0.0]])
-    ms.integrate(swing, 0.2, settle=0, keep=1, start={"displacement": {0: 0.1}})  # where it touches
+    ms.integrate(swing, 0.2, settle=0, keep=1, samples=64, start={"displacement": {0: 0.1}})  # where it touches
 
 
 # ground that moves ---------------------------------------------------------------------------------------------------

@@ -23,7 +23,7 @@ from microslip.harmonic_balance import problem as balance
 from microslip.harmonic_balance.forces import AFT
 from microslip.harmonic_balance.problem import Group, Problem
 from microslip.harmonic_balance.solver import newton
-from microslip.harmonic_balance.stability import Orbit, Settings, _carrier, judged, multipliers, orbit, stability
+from microslip.harmonic_balance.stability import ForcedOrbit, Settings, _carrier, judged, multipliers, orbit, stability
 from microslip.system.assembly import Assembly, Contact, ContactFace, Linear
 
 
@@ -85,7 +85,7 @@ def value(number):
 def moving(law, rows, M, C, K, harmonics, Omega, **more):
     """An orbit of one point contact whose three displacements (3, 2 H + 1) are given."""
     displacement = np.vstack([harmonics, np.zeros_like(harmonics)])
-    return Orbit(M, C, K, rows, np.zeros((6, 6)), (law,), (ONE_POINT,), np.asarray(displacement), Omega, **more)
+    return ForcedOrbit(M, C, K, rows, np.zeros((6, 6)), (law,), (ONE_POINT,), np.asarray(displacement), Omega, **more)
 
 
 def along(*directions):
@@ -134,7 +134,7 @@ def hill(orbit, slope):
 
     Args:
         slope: (c (2 H + 1), c (2 H + 1)) derivative k of the contact forces' harmonics, the harmonics in the order of
-            `Orbit.displacement`, the c rows of each together.
+            `ForcedOrbit.displacement`, the c rows of each together.
     """
     coefficients, m = orbit.displacement.shape[1], len(orbit.M)
     D = orbit.Omega * derivative(coefficients // 2)

@@ -34,9 +34,10 @@ if TYPE_CHECKING:
 
     from .bifurcation.diagram import Diagram
     from .bifurcation.dynamics import Dynamics
-    from .harmonic_balance.tones import Kept, Solved
+    from .harmonic_balance.tones import Solved
     from .mistuning.ensemble import Ensemble
     from .mistuning.scatter import Scatter
+    from .results import Journal
     from .time_domain.many import Reached
     from .time_domain.orbit import Orbit
 
@@ -172,7 +173,7 @@ def harmonic_response(
 def two_tones(
     system: System, first: Frequencies, second: Frequencies, *, free: bool = False, harmonics: Count = 5,
     samples: Count | None = None, turns: Count | None = None, start: Orbit | None = None,
-    unit: Unit = "Hz", kept: Kept | None = None, report: Report = lambda _: None,
+    unit: Unit = "Hz", kept: Journal | None = None, report: Report = lambda _: None,
 ) -> Solved:  # fmt: skip
     """Quasi-periodic vibration of two frequencies without a common period, by harmonic balance over both.
 
@@ -182,8 +183,9 @@ def two_tones(
         free: the second frequency is that of a self-excited vibration, unknown, and ``second`` a guess within 15 %; no
             load has a second tone then. start: a motion in time to begin from then, of `integrate`; if not given 200
             periods of the first tone from rest, and a hundred that are kept.
-        harmonics: H: pairs (k1, k2) with |k1| + |k2| <= H are balanced. samples: of a turn of the faster angle, 8 H and
-            32 at least if not given. turns: of it in the line along which contacts that remember are marched; as many.
+        harmonics: H: pairs (k1, k2) with ``abs(k1) + abs(k2) <= H`` are balanced. samples: of a turn of the faster
+            angle, 8 H and 32 at least if not given. turns: of it in the line along which contacts that remember are
+            marched; as many.
         kept: finished points of a run that did not end. report: is told what is under way.
 
     Returns:

@@ -27,8 +27,10 @@ import jax.numpy as jnp
 import numpy as np
 import scipy.linalg
 
+from .. import series
 from ..continuation import NewtonSettings, Solution, newton
 from ..data import Array, ComplexArray
+from ..series import derivative
 from .dynamics import Dynamics
 from .shooting import PeriodicOrbit
 
@@ -56,22 +58,12 @@ class Harmonics:
     @property
     def slopes(self) -> Array:
         """(2 H + 1, n) of the derivative over t'."""
-        return differentiated(self.c)
+        return derivative(len(self.c)) @ self.c
 
 
 def summed(H: int, turns: Array) -> Array:
     """(s, 2 H + 1) E at times in periods (s,)."""
-    angle = 2 * np.pi * np.outer(turns, np.arange(1, H + 1))
-    waves = np.stack([np.cos(angle), np.sin(angle)], axis=-1).reshape(len(turns), -1)
-    return np.concatenate([np.ones((len(turns), 1)), waves], axis=1)
-
-
-def differentiated(c: Array) -> Array:
-    """D c."""
-    h = np.arange(1, len(c) // 2 + 1)[:, None]
-    pairs = c[1:].reshape(len(h), 2, -1)
-    turned = np.stack([h * pairs[:, 1], -h * pairs[:, 0]], axis=1).reshape(len(c) - 1, -1)
-    return np.concatenate([np.zeros((1, c.shape[1])), turned])
+    return series.summed(2 * np.pi * np.outer(turns, np.arange(1, H + 1)))
 
 
 def of_orbit(orbit: PeriodicOrbit, H: int, each: int = 32) -> Harmonics:
@@ -153,8 +145,8 @@ class Balance:
         omega, change = (float(x[-1]), 0.0) if self.free else self._driven(lam)
         angles = 2 * np.pi * self.turns * np.arange(len(E)) / len(E)
         f, J, slope = map(np.asarray, self._rates(E @ c, float(lam), angles))
-        D = differentiated(np.eye(k))
-        moving = differentiated(c)
+        D = derivative(k)
+        moving = D @ c
         J_c = np.zeros((k, n, k, n))
         J_c[:, range(n), :, range(n)] += omega * D
         mean = J.mean(axis=0)
@@ -274,7 +266,7 @@ class CondensedBalance(Balance):
         at = _Answer(self, z, omega, lam)
         own = at.x + (z - at.x @ self.V) @ self.V.T  # where f is as linear as said
         slope = np.asarray(self._over(E @ own, float(lam), at.angles))
-        faster = at.through(differentiated(at.x)).ravel()
+        faster = at.through(derivative(len(at.x)) @ at.x).ravel()
         R, A = (z - at.x @ self.V).ravel(), np.eye(k * r) - at.derivative.reshape(k * r, k * r)
         over = change * faster - at.through(P.T @ slope).ravel()
         phase = ((self.reference.slopes / np.asarray(self.system.scale) ** 2) @ self.V).ravel()

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..contact.harmonics import fourier
 from ..contact.jenkins import Jenkins
 from ..data import Array
 from ..harmonic_balance import FrequencyResponse
@@ -19,6 +18,7 @@ from ..harmonic_balance.response import HarmonicResponse, unsolved
 from ..harmonic_balance.sweeps import overhanging
 from ..results.checks import UNCERTAIN, cause
 from ..results.names import apart
+from ..series import fourier
 from ..time_domain.swept import SettledMotion, nearer
 from ..units import Quantity, counted, percent
 from .assemble import Built

@@ -15,13 +15,12 @@ from ..harmonic_balance import FrequencyResponse
 from ..harmonic_balance.accuracy import FLOOR, enough, judged
 from ..harmonic_balance.book import normal_law
 from ..harmonic_balance.checkpoint import labels, resumed_response
-from ..harmonic_balance.cost import GIB
+from ..harmonic_balance.forces import GIB
 from ..harmonic_balance.growing import verdict
 from ..harmonic_balance.problem import Problem
 from ..harmonic_balance.readout import measured
 from ..harmonic_balance.reduced import stuck, stuck_damping
-from ..harmonic_balance.refinement import filled_response
-from ..harmonic_balance.response import HarmonicResponse, Resonance, parted, refined_peaks
+from ..harmonic_balance.response import HarmonicResponse, Resonance, filled_response, parted, refined_peaks
 from ..harmonic_balance.sweeps import gaps, still
 from ..results import Journal
 from ..results.checks import UNCERTAIN
@@ -32,7 +31,7 @@ from . import messages as say
 from .assemble import Built, build
 from .beyond import Beyond, beyond
 from .checkpoint import series_name
-from .contacts import memory_of, swept
+from .contacts import memory_of
 from .edges import Rising
 from .problem import normal_forces, pressed_by, problem_of
 from .readouts import Readout, readouts
@@ -157,15 +156,14 @@ class _Run:
         built, problem = self.built, problem_of(self.built, normal)
         key = pressed_by(built, problem) if normal is None else normal
         self.report(f"friction response at a normal force of {key:g} N")
-        limits = np.array([c.coefficient * (key if swept(c) else c.normal_force or 0.0) for c in built.contacts])
         if journal is None:
-            found = filled_response(problem, self.frequency, limits, self.report)
+            found = filled_response(problem, self.frequency, self.report)
             peaks = refined_peaks(problem, found)
         else:
             name = series_name(key)
             parameters = {**journal.head.get("parameters", {}), name: {"normal_force": key}}
-            journal.say({**journal.head, "parameters": parameters, "labels": labels(problem)})
-            found, peaks = resumed_response(problem, self.frequency, limits, journal, name, self.report)
+            journal.say({**journal.head, "parameters": parameters, "labels": labels(problem.assembly)})
+            found, peaks = resumed_response(problem, self.frequency, journal, name, self.report)
         peaks, turns = parted(found, peaks)
         self.responses[key] = found
         self.folds[key] = [(fold.frequency, fold.amplitude) for fold in turns]
@@ -342,7 +340,7 @@ def free_response(built: Built, frequency: Array) -> FrequencyResponse:
     q = np.concatenate([_moved(part, Omega) for Omega in portions])
     zero, none = np.zeros(len(frequency)), np.zeros((len(frequency), 0))
     moved = q @ part.output[0] + part.output_given[0]
-    return FrequencyResponse(frequency, moved, none, zero, np.ones(len(frequency), dtype=bool), np.zeros(0), none)
+    return FrequencyResponse(frequency, moved, none, zero, np.ones(len(frequency), dtype=bool))
 
 
 def _moved(part: Linear, Omega: Array) -> ComplexArray:

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from ..harmonic_balance.envelope import Envelope, OverOrders
-    from ..harmonic_balance.identification import Identified, NodalDiagram
+    from ..harmonic_balance.identification import IdentifiedStiffness, NodalDiagram
 
 
 def _amplitudes(axes: Axes, unit: str) -> None:
@@ -43,7 +43,7 @@ def _logarithmic(axes: Axes) -> None:
 
 
 def nodal_diameter_picture(
-    diagrams: Sequence[NodalDiagram], path: Path, title: str, found: Identified | None = None
+    diagrams: Sequence[NodalDiagram], path: Path, title: str, found: IdentifiedStiffness | None = None
 ) -> Path:
     """Frequencies over the nodal diameter for several contact stiffnesses, with what was measured (Sextro Fig. 5.4-1).
 

@@ -20,9 +20,8 @@ from ..data import Array
 from ..harmonic_balance.problem import Problem
 from ..harmonic_balance.reduced import stuck, stuck_damping
 from ..harmonic_balance.reduced import untouched as free
-from ..harmonic_balance.refinement import between
-from ..harmonic_balance.response import HarmonicResponse, operating
-from ..harmonic_balance.solver import CONVERGED, Point
+from ..harmonic_balance.response import HarmonicResponse, between, operating
+from ..harmonic_balance.solver import Point
 from ..interrupts import look
 from ..progress import Report
 from ..results import Journal
@@ -307,7 +306,7 @@ class Sweeps:
         self.step = float(np.median(np.diff(self.asked)))
         self.periods = _periods(problem, gap)
         self.balanced = {
-            float(f): (Point(2 * np.pi * f, x, CONVERGED, 0.0, 0), float(amplitude))
+            float(f): (Point(2 * np.pi * f, x), float(amplitude))
             for f, x, amplitude, good in zip(
                 found.frequency, found.x, np.abs(found.monitor), found.converged, strict=True
             )
