@@ -301,8 +301,9 @@ def test_patience_that_ends_is_told_and_more_of_it_goes_on(case: Path, capsys: p
     assert ends in said and "--set sweep.patience=0.002, which goes on from there" in said
     assert not rows and "not known" in summary["beyond"][0] and summary["resonances"]
     more, further, after = run(10.0)
-    assert said.count("motion in time, ") == 1 and more.count("motion in time, ") >= len(further) > 0
-    assert ends not in more and after["resonances"] == summary["resonances"]
+    assert said.count("motion in time, ") <= 2 and more.count("motion in time, ") >= len(further) > 0
+    at = [[r["frequency_Hz"] for r in s["resonances"]] for s in (summary, after)]
+    assert ends not in more and at[0] == at[1]
 
 
 def test_a_curve_whose_time_is_over_goes_on_with_more_of_it(case: Path) -> None:
