@@ -28,7 +28,7 @@ from microslip.files import store
 from microslip.results import read_response
 from microslip.stages import response as making
 from microslip.stages import running
-from microslip.stages.following import open_case
+from microslip.stages.answer import CaseJob, case_job
 from microslip.stages.surveying import survey_stage
 from microslip.units import METRES, Quantity
 
@@ -272,7 +272,7 @@ def test_killed_at_any_write_by_another_case(folder: Path, monkeypatch: pytest.M
     """`respond`, `respond --set amplitude=4` killed at its first, second, ... write, `respond`: the first answer."""
     (folder / "case.toml").write_text(QUICK)
     monkeypatch.setattr(making, "_assessed", lambda *_: None)  # which takes a second, and writes more of the same
-    monkeypatch.setattr("microslip.pictures.response.response_picture", lambda _, path, *__: path.write_bytes(b"p"))
+    monkeypatch.setattr("microslip.pictures.response.response_picture", lambda *_, **__: None)
     respond(folder)
     build, replaced, written = folder / "build" / "vane", os.replace, 0
     whole = {p: p.read_bytes() for p in (build / "response.csv", build / "response.h5", build / "response.json")}
@@ -592,7 +592,7 @@ def test_as_many_harmonics_as_the_error_asks_for(folder: Path) -> None:
             raise KeyboardInterrupt
 
     with pytest.raises(UserError, match=r'"auto" is found by microslip respond .*; run it first, or give a number'):
-        survey_stage(folder / "case.toml", None, "load")
+        survey_stage(case_job(folder / "case.toml", make=False), "load")
     with pytest.raises(KeyboardInterrupt):
         respond(folder, report=impatient)
     (said,) = [t for t in begun if "an error of about" in t]
@@ -606,8 +606,8 @@ def test_as_many_harmonics_as_the_error_asks_for(folder: Path) -> None:
     assert (found.arrays["harmonics"] == H).all() and found.monitor("middle").shape[2] == H + 1
     assert f",{H}," in (build / "response.csv").read_text().splitlines()[1]
     assert f"<td>{H}</td>" in (build / "response.html").read_text()
-    opened = open_case(folder / "case.toml", {"sled": folder / "basis.h5"}, build)
-    assert opened.plain.settings.harmonics == H and opened.plain.settings.sampled >= 8 * H
+    opened = CaseJob(folder / "case.toml", {"sled": folder / "basis.h5"}, build, swept=True)
+    assert opened.settings.harmonics == H and opened.settings.sampled >= 8 * H
 
 
 def turning_sample(folder: Path) -> None:

@@ -22,6 +22,7 @@ from microslip.data import ModalBasis, StressSet
 from microslip.harmonic_balance import envelope, identification, response
 from microslip.harmonic_balance.envelope import Envelope
 from microslip.harmonic_balance.problem import Problem
+from microslip.stages.answer import case_job
 from microslip.stages.surveying import _ranges_sentences, survey_stage
 
 RING = """
@@ -180,7 +181,7 @@ def test_contacts_of_a_whole_ring_are_drawn_under_their_own_names(ring: Path, mo
 
     titles, draw = list[str](), operating.contact_map_plot
     monkeypatch.setattr(
-        operating, "contact_map_plot", lambda maps, title, path: titles.append(title) or draw(maps, title, path)
+        operating, "contact_map_plot", lambda maps, title, figure: titles.append(title) or draw(maps, title, figure)
     )
     write_basis(ring.with_name("basis.h5"), stressed())
     near = RING.replace("start = 150.0\nstop = 600.0", "start = 225.0\nstop = 235.0").replace("31", "5")
@@ -202,7 +203,7 @@ def test_surveys_that_are_interrupted_leave_what_was_finished(ring: Path) -> Non
                 raise KeyboardInterrupt
 
         with pytest.raises(KeyboardInterrupt):
-            survey_stage(ring, None, kind, ["sweep.points=5"], report=report)
+            survey_stage(case_job(ring, None, ["sweep.points=5"], report=report, make=False), kind)
         assert not Path(f"build/ring/{kind}.json").exists()
     assert rows("build/ring/orders.csv")["engine_order"].tolist() == [1]
     assert rows("build/ring/ranges_combinations.csv")["combination"].tolist() == [1]

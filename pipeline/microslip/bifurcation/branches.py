@@ -66,7 +66,7 @@ class DiagramBranch:
     def __repr__(self) -> str:
         special = ", ".join(f"{len(self.of_kind(k))} {k}" for k in SPECIAL if len(self.of_kind(k)))
         points = f"{counted(len(self), 'point')}{special and f' ({special})'}"
-        return f"<Branch {self.name}: {points}, {int(self.stable.sum())} stable; ended: {self.ended}>"
+        return f"<DiagramBranch {self.name}: {points}, {int(self.stable.sum())} stable; ended: {self.ended}>"
 
     @property
     def still(self) -> bool:

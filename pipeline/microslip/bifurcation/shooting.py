@@ -34,7 +34,7 @@ class PeriodicOrbit:
     turns: int = 1
 
     def __repr__(self) -> str:
-        return f"<Orbit: period {self.period:.6g} s at {self.p:.6g}, {len(self.x)} nodes>"
+        return f"<PeriodicOrbit: period {self.period:.6g} s at {self.p:.6g}, {len(self.x)} nodes>"
 
     def sampled(self, each: int = 8) -> Array:
         """(m each, n) at equal times of one period."""

@@ -317,7 +317,7 @@ def _resonance(
     key = f"{normal}, {s.start} to {s.stop} Hz by {s.points}"
     if key not in known:
         report(f"resonance between {s.start:g} and {s.stop:g} Hz")
-        top = largest_resonance(problem, np.linspace(s.start, s.stop, s.points))
+        top = largest_resonance(problem, s.grid)
         if top.missing:
             raise UserError(f"{top.missing}; widen the sweep, or give a frequency (Hz)", "curve.frequency")
         known[key] = top.frequency

@@ -140,8 +140,7 @@ class _Run:
 
     def __init__(self, built: Built, tolerance: float | None, report: Callable[[str], None]) -> None:
         self.built, self.tolerance, self.report = built, tolerance, report
-        sweep = built.settings.sweep
-        self.frequency = np.linspace(sweep.start, sweep.stop, sweep.points)
+        self.frequency = built.settings.sweep.grid
         self.responses: dict[float, HarmonicResponse] = {}
         self.resonances, self.folds = dict[float, Peaks](), dict[float, Peaks]()
         self.errors, self.lost = dict[float, dict[float, float]](), dict[float, list[float]]()

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..contact.friction import OfCoulomb
-from ..data import Array, ModalBasis
+from ..data import ModalBasis
 from ..errors import UserError, in_its_file
 from ..harmonic_balance import envelope
 from ..harmonic_balance.envelope import Envelope, OverOrders, SpeedResponse
@@ -202,11 +202,7 @@ def over_ranges(
     ) -> Problem:  # fmt: skip
         return problem_of(at(damping_ratio, friction), normal_force).loaded(load)
 
-    return envelope.envelope(problem, asked.given, _frequency(settings), report, keep)
-
-
-def _frequency(settings: CaseSettings) -> Array:
-    return np.linspace(settings.sweep.start, settings.sweep.stop, settings.sweep.points)
+    return envelope.envelope(problem, asked.given, settings.sweep.grid, report, keep)
 
 
 @in_its_file

@@ -74,11 +74,11 @@ def peak(problem: Rated, x: Array, lam: float, settings: Settings | None = None)
     slope = _Slope(problem)
     here = slope.at(begun.y, begun.tangent)
     uphill = begun if here.slope >= 0 else _reversed(begun)
-    found = _ahead(slope, uphill, settings)
-    if not found.converged or math.log(found.value / here.value) > DIP:
-        return found
+    top = _ahead(slope, uphill, settings)
+    if not top.converged or math.log(top.value / here.value) > DIP:
+        return top
     other = _ahead(slope, _reversed(uphill), settings)  # that peak is hardly higher than the beginning
-    return other if other.converged and other.value > found.value else found
+    return other if other.converged and other.value > top.value else top
 
 
 def placed(problem: Rated, x: Array, lam: float) -> Peak:
@@ -93,10 +93,10 @@ def placed(problem: Rated, x: Array, lam: float) -> Peak:
     uphill = uphill if slope(y, uphill) >= 0 else -uphill
     here, top = slope.at(y, uphill), None
     ahead = y + BESIDE_TOP * uphill
-    found = correct(slope.scaled, ahead, uphill, float(uphill @ ahead), SEARCH.newton)
-    if found.ok and found.tangent is not None:
-        tangent = found.tangent * np.sign(found.tangent @ uphill) / norm(found.tangent)
-        behind = slope.at(found.y, tangent)
+    corrected = correct(slope.scaled, ahead, uphill, float(uphill @ ahead), SEARCH.newton)
+    if corrected.ok and corrected.tangent is not None:
+        tangent = corrected.tangent * np.sign(corrected.tangent @ uphill) / norm(corrected.tangent)
+        behind = slope.at(corrected.y, tangent)
         top = _pinned(slope, here, behind, False, SEARCH) if behind.slope < 0 else None
     return replace(top or _peak(slope, here), kink=False)
 
@@ -181,8 +181,8 @@ def _pinned(slope: _Slope, low: _Place, high: _Place, bends: bool, settings: Set
         y, t = root(slope.scaled, segment, settings, slope, 1e-6)  # where g is level
     except Lost:
         return None
-    found = _peak(slope, slope.at(y, t))
-    return found if found.value >= max(low.value, high.value) else None
+    top = _peak(slope, slope.at(y, t))
+    return top if top.value >= max(low.value, high.value) else None
 
 
 def _peak(slope: _Slope, at: _Place, status: str = CONVERGED) -> Peak:
@@ -253,22 +253,22 @@ def lowest(
         highest: the highest peak at a value, `rated`. values: rising or falling. tolerance: of ln g, by
             which a lower peak would go unseen. most: peaks at most between the values.
     """
-    found = {float(value): highest(float(value)) for value in values}
-    ends = min(found), max(found)
-    known = sorted(value for value, peak in found.items() if peak.converged)
+    peaks = {float(value): highest(float(value)) for value in values}
+    ends = min(peaks), max(peaks)
+    known = sorted(value for value, peak in peaks.items() if peak.converged)
     if not known:
         first = float(values[0])
-        return Lowest(first, found[first], found[first].status, found)
-    i = min(range(len(known)), key=lambda k: found[known[k]].value)
-    at = i if found[known[i]].rate < 0 else i - 1
+        return Lowest(first, peaks[first], peaks[first].status, peaks)
+    i = min(range(len(known)), key=lambda k: peaks[known[k]].value)
+    at = i if peaks[known[i]].rate < 0 else i - 1
     status = NO_OPTIMUM
     if 0 <= at < len(known) - 1:
-        status = _valley(highest, found, known[at], known[at + 1], tolerance, most)
+        status = _valley(highest, peaks, known[at], known[at + 1], tolerance, most)
     if status in ("kink", "two peaks"):
-        _between(highest, found, most)
-    found = dict(sorted(found.items()))
-    best = min((value for value, peak in found.items() if peak.converged), key=lambda value: found[value].value)
-    return Lowest(best, found[best], NO_OPTIMUM if best in ends else status, found)
+        _between(highest, peaks, most)
+    peaks = dict(sorted(peaks.items()))
+    best = min((value for value, peak in peaks.items() if peak.converged), key=lambda value: peaks[value].value)
+    return Lowest(best, peaks[best], NO_OPTIMUM if best in ends else status, peaks)
 
 
 NEAR = 5e-3

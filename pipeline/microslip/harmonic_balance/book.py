@@ -352,8 +352,8 @@ def _cut(normal: Rough, mean: jax.Array, count: int) -> tuple[jax.Array, jax.Arr
     edges = first + (jnp.clip(x, first, last) - first) * (1 - left)
     area, volume = normal.heights.area(edges), normal.heights.volume(edges)
     shares = jnp.diff(area, axis=0)
-    pressed = shares * x - (jnp.diff(edges * area, axis=0) - jnp.diff(volume, axis=0))
-    return shares, normal.stiffness_0 * normal.roughness * jnp.maximum(pressed, 0.0)
+    forces = shares * x - (jnp.diff(edges * area, axis=0) - jnp.diff(volume, axis=0))
+    return shares, normal.stiffness_0 * normal.roughness * jnp.maximum(forces, 0.0)
 
 
 def normal_law(law: Law, strips: int = 0) -> Normal | Strips:

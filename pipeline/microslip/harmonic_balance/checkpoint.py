@@ -44,12 +44,12 @@ def resumed_response(
         The response and its resonances: of the maxima of one plateau the highest.
     """
     rows = journal.of(series)
-    held = {key: restored(problem, row) for key, row in rows.items() if not row["peak"] or _same(row["peak"], key)}
+    points = {key: restored(problem, row) for key, row in rows.items() if not row["peak"] or _same(row["peak"], key)}
 
     def keep(f: float, solved: Solved, added: bool) -> None:
         journal.keep(series, f, record(problem, *solved) | {"frequency": f, "added": int(added)})
 
-    response = filled_response(problem, frequency, report, held, keep)
+    response = filled_response(problem, frequency, report, points, keep)
 
     def searched(bracket: tuple[int, int, int], beside: float) -> dict[str, Any]:
         report(f"peak near {beside:.6g} Hz")
@@ -59,8 +59,8 @@ def resumed_response(
         point, amplitude = found
         f, rows = point.Omega / (2 * np.pi), journal.of(series)
         f = next((key for key in rows if _same(key, f)), f)  # a point of the sweep stays what it is
-        kept = rows.get(f) or record(problem, point, operating(problem, point))
-        journal.keep(series, f, kept | {"peak": beside})
+        row_of_point = rows.get(f) or record(problem, point, operating(problem, point))
+        journal.keep(series, f, row_of_point | {"peak": beside})
         return {"frequency": f, "amplitude": amplitude, "x": point.x}
 
     peaks, searches = list[Resonance](), f"{series}, searches for peaks"
@@ -218,7 +218,7 @@ def restored(problem: Problem, row: dict[str, Any]) -> tuple[Point, Operating]:
     for m in a.components:
         sizes = [m.at(a.index(h)).group.n_modes for h in range(problem.harmonics + 1)]
         q[m.name] = [one[:n] for one, n in zip(row[f"bodies/{m.name}/q"], sizes, strict=True)]
-    found = Operating(
+    motion = Operating(
         point.Omega,
         q,
         _outputs_of(problem, row),
@@ -231,7 +231,7 @@ def restored(problem: Problem, row: dict[str, Any]) -> tuple[Point, Operating]:
         cycles,
         checks,
     )
-    return point, found
+    return point, motion
 
 
 def array_of(a: Assembly, w: Output) -> str:

@@ -66,7 +66,7 @@ class OverOrders:
 
     def columns(self) -> dict[str, Array]:
         """Name -> column, for a table."""
-        found = {
+        table = {
             "engine_order": self.order.astype(float),
             "wave": self.index.astype(float),
             "resonance_Hz": self.frequency,
@@ -75,10 +75,10 @@ class OverOrders:
             "failed_points": self.failed.astype(float),
         }
         if any(self.missing):
-            found["missing"] = np.array(self.missing)
+            table["missing"] = np.array(self.missing)
         if np.isfinite(self.stress).any():
-            found |= {"stress_amplitude_Pa": self.stress, "frequency_of_stress_Hz": self.stressed_at}
-        return found
+            table |= {"stress_amplitude_Pa": self.stress, "frequency_of_stress_Hz": self.stressed_at}
+        return table
 
 
 @dataclass(frozen=True)
@@ -166,15 +166,15 @@ def largest_resonance(problem: Problem, frequency: Array, report: Report = lambd
     """The largest resonance of a band, looked for as a response looks for its own, and the largest stress on the
     way."""
     solved: list[Solved] = []
-    found = filled_response(problem, frequency, report, keep=lambda f, one, _: solved.append(one))
-    failed = int((~found.converged).sum())
+    swept = filled_response(problem, frequency, report, keep=lambda f, one, _: solved.append(one))
+    failed = int((~swept.converged).sum())
     report("resonances between the points")
-    peaks, folds = response.parted(found, response.refined_peaks(problem, found))
+    peaks, folds = response.parted(swept, response.refined_peaks(problem, swept))
     if not peaks:
-        return Largest(np.nan, np.nan, failed, response.no_resonance(found, folds))
-    known = [motion for point, motion in solved if response.judged(point, motion.checks).converged]
+        return Largest(np.nan, np.nan, failed, response.no_resonance(swept, folds))
+    motions = [motion for point, motion in solved if response.judged(point, motion.checks).converged]
     tops = [response.operating(problem, Point(2 * np.pi * p.frequency, p.x)) for p in peaks]
-    motion = motion_of_read(problem, [*known, *tops])
+    motion = motion_of_read(problem, [*motions, *tops])
     top = max(peaks, key=lambda peak: peak.amplitude)
     one = Largest(top.frequency, top.amplitude, failed)
     if motion is None:
@@ -291,12 +291,12 @@ def envelope(
         length = length or problem.length
         problem = replace(problem, length=length)  # one unit for the unknowns of all combinations
         # Starts from the neighbouring combination at every frequency saved a fifth of Newton's steps and no time.
-        found = response.harmonic_response(problem, frequency, report, start)
-        start = found.x[0] if found.converged[0] else None
-        rows.append((found.monitor, found.converged, found.iterations))
+        swept = response.harmonic_response(problem, frequency, report, start)
+        start = swept.x[0] if swept.converged[0] else None
+        rows.append((swept.monitor, swept.converged, swept.iterations))
         columns = [np.array(column) for column in zip(*rows, strict=True)]
         done = np.array(values[: i + 1])
-        whole = Envelope(np.asarray(frequency), tuple(ranges), done, *columns, quantity=found.quantity)
+        whole = Envelope(np.asarray(frequency), tuple(ranges), done, *columns, quantity=swept.quantity)
         keep(whole)
     return whole
 
@@ -371,8 +371,8 @@ def along(
         normal.append([float(F[0, 0]) for F in motions[-1].force.values()])
         words = "" if done[-1].converged else ", not converged"
         report(f"{i + 1} of {len(speeds)} speeds: {n:.6g} rpm, {f:.6g} Hz{words}")
-        found = of_points(problem, done, motions)
-        whole = SpeedResponse(**vars(found), rpm=speeds[: i + 1], order=base, normal=np.array(normal))
+        responded = of_points(problem, done, motions)
+        whole = SpeedResponse(**vars(responded), rpm=speeds[: i + 1], order=base, normal=np.array(normal))
         keep(whole)
     return whole
 

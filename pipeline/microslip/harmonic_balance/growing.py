@@ -68,14 +68,14 @@ def _fastest(part: Linear, K: Array) -> complex | None:
 
 def fed(assembly: Assembly) -> list[str]:
     """`growing`, and what static friction above the sliding one does between two samples."""
-    names, said = [c.name for c in assembly.contacts if saws(c.patch.law)], growing(assembly)
+    names, sentences = [c.name for c in assembly.contacts if saws(c.patch.law)], growing(assembly)
     if names:
-        said.append(
+        sentences.append(
             f"Static friction above the sliding one ({', '.join(names)}): a point without mass sticks again as soon as "
             "it has slipped, so sliding friction saws between both values and the answer hangs on samples; write law "
             '= "rate", or friction that falls with the speed.'
         )
-    return said
+    return sentences
 
 
 def verdict(problem: Problem, x: Array, Omega: float, at: str) -> list[str]:

@@ -198,9 +198,9 @@ def identify(
     )
     stiffness, h = float(np.exp(root)), 1e-3
     slope = float(np.log(f(stiffness * np.exp(h)) / f(stiffness * np.exp(-h))) / (2 * h))
-    known = tuple(measured) if fit in measured else (fit, *measured)
-    predicted = np.array([_Mode(assembly, m, ratio)(stiffness) for m in known])
-    return IdentifiedStiffness(stiffness, ratio, fit, (low, high), slope, known, predicted)
+    measured_all = tuple(measured) if fit in measured else (fit, *measured)
+    predicted = np.array([_Mode(assembly, m, ratio)(stiffness) for m in measured_all])
+    return IdentifiedStiffness(stiffness, ratio, fit, (low, high), slope, measured_all, predicted)
 
 
 class _Mode:

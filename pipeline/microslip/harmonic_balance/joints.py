@@ -54,8 +54,8 @@ class Sides:
         """(p, r) sides of each of some parts, m where there are fewer than r."""
         each = [np.flatnonzero(self.part == i) for i in parts]
         out = np.full((len(each), max(map(len, each), default=0)), len(self.part))
-        for row, own in zip(out, each, strict=True):
-            row[: len(own)] = own
+        for row, sides in zip(out, each, strict=True):
+            row[: len(sides)] = sides
         return out
 
     @cached_property
@@ -65,9 +65,9 @@ class Sides:
         pairs = np.array(np.nonzero(self.part[:, None] == self.part))
         i, j = self.contact[pairs]
         pairs = pairs[:, np.lexsort((j, i))]
-        both = self.contact[pairs]
-        begins = np.flatnonzero(np.append(True, (np.diff(both) != 0).any(axis=0))[: pairs.shape[1]])
-        return pairs, begins, both[:, begins]
+        contacts = self.contact[pairs]
+        begins = np.flatnonzero(np.append(True, (np.diff(contacts) != 0).any(axis=0))[: pairs.shape[1]])
+        return pairs, begins, contacts[:, begins]
 
     @cached_property
     def ring(self) -> RingOfGaps | None:

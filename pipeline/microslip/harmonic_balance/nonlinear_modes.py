@@ -87,9 +87,9 @@ class Backbone:
 
     def columns(self) -> dict[str, Array]:
         """Heading -> (k,) numbers; nan where a motion fails its checks."""
-        column, found = self.quantity.column("amplitude"), {"frequency_Hz": self.frequency}
+        column, table = self.quantity.column("amplitude"), {"frequency_Hz": self.frequency}
         passed = np.array([not c.failure for c in self.checks], dtype=bool)
-        return {column: self.amplitude, **of_solutions({**found, "damping_ratio": self.damping}, passed)}
+        return {column: self.amplitude, **of_solutions({**table, "damping_ratio": self.damping}, passed)}
 
     def to_dataframe(self) -> Any:
         """The table of `columns` as a `pandas.DataFrame`."""
@@ -131,12 +131,12 @@ class Backbone:
         Raises:
             UserError: a file that is no response stands there.
         """
-        known = {"frequency": self.frequency, "parameter": self.amplitude, "damping_ratio": self.damping, "x": self.x}
-        known |= {f"checks/{n.name}": np.array([getattr(c, n.name) for c in self.checks]) for n in fields(Checks)}
+        arrays = {"frequency": self.frequency, "parameter": self.amplitude, "damping_ratio": self.damping, "x": self.x}
+        arrays |= {f"checks/{n.name}": np.array([getattr(c, n.name) for c in self.checks]) for n in fields(Checks)}
         status = tuple(c.failure or CONVERGED for c in self.checks)
         labels = {"parameter": (self.quantity.unit,)}
-        told = {"stuck": self.stuck}
-        series = Series("nonlinear mode", told, self.amplitude, status, known, labels, OVER_AMPLITUDE)
+        parameters = {"stuck": self.stuck}
+        series = Series("nonlinear mode", parameters, self.amplitude, status, arrays, labels, OVER_AMPLITUDE)
         write_response(path, Response("nonlinear mode", "aft", (series,), description=self.status, labels=labels))
         return Path(path)
 
@@ -222,9 +222,9 @@ def backbone(
     A = np.exp([p.lam for p in points])
     Omega, xi = (np.array([p.x[i] for p in points]) for i in (-2, -1))
     x = np.array([p.x[:-2] * curve.units(a)[0] for p, a in zip(points, A, strict=True)]).reshape(len(A), len(z) - 2)
-    found = tuple(curve.checks(*one) for one in zip(x, Omega, xi, strict=True))
+    checked = tuple(curve.checks(*one) for one in zip(x, Omega, xi, strict=True))
     status = _in_words(state.status, points, low, high, quantity)
-    return Backbone(A, Omega, xi / (2 * Omega) if len(A) else xi, x, omega, status, found, quantity)
+    return Backbone(A, Omega, xi / (2 * Omega) if len(A) else xi, x, omega, status, checked, quantity)
 
 
 def motion(problem: Problem, found: Backbone, at: int) -> tuple[Problem, Solved]:
@@ -413,9 +413,9 @@ class _Curve:
     def checks(self, x: Array, Omega: float, xi: float) -> Checks:
         """Of a point of the mode: the force that feeds the losses supplies xi v . M v."""
         fed = self._fed(xi)
-        found = operating(fed, Solved(Omega, x))
-        supplied = 2 * np.pi * xi * found.kinetic / Omega  # J per cycle; its share of `damped` is taken back
-        return checks(fed, replace(found, supplied=found.supplied + supplied, damped=found.damped + supplied))
+        motion = operating(fed, Solved(Omega, x))
+        supplied = 2 * np.pi * xi * motion.kinetic / Omega  # J per cycle; its share of `damped` is taken back
+        return checks(fed, replace(motion, supplied=motion.supplied + supplied, damped=motion.damped + supplied))
 
     def _fed(self, xi: float) -> Problem:
         parts = tuple(tuple(replace(p, C=p.C - xi * p.M) for p in one) for one in self.problem.parts)

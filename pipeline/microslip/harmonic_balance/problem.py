@@ -8,7 +8,7 @@ with the number of its blades, not with its cube.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from itertools import product
@@ -45,6 +45,14 @@ RELATIVE_AT_MOST = 8
 
 Tried = list[tuple[Array, Array, Any]]
 """Of every group of contacts the displacements (n, k, W) that were tried, the forces, and what is known of them."""
+
+
+def grouped(keys: Iterable[Any]) -> list[list[int]]:
+    """Numbers of equal keys, in the order of the first of each."""
+    found: dict[Any, list[int]] = {}
+    for i, key in enumerate(keys):
+        found.setdefault(key, []).append(i)
+    return list(found.values())
 
 
 @dataclass(frozen=True, eq=False)
@@ -225,19 +233,15 @@ class Problem:
     @cached_property
     def waves(self) -> list[list[int]]:
         """The mean, and the harmonics by the wave of the ring that the components move in."""
-        found: dict[int, list[int]] = {}
-        for h in range(1, self.harmonics + 1):
-            found.setdefault(self.assembly.index(h), []).append(h)
-        return [[0], *found.values()]
+        alike = grouped(self.assembly.index(h + 1) for h in range(self.harmonics))
+        return [[0], *([h + 1 for h in own] for own in alike)]
 
     @cached_property
     def alike(self) -> list[tuple[Indices, Indices]]:
         """Of n parts with as many coordinates their numbers, and (n, c) these."""
-        found: dict[int, list[int]] = {}
-        for i, s in enumerate(self.slices):
-            found.setdefault(s.stop - s.start, []).append(i)
-        begins = np.array(self.begins)
-        return [(np.array(parts), begins[parts, None] + np.arange(c)) for c, parts in found.items()]
+        begins, counts = np.array(self.begins), [part.count for part in self.parts[0]]
+        each = grouped(counts)
+        return [(np.array(parts), begins[parts, None] + np.arange(counts[parts[0]])) for parts in each]
 
     @cached_property
     def kind(self) -> list[tuple[int, int]]:
@@ -325,9 +329,9 @@ class Problem:
             views = [one.at(Omega) for one in self.eliminated]
         else:
             views = [reduced.joined(poles, Omega) for poles in self._poles]
-        known = [view for view in views if view is not None]
-        if len(known) == len(views):
-            both = self.stacked(known) if self._poles is None else tuple(known)
+        finite = [view for view in views if view is not None]
+        if len(finite) == len(views):
+            both = self.stacked(finite) if self._poles is None else tuple(finite)
             return AtFrequency(self, Omega, both)
         softer = self._softer
         return AtFrequency(softer, Omega, softer.stacked([one.directly(Omega) for one in softer.eliminated]))
@@ -356,13 +360,11 @@ class Problem:
     @cached_property
     def driven(self) -> list[tuple[Indices, list[Driven]]]:
         """Parts by their numbers, and by harmonics whose matrices are the same, what moves the coordinates of them."""
-        found: dict[Any, list[int]] = {}
-        for parts, _ in self.alike:
-            for i in parts:
-                key = tuple((tuple(d.harmonics), d.given.shape) for d in self.eliminated[i].driven)
-                found.setdefault(key, []).append(int(i))
-        each = [(parts, zip(*(self.eliminated[i].driven for i in parts), strict=True)) for parts in found.values()]
-        return [(np.array(parts), [Driven.of(together) for together in own]) for parts, own in each]
+        order = np.concatenate([parts for parts, _ in self.alike])
+        moved = [self.eliminated[i].driven for i in order]
+        kinds = grouped(tuple((tuple(d.harmonics), d.given.shape) for d in own) for own in moved)
+        each = [(order[same], zip(*(moved[i] for i in same), strict=True)) for same in kinds]
+        return [(parts, [Driven.of(together) for together in own]) for parts, own in each]
 
     @cached_property
     def _softer(self) -> Problem:
@@ -472,8 +474,8 @@ class AtFrequency:
     def tried(self, x: Array, near: Tried | None = None) -> tuple[Array, Tried]:
         """`residual`, and what it is of. near: of a motion near by."""
         moved = self._moved(x)
-        known = [k for *_, k in near] if near else [None] * len(moved)
-        pairs = zip(moved, known, strict=True)
+        before = [k for *_, k in near] if near else [None] * len(moved)
+        pairs = zip(moved, before, strict=True)
         tried = [(u, *g.near(u, self.period, k)) for (g, u), k in pairs]
         return self.residual_of(x, self.along([F for _, F, _ in tried])), tried
 
@@ -690,11 +692,9 @@ def of(
     together = together or assembly.stuck_damping is not None or bool(assembly.flow)
     contacts = assembly.contacts
     begins, where = _numbered(assembly, together)
-    groups, alike = [], dict[Any, list[int]]()
-    for i, c in enumerate(contacts):
-        kind = id(c.patch) if models else by_hand.alike(c.patch)
-        alike.setdefault((kind, c.second is None), []).append(i)
-    for same in alike.values():
+    kind: Callable[[Any], Any] = id if models else by_hand.alike
+    groups = []
+    for same in grouped((kind(c.patch), c.second is None) for c in contacts):
         patches = [contacts[i].patch for i in same]
         model = (models or {}).get(same[0]) or by_hand.model(patches, samples, cycles, periodicity)
         first = np.array([where[i, 0] for i in same])
@@ -726,10 +726,10 @@ def _no_stiffer(part: Linear, stiffness: Array) -> Array:
     if not elastic.size:
         return stiffness
     yields = (np.abs(part.rows @ shapes) ** 2 / np.maximum(squares, elastic.min())).sum(axis=1)
-    over = np.diag(stiffness) * (yields + np.diag(part.residual)) / STIFFER
-    if not (over > 1).any():
+    excess = np.diag(stiffness) * (yields + np.diag(part.residual)) / STIFFER
+    if not (excess > 1).any():
         return stiffness
-    less = 1 / np.sqrt(np.maximum(over, 1.0))
+    less = 1 / np.sqrt(np.maximum(excess, 1.0))
     return stiffness * less * less[:, None]
 
 
@@ -754,12 +754,12 @@ RIGID = 1e-9
 
 def _eliminated(assembly: Assembly, harmonics: int, together: bool) -> tuple[tuple[Linear, ...], ...]:
     """`eliminated` in the harmonics 0 to H; those of one wave that nothing drives are the same."""
-    driven, known = {0, *(x.harmonic for x in assembly.loads)}, dict[Any, tuple[Linear, ...]]()
+    driven, made = {0, *(x.harmonic for x in assembly.loads)}, dict[Any, tuple[Linear, ...]]()
     kinds = [(True, h) if h in driven else (False, assembly.index(h)) for h in range(harmonics + 1)]
     for h, kind in enumerate(kinds):
-        if kind not in known:
-            known[kind] = eliminated(assembly, h, together)
-    return tuple(known[kind] for kind in kinds)
+        if kind not in made:
+            made[kind] = eliminated(assembly, h, together)
+    return tuple(made[kind] for kind in kinds)
 
 
 def eliminated(assembly: Assembly, harmonic: int, together: bool) -> tuple[Linear, ...]:
@@ -784,9 +784,9 @@ def moves_by(assembly: Assembly) -> float:
     gapes, how far the loads move the stiffest."""
     pairs = [(abs(float(c.preload[0])) * 0.3, float(np.diag(c.stiffness)[:2][-1])) for c in assembly.contacts]
     gaps = [-float(c.offset[0]) for c in assembly.contacts]
-    told = [c.length for c in assembly.contacts if c.length]
-    moved = max([*(limit / k for limit, k in pairs if k), *gaps, *told], default=0.0)
-    if moved <= 0:
+    lengths = [c.length for c in assembly.contacts if c.length]
+    reach = max([*(limit / k for limit, k in pairs if k), *gaps, *lengths], default=0.0)
+    if reach <= 0:
         stiffest = max((float(np.diag(c.stiffness)[:3].max()) for c in assembly.contacts), default=0.0)
-        moved = max((abs(x.amplitude) for x in assembly.loads), default=0.0) / stiffest if stiffest else 0.0
-    return max(moved, 1e-9)
+        reach = max((abs(x.amplitude) for x in assembly.loads), default=0.0) / stiffest if stiffest else 0.0
+    return max(reach, 1e-9)

@@ -77,11 +77,11 @@ def _through(p: Problem, weights: ComplexArray, slopes: list[Array], harmonic: i
     """(W, c) derivative of weights (c,) times the forces' amplitude."""
     out = np.zeros((p.coefficients, p.count), dtype=complex)
     for g, S in zip(p.groups, slopes, strict=True):
-        own = weights[g.first] - (0.0 if g.second is None else weights[g.second])
-        found = sum(unit * np.einsum("nk,nklz->znl", own, S[:, :, wave]) for wave, unit in _waves(harmonic))
-        out[:, g.first] += found
+        weight = weights[g.first] - (0.0 if g.second is None else weights[g.second])
+        gained = sum(unit * np.einsum("nk,nklz->znl", weight, S[:, :, wave]) for wave, unit in _waves(harmonic))
+        out[:, g.first] += gained
         if g.second is not None:
-            out[:, g.second] -= found
+            out[:, g.second] -= gained
     return out
 
 

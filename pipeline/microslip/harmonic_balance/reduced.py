@@ -224,24 +224,24 @@ class Eliminated:
         that the numbers subtracted are without bounds."""
         if self.poles is not None:
             return joined(self.poles, Omega)
-        found = [seen(part, self.stiffness, Omega, h) for h, part in enumerate(self.parts)]
-        for s in found:  # how fast the coordinates change with the frequency
+        views = [seen(part, self.stiffness, Omega, h) for h, part in enumerate(self.parts)]
+        for s in views:  # how fast the coordinates change with the frequency
             moved = np.column_stack([s.modal, s.modal_compliance])
             rates = np.column_stack([s.modal_rate, s.modal_compliance_rate])
             if not Omega * largest(rates) * MET <= largest(moved):
                 return None
-        return _view(found)
+        return _view(views)
 
     @cached_property
     def driven(self) -> list[Driven]:
         """By equal matrices, what loads and contact forces beyond those of k do."""
-        found = []
+        out = []
         for same in self._same:
             part, T = self.parts[same[0]], self.parts[same[0]].rows
             _, W, held, stiff = taken_in(part, self.stiffness)
             loads = np.array([self.parts[i].load - T.conj().T @ (held @ self.parts[i].given) for i in same])
-            found.append(Driven(np.array(same), stiff, part.M, part.C, loads, (T.conj().T @ W).T))
-        return found
+            out.append(Driven(np.array(same), stiff, part.M, part.C, loads, (T.conj().T @ W).T))
+        return out
 
     def directly(self, Omega: float) -> View:
         """The same from the equations themselves: at a single frequency less work than the eigenvalues."""
@@ -265,8 +265,8 @@ class Eliminated:
 
         So it is of a body that moves freely without its contacts feeling it, or whose eigenvectors nearly coincide.
         """
-        found = [self._of(group) for group in self._same]
-        return None if any(one is None for one in found) else [one for one in found if one is not None]
+        each = [self._of(group) for group in self._same]
+        return None if any(one is None for one in each) else [one for one in each if one is not None]
 
     def _of(self, harmonics: list[int]) -> Poles | None:
         part = self.parts[harmonics[0]]
@@ -279,10 +279,10 @@ class Eliminated:
         if np.abs(values).min() <= 1e-13 * np.abs(values).max():
             return None
         W = np.linalg.solve(V, np.vstack([np.zeros((m, m)), np.linalg.inv(part.M)]))
-        given = [self.parts[h].given for h in harmonics]
-        loads = [self.parts[h].load - T.conj().T @ (held @ e) for h, e in zip(harmonics, given, strict=True)]
+        loaded = [self.parts[h].given for h in harmonics]
+        loads = [self.parts[h].load - T.conj().T @ (held @ e) for h, e in zip(harmonics, loaded, strict=True)]
         driven = np.array([np.column_stack([f, T.conj().T @ right]) for f in loads])
-        static = np.array([P @ np.column_stack([e, part.yielding]) for e in given])
+        static = np.array([P @ np.column_stack([e, part.yielding]) for e in loaded])
         poles = Poles(np.array(harmonics), values, P @ T @ V[:m], W @ driven, static)
         return poles if self._right(poles) else None
 
@@ -306,12 +306,12 @@ class Eliminated:
 
 def joined(poles: Sequence[Poles], Omega: float) -> View | None:
     """Of all harmonics together; None where `Poles.at` is."""
-    found = [group.at(Omega) for group in poles]
-    if len(found) == 1 or any(one is None for one in found):
-        return found[0] if len(found) == 1 else None
+    each = [group.at(Omega) for group in poles]
+    if len(each) == 1 or any(one is None for one in each):
+        return each[0] if len(each) == 1 else None
     *n, _, c, columns = poles[0].static.shape
     both = np.empty((*n, 2, sum(len(group.harmonics) for group in poles), c, columns), complex)
-    for group, one in zip(poles, found, strict=True):
+    for group, one in zip(poles, each, strict=True):
         both[..., group.harmonics, :, :] = one
     return both
 
@@ -395,10 +395,10 @@ def monitored(part: Linear | ReadOuts, q: ComplexArray, force: ComplexArray, sha
 def read(parts: Sequence[Linear | ReadOuts], q: ComplexArray, force: ComplexArray, share: float = 1.0) -> ComplexArray:
     """(w, g) read-outs by coordinates (g, m), contact forces (g, c) less the preload, and a share of the loads, over g
     harmonics of one wave; parts (g,), equal but for the loads. What is rounding is zero."""
-    output, given = parts[0].output, np.array([part.output_given for part in parts]).T
-    found = output @ q.T - parts[0].output_residual @ force.T + share * given
+    output, loaded = parts[0].output, np.array([part.output_given for part in parts]).T
+    values = output @ q.T - parts[0].output_residual @ force.T + share * loaded
     moved = np.sqrt((output != 0) @ np.abs(q.T) ** 2)  # of the coordinates that a read-out has to do with
-    return np.where(np.abs(found) <= READS * np.linalg.norm(output, axis=1)[:, None] * moved, 0.0, found)
+    return np.where(np.abs(values) <= READS * np.linalg.norm(output, axis=1)[:, None] * moved, 0.0, values)
 
 
 def work(

@@ -86,7 +86,7 @@ def operating(problem: Problem, point: Point) -> Operating:
             if hs[0]:
                 work += reduced.work(parts, at.Omega, hs, own, F, share)
                 driven += reduced.work(parts, at.Omega, hs, np.array([alone[h][i] for h in hs]), 0 * F, share)[2]
-    found = Operating(
+    motion = Operating(
         at.Omega,
         {m.name: list(own) for m, own in zip(bodies, zip(*each, strict=True), strict=True)},
         outputs,
@@ -99,7 +99,7 @@ def operating(problem: Problem, point: Point) -> Operating:
         float(work[3]),
         _by_contact(p, cycles),
     )
-    return replace(found, checks=checks(p, found))
+    return replace(motion, checks=checks(p, motion))
 
 
 def traced(problem: Problem, found: Operating) -> dict[str, Traced]:
@@ -143,7 +143,7 @@ class HarmonicResponse(FrequencyResponse):
     def columns(self) -> dict[str, Array]:
         name, a = self.quantity.column, without_rounding(self.harmonics)
         more = {name(f"amplitude_{h}"): np.abs(a[:, h]) for h in range(2, a.shape[1])}
-        found = {
+        table = {
             name("mean"): a[:, 0].real,
             **more,
             "slip_dissipated_J": self.by_slip,
@@ -152,7 +152,7 @@ class HarmonicResponse(FrequencyResponse):
         }
         return {
             **super().columns(),
-            **of_solutions(found, self.converged),
+            **of_solutions(table, self.converged),
             "harmonics": np.full(len(self.frequency), self.harmonics.shape[1] - 1.0),
             "iterations": self.iterations.astype(float),
         }
@@ -275,11 +275,11 @@ def unsolved(response: HarmonicResponse, folds: Sequence[Resonance] = ()) -> str
     """Where the curve turns back, how many points have no solution, and where the first one is; nothing where there is
     none of these."""
     failed = np.flatnonzero(~response.converged)
-    said = [f"the curve turns back at {one.frequency:.6g} Hz, at a fold" for one in folds]
+    parts = [f"the curve turns back at {one.frequency:.6g} Hz, at a fold" for one in folds]
     if len(failed):
         points = counted(len(response.frequency), "point")
-        said.append(f"{len(failed)} of {points} did not converge, first at {response.frequency[failed[0]]:.6g} Hz")
-    return "; ".join(said)
+        parts.append(f"{len(failed)} of {points} did not converge, first at {response.frequency[failed[0]]:.6g} Hz")
+    return "; ".join(parts)
 
 
 def parted(
@@ -298,8 +298,8 @@ def refined_peaks(problem: Problem, response: HarmonicResponse) -> list[Resonanc
     read-out that does not move."""
     if still(response):
         return []
-    found = [highest(problem, response, bracket) for bracket in brackets(response)]
-    return resonances(response, [Resonance(p.Omega / (2 * np.pi), a, p.x) for p, a in filter(None, found)])
+    tops = [highest(problem, response, bracket) for bracket in brackets(response)]
+    return resonances(response, [Resonance(p.Omega / (2 * np.pi), a, p.x) for p, a in filter(None, tops)])
 
 
 def highest(problem: Problem, response: HarmonicResponse, bracket: tuple[int, int, int]) -> tuple[Point, float] | None:
@@ -310,10 +310,10 @@ def highest(problem: Problem, response: HarmonicResponse, bracket: tuple[int, in
     points but not beyond the band. Where the climb fails the highest of the points stands for it.
     """
     f, (low, top, high) = response.frequency, bracket
-    own = Point(2 * np.pi * float(f[top]), response.x[top], CONVERGED, response.error[top], 0)
-    tried = [(own, float(abs(response.monitor[top])))]
+    begin = Point(2 * np.pi * float(f[top]), response.x[top], CONVERGED, response.error[top], 0)
+    tried = [(begin, float(abs(response.monitor[top])))]
 
-    def amplitude(at: float, start: Array = own.x) -> float:
+    def amplitude(at: float, start: Array = begin.x) -> float:
         point = solve(problem, 2 * np.pi * at, [start])
         found = operating(problem, point)
         point = judged(point, found.checks)
@@ -384,23 +384,23 @@ def filled_response(
         one, other = solved[low][0], solved[high][0]
         before = [f for f in solved if low < f < high]
         if len(before) < one.converged + other.converged:
-            told = ""
+            said_last = ""
             for point in last_solutions(problem, one, other):
                 words = f"a point is added at {point.Omega / (2 * np.pi):.6g} Hz, where the curve ends"
-                if words != told:  # both sides of a fold may read alike
-                    report(told := words)
+                if words != said_last:  # both sides of a fold may read alike
+                    report(said_last := words)
                 take(point.Omega / (2 * np.pi), point, True)
     chosen = asked + [f for f in solved if f not in asked]
-    points, found = zip(*(solved[f] for f in chosen), strict=True)
-    return of_points(problem, points, found, frequency)
+    points, motions = zip(*(solved[f] for f in chosen), strict=True)
+    return of_points(problem, points, motions, frequency)
 
 
 def hidden(problem: Problem, frequency: Array) -> list[float]:
     """Hz of resonances that a sweep may step over, see `sweeps.hidden`: of sticking contacts, and of none."""
     if not problem.assembly.loads:
         return []
-    found = sticking_and_free(problem.assembly)
-    return sweeps.hidden(np.asarray(frequency, dtype=float), *found)
+    modes_and_damping = sticking_and_free(problem.assembly)
+    return sweeps.hidden(np.asarray(frequency, dtype=float), *modes_and_damping)
 
 
 def between(problem: Problem, points: Sequence[Point], frequency: float) -> Point:
@@ -424,7 +424,7 @@ def last_solutions(problem: Problem, low: Point, high: Point) -> list[Point]:
     It ends at a fold, beyond which the vibration is another one, or where no solution is found. None are told if both
     points are of one curve.
     """
-    given = (low.Omega, high.Omega)
+    ends_asked = (low.Omega, high.Omega)
     for _ in range(HALVINGS):
         both = low.converged and high.converged
         if both and _apart(problem, low.x, high.x) <= JUMP:
@@ -434,17 +434,17 @@ def last_solutions(problem: Problem, low: Point, high: Point) -> list[Point]:
         if not good or (both and _lead_to_each_other(problem, low, high)):
             return []
         at = problem.at(0.5 * (low.Omega + high.Omega))
-        found = next((p for g in good if (p := newton(at, g.x, most=20, slope=g.slope)).converged), None)
-        if found is None and both:
+        middle = next((p for g in good if (p := newton(at, g.x, most=20, slope=g.slope)).converged), None)
+        if middle is None and both:
             break
-        if found is None:  # the end lies on this side of the middle
+        if middle is None:  # the end lies on this side of the middle
             nothing = Point(at.Omega, good[0].x, "", np.inf, 0)
             low, high = (low, nothing) if low.converged else (nothing, high)
-        elif _apart(problem, low.x, found.x) < _apart(problem, found.x, high.x) if both else low.converged:
-            low = found
+        elif _apart(problem, low.x, middle.x) < _apart(problem, middle.x, high.x) if both else low.converged:
+            low = middle
         else:
-            high = found
-    return [p for p in (low, high) if p.converged and p.Omega not in given]
+            high = middle
+    return [p for p in (low, high) if p.converged and p.Omega not in ends_asked]
 
 
 def _with_slope(problem: Problem, point: Point) -> Point:

@@ -270,10 +270,10 @@ def from_rest(problem: Problem, Omega: float) -> Point:
         point, q = trial, step.modal(trial.x, step.force(trial.x))
         rate *= 0.5
         if rate < LAST * Omega and count % 3 == 0:
-            found = _ended(at, point, q)
-            spent += found.iterations
-            if found.converged or found.away:
-                return replace(found, iterations=spent)
+            last = _ended(at, point, q)
+            spent += last.iterations
+            if last.converged or last.away:
+                return replace(last, iterations=spent)
     error = float(np.abs(at.residual(point.x)).max() / max(np.abs(point.x).max(), 1e-300))
     return Point(Omega, point.x, f"no rest in {SLOW} steps of pseudo-time", error, spent)
 
@@ -294,18 +294,18 @@ TOLERANCE = 1e-9
 def _ended(at: AtFrequency, point: Point, q: pseudo_transient.Places) -> Point:
     """Newton's method where pseudo-time ends; where that fails, with the place of what nothing holds left as it is."""
     rises = _rises(at.problem)
-    found = newton(at, point.x, most=20 if rises else 10, slope=point.slope, rises=rises)
-    if found.converged or not pseudo_transient.unheld(at.problem):
-        return found
-    held = pseudo_transient.in_place(at, q)
-    fixed = newton(held, point.x, most=20)
-    spent = found.iterations + fixed.iterations
+    direct = newton(at, point.x, most=20 if rises else 10, slope=point.slope, rises=rises)
+    if direct.converged or not pseudo_transient.unheld(at.problem):
+        return direct
+    in_place = pseudo_transient.in_place(at, q)
+    fixed = newton(in_place, point.x, most=20)
+    spent = direct.iterations + fixed.iterations
     if not fixed.converged:
-        return replace(found, iterations=spent)
+        return replace(direct, iterations=spent)
     last = newton(at, fixed.x, most=1)
     if last.converged:
         return replace(last, iterations=spent)
-    force, whom = pseudo_transient.unbalanced(at, q, held.modal(fixed.x, held.force(fixed.x)))
+    force, whom = pseudo_transient.unbalanced(at, q, in_place.modal(fixed.x, in_place.force(fixed.x)))
     words = (
         f"{whom} {AWAY}: nothing balances a mean force of {force:.2g} N on it; give the body weak_springs or a spring"
     )

@@ -62,11 +62,11 @@ class Solved(TwoTones):
         if other.status != CONVERGED:
             return float("inf")
         a, b = (_amplitudes(*one)[readout] for one in ((self.balances[i], own), (finer, other)))
-        known = {tuple(k): v for k, v in zip(self.pairs.tolist(), a, strict=True)}
+        by_pair = {tuple(k): v for k, v in zip(self.pairs.tolist(), a, strict=True)}
         pairs = [(0, 0), *map(tuple, finer.torus.pairs.tolist())]
         size = largest(a[1:]) or 1.0
-        turn = _turned(known, dict(zip(pairs, b, strict=True))) if self.balances[i].free else 0.0
-        change = [known.get(k, 0.0) - v * np.exp(1j * k[1] * turn) for k, v in zip(pairs, b, strict=True)]
+        turn = _turned(by_pair, dict(zip(pairs, b, strict=True))) if self.balances[i].free else 0.0
+        change = [by_pair.get(k, 0.0) - v * np.exp(1j * k[1] * turn) for k, v in zip(pairs, b, strict=True)]
         return float(3 * np.abs(change).max() / size)
 
 
@@ -102,20 +102,20 @@ def _spread(b: TwoTone, x: Array, other: TwoTone) -> Array:
 
 def solve(b: TwoTone, first: float, second: float, starts: Sequence[Array]) -> TwoTonePoint:
     """A motion at two frequencies (rad/s), from one of several starts or led there from little load."""
-    found = None
+    solution = None
     for x in starts:
         own = replace(b, reference=b.displacement(x)) if b.free else b
-        found = newton(own, x, first)
-        if found.converged:
+        solution = newton(own, x, first)
+        if solution.converged:
             break
-    if found is None or not (found.converged or b.free):
-        found = _led(b, first) or found or newton(b, np.zeros(b.size), first)
-    status = CONVERGED if found.converged else found.status
+    if solution is None or not (solution.converged or b.free):
+        solution = _led(b, first) or solution or newton(b, np.zeros(b.size), first)
+    status = CONVERGED if solution.converged else solution.status
     if b.free:
-        second = float(found.x[-1])
-        if status == CONVERGED and not _vibrates(b, found.x):
+        second = float(solution.x[-1])
+        if status == CONVERGED and not _vibrates(b, solution.x):
             status = "the second tone has died out: the motion repeats with the first one; start from another motion"
-    return TwoTonePoint(first, second, found.x, status, found.error)
+    return TwoTonePoint(first, second, solution.x, status, solution.error)
 
 
 def _vibrates(b: TwoTone, x: Array) -> bool:
@@ -127,15 +127,15 @@ def _vibrates(b: TwoTone, x: Array) -> bool:
 
 def _led(b: TwoTone, first: float) -> Any:
     """The solution of the whole loads by growing shares of them; None where one is not found."""
-    x, share, step, found = np.zeros(b.size), 0.0, 0.25, None
+    x, share, step, solution = np.zeros(b.size), 0.0, 0.25, None
     while share < 1.0:
         tried = min(1.0, share + step)
-        found = newton(replace(b, shares=(tried, tried)), x, first)
-        if found.converged:
-            x, share, step = found.x, tried, 1.5 * step
+        solution = newton(replace(b, shares=(tried, tried)), x, first)
+        if solution.converged:
+            x, share, step = solution.x, tried, 1.5 * step
         elif (step := 0.5 * step) < SMALLEST:
             return None
-    return found
+    return solution
 
 
 SERIES = "two tones"
@@ -147,16 +147,16 @@ def swept(
 ) -> Solved:  # fmt: skip
     """Motions at frequencies (f,), rad/s, each from its neighbours. start: (n,) unknowns of the first one. kept: holds
     those that are known from a run that did not end, and each by its number the moment it is found."""
-    points, balances, known = list[TwoTonePoint](), list[TwoTone](), [] if start is None else [start]
+    points, balances, solutions = list[TwoTonePoint](), list[TwoTone](), [] if start is None else [start]
     for i, (one, two) in enumerate(zip(first.tolist(), second.tolist(), strict=True)):
-        here = b.at(one, known[-1][-1] if b.free else two)
-        starts = [*known[::-1][:1], *([] if b.free else [np.zeros(b.size)])]
+        here = b.at(one, solutions[-1][-1] if b.free else two)
+        starts = [*solutions[::-1][:1], *([] if b.free else [np.zeros(b.size)])]
         row = once(kept, SERIES, i, lambda: solve(here, one, two, starts)._asdict())  # noqa: B023
         found = TwoTonePoint(**row)
         points.append(found)
         balances.append(here)
         if found.status == CONVERGED:
-            known.append(found.x)
+            solutions.append(found.x)
         report(f"{i + 1} of {len(first)} points, {hertz(one / (2 * np.pi))} and {hertz(found.second / (2 * np.pi))}")
     return of_points(points, balances)
 
@@ -191,13 +191,14 @@ def _said(points: Sequence[TwoTonePoint], b: TwoTone) -> tuple[str, ...]:
 
 class _Shown(NamedTuple):
     """Of the mean and every pair: parts, |k . omega|, amplitudes of bodies q and contact forces F, conjugate where the
-    frequency is negative; (P + 1,) signs."""
+    frequency is negative; (P + 1,) signs. force: (W, c) of the contacts."""
 
     parts: list[Any]
     w: Array
     q: list[Any]
     F: list[Any]
     sign: Array
+    force: Array
 
 
 def _shown(b: TwoTone, p: TwoTonePoint) -> _Shown:
@@ -208,7 +209,7 @@ def _shown(b: TwoTone, p: TwoTonePoint) -> _Shown:
     F, g = stacked.complex(force), stacked.complex(force - v @ b.problem.stiffness[0].T)
     q = [one.modal - one.modal_compliance @ own for one, own in zip(views, g, strict=True)]
     parts = [b.parts[0, 0], *(b.linear(k)[0] for k in b.torus.pairs)]
-    return _Shown(parts, np.append(0.0, np.abs(w)), q, list(F), stacked.sign)
+    return _Shown(parts, np.append(0.0, np.abs(w)), q, list(F), stacked.sign, force)
 
 
 def _amplitudes(b: TwoTone, p: TwoTonePoint) -> Array:
@@ -226,10 +227,8 @@ def _powers(b: TwoTone, p: TwoTonePoint) -> list[float]:
             done, lost, *_ = reduced.work([part], float(w), [1], q[None], F[None])
             supplied[int(k[0] == 0)] += done * w / (2 * np.pi)
             damped += lost * w / (2 * np.pi)
-    v = b.displacement(p.x)
-    into = b.forces(v, p.first, p.second, slopes=False)[0]
-    speed = differentiated(b.torus.frequencies(p.first, p.second)) @ v
-    exchanged = 0.5 * float((into[1:] * speed[1:]).sum())
+    speed = differentiated(b.torus.frequencies(p.first, p.second)) @ b.displacement(p.x)
+    exchanged = 0.5 * float((s.force[1:] * speed[1:]).sum())
     return [*supplied, damped, exchanged, b.lost(p.x, p.first)]
 
 
@@ -265,9 +264,9 @@ def from_time(b: TwoTone, time: Array, d: Array, first: float, around: float) ->
     def missed(second: float) -> float:
         return fitted(second, few)[1]
 
-    found = scipy.optimize.minimize_scalar(missed, bounds=bounds, method="bounded", options=options)
-    c = fitted(float(found.x), b.torus)[0]
-    x = np.append(c.ravel(), found.x)
+    fit = scipy.optimize.minimize_scalar(missed, bounds=bounds, method="bounded", options=options)
+    c = fitted(float(fit.x), b.torus)[0]
+    x = np.append(c.ravel(), fit.x)
     if not _vibrates(b, x):
         raise UserError("second: the motion in time shows no second frequency near it; correct second, or the start")
     return b, x

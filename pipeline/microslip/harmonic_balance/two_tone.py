@@ -113,9 +113,9 @@ class TwoTone:
         Raises:
             UserError: contacts that remember while the two have a common period.
         """
-        found = replace(self, second=second, lam_scale=first)
+        other = replace(self, second=second, lam_scale=first)
         if not any(one.remember for one in self.contacts):
-            return found
+            return other
         small = commensurate(first, second, self.torus.order)
         if small and not self.free:
             raise UserError(
@@ -124,7 +124,7 @@ class TwoTone:
                 f"{small[1]} of their common frequency and use harmonic_response"
             )
         torus = replace(self.torus, turns=closed(first, second, self.least))
-        return replace(found, torus=torus, contacts=tuple(one.on(torus) for one in self.contacts))
+        return replace(other, torus=torus, contacts=tuple(one.on(torus) for one in self.contacts))
 
     def frequencies(self, x: Array, first: float) -> tuple[float, float]:
         """rad/s."""
@@ -143,12 +143,12 @@ class TwoTone:
     def views(self, first: float, second: float) -> list[reduced.Seen]:
         """Of the mean and every pair, at their frequencies; of negative ones conjugate."""
         w, k = self.torus.frequencies(first, second), self.problem.stiffness[0]
-        found = [reduced.seen(self.parts[0, 0], k, 0.0, 0)]
+        seen = [reduced.seen(self.parts[0, 0], k, 0.0, 0)]
         for pair, one in zip(self.torus.pairs, w, strict=True):
             part, share = self.linear(pair)
             part = replace(part, load=share * part.load, given=share * part.given)
-            found.append(reduced.seen(part, k, float(abs(one)), 1))
-        return found
+            seen.append(reduced.seen(part, k, float(abs(one)), 1))
+        return seen
 
     def evaluate(self, x: Array, lam: float) -> tuple[Array, Array, Array]:
         """R, dR/dx and dR/dlam; of a free second frequency with the phase condition as the last row."""
@@ -212,12 +212,12 @@ class TwoTone:
         rates = [t.values @ differentiated(t.pairs[:, i]) for i in (0, 1)]
         ahead = first * rates[0] + second * rates[1]
         F, S, D = map(np.asarray, _pointwise(one.law, one.kinematics, u, one.ground, t.values, ahead))
-        found = np.einsum("ws,scj->cjw", t.transform, F)
+        force = np.einsum("ws,scj->cjw", t.transform, F)
         if not slopes:
-            return found, np.zeros(0), none
+            return force, np.zeros(0), none
         moved = [np.einsum("scab,sx,cbx->sca", D, rate, u, optimize=True) for rate in rates]
         by_tone = np.array([np.einsum("ws,scj->cjw", t.transform, m) for m in moved])
-        return found, self._transformed(S, D, ahead), by_tone
+        return force, self._transformed(S, D, ahead), by_tone
 
     def _transformed(self, S: Array, D: Array, ahead: Array) -> Array:
         """(c, k, W, k, W) from slopes over displacement and velocity at the samples, (S, c, k, k)."""
@@ -333,8 +333,9 @@ def of(
     problem = balance.of(plain, 1, form="relative")
     torus = Torus(order, closed(first, second, turns), samples * round(1.5 * turns))  # one program for all lines
     groups = tuple(_contacts(g, grounds, torus) for g in problem.groups)
-    made = TwoTone(problem, _parts(assembly, order), groups, torus, second, free=free, lam_scale=first, least=turns)
-    return made.at(first, second)
+    parts = _parts(assembly, order)
+    balanced = TwoTone(problem, parts, groups, torus, second, free=free, lam_scale=first, least=turns)
+    return balanced.at(first, second)
 
 
 def _contacts(g: Group, grounds: Sequence[Any], torus: Torus) -> TwoToneContacts:
@@ -347,10 +348,10 @@ def _contacts(g: Group, grounds: Sequence[Any], torus: Torus) -> TwoToneContacts
                 raise UserError("ground: wavy ground has frequencies of its own; leave waviness out")
             ground[i, :, 1:] = moves.velocity * np.array([np.cos(moves.angle), np.sin(moves.angle)])
     made = replace(g.model, samples=torus.count, cycles=CYCLES, periodicity=PERIODICITY, torus=torus)
-    found = TwoToneContacts(g, made, ground.reshape(-1, 3))
-    if found.remember and ground.any():
+    contacts = TwoToneContacts(g, made, ground.reshape(-1, 3))
+    if contacts.remember and ground.any():
         raise UserError("ground: moves under a contact that remembers; take friction by the velocity alone")
-    return found
+    return contacts
 
 
 def _parts(assembly: Assembly, order: int) -> dict[tuple[int, int], Linear]:
@@ -360,9 +361,9 @@ def _parts(assembly: Assembly, order: int) -> dict[tuple[int, int], Linear]:
         loads = tuple(replace(x, tone=1) for x in assembly.loads if x.tone == tone or not x.harmonic)
         return replace(assembly, loads=loads).joined(harmonic)
 
-    found = {(0, 0): linear(1, 0), (1, 1): replace(assembly, loads=()).joined(1)}
+    parts = {(0, 0): linear(1, 0), (1, 1): replace(assembly, loads=()).joined(1)}
     for tone, harmonic in sorted({(x.tone, x.harmonic) for x in assembly.loads if x.harmonic}):
         if harmonic > order:
             raise UserError(f"harmonics: {order} are balanced and a load has harmonic {harmonic}; raise harmonics")
-        found[(harmonic, 0) if tone == 1 else (0, harmonic)] = linear(tone, harmonic)
-    return found
+        parts[(harmonic, 0) if tone == 1 else (0, harmonic)] = linear(tone, harmonic)
+    return parts

@@ -92,31 +92,31 @@ class Ensemble:
     @property
     def unsure(self) -> list[str]:
         """Warnings, in sentences: of the tuned ring's peak, by which amplifications are divided, and of samples."""
-        told, top = [], self.tuned.top
+        warnings, top = [], self.tuned.top
         if top.at_end:
-            told.append(
+            warnings.append(
                 "the tuned ring is highest at an end of the band, so amplifications are over no peak of it; widen the "
                 "sweep."
             )
         elif top.missed > UNSURE:
-            told.append(f"the tuned ring may be {_missed(top.missed)}")
+            warnings.append(f"the tuned ring may be {_missed(top.missed)}")
         ends, off = int(np.nansum(self.column("at_end"))), self.column("missed") > UNSURE
         if ends:
-            told.append(f"in {counted(ends, 'sample')} the highest is at an end of the band; widen the sweep.")
+            warnings.append(f"in {counted(ends, 'sample')} the highest is at an end of the band; widen the sweep.")
         if off.any():
             most = float(self.column("missed")[off].max())
-            told.append(f"{counted(int(off.sum()), 'sample')} may be {_missed(most)}")
+            warnings.append(f"{counted(int(off.sum()), 'sample')} may be {_missed(most)}")
         if self.again and (low := self.lacked) > LEFT + float(self.column("missed")[self.highest]):
-            told.append(
+            warnings.append(
                 f"the first search missed {percent(low)} of the highest sample's peak, so others and the quantiles may "
                 "be as low; give the sweep more points."
             )
         if unsolved := int((self.column("unsolved") > 0).sum()):
-            told.append(
+            warnings.append(
                 f"in {counted(unsolved, 'sample')} no solution was found at some frequencies of the sweep (column "
                 "unsolved); give it more points."
             )
-        return told
+        return warnings
 
     @property
     def amplification(self) -> Array:
@@ -164,10 +164,10 @@ def run(
     if not np.isfinite(tuned.top.amplitude):
         raise UserError("mistuning: the tuned ring has no solution in the band; see what microslip respond says of it")
     rows, envelope = np.zeros((0, len(COLUMNS))), Envelope.empty(len(asked.frequency), tuned.top.amplitude)
-    known = _left(file, inputs)
-    if known.keys() >= {"rows", "sums", "bins", "grids"} and known["rows"].ndim == 2:
-        rows = known["rows"]
-        envelope = Envelope(envelope.unit, known["sums"], known["bins"], list(known["grids"]))
+    kept = _left(file, inputs)
+    if kept.keys() >= {"rows", "sums", "bins", "grids"} and kept["rows"].ndim == 2:
+        rows = kept["rows"]
+        envelope = Envelope(envelope.unit, kept["sums"], kept["bins"], list(kept["grids"]))
     found = Ensemble(asked, tuned, rows, envelope)
     if len(found) > samples:
         found.rows, found.envelope = found.rows[:samples], found.envelope.first(samples)
@@ -258,9 +258,9 @@ def choose(
     report(f"{rare.EACH * samples} samples of the linear ring")
     linear = beside(asked)
     before = np.array([linear(asked.deviations(int(i))) for i in np.flatnonzero(known)])
-    told = rare.correlation(before, found.amplification[known])
+    correlated = rare.correlation(before, found.amplification[known])
     every = np.array([linear(asked.deviations(FIRST + i)) for i in range(rare.EACH * samples)])
-    pi = rare.chances(every, samples, RARE, told, int(known.sum()))
+    pi = rare.chances(every, samples, RARE, correlated, int(known.sum()))
     chosen, inputs = rare.chosen(pi, asked.seed), f"{inputs} {len(found)} {samples}"
     high = _left(file, inputs).get("high", np.zeros(0))
     workers = workers or _cores()
@@ -271,7 +271,7 @@ def choose(
             report(f"{len(high)} of {len(chosen)} chosen samples")
             _keep(file, inputs, high=high)
     solved = np.isfinite(high)
-    return rare.estimate(high[solved] / found.tuned.top.amplitude, pi[chosen][solved], len(pi), RARE, told)
+    return rare.estimate(high[solved] / found.tuned.top.amplitude, pi[chosen][solved], len(pi), RARE, correlated)
 
 
 def _missed(share: float) -> str:

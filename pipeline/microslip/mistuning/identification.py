@@ -118,14 +118,14 @@ def blades_from_modes(
     """
     ring = _Family(np.asarray(tuned, float), np.asarray(share, float), find_tuned, np.shape(shapes)[-1])
     try:
-        found = _fitted(ring, frequency, shapes, frequency_noise, shape_noise)
+        fit = _fitted(ring, frequency, shapes, frequency_noise, shape_noise)
     except UserError:
         if not _in_columns(ring, frequency, shapes, frequency_noise, shape_noise):
             raise
         raise UserError(IN_COLUMNS) from None
-    if not found.fits and _in_columns(ring, frequency, shapes, frequency_noise, shape_noise):
+    if not fit.fits and _in_columns(ring, frequency, shapes, frequency_noise, shape_noise):
         raise UserError(IN_COLUMNS)
-    return found
+    return fit
 
 
 IN_COLUMNS = "shapes: fit as columns and not as rows; give a row for each mode, that is shapes.T"
@@ -133,11 +133,11 @@ IN_COLUMNS = "shapes: fit as columns and not as rows; give a row for each mode, 
 
 def _fitted(ring: _Family, frequency: ArrayLike, shapes: ArrayLike, noise: float, shape_noise: float) -> FromModes:
     measured = _Measured.of(ring, frequency, shapes, noise, shape_noise)
-    found = scipy.optimize.least_squares(
+    fit = scipy.optimize.least_squares(
         lambda y: measured.compare(ring, y)[0], ring.start(measured), lambda y: measured.compare(ring, y)[1],
         x_scale="jac", xtol=1e-12, ftol=1e-12, gtol=1e-12,
     )  # fmt: skip
-    return ring.identified(found.x, found.fun, found.jac)
+    return ring.identified(fit.x, fit.fun, fit.jac)
 
 
 def _in_columns(ring: _Family, frequency: ArrayLike, shapes: ArrayLike, noise: float, shape_noise: float) -> bool:

@@ -65,13 +65,13 @@ class Beside:
         own = self.own(deviations)
         square = np.unique([*self.square, *self.resonances(own)])
         y = self.amplitudes(square, own)
-        known, top = dict(zip(square, y, strict=True)), float(y.max())
+        heights, top = dict(zip(square, y, strict=True)), float(y.max())
         for _ in range(ROUNDS):
-            told = told_by(known)
-            if told is None or told[0] <= (1 + TOLERANCE) * top:
+            parabola = told_by(heights)
+            if parabola is None or parabola[0] <= (1 + TOLERANCE) * top:
                 break
-            known[told[1]] = self.amplitudes(np.array([told[1]]), own)[0]
-            top = max(top, float(known[told[1]].max()))
+            heights[parabola[1]] = self.amplitudes(np.array([parabola[1]]), own)[0]
+            top = max(top, float(heights[parabola[1]].max()))
         return top
 
     def own(self, deviations: Deviations) -> Array:
@@ -155,10 +155,10 @@ def known_of(asked: Asked) -> list[tuple[int, Scatter]]:
     Raises:
         UserError: none.
     """
-    found = [(i, s) for i, s in enumerate(asked.scatter) if s.of in MODAL and asked.tuned.body(s).sectors == 1]
-    if not found:
+    scattered = [(i, s) for i, s in enumerate(asked.scatter) if s.of in MODAL and asked.tuned.body(s).sectors == 1]
+    if not scattered:
         raise UserError("rare: needs blades whose frequency or damping scatters, for the linear ring to tell samples")
-    return found
+    return scattered
 
 
 def held(part: Linear, k: Array) -> Linear:
@@ -197,9 +197,9 @@ def _rise(at: AtFrequency, tuned: Tuned, s: Scatter, mode: int) -> complex:
 
 def answer(at: AtFrequency, slopes: list[Array]) -> ComplexArray:
     """(relative, relative) k of all contacts, from the derivatives of their forces."""
-    found = {}
+    stiffness = {}
     for g, S in zip(at.problem.groups, slopes, strict=True):
         for i, one in zip(g.contacts, S, strict=True):
             cc, ss, cs, sc = one[:, 1, :, 1], one[:, 2, :, 2], one[:, 1, :, 2], one[:, 2, :, 1]
-            found[i] = 0.5 * (cc + ss + 1j * (cs - sc))
-    return np.asarray(scipy.linalg.block_diag(*(found[i] for i in sorted(found))))
+            stiffness[i] = 0.5 * (cc + ss + 1j * (cs - sc))
+    return np.asarray(scipy.linalg.block_diag(*(stiffness[i] for i in sorted(stiffness))))

@@ -14,8 +14,7 @@ from ..errors import UserError
 from ..reduced.coordinates import of_density
 from ..system.assembly import Assembly, Contact, ContactFace, preloaded_contact
 from ..system.component import Component
-from ..system.disc import at_sector
-from ..system.flow import Flow, through
+from ..system.disc import Flow, at_sector, through
 from . import subset
 from .scatter import MODAL, OF_BLADES, Scatter
 
@@ -96,16 +95,16 @@ class Tuned:
                 else:
                     heavier.append((name, s, values[:, 0]))
                 continue
-            for at, own in ((f"{name}_{j}", own) for j, own in enumerate(values)):
+            for j, own in enumerate(values):
+                at = f"{name}_{j}"
                 if s.of == "modal_file":
                     components[at] = replace(self._made(s, own), name=at, aerodynamic=components[at].aerodynamic)
                 elif s.of in OF_BLADES:
                     components[at] = deviated(components[at], s, own)
                 else:
                     contacts[at] = _met(contacts[at], s, float(own[0]))
-            for c in self.pressed_by.get(name, ()) if s.of == "mass" else ():
-                for at, own in ((f"{c}_{j}", own) for j, own in enumerate(values)):
-                    contacts[at] = _pressed(contacts[at], float(own[0]))
+                for c in self.pressed_by.get(name, ()) if s.of == "mass" else ():
+                    contacts[f"{c}_{j}"] = _pressed(contacts[f"{c}_{j}"], float(own[0]))
         for m in self.sector.components:
             if m.name in discs:
                 components[m.name] = subset.mistuned(m, discs[m.name])
@@ -140,13 +139,13 @@ class Tuned:
 
     def _flow(self, deviations: Deviations) -> tuple[Flow, ...]:
         """What the flow adds to the tuned ring, or to the one of other modal files; it knows of no deviations."""
-        found = {f.components: f for f in self.whole.flow}
+        flows = {f.components: f for f in self.whole.flow}
         for s, values in (one for one in deviations if one[0].others):
             body = self.body(s)
             blades = [replace(self._made(s, own), name=f"{body.name}_{j}") for j, own in enumerate(values)]
-            if (names := tuple(b.name for b in blades)) in found:
-                found[names] = through(blades, body.aerodynamic)
-        return tuple(found.values())
+            if (names := tuple(b.name for b in blades)) in flows:
+                flows[names] = through(blades, body.aerodynamic)
+        return tuple(flows.values())
 
     def _alike(self, s: Scatter, sector: int, other: Assembly) -> None:
         """Raise `UserError` where a body of another modal file does not fit into the place of the nominal one."""
@@ -260,11 +259,11 @@ def _pressed(contact: Contact, own: float) -> Contact:
     changed, count = _changed(contact, "normal_force", own)
     if not force and not count:
         raise UserError(f"normal_force: contact '{contact.name}' has none; give it one, or scatter its gap")
-    found = preloaded_contact(
+    pressed = preloaded_contact(
         contact.name, changed.patch, contact.first, contact.second, normal=force * (1 + own),
         compliance=contact.compliance,
     )  # fmt: skip
-    return replace(found, phase=contact.phase, length=contact.length)
+    return replace(pressed, phase=contact.phase, length=contact.length)
 
 
 def _changed(contact: Contact, of: str, own: float) -> tuple[Contact, int]:

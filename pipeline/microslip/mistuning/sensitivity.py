@@ -56,8 +56,8 @@ class Approximation:
 def approximation(asked: Asked, scatter: Scatter) -> Approximation:
     """First order in the deviations of one scatter of frequencies, about the tuned ring's solutions."""
     points = asked.tuned_points
-    found = [sensitivities(asked, scatter, point) for point in points]
-    mean, S = np.array([m for m, _ in found]), np.array([s for _, s in found])
+    each = [sensitivities(asked, scatter, point) for point in points]
+    mean, S = np.array([m for m, _ in each]), np.array([s for _, s in each])
     return Approximation(np.array([p.Omega for p in points]) / (2 * np.pi), mean, S, spread(S, scatter))
 
 
@@ -132,13 +132,13 @@ class LinearisedRing:
                 out[1, s], out[2, s] = -z.real, -z.imag
         c = self.felt(by_force, turned=True) - by_motion
         turned = self.matrix.transposed.solve((c * p.scale).ravel()).reshape(c.shape) / p.scale
-        found: list[list[ComplexArray]] = []
+        pushes: list[list[ComplexArray]] = []
         for h in range(p.harmonics + 1):
             z = turned[0] if h == 0 else turned[2 * h - 1] + 1j * turned[2 * h]
             each = [(*self._of_part(i, h), s) for i, s in enumerate(p.slices)]
-            found.append([np.asarray(-np.linalg.solve(A.T, z[s] @ rows), complex) for A, rows, s in each])
-        found[1] = [z - own[i] for i, z in enumerate(found[1])]
-        return found
+            pushes.append([np.asarray(-np.linalg.solve(A.T, z[s] @ rows), complex) for A, rows, s in each])
+        pushes[1] = [z - own[i] for i, z in enumerate(pushes[1])]
+        return pushes
 
     def _of_part(self, i: int, h: int) -> tuple[ComplexArray, ComplexArray]:
         """A part's dynamic stiffness with contacts of the stiffness taken into it, and what of it they feel."""

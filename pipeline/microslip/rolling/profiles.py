@@ -46,7 +46,7 @@ class CrossSection:
     moved: tuple[float, float] = (0.0, 0.0)
 
     def __repr__(self) -> str:
-        return f"<Profile {self.name}: {len(self.y)} points, y from {self.y[0]:.6g} to {self.y[-1]:.6g} m>"
+        return f"<CrossSection {self.name}: {len(self.y)} points, y from {self.y[0]:.6g} to {self.y[-1]:.6g} m>"
 
     @cached_property
     def curve(self) -> CubicSpline | UnivariateSpline:

@@ -67,14 +67,14 @@ def _family(body: Any, speed: int | None) -> Family:
         body = (body.M, body.C, body.K)
     if not isinstance(body, tuple | list) or len(body) != 3:
         raise UserError("stability: body: give a path, a modal basis or three matrices (M, C, K)")
-    found = [_matrix(A, key) for A, key in zip(body, "MCK", strict=True)]
-    sizes = {key: A.shape[0] for A, key in zip(found, "MCK", strict=True)}
+    matrices = [_matrix(A, key) for A, key in zip(body, "MCK", strict=True)]
+    sizes = {key: A.shape[0] for A, key in zip(matrices, "MCK", strict=True)}
     if len(set(sizes.values())) > 1:
         told = ", ".join(f"{key} {n} x {n}" for key, n in sizes.items())
         raise UserError(f"stability: the matrices are {told}; give them the same size")
-    if any(map(sp.issparse, found)):
-        found = [sp.csr_matrix(A) for A in found]
-    return Family(tuple(MatrixTerm(r, A) for r, A in zip(("mass", "damping", "stiffness"), found, strict=True)))
+    if any(map(sp.issparse, matrices)):
+        matrices = [sp.csr_matrix(A) for A in matrices]
+    return Family(tuple(MatrixTerm(r, A) for r, A in zip(("mass", "damping", "stiffness"), matrices, strict=True)))
 
 
 def _matrix(A: Any, key: str) -> Any:

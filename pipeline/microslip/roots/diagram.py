@@ -147,13 +147,13 @@ def diagram(
     if family.terms[0].matrix.shape[0] > quadratic.DENSE:
         low, high = float(values[0]), float(values[-1])
         basis = sampled(family, parameter, low, high, window, tolerance=tolerance, values=at, report=report)
-    found = []
+    each = []
     for value in values:
         if basis is not None:
-            found.append(basis.at(float(value))[:2])
+            each.append(basis.at(float(value))[:2])
             continue
         s = quadratic.every_value(family.at({**(at or {}), parameter: float(value)}))
         s = s[window.holds(s)]
-        found.append((s[np.argsort(s.imag, kind="stable")], 1e-12 * np.abs(s)))
-    s, error = zip(*found, strict=True)
+        each.append((s[np.argsort(s.imag, kind="stable")], 1e-12 * np.abs(s)))
+    s, error = zip(*each, strict=True)
     return Diagram(parameter, values, s, error, neutral, window, basis)

@@ -77,13 +77,13 @@ class Map(Shown):
     @property
     def limit(self) -> Array:
         """(y,) the smallest value of x at which a root begins to grow, by straight lines; NaN where none does."""
-        found = np.full(len(self.y.values), np.nan)
+        limits = np.full(len(self.y.values), np.nan)
         for i, g in enumerate(self.growth):
             up = np.flatnonzero((g[:-1] <= 0) & (g[1:] > 0))
             if len(up):
                 j = up[0]
-                found[i] = np.interp(0.0, g[j : j + 2], self.x.values[j : j + 2])
-        return found
+                limits[i] = np.interp(0.0, g[j : j + 2], self.x.values[j : j + 2])
+        return limits
 
     @property
     def columns(self) -> dict[str, Array]:

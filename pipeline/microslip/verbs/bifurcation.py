@@ -20,7 +20,6 @@ from ..bifurcation import branches, mechanics
 from ..bifurcation.branches import SPECIAL, DiagramBranch
 from ..bifurcation.diagram import Diagram, DiagramPlan, diagram
 from ..bifurcation.recorded import Branches, write_bifurcation
-from ..case import headline
 from ..errors import NotConverged, UserError, of_file
 from ..files.store import fingerprint, write_text
 from ..files.tables import rows_csv
@@ -106,9 +105,9 @@ def solve(q: Question) -> Answer:
     for asked, one in found:
         files |= _pictures(asked, one, q.built.settings.name)
     return Answer(
-        [*(words for a, one in found for words in told(a, one)), *headline.doubted(q.built, top)],
+        [words for a, one in found for words in told(a, one)],
         tables=[say(READ_AS, tone="note"), *(_points(a, one) for a, one in found)],
-        largest=None,
+        largest=top,
         whole=not any(b.lost for b in every),
         files=files,
     )
@@ -243,9 +242,9 @@ def beside(found: Diagram, p: float) -> str:
 
 
 ANALYSIS = Analysis(
-    name="bifurcation",
-    asks=Keys,
-    solve=solve,
+    "bifurcation",
+    Keys,
+    solve,
     lost="some branches could not be followed to their end",
     needed="keys, start and stop",
     swept=False,

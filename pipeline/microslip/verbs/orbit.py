@@ -13,7 +13,6 @@ from pydantic import BeforeValidator, Field, model_validator
 from scipy.interpolate import CubicHermiteSpline
 
 from ..analysis import Analysis, Answer, Files, Question
-from ..case import headline
 from ..case.assemble import Built
 from ..case.contacts import swept
 from ..case.problem import problem_of
@@ -127,10 +126,13 @@ def solve(q: Question) -> Answer:
     found: Named = [(one.name, one) for one in ran]
     files: Files = {"orbit.csv": partial(write_columns, _columns(found), 8)}
     files["orbit.h5"] = lambda _: None  # is there
+    ends = [_ends(one) for _, one in found if len(one.time)]
+    notes = [words for one in found for words in (_sentence(*one), *_chatter(*one))]
     return Answer(
-        [*_notes(found), *_messages(found, built), *_doubted(found, built, q.asked)],
+        [*notes, *_messages(found, built)],
         tables=_shown(found),
-        largest=None,
+        largest=max((0.5 * (top - low) for top, low in ends), default=0.0),
+        judged={"normal": q.asked.normal_force, "in_time": True},
         whole=not any(np.isfinite(one.diverged) for _, one in found),
         files=files | _pictures(found, built.settings.name),
         moving=lambda folder: _moving(found, built, folder),
@@ -184,11 +186,6 @@ def _run_up(assembly: Assembly, asked: Keys, how: RunUp) -> recorded.Integration
     return recorded.Integration(name, driven, 0, ramp.periods, asked.samples, asked.steps, start)
 
 
-def _notes(found: Named) -> list[str]:
-    """What motions they are, in sentences."""
-    return [words for name, one in found for words in (_sentence(name, one), *_chatter(name, one))]
-
-
 def _messages(found: Named, built: Built) -> list[str]:
     """What a reader must know of them."""
     own = [f"{name}: {words}" for name, one in found for words in one.messages]
@@ -198,14 +195,7 @@ def _messages(found: Named, built: Built) -> list[str]:
         for b in built.settings.components if one.equations.ramp else ():
             if b.pressed_at_rpm is not None:
                 own.append(f"{name}: the contacts of {b.name} stay pressed as at {b.pressed_at_rpm:g} rpm.")
-    return [*own, *built.messages]
-
-
-def _doubted(found: Named, built: Built, asked: Keys) -> list[str]:
-    """What looks like a number in a wrong unit."""
-    ends = [_ends(one) for _, one in found if len(one.time)]
-    swing = max((0.5 * (largest - smallest) for largest, smallest in ends), default=0.0)
-    return headline.doubted(built, swing, asked.normal_force, in_time=True)
+    return own
 
 
 def _sentence(name: str, one: Orbit) -> str:
@@ -323,9 +313,9 @@ def _band(asked: Mapping[str, Any]) -> dict[str, float]:
 
 
 ANALYSIS = Analysis(
-    name="orbit",
-    asks=Keys,
-    solve=solve,
+    "orbit",
+    Keys,
+    solve,
     lost="a motion diverged",
     needed="frequency (Hz), Omega (rad/s) or run_up",
     swept=False,

@@ -169,9 +169,9 @@ def draw_point(motions: TwoTones, i: int, figure: Figure) -> None:
 
 
 ANALYSIS = Analysis(
-    name="two_tones",
-    asks=Keys,
-    solve=solve,
+    "two_tones",
+    Keys,
+    solve,
     lost="some points did not converge",
     needed="start and second (Hz), or ratio",
     swept=False,

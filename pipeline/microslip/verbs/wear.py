@@ -295,8 +295,7 @@ Vibrates = Callable[[Surface, Row | None], Row]
 
 def _course(w: Wearing, asked: Keys, kept: Kept, report: Callable[[str], None]) -> Course:
     """Jump after jump, each made of the one before and kept."""
-    over = w.settings.sweep
-    band = 2 * np.pi * np.linspace(over.start, over.stop, over.points)
+    band = 2 * np.pi * w.settings.sweep.grid
     vibrates = partial(_vibrating, w, asked.frequency, band, report)
     rows, lost = [kept(0.0, partial(_begun, w, asked, vibrates))], ""
     while not lost and rows[-1]["time"] < asked.hours * (1 - SHORTEST):
@@ -592,9 +591,9 @@ def draw_depth(depth: Dataset, figure: Figure) -> None:
 
 
 ANALYSIS = Analysis(
-    name="wear",
-    asks=Keys,
-    solve=solve,
+    "wear",
+    Keys,
+    solve,
     lost="a course of wear ends before its hours",
     needed="coefficient (m3/J) and hours",
 )
