@@ -411,7 +411,12 @@ def whole(tmp_path_factory: pytest.TempPathFactory, undrawn_file: None, unjudged
 
 
 @pytest.mark.parametrize(
-    "wanted", [response.Wanted("resonances"), response.Wanted("none"), response.Wanted("all", False)]
+    "wanted",
+    [
+        response.Wanted("resonances"),
+        pytest.param(response.Wanted("none"), marks=pytest.mark.slow),
+        response.Wanted("all", False),
+    ],
 )
 def test_stresses_and_pictures_can_be_left_out(wanted, whole, tmp_path):
     """The stress of a resonance does not depend on whether it is drawn over the whole sweep."""
