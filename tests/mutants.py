@@ -175,8 +175,8 @@ MISTAKES = (
     Mistake(
         "Floquet: pieces of a period in the wrong order",
         "bifurcation/shooting.py",
-        "found = piece @ found",
-        "found = found @ piece",
+        "product = piece @ product",
+        "product = product @ piece",
         "test_bifurcation.py",
         "test_hopf_normal_form_is_found_with_its_circles",
     ),
@@ -191,8 +191,8 @@ MISTAKES = (
     Mistake(
         "condensed orbits: sign of the sines",
         "bifurcation/balance.py",
-        "found[2 * h - 1], found[2 * h] = part.real, -part.imag",
-        "found[2 * h - 1], found[2 * h] = part.real, part.imag",
+        "D[2 * h - 1], D[2 * h] = part.real, -part.imag",
+        "D[2 * h - 1], D[2 * h] = part.real, part.imag",
         "test_condensed.py",
         "test_derivatives_at_an_orbit_are_those_of_differences",
     ),
@@ -249,7 +249,7 @@ MISTAKES = (
     ),
     Mistake(
         "run-up: sign of the Euler force",
-        "modal/run_up.py",
+        "modal/invariants.py",
         'euler = -np.einsum("nia,ni->a"',
         'euler = np.einsum("nia,ni->a"',
         "test_gyroscopic.py",

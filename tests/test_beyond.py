@@ -287,23 +287,22 @@ def test_a_curve_with_more_harmonics_begins_on_the_motion_that_fewer_tell(case: 
 
 @pytest.mark.slow
 def test_patience_that_ends_is_told_and_more_of_it_goes_on(case: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """The sweep and its resonances stay, what was seen in time is in the table, the sentence says
-    where it ended and what to type; that goes on there, and leaves what was there."""
+    """The sweep and its resonances stay, the sentence says where the motion in time was cut and what to type; with more
+    time there are motions in the table."""
+    table = Path("build/lifting/motions.csv")
 
     def run(patience: float) -> tuple[str, list[dict], dict]:
         assert main(["respond", "case.toml", "--set", f"sweep.patience={patience:g}"]) == 0
-        rows = list(csv.DictReader(Path("build/lifting/motions.csv").open()))
+        rows = list(csv.DictReader(table.open())) if table.exists() else []
         return capsys.readouterr().err, rows, json.loads(Path("build/lifting/response.json").read_text())
 
     said, rows, summary = run(1e-3)
     ends = "Motions in time ended with their share of 0.001 s, downwards before "
     assert ends in said and "--set sweep.patience=0.002, which goes on from there" in said
-    assert len(rows) == 2 and "known in part" in summary["beyond"][0] and summary["resonances"]
-    begun = said.count("motion in time, ")
-    more, further, after = run(1.0)
-    assert begun == 2 and more.count("motion in time, ") >= len(further) - 2 > 0
-    assert all(row in further for row in rows) and f"{ends[:-11]}" not in more
-    assert after["resonances"] == summary["resonances"]
+    assert not rows and "not known" in summary["beyond"][0] and summary["resonances"]
+    more, further, after = run(10.0)
+    assert said.count("motion in time, ") == 1 and more.count("motion in time, ") >= len(further) > 0
+    assert ends not in more and after["resonances"] == summary["resonances"]
 
 
 def test_a_curve_whose_time_is_over_goes_on_with_more_of_it(case: Path) -> None:

@@ -27,8 +27,8 @@ from microslip.harmonic_balance.solver import solve
 from microslip.results import Response, read_response, write_response
 from microslip.results.checks import COUNTED, cause, check_response, largest, sentence
 from microslip.stages import response as making
-from microslip.stages.following import unreached
 from microslip.stages.surveying import _worst_sentences
+from microslip.verbs.backbone import unreached
 
 pytestmark = pytest.mark.usefixtures("undrawn")
 

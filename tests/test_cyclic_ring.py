@@ -287,7 +287,7 @@ def test_static_compliance_at_every_nodal_diameter():
     from microslip.modal.body_rows import body_rows
 
     described = settings(6, sector())
-    B, labels = body_rows(sector(), described).stacked(described)
+    B, labels = body_rows(sector(), described).stacked
     full = whole()
     lu = sp.linalg.splu(full.K.tocsc())
     for k, group in groups():

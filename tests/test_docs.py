@@ -393,6 +393,7 @@ def test_platforms_page() -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("unestimated")
 def test_own_model_page(tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
     """Everything the page says to type, pictures and friction response as well; the frequency it shows. Where its
     assemblies jump they are not followed in time, which takes up to `sweep.patience` at every place; they have

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -200,18 +201,16 @@ def test_what_moving_ground_gives_is_its_force_times_its_way(taken_along: orbit.
 
 
 def test_the_picture_of_a_motion_has_the_loss_of_its_table(
-    taken_along: orbit.Orbit, monkeypatch: pytest.MonkeyPatch
+    taken_along: orbit.Orbit,
 ) -> None:
     """On moving ground a loop's area is no loss: what stands in the picture is the table's, whatever that says. A long
     title stands in the picture with all of its letters."""
-    from microslip.pictures import orbit as drawing
+    from microslip.pictures.orbit import orbit_picture
+    from microslip.pictures.plots import figure_of
 
-    figures: list = []
-    monkeypatch.setattr(drawing, "save_figure", lambda figure, path: figures.append(figure) or path)
     long = ", ".join(["title", *15 * ["and it does not come back"]])
     row = {"lost_in_contacts_J_per_period": 123.4}
-    drawing.orbit_picture(taken_along, row, Path("orbit.png"), long)
-    (figure,) = figures
+    figure = figure_of(partial(orbit_picture, taken_along, row, title=long))
     titles = [figure.get_suptitle(), *(axes.get_title() for axes in figure.axes)]
     (said,) = [" ".join(t.split()) for t in titles if " J" in t]
     assert said == f"{long}; contacts lose 123.4 J a period"

@@ -23,9 +23,8 @@ from microslip.contact.friction import Coulomb, Falling
 from microslip.contact.heights import Polynomial
 from microslip.contact.law import Law
 from microslip.contact.normal import Normal, Penalty, Preload, Rough
-from microslip.contact.patch import Patch, equilibrium, grid, stuck_stiffness
+from microslip.contact.patch import Patch, equilibrium, grid, stuck_stiffness, thinned
 from microslip.contact.point import PointContact
-from microslip.contact.thinned import thinned
 from microslip.data import ModalBasis, ModalGroup
 from microslip.errors import NotConverged
 from microslip.harmonic_balance import solver

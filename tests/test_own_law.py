@@ -105,6 +105,7 @@ def microslip(where: Path, environment: dict[str, str], *lines: str) -> str:
     return subprocess.run(call, cwd=where, env=environment, capture_output=True, text=True, check=True).stderr
 
 
+@pytest.mark.usefixtures("unestimated")
 @pytest.mark.slow
 def test_a_law_of_another_package_is_named_in_a_case(
     tmp_path: Path, package: dict[str, str], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]

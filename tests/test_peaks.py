@@ -24,7 +24,7 @@ from microslip.harmonic_balance.peak import highest, optimum, resonance
 from microslip.harmonic_balance.readout import amplitude
 from microslip.harmonic_balance.response import filled_response, of_body, operating, refined_peaks
 from microslip.harmonic_balance.solver import solve, sweep
-from microslip.stages.following import missed, optimum_message
+from microslip.verbs.optimum import missed, optimum_message
 
 
 @dataclass(frozen=True)

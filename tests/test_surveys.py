@@ -180,7 +180,7 @@ def test_contacts_of_a_whole_ring_are_drawn_under_their_own_names(ring: Path, mo
 
     titles, draw = list[str](), operating.contact_map_plot
     monkeypatch.setattr(
-        operating, "contact_map_plot", lambda maps, title, path: titles.append(title) or draw(maps, title, path)
+        operating, "contact_map_plot", lambda maps, title, figure: titles.append(title) or draw(maps, title, figure)
     )
     write_basis(ring.with_name("basis.h5"), stressed())
     near = RING.replace("start = 150.0\nstop = 600.0", "start = 225.0\nstop = 235.0").replace("31", "5")

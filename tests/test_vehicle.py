@@ -512,7 +512,7 @@ def test_little_wear_of_given_kinematics_is_that_of_kept_profiles(
     rolling: wearing.RunningVehicle, tmp_path: Path
 ) -> None:
     """What renewing changes, as a share of the depth, goes with the wear to first order."""
-    wheel, off = given(tmp_path, table(rolling, 1)[0], "kinematics.places=24"), []
+    wheel, off = given(tmp_path, table(rolling, 1)[0], *FEW), []
     new = wheel.at(wheel.new(), 0.0)
     for far in (1e3, 2e3, 4e3):
         depth, _, _ = depth_of(wheel, far)
@@ -522,10 +522,10 @@ def test_little_wear_of_given_kinematics_is_that_of_kept_profiles(
 
 
 def test_the_error_of_jumps_by_a_file_is_less_than_they_tell(rolling: wearing.RunningVehicle, tmp_path: Path) -> None:
-    """Against jumps of a quarter."""
+    """Against jumps of a half."""
     wheel = given(tmp_path, table(rolling, 1)[0], *FEW)
     whole, _, told = depth_of(wheel, 1e5)
-    fine, _, less = depth_of(wheel, 1e5, 4)
+    fine, _, less = depth_of(wheel, 1e5, 2)
     assert 0 < np.abs(whole - fine).max() < told and less < told
 
 

@@ -20,10 +20,9 @@ import numpy as np
 
 from ..contact.harmonics import CHUNK, CHUNK_ALONE, force_harmonics, force_near
 from ..contact.law import Law, State, Step, point_axes
-from ..contact.patch import Patch
+from ..contact.patch import Patch, thinned
 from ..contact.periodic import Known, periodic, unknown, with_slopes
 from ..contact.point import PointContact
-from ..contact.thinned import thinned
 from ..data import Array
 from ..programs import often, program, seldom
 from ..series import Torus, derivative, fourier

@@ -14,8 +14,7 @@ from ..errors import UserError
 from ..reduced.coordinates import of_density
 from ..system.assembly import Assembly, Contact, ContactFace, preloaded_contact
 from ..system.component import Component
-from ..system.disc import at_sector
-from ..system.flow import Flow, through
+from ..system.disc import Flow, at_sector, through
 from . import subset
 from .scatter import MODAL, OF_BLADES, Scatter
 

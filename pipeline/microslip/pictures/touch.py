@@ -159,10 +159,10 @@ def _line(axes: Axes, line: Line2D, label: str, pointed: bool) -> list[Trace]:
     colour = to_hex(line.get_color())
     trace: Trace = {"type": "scatter", "x": _numbers(x), "y": _numbers(y), "legendgroup": colour}
     trace |= {"showlegend": bool(label), "name": _text(label), "opacity": line.get_alpha() or 1.0}
-    if line.get_gid():
-        columns = json.loads(line.get_gid())
+    if gid := line.get_gid():
+        columns = json.loads(gid)
         rows = ["<br>".join(f"{name}: {values[i]}" for name, values in columns.items()) for i in range(len(x))]
-        head = _text(line.get_label().removeprefix("_"))
+        head = _text(str(line.get_label()).removeprefix("_"))
         return [trace | {
             "mode": "markers", "marker": {"color": colour, "size": 5, "opacity": 0.35}, "text": rows, "name": head,
             "hovertemplate": f"<b>{head}</b><br>%{{text}}<extra></extra>", "showlegend": False,
@@ -191,7 +191,7 @@ def _collection(some: Any) -> list[Trace]:
     values = some.get_array()
     if isinstance(some, QuadMesh):
         x, y = _edges(some) or (np.zeros(0), np.zeros(0))
-        z = np.ma.filled(np.ma.asarray(values, dtype=float), np.nan).reshape(len(y) - 1, len(x) - 1)
+        z: Array = np.ma.filled(np.ma.asarray(values, dtype=float), np.nan).reshape(len(y) - 1, len(x) - 1)
         logged = isinstance(some.norm, LogNorm)
         bar = some.colorbar
         shown = np.log10(np.where(z > 0, z, np.nan)) if logged else z

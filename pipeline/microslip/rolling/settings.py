@@ -11,7 +11,7 @@ import numpy as np
 from pydantic import BeforeValidator, Field, model_validator
 
 from ..contact.friction import Friction
-from ..contact.keys import FileName, OneOrTwo, Poisson
+from ..contact.kinds import FileName, OneOrTwo, Poisson
 from ..contact.law import value
 from ..contact.settings import AnyFriction, AnyRoughness, _short
 from ..contact.solids import Solid

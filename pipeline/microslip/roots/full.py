@@ -12,7 +12,7 @@ from ..data import ComplexArray
 from ..errors import UserError
 from ..linalg import quadratic, winding
 from ..linalg.quadratic import Quadratic, Window
-from ..modal.unreduced import Unreduced
+from ..modal.compute import Unreduced
 from ..progress import Report
 from ..sliding import Tangent
 from ..system.assembly import Assembly

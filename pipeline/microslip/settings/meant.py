@@ -34,7 +34,8 @@ def meant(path: Path, root: Path = Path("."), case: bool = False) -> Path:
     found = next((p for p in places if p.is_file()), None)
     if found is not None or path.is_file():
         return found or path
-    cases, bodies = ({p.stem for p in root.glob("pipeline/cases/*.toml")}, _bodies_in(root))
+    cases = {p.stem for p in root.glob("pipeline/cases/*.toml")}
+    bodies = {p.parent.name for p in root.glob("geometry/*/body.toml")}
     known, what = sorted(cases if case else cases | bodies), "case" if case else "body or case"
     near = difflib.get_close_matches(name, known, 1)
     said = (
@@ -54,7 +55,3 @@ def case_file(case: Path, root: Path = Path(".")) -> Path:
 
 PRODUCTS = ("basis.h5", "response.h5", "response.csv", "report.html", "response.html")
 """Files in build/NAME that stand for the case or body that they are made of."""
-
-
-def _bodies_in(root: Path) -> set[str]:
-    return {p.parent.name for p in root.glob("geometry/*/body.toml")}

@@ -1,11 +1,13 @@
-"""Any analysis of a case, from its files to tables, files, diagrams and a page; see `microslip.analysis`."""
+"""Any analysis of a case, from its files to tables, files, diagrams and a page, see
+`microslip.analysis`; a case with other values of its keys, and its bodies as they are meshed."""
 
 from __future__ import annotations
 
+import copy
 import json
 import tempfile
-from collections.abc import Callable, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -13,18 +15,28 @@ from typing import Any
 from .. import analysis
 from ..analysis import Analysis, Answer, Question
 from ..case import headline
-from ..errors import UserError, of_file
+from ..case.assemble import Built, build
+from ..case.settings import case_model
+from ..data import Mesh, ModalBasis
+from ..errors import UserError, at, of_file
 from ..files import store
 from ..results import Journal, open_journal
+from ..settings.body import BodySettings
 from ..settings.meant import case_file
 from ..settings.mistakes import validate
+from ..settings.toml import override
+from ..system.assembly import Assembly
+from ..system.settings import load_system
 from .answer import CaseJob, Written, case_job, depends, made
+from .job import open_job
+from .meshing import load_mesh, mesh_stage
+from .places import find_body, lumped
 from .stage import Report, Stage, hash_of_code
-from .varied import Varied
 
 
 def analysed(name: str, case: CaseJob) -> Written:
-    """The answer to what a case asks for in the table of an analysis, made where it is not up to date.
+    """The answer to what a case asks for in the table of an analysis, made where it is not up to
+    date.
 
     Raises:
         UserError: the case asks for nothing, or for what cannot be.
@@ -92,7 +104,9 @@ def _answer(one: Analysis, asked: Any, stage: Stage, case: CaseJob, journal: Jou
     inputs = {**case.inputs, "case": others, "code": hash_of_code(stage.code)}
     own = store.hash_settings(inputs)
     try:
-        answer = one.solve(Question(asked, built, journal, case.report, varied, case.folder, own, case.force))
+        answer = one.solve(
+            Question(asked, built, journal, case.report, varied, case.folder, own, case.force)
+        )
     except UserError as error:
         if error.file is None:
             error.key = ".".join(filter(None, (one.name, error.key)))
@@ -101,3 +115,64 @@ def _answer(one: Analysis, asked: Any, stage: Stage, case: CaseJob, journal: Jou
         return answer
     of_case = [*built.messages, *headline.doubted(built, answer.largest)]
     return replace(answer, sentences=[*answer.sentences, *of_case])
+
+
+OF_SYSTEM = "system."
+"""Begins keys that are those of a system.toml and not of the case."""
+
+
+@dataclass(frozen=True)
+class Varied:
+    """A case. Attributes: path. raw: its text as a table. bases: body -> modal basis."""
+
+    path: Path
+    raw: Mapping[str, Any]
+    bases: Mapping[str, ModalBasis]
+
+    def under(self, values: Mapping[str, float], where: str) -> Assembly:
+        """The assembly of `built`."""
+        return self.built(values, where).assembly
+
+    def built(self, values: Mapping[str, float], where: str) -> Built:
+        """The case with other values of keys, dotted. where: the key that says so, for messages.
+
+        Raises:
+            UserError: a key that is none of the case or the system.
+        """
+        raw: dict[str, Any] = copy.deepcopy(dict(self.raw))
+        own = [f"{k}={v!r}" for k, v in values.items() if not k.startswith(OF_SYSTEM)]
+        others = [
+            f"{k.removeprefix(OF_SYSTEM)}={v!r}"
+            for k, v in values.items()
+            if k.startswith(OF_SYSTEM)
+        ]
+        with at(where, self.path), of_file(self.path):
+            settings = validate(case_model(), override(raw, own, self.path, ""), self.path)
+            return build(settings, self._systems(others) if others else self.bases)
+
+    def meshed(self, name: str, where: str) -> tuple[Mesh, BodySettings]:
+        """The mesh of a body, in metres, and its settings. where: the key that asks for it.
+
+        Raises:
+            UserError: it has none.
+        """
+        job = None if lumped(self.path, name) else open_job(find_body(self.path, name, Path(".")))
+        if job is None or job.settings.geometry.matrices is not None:
+            raise UserError(
+                f"'{name}' has no mesh, so there is nothing unreduced; leave full out",
+                where,
+                self.path,
+            )
+        return load_mesh(job, mesh_stage(job))[0], job.settings
+
+    def _systems(self, assignments: list[str]) -> dict[str, ModalBasis]:
+        found = dict(self.bases)
+        made = {name: lumped(self.path, basis.name) for name, basis in self.bases.items()}
+        for name, file in made.items():
+            if file is not None:
+                found[name] = load_system(file, assignments).basis()
+        if not any(made.values()):
+            raise UserError(
+                f"'{OF_SYSTEM}' names a key of a system.toml, but no body of this case has one"
+            )
+        return found

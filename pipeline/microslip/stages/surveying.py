@@ -144,11 +144,11 @@ def _orders(write: Write, settings: CaseSettings, bases: Bases, report: Report) 
     found = surveys.over_orders(settings, bases, report, lambda some: write(tables(some)))
     title = f"{settings.name}: resonances over the engine order"
     failed = _unsolved(sum(int(r.failed.sum()) for r in found.values()))
-    draw: dict[str, Callable[[Path], Path]] = {"pictures/orders.png": lambda p: over_orders_picture(found, p, title)}
+    every = list(found.values())
+    draw: Files = {"pictures/orders.png": lambda figure: over_orders_picture(found, figure, title)}
     if len(found) > 1:
         words = f"{settings.name}: the worst of all engine orders over the normal force"
-        draw = {"pictures/orders_worst.png": lambda p: worst_order_picture(list(found.values()), p, words)} | draw
-    every = list(found.values())
+        draw = {"pictures/orders_worst.png": lambda p: worst_order_picture(every, p, words)} | draw
     amplitude, stress = (np.concatenate([getattr(r, of) for r in every]) for of in ("amplitude", "stress"))
     said = _judged_by(_worst_sentences(every), settings, bases, "orders", amplitude, stress)
     return _answer(tables(found), draw, said, failed)

@@ -30,7 +30,7 @@ from ..harmonic_balance.nonlinear_modes import Backbone
 from ..progress import Report
 from ..results.dataset import Dataset, is_dataset, read_dataset
 from ..results.series import Series
-from ..results.tones import TwoTones, is_of_tones, read_tones
+from ..results.tones import KIND, TwoTones
 from ..settings.arguments import checked
 from . import orbit
 from .equations import MotionEquations
@@ -392,10 +392,9 @@ def load(path: Path | str) -> Series | Backbone | RecordedOrbit | TwoTones | Dat
     Raises:
         UserError: no such file, or one of several series or motions.
     """
-    if is_of_tones(path):
-        return read_tones(path)
     if is_dataset(path):
-        return read_dataset(path)
+        data = read_dataset(path)
+        return TwoTones.of_data(data) if data.kind == KIND else data
     if not _is_of_motions(path):
         return solved.load(path)
     motions = read_orbits(path)

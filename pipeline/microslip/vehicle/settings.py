@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import BeforeValidator, Field, model_validator
 
-from ..contact.keys import FileName
+from ..contact.kinds import FileName
 from ..contact.solids import Solid
 from ..data import Array
 from ..rolling.ellipse import combined

@@ -127,8 +127,9 @@ def solve(q: Question) -> Answer:
     found: Named = [(one.name, one) for one in ran]
     files: Files = {"orbit.csv": partial(write_columns, _columns(found), 8)}
     files["orbit.h5"] = lambda _: None  # is there
+    notes = [words for one in found for words in (_sentence(*one), *_chatter(*one))]
     return Answer(
-        [*_notes(found), *_messages(found, built), *_doubted(found, built, q.asked)],
+        [*notes, *_messages(found, built), *_doubted(found, built, q.asked)],
         tables=_shown(found),
         largest=None,
         whole=not any(np.isfinite(one.diverged) for _, one in found),
@@ -182,11 +183,6 @@ def _run_up(assembly: Assembly, asked: Keys, how: RunUp) -> recorded.Integration
     driven = equations.of_ramp(assembly, ramp)
     start = _rest(driven, asked)
     return recorded.Integration(name, driven, 0, ramp.periods, asked.samples, asked.steps, start)
-
-
-def _notes(found: Named) -> list[str]:
-    """What motions they are, in sentences."""
-    return [words for name, one in found for words in (_sentence(name, one), *_chatter(name, one))]
 
 
 def _messages(found: Named, built: Built) -> list[str]:

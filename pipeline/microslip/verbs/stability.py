@@ -22,7 +22,7 @@ from ..errors import NotConverged, UserError, of_file
 from ..files.tables import csv_files
 from ..linalg import quadratic
 from ..linalg.quadratic import Quadratic, Window
-from ..modal.unreduced import unreduced
+from ..modal.compute import unreduced
 from ..pictures.roots import cycles_picture, map_picture, plane_picture, relief_picture
 from ..report.page import fold, say, table
 from ..report.roots import root_table, table_lines
