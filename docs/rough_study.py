@@ -8,7 +8,7 @@ import numpy as np
 
 from microslip.contact.heights import Cut, Exponential, Gaussian, Heights, Linear, Polynomial
 from microslip.contact.normal import Hyperbolic, Rough
-from microslip.contact.topography import Profile, fit_roughness, heights, levelled, material_curve, roughness
+from microslip.contact.topography import SurfaceProfile, fit_roughness, heights, levelled, material_curve, roughness
 from microslip.contact.wear import WearCourse, course
 
 COLOURS = ("#0b4f9c", "#d98410", "#5a8f3c", "#c8382c", "#7a4fa3", "0.45")
@@ -22,13 +22,13 @@ FORCE = 0.09375
 TIMES = (0.0, 0.5, 1.0, 2.0, 4.0, 8.0)
 
 
-def ground(points: int = 4001) -> Profile:
+def ground(points: int = 4001) -> SurfaceProfile:
     """An invented ground surface: grooves 20 um apart and waviness, its peaks dulled; 8 mm long, tilted."""
     rng = np.random.default_rng(6)
     x = np.linspace(0, 8e-3, points)
     noise = np.convolve(rng.normal(size=points + 60), np.hanning(15), "same")[30:-30]
     z = 2.4e-6 * noise / noise.std() + 0.8e-6 * np.sin(2 * np.pi * x / 2.5e-3)
-    return Profile(x, np.where(z > 0, 3e-6 * np.tanh(z / 3e-6), z) + 5e-4 * x, "ground.txt")
+    return SurfaceProfile(x, np.where(z > 0, 3e-6 * np.tanh(z / 3e-6), z) + 5e-4 * x, "ground.txt")
 
 
 def numbers() -> tuple[list[str], list[list[str]]]:

@@ -12,7 +12,7 @@ from refusals import refused
 
 from microslip.contact.heights import Linear, Polynomial
 from microslip.contact.topography import (
-    Profile,
+    SurfaceProfile,
     fit_roughness,
     heights,
     levelled,
@@ -33,24 +33,24 @@ def written(tmp_path: Path, text: str, name: str = "ground.txt") -> Path:
     return path
 
 
-def sawtooth(teeth: int = 50) -> Profile:
+def sawtooth(teeth: int = 50) -> SurfaceProfile:
     """Peaks of 4 um, straight flanks: linear heights."""
     x = np.linspace(0, 1e-3, 2 * teeth + 1)
-    return Profile(x, 4 * UM * (np.arange(2 * teeth + 1) % 2))
+    return SurfaceProfile(x, 4 * UM * (np.arange(2 * teeth + 1) % 2))
 
 
-def polynomial(points: int = 2001) -> Profile:
+def polynomial(points: int = 2001) -> SurfaceProfile:
     """A hill and its mirror image whose heights have the distribution 3 x^2 - 2 x^3 with R_Z = 7 um."""
     fine = np.linspace(0, 1, 100001)
     depth = np.interp(np.linspace(0, 1, points), fine**2 * (3 - 2 * fine), fine)
-    return Profile(np.linspace(0, 4e-3, 2 * points - 1), -7 * UM * np.concatenate([depth[::-1], depth[1:]]))
+    return SurfaceProfile(np.linspace(0, 4e-3, 2 * points - 1), -7 * UM * np.concatenate([depth[::-1], depth[1:]]))
 
 
 def test_roughness_numbers_of_a_sawtooth() -> None:
     """Ra = h/4 needs the straight flanks between the points; so does Rq = h/sqrt(12): sampled finely."""
     coarse = sawtooth()
     x = np.linspace(0, 1e-3, 50 * 400 + 1)
-    found = roughness(Profile(x, np.interp(x, coarse.x, coarse.z)))
+    found = roughness(SurfaceProfile(x, np.interp(x, coarse.x, coarse.z)))
     expected = [UM, 4 * UM / 12**0.5, 4 * UM, 4 * UM, 4 * UM]
     assert np.allclose([found.Ra, found.Rq, found.Rt, found.Rmax, found.Rz], expected, rtol=1e-4)
 
@@ -59,7 +59,7 @@ def test_roughness_depths_of_different_sampling_lengths() -> None:
     """Peak to valley 1, 2, 3, 4, 5 um in the five lengths, valleys at 0: Rz is the mean, Rmax the largest."""
     x = np.linspace(0, 5e-3, 5001)
     depth = np.minimum(np.floor(x / 1e-3), 4) + 1
-    profile = Profile(x, UM * depth * np.sin(np.pi * x / 1e-3 * 4) ** 2)
+    profile = SurfaceProfile(x, UM * depth * np.sin(np.pi * x / 1e-3 * 4) ** 2)
     found = roughness(profile)
     assert found.Rz == pytest.approx(3 * UM, rel=1e-3)
     assert found.Rmax == pytest.approx(5 * UM, rel=1e-3) and found.Rt == pytest.approx(5 * UM, rel=1e-3)
@@ -93,7 +93,7 @@ def test_every_profile_gives_a_law(seed, points, flat) -> None:
         z = np.round(z, 6)
         z[0], z[1] = 0, UM
     x = np.cumsum(rng.uniform(0.1, 2, size=points)) * UM
-    profile = Profile(x, z)
+    profile = SurfaceProfile(x, z)
     depth, share = material_curve(profile, 2049)
     assert share[0] == 0 and share[-1] == 1 and np.all(np.diff(share) >= 0)
     mean_depth = z.max() - np.trapezoid(z, x) / np.ptp(x)
@@ -105,17 +105,17 @@ def test_every_profile_gives_a_law(seed, points, flat) -> None:
 def test_levelling_takes_off_what_it_says() -> None:
     x = np.linspace(0, 2e-3, 501)
     z = UM * np.sin(np.linspace(0, 40 * np.pi, 501))
-    tilted = Profile(x, z + 0.01 * x + 5e-6)
+    tilted = SurfaceProfile(x, z + 0.01 * x + 5e-6)
     straight = levelled(tilted, 1)
-    assert np.abs(straight.z - levelled(Profile(x, z), 1).z).max() < 1e-15
-    assert np.abs(levelled(Profile(x, z + 3 * x**2), 2).z - levelled(Profile(x, z), 2).z).max() < 1e-15
+    assert np.abs(straight.z - levelled(SurfaceProfile(x, z), 1).z).max() < 1e-15
+    assert np.abs(levelled(SurfaceProfile(x, z + 3 * x**2), 2).z - levelled(SurfaceProfile(x, z), 2).z).max() < 1e-15
     assert levelled(tilted, None) is tilted
     assert abs(np.trapezoid(straight.z * (x - 1e-3), x)) < 1e-12 * UM * 1e-3
 
 
 def test_a_map_is_its_lines_together() -> None:
     one = sawtooth()
-    both = Profile(one.x, np.array([one.z, 0.5 * one.z]))
+    both = SurfaceProfile(one.x, np.array([one.z, 0.5 * one.z]))
     found = roughness(both)
     assert found.Rt == 4 * UM and found.Rz == pytest.approx(3 * UM)
     table = heights(both, 4 * UM, 513)

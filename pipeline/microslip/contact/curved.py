@@ -19,11 +19,11 @@ from ..errors import UserError
 from ..reduced.compliance import SURFACE
 from .curves import NormalCurve
 from .hertz import Hertz
-from .law import Law
+from .law import Law, value
 from .normal import Gapped, Normal, Preload
 from .portion import Portion
 from .sliders import Strips
-from .solids import Solid, mean_inverse_distance, normal_modulus
+from .solids import Solid, doubles, mean_inverse_distance, normal_modulus
 
 Match = Literal["approach", "width"]
 
@@ -67,7 +67,7 @@ def apart(law: Law, gap: Array) -> Law:
     whole: Any = law
     normal = getattr(whole, "normal", None)
     if isinstance(normal, Normal) and not isinstance(normal, Preload):
-        return replace(whole, normal=Gapped(normal, jnp.asarray(gap, dtype=float)))
+        return replace(whole, normal=Gapped(normal, value(gap)))
     raise UserError("the law's normal force is given and not found from the approach; take another law")
 
 
@@ -96,21 +96,21 @@ class Line:
 
     def half_width(self, force: ArrayLike) -> Array:
         """a (m) under a normal force (N): a^2 = 4 F R / (pi E* l)."""
-        F = np.asarray(force, dtype=float)
+        F = doubles(force)
         return np.sqrt(4 * F * self.radius / (np.pi * self.modulus * self.length))
 
     def force_of(self, half_width: ArrayLike) -> Array:
         """The inverse of `half_width`, N."""
-        return np.pi * self.modulus * self.length * np.asarray(half_width, dtype=float) ** 2 / (4 * self.radius)
+        return np.pi * self.modulus * self.length * doubles(half_width) ** 2 / (4 * self.radius)
 
     def largest_pressure(self, force: ArrayLike) -> Array:
         """2 F / (pi a l), Pa, in the middle; zero without force."""
-        a, F = self.half_width(force), np.asarray(force, dtype=float)
+        a, F = self.half_width(force), doubles(force)
         return np.divide(2 * F, np.pi * a * self.length, out=np.zeros_like(a), where=a > 0)
 
     def pressure(self, force: float, x: ArrayLike) -> Array:
         """Pressure (Pa) at distances (m) from the line; zero outside."""
-        inside = 1 - (np.asarray(x, dtype=float) / self.half_width(force)) ** 2
+        inside = 1 - (doubles(x) / self.half_width(force)) ** 2
         return self.largest_pressure(force) * np.sqrt(np.maximum(inside, 0.0))
 
     def approach(self, force: ArrayLike, strip: float) -> Array:
@@ -124,13 +124,13 @@ class Line:
 
         So the compliance of the bodies is counted once, as long as the line is narrow: see `WIDEST`.
         """
-        F = np.asarray(force, dtype=float)
+        F = doubles(force)
         a = np.where(F > 0, self.half_width(F), strip)
         return 2 * F / (np.pi * self.modulus * self.length) * (np.log(2 * strip / a) - 1)
 
     def stiffness(self, force: ArrayLike, strip: float) -> Array:
         """dF/d(delta) of `approach`, N/m; zero without force."""
-        F = np.asarray(force, dtype=float)
+        F = doubles(force)
         a = np.where(F > 0, self.half_width(F), strip)
         k = np.pi * self.modulus * self.length / (2 * (np.log(2 * strip / a) - 1.5))
         return np.where(F > 0, k, 0.0)

@@ -25,7 +25,7 @@ from ..reduced.compliance import BULK_AND_SURFACE
 from .hertz import Hertz
 from .profiles import RoundContact
 from .series import BULK, INCLUDES
-from .solids import bisected, pressing
+from .solids import bisected, doubles, pressing
 
 LENGTHS = {"m": 1.0, "mm": 1e-3, "um": 1e-6, "nm": 1e-9}
 FORCES = {"N": 1.0, "kN": 1e3, "mN": 1e-3}
@@ -96,7 +96,7 @@ class NormalCurve:
 
     def _split(self, approach: ArrayLike) -> tuple[Array, Array]:
         """Approaches held within the knots, and how far they go beyond the last one."""
-        x = np.asarray(approach, dtype=float)
+        x = doubles(approach)
         return np.clip(x, self.knots[0], self.knots[-1]), np.maximum(x - self.knots[-1], 0.0)
 
     def _inverse(self, force: float) -> float:
@@ -138,7 +138,7 @@ def curve(
         UserError: NaN, negative or falling forces, approaches that do not rise, fewer than `FEWEST` points with force,
             a curve that ends level; each with file and line.
     """
-    x, F = (np.asarray(v, dtype=float) for v in (approach, force))
+    x, F = map(doubles, (approach, force))
     if x.ndim != 1 or x.shape != F.shape:
         raise UserError(f"{name}: needs one force for each approach, {x.size} approaches and {F.size} forces are given")
     _check(name, places, x, F, noise)

@@ -12,16 +12,16 @@ from typing import Any, NamedTuple
 import jax
 import jax.numpy as jnp
 
-from .law import Array, Law, State, stepped, velocities
+from .law import Array, Law, Scalar, State, stepped, velocities
 
 
-def around(path: Array, dt: Array | float) -> Array:
+def around(path: Array, dt: Scalar) -> Array:
     """Rates of a periodic path (s, ...) over the steps that end at its samples."""
     return velocities(path, dt, path[-1])
 
 
 def push(
-    law: Law, path: Array, dt: Array | float, state: State, tangents: State, moves: Array
+    law: Law, path: Array, dt: Scalar, state: State, tangents: State, moves: Array
 ) -> tuple[tuple[Array, State], tuple[Array, State]]:
     """`law.march`, and its tangents along every parameter: of the force (s, p, n, 3), and of the state.
 
@@ -68,7 +68,7 @@ class Ways(NamedTuple):
     first: Any
 
 
-def ways(law: Law, path: Array, dt: Array | float) -> Ways:
+def ways(law: Law, path: Array, dt: Scalar) -> Ways:
     """Of a periodic path (s, n, 3) m."""
     rate, rest = around(path, dt), law.init(path.shape[1])
     placed = jax.vmap(lambda u, v: stepped(law, u, v, dt, rest)[1])(path, rate)
@@ -86,7 +86,7 @@ def beginning(rows: Any, first: Any) -> Any:
     return jax.tree_util.tree_map(lambda leaf, one: leaf.at[0].set(one), rows, first)
 
 
-class Cycle(NamedTuple):
+class CycleFromMemory(NamedTuple):
     """A cycle: forces (s, 3, n) N, the memory that every step begins with (s, ..., 2, n) N, and that at its end."""
 
     force: Array
@@ -94,7 +94,7 @@ class Cycle(NamedTuple):
     memory: Array
 
 
-def cycle(law: Law, ways: Any, memory: Array) -> Cycle:
+def cycle(law: Law, ways: Any, memory: Array) -> CycleFromMemory:
     """From a memory at its beginning; ways: `way` of its steps."""
 
     def one(memory: Array, way: Any) -> tuple[Array, tuple[Array, Array]]:
@@ -102,7 +102,7 @@ def cycle(law: Law, ways: Any, memory: Array) -> Cycle:
         return after, (force, memory)
 
     after, (force, begun) = jax.lax.scan(one, memory, ways)
-    return Cycle(force, begun, after)
+    return CycleFromMemory(force, begun, after)
 
 
 def first_memory(law: Law, ways: Ways, rest: Array) -> Array:
@@ -114,7 +114,7 @@ def first_memory(law: Law, ways: Ways, rest: Array) -> Array:
     return jax.lax.fori_loop(1, len(ways.rate), one, law.drag(ways.first, rest)[1])
 
 
-class Turn(NamedTuple):
+class SummedCycle(NamedTuple):
     """A cycle: (h, 3, n) weighted sums of its forces, N, the largest entry of these, and the memory at its end."""
 
     force: Array
@@ -122,7 +122,7 @@ class Turn(NamedTuple):
     memory: Array
 
 
-def turn(law: Law, ways: Any, weights: Array, memory: Array) -> Turn:
+def turn(law: Law, ways: Any, weights: Array, memory: Array) -> SummedCycle:
     """From a memory at its beginning; ways: `way` of its steps. weights: (s, h) of the sums."""
 
     def one(at: tuple[Array, Array, Array], row: tuple[Any, Array]) -> tuple[tuple[Array, Array, Array], None]:
@@ -130,10 +130,10 @@ def turn(law: Law, ways: Any, weights: Array, memory: Array) -> Turn:
         return (*_more(at, force, row[1]), after), None
 
     (force, size, after), _ = jax.lax.scan(one, (*_none(memory, weights), memory), (ways, weights))
-    return Turn(force, size.max(), after)
+    return SummedCycle(force, size.max(), after)
 
 
-def recall(law: Law, ways: Any, weights: Array, memory: Array) -> tuple[Turn, Array]:
+def recall(law: Law, ways: Any, weights: Array, memory: Array) -> tuple[SummedCycle, Array]:
     """`turn`, and (2, ..., 2, n) how the memory at the end follows either direction of that at the beginning."""
 
     def one(at: Any, row: tuple[Any, Array]) -> tuple[Any, None]:
@@ -151,7 +151,7 @@ def recall(law: Law, ways: Any, weights: Array, memory: Array) -> tuple[Turn, Ar
 
     begin = (*_none(memory, weights), memory, directions(memory))
     (force, size, after, slope), _ = jax.lax.scan(one, begin, (ways, weights))
-    return Turn(force, size.max(), after), slope
+    return SummedCycle(force, size.max(), after), slope
 
 
 def _none(memory: Array, weights: Array) -> tuple[Array, Array]:

@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 import jax.numpy as jnp
 import numpy as np
 
-from .law import Array, Law, Step, number, settings, static, table
+from .law import Array, Law, Scalar, Step, number, settings, static, table
 
 
 class Spring(Law):
@@ -31,7 +31,7 @@ class Spring(Law):
     def init(self, n: int) -> Array:
         return jnp.zeros((1, n))
 
-    def step(self, u: Array, v: Array, dt: Array | float, state: Array) -> tuple[Array, Array]:
+    def step(self, u: Array, v: Array, dt: Scalar, state: Array) -> tuple[Array, Array]:
         force = self.force(u[:, 1])
         return jnp.stack([0 * force, force, 0 * force], axis=1), state
 
@@ -43,7 +43,7 @@ class Spring(Law):
     def follows(self) -> float:
         return np.inf
 
-    def rates(self, u: Array, v: Array, x: Array, time: Array | float, lag: float) -> tuple[Array, Array]:
+    def rates(self, u: Array, v: Array, x: Array, time: Scalar, lag: float) -> tuple[Array, Array]:
         return self.step(u, v, 0.0, x)[0], x
 
     def limit(self, force: Array, state: Array) -> Array:

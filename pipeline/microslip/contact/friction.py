@@ -25,7 +25,7 @@ from ..settings.numbers import Coefficient, NotNegative, Number, Positive
 from .curves import read_table
 from .heights import Heights
 from .kinds import Columns, FileName, Kind, beside
-from .law import Array, bisected, number, settings, value, values
+from .law import Array, Scalar, bisected, number, settings, value, values
 
 if TYPE_CHECKING:
     from .settings import Temperature
@@ -40,7 +40,7 @@ class Friction:
 
     constant: ClassVar[bool] = False
 
-    def coefficient(self, speed: Array, pressed: Array, time: Array | float = 0.0) -> Array:
+    def coefficient(self, speed: Array, pressed: Array, time: Scalar = 0.0) -> Array:
         """(n,) friction coefficient.
 
         Args:
@@ -48,7 +48,7 @@ class Friction:
         """
         raise NotImplementedError
 
-    def highest(self, pressed: Array, time: Array | float = 0.0) -> Array:
+    def highest(self, pressed: Array, time: Scalar = 0.0) -> Array:
         """(n,) largest coefficient at any speed: of a characteristic that falls from the start, that at rest."""
         return self.coefficient(jnp.zeros_like(pressed), pressed, time)
 
@@ -92,7 +92,7 @@ class Coulomb(Friction):
     mu: Array = number(ge=0)
     constant: ClassVar[bool] = True
 
-    def coefficient(self, speed: Array, pressed: Array, time: Array | float = 0.0) -> Array:
+    def coefficient(self, speed: Array, pressed: Array, time: Scalar = 0.0) -> Array:
         return jnp.broadcast_to(self.mu, speed.shape)
 
 
@@ -103,10 +103,10 @@ class StaticSliding(Friction):
     static: Array = number(ge=0)
     sliding: Array = number(ge=0)
 
-    def coefficient(self, speed: Array, pressed: Array, time: Array | float = 0.0) -> Array:
+    def coefficient(self, speed: Array, pressed: Array, time: Scalar = 0.0) -> Array:
         return jnp.where(speed > 0, self.sliding, self.static)
 
-    def highest(self, pressed: Array, time: Array | float = 0.0) -> Array:
+    def highest(self, pressed: Array, time: Scalar = 0.0) -> Array:
         return jnp.broadcast_to(jnp.maximum(self.static, self.sliding), pressed.shape)
 
 
@@ -117,7 +117,7 @@ class Falling(Friction):
     mu_0: Array = number(ge=0)
     p_v: Array = number(ge=0)
 
-    def coefficient(self, speed: Array, pressed: Array, time: Array | float = 0.0) -> Array:
+    def coefficient(self, speed: Array, pressed: Array, time: Scalar = 0.0) -> Array:
         return self.mu_0 / (1 + self.p_v * speed)
 
     def scale(self, pressed: float) -> float:
@@ -135,10 +135,10 @@ class Exponential(Friction):
     mu_inf: Array = number(ge=0)
     rate: Array = number(ge=0)
 
-    def coefficient(self, speed: Array, pressed: Array, time: Array | float = 0.0) -> Array:
+    def coefficient(self, speed: Array, pressed: Array, time: Scalar = 0.0) -> Array:
         return (self.mu_0 - self.mu_inf) * jnp.exp(-self.rate * speed) + self.mu_inf
 
-    def highest(self, pressed: Array, time: Array | float = 0.0) -> Array:
+    def highest(self, pressed: Array, time: Scalar = 0.0) -> Array:
         return jnp.broadcast_to(jnp.maximum(self.mu_0, self.mu_inf), pressed.shape)
 
     def scale(self, pressed: float) -> float:
@@ -166,7 +166,7 @@ class Heated(Friction):
     limit: Array = number(gt=0)
     area: Array = number(gt=0)
 
-    def coefficient(self, speed: Array, pressed: Array, time: Array | float = 0.0) -> Array:
+    def coefficient(self, speed: Array, pressed: Array, time: Scalar = 0.0) -> Array:
         return self.mu_0 / (1 + self._p_v(pressed) * speed)
 
     def _p_v(self, pressed: Array) -> Array:
@@ -202,10 +202,10 @@ class Measured(Friction):
     speeds: Array = number(gt=0)
     values: Array = number(ge=0)
     slopes: Array = number()
-    temperature: Array | float = number(gt=0, default=293.15)
-    reference: Array | float = number(gt=0, default=293.15)
-    c_1: Array | float = number(ge=0, default=8.86)
-    c_2: Array | float = number(ge=0, default=101.6)
+    temperature: Scalar = number(gt=0, default=293.15)
+    reference: Scalar = number(gt=0, default=293.15)
+    c_1: Scalar = number(ge=0, default=8.86)
+    c_2: Scalar = number(ge=0, default=101.6)
 
     def shift(self) -> Array:
         """a_T: factor on the speed."""
@@ -216,7 +216,7 @@ class Measured(Friction):
         low, high = (float(self.speeds[i, 0] / self.shift()) for i in (0, -1))
         return np.geomspace(low / 3, 3 * high, 301)
 
-    def coefficient(self, speed: Array, pressed: Array, time: Array | float = 0.0) -> Array:
+    def coefficient(self, speed: Array, pressed: Array, time: Scalar = 0.0) -> Array:
         x, y, d = jnp.log(self.speeds[:, 0]), self.values[:, 0], self.slopes[:, 0]
         at = jnp.log(jnp.clip(speed * self.shift(), self.speeds[0, 0], self.speeds[-1, 0]))
         i = jnp.clip(jnp.searchsorted(x, at, side="right") - 1, 0, len(x) - 2)
@@ -225,7 +225,7 @@ class Measured(Friction):
         rise, first, last = y[i + 1] - y[i], h * d[i], h * d[i + 1]
         return y[i] + s * (first + s * (3 * rise - 2 * first - last + s * (first + last - 2 * rise)))
 
-    def highest(self, pressed: Array, time: Array | float = 0.0) -> Array:
+    def highest(self, pressed: Array, time: Scalar = 0.0) -> Array:
         return jnp.broadcast_to(jnp.max(self.values), pressed.shape)
 
 
@@ -296,12 +296,12 @@ class Scattered(Friction):
         cosines = jnp.cos(omega * jnp.atleast_1d(time) + self.phases)
         return jnp.sqrt(2.0 / self.phases.shape[0]) * jnp.sum(cosines, axis=0)
 
-    def coefficient(self, speed: Array, pressed: Array, time: Array | float = 0.0) -> Array:
+    def coefficient(self, speed: Array, pressed: Array, time: Scalar = 0.0) -> Array:
         deviation = self.deviation
         share = deviation.coefficient(speed, pressed, time) if isinstance(deviation, Friction) else deviation
         return self.mean.coefficient(speed, pressed, time) * self._factor(share, speed, time)
 
-    def highest(self, pressed: Array, time: Array | float = 0.0) -> Array:
+    def highest(self, pressed: Array, time: Scalar = 0.0) -> Array:
         share = self.deviation.highest(pressed, time) if isinstance(self.deviation, Friction) else self.deviation
         return self.mean.highest(pressed, time) * self._factor(share, pressed, time)
 
@@ -317,7 +317,7 @@ class Scattered(Friction):
         share, mean = float(np.asarray(self.deviation)), found["coefficient"]
         return found | {"mean_less_deviation": (1 - share) * mean, "mean_plus_deviation": (1 + share) * mean}
 
-    def _factor(self, share: Array, like: Array, time: Array | float) -> Array:
+    def _factor(self, share: Array, like: Array, time: Scalar) -> Array:
         return jnp.maximum(1 + share * self.noise(jnp.broadcast_to(time, like.shape)), 0.0)
 
 
@@ -402,12 +402,12 @@ def _panels(edges: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return (edges[:-1, None] + half * (1 + _GAUSS[0])).ravel(), (half * _GAUSS[1]).ravel()
 
 
-def smoothed(speed: Array, slope: Array | float) -> Array:
+def smoothed(speed: Array, slope: Scalar) -> Array:
     """(2 / pi) arctan(k_S v) (Sextro Eqs. (3.7-43), (4.1-23)): what stands for the sign of a small speed."""
     return 2 / jnp.pi * jnp.arctan(slope * speed)
 
 
-def creep(speed: Array, slope: Array | float) -> Array:
+def creep(speed: Array, slope: Scalar) -> Array:
     """`smoothed` over the speed, and its limit at rest: the smoothed direction is this times the velocity."""
     moves = speed > 0
     some = jnp.where(moves, speed, 1.0)

@@ -14,7 +14,7 @@ import jax.numpy as jnp
 
 from ..programs import inner
 from ..series import fourier
-from .law import Array, Law, point_axes
+from .law import Array, Law, Scalar, point_axes
 from .periodic import Known, near, unknown, with_slopes
 
 CHUNK = 120
@@ -26,8 +26,8 @@ CHUNK_ALONE = 480
 
 @partial(inner, static_argnames=("samples", "count", "chunk"))
 def force_harmonics(
-    law: Law, u: Array, period: Array | float, samples: int = 64, count: int = 2, chunk: int = CHUNK,
-    periodicity: Array | float = 0.0,
+    law: Law, u: Array, period: Scalar, samples: int = 64, count: int = 2, chunk: int = CHUNK,
+    periodicity: Scalar = 0.0,
 ) -> tuple[Array, Array]:  # fmt: skip
     """Harmonics of the force in the last cycle, and their derivative.
 
@@ -53,16 +53,16 @@ def force_harmonics(
 
 @partial(inner, static_argnames=("samples", "count", "chunk"))
 def force_alone(
-    law: Law, u: Array, period: Array | float, samples: int = 64, count: int = 2, chunk: int = CHUNK_ALONE,
-    periodicity: Array | float = 0.0,
+    law: Law, u: Array, period: Scalar, samples: int = 64, count: int = 2, chunk: int = CHUNK_ALONE,
+    periodicity: Scalar = 0.0,
 ) -> Array:  # fmt: skip
     """The force of `force_harmonics` without its derivative; in chunks of one size after the same number of cycles."""
     return force_near(law, u, unknown(law, u.shape[0]), period, samples, count, chunk, periodicity)[0]
 
 
 def force_near(
-    law: Law, u: Array, known: Known, period: Array | float, samples: int, count: int, chunk: int = CHUNK_ALONE,
-    periodicity: Array | float = 0.0,
+    law: Law, u: Array, known: Known, period: Scalar, samples: int, count: int, chunk: int = CHUNK_ALONE,
+    periodicity: Scalar = 0.0,
 ) -> tuple[Array, Known]:  # fmt: skip
     """`force_alone`, begun with what sliders remember of a motion near by, and what they remember now."""
     values, transform = fourier(u.shape[2] // 2, samples)
@@ -108,7 +108,7 @@ def _split(leaf: Array, axis: int, parts: int, chunk: int) -> Array:
 
 
 def _with_derivative(
-    law: Law, u: Array, period: Array | float, samples: int, count: int, periodicity: Array | float
+    law: Law, u: Array, period: Scalar, samples: int, count: int, periodicity: Scalar
 ) -> tuple[Array, Array]:
     """With the tangents along every harmonic of every direction."""
     values, transform = fourier(u.shape[2] // 2, samples)

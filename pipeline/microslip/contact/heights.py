@@ -17,7 +17,7 @@ from jax.scipy.stats import norm as normal_distribution
 from numpy.typing import ArrayLike
 
 from ..errors import UserError
-from .law import Array, number, settings, table, values
+from .law import Array, Scalar, number, settings, table, values
 
 
 class Heights:
@@ -108,7 +108,7 @@ class Exponential(Heights):
     law that separates takes `Cut(Exponential(rate))`.
     """
 
-    rate: Array | float = number(gt=0, default=4.0)
+    rate: Scalar = number(gt=0, default=4.0)
 
     def area(self, x: Array) -> Array:
         return jnp.exp(self.rate * (jnp.minimum(x, 1.0) - 1))
@@ -131,8 +131,8 @@ class Gaussian(Heights):
     It has no highest peak, so the contact never opens; a law that separates takes `Cut(Gaussian(mean, deviation))`.
     """
 
-    mean: Array | float = number(default=0.5)
-    deviation: Array | float = number(gt=0, default=20**-0.5)
+    mean: Scalar = number(default=0.5)
+    deviation: Scalar = number(gt=0, default=20**-0.5)
 
     def area(self, x: Array) -> Array:
         return normal_distribution.cdf(self._s(x))

@@ -17,7 +17,7 @@ from scipy.special import elliprd, elliprf
 
 from ..data import Array
 from ..errors import UserError
-from .solids import Solid, normal_modulus, pressing
+from .solids import Solid, doubles, normal_modulus, pressing
 
 SLENDEREST = 1e-6
 """Smallest ratio of half curvatures: such an ellipse is 20 000 times longer than wide, no longer a point contact."""
@@ -28,7 +28,7 @@ def ellipse_integrals(ratio: ArrayLike) -> tuple[Array, Array, Array]:
 
     K the complete elliptic integral, D = (K - E)/e^2, B = K - D. For g = 1: pi/2, pi/4, pi/4.
     """
-    m = np.asarray(ratio, dtype=float) ** 2
+    m = doubles(ratio) ** 2
     return elliprf(0, m, 1), elliprd(0, m, 1) / 3, m * elliprd(0, 1, m) / 3
 
 
@@ -38,7 +38,7 @@ def axis_ratio(curvature_ratio: ArrayLike) -> Array:
     The slope of log(A/B) over log(g) lies between 3/2 and 2, so each step leaves a seventh of the error, which a spline
     has brought to 1e-9 before.
     """
-    wanted = np.log(np.asarray(curvature_ratio, dtype=float))
+    wanted = np.log(doubles(curvature_ratio))
     return (
         _closer(_nearly()(wanted), wanted, 4)
         if np.min(wanted, initial=0) > FLATTEST
@@ -142,7 +142,7 @@ class Hertz:
 
     def force(self, approach: ArrayLike) -> Array:
         """Normal force (N) at an approach (m, any shape); zero where the bodies are apart."""
-        return self._coefficient * np.maximum(np.asarray(approach, dtype=float), 0.0) ** 1.5
+        return self._coefficient * np.maximum(doubles(approach), 0.0) ** 1.5
 
     def approach(self, force: ArrayLike) -> Array:
         """Approach (m) under a normal force (N, not negative)."""
@@ -169,7 +169,7 @@ class Hertz:
         a, b = self.semi_axes(force)
         if not a > 0:
             return np.zeros(np.broadcast(x, y).shape)
-        inside = 1 - (np.asarray(x, dtype=float) / a) ** 2 - (np.asarray(y, dtype=float) / b) ** 2
+        inside = 1 - (doubles(x) / a) ** 2 - (doubles(y) / b) ** 2
         return self.largest_pressure(force) * np.sqrt(np.maximum(inside, 0.0))
 
     def normal_stiffness(self, force: ArrayLike) -> Array:

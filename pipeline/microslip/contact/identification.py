@@ -100,7 +100,9 @@ def identify(
         raise UserError(f"bounds: must be two rising numbers of N/m greater than 0 for each of {', '.join(names)}")
     picked = _picked(model, resonances, len(names))
     _within_reach(picked, resonances, ends)
-    return _judged(picked, resonances, tuple(names), _best(picked, resonances, tuple(names), ends))
+    f, s = np.array([(r.frequency, r.uncertainty) for r in resonances]).T
+    best = _best(lambda x: (picked(x) - f) / s, tuple(names), ends)
+    return _judged(picked, resonances, tuple(names), best)
 
 
 def _picked(model: Model, resonances: Sequence[MeasuredResonance], count: int) -> Callable[[Array], Array]:
@@ -131,12 +133,8 @@ def _within_reach(picked: Callable[[Array], Array], resonances: Sequence[Measure
             raise UserError(f"resonances: {r.frequency:g} Hz (mode {r.mode}) is {why}")
 
 
-def _best(
-    picked: Callable[[Array], Array], resonances: Sequence[MeasuredResonance], names: tuple[str, ...], ends: Ends
-) -> Array:  # fmt: skip
+def _best(residual: Callable[[Array], Array], names: tuple[str, ...], ends: Ends) -> Array:
     """(k,) ln(k): least squares from the low points of a grid; modes are flat far from where they feel a spring."""
-    f, s = np.array([r.frequency for r in resonances]), np.array([r.uncertainty for r in resonances])
-    residual = lambda x: (picked(x) - f) / s  # noqa: E731
     axes = [np.linspace(np.log(a), np.log(b), 25) for a, b in ends]
     grid = np.array(list(product(*axes)))
     cost = np.array([float(residual(x) @ residual(x)) for x in grid])
@@ -173,7 +171,7 @@ def _apart(residual: Callable[[Array], Array], a: Array, b: Array) -> bool:
 def _judged(
     picked: Callable[[Array], Array], resonances: Sequence[MeasuredResonance], names: tuple[str, ...], x: Array
 ) -> Identified:  # fmt: skip
-    f, s = np.array([r.frequency for r in resonances]), np.array([r.uncertainty for r in resonances])
+    f, s = np.array([(r.frequency, r.uncertainty) for r in resonances]).T
     found, k = picked(x), len(names)
     step = 1e-4
     J = np.array([(picked(x + step * e) - picked(x - step * e)) / (2 * step) for e in np.eye(k)]).T  # df/d ln k

@@ -14,7 +14,7 @@ import numpy as np
 
 from .friction import OfCoulomb
 from .kinds import LawKind
-from .law import Array, Law, Step, number, ratio, settings, static, value
+from .law import Array, Law, Scalar, Step, number, ratio, settings, static, value
 from .stiffness import Given
 
 if TYPE_CHECKING:
@@ -53,7 +53,7 @@ class Jenkins(Law):
     def init(self, n: int) -> JenkinsState:
         return JenkinsState(jnp.zeros(n), jnp.zeros((2, n)), jnp.zeros(n))
 
-    def step(self, u: Array, v: Array, dt: Array | float, state: JenkinsState) -> tuple[Array, JenkinsState]:
+    def step(self, u: Array, v: Array, dt: Scalar, state: JenkinsState) -> tuple[Array, JenkinsState]:
         way, other = u[:, self.slider], u[:, 3 - self.slider]
         trial = state.elastic[0] + self.along * (way - state.way)
         elastic = jnp.where(jnp.abs(trial) < self.held, trial, self.held * jnp.sign(trial))
@@ -65,7 +65,7 @@ class Jenkins(Law):
     def remembers(self) -> int | None:
         return 1
 
-    def rates(self, u: Array, v: Array, x: Array, time: Array | float, lag: float) -> tuple[Array, Array]:
+    def rates(self, u: Array, v: Array, x: Array, time: Scalar, lag: float) -> tuple[Array, Array]:
         """x: force of the spring with the slider, N, which grows no more where the slider holds it."""
         stretching = self.along * v[:, self.slider]
         slides = (jnp.abs(x[0]) >= self.held) & (stretching * x[0] > 0)

@@ -37,6 +37,9 @@ def values(made: Any, what: str, x: ArrayLike) -> np.ndarray:
 Array = jax.Array
 """A jax array of doubles; one value or one per point where a setting is meant."""
 
+Scalar = Array | float
+"""A number, or an array as above."""
+
 State = Any
 """A pytree of arrays whose last axis counts the points: the tangents of many points are then computed side by side."""
 
@@ -48,7 +51,7 @@ def static(**options: Any) -> Any:
     return field(metadata={"static": True}, **options)
 
 
-def value(x: float) -> Array:
+def value(x: ArrayLike) -> Array:
     """A number of a law."""
     prepare()
     return jnp.asarray(x, dtype=float)
@@ -142,7 +145,7 @@ class Step(NamedTuple):
 
     u: Array
     moved: Array
-    dt: Array | float
+    dt: Scalar
     force_before: Array
     force: Array
     before: State
@@ -171,7 +174,7 @@ class SolvableMemory:
         """The state with another memory, linear in both; None (the default): it cannot be solved for."""
         return None
 
-    def way(self, u: Array, v: Array, dt: Array | float, state: State) -> Any:
+    def way(self, u: Array, v: Array, dt: Scalar, state: State) -> Any:
         """All that `drag` needs of a step that ends at u, v, beside the memory: a pytree, for instance pressed force,
         stiffness times displacement, and what friction holds at both ends.
 
@@ -204,7 +207,7 @@ class DifferentialForm:
         """k numbers of a point in the differential equation, see `rates`; None, the default: the law has none."""
         return None
 
-    def rates(self, u: Array, v: Array, x: Array, time: Array | float, lag: float) -> tuple[Array, Array]:
+    def rates(self, u: Array, v: Array, x: Array, time: Scalar, lag: float) -> tuple[Array, Array]:
         """The force, and how what is remembered changes.
 
         Args:
@@ -233,7 +236,7 @@ class Braking:
 
     brakes: ClassVar[bool] = False
 
-    def slowed(self, u: Array, v: Array, dt: Array | float, state: State, yielding: Array) -> Array:
+    def slowed(self, u: Array, v: Array, dt: Scalar, state: State, yielding: Array) -> Array:
         """(n, 3) velocities in m/s that are left of v when friction brakes points which yield by (n,) m/s per N:
         v_t = left_t + yielding F_t(left), with the normal velocity as it is. The default leaves v: friction follows the
         displacement."""
@@ -269,7 +272,7 @@ class Law(SolvableMemory, DifferentialForm, Braking):
         """State of n points that were never loaded, at u = 0."""
         raise NotImplementedError
 
-    def step(self, u: Array, v: Array, dt: Array | float, state: State) -> tuple[Array, State]:
+    def step(self, u: Array, v: Array, dt: Scalar, state: State) -> tuple[Array, State]:
         """Force at the end of a step that ends at ``u`` with velocity ``v``, and the state there.
 
         Args:
@@ -336,12 +339,12 @@ class History:
 
 
 @inner
-def stepped(law: Law, u: Array, v: Array, dt: Array | float, state: State) -> tuple[Array, State]:
+def stepped(law: Law, u: Array, v: Array, dt: Scalar, state: State) -> tuple[Array, State]:
     """`Law.step`, which python reads once for all its uses."""
     return law.step(u, v, dt, state)
 
 
-def velocities(u: Array, dt: Array | float, before: Array | None = None) -> Array:
+def velocities(u: Array, dt: Scalar, before: Array | None = None) -> Array:
     """Backward differences of a path u (s, n, 3) that starts from ``before`` (n, 3), m/s; without it the first one is
     that of the second sample."""
     if before is None:
@@ -349,7 +352,7 @@ def velocities(u: Array, dt: Array | float, before: Array | None = None) -> Arra
     return jnp.diff(jnp.concatenate([before[None], u]), axis=0) / dt
 
 
-def march(law: Law, u: Array, dt: Array | float, state: State, v: Array | None = None) -> tuple[Array, State]:
+def march(law: Law, u: Array, dt: Scalar, state: State, v: Array | None = None) -> tuple[Array, State]:
     """Forces along a path: ``lax.scan`` over `Law.step`.
 
     Args:
@@ -369,7 +372,7 @@ def march(law: Law, u: Array, dt: Array | float, state: State, v: Array | None =
 
 
 @inner
-def history(law: Law, u: Array, dt: Array | float) -> History:
+def history(law: Law, u: Array, dt: Scalar) -> History:
     """Forces, slip path and dissipated energy of a prescribed motion u (s, n, 3) in m, steps of dt seconds.
 
     The work of a step is that of its mean force, the trapezoidal rule. It is counted from the first sample, to which

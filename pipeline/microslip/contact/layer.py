@@ -15,7 +15,7 @@ from scipy.optimize import brentq
 
 from ..data import Array, Indices
 from ..errors import UserError
-from .solids import Solid
+from .solids import Solid, doubles
 
 STRESS_FREE, HYDROSTATIC, NO_LATERAL_STRAIN = BOUNDARIES = ("stress-free", "hydrostatic", "no-lateral-strain")
 """The book's i = 1, 2, 3: sides free (3.1-8), as much pressure from the sides (3.1-18), sides held (3.1-21)."""
@@ -74,11 +74,11 @@ class Layer:
 
     def normal_stiffness(self, area: ArrayLike) -> Array:
         """c_N0 (N/m) of elements of the given areas (m2, any shape), Sextro Eqs. (3.1-15), (3.1-20), (3.1-24)."""
-        return self.modulus * np.asarray(area, dtype=float) / self.thickness
+        return self.modulus * doubles(area) / self.thickness
 
     def tangential_stiffness(self, area: ArrayLike) -> Array:
         """c_R0 (N/m), the same along both tangents, Sextro Eq. (3.1-16)."""
-        return self.solid.shear * np.asarray(area, dtype=float) / self.thickness
+        return self.solid.shear * doubles(area) / self.thickness
 
     def lengthening_error(self, approach: ArrayLike) -> Array:
         """Relative error of a force that is computed with l_0 instead of the deformed length, Sextro Eq. (3.1-17).
@@ -89,7 +89,7 @@ class Layer:
         Args:
             approach: u_P, m, any shape.
         """
-        return -np.asarray(approach, dtype=float) / self.thickness
+        return -doubles(approach) / self.thickness
 
     # yield ---------------------------------------------------------------------------------------------------------
 
@@ -101,9 +101,9 @@ class Layer:
         Args:
             pressure: (n,) Pa. shear: (n,) Pa, or (n, 2) along t1 and t2, whose resultant counts.
         """
-        tau = np.asarray(shear, dtype=float)
+        tau = doubles(shear)
         tau = np.hypot(tau[..., 0], tau[..., 1]) if tau.ndim > np.ndim(pressure) else tau
-        return np.hypot(tau, 0.5 * (1 - self.lateral_share) * np.asarray(pressure, dtype=float))
+        return np.hypot(tau, 0.5 * (1 - self.lateral_share) * doubles(pressure))
 
     def shear_strength(self, pressure: ArrayLike, yield_shear: ArrayLike) -> Array:
         """tau_max (Pa) that the layer carries beside a pressure before it flows, Sextro Eqs. (3.1-33), (3.1-36).
@@ -113,13 +113,13 @@ class Layer:
         Args:
             pressure: Pa. yield_shear: tau_S at the temperature there, Pa, one value or one a point.
         """
-        p, tau_s = np.broadcast_arrays(np.asarray(pressure, dtype=float), _yield_shear(yield_shear))
+        p, tau_s = np.broadcast_arrays(doubles(pressure), _yield_shear(yield_shear))
         half = 0.5 * (1 - self.lateral_share) * p
         return np.sqrt(np.maximum((tau_s - half) * (tau_s + half), 0.0))
 
     def largest_friction(self, pressure: ArrayLike, yield_shear: ArrayLike) -> Array:
         """mu_max of Sextro Eq. (3.1-33): no friction coefficient above it is possible; infinite without pressure."""
-        p = np.asarray(pressure, dtype=float)
+        p = doubles(pressure)
         strength = self.shear_strength(p, yield_shear)
         return np.divide(strength, p, out=np.full(strength.shape, np.inf), where=np.broadcast_to(p > 0, strength.shape))
 
@@ -136,10 +136,10 @@ class Layer:
         Raises:
             UserError: numbers that are not finite, a negative pressure, lists of different length.
         """
-        p = np.atleast_1d(np.asarray(pressure, dtype=float))
-        tau = np.asarray(shear, dtype=float)
+        p = np.atleast_1d(doubles(pressure))
+        tau = doubles(shear)
         tau = np.broadcast_to(tau, p.shape) if tau.ndim < 2 and tau.size == 1 else tau
-        limit, xyz = _yield_shear(yield_shear), None if points is None else np.asarray(points, dtype=float)
+        limit, xyz = _yield_shear(yield_shear), None if points is None else doubles(points)
         for name, value in (("shear", tau), ("yield_shear", limit), ("points", xyz), ("names", names)):
             if value is not None and np.ndim(value) and len(value) not in (len(p), 1 if name == "yield_shear" else -1):
                 raise UserError(f"{name}: {len(value)} entries for {len(p)} pressures; give one a point")
@@ -167,7 +167,7 @@ class Layer:
 
     def reduced_mass(self, area: ArrayLike) -> Array:
         """Delta m_D0 = (4/pi^2) rho_0 A l_0 (kg) of elements of the given areas, Sextro Eqs. (3.2-27), (3.2-28)."""
-        return REDUCED_MASS * self._rho() * np.asarray(area, dtype=float) * self.thickness
+        return REDUCED_MASS * self._rho() * doubles(area) * self.thickness
 
     def quasi_static(self, frequency: float, tolerance: float = 0.01) -> FrequencyMargin:
         """Whether the static stiffness may be used up to a frequency, and by what margin, Sextro Eq. (3.2-31).
@@ -327,7 +327,7 @@ def _x_cot_x(x: Array) -> Array:
 
 
 def _yield_shear(value: ArrayLike) -> Array:
-    tau_s = np.asarray(value, dtype=float)
+    tau_s = doubles(value)
     if not ((tau_s > 0) & np.isfinite(tau_s)).all():
         raise UserError("must be greater than 0 Pa; half the yield stress of a tensile test", "yield_shear")
     return tau_s

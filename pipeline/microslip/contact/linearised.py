@@ -17,7 +17,7 @@ import jax
 import jax.numpy as jnp
 
 from .cycle import Ways, beginning, blank, directions, rolled
-from .law import Array, Law, State, stepped
+from .law import Array, Law, Scalar, State, stepped
 
 BLOCK = 2048
 """Samples times sliders that are differentiated at once, for the cache and for memory that does not grow with them."""
@@ -60,7 +60,7 @@ class _Steps(NamedTuple):
 
 
 def linearised(
-    law: Law, path: Array, dt: Array | float, ways: Ways, memory: Array, whole: Array, signals: Array, weights: Array
+    law: Law, path: Array, dt: Scalar, ways: Ways, memory: Array, whole: Array, signals: Array, weights: Array
 ) -> Linearised:  # fmt: skip
     """A cycle of a law whose sliders can be solved for (`Law.recalled`).
 
@@ -105,7 +105,7 @@ def sliders(memory: Array, lead: int) -> Array:
     return memory.reshape(*memory.shape[:lead], -1, *memory.shape[-2:])
 
 
-def _step(law: Law, dt: Array | float, u: Array, v: Array, state: State, held: State, memory: Array) -> _Steps:
+def _step(law: Law, dt: Scalar, u: Array, v: Array, state: State, held: State, memory: Array) -> _Steps:
     """Derivatives of a step to u (n, 3) m at the rate v (n, 3) m/s.
 
     Args:
@@ -137,7 +137,7 @@ def _by_slider(law: Law, way: Any, memory: Array) -> Array:
     return sliders(jax.vmap(pull)(unit)[0], 1)
 
 
-def _held(law: Law, u: Array, v: Array, dt: Array | float) -> State:
+def _held(law: Law, u: Array, v: Array, dt: Scalar) -> State:
     """(3, ...) tangents of the state at a place along where that is, but for the memory."""
     ways, rest = _ways(len(u)), law.init(len(u))
 

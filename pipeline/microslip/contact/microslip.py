@@ -14,7 +14,7 @@ from ..data import Array
 from ..errors import UserError
 from .heights import Heights
 from .law import values
-from .solids import bisected
+from .solids import bisected, doubles
 
 NODES = 2048
 """Intervals of the slip depth in which the curve is laid out before it is refined: folds are found to 1e-6 of w."""
@@ -52,7 +52,7 @@ class MonotoneSlip:
 
     def __post_init__(self) -> None:
         for name, strict in (("stiffness", True), ("roughness", False), ("strength", True), ("heating", False)):
-            value = np.asarray(getattr(self, name), dtype=float)
+            value = doubles(getattr(self, name))
             if not np.all(value > 0 if strict else value >= 0) or (np.isinf(value).any() and name != "strength"):
                 bound = "greater than 0" if strict else "0 or more"
                 raise UserError(f"{name}: {value.min():g}; it must be {bound} and finite")
@@ -77,12 +77,12 @@ class MonotoneSlip:
         Raises:
             UserError: a force that does not press.
         """
-        loads = np.asarray(force, dtype=float)
+        loads = doubles(force)
         if not (np.all(loads > 0) and np.all(np.isfinite(loads))):
             raise UserError("normal force: not a positive number; microslip needs a pressed contact")
         loads = loads + 0.0 * np.asarray(self.roughness)
         # beyond the deepest height the force has risen by less than the approach
-        deepest = np.asarray(self.roughness, dtype=float) * float(self.heights.breaks()[..., -1])
+        deepest = doubles(self.roughness) * float(self.heights.breaks()[..., -1])
         low, high = bisected(
             lambda u: self.normal_force(u) < loads, np.zeros_like(loads), loads + deepest, 200
         )
@@ -93,16 +93,16 @@ class MonotoneSlip:
     def force(self, w: ArrayLike, u: ArrayLike) -> Array:
         """F_T* (3.8-26) at the tangential displacement w_P* and the normal one u_x*; odd in w."""
         s = self.slip_depth(w, u)
-        u = np.asarray(u, dtype=float)
+        u = doubles(u)
         return np.sign(w) * (1 - self._warmth(s, u)) * (self.normal_force(u) - self.normal_force(u - s))
 
     def temperature(self, w: ArrayLike, u: ArrayLike) -> Array:
         """dT* (3.8-18): rise over dT_E, at which friction and strength would be gone."""
-        return self._warmth(self.slip_depth(w, u), np.asarray(u, dtype=float))
+        return self._warmth(self.slip_depth(w, u), doubles(u))
 
     def slip_depth(self, w: ArrayLike, u: ArrayLike) -> Array:
         """s = u_x* - u_S*, on the branch that begins at w = 0: the least s that needs |w|, the whole of it if none."""
-        w, rows, u, flat = self._rows(np.abs(np.asarray(w, dtype=float)), u)
+        w, rows, u, flat = self._rows(np.abs(doubles(w)), u)
         low, high = flat._brackets(w.ravel(), rows.ravel(), u)
         each, u = flat._picked(rows.ravel()), u[rows.ravel()]
         _, high = bisected(lambda s: each.displacement(s, u) < w.ravel(), low, high, _HALVINGS)
@@ -128,15 +128,15 @@ class MonotoneSlip:
     def displacement(self, s: ArrayLike, u: ArrayLike) -> Array:
         """w_P* at which the slip depth s (up to min(tau_S0*, u_x*)) is a solution; where it falls with s the
         solution cannot be held."""
-        s, u = np.asarray(s, dtype=float), np.asarray(u, dtype=float)
-        return s * (1 - self._warmth(s, u)) / np.asarray(self.stiffness, dtype=float)
+        s, u = doubles(s), doubles(u)
+        return s * (1 - self._warmth(s, u)) / doubles(self.stiffness)
 
     # under a given normal force ----------------------------------------------------------------------------------
 
     def coefficient(self, w: ArrayLike, force: ArrayLike, mu_0: float = 1.0) -> Array:
         """Equivalent friction coefficient f = mu_0 F_T*/F_N* (3.8-29) at w_P* under a constant F_N*."""
         u = self.approach(force)
-        return mu_0 * self.force(w, u) / np.asarray(force, dtype=float)
+        return mu_0 * self.force(w, u) / doubles(force)
 
     # ---------------------------------------------------------------------------------------------------------------
 
@@ -149,7 +149,7 @@ class MonotoneSlip:
 
     def _rows(self, w: Array, u: ArrayLike) -> tuple[Array, Array, Array, MonotoneSlip]:
         """w over all that it broadcasts with; for each, its row; u (r,) and the settings (r,) of the rows."""
-        u, *parts = np.broadcast_arrays(np.asarray(u, dtype=float), *self._settings())
+        u, *parts = np.broadcast_arrays(doubles(u), *self._settings())
         w, rows = np.broadcast_arrays(w, np.arange(u.size).reshape(u.shape))
         return w, rows, u.ravel(), MonotoneSlip(self.heights, *(part.ravel() for part in parts))
 
@@ -174,7 +174,7 @@ class MonotoneSlip:
         return self.stiffness, self.roughness, self.strength, self.heating
 
     def _scaled(self, u: ArrayLike) -> tuple[Array, Array, Array]:
-        u, R = np.broadcast_arrays(np.asarray(u, dtype=float), np.asarray(self.roughness, dtype=float))
+        u, R = np.broadcast_arrays(doubles(u), doubles(self.roughness))
         return u, np.where(R > 0, R, 1.0), R > 0
 
 

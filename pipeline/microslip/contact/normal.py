@@ -10,7 +10,7 @@ import numpy as np
 from ..errors import UserError
 from .curves import NormalCurve
 from .heights import Heights
-from .law import Array, number, settings, table
+from .law import Array, Scalar, number, settings, table
 
 
 class Normal:
@@ -32,7 +32,7 @@ class Normal:
         """(n,) elastic energy, J: the integral of the force."""
         raise NotImplementedError
 
-    def touches(self) -> Array | float:
+    def touches(self) -> Scalar:
         """m: the approach, of each point if they differ, below which there is no force; NaN: there always is one."""
         return 0.0
 
@@ -46,7 +46,7 @@ class Penalty(Normal):
     """A spring that cannot pull (Sextro Eq. (3.3-33)). stiffness_0: N/m. gap: m, at u = 0."""
 
     stiffness_0: Array = number(ge=0)
-    gap: Array | float = number(default=0.0)
+    gap: Scalar = number(default=0.0)
 
     def force(self, u: Array) -> Array:
         return self.stiffness_0 * jnp.maximum(u - self.gap, 0.0)
@@ -60,7 +60,7 @@ class Penalty(Normal):
     def stored(self, u: Array) -> Array:
         return 0.5 * self.stiffness_0 * jnp.maximum(u - self.gap, 0.0) ** 2
 
-    def touches(self) -> Array | float:
+    def touches(self) -> Scalar:
         return self.gap
 
     def scaled(self, share: Array) -> Penalty:
@@ -133,7 +133,7 @@ class Gapped(Normal):
     def share(self, u: Array) -> Array:
         return self.normal.share(u - self.gap)
 
-    def touches(self) -> Array | float:
+    def touches(self) -> Scalar:
         return self.gap + self.normal.touches()
 
     def stored(self, u: Array) -> Array:
@@ -161,7 +161,7 @@ class Hyperbolic(Normal):
     roughness: Array = number(gt=0)
     heights: Heights
     length: Array = number(gt=0)
-    shortest: Array | float = number(gt=0, le=1, default=0.1)
+    shortest: Scalar = number(gt=0, le=1, default=0.1)
 
     def force(self, u: Array) -> Array:
         inside, beyond = self._parts(u)
@@ -215,7 +215,7 @@ class Potential(Normal):
     force_s: Array = number(ge=0)
     depth: Array = number(gt=0)
     exponent: Array = number(ge=1)
-    gap: Array | float = number(default=0.0)
+    gap: Scalar = number(default=0.0)
 
     def force(self, u: Array) -> Array:
         return self.force_s * self._power(u, self.exponent)
@@ -246,7 +246,7 @@ class Greenwood(Normal):
 
     force_s: Array = number(ge=0)
     deviation: Array = number(gt=0)
-    offset: Array | float = number(default=0.0)
+    offset: Scalar = number(default=0.0)
 
     def force(self, u: Array) -> Array:
         return self.force_s * self.share(u)

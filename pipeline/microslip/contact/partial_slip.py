@@ -17,7 +17,7 @@ from scipy.integrate import quad
 
 from ..data import Array
 from ..errors import UserError
-from .solids import refuse_not_positive
+from .solids import doubles, refuse_not_positive
 
 
 class NormalContact(Protocol):
@@ -77,7 +77,7 @@ class PartialSlip:
 
         T = mu (F(delta) - F(delta - (k_T/k_N) u/mu)).
         """
-        u = np.asarray(displacement, dtype=float)
+        u = doubles(displacement)
         delta = float(self.contact.approach(self.normal_force))
         stick = np.maximum(delta - self._slope * np.abs(u), 0.0)
         return np.sign(u) * self.friction * (self.normal_force - self.contact.force(stick))
@@ -88,7 +88,7 @@ class PartialSlip:
         Raises:
             UserError: a force beyond mu F_N.
         """
-        T = np.asarray(force, dtype=float)
+        T = doubles(force)
         if (np.abs(T) > self.limit * (1 + 1e-12)).any():
             raise UserError(f"force: {np.abs(T).max():g} N is more than friction holds, {self.limit:g} N")
         stick = np.maximum(self.normal_force - np.abs(T) / self.friction, 0.0)

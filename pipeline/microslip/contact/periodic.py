@@ -20,6 +20,7 @@ slider that Newton's step does not bring closer goes on so for a while, longer e
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import cached_property, partial
 from typing import Any, NamedTuple
 
@@ -28,8 +29,8 @@ import jax.numpy as jnp
 import numpy as np
 
 from ..programs import inner
-from .cycle import Turn, Ways, around, beginning, blank, cycle, first_memory, push, recall, turn, ways
-from .law import Array, Law, State, march
+from .cycle import SummedCycle, Ways, around, beginning, blank, cycle, first_memory, push, recall, turn, ways
+from .law import Array, Law, Scalar, State, march
 from .linearised import Linearised, linearised
 
 FEWEST = 4
@@ -103,7 +104,7 @@ class _Solving(NamedTuple):
             memory is periodic.
     """
 
-    last: Turn
+    last: SummedCycle
     begun: Array
     memory: Array
     slope: Array
@@ -120,7 +121,7 @@ class _Solving(NamedTuple):
 
 @partial(inner, static_argnames="count")
 def periodic(
-    law: Law, path: Array, period: float | Array, count: int = 2, periodicity: float | Array = 0.0
+    law: Law, path: Array, period: Scalar, count: int = 2, periodicity: Scalar = 0.0
 ) -> Periodic:  # fmt: skip
     """Force in the last cycle of a periodic path, marched from rest.
 
@@ -141,7 +142,7 @@ def periodic(
 
 
 def near(
-    law: Law, path: Array, period: float | Array, count: int, periodicity: float | Array, weights: Array, known: Known
+    law: Law, path: Array, period: Scalar, count: int, periodicity: Scalar, weights: Array, known: Known
 ) -> tuple[Array, Known]:  # fmt: skip
     """Weighted sums of the force of `periodic`, begun with what is known of a path near by; and what is known then.
 
@@ -162,7 +163,7 @@ def near(
 
 
 def with_slopes(
-    law: Law, path: Array, period: float | Array, count: int, periodicity: float | Array, signals: Array, weights: Array
+    law: Law, path: Array, period: Scalar, count: int, periodicity: Scalar, signals: Array, weights: Array
 ) -> tuple[Periodic, Array]:
     """`periodic` and the derivative of the force.
 
@@ -187,11 +188,15 @@ def solves(law: Law, count: int) -> bool:
     return count >= FEWEST and law.recalled(one, law.memory(jnp.zeros((1, 3)), one)) is not None
 
 
+@dataclass(frozen=True, eq=False)
 class _Loop:
     """A path through a law, again and again; arguments as in `periodic`."""
 
-    def __init__(self, law: Law, path: Array, dt: Array | float, periodicity: Array | float, count: int) -> None:
-        self.law, self.path, self.dt, self.periodicity, self.count = law, path, dt, periodicity, count
+    law: Law
+    path: Array
+    dt: Scalar
+    periodicity: Scalar
+    count: int
 
     def rest(self) -> _At:
         """Before the first cycle."""
@@ -241,7 +246,7 @@ class _Sliders:
     """A path through a law whose sliders are solved for; arguments as in `periodic` and `near`."""
 
     def __init__(
-        self, law: Law, path: Array, dt: Array | float, periodicity: Array | float, count: int,
+        self, law: Law, path: Array, dt: Scalar, periodicity: Scalar, count: int,
         weights: Array | None = None, known: Known | None = None,
     ) -> None:  # fmt: skip
         self.law, self.path, self.dt, self.periodicity, self.count = law, path, dt, periodicity, count
@@ -258,7 +263,7 @@ class _Sliders:
         new = ~(known.told.all() & solved)
         memory = jnp.where(new, self.first, known.memory)
         each, W = jnp.zeros((*memory.shape[:-2], memory.shape[-1])), self.weights.shape[1]
-        counted, none = each.astype(int), Turn(jnp.zeros((W, 3, len(known.told))), jnp.zeros(()), memory)
+        counted, none = each.astype(int), SummedCycle(jnp.zeros((W, 3, len(known.told))), jnp.zeros(()), memory)
         begin = _Solving(
             none, memory, memory, known.slope, new & solved, each + jnp.inf, each > 0, counted, counted,
             jnp.asarray(1), each + jnp.inf, jnp.asarray(jnp.inf), jnp.asarray(False),

@@ -20,7 +20,7 @@ from ..reduced.compliance import BULK_AND_SURFACE
 from ..settings.numbers import NotNegative, Positive, PositiveLength
 from .friction import Friction, StaticSliding
 from .kinds import LawKind
-from .law import Array, Law, Step, bisected, norm, number, ratio, root, settings, static, value
+from .law import Array, Law, Scalar, Step, bisected, norm, number, ratio, root, settings, static, value
 from .normal import Hyperbolic, Normal, Preload
 
 if TYPE_CHECKING:
@@ -116,7 +116,7 @@ class PointContact(OnNormal):
         pair, one = jnp.zeros((2, n)), jnp.zeros(n)
         return PointState(pair, pair, one, jnp.ones(n), pair, one)  # the first step is taken with all of its area
 
-    def step(self, u: Array, v: Array, dt: Array | float, state: PointState) -> tuple[Array, PointState]:
+    def step(self, u: Array, v: Array, dt: Scalar, state: PointState) -> tuple[Array, PointState]:
         w, time = self._stretch(u, v, dt, state), state.time + dt
         relaxed = state.elastic * w.left
         if self._straight:
@@ -132,7 +132,7 @@ class PointContact(OnNormal):
         after = PointState(tangential, elastic, w.held, w.share, slipped, time)
         return jnp.concatenate([w.pressed[None], force]).T, after
 
-    def way(self, u: Array, v: Array, dt: Array | float, state: PointState) -> Any:
+    def way(self, u: Array, v: Array, dt: Scalar, state: PointState) -> Any:
         return self._stretch(u, v, dt, state) if self._straight else super().way(u, v, dt, state)
 
     def drag(self, way: Any, memory: Array) -> tuple[Array, Array]:
@@ -141,7 +141,7 @@ class PointContact(OnNormal):
         force = dragged(memory * way.left, way.way, way.before, way.held)
         return jnp.concatenate([way.pressed[None], force]), force
 
-    def _stretch(self, u: Array, v: Array, dt: Array | float, state: PointState) -> Stretch:
+    def _stretch(self, u: Array, v: Array, dt: Scalar, state: PointState) -> Stretch:
         approach, tangential = u.T[0], u.T[1:]
         share, pressed = self.normal.share(approach), self._pressed(approach, v.T[0])
         springs = self._springs(met(share, jnp.maximum(state.share, touching(self.normal, approach))))
@@ -162,7 +162,7 @@ class PointContact(OnNormal):
     def follows(self) -> float:
         return 0.0 if self.remembers is None else float(_follows(self))
 
-    def rates(self, u: Array, v: Array, x: Array, time: Array | float, lag: float) -> tuple[Array, Array]:
+    def rates(self, u: Array, v: Array, x: Array, time: Scalar, lag: float) -> tuple[Array, Array]:
         """x: tangential force of the springs, N. Friction holds them and the damper beside them, one of the
         lag where the law has none."""
         share, growth = jax.jvp(self.normal.share, (u[:, 0],), (v[:, 0],))
@@ -429,7 +429,7 @@ def weight(theta: Array, relative: Array | None) -> Array:
 
 
 def slide(
-    trial: Array, stiffness: Array, relative: Array | None, friction: Friction, pressed: Array, dt: Array | float,
+    trial: Array, stiffness: Array, relative: Array | None, friction: Friction, pressed: Array, dt: Scalar,
     time: Array,
 ) -> Array:  # fmt: skip
     """theta where friction holds what is left. With one coefficient and one stiffness that is the share which is held;

@@ -5,15 +5,13 @@ Each law keeps the word for whose compliance it counts.
 
 from __future__ import annotations
 
-import jax.numpy as jnp
-
 from ..errors import UserError
 from ..reduced.compliance import BULK_AND_SURFACE, SURFACE
 from .curves import NormalCurve, of_contact
 from .friction import Friction
 from .heights import Heights
 from .hertz import Hertz
-from .law import Array
+from .law import value
 from .normal import Normal, Penalty, Potential, Rough, measured
 from .point import PointContact
 from .profiles import RoundContact
@@ -22,7 +20,7 @@ from .series import ContactStiffness
 
 def smooth_point(stiffness: ContactStiffness, friction: Friction) -> PointContact:
     """A spring that cannot pull, and its tangential springs (Sextro Eqs. (3.1-25), (3.3-33))."""
-    return _point(Penalty(_value(stiffness.normal)), friction, stiffness.tangential, stiffness.includes)
+    return _point(Penalty(value(stiffness.normal)), friction, stiffness.tangential, stiffness.includes)
 
 
 def rough_point(
@@ -39,7 +37,7 @@ def rough_point(
     if not roughness > 0:
         raise UserError(f"roughness: {roughness:g} m; it must be greater than 0, or take a smooth point")
     includes = SURFACE if stiffness.includes == SURFACE else BULK_AND_SURFACE
-    law = Rough(_value(stiffness.normal), _value(roughness), heights)
+    law = Rough(value(stiffness.normal), value(roughness), heights)
     return _point(law, friction, stiffness.tangential, includes)
 
 
@@ -53,7 +51,7 @@ def hertz_point(contact: Hertz, friction: Friction, normal_force: float = 1.0) -
         normal_force: N, at which the nominal stiffness is taken; the law does not depend on it.
     """
     depth = float(contact.approach(normal_force))
-    law = Potential(_value(normal_force), _value(depth), _value(1.5))
+    law = Potential(value(normal_force), value(depth), value(1.5))
     x, y = contact.tangential_stiffness(normal_force)
     return _point(law, friction, (float(x), float(y)), "bulk")
 
@@ -83,8 +81,4 @@ def _point(
     normal: Normal, friction: Friction, tangential: tuple[float, float], includes: str
 ) -> PointContact:  # fmt: skip
     first, second = tangential
-    return PointContact(normal, friction, _value(first), None if second == first else _value(second), includes=includes)
-
-
-def _value(number: float) -> Array:
-    return jnp.asarray(number, dtype=float)
+    return PointContact(normal, friction, value(first), None if second == first else value(second), includes=includes)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from .law import Array, Law, State, Step, number, settings
+from .law import Array, Law, Scalar, State, Step, number, settings
 
 
 def portion(whole: Law, share: Array) -> Law:
@@ -30,7 +30,7 @@ class Portion(Law):
     def init(self, n: int) -> State:
         return self.whole.init(n)
 
-    def step(self, u: Array, v: Array, dt: Array | float, state: State) -> tuple[Array, State]:
+    def step(self, u: Array, v: Array, dt: Scalar, state: State) -> tuple[Array, State]:
         force, after = self.whole.step(u, v, dt, state)
         return (self.share * force.T).T, after
 
@@ -42,7 +42,7 @@ class Portion(Law):
     def follows(self) -> float:
         return self.whole.follows
 
-    def rates(self, u: Array, v: Array, x: Array, time: Array | float, lag: float) -> tuple[Array, Array]:
+    def rates(self, u: Array, v: Array, x: Array, time: Scalar, lag: float) -> tuple[Array, Array]:
         force, rate = self.whole.rates(u, v, x, time, lag)
         return (self.share * force.T).T, rate
 
@@ -54,7 +54,7 @@ class Portion(Law):
     def brakes(self) -> bool:  # type: ignore[override]
         return self.whole.brakes
 
-    def slowed(self, u: Array, v: Array, dt: Array | float, state: State, yielding: Array) -> Array:
+    def slowed(self, u: Array, v: Array, dt: Scalar, state: State, yielding: Array) -> Array:
         return self.whole.slowed(u, v, dt, state, self.share * yielding)
 
     def memory(self, force: Array, state: State) -> Array:
@@ -63,7 +63,7 @@ class Portion(Law):
     def recalled(self, state: State, memory: Array) -> State | None:
         return self.whole.recalled(state, memory / self.share)
 
-    def way(self, u: Array, v: Array, dt: Array | float, state: State) -> Any:
+    def way(self, u: Array, v: Array, dt: Scalar, state: State) -> Any:
         return self.whole.way(u, v, dt, state)
 
     def drag(self, way: Any, memory: Array) -> tuple[Array, Array]:

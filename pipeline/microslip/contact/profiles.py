@@ -23,7 +23,7 @@ from scipy.special import ellipk, ellipkinc
 
 from ..data import Array, Indices
 from ..errors import UserError
-from .solids import Solid, normal_modulus, pressing, tangential_modulus
+from .solids import Solid, doubles, normal_modulus, pressing, tangential_modulus
 
 _RULES = {n: np.polynomial.legendre.leggauss(n) for n in (4, 16)}
 _DEGREE = 14
@@ -63,7 +63,7 @@ class Profile:
         Raises:
             UserError: fewer than 3 points, not finite, radii that do not rise or do not begin at 0.
         """
-        r, f = (np.asarray(v, dtype=float) for v in (radius, gap))
+        r, f = map(doubles, (radius, gap))
         if r.ndim != 1 or r.shape != f.shape or len(r) < 3:
             raise UserError(f"{name}: needs at least three radii with one gap each")
         for what, v in (("radius", r), ("gap", f)):
@@ -91,7 +91,7 @@ class Profile:
             raise UserError(f"corners: must lie between 0 and the radius {radius:g} m, each once")
         breaks = np.unique(np.concatenate([_panels(a, b) for a, b in zip(ends, ends[1:], strict=False)]))
         zero = float(np.asarray(value(np.zeros(1)))[0])
-        curve = _Piecewise.of(lambda r: np.asarray(value(r), dtype=float) - zero, breaks)
+        curve = _Piecewise.of(lambda r: doubles(value(r)) - zero, breaks)
         slope, at = curve.derivative(), np.array(ends[1:-1])
         before = np.searchsorted(breaks, at) - 1
         jumps = slope.at_ends(before + 1)[0] - slope.at_ends(before)[1]
@@ -108,7 +108,7 @@ class Profile:
 
     def _integrals(self, x: ArrayLike) -> tuple[Array, Array]:
         """g(x) and its integral from 0 to x, m and m2: x int f'(x sin t) dt and x int f(x sin t) sin t dt."""
-        flat = np.atleast_1d(np.asarray(x, dtype=float)).ravel()
+        flat = np.atleast_1d(doubles(x)).ravel()
         both = np.array([self._at(v) for v in flat]).reshape(-1, 2)
         return both[:, 0].reshape(np.shape(x)), both[:, 1].reshape(np.shape(x))
 
@@ -218,7 +218,7 @@ class RoundContact:
         Raises:
             UserError: it would be larger than the profile, which has no edge.
         """
-        d = np.asarray(approach, dtype=float)
+        d = doubles(approach)
         return np.array([self._radius(v) for v in np.atleast_1d(d).ravel()]).reshape(d.shape)
 
     def _radius(self, approach: float) -> float:
@@ -238,7 +238,7 @@ class RoundContact:
 
     def force(self, approach: ArrayLike) -> Array:
         """Normal force (N): 2 E* integral_0^a (approach - g(x)) dx; zero where the bodies are apart."""
-        d = np.maximum(np.asarray(approach, dtype=float), 0.0)
+        d = np.maximum(doubles(approach), 0.0)
         a = self.radius_at(d)
         return 2 * self.modulus * np.maximum(a * d - self.profile._integrals(a)[1], 0.0)
 
@@ -278,7 +278,7 @@ class RoundContact:
 
         p(r) = (E*/pi) (integral_r^a g'(x)/sqrt(x^2 - r^2) dx + (approach - g(a))/sqrt(a^2 - r^2)).
         """
-        approach, at = float(self.approach(force)), np.asarray(r, dtype=float)
+        approach, at = float(self.approach(force)), doubles(r)
         a = self._radius(approach)
         beyond = max(approach - float(self.profile.transform(a)), 0.0) if self.edge else 0.0
         return np.array([self._pressure(abs(v), a, beyond) for v in np.atleast_1d(at).ravel()]).reshape(at.shape)

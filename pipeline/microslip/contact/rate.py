@@ -13,7 +13,7 @@ import jax.numpy as jnp
 from ..reduced.compliance import BULK_AND_SURFACE
 from ..settings.numbers import NotNegative, Positive
 from .friction import Friction, Scattered, creep, halved
-from .law import Array, Law, Step, norm, number, settings, static, value
+from .law import Array, Law, Scalar, Step, norm, number, settings, static, value
 from .normal import Normal
 from .point import OnNormal, OwnNormal
 
@@ -60,7 +60,7 @@ class RateContact(OnNormal):
     def remembers(self) -> int | None:
         return 0
 
-    def rates(self, u: Array, v: Array, x: Array, time: Array | float, lag: float) -> tuple[Array, Array]:
+    def rates(self, u: Array, v: Array, x: Array, time: Scalar, lag: float) -> tuple[Array, Array]:
         pressed, now = self._pressed(u[:, 0], v[:, 0]), jnp.asarray(time)
         return jnp.concatenate([pressed[None], self._drag(norm(v.T[1:]), pressed, now) * v.T[1:]]).T, x
 
@@ -68,7 +68,7 @@ class RateContact(OnNormal):
         still = jnp.zeros((2, n))
         return RateState(still, still, still, jnp.zeros(n), jnp.zeros(n))
 
-    def step(self, u: Array, v: Array, dt: Array | float, state: RateState) -> tuple[Array, RateState]:
+    def step(self, u: Array, v: Array, dt: Scalar, state: RateState) -> tuple[Array, RateState]:
         time, tangential, speed = state.time + dt, u.T[1:], norm(v.T[1:])
         pressed = self._pressed(u[:, 0], v[:, 0])
         force = self._drag(speed, pressed, time) * v.T[1:]
@@ -79,7 +79,7 @@ class RateContact(OnNormal):
         after = RateState(tangential, v.T[1:], slipped, time, slides.astype(float))
         return jnp.concatenate([pressed[None], force]).T, after
 
-    def slowed(self, u: Array, v: Array, dt: Array | float, state: RateState, yielding: Array) -> Array:
+    def slowed(self, u: Array, v: Array, dt: Scalar, state: RateState, yielding: Array) -> Array:
         pressed, trial, time = self._pressed(u[:, 0], v[:, 0]), v.T[1:], state.time + dt
         fastest = norm(trial)
 

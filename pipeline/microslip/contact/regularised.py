@@ -21,7 +21,7 @@ from ..errors import NotConverged
 from ..reduced.compliance import BULK_AND_SURFACE
 from ..settings.numbers import NotNegative, Positive
 from .friction import Friction, creep, halved
-from .law import Array, Law, Step, norm, number, ratio, settings, static, value
+from .law import Array, Law, Scalar, Step, norm, number, ratio, settings, static, value
 from .normal import Normal
 from .point import OnNormal, OwnNormal, met, touching
 from .solids import bisected
@@ -75,7 +75,7 @@ class MassContact(OnNormal):
         none = jnp.zeros((2, n))
         return MassState(none, none, none, jnp.ones(n), none, jnp.zeros(n))
 
-    def step(self, u: Array, v: Array, dt: Array | float, state: MassState) -> tuple[Array, MassState]:
+    def step(self, u: Array, v: Array, dt: Scalar, state: MassState) -> tuple[Array, MassState]:
         """Implicit Euler: of first order, and for a vanishing mass and creep exactly the return map of `point`."""
         approach, tangential = u.T[0], u.T[1:]
         share, pressed, stretch, carries = self._loaded(approach, v.T[0], state)
@@ -137,7 +137,7 @@ class MassContact(OnNormal):
     def remembers(self) -> int | None:
         return 4
 
-    def rates(self, u: Array, v: Array, x: Array, time: Array | float, lag: float) -> tuple[Array, Array]:
+    def rates(self, u: Array, v: Array, x: Array, time: Scalar, lag: float) -> tuple[Array, Array]:
         """x: stretch of the springs, m, and velocity of P, m/s; open, P follows M on springs and dampers."""
         share = self.normal.share(u[:, 0])
         state = MassState(u.T[1:], x[:2], x[2:], share, 0 * x[:2], jnp.broadcast_to(time, share.shape))
@@ -182,7 +182,7 @@ class MassContact(OnNormal):
 
 
 @dataclass(frozen=True)
-class Course:
+class ElementCourse:
     """What one integrated element did at the times asked for.
 
     Attributes:
@@ -201,7 +201,7 @@ class Course:
 def integrate(
     law: MassContact, motion: Callable[[Array], Array], times: np.ndarray, tolerance: float = 1e-8,
     method: str = "Radau",
-) -> Course:  # fmt: skip
+) -> ElementCourse:  # fmt: skip
     """One element under a prescribed motion, by an integrator for stiff equations with the exact Jacobian.
 
     ContactModel opens and closes at times that the motion alone decides: they are found first, and each interval is
@@ -230,7 +230,7 @@ def integrate(
         else:
             part = np.tile(y, (len(inside), 1))
         courses.append(part)
-    return Course(times, *map(np.array, _told(law, motion, times, np.concatenate(courses))))
+    return ElementCourse(times, *map(np.array, _told(law, motion, times, np.concatenate(courses))))
 
 
 # The unknowns of one element are y = stretch, velocity and path of P. A motion is a part of the program.
@@ -290,7 +290,7 @@ def _solve(
 
 
 @partial(jax.jit, static_argnums=0)
-def _moving(motion: Callable[[Array], Array], t: Array | float) -> tuple[Array, Array]:
+def _moving(motion: Callable[[Array], Array], t: Scalar) -> tuple[Array, Array]:
     """Displacement and velocity of M (3,)."""
     t = jnp.asarray(t, float)
     return jax.jvp(motion, (t,), (jnp.ones_like(t),))
@@ -325,7 +325,7 @@ _jacobian = jax.jit(jax.jacfwd(_rate, argnums=3), static_argnums=1)
 
 @partial(jax.jit, static_argnums=1)
 def _told(law: MassContact, motion: Callable[[Array], Array], times: Array, ys: Array) -> tuple[Array, ...]:
-    """What `Course` holds, at many times."""
+    """What `ElementCourse` holds, at many times."""
 
     def one(t: Array, y: Array) -> tuple[Array, ...]:
         u, v, state = _state(law, motion, t, y)

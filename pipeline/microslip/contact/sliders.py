@@ -22,7 +22,7 @@ from ..settings.numbers import NotNegative, Number
 from .friction import Coulomb, OfCoulomb
 from .heights import Heights, as_table
 from .kinds import LawKind
-from .law import Array, Law, Step, norm, number, ratio, settings, static, value, values
+from .law import Array, Law, Scalar, Step, norm, number, ratio, settings, static, value, values
 from .normal import Normal, Preload
 from .partial_slip import NormalContact
 from .point import PointContact, Stretch, dragged, let_go, met, slide, touching, weight
@@ -76,7 +76,7 @@ class Sliders(Law):
         pair, each = jnp.zeros((2, n)), jnp.zeros((self.count(), n))
         return SliderState(pair, jnp.zeros((self.count(), 2, n)), each, each + self.full(), pair)
 
-    def step(self, u: Array, v: Array, dt: Array | float, state: SliderState) -> tuple[Array, SliderState]:
+    def step(self, u: Array, v: Array, dt: Scalar, state: SliderState) -> tuple[Array, SliderState]:
         pressed, springs, limits = self.local(u.T[0])
         left, relaxed, both = self._met(u.T[0], springs, state)
         way = both * (u.T[1:] - state.tangential)
@@ -88,7 +88,7 @@ class Sliders(Law):
         force = jnp.concatenate([pressed[None], jnp.sum(elastic, axis=0)])
         return force.T, SliderState(u.T[1:], elastic, limits, springs, slipped)
 
-    def way(self, u: Array, v: Array, dt: Array | float, state: SliderState) -> Any:
+    def way(self, u: Array, v: Array, dt: Scalar, state: SliderState) -> Any:
         if self.stiffness_ratio is not None:
             return super().way(u, v, dt, state)
         pressed, springs, limits = self.local(u.T[0])
@@ -275,8 +275,8 @@ class Iwan(Sliders):
 
 def jenkins(stiffness: float, mu: float, normal: float | Normal) -> PointContact:
     """One slider behind one spring. normal: a normal law, or a constant force in N; stiffness: tangential, N/m."""
-    law = normal if isinstance(normal, Normal) else Preload(jnp.asarray(normal, dtype=float))
-    return PointContact(law, Coulomb(jnp.asarray(mu, dtype=float)), jnp.asarray(stiffness, dtype=float))
+    law = normal if isinstance(normal, Normal) else Preload(value(normal))
+    return PointContact(law, Coulomb(value(mu)), value(stiffness))
 
 
 # Shares of Iwan's sliders ------------------------------------------------------------------------------------------
@@ -417,7 +417,7 @@ def mindlin(contact: NormalContact, mu: float, deepest: float, count: int, axis:
 def _strips(
     at: np.ndarray, shares: np.ndarray, depth: float, stiffness_0: float, stiffness_t: float, mu: float
 ) -> Strips:
-    depth_, c_N0, c_R0, friction = (jnp.asarray(x, dtype=float) for x in (depth, stiffness_0, stiffness_t, mu))
+    depth_, c_N0, c_R0, friction = (value(x) for x in (depth, stiffness_0, stiffness_t, mu))
     return Strips(jax.device_put(at[:, None]), jax.device_put(shares[:, None]), depth_, c_N0, c_R0, friction)
 
 

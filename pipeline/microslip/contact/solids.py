@@ -42,13 +42,18 @@ class Solid:
         return self.young / (2 * (1 + self.poisson)) if self.given_shear is None else self.given_shear
 
 
+def doubles(numbers: ArrayLike) -> Array:
+    """Numbers of any shape in double precision."""
+    return np.asarray(numbers, dtype=float)
+
+
 def pressing(force: ArrayLike) -> Array:
     """Normal forces, N, any shape.
 
     Raises:
         UserError: a negative one.
     """
-    F = np.asarray(force, dtype=float)
+    F = doubles(force)
     if not (F >= 0).all():
         raise UserError(f"{F.min():g} N; a contact is pressed, so the force must not be negative", "force")
     return F
@@ -58,7 +63,7 @@ def bisected(
     below: Callable[[Array], Array], low: ArrayLike, high: ArrayLike, halvings: int
 ) -> tuple[Array, Array]:
     """Ends of intervals (numbers or arrays) that are halved so often: `below` holds at the lower one alone."""
-    low, high = np.asarray(low, dtype=float), np.asarray(high, dtype=float)
+    low, high = doubles(low), doubles(high)
     for _ in range(halvings):
         middle = 0.5 * (low + high)
         short = below(middle)

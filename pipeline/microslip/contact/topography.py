@@ -27,7 +27,7 @@ SAMPLING_LENGTHS = 5
 
 
 @dataclass(frozen=True)
-class Profile:
+class SurfaceProfile:
     """A measured profile.
 
     Attributes:
@@ -45,7 +45,7 @@ class Profile:
 
 
 @dataclass(frozen=True)
-class Roughness:
+class RoughnessNumbers:
     """Roughness numbers of a profile in m, from its mean line as it is, without a filter: waviness is in them.
 
     Attributes:
@@ -71,7 +71,7 @@ class Fit:
 @in_its_file
 def read_profile(
     path: str | Path, unit: str | tuple[str, str], level: int | None = 1, columns: tuple[int | str, int | str] = (1, 2)
-) -> Profile:
+) -> SurfaceProfile:
     """A profile from a file of columns, way x and height z; see `curves.read_columns`.
 
     Any other file name than .txt, .csv, .tsv, .dat, .asc, .prf or none is given to `read_instrument`.
@@ -102,30 +102,30 @@ def read_profile(
             f"line {lines[i]}: x = {x[i]:g} does not lie behind {x[i - 1]:g}; "
             "sort the lines by x and leave doubled ones out"
         )
-    return levelled(_checked(Profile(x * scales[0], table[:, 1] * scales[1], str(path))), level)
+    return _levelled(x * scales[0], table[:, 1] * scales[1], path, level)
 
 
-def _scales(unit: str | tuple[str, str]) -> tuple[float, float]:
+def _scales(unit: str | tuple[str, str]) -> list[float]:
     names = (unit, unit) if isinstance(unit, str) else tuple(unit)
     for name in names:
         if name not in UNITS:
             raise UserError(f"unknown unit of length {name!r}; one of {', '.join(UNITS)}")
     if len(names) != 2:
         raise UserError(f"units of x and z are two names; got {len(names)}")
-    return UNITS[names[0]], UNITS[names[1]]
+    return [UNITS[name] for name in names]
 
 
-def _checked(profile: Profile) -> Profile:
-    z = profile.lines
-    if z.shape[1] < 10:
-        raise UserError(f"{z.shape[1]} points; a profile needs ten or more")
+def _levelled(x: np.ndarray, z: np.ndarray, path: Path, level: int | None) -> SurfaceProfile:
+    """A checked profile of a file, `levelled`."""
+    if z.shape[-1] < 10:
+        raise UserError(f"{z.shape[-1]} points; a profile needs ten or more")
     if np.ptp(z) == 0:
-        raise UserError(f"z is {z[0, 0]:g} m everywhere; a smooth surface needs no height distribution")
-    return profile
+        raise UserError(f"z is {z.flat[0]:g} m everywhere; a smooth surface needs no height distribution")
+    return levelled(SurfaceProfile(x, z, str(path)), level)
 
 
 @in_its_file
-def read_instrument(path: str | Path, level: int | None = 1) -> Profile:
+def read_instrument(path: str | Path, level: int | None = 1) -> SurfaceProfile:
     """A line or a map from a file of a profilometer, by SurfaceTopography (`pip install "microslip[profile]"`).
 
     Args:
@@ -155,7 +155,7 @@ def read_instrument(path: str | Path, level: int | None = 1) -> Profile:
     if np.ma.is_masked(z) or not np.all(np.isfinite(z)):
         raise UserError("some points were not measured; fill them in the instrument's program", "z")
     scale = UNITS[topography.unit]
-    return levelled(_checked(Profile(np.asarray(x) * scale, np.asarray(z) * scale, str(path))), level)
+    return _levelled(np.asarray(x) * scale, np.asarray(z) * scale, path, level)
 
 
 def _positions(topography: object) -> tuple[np.ndarray, np.ndarray]:
@@ -166,7 +166,7 @@ def _positions(topography: object) -> tuple[np.ndarray, np.ndarray]:
     return x[:, 0], z.T
 
 
-def levelled(profile: Profile, order: int | None = 1) -> Profile:
+def levelled(profile: SurfaceProfile, order: int | None = 1) -> SurfaceProfile:
     """The profile less the polynomial in x of this order that fits it best in the mean square; lines one by one.
 
     0 takes off the mean, 1 the tilt of the part in the instrument, 2 also a cylinder or the sag of the guide. None
@@ -187,18 +187,15 @@ def _shares(x: np.ndarray) -> np.ndarray:
     return (np.append(d, 0) + np.append(0, d)) / (2 * (x[-1] - x[0]))
 
 
-def roughness(profile: Profile) -> Roughness:
+def roughness(profile: SurfaceProfile) -> RoughnessNumbers:
     """Ra, Rq, Rt, Rmax and Rz of a profile, of a map the means over its lines (Rt and Rmax: the largest)."""
     z, shares = profile.lines, _shares(profile.x)
     z = z - (z @ shares)[:, None]
     edges = np.linspace(profile.x[0], profile.x[-1], SAMPLING_LENGTHS + 1)
     heights = np.array([_peak_to_valley(profile.x, z, a, b) for a, b in zip(edges, edges[1:], strict=False)])
-    return Roughness(
-        float(np.mean(np.abs(z) @ shares)),
-        float(np.mean(np.sqrt(z**2 @ shares))),
-        float(np.max(np.ptp(z, axis=1))),
-        float(heights.max()),
-        float(heights.mean()),
+    return RoughnessNumbers(
+        Ra=float(np.mean(np.abs(z) @ shares)), Rq=float(np.mean(np.sqrt(z**2 @ shares))),
+        Rt=float(np.max(np.ptp(z, axis=1))), Rmax=float(heights.max()), Rz=float(heights.mean()),
     )
 
 
@@ -209,7 +206,7 @@ def _peak_to_valley(x: np.ndarray, z: np.ndarray, start: float, end: float) -> n
     return np.ptp(np.column_stack([inside, cut]), axis=1)
 
 
-def material_curve(profile: Profile, count: int = 129) -> tuple[np.ndarray, np.ndarray]:
+def material_curve(profile: SurfaceProfile, count: int = 129) -> tuple[np.ndarray, np.ndarray]:
     """Share of the length that lies higher than a depth below the highest peak: the cumulative height distribution.
 
     Returns:
@@ -226,7 +223,7 @@ def material_curve(profile: Profile, count: int = 129) -> tuple[np.ndarray, np.n
     return depth, share
 
 
-def heights(profile: Profile, roughness_z: float, count: int = 129) -> Tabulated:
+def heights(profile: SurfaceProfile, roughness_z: float, count: int = 129) -> Tabulated:
     """The measured cumulative height distribution as a law's heights, depths divided by roughness_z (m)."""
     from .heights import tabulated
 
@@ -236,7 +233,7 @@ def heights(profile: Profile, roughness_z: float, count: int = 129) -> Tabulated
     return tabulated(depth / roughness_z, share, profile.name)
 
 
-def fit_roughness(profile: Profile, count: int = 513) -> Fit:
+def fit_roughness(profile: SurfaceProfile, count: int = 513) -> Fit:
     """R_Z of 3 x^2 - 2 x^3 by least squares over the measured distribution (Sextro Eqs. (3.3-4), (3.3-5)).
 
     x = 0 is the highest peak. A single high peak therefore shows as a large residual.

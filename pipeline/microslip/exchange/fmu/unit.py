@@ -13,7 +13,7 @@ from ..mat import field_names
 
 
 @dataclass(frozen=True)
-class Row:
+class NamedRow:
     """An input, or what is read.
 
     Attributes:
@@ -42,8 +42,8 @@ class Unit:
     damping_ratio: Array
     K: Array
     C: Array
-    load: tuple[Row, ...]
-    read: tuple[Row, ...]
+    load: tuple[NamedRow, ...]
+    read: tuple[NamedRow, ...]
     nominal: Array
 
     @property
@@ -60,13 +60,13 @@ def unit_of(basis: ModalBasis, g: ModalGroup) -> Unit:
         UserError: there is nothing to act on, or nothing to read.
     """
     faces, gauges = list(_faces(g)), _named("gauge", g.gauges)
-    load = [Row(f"{name}.force", {"m": "N", "rad": "N.m"}[unit], said, row) for name, said, row, unit in faces]
-    load += [Row(name, unit, said, row) for name, said, row, unit in _named("excitation", g.excitations)]
+    load = [NamedRow(f"{name}.force", {"m": "N", "rad": "N.m"}[unit], said, row) for name, said, row, unit in faces]
+    load += [NamedRow(name, unit, said, row) for name, said, row, unit in _named("excitation", g.excitations)]
     read = [
-        Row(f"{name}.displacement", unit, said, row, f"{name}.velocity", f"{unit}/s")
+        NamedRow(f"{name}.displacement", unit, said, row, f"{name}.velocity", f"{unit}/s")
         for name, said, row, unit in (*faces, *_named("monitor", g.monitors))
     ]
-    read += [Row(name, unit, said, row, f"{name}_rate", "1/s") for name, said, row, unit in gauges]
+    read += [NamedRow(name, unit, said, row, f"{name}_rate", "1/s") for name, said, row, unit in gauges]
     if not load or not read:
         raise UserError(
             f"{basis.name}: export --to fmu: there is nothing to {'read' if load else 'act on'}; give the body "

@@ -17,7 +17,7 @@ from ...errors import UserError, in_its_file, of_file
 from ...files.store import ordinary
 from ...units import SYSTEMS, usual_system
 from . import calculix, hdf5, market, matlab, nastran, numpy_archive
-from .found import Found, Unreadable, pick
+from .found import StoredMatrix, Unreadable, pick
 from .nodes import read_dofs, read_nodes
 
 if TYPE_CHECKING:
@@ -95,7 +95,7 @@ def read_matrices(
 
 
 def _checked(
-    item: Found, role: str, reference: str, folder: Path, rows: int, dofs: Indices
+    item: StoredMatrix, role: str, reference: str, folder: Path, rows: int, dofs: Indices
 ) -> tuple[sp.csr_matrix, str]:  # fmt: skip
     """The matrix on the rows of all, as symmetric as its role says, and what is told of that."""
     path = folder / split(reference)[0]
@@ -171,7 +171,7 @@ def _there(path: Path, key: str) -> Path:
     return path
 
 
-def _read(folder: Path, reference: str, role: str) -> Found:
+def _read(folder: Path, reference: str, role: str) -> StoredMatrix:
     file, name = split(reference)
     path = folder / file
     reader = _reader(path)
@@ -197,7 +197,7 @@ def _nodes(folder: Path, given: MatrixFiles, unit: str) -> Mesh:
     return replace(mesh, point_sets=sets)
 
 
-def _dofs(folder: Path, given: MatrixFiles, found: dict[str, Found], mesh: Mesh) -> tuple[Indices, str]:
+def _dofs(folder: Path, given: MatrixFiles, found: dict[str, StoredMatrix], mesh: Mesh) -> tuple[Indices, str]:
     """(k, 2) node number and component of the rows, and where that is said."""
     if given.nodes is None:
         return np.zeros((0, 2), dtype=np.int64), "nothing"
@@ -252,7 +252,7 @@ def _meaning(dofs: Indices, mesh: Mesh, rows: int, superelement: bool, where: st
     return np.where(physical, order[at], -1), whole[:, 1] - 1
 
 
-def _in_order(item: Found, dofs: Indices) -> sp.csr_matrix:
+def _in_order(item: StoredMatrix, dofs: Indices) -> sp.csr_matrix:
     """A matrix with rows of its own on the rows of all."""
     assert item.dofs is not None
     if item.dofs.shape == dofs.shape and (item.dofs == dofs).all():

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from ...data import Indices
-from .found import Found, Unreadable, sparse, square, table
+from .found import StoredMatrix, Unreadable, sparse, square, table
 
 
 def names(path: Path) -> list[str]:
@@ -15,7 +15,7 @@ def names(path: Path) -> list[str]:
     return [path.stem]
 
 
-def read(path: Path, name: str) -> Found:
+def read(path: Path, name: str) -> StoredMatrix:
     """Read a .sti or .mas file, and the .dof file beside it.
 
     Raises:
@@ -30,7 +30,7 @@ def read(path: Path, name: str) -> Found:
     upper = sparse(entries[:, 2], i, j, len(dofs))
     off = upper.copy()
     off.setdiag(0)
-    return Found(square(upper + off.T, "the matrix"), dofs)
+    return StoredMatrix(square(upper + off.T, "the matrix"), dofs)
 
 
 def read_dof(path: Path) -> Indices:

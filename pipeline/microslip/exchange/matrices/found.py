@@ -21,7 +21,7 @@ DENSE = 20_000
 
 
 @dataclass(frozen=True)
-class Found:
+class StoredMatrix:
     """One matrix of a file: (m, m), and the (m, 2) node number and component (1 to 6; 0: generalised) of its rows."""
 
     matrix: sp.csr_matrix

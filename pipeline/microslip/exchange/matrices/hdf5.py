@@ -15,7 +15,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from ...files.hostile import HostileFile, read_hdf5
-from .found import DENSE, Found, Unreadable, square
+from .found import DENSE, StoredMatrix, Unreadable, square
 
 _WAYS = (("row", "col", "data"), ("indptr", "indices", "data"), ("jc", "ir", "data"))
 _SKIP = "#refs#"
@@ -30,13 +30,13 @@ def names(path: Path) -> list[str]:
     return _guarded(path, _names)
 
 
-def read(path: Path, name: str) -> Found:
+def read(path: Path, name: str) -> StoredMatrix:
     """Read one matrix.
 
     Raises:
         Unreadable: damaged or hostile, no matrix.
     """
-    return Found(square(_guarded(path, lambda file: _matrix(file[name], name)), name))
+    return StoredMatrix(square(_guarded(path, lambda file: _matrix(file[name], name)), name))
 
 
 def read_table(path: Path, name: str, columns: int) -> Any:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import scipy.io
 
-from .found import LARGEST, Found, Unreadable, square
+from .found import LARGEST, StoredMatrix, Unreadable, square
 
 
 def names(path: Path) -> list[str]:
@@ -14,7 +14,7 @@ def names(path: Path) -> list[str]:
     return [path.stem]
 
 
-def read(path: Path, name: str) -> Found:
+def read(path: Path, name: str) -> StoredMatrix:
     """Read the matrix.
 
     Raises:
@@ -35,4 +35,4 @@ def read(path: Path, name: str) -> Found:
         found = scipy.io.mmread(str(path))
     except (ValueError, OverflowError) as error:
         raise Unreadable(f"it announces {count} entries, which cannot be read ({error})") from None
-    return Found(square(found, "the matrix"))
+    return StoredMatrix(square(found, "the matrix"))

@@ -9,7 +9,7 @@ import h5py
 
 from ...files.hostile import tried
 from . import hdf5
-from .found import DENSE, Found, Unreadable, square
+from .found import DENSE, StoredMatrix, Unreadable, square
 
 
 def names(path: Path) -> list[str]:
@@ -29,7 +29,7 @@ def names(path: Path) -> list[str]:
     ]
 
 
-def read(path: Path, name: str) -> Found:
+def read(path: Path, name: str) -> StoredMatrix:
     """Read one variable.
 
     Raises:
@@ -42,7 +42,7 @@ def read(path: Path, name: str) -> Found:
     for found, shape, kind in _trusting(scipy.io.whosmat, path):
         if found == name and kind != "sparse" and max(shape) > DENSE:
             raise Unreadable(f"{name} is stored in full with {max(shape)} rows; store it sparse")
-    return Found(square(_trusting(scipy.io.loadmat, path, variable_names=[name])[name], name))
+    return StoredMatrix(square(_trusting(scipy.io.loadmat, path, variable_names=[name])[name], name))
 
 
 _TRIAL = """

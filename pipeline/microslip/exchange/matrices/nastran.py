@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from .found import DENSE, Found, Unreadable, sparse, square
+from .found import DENSE, StoredMatrix, Unreadable, sparse, square
 
 
 def names(path: Path) -> list[str]:
@@ -22,14 +22,14 @@ def names(path: Path) -> list[str]:
     return [name.upper() for name in _dmig(path)]
 
 
-def read(path: Path, name: str) -> Found:
+def read(path: Path, name: str) -> StoredMatrix:
     """Read one matrix.
 
     Raises:
         Unreadable: damaged.
     """
     if path.suffix.lower() == ".op4":
-        return Found(square(_op4(path)[name.lower()], name))
+        return StoredMatrix(square(_op4(path)[name.lower()], name))
     frame = _dmig(path)[name.lower()]
     rows = np.array([tuple(i) for i in frame.index], dtype=np.int64).reshape(-1, 2)
     cols = np.array([tuple(i) for i in frame.columns], dtype=np.int64).reshape(-1, 2)
@@ -38,7 +38,7 @@ def read(path: Path, name: str) -> Found:
     values = np.asarray(frame, dtype=float)
     i, j = np.nonzero(values)
     at = [np.array([place[tuple(d)] for d in side.tolist()], dtype=np.int64) for side in (rows, cols)]
-    return Found(square(sparse(values[i, j], at[0][i], at[1][j], len(dofs)), name), dofs)
+    return StoredMatrix(square(sparse(values[i, j], at[0][i], at[1][j], len(dofs)), name), dofs)
 
 
 def grids(path: Path) -> Any:

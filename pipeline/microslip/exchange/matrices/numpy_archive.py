@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from .found import DENSE, Found, Unreadable, square
+from .found import DENSE, StoredMatrix, Unreadable, square
 
 _PARTS = ("data", "indices", "indptr", "shape")
 LARGEST_FILE = 2**34
@@ -32,7 +32,7 @@ def names(path: Path) -> list[str]:
     return [*sparse, *(name for name in stored if name not in taken)]
 
 
-def read(path: Path, name: str) -> Found:
+def read(path: Path, name: str) -> StoredMatrix:
     """Read one matrix.
 
     Raises:
@@ -43,11 +43,11 @@ def read(path: Path, name: str) -> Found:
     if single or f"{name}_data" in stored:
         kind = str(_array(path, "format").astype(str)) if "format" in stored and single else "csr"
         parts = {part: _array(path, part if single else f"{name}_{part}") for part in _PARTS}
-        return Found(square(_compressed(parts, kind, name), name))
+        return StoredMatrix(square(_compressed(parts, kind, name), name))
     whole = _array(path, name)
     if max(whole.shape, default=0) > DENSE:
         raise Unreadable(f"{name} is stored in full with {max(whole.shape)} rows; store it sparse")
-    return Found(square(whole, name))
+    return StoredMatrix(square(whole, name))
 
 
 def _compressed(parts: dict[str, Any], kind: str, name: str) -> Any:
