@@ -45,7 +45,7 @@ def bare(monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest) -> Non
     if "whole" not in request.node.name:
         drawn = "microslip.pictures.response.response_picture"
         monkeypatch.setattr(drawn, lambda *_, **__: None)
-        monkeypatch.setattr("microslip.case.run._Left.out", lambda *_: [])
+        monkeypatch.setattr("microslip.case.run._Run._judge", lambda *_: True)
     monkeypatch.setattr(solver, "newton", _to_the_end)
 
 
