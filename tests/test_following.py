@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import shutil
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
@@ -200,8 +201,13 @@ def test_the_error_of_a_backbone_is_what_more_harmonics_and_samples_change(
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("unestimated")
-def test_what_was_found_stays_when_it_is_interrupted(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_was_found_stays_when_it_is_interrupted(
+    place: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Ctrl-C at the second normal force, the third value, the third point: the same command goes on from there."""
+    for name in ("case.toml", "basis.h5"):
+        shutil.copy(place / name, tmp_path)
+    monkeypatch.chdir(tmp_path)
 
     def stopped(work: Callable[[CaseJob], object], words: str, *assignments: str) -> list[str]:
         """What is said when it goes on."""
