@@ -16,10 +16,9 @@ from meshes import STEEL, body, brick
 from refusals import refused
 from scipy.special import ellipe, ellipk, gamma
 
-from microslip.contact import joined_beams
+from microslip.contact import identification
 from microslip.contact.hertz import Hertz, axis_ratio, ellipse_integrals, half_curvatures
-from microslip.contact.identification import MeasuredResonance, identify, joined, two_beams
-from microslip.contact.joined_beams import rectangle
+from microslip.contact.identification import MeasuredResonance, identify, joined, rectangle, two_beams
 from microslip.contact.layer import BOUNDARIES, Layer, modal_stiffness, quasi_static_error
 from microslip.contact.partial_slip import PartialSlip
 from microslip.contact.profiles import Profile, RoundContact
@@ -580,8 +579,8 @@ RIG = two_beams(BEAM, 0.01)
 def test_limits_of_the_two_beams_are_those_of_single_ones():
     """Free: cantilevers. Rigid: the first mode of a clamped-clamped beam of both, and of a clamped-pinned one."""
     free = BEAM.unit * euler_bernoulli(1)[0]
-    assert joined_beams.frequencies(BEAM, 0.0, 0.0) == pytest.approx((free, free), rel=1e-12)
-    rigid = joined_beams.frequencies(BEAM, np.inf, np.inf)
+    assert identification.frequencies(BEAM, 0.0, 0.0) == pytest.approx((free, free), rel=1e-12)
+    rigid = identification.frequencies(BEAM, np.inf, np.inf)
     twice = rectangle(0.4, 0.02, 0.01, 2.1e11, 0.3, 7850)
     whole = twice.unit * euler_bernoulli(2, "clamped-clamped")
     assert rigid == pytest.approx(tuple(whole), rel=1e-10)  # one piece
@@ -597,8 +596,8 @@ def test_two_beams_against_a_sum_over_modes():
     slope = np.sqrt(tip) * sigma * b / BEAM.length  # both up to a sign that the rank-one spring does not see
     k_phi, k_t = 800.0, 3e7
     for row, k, found in (
-        (slope, 2 * k_phi, joined_beams.frequencies(BEAM, k_phi, k_t)[0]),
-        (np.sqrt(tip) * np.ones(60), 2 * k_t, joined_beams.frequencies(BEAM, k_phi, k_t)[1]),
+        (slope, 2 * k_phi, identification.frequencies(BEAM, k_phi, k_t)[0]),
+        (np.sqrt(tip) * np.ones(60), 2 * k_t, identification.frequencies(BEAM, k_phi, k_t)[1]),
     ):
         K = np.diag((BEAM.unit * b2) ** 2) + k * np.outer(row, row)
         assert found == pytest.approx(np.sqrt(scipy.linalg.eigvalsh(K)[0]), rel=5e-3)

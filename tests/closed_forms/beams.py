@@ -14,7 +14,7 @@ from numpy.polynomial import Polynomial
 from numpy.polynomial.legendre import Legendre, leggauss
 from scipy.optimize import brentq
 
-from microslip.contact.joined_beams import Section
+from microslip.contact.identification import Section
 from microslip.data import Array
 
 # ends -> (function whose roots are beta L, scaled so that it stays bounded; the k-th is near (k - shift) pi)

@@ -1,10 +1,10 @@
-"""Springs between two cantilevers in line from one measured frequency: `microslip.contact.joined_beams` inverted."""
+"""Springs between two cantilevers in line from one measured frequency: `microslip.contact.identification` inverted."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from microslip.contact.joined_beams import FREE, HINGE_LOCKED, SHEAR_LOCKED, Section, hinge_number, shear_number
+from microslip.contact.identification import FREE, HINGE_LOCKED, SHEAR_LOCKED, Section, hinge_number, shear_number
 
 
 def hinge_spring(section: Section, omega: float) -> float:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from microslip.contact.joined_beams import Section
+from microslip.contact.identification import Section
 from microslip.data import Array
 
 

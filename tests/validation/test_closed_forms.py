@@ -11,7 +11,7 @@ import pytest
 from closed_forms import bars, beams, shafts
 from meshes import STEEL, body, brick, nearest, with_sets
 
-from microslip.contact.joined_beams import rectangle
+from microslip.contact.identification import rectangle
 from microslip.errors import UserError
 from microslip.modal.compute import modal_basis
 

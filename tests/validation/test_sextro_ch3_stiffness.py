@@ -11,8 +11,7 @@ from closed_forms.joined_beams import shear_spring
 from scipy.integrate import quad
 
 from microslip.contact.curves import curve
-from microslip.contact.identification import MeasuredResonance, identify, two_beams
-from microslip.contact.joined_beams import rectangle
+from microslip.contact.identification import MeasuredResonance, identify, rectangle, two_beams
 from microslip.contact.layer import Layer, modal_stiffness
 from microslip.contact.solids import Solid
 

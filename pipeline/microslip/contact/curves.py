@@ -25,7 +25,7 @@ from ..reduced.compliance import BULK_AND_SURFACE
 from .hertz import Hertz
 from .profiles import RoundContact
 from .series import BULK, INCLUDES
-from .solids import pressing
+from .solids import bisected, pressing
 
 LENGTHS = {"m": 1.0, "mm": 1e-3, "um": 1e-6, "nm": 1e-9}
 FORCES = {"N": 1.0, "kN": 1e3, "mN": 1e-3}
@@ -103,11 +103,8 @@ class NormalCurve:
         if force >= self.loads[-1]:
             return float(self.knots[-1] + (force - self.loads[-1]) / self.slopes[-1])
         i = max(int(np.searchsorted(self.loads, force)), 1)
-        low, high = self.knots[i - 1], self.knots[i]
-        for _ in range(80):  # bisection: a level stretch has no slope to divide by
-            middle = 0.5 * (low + high)
-            low, high = (low, middle) if self._spline(middle) >= force else (middle, high)
-        return float(high)
+        # a level stretch has no slope to divide by
+        return float(bisected(lambda x: self._spline(x) < force, self.knots[i - 1], self.knots[i], 80)[1])
 
 
 def of_contact(contact: Hertz | RoundContact, largest: float, count: int = 81) -> NormalCurve:

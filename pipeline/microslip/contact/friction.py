@@ -7,6 +7,7 @@ jump (stick-slip in one step); the return map then takes one of the roots, the r
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
@@ -23,9 +24,8 @@ from ..settings.mistakes import bounded
 from ..settings.numbers import Coefficient, NotNegative, Number, Positive
 from .curves import read_table
 from .heights import Heights
-from .keys import Columns, FileName
-from .kinds import Kind, beside
-from .law import Array, number, settings, value, values
+from .kinds import Columns, FileName, Kind, beside
+from .law import Array, bisected, number, settings, value, values
 
 if TYPE_CHECKING:
     from .settings import Temperature
@@ -146,7 +146,7 @@ class Exponential(Friction):
 
 
 EXPONENTIAL_44 = Exponential(
-    jnp.asarray(0.14 * 2.14 * np.pi / 2), jnp.asarray(0.14 * np.pi / 2), jnp.asarray(2.0)
+    np.asarray(0.14 * 2.14 * np.pi / 2), np.asarray(0.14 * np.pi / 2), np.asarray(2.0)  # type: ignore[arg-type]
 )  # a_1 (1 + a_2 exp(-b_1 |v|)) arctan(b_2 v), whose arctan tends to pi/2 (errata to 4.4-9: no factor 2/pi)
 
 
@@ -418,15 +418,9 @@ def halved(excess: Callable[[Array], Array], fastest: Array, powers: float, halv
     """(n,) speed where a function is zero that is negative at rest and not negative at ``fastest``: its logarithm is
     halved so often, over so many powers of e."""
     safe = jnp.where(fastest > 0, fastest, 1.0)
-
-    def halve(_: int, ends: tuple[Array, Array]) -> tuple[Array, Array]:
-        low, high = ends
-        middle = 0.5 * (low + high)
-        above = excess(safe * jnp.exp(middle)) > 0
-        return jnp.where(above, low, middle), jnp.where(above, middle, high)
-
-    low, high = jax.lax.fori_loop(0, halvings, halve, (jnp.full_like(safe, -powers), jnp.zeros_like(safe)))
-    return jnp.where(fastest > 0, safe * jnp.exp(0.5 * (low + high)), 0.0)
+    ends = jnp.full_like(safe, -powers), jnp.zeros_like(safe)
+    power = bisected(lambda power: excess(safe * jnp.exp(power)), *ends, halvings)
+    return jnp.where(fastest > 0, safe * jnp.exp(power), 0.0)
 
 
 def peak(friction: Friction, slope: float, fastest: float = 10.0) -> tuple[float, float]:
@@ -445,9 +439,11 @@ class FrictionKind(Kind):
 
     Attributes:
         heated: whether it needs the heat of sliding, [temperature], and an area.
+        characteristic: what `mean` makes, where its numbers are keys of the same names.
     """
 
     heated: ClassVar[bool] = False
+    characteristic: ClassVar[type[Friction] | None] = None
     kind: str
     """friction characteristic"""
     deviation: NotNegative = 0.0
@@ -468,59 +464,54 @@ class FrictionKind(Kind):
 
     def mean(self, path: Path, heat: Temperature | None, area: float | None) -> Friction:
         """The characteristic without its scatter."""
-        raise NotImplementedError
+        if self.characteristic is None:
+            raise NotImplementedError
+        names = (f.name for f in fields(self.characteristic))  # type: ignore[arg-type]
+        return self.characteristic(*(value(getattr(self, name)) for name in names))
 
 
 class OfCoulomb(FrictionKind):
     """The same coefficient at every speed."""
 
     kind: Literal["coulomb"]
+    characteristic: ClassVar[type[Friction]] = Coulomb
     mu: Coefficient
     """coefficient"""
-
-    def mean(self, path: Path, heat: Temperature | None, area: float | None) -> Friction:
-        return Coulomb(value(self.mu))
 
 
 class OfStaticSliding(FrictionKind):
     """One coefficient for sticking, a lower one for sliding."""
 
     kind: Literal["static-sliding"]
+    characteristic: ClassVar[type[Friction]] = StaticSliding
     static: Coefficient
     """coefficient at rest"""
     sliding: Coefficient
     """coefficient of sliding"""
-
-    def mean(self, path: Path, heat: Temperature | None, area: float | None) -> Friction:
-        return StaticSliding(value(self.static), value(self.sliding))
 
 
 class OfFalling(FrictionKind):
     """mu_0/(1 + p_v v) (3.6-15)."""
 
     kind: Literal["falling"]
+    characteristic: ClassVar[type[Friction]] = Falling
     mu_0: Coefficient
     """coefficient at zero speed, cold"""
     p_v: NotNegative
     """[s/m] of (3.6-15)"""
-
-    def mean(self, path: Path, heat: Temperature | None, area: float | None) -> Friction:
-        return Falling(value(self.mu_0), value(self.p_v))
 
 
 class OfExponential(FrictionKind):
     """(mu_0 - mu_inf) exp(-rate v) + mu_inf (4.1-22)."""
 
     kind: Literal["exponential"]
+    characteristic: ClassVar[type[Friction]] = Exponential
     mu_0: Coefficient
     """coefficient at zero speed, cold"""
     mu_inf: Coefficient
     """coefficient at high speed"""
     rate: NotNegative
     """[s/m] lambda_e"""
-
-    def mean(self, path: Path, heat: Temperature | None, area: float | None) -> Friction:
-        return Exponential(value(self.mu_0), value(self.mu_inf), value(self.rate))
 
 
 class OfHeated(FrictionKind):

@@ -15,21 +15,34 @@ from collections.abc import Iterable
 from importlib.metadata import entry_points
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Union
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Union
 
 import numpy as np
-from pydantic import Field
+from pydantic import BeforeValidator, Field
 
 from ..errors import UserError
 from ..files.store import ordinary
-from ..settings.numbers import Model
+from ..settings.numbers import Model, NotNegative, Number, Positive, _finite_vector, _tuple
 from ..settings.toml import load_toml
+from .layer import BOUNDARIES
 
 if TYPE_CHECKING:
     from .composed import ContactModel
     from .law import Law
     from .normal import Normal
     from .settings import ContactLaw
+
+NotNegativeLength = Annotated[NotNegative, "length"]
+Lengths = Annotated[tuple[Number, ...], BeforeValidator(_finite_vector), "length"]
+PositiveLengths = Annotated[tuple[Positive, ...], BeforeValidator(_finite_vector), "length"]
+Radii = Annotated[tuple[float, float], BeforeValidator(_finite_vector), "length"]  # inf is flat
+OneOrTwo = Positive | Annotated[tuple[Positive, Positive], BeforeValidator(_finite_vector)]
+Column = Annotated[int, Field(ge=1)] | Annotated[str, Field(min_length=1)]
+Columns = Annotated[tuple[Column, Column], BeforeValidator(_tuple)]
+FileName = Annotated[str, Field(min_length=1)]
+Poisson = Annotated[Number, Field(gt=-1, le=0.5)]
+Boundary = Literal["stress-free", "hydrostatic", "no-lateral-strain"]
+assert set(BOUNDARIES) == {"stress-free", "hydrostatic", "no-lateral-strain"}
 
 SECTIONS = ("stiffness", "roughness", "friction", "law")
 

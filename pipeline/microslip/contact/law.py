@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, fields, is_dataclass
 from functools import partial
 from typing import Any, ClassVar, NamedTuple, TypeVar, dataclass_transform
@@ -149,8 +149,101 @@ class Step(NamedTuple):
     after: State
 
 
-class Law:
-    """Base of the contact laws.
+class SolvableMemory:
+    """Of laws whose next step depends on all steps before by two things alone: the place (u, v) where the last one
+    ended, and forces of springs, each behind a slider that knows of no other: the memory, (..., 2, n) N along t1, t2.
+
+    The periodic memory is then solved for (`periodic`); of other laws cycles are marched until they repeat. The steps
+    of a cycle are taken apart: what their places decide, `way`, is computed for all samples at once, and what goes from
+    sample to sample is `drag`. With both left as they are a law works too, more slowly.
+    """
+
+    def memory(self, force: Array, state: State) -> Array:
+        """(..., n) forces in N that come back with the cycle once it is periodic, and that the next one depends on.
+
+        All of them, however many parts a contact has; not what grows from cycle to cycle, as the path slid. The
+        default, the force (n, 3), will do where nothing else is remembered. With `recalled` it is (..., 2, n), and
+        made of the state alone.
+        """
+        return force.T
+
+    def recalled(self, state: State, memory: Array) -> State | None:
+        """The state with another memory, linear in both; None (the default): it cannot be solved for."""
+        return None
+
+    def way(self, u: Array, v: Array, dt: Array | float, state: State) -> Any:
+        """All that `drag` needs of a step that ends at u, v, beside the memory: a pytree, for instance pressed force,
+        stiffness times displacement, and what friction holds at both ends.
+
+        Args:
+            state: that in which a single step from rest to the place where the step before ended leaves the points.
+                Only what the place decides may be read of it (where it is, the share of the area, what friction holds
+                there): neither the memory nor what adds up on the way, as time and path slid.
+        """
+        return u, v, dt, state
+
+    def drag(self, way: Any, memory: Array) -> tuple[Array, Array]:
+        """(3, n) force in N and the memory at the end of a step, from its `way` and the memory at its beginning: the
+        same as those of `Law.step` from `recalled`."""
+        u, v, dt, state = way
+        force, after = self.step(u, v, dt, self.recalled(state, memory))  # type: ignore[attr-defined]
+        return force.T, self.memory(force, after)
+
+
+class DifferentialForm:
+    """Of laws that can be written as a differential equation: for integrators that choose their own steps.
+
+    Attributes:
+        smooth: whether `rates` has a slope everywhere, so that it can be linearised wherever it is.
+    """
+
+    smooth: ClassVar[bool] = False
+
+    @property
+    def remembers(self) -> int | None:
+        """k numbers of a point in the differential equation, see `rates`; None, the default: the law has none."""
+        return None
+
+    def rates(self, u: Array, v: Array, x: Array, time: Array | float, lag: float) -> tuple[Array, Array]:
+        """The force, and how what is remembered changes.
+
+        Args:
+            u: (n, 3) m. v: (n, 3) m/s. x: (k, n) what it remembers, zero at first. time: s.
+            lag: s, of the damper (stiffness times lag) that is put beside springs with a slider and without one, lest
+                integrators meet a jump wherever it begins to slide or to stick.
+
+        Returns:
+            (n, 3) force in N and (k, n) the time derivative of x.
+        """
+        raise NotImplementedError
+
+    @property
+    def follows(self) -> float:
+        """s, in which what the differential equation remembers follows the motion; inf: it remembers nothing; 0, the
+        default: at once, with jumps of its rate, or it is known by its steps alone."""
+        return 0.0
+
+
+class Braking:
+    """Of laws whose friction changes so fast with the velocity that a motion in time needs `slowed`.
+
+    Attributes:
+        brakes: whether it is one.
+    """
+
+    brakes: ClassVar[bool] = False
+
+    def slowed(self, u: Array, v: Array, dt: Array | float, state: State, yielding: Array) -> Array:
+        """(n, 3) velocities in m/s that are left of v when friction brakes points which yield by (n,) m/s per N:
+        v_t = left_t + yielding F_t(left), with the normal velocity as it is. The default leaves v: friction follows the
+        displacement."""
+        return v
+
+
+class Law(SolvableMemory, DifferentialForm, Braking):
+    """Base of the contact laws. An author writes `init`, `step`, `limit`, `slip`, `stored` and `lost`.
+
+    What solvers can use besides has defaults: the three classes above, and what a patch asks below.
 
     A setting is one number or has the points along its last axis, in the order of the rows of ``u``; a table is a
     field of its own kind, see `table`, or has a last axis of length one. States have the points along their last axis.
@@ -161,14 +254,10 @@ class Law:
     closed cycle, the integral of force . du, is the energy the contact dissipates.
 
     Attributes:
-        brakes: whether its friction changes so fast with the velocity that a motion in time needs `slowed`.
-        smooth: whether `rates` has a slope everywhere, so that it can be linearised wherever it is.
         NEEDED: methods without which no law is solved.
     """
 
     NEEDED: ClassVar[tuple[str, ...]] = ("init", "step", "limit", "slip", "stored")
-    brakes: ClassVar[bool] = False
-    smooth: ClassVar[bool] = False
 
     def __init_subclass__(cls, **more: Any) -> None:
         """A class with a step of its own alone has not the way of the class that it is made from."""
@@ -188,73 +277,6 @@ class Law:
         """
         raise NotImplementedError
 
-    @property
-    def remembers(self) -> int | None:
-        """k numbers of a point in the law's differential equation, see `rates`; None, the default: it has none."""
-        return None
-
-    def rates(self, u: Array, v: Array, x: Array, time: Array | float, lag: float) -> tuple[Array, Array]:
-        """The law as a differential equation, for integrators that choose their own steps.
-
-        Args:
-            u: (n, 3) m. v: (n, 3) m/s. x: (k, n) what it remembers, zero at first. time: s.
-            lag: s, of the damper (stiffness times lag) that is put beside springs with a slider and without one, lest
-                integrators meet a jump wherever it begins to slide or to stick.
-
-        Returns:
-            (n, 3) force in N and (k, n) the time derivative of x.
-        """
-        raise NotImplementedError
-
-    @property
-    def follows(self) -> float:
-        """s, in which what the differential equation remembers follows the motion; inf: it remembers nothing; 0, the
-        default: at once, with jumps of its rate, or it is known by its steps alone."""
-        return 0.0
-
-    def slowed(self, u: Array, v: Array, dt: Array | float, state: State, yielding: Array) -> Array:
-        """(n, 3) velocities in m/s that are left of v when friction brakes points which yield by (n,) m/s per N:
-        v_t = left_t + yielding F_t(left), with the normal velocity as it is. The default leaves v: friction follows the
-        displacement."""
-        return v
-
-    def given(self, step: Step) -> Array:
-        """(n,) J that what the contact touches gives it in a step, where that moves; the default: it does not."""
-        return jnp.zeros(step.u.shape[0])
-
-    def memory(self, force: Array, state: State) -> Array:
-        """(..., n) forces in N that come back with the cycle once it is periodic, and that the next one depends on.
-
-        All of them, however many parts a contact has; not what grows from cycle to cycle, as the path slid. The
-        default, the force (n, 3), will do where nothing else is remembered. With `recalled` it is (..., 2, n).
-        """
-        return force.T
-
-    def recalled(self, state: State, memory: Array) -> State | None:
-        """A state with another memory, linear in both; None (the default) lets `periodic` march and solve for nothing.
-
-        For laws whose next step depends on the last one by nothing else but where that ended, with a memory (..., 2, n)
-        of sliders that each know of no other: where it ends may depend on its own beginning alone. `memory` must not
-        need the force.
-        """
-        return None
-
-    def way(self, u: Array, v: Array, dt: Array | float, state: State) -> Any:
-        """What a step is of besides the memory, of a law with `recalled`: once for all cycles of a path. What a law
-        offers here saves time; what is left of the state need not be true but for that."""
-        return u, v, dt, state
-
-    def drag(self, way: Any, memory: Array) -> tuple[Array, Array]:
-        """(3, n) force in N and the memory at the end of a step that `way` tells, from that at its beginning."""
-        u, v, dt, state = way
-        force, after = self.step(u, v, dt, self.recalled(state, memory))
-        return force.T, self.memory(force, after)
-
-    def scaled(self, share: Array) -> Law | None:
-        """The law of points that carry shares of the whole contact, in numbers of its own; None, the default: it is
-        shared out by `portion.Portion`, as any law can be."""
-        return None
-
     def limit(self, force: Array, state: State) -> Array:
         """(n,) largest tangential force in N that goes with a normal force; ``force`` (n, 3) N."""
         raise NotImplementedError
@@ -267,6 +289,17 @@ class Law:
         """(n,) energy in J that an unloading can give back at most."""
         raise NotImplementedError
 
+    def lost(self, step: Step) -> Array:
+        """(n,) energy in J that a step takes for good, counted where it goes: friction times the path slid, dampers,
+        stretched area that opens.
+
+        Over a closed cycle it is the work done on the contact, but for the second order of the steps: the balance of
+        every solution is checked by that. NaN, the default: the law does not count it, and nothing is checked.
+        """
+        return jnp.full(step.u.shape[0], jnp.nan)
+
+    # what a patch asks -----------------------------------------------------------------------------------------------
+
     def pressed(self, approach: Array) -> Array:
         """(n,) N by which an approach (n,) m presses, come to straight from u = 0 and at rest."""
         path = jnp.stack([approach, jnp.zeros_like(approach), jnp.zeros_like(approach)], axis=1)
@@ -277,14 +310,14 @@ class Law:
         nothing, and no way of that length closes them. NaN, the default: they never open, or it is not known."""
         return jnp.full(u.shape[0], jnp.nan)
 
-    def lost(self, step: Step) -> Array:
-        """(n,) energy in J that a step takes for good, counted where it goes: friction times the path slid, dampers,
-        stretched area that opens.
+    def scaled(self, share: Array) -> Law | None:
+        """The law of points that carry shares of the whole contact, in numbers of its own; None, the default: it is
+        shared out by `portion.Portion`, as any law can be."""
+        return None
 
-        Over a closed cycle it is the work done on the contact, but for the second order of the steps: the balance of
-        every solution is checked by that. NaN, the default: the law does not count it, and nothing is checked.
-        """
-        return jnp.full(step.u.shape[0], jnp.nan)
+    def given(self, step: Step) -> Array:
+        """(n,) J that what the contact touches gives it in a step, where that moves; the default: it does not."""
+        return jnp.zeros(step.u.shape[0])
 
 
 @settings
@@ -302,41 +335,46 @@ class History:
     state: State
 
 
-def velocities(u: Array, dt: float | Array, before: Array) -> Array:
-    """Backward differences of a path u (s, n, 3) that starts from ``before`` (n, 3): m/s."""
+@inner
+def stepped(law: Law, u: Array, v: Array, dt: Array | float, state: State) -> tuple[Array, State]:
+    """`Law.step`, which python reads once for all its uses."""
+    return law.step(u, v, dt, state)
+
+
+def velocities(u: Array, dt: Array | float, before: Array | None = None) -> Array:
+    """Backward differences of a path u (s, n, 3) that starts from ``before`` (n, 3), m/s; without it the first one is
+    that of the second sample."""
+    if before is None:
+        before = 2 * u[0] - u[1] if len(u) > 1 else u[0]
     return jnp.diff(jnp.concatenate([before[None], u]), axis=0) / dt
 
 
-def march(law: Law, u: Array, dt: float | Array, state: State, v: Array | None = None) -> tuple[Array, State]:
+def march(law: Law, u: Array, dt: Array | float, state: State, v: Array | None = None) -> tuple[Array, State]:
     """Forces along a path: ``lax.scan`` over `Law.step`.
 
     Args:
-        u: (s, n, 3) displacements after each step, m. dt: s. state: at the beginning.
-        v: (s, n, 3) m/s; backward differences if not given, the first one taken from the second sample.
+        u: (s, n, 3) displacements after each step, m. dt: s. state: at the beginning. v: (s, n, 3) m/s; `velocities`
+            if not given.
 
     Returns:
         (s, n, 3) forces in N and the state at the end.
     """
-    if v is None:
-        v = velocities(u, dt, 2 * u[0] - u[1] if len(u) > 1 else u[0])
 
-    def one(carried: State, sample: tuple[Array, Array]) -> tuple[State, Array]:
-        force, after = law.step(*sample, dt, carried)
+    def sample(carried: State, place: tuple[Array, Array]) -> tuple[State, Array]:
+        force, after = stepped(law, *place, dt, carried)
         return after, force
 
-    state, force = jax.lax.scan(one, state, (u, v))
+    state, force = jax.lax.scan(sample, state, (u, velocities(u, dt) if v is None else v))
     return force, state
 
 
 @inner
-def history(law: Law, u: Array, dt: float | Array, state: State | None = None) -> History:
+def history(law: Law, u: Array, dt: Array | float) -> History:
     """Forces, slip path and dissipated energy of a prescribed motion u (s, n, 3) in m, steps of dt seconds.
 
     The work of a step is that of its mean force, the trapezoidal rule. It is counted from the first sample, to which
     an unloaded contact is taken in one step, straight from u = 0.
     """
-    state = law.init(u.shape[1]) if state is None else state
-    v = velocities(u, dt, 2 * u[0] - u[1] if len(u) > 1 else u[0])
 
     def one(carried: tuple[State, Array, Array, Array], sample: tuple[Array, Array]) -> tuple[Any, tuple[Array, ...]]:
         state, before, force_before, work = carried
@@ -344,9 +382,23 @@ def history(law: Law, u: Array, dt: float | Array, state: State | None = None) -
         work = work + 0.5 * jnp.sum((force + force_before) * (sample[0] - before), axis=-1)
         return (state, sample[0], force, work), (force, law.slip(state), work - law.stored(sample[0], state))
 
-    start = (state, u[0], jnp.zeros_like(u[0]), jnp.zeros(u.shape[1]))  # no way to the first, and no work
-    (after, *_), (force, slip, lost) = jax.lax.scan(one, start, (u, v))
+    # no way to the first, and no work
+    start = (law.init(u.shape[1]), u[0], jnp.zeros_like(u[0]), jnp.zeros(u.shape[1]))
+    (after, *_), (force, slip, lost) = jax.lax.scan(one, start, (u, velocities(u, dt)))
     return History(force, slip, lost - lost[0], after)
+
+
+def bisected(excess: Callable[[Array], Array], low: Array, high: Array, halvings: int) -> Array:
+    """(n,) middle of intervals that are halved so often, where a function changes to more than zero."""
+
+    def halve(_: int, ends: tuple[Array, Array]) -> tuple[Array, Array]:
+        low, high = ends
+        middle = 0.5 * (low + high)
+        above = excess(middle) > 0
+        return jnp.where(above, low, middle), jnp.where(above, middle, high)
+
+    low, high = jax.lax.fori_loop(0, halvings, halve, (low, high))
+    return 0.5 * (low + high)
 
 
 def root(value: Array) -> Array:

@@ -16,9 +16,8 @@ from typing import Any, NamedTuple
 import jax
 import jax.numpy as jnp
 
-from .cycle import blank, stepped
-from .law import Array, Law, State
-from .settling import Ways, beginning, directions, rolled
+from .cycle import Ways, beginning, blank, directions, rolled
+from .law import Array, Law, State, stepped
 
 BLOCK = 2048
 """Samples times sliders that are differentiated at once, for the cache and for memory that does not grow with them."""

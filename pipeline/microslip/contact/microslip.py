@@ -14,6 +14,7 @@ from ..data import Array
 from ..errors import UserError
 from .heights import Heights
 from .law import values
+from .solids import bisected
 
 NODES = 2048
 """Intervals of the slip depth in which the curve is laid out before it is refined: folds are found to 1e-6 of w."""
@@ -80,11 +81,11 @@ class MonotoneSlip:
         if not (np.all(loads > 0) and np.all(np.isfinite(loads))):
             raise UserError("normal force: not a positive number; microslip needs a pressed contact")
         loads = loads + 0.0 * np.asarray(self.roughness)
-        low, high = np.zeros_like(loads), loads + self._reach()
-        for _ in range(200):
-            middle = 0.5 * (low + high)
-            below = self.normal_force(middle) < loads
-            low, high = np.where(below, middle, low), np.where(below, high, middle)
+        # beyond the deepest height the force has risen by less than the approach
+        deepest = np.asarray(self.roughness, dtype=float) * float(self.heights.breaks()[..., -1])
+        low, high = bisected(
+            lambda u: self.normal_force(u) < loads, np.zeros_like(loads), loads + deepest, 200
+        )
         return 0.5 * (low + high)
 
     # tangential, under a given normal displacement ---------------------------------------------------------------
@@ -104,10 +105,7 @@ class MonotoneSlip:
         w, rows, u, flat = self._rows(np.abs(np.asarray(w, dtype=float)), u)
         low, high = flat._brackets(w.ravel(), rows.ravel(), u)
         each, u = flat._picked(rows.ravel()), u[rows.ravel()]
-        for _ in range(_HALVINGS):
-            middle = 0.5 * (low + high)
-            short = each.displacement(middle, u) < w.ravel()
-            low, high = np.where(short, middle, low), np.where(short, high, middle)
+        _, high = bisected(lambda s: each.displacement(s, u) < w.ravel(), low, high, _HALVINGS)
         return high.reshape(w.shape)
 
     def roots(self, w: float, u: float) -> Array:
@@ -123,11 +121,8 @@ class MonotoneSlip:
 
         side = np.sign(excess(grid))
         crosses = side[1:] != side[:-1]
-        low, high, side = grid[:-1][crosses], grid[1:][crosses], side[:-1][crosses]
-        for _ in range(_HALVINGS):
-            middle = 0.5 * (low + high)
-            same = np.sign(excess(middle)) == side
-            low, high = np.where(same, middle, low), np.where(same, high, middle)
+        start, ends = side[:-1][crosses], (grid[:-1][crosses], grid[1:][crosses])
+        _, high = bisected(lambda s: np.sign(excess(s)) == start, *ends, _HALVINGS)
         return np.append(high, s_max) if excess(grid[-1:])[0] < 0 else high
 
     def displacement(self, s: ArrayLike, u: ArrayLike) -> Array:
@@ -181,10 +176,6 @@ class MonotoneSlip:
     def _scaled(self, u: ArrayLike) -> tuple[Array, Array, Array]:
         u, R = np.broadcast_arrays(np.asarray(u, dtype=float), np.asarray(self.roughness, dtype=float))
         return u, np.where(R > 0, R, 1.0), R > 0
-
-    def _reach(self) -> Array:
-        """Approach beyond which the force has risen by less than the approach: the deepest height."""
-        return np.asarray(self.roughness, dtype=float) * float(self.heights.breaks()[..., -1])
 
 
 def of(

@@ -28,10 +28,9 @@ import jax.numpy as jnp
 import numpy as np
 
 from ..programs import inner
-from .cycle import blank, march, push
-from .law import Array, Law, State
+from .cycle import Turn, Ways, around, beginning, blank, cycle, first_memory, push, recall, turn, ways
+from .law import Array, Law, State, march
 from .linearised import Linearised, linearised
-from .settling import Turn, Ways, beginning, cycle, first_memory, recall, turn, ways
 
 FEWEST = 4
 """Cycles that have to be allowed if sliders are to be solved for; fewer are marched."""
@@ -206,7 +205,7 @@ class _Loop:
 
     def marching(self, at: _At) -> _At:
         """One cycle more."""
-        return self._marched(at, *march(self.law, self.path, self.dt, at.found.state))
+        return self._marched(at, *march(self.law, self.path, self.dt, at.found.state, around(self.path, self.dt)))
 
     def slopes(self, signals: Array, weights: Array) -> tuple[Periodic, Array]:
         """Tangents are marched along with every cycle."""

@@ -6,7 +6,6 @@ normal law and two tangential springs (with dampers, if wanted); P sticks to the
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
@@ -21,7 +20,7 @@ from ..reduced.compliance import BULK_AND_SURFACE
 from ..settings.numbers import NotNegative, Positive, PositiveLength
 from .friction import Friction, StaticSliding
 from .kinds import LawKind
-from .law import Array, Law, Step, norm, number, ratio, root, settings, static, value
+from .law import Array, Law, Step, bisected, norm, number, ratio, root, settings, static, value
 from .normal import Hyperbolic, Normal, Preload
 
 if TYPE_CHECKING:
@@ -447,13 +446,15 @@ def slide(
         slip = ratio((1 - theta) * force, theta * largest)
         return force - friction.coefficient(slip / dt, pressed, time) * pressed
 
-    sticks = excess(jnp.ones(trial.shape[1])) <= 0
+    nothing, one = jnp.zeros(trial.shape[1]), jnp.ones(trial.shape[1])
+    sticks = excess(one) <= 0
     if friction.constant and relative is not None:
         theta = _secular(trial, relative, held)
     else:
-        theta = _halved(excess, trial.shape[1])
+        # a characteristic that falls with the speed makes more than one root possible
+        theta = bisected(excess, nothing, one, _STEPS)
     theta = jax.lax.stop_gradient(theta)
-    value, slope = jax.jvp(excess, (theta,), (jnp.ones(trial.shape[1]),))
+    value, slope = jax.jvp(excess, (theta,), (one,))
     slope = jnp.where(slope > 0, jax.lax.stop_gradient(slope), jnp.inf)
     theta = theta - (value - jax.lax.stop_gradient(value)) / slope
     return jnp.where(sticks, 1.0, jnp.clip(theta, 0.0, 1.0))
@@ -513,19 +514,6 @@ def opposed(
 _TINY = 1e-300  # keeps quotients of nothing, and their derivatives, at nothing
 
 
-def _halved(excess: Callable[[Array], Array], count: int) -> Array:
-    """theta by bisection: a characteristic that falls with the speed makes more than one root possible."""
-
-    def halve(_: int, ends: tuple[Array, Array]) -> tuple[Array, Array]:
-        low, high = ends
-        middle = 0.5 * (low + high)
-        above = excess(middle) > 0
-        return jnp.where(above, low, middle), jnp.where(above, middle, high)
-
-    low, high = jax.lax.fori_loop(0, _STEPS, halve, (jnp.zeros(count), jnp.ones(count)))
-    return 0.5 * (low + high)
-
-
 # the laws of a contact file ------------------------------------------------------------------------------------------
 
 
@@ -540,9 +528,10 @@ class OwnNormal(LawKind):
             raise ValueError("law.length: the hyperbolic law needs a rough surface; add [roughness]")
 
     def normal(self, contact: ContactModel) -> Normal | None:
-        if self.length is None or contact.heights is None or contact.roughness is None:
+        if self.length is None:
             return None
-        return Hyperbolic(value(contact.normal_0), value(contact.roughness), contact.heights, value(self.length))
+        heights, roughness = contact.surface  # see `fits`
+        return Hyperbolic(value(contact.normal_0), value(roughness), heights, value(self.length))
 
 
 class OfPoint(OwnNormal):

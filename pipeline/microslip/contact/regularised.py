@@ -24,6 +24,7 @@ from .friction import Friction, creep, halved
 from .law import Array, Law, Step, norm, number, ratio, settings, static, value
 from .normal import Normal
 from .point import OnNormal, OwnNormal, met, touching
+from .solids import bisected
 
 if TYPE_CHECKING:
     from .composed import ContactModel
@@ -248,14 +249,15 @@ def _intervals(
     """Beginning, end, and whether the contact is closed, in order."""
     grid = np.linspace(times[0], times[-1], 8193)
     states = np.asarray(_closed(law, motion, grid))
-    ends = [grid[0]]
-    for i in np.flatnonzero(states[1:] != states[:-1]):
-        low, high = grid[i], grid[i + 1]
-        for _ in range(60):
-            middle = 0.5 * (low + high)
-            low, high = (middle, high) if _closed(law, motion, np.array([middle]))[0] == states[i] else (low, middle)
-        ends.append(high)
-    ends.append(grid[-1])
+
+    def change(i: int) -> np.ndarray:
+        """s, at which what holds at a sample ends."""
+        _, high = bisected(
+            lambda t: _closed(law, motion, np.array([t]))[0] == states[i], grid[i], grid[i + 1], 60
+        )
+        return high
+
+    ends = [grid[0], *map(change, np.flatnonzero(states[1:] != states[:-1]).tolist()), grid[-1]]
     pairs = [(float(a), float(b)) for a, b in zip(ends, ends[1:], strict=False) if b > a]
     return [(a, b, bool(_closed(law, motion, np.array([0.5 * (a + b)]))[0])) for a, b in pairs]
 

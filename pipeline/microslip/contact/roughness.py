@@ -14,8 +14,7 @@ from ..settings.numbers import Numbers, Positive, PositiveLength
 from . import topography
 from .curves import read_table
 from .heights import Cut, Exponential, Gaussian, Heights, Linear, Polynomial, combined, tabulated
-from .keys import Columns, FileName, Lengths, NotNegativeLength
-from .kinds import Kind, beside
+from .kinds import Columns, FileName, Kind, Lengths, NotNegativeLength, beside
 from .law import value
 from .topography import UNITS
 

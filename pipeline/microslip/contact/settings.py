@@ -36,8 +36,7 @@ from .friction import (
     OfTable,
 )
 from .jenkins import OfJenkins
-from .keys import Boundary, Lengths, PositiveLengths
-from .kinds import LawKind, kinds
+from .kinds import Boundary, LawKind, Lengths, PositiveLengths, kinds
 from .point import OfPoint
 from .rate import OfRate
 from .regularised import WithMass

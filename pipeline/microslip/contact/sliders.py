@@ -456,9 +456,8 @@ class OfStrips(_Parallel):
             raise ValueError("law: strips are those of a rough surface; add [roughness]")
 
     def law(self, contact: ContactModel) -> Law:
-        assert contact.heights is not None and contact.roughness is not None and contact.stiffness is not None
-        first, mu = contact.stiffness.tangential[0], contact.mu
-        strips = rough_strips(contact.normal_0, contact.roughness, contact.heights, first, mu, self.count)
+        (heights, roughness), first = contact.surface, contact.tangential[0]
+        strips = rough_strips(contact.normal_0, roughness, heights, first, contact.mu, self.count)
         return replace(strips, stiffness_ratio=contact.ratio)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -51,6 +52,18 @@ def pressing(force: ArrayLike) -> Array:
     if not (F >= 0).all():
         raise UserError(f"{F.min():g} N; a contact is pressed, so the force must not be negative", "force")
     return F
+
+
+def bisected(
+    below: Callable[[Array], Array], low: ArrayLike, high: ArrayLike, halvings: int
+) -> tuple[Array, Array]:
+    """Ends of intervals (numbers or arrays) that are halved so often: `below` holds at the lower one alone."""
+    low, high = np.asarray(low, dtype=float), np.asarray(high, dtype=float)
+    for _ in range(halvings):
+        middle = 0.5 * (low + high)
+        short = below(middle)
+        low, high = np.where(short, middle, low), np.where(short, high, middle)
+    return low, high
 
 
 def refuse_not_positive(**given: float) -> None:

@@ -14,8 +14,7 @@ from ..errors import UserError
 from ..settings.numbers import Name, NotNegative, Number, Positive, PositiveLength
 from .curves import FORCES, LENGTHS, read_curve
 from .hertz import Hertz, half_curvatures
-from .keys import Boundary, Columns, FileName, OneOrTwo, Poisson, Radii
-from .kinds import Kind, beside
+from .kinds import Boundary, Columns, FileName, Kind, OneOrTwo, Poisson, Radii, beside
 from .law import value
 from .layer import Layer
 from .normal import Normal, Penalty, Potential, measured

@@ -30,6 +30,7 @@ from ..programs import program
 from .friction import Friction, coefficients
 from .heights import Heights, Tabulated, as_table, summed
 from .normal import Rough
+from .solids import bisected
 
 
 @dataclass(frozen=True)
@@ -76,11 +77,7 @@ def approach_under(heights: Heights, force: np.ndarray | float) -> np.ndarray:
     """u* at which the normal force is F* (any shape, positive), by bisection down to rounding."""
     force, volume = np.asarray(force, float), _volume_of(heights)
     first, last = np.asarray(heights.breaks())[[0, -1]]
-    low, high = np.full(force.shape, first), last + force
-    for _ in range(64):
-        middle = 0.5 * (low + high)
-        below = volume(middle) < force
-        low, high = np.where(below, middle, low), np.where(below, high, middle)
+    low, high = bisected(lambda u: volume(u) < force, np.full(force.shape, first), last + force, 64)
     return 0.5 * (low + high)
 
 

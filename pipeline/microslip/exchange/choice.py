@@ -10,7 +10,7 @@ import numpy as np
 
 from ..data import Indices, ModalBasis, ModalGroup
 from ..errors import UserError
-from ..reduced.coordinates import in_modes
+from ..reduced.coordinates import in_modes, with_modes
 from ..ring.resonances import speeds_of
 from ..units import rpm_text
 
@@ -159,24 +159,17 @@ def elastic(g: ModalGroup, form: str) -> ModalGroup:
     keep = np.flatnonzero(g.omega > 0)
     if not len(keep):
         raise UserError(f"export --to {form}: the modal file holds rigid motions only; ask for more modes")
-    some, v = np.ix_(keep, keep), g.invariants
-    assert v is not None
+    some = np.ix_(keep, keep)
+    assert g.invariants is not None
     if g.N_r is not None:
         raise UserError(f"export --to {form}: this format has no place for circulatory forces (N_r); use mat or mtx")
-    cut = replace(
-        v,
-        shape=v.shape[:, keep],
-        position_shape=v.position_shape[:, :, keep],
-        shape_shape=v.shape_shape[:, :, keep][:, :, :, keep],
-        stiffening=v.stiffening[:, keep][:, :, keep],
-    )
     return replace(
         g, omega=g.omega[keep], kind=tuple(g.kind[j] for j in keep), damping_ratio=g.damping_ratio[keep],
         M_r=g.M_r[some], K_r=g.K_r[some], C_r=g.C_r[some], G_r=g.G_r[some],
         phi=g.phi[:, :, keep] if len(g.phi) else g.phi,
         interfaces={n: replace(i, rows=i.rows[:, keep]) for n, i in g.interfaces.items()},
         monitors={n: replace(r, rows=r.rows[:, keep]) for n, r in g.monitors.items()},
-        invariants=cut,
+        invariants=with_modes(g.invariants, keep),
     )  # fmt: skip
 
 

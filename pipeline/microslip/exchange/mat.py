@@ -20,7 +20,7 @@ from ..basis import CONVENTIONS, FORMAT, FORMAT_VERSION
 from ..data import INTERFACE_ROWS, Array, Interface, ModalBasis, ModalGroup, Rows
 from ..errors import UserError
 from ..files.store import complete_or_absent
-from .choice import STATEMENT, Format
+from .choice import STATEMENT, Format, node_numbers
 
 _HEADER = b"MATLAB 5.0 MAT-file, modal basis written by microslip"
 _KEYWORDS = set(
@@ -74,19 +74,23 @@ def mat_tables(basis: ModalBasis) -> dict[str, Any]:
     return tables
 
 
+def words(texts: Iterable[str]) -> Array:
+    """A column of cells of text."""
+    return np.array(list(texts), dtype=object).reshape(-1, 1)
+
+
 def _column(values: Array) -> Array:
     return np.asarray(values, dtype=float).reshape(-1, 1)
 
 
 def _mesh(basis: ModalBasis) -> dict[str, Any]:
     mesh = basis.mesh
-    ids = mesh.node_id if len(mesh.node_id) else np.arange(1, mesh.n_points + 1)
     groups = {name: mesh.face_points(name) for name in sorted({*mesh.faces, *mesh.point_sets})}
     return {
-        "node": ids.reshape(-1, 1).astype(float),
+        "node": _column(node_numbers(basis)),
         "xyz": mesh.points,
         "cells": _struct(mesh.cells, lambda c: c.astype(float) + 1),
-        "groups": _struct(groups, lambda chosen: chosen.reshape(-1, 1).astype(float) + 1),
+        "groups": _struct(groups, lambda chosen: _column(chosen) + 1),
     }
 
 
@@ -105,11 +109,11 @@ def _group(g: ModalGroup) -> dict[str, Any]:
         **({} if g.N_r is None else {"N": g.N_r}),
         "Fex1": np.concatenate(loads).conj().T if loads else np.zeros((g.n_modes, 0)),
         "W": np.concatenate(contacts).conj().T if contacts else np.zeros((g.n_modes, 0)),
-        "W_row": np.array([f"{n}:{r}" for n in g.interfaces for r in INTERFACE_ROWS], dtype=object).reshape(-1, 1),
+        "W_row": words(f"{n}:{r}" for n in g.interfaces for r in INTERFACE_ROWS),
         "omega": _column(g.omega),
         "frequency": _column(g.frequency),
         "damping_ratio": _column(g.damping_ratio),
-        "kind": np.array(g.kind, dtype=object).reshape(-1, 1),
+        "kind": words(g.kind),
         "to_diagonal": np.eye(g.n_modes) if g.to_diagonal is None else g.to_diagonal,
         "phi": g.phi,
         "u_static": g.u_static,
@@ -118,7 +122,7 @@ def _group(g: ModalGroup) -> dict[str, Any]:
         "monitors": _struct(g.monitors, _rows),
         "gauges": _struct(g.gauges, _rows),
         "compliance": {
-            "row": np.array(g.compliance.labels, dtype=object).reshape(-1, 1),
+            "row": words(g.compliance.labels),
             "static": g.compliance.static,
             "modal": g.compliance.modal,
             "plain": g.compliance.plain,
@@ -134,17 +138,13 @@ def _rotation(g: ModalGroup) -> dict[str, Any]:
     """What a change of the speed adds, and the modes with gyroscopic coupling, where the basis has them."""
     out: dict[str, Any] = {}
     if (r := g.run_up) is not None:
-        out["run_up"] = {"N": r.N, "P": r.P, "euler": _load(r.euler), "centrifugal": _load(r.centrifugal)}
+        out["run_up"] = {"N": r.N, "P": r.P, "euler": r.euler[:, None], "centrifugal": r.centrifugal[:, None]}
     if (y := g.gyroscopic) is not None:
         out["gyroscopic"] = {
             "omega": _column(y.omega), "shapes": y.shapes, "growth": _column(y.growth), "sense": _column(y.sense),
-            "direction": np.array(y.direction, dtype=object).reshape(-1, 1), "error": _column(y.error),
+            "direction": words(y.direction), "error": _column(y.error),
         }  # fmt: skip
     return out
-
-
-def _load(values: Array) -> Array:
-    return np.asarray(values).reshape(-1, 1)
 
 
 def _interface(item: Interface) -> dict[str, Any]:
@@ -168,7 +168,7 @@ def _interface(item: Interface) -> dict[str, Any]:
 def _rows(rows: Rows) -> dict[str, Any]:
     return {
         "T": rows.rows,
-        "row": np.array(rows.labels, dtype=object).reshape(-1, 1),
+        "row": words(rows.labels),
         "unit": rows.unit,
         "point": _column(rows.point),
         "distance": rows.distance,
@@ -188,7 +188,7 @@ def _stress(g: ModalGroup) -> dict[str, Any]:
 def _struct(items: Mapping[str, Any], convert: Any) -> dict[str, Any]:
     """A MATLAB struct; its field ``names`` holds the original names, one for each of the other fields in order."""
     fields = {field: convert(value) for field, value in zip(field_names(items), items.values(), strict=True)}
-    return {"names": np.array(list(items), dtype=object).reshape(-1, 1), **fields}
+    return {"names": words(items), **fields}
 
 
 def field_names(names: Iterable[str]) -> list[str]:

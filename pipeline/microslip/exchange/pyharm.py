@@ -17,11 +17,11 @@ from typing import Any
 
 import numpy as np
 
-from ..data import INTERFACE_ROWS, Array, Indices, ModalBasis, ModalGroup
+from ..data import INTERFACE_ROWS, Indices, ModalBasis, ModalGroup
 from ..errors import UserError
 from ..files.store import complete_or_absent
 from .choice import STATEMENT, Format, only_group, real
-from .mat import clean_header
+from .mat import clean_header, words
 from .mtx import interface_coordinates
 
 
@@ -48,29 +48,26 @@ def pyharm_tables(basis: ModalBasis, g: ModalGroup) -> dict[str, Any]:
     nodes, order = physical_first(basis, g, "pyharm")
     N = np.zeros_like(g.K_r) if g.N_r is None else g.N_r
     some, faces = np.ix_(order, order), [g.interfaces[name] for name in nodes]
+    M, K = g.M_r[some], g.K_r[some]
     loads = [rows.rows for rows in g.excitations.values()]
     names = [f"{name}:{label}" for name, rows in g.excitations.items() for label in rows.labels]
     return {
-        "M": _symmetric(g.M_r[some]), "K": _symmetric(g.K_r[some]) + N[some], "C": (g.C_r + g.G_r)[some],
+        "M": (M + M.T) / 2, "K": (K + K.T) / 2 + N[some], "C": (g.C_r + g.G_r)[some],
         "G": np.zeros_like(g.G_r),
         "ndofs": 6.0, "nnodes": float(len(nodes)), "nmodes": float(g.n_modes - 6 * len(nodes)),
-        "nodes": np.array(nodes, dtype=object).reshape(-1, 1),
-        "dofs": np.array(INTERFACE_ROWS, dtype=object).reshape(-1, 1),
-        "kind": np.array([g.kind[j] for j in order], dtype=object).reshape(-1, 1),
+        "nodes": words(nodes),
+        "dofs": words(INTERFACE_ROWS),
+        "kind": words(g.kind[j] for j in order),
         "origin": np.array([i.origin for i in faces]),
         "rotation": np.array([i.rotation for i in faces]),
         "Fex": np.concatenate(loads)[:, order].T if loads else np.zeros((g.n_modes, 0)),
-        "Fex_name": np.array(names, dtype=object).reshape(-1, 1),
+        "Fex_name": words(names),
         "omega": g.omega, "Omega": g.speed,
         "readme": f"{basis.name}: {STATEMENT}. Physical coordinates first: for each of nodes the six dofs in its frame "
         "(rotation has n, t1, t2 as rows, n outwards), then nmodes modal ones. "
         "C holds damping and the gyroscopic matrix at Omega. "
         "Check: eigenvalues of (K, M) are omega^2 (without the massless coordinates).",
     }  # fmt: skip
-
-
-def _symmetric(A: Array) -> Array:
-    return (A + A.T) / 2
 
 
 def physical_first(basis: ModalBasis, g: ModalGroup, form: str) -> tuple[list[str], Indices]:

@@ -7,7 +7,18 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..data import CENTRIFUGAL, Array, GyroscopicModes, Interface, Invariants, ModalBasis, ModalGroup, Rows, RunUp
+from ..data import (
+    CENTRIFUGAL,
+    Array,
+    GyroscopicModes,
+    Indices,
+    Interface,
+    Invariants,
+    ModalBasis,
+    ModalGroup,
+    Rows,
+    RunUp,
+)
 from ..errors import UserError
 
 
@@ -30,6 +41,17 @@ def in_modes(g: ModalGroup) -> ModalGroup:
         gyroscopic=_gyroscopic(g.gyroscopic, V, g.M_r),
         to_diagonal=None,
     )
+
+
+def own_shapes(g: ModalGroup) -> Array:
+    """(c, m) the own modes in the coordinates of the group."""
+    return np.eye(len(g.M_r)) if g.to_diagonal is None else g.to_diagonal
+
+
+def of_modes(g: ModalGroup, numbers: Array) -> Array:
+    """(c, c) sum over the own modes v_j of numbers_j (M v_j)(M v_j)^H."""
+    P = g.M_r @ own_shapes(g)
+    return (P * numbers) @ P.conj().T
 
 
 def own_stiffness(K_r: Array, omega: Array, V: Array | None, speed: float) -> Array:
@@ -118,8 +140,7 @@ def of_density(g: ModalGroup, share: float) -> ModalGroup:
         g, M_r=share * g.M_r, C_r=np.sqrt(share) * g.C_r, omega=g.omega / np.sqrt(share), excitations=heavy,
         run_up=None, invariants=None, gyroscopic=None,
     )  # fmt: skip
-    own = np.eye(g.n_modes) if g.to_diagonal is None else g.to_diagonal
-    return replace(dense, to_diagonal=own / np.sqrt(share))
+    return replace(dense, to_diagonal=own_shapes(g) / np.sqrt(share))
 
 
 def own_kind(g: ModalGroup) -> tuple[str, ...]:
@@ -215,6 +236,17 @@ def _invariants(i: Invariants | None, V: Array) -> Invariants | None:
         position_shape=i.position_shape @ V,
         shape_shape=W @ i.shape_shape @ V,
         stiffening=W @ i.stiffening @ V,
+    )
+
+
+def with_modes(v: Invariants, keep: Indices) -> Invariants:
+    """The integrals of some of the modes."""
+    return replace(
+        v,
+        shape=v.shape[:, keep],
+        position_shape=v.position_shape[:, :, keep],
+        shape_shape=v.shape_shape[:, :, keep][:, :, :, keep],
+        stiffening=v.stiffening[:, keep][:, :, keep],
     )
 
 

@@ -22,7 +22,7 @@ import scipy.integrate
 from ..data import Array, Invariants, ModalBasis
 from ..errors import NotConverged, UserError
 from ..frames import skew
-from .coordinates import in_modes
+from .coordinates import in_modes, with_modes
 
 OfTime = Callable[[float], float]
 _LEVI_CIVITA = np.zeros((3, 3, 3))
@@ -104,12 +104,7 @@ def floating_body(basis: ModalBasis, speed: int = 0, stiffened: bool = True) -> 
             "[output] and compute it again, or say stiffened=False"
         )
     keep = np.flatnonzero(g.omega > 0)
-    some = np.ix_(keep, keep)
-    v = g.invariants
-    invariants = Invariants(
-        v.point, v.mass, v.first_moment, v.second_moment, v.shape[:, keep], v.position_shape[:, :, keep],
-        v.shape_shape[:, :, keep][:, :, :, keep], v.stiffening[:, keep][:, :, keep],
-    )  # fmt: skip
+    some, invariants = np.ix_(keep, keep), with_modes(g.invariants, keep)
     soft = g.speed**2 * g.run_up.P if g.spin_softening else 0 * g.run_up.P
     return FloatingBody(
         invariants, (g.K_r + soft)[some], g.C_r[some], g.speed**2 * g.run_up.centrifugal[keep], g.speed,

@@ -26,8 +26,7 @@ from ..data import INTERFACE_ROWS, Array, ComplexArray, Indices
 from ..errors import UserError
 from ..settings.mistakes import bounded
 from .component import Component, InWave, Ring
-from .disc import directed, spread, whole
-from .flow import Flow, through
+from .disc import Flow, directed, spread, through, whole
 from .ground import Ground
 
 if TYPE_CHECKING:

@@ -11,6 +11,7 @@ import numpy as np
 
 from ..data import Array, ModalGroup
 from ..errors import UserError
+from ..reduced.coordinates import of_modes
 
 if TYPE_CHECKING:
     from .spin import Spin
@@ -100,10 +101,8 @@ class InWave:
         g = self.group
         M, K, C = g.M_r, g.K_r, g.C_r + g.G_r
         if self.aerodynamic:
-            V = np.eye(len(M)) if g.to_diagonal is None else g.to_diagonal
-            P = M @ V
-            K = K + (P * (2 * self.aerodynamic.real * g.omega**2)) @ P.conj().T
-            C = C + (P * (2 * self.aerodynamic.imag * g.omega)) @ P.conj().T
+            K = K + of_modes(g, 2 * self.aerodynamic.real * g.omega**2)
+            C = C + of_modes(g, 2 * self.aerodynamic.imag * g.omega)
         return self._moving(M), self._moving(K), self._moving(C)
 
     @property

@@ -13,7 +13,7 @@ import numpy as np
 from ..data import Array, ModalGroup
 from ..errors import UserError, at, in_its_file
 from ..files.store import ordinary
-from ..reduced.coordinates import own_stiffness
+from ..reduced.coordinates import of_modes, own_shapes, own_stiffness
 from ..ring.expansion import BACKWARD, FORWARD
 from .component import Component
 from .excitation import Turning, direction, index_of
@@ -38,8 +38,7 @@ def with_ratios(group: ModalGroup, ratios: Sequence[float] | float) -> ModalGrou
         )
     padded = np.concatenate([given, np.full(max(len(group.omega) - len(given), 0), given[-1])])
     D = np.where(group.omega > 0, padded[: len(group.omega)], 0.0)
-    P = group.M_r @ (np.eye(len(group.M_r)) if group.to_diagonal is None else group.to_diagonal)
-    return replace(group, damping_ratio=D, C_r=(P * (2 * D * group.omega)) @ P.conj().T)
+    return replace(group, damping_ratio=D, C_r=of_modes(group, 2 * D * group.omega))
 
 
 def as_loss(group: ModalGroup) -> tuple[ModalGroup, Array]:
@@ -49,12 +48,10 @@ def as_loss(group: ModalGroup) -> tuple[ModalGroup, Array]:
     them: 2 D K_r where all D_j are equal. At the resonance of an own mode this damps as Sextro Eq. (2.4-13) does;
     elsewhere it takes the share 4 pi D of the elastic energy in every cycle, whatever the frequency.
     """
-    V = np.eye(len(group.M_r)) if group.to_diagonal is None else group.to_diagonal
-    P, D, omega = group.M_r @ V, group.damping_ratio, group.omega
-    modal = (P * (2 * D * omega)) @ P.conj().T
+    P, D, omega = group.M_r @ own_shapes(group), group.damping_ratio, group.omega
     elastic = P @ own_stiffness(group.K_r, omega, group.to_diagonal, group.speed) @ P.conj().T
-    H = (P * (2 * D * omega**2)) @ P.conj().T + 2 * last_ratio(group) * (group.K_r - elastic)
-    return replace(group, C_r=group.C_r - modal), 0.5 * (H + H.conj().T)
+    H = of_modes(group, 2 * D * omega**2) + 2 * last_ratio(group) * (group.K_r - elastic)
+    return replace(group, C_r=group.C_r - of_modes(group, 2 * D * omega)), 0.5 * (H + H.conj().T)
 
 
 def last_ratio(group: ModalGroup) -> float:

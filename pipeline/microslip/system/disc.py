@@ -8,8 +8,8 @@ as N sectors have, with the mass of the ring.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -17,8 +17,8 @@ import scipy.linalg
 
 from ..data import Array, Compliance, Interface, ModalGroup, Rows
 from ..errors import UserError
+from ..reduced.coordinates import own_shapes
 from .component import Component, InWave
-from .flow import Flow
 
 
 def at_sector(name: str, sector: int) -> str:
@@ -42,9 +42,7 @@ def whole(component: Component) -> Component:
     first = component.at(0).group
     named: Any = {
         "interfaces": _faces(first, waves, N),
-        "excitations": _rows(first.excitations, lambda w, name: w.group.excitations[name].rows, waves, N),
-        "monitors": _rows(first.monitors, lambda w, name: w.group.monitors[name].rows, waves, N),
-        "gauges": _rows(first.gauges, lambda w, name: w.group.gauges[name].rows, waves, N),
+        **{kind: _rows(kind, waves, N) for kind in ("excitations", "monitors", "gauges")},
     }
     group = replace(
         first, M_r=M, K_r=K, C_r=C, G_r=np.zeros_like(M), kind=("ring",) * len(M), to_diagonal=None,
@@ -115,14 +113,13 @@ def _faces(first: ModalGroup, waves: list[InWave], N: int) -> dict[str, Interfac
     return found
 
 
-def _rows(
-    named: Mapping[str, Rows], of: Callable[[InWave, str], Array], waves: list[InWave], N: int
-) -> dict[str, Rows]:
-    found = {}
-    for name, rows in named.items():
-        for j in range(N):
-            found[at_sector(name, j)] = replace(rows, rows=spread([of(w, name) for w in waves], j, N))
-    return found
+def _rows(kind: str, waves: list[InWave], N: int) -> dict[str, Rows]:
+    named: list[Mapping[str, Rows]] = [getattr(w.group, kind) for w in waves]
+    return {
+        at_sector(name, j): replace(rows, rows=spread([n[name].rows for n in named], j, N))
+        for name, rows in named[0].items()
+        for j in range(N)
+    }
 
 
 def _compliance(first: ModalGroup, waves: list[InWave], N: int) -> Compliance:
@@ -146,3 +143,47 @@ def _circulant(blocks: list[Array], N: int) -> Array:
         for j in range(N):
             out[i * r : (i + 1) * r, j * r : (j + 1) * r] = ahead[(i - j) % N]
     return out
+
+
+# flow through the ring: what it adds differs from wave to wave --------------------------------------------------------
+
+
+@dataclass(frozen=True, eq=False)
+class Flow:
+    """Attributes:
+    components: names. K, C: (n, n) Hermitian, on their coordinates one after the other, in a vibration exp(i w t) of
+        w > 0; the mean meets the real part of K.
+    """
+
+    components: tuple[str, ...]
+    K: Array
+    C: Array
+
+
+def through(blades: Sequence[Component], aerodynamic: Mapping[int, complex]) -> Flow:
+    """What the flow adds to the blades of a ring, in the order of their sectors, so that each feels the motion of all.
+
+    The coefficient a_n of the wave n (`Component.aerodynamic`) adds 2 Re(a_n) omega^2 to the stiffness of a mode and
+    2 Im(a_n) omega to its damping. Of the modal amplitudes q_j of N blades the wave n is
+
+            sum over j of q_j exp(-i 2 pi n j / N) / sqrt(N)
+
+    so that the stiffness between the blades i and j is
+
+            2 omega_i omega_j / N  sum over n of Re(a_n) exp(i 2 pi n (i - j) / N)
+
+    and the damping likewise: block circulants of influence coefficients. They are complex where the two directions of a
+    nodal diameter differ: a vibration knows its direction, the mean does not.
+    """
+    groups, N = [b.groups[0] for b in blades], len(blades)
+    P = [g.M_r @ own_shapes(g) for g in groups]
+    a = np.array([aerodynamic.get(n, 0.0) for n in range(N)])
+    waves = np.exp(2j * np.pi * np.outer(np.arange(N), np.arange(N)) / N)
+    same = np.allclose(a, a[-np.arange(N)], rtol=1e-15, atol=0)
+
+    def added(part: Array, power: float) -> Array:
+        L = (waves * (2 * part / N)) @ waves.conj().T
+        S = scipy.linalg.block_diag(*[p * g.omega**power for p, g in zip(P, groups, strict=True)])
+        return S @ np.kron(L.real if same else L, np.eye(len(groups[0].omega))) @ S.conj().T
+
+    return Flow(tuple(b.name for b in blades), added(a.real, 1.0), added(a.imag, 0.5))

@@ -59,7 +59,14 @@ def unit_of(basis: ModalBasis, g: ModalGroup) -> Unit:
     Raises:
         UserError: there is nothing to act on, or nothing to read.
     """
-    load, read = (*_pushed(g), *_excited(g)), (*_moved(g), *_monitored(g), *_strained(g))
+    faces, gauges = list(_faces(g)), _named("gauge", g.gauges)
+    load = [Row(f"{name}.force", {"m": "N", "rad": "N.m"}[unit], said, row) for name, said, row, unit in faces]
+    load += [Row(name, unit, said, row) for name, said, row, unit in _named("excitation", g.excitations)]
+    read = [
+        Row(f"{name}.displacement", unit, said, row, f"{name}.velocity", f"{unit}/s")
+        for name, said, row, unit in (*faces, *_named("monitor", g.monitors))
+    ]
+    read += [Row(name, unit, said, row, f"{name}_rate", "1/s") for name, said, row, unit in gauges]
     if not load or not read:
         raise UserError(
             f"{basis.name}: export --to fmu: there is nothing to {'read' if load else 'act on'}; give the body "
@@ -70,47 +77,24 @@ def unit_of(basis: ModalBasis, g: ModalGroup) -> Unit:
     K = g.K_r if g.N_r is None else g.K_r + g.N_r
     own = basis.damping_source.startswith("matrix")  # else C_r is diagonal but for rounding
     C = (g.C_r if own else np.diag(2 * g.damping_ratio * g.omega)) + g.G_r
-    return Unit(g.omega, g.damping_ratio, K, C, load, read, np.concatenate([nominal, nominal * pace]))
+    return Unit(g.omega, g.damping_ratio, K, C, tuple(load), tuple(read), np.concatenate([nominal, nominal * pace]))
 
 
-def _faces(g: ModalGroup) -> Iterator[tuple[str, str, Array, bool]]:
-    """Name, original name and row of each row of the interfaces, and whether it is a rotation."""
+Named = tuple[str, str, Array, str]
+"""Name, original name, row and unit of what it reads."""
+
+
+def _faces(g: ModalGroup) -> Iterator[Named]:
     for field, (name, face) in zip(field_names(g.interfaces), g.interfaces.items(), strict=True):
         for label in (*INTERFACE_ROWS, *(f"c{i + 1}" for i in range(len(face.characteristic)))):
-            turns = label.startswith("phi")
-            yield f"interface.{field}.{label}", f"interface {name}, {label}", face.row(label), turns
+            unit = "rad" if label.startswith("phi") else "m"
+            yield f"interface.{field}.{label}", f"interface {name}, {label}", face.row(label), unit
 
 
-def _pushed(g: ModalGroup) -> Iterator[Row]:
-    for name, said, row, turns in _faces(g):
-        yield Row(f"{name}.force", "N.m" if turns else "N", said, row)
-
-
-def _moved(g: ModalGroup) -> Iterator[Row]:
-    for name, said, row, turns in _faces(g):
-        unit = "rad" if turns else "m"
-        yield Row(f"{name}.displacement", unit, said, row, f"{name}.velocity", f"{unit}/s")
-
-
-def _named(kind: str, named: Mapping[str, Rows]) -> Iterator[tuple[str, str, Array, str]]:
+def _named(kind: str, named: Mapping[str, Rows]) -> Iterator[Named]:
     for field, (name, rows) in zip(field_names(named), named.items(), strict=True):
         for label, text, row in zip(field_names(rows.labels), rows.labels, rows.rows, strict=True):
             yield f"{kind}.{field}.{label}", f"{kind} {name}, {text}", row, rows.unit
-
-
-def _excited(g: ModalGroup) -> Iterator[Row]:
-    for name, said, row, unit in _named("excitation", g.excitations):
-        yield Row(name, unit, said, row)
-
-
-def _monitored(g: ModalGroup) -> Iterator[Row]:
-    for name, said, row, unit in _named("monitor", g.monitors):
-        yield Row(f"{name}.displacement", unit, said, row, f"{name}.velocity", f"{unit}/s")
-
-
-def _strained(g: ModalGroup) -> Iterator[Row]:
-    for name, said, row, unit in _named("gauge", g.gauges):
-        yield Row(name, unit, said, row, f"{name}_rate", "1/s")
 
 
 def numbers(unit: Unit) -> Iterator[str]:
