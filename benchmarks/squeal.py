@@ -19,13 +19,13 @@ from pathlib import Path
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 import numpy as np
-from microslip.modal.unreduced import unreduced
 from stability import companion, condensed, cpu
 
 from microslip.basis import read_basis
 from microslip.case import load_case
 from microslip.cli import main as typed
 from microslip.linalg.quadratic import Quadratic, every_value
+from microslip.modal.compute import unreduced
 from microslip.roots.asked import window_of
 from microslip.roots.full import full_matrices
 from microslip.stages.analysing import Varied

@@ -43,14 +43,18 @@ from .closing import Closing
 Report = Callable[[str], None]
 
 
-class Unknowns(Protocol):
-    """What a pencil's unknowns mean on the mesh: `FreeUpper`, `Tied`, `modal.sector.HarmonicUnknowns`."""
+class Expandable(Protocol):
+    """What a pencil's unknowns mean on the mesh, or on the rows of foreign matrices (`modal.foreign.Layout`)."""
 
     def expand(self, unknowns: Array, n: int) -> Array:
         """(3n, r) displacements of n points from the unknowns (m, r)."""
 
     def rows(self, B: sp.csr_matrix) -> sp.csr_matrix:
         """(r, m) rows on the unknowns, from rows (r, 3n) on all degrees of freedom."""
+
+
+class Unknowns(Expandable, Protocol):
+    """Those of a mesh: `FreeUpper`, `Tied`, `modal.sector.HarmonicUnknowns`."""
 
     def restrict(self, forces: Array) -> Array:
         """(m, r) forces on the unknowns, from forces (3n, r)."""

@@ -31,7 +31,7 @@ from typing import Any
 
 import numpy as np
 
-from ..data import Array
+from ..data import Array, SpeedRange
 from ..errors import NotConverged
 from ..linalg import eigen
 from ..units import rpm_text
@@ -213,6 +213,12 @@ class Interpolant:
         along = np.ones_like(t) if self.shift is None else 2 * t
         of_values, of_slopes = -2 * _log_slopes(t) * reach * once**2, along * reach * once**2
         return np.tensordot(of_values, self.values, 1) + np.tensordot(of_slopes, self.slopes, 1), 2
+
+
+def interpolant(r: SpeedRange) -> Interpolant:
+    """The stiffness of a range of a modal file at any of its speeds."""
+    K = np.array([g.K_r for g, held in zip(r.samples, r.held, strict=True) if not held])
+    return Interpolant(r.speeds[~r.held], K, r.slopes, r.form, r.shift)
 
 
 def _root_slope(Q: Array, roots: Array, slope: Array) -> Array:

@@ -18,7 +18,7 @@ from ..reduction import METHODS, Reduced, Substructure, stuck
 from ..settings.body import BodySettings
 from ..units import rpm_text
 from .body_rows import BodyRows
-from .equilibrium import StaticState, Unknowns, what_loads
+from .equilibrium import Expandable, StaticState, what_loads
 from .floating import Floating, floated, with_rotation
 from .preload import pressed_modes
 from .prepared import Prepared
@@ -37,7 +37,7 @@ class Searched:
     """
 
     pencil: eigen.Pencil
-    unknowns: Unknowns
+    unknowns: Expandable
     R: Array
     shift: float
     found: eigen.Spectrum
@@ -65,7 +65,7 @@ class Solution:
     answers: Array
     static: Array
     eigenmodes: Array
-    unknowns: Unknowns
+    unknowns: Expandable
     labels: tuple[str, ...]
     indicators: Mapping[str, float]
     force_labels: tuple[str, ...] = ()
@@ -129,7 +129,7 @@ def _searched(
 
 
 def answered(
-    pencil: eigen.Pencil, unknowns: Unknowns, R: Array, shift: float, found: eigen.Spectrum,
+    pencil: eigen.Pencil, unknowns: Expandable, R: Array, shift: float, found: eigen.Spectrum,
     rows: BodyRows, floats: bool, floating: Floating | None = None,
 ) -> Searched:  # fmt: skip
     """Modes found, with the static answers of all rows and what sticking interfaces are judged by.

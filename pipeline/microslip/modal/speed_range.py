@@ -6,7 +6,7 @@ carried out anew at the speed, within the common coordinates.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 
 import numpy as np
@@ -32,7 +32,7 @@ from ..reduced.coordinates import compliance_rows, in_coordinates
 from ..reduction import METHODS, Reduced, Substructure
 from ..units import from_rpm, rpm_text, to_rpm
 from .group import modal_damping, without_massless
-from .range_basis import Interpolant, lagrange
+from .range_basis import interpolant, lagrange
 from .solution import held_compliance
 
 
@@ -92,14 +92,7 @@ def frequencies_over(r: SpeedRange, speeds: Array, count: int | None = None) -> 
 
     Much cheaper than `group_at`: nothing of the mesh's size is touched. The modes are orthonormal.
     """
-    count = count or r.count
-    parts = interpolant(r)
-    omega, modes = np.empty((len(speeds), count)), []
-    for i, speed in enumerate(speeds):
-        values, Y = parts.modes(float(speed))
-        omega[i] = values[:count]
-        modes.append(Y[:, :count])
-    return omega, modes
+    return _over(speeds, interpolant(r).modes, count or r.count)
 
 
 def waves_over(r: SpeedRange, speeds: Array, forward: bool) -> tuple[Array, list[Array]]:
@@ -108,24 +101,26 @@ def waves_over(r: SpeedRange, speeds: Array, forward: bool) -> tuple[Array, list
     Raises:
         numpy.linalg.LinAlgError: the body is unstable at one of the speeds.
     """
-    count, run_up = r.count, r.samples[0].run_up
+    run_up, parts = r.samples[0].run_up, interpolant(r)
     if run_up is None:
-        return frequencies_over(r, speeds, count)
-    parts, N = interpolant(r), run_up.N
-    omega, modes = np.empty((len(speeds), count)), []
-    for i, speed in enumerate(speeds):
-        found, x = hermitian_modes(np.eye(len(N)), 2 * speed * N, parts.stiffness(float(speed)))
-        chosen = np.flatnonzero(found < 0 if forward else found > 0)
-        chosen = chosen[np.argsort(np.abs(found[chosen]), kind="stable")][:count]
-        omega[i] = np.abs(found[chosen])
-        modes.append(x[:, chosen] / np.linalg.norm(x[:, chosen], axis=0))
-    return omega, modes
+        return frequencies_over(r, speeds)
+
+    def waves(speed: float) -> tuple[Array, Array]:
+        N = run_up.N
+        values, x = hermitian_modes(np.eye(len(N)), 2 * speed * N, parts.stiffness(speed))
+        chosen = np.flatnonzero(values < 0 if forward else values > 0)
+        chosen = chosen[np.argsort(np.abs(values[chosen]), kind="stable")][: r.count]
+        return np.abs(values[chosen]), x[:, chosen] / np.linalg.norm(x[:, chosen], axis=0)
+
+    return _over(speeds, waves, r.count)
 
 
-def interpolant(r: SpeedRange) -> Interpolant:
-    """The stiffness of a range at any of its speeds."""
-    K = np.array([g.K_r for g, held in zip(r.samples, r.held, strict=True) if not held])
-    return Interpolant(r.speeds[~r.held], K, r.slopes, r.form, r.shift)
+def _over(
+    speeds: Array, modes_at: Callable[[float], tuple[Array, Array]], count: int
+) -> tuple[Array, list[Array]]:
+    every = [modes_at(float(speed)) for speed in speeds]
+    omega = np.reshape([values[:count] for values, _ in every], (len(every), count))
+    return omega, [modes[:, :count] for _, modes in every]
 
 
 class _Evaluated:
