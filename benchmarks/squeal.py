@@ -28,8 +28,8 @@ from microslip.linalg.quadratic import Quadratic, every_value
 from microslip.modal.unreduced import unreduced
 from microslip.roots.asked import window_of
 from microslip.roots.full import full_matrices
+from microslip.stages.analysing import Varied
 from microslip.stages.places import modal_files
-from microslip.stages.varied import Varied
 from microslip.verbs.stability import state_of
 
 ROOT = Path(__file__).resolve().parents[1]

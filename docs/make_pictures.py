@@ -38,12 +38,12 @@ from microslip.pictures.scene import quiet_vtk
 from microslip.reduced import truncation
 from microslip.reduced.compliance import contact_share, without_bulk
 from microslip.reduction import METHODS
-from microslip.stages import following
 from microslip.stages.closure import closure_stage
 from microslip.stages.job import open_job
 from microslip.stages.meshing import load_mesh, mesh_stage
 from microslip.stages.modal import modes_stage
 from microslip.stages.running import compare_book
+from microslip.verbs import optimum as lowest
 
 ROOT = HERE.parent
 BUILD = ROOT / "build" / "docs"
@@ -406,7 +406,7 @@ def spin_pit() -> None:
     best = []
     for shape, (m, strain, valid) in over_mass.items():
         i = strain.argmin()
-        best.append([shape, f"{1e3 * m[i]:.1f}", f"{1e6 * strain[i]:.0f}", "" if valid[i] else following.NOT_VALID])
+        best.append([shape, f"{1e3 * m[i]:.1f}", f"{1e6 * strain[i]:.0f}", "" if valid[i] else lowest.NOT_VALID])
     fill("dampers.md", "mass", table(["damper", "best mass, g", "largest strain there, µm/m", "validity"], best))
 
 
@@ -416,9 +416,9 @@ def strain_over_mass(shape: str) -> tuple[Array, Array, Array]:
     with contextlib.chdir(BUILD):  # where `companion` has left the bodies
         typed([*asked.split(), "--points", "9"])
     text = (BUILD / f"build/spin-pit-{shape}/optimum.csv").read_text(encoding="utf-8")
-    rows = [row for row in csv.DictReader(text.splitlines()) if row["what"].startswith(following.RESONANCE)]
+    rows = [row for row in csv.DictReader(text.splitlines()) if row["what"].startswith(lowest.RESONANCE)]
     mass, strain = (np.array([float(row[k]) for row in rows]) for k in ("bodies.damper.mass_kg", "amplitude_strain"))
-    return mass, strain, np.array([following.NOT_VALID not in row["what"] for row in rows])
+    return mass, strain, np.array([lowest.NOT_VALID not in row["what"] for row in rows])
 
 
 # static contact ----------------------------------------------------------------------------------------------------
@@ -1188,13 +1188,12 @@ def identification() -> None:
 
 def rolling() -> None:
     """A wheel on a rail: creep curve and tractions; profiles that wear."""
-    from microslip.stages.answer import RollJob
-    from microslip.stages.rolling import rolling_stage
+    from microslip.stages.rolling import roll_stage
 
     wear = ["name=wheel-rail-worn", "wear={coefficient=2e-13, updates=20, passages=1e6}", "model.exact=0"]
     case = ROOT / "pipeline" / "cases" / "wheel-rail.toml"
-    worn = [file for file in rolling_stage(RollJob(case, BUILD, wear)).files if file.stem == "wearing"]
-    for file in [*rolling_stage(RollJob(case, BUILD)).files, *worn]:
+    worn = [file for file in roll_stage(case, BUILD, wear).files if file.stem == "wearing"]
+    for file in [*roll_stage(case, BUILD).files, *worn]:
         if file.suffix == ".png":
             save(from_file(file), f"rolling_{file.stem}", colours=LINES)
 
@@ -1203,10 +1202,9 @@ def unround_wheels() -> None:
     """A wheel with three lobes: wear over its circumference, and growth by order over distance and speed."""
     from PIL import Image
 
-    from microslip.stages.answer import RollJob
-    from microslip.stages.vehicle import vehicle_stage
+    from microslip.stages.rolling import roll_stage
 
-    made = vehicle_stage(RollJob(ROOT / "pipeline" / "cases" / "unround-wheel.toml", BUILD)).files
+    made = roll_stage(ROOT / "pipeline" / "cases" / "unround-wheel.toml", BUILD).files
     parts = [from_file(file) for file in made if file.suffix == ".png"]
     whole = Image.new("RGB", (max(p.width for p in parts), sum(p.height for p in parts)), "white")
     for k, part in enumerate(parts):
@@ -1216,10 +1214,9 @@ def unround_wheels() -> None:
 
 def tyre() -> None:
     """A rubber wheel whose slip jumps."""
-    from microslip.stages.answer import RollJob
-    from microslip.stages.tyre import tyre_stage
+    from microslip.stages.rolling import roll_stage
 
-    for file in tyre_stage(RollJob(ROOT / "pipeline" / "cases" / "slip-jump.toml", BUILD)).files:
+    for file in roll_stage(ROOT / "pipeline" / "cases" / "slip-jump.toml", BUILD).files:
         if file.suffix == ".png":
             save(from_file(file), "tyre", colours=LINES)
 

@@ -34,7 +34,7 @@ def motions(basis: ModalBasis) -> dict[str, dict[float, Orbit]]:
     return found
 
 
-def assembled(case: Path, changes: list[str], basis: ModalBasis) -> tuple[list[equations.Equations], Keys]:
+def assembled(case: Path, changes: list[str], basis: ModalBasis) -> tuple[list[equations.MotionEquations], Keys]:
     """The equations of a case of one body with changes, at each of its frequencies, and what it asks."""
     settings, _ = load_case(case, changes)
     built, asked = build(settings, {basis.name: basis}), settings.asked["orbit"]

@@ -159,12 +159,15 @@ def test_harmonics_are_added_to_a_slider():
 def test_too_few_harmonics_of_a_slider_are_told():
     """One where a Jenkins element slides is remarked on, and enough for whoever asks for no more."""
     built = SimpleNamespace(settings=SimpleNamespace(ring=None, mode="aft"))
-    problem = sliding(1)
+    rows = {"face": np.outer([0, 1, 0, 0, 0, 0], np.ones(1)), "push": np.ones(1), "tip": np.ones(1)}
+    body = group(np.array([100.0]), rows, 0.02)
+    slides = held(body, jenkins(2e4, 0.3, 2.0), [1], np.zeros(1), np.zeros(1), 1.0)
+    problem = balance.of(slides, 1, 64, length=3e-5)  # programs of the random systems
     start = readout(problem, 17.0)[0]
     known = error(problem, start.x, start.Omega)
     assert enough(problem, start, tolerance=1.01 * known.readout, first=known).reached
     assert not enough(problem, start, tolerance=0.99 * known.readout, most=4, first=known).reached
-    (message,) = _Left(built, None).out(problem, harmonic_response(problem, np.array([17.0]), np.ones(1)), [], 8.0)
+    (message,) = _Left(built, None).out(problem, harmonic_response(problem, np.array([17.0])), [], 8.0)
     assert "At F_N = 8 N the amplitude at 17 Hz" in message and "(too " in message and "at most" in message
 
 
@@ -210,7 +213,7 @@ def test_a_case_says_where_its_harmonics_are_too_few():
     built = SimpleNamespace(settings=SimpleNamespace(ring=None, mode="aft"))
     for harmonics, count in ((1, 1), (12, 0)):
         problem = opening(harmonics)
-        found = harmonic_response(problem, np.array([22.0, 30.0]), np.ones(1))
+        found = harmonic_response(problem, np.array([22.0, 30.0]))
         messages = _Left(built, None).out(problem, found, [], 8.0)
         assert len(messages) == count
         assert all(re.match(r"At F_N = 8 N the amplitude at (22|30) Hz .* harmonics", r) for r in messages)

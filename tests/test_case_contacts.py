@@ -32,7 +32,7 @@ from microslip.contact.patch import pressure
 from microslip.contact.solids import Solid
 from microslip.errors import UserError
 from microslip.files import store
-from microslip.harmonic_balance.cost import aft_bytes
+from microslip.harmonic_balance.forces import aft_bytes
 from microslip.modal.compute import modal_basis
 from microslip.settings.body import BodySettings, validate
 from microslip.stages import checkpoint

@@ -442,7 +442,7 @@ def test_rolling_page(capsys: pytest.CaptureFixture[str]) -> None:
 def test_pages_on_rolling_unround_wheels_and_tyres() -> None:
     """All keys of their cases are keys."""
     from microslip.rolling.settings import RollingCase
-    from microslip.rolling.slip import TyreCase
+    from microslip.rolling.tyre import TyreCase
     from microslip.vehicle.settings import KinematicsCase, VehicleCase
 
     blocks = [

@@ -413,6 +413,7 @@ def test_a_body_is_no_path(given: str, folder: Path, capsys: pytest.CaptureFixtu
 # ---------------------------------------------------------------- what check says
 
 
+@pytest.mark.usefixtures("untried")
 def test_check_tells_a_missing_seal(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["respond", ".", "-q"]) == 0
     for file in ("basis.h5", f"{BUILD}/response.h5"):

@@ -54,7 +54,7 @@ def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return tmp_path_factory.mktemp("drawn")
 
 
-MILD = {"harmonics": 1, "samples": 32}
+MILD = {"harmonics": 1, "samples": 24}
 HARD = {"harmonics": 2, "samples": 32, "hard": 1.5, "rough": True}
 made: dict[str, tuple[Drawn, Case, Answer]] = {}
 

@@ -28,7 +28,7 @@ from microslip.files import store
 from microslip.results import read_response
 from microslip.stages import response as making
 from microslip.stages import running
-from microslip.stages.following import open_case
+from microslip.stages.answer import CaseJob
 from microslip.stages.surveying import survey_stage
 from microslip.units import METRES, Quantity
 
@@ -117,7 +117,7 @@ def test_interrupted_and_resumed(folder: Path) -> None:
 
 QUICK = (
     CASE.replace('law = "smooth"\npoints = [2, 2]\n', 'law = "jenkins"\n').replace("points = 9", "points = 4")
-    .replace("samples = 24", "samples = 8").replace("[50.0]", "[1e4]").split("[material_limits]")[0]
+    .replace("[50.0]", "[1e4]").split("[material_limits]")[0]
 )  # fmt: skip
 """Linear, as it sticks, and without margins: it costs little."""
 
@@ -603,8 +603,8 @@ def test_as_many_harmonics_as_the_error_asks_for(folder: Path) -> None:
     assert (found.arrays["harmonics"] == H).all() and found.monitor("middle").shape[2] == H + 1
     assert f",{H}," in (build / "response.csv").read_text().splitlines()[1]
     assert f"<td>{H}</td>" in (build / "response.html").read_text()
-    opened = open_case(folder / "case.toml", {"sled": folder / "basis.h5"}, build)
-    assert opened.plain.settings.harmonics == H and opened.plain.settings.sampled >= 8 * H
+    opened = CaseJob(folder / "case.toml", {"sled": folder / "basis.h5"}, build, swept=True)
+    assert opened.settings.harmonics == H and opened.settings.sampled >= 8 * H
 
 
 def turning_sample(folder: Path) -> None:

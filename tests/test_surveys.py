@@ -136,7 +136,7 @@ def test_the_worst_engine_order_in_stress_and_its_best_normal_force(ring: Path) 
         return problem_of(build(settings, {"blade": stressed()}), 1e4)
 
     found = [
-        replace(envelope.over_orders(partial(driven, push=push), [1, 2], (200.0, 420.0), 45), normal_force=push)
+        replace(envelope.over_orders(partial(driven, push=push), [1, 2], (200.0, 420.0), 15), normal_force=push)
         for push in (2.0, 1.0)
     ]
     for r in found:
@@ -223,7 +223,7 @@ def test_respond_over_ranges(ring: Path) -> None:
     table = rows("build/ring/ranges.csv")
     settings, _ = load_case(ring)
     alone = response.harmonic_response(
-        problem_of(build(settings, {"blade": blade()}), 1e4), table["frequency_Hz"], np.zeros(1)
+        problem_of(build(settings, {"blade": blade()}), 1e4), table["frequency_Hz"]
     )
     np.testing.assert_allclose(table["combination_1_m"], np.abs(alone.monitor), rtol=1e-6)  # 1 % as in its modal file
     assert (table["high_m"] >= table["combination_3_m"]).all()
@@ -286,7 +286,7 @@ def test_respond_over_speeds(tmp_path, monkeypatch, capsys) -> None:
     np.testing.assert_allclose(found["normal_force_1_N"], 80 * (found["speed_rpm"] / 20000) ** 2, rtol=1e-2)
     settings, _ = load_case(path, ["speed_rpm=12000"])
     made = build(settings, {settings.components[0].name: ranged()})
-    alone = response.harmonic_response(problem_of(made, 80 * 0.6**2), np.array([800.0]), np.zeros(1))
+    alone = response.harmonic_response(problem_of(made, 80 * 0.6**2), np.array([800.0]))
     assert found["amplitude_m"][2] == pytest.approx(abs(alone.monitor[0]), rel=1e-6)
     for change, words in (
         ("normal_force = [[10000, 0.0], [20000, 80.0]]", "is known from 10000 to 20000 rpm, not at 9000 rpm"),
@@ -314,7 +314,7 @@ def test_speeds_of_a_body_without_a_range_in_the_books_mode(tmp_path, monkeypatc
     assert "Book mode" in said and f"The same at all speeds: {blade().name}" in said
     found, (settings, _) = rows("build/line/speeds.csv"), load_case(path)
     made = build(settings, {settings.components[0].name: blade()})
-    alone = response.harmonic_response(problem_of(made, 800 * 0.18**2), np.array([240.0]), np.zeros(1))
+    alone = response.harmonic_response(problem_of(made, 800 * 0.18**2), np.array([240.0]))
     assert alone.slipping.max() > 0
     assert found["amplitude_m"][1] == pytest.approx(abs(alone.monitor[0]), rel=1e-6)
 

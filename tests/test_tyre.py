@@ -24,8 +24,7 @@ from microslip.fem.loads import pressure
 from microslip.fem.operators import stiffness
 from microslip.linalg import eigen
 from microslip.modal.equilibrium import equilibrium, make_model
-from microslip.rolling.brush import Brush, fitted, jump, parabola, reached
-from microslip.rolling.slip import Studied, row
+from microslip.rolling.tyre import Brush, TyreAnswer, fitted, jump, parabola, reached, row
 from microslip.stages.job import open_job
 from microslip.stages.modal import modes_stage
 
@@ -103,7 +102,7 @@ def test_the_picture_names_the_time_constants_of_the_table() -> None:
         x=np.zeros(1), pressure=np.ones(1), highest=1.0, middle=0.0, length=BRUSH.length, force=40.0
     )
     case = SimpleNamespace(jumps=SimpleNamespace(targets=[0.05, 0.3], shown=0.05))
-    studied = Studied(case, patch, BRUSH, 0.0)  # type: ignore[arg-type]
+    studied = TyreAnswer(case, patch, BRUSH, 0.0)  # type: ignore[arg-type]
     lines = figure_of(partial(tyre_picture, studied, title="t")).axes[2].lines
     for way, fit in (("up", lines[1]), ("down", lines[3])):
         assert fit.get_label() == f"exponential of {studied.constants[f'{way}_fitted_s'][0]:.3g} s"

@@ -146,19 +146,14 @@ def start(problem: Equations, x: Array, lam: float, settings: Settings | None = 
     settings = settings or Settings()
     scaled = Scaled(problem)
     y = scaled.pack(x, lam)
-    found = correct(scaled, y, unit(len(y)), y[-1], replace(settings.newton, iterations=40, last_resort=True))
-    empty = State(y, np.zeros_like(y), 1, settings.step, None, settings.direction, y, y, 0, 0.0, ())
+    found = _first(scaled, y, unit(len(y)), settings)
     if not found.ok:
-        return replace(empty, status=f"no start: {found.status}")
-    y = found.y
-    D = scaled(y)[1]
-    t = tangent(D, 1)
+        return _no_start(y, found.status, settings)
+    t = tangent(scaled(found.y)[1], 1)
     if t is None:
-        return replace(empty, status="no start: singular derivative: start elsewhere")
+        return _no_start(y, "singular derivative: start elsewhere", settings)
     orientation = -1 if t[-1] * settings.direction < 0 else 1
-    t = t * orientation
-    first = _point(scaled, y, t, "start", False, 0.0, lam)
-    return State(y, t, orientation, settings.step, None, _sign(t[-1]) or settings.direction, y, t, 1, 0.0, (first,))
+    return _started(scaled, found.y, t * orientation, orientation, settings, lam)
 
 
 def branch_off(
@@ -170,18 +165,35 @@ def branch_off(
     Args:
         direction: of x (n,) and of lambda, in their units, in which the curve is to be followed.
     """
-    settings = settings or Settings()
     scaled = Scaled(problem)
-    y = scaled.pack(x, lam)
     ahead = scaled.pack(*direction)
-    ahead = ahead / norm(ahead)
-    found = correct(scaled, y, ahead, float(ahead @ y), replace(settings.newton, iterations=40, last_resort=True))
-    empty = State(y, np.zeros_like(y), 1, settings.step, None, settings.direction, y, y, 0, 0.0, ())
+    return across(scaled, scaled.pack(x, lam), ahead / norm(ahead), settings or Settings())
+
+
+def across(scaled: Scaled, y: Array, border: Array, settings: Settings) -> State:
+    """The first point on the plane through a scaled guess y across a border, in which the curve is to be followed."""
+    found = _first(scaled, y, border, settings)
     if not found.ok or found.tangent is None:
-        return replace(empty, status=f"no start: {found.status}")
-    y, t = found.y, found.tangent / norm(found.tangent)  # border . tangent = 1: it goes ahead
-    first = _point(scaled, y, t, "start", False, 0.0)
-    return State(y, t, found.sign, settings.step, None, _sign(t[-1]) or settings.direction, y, t, 1, 0.0, (first,))
+        return _no_start(y, found.status, settings)
+    t = found.tangent / norm(found.tangent)  # border . tangent = 1: it goes ahead
+    return _started(scaled, found.y, t, found.sign, settings)
+
+
+def _first(scaled: Scaled, y: Array, border: Array, settings: Settings) -> Corrected:
+    newton = replace(settings.newton, iterations=40, last_resort=True)
+    return correct(scaled, y, border, float(border @ y), newton)
+
+
+def _no_start(y: Array, why: str, settings: Settings) -> State:
+    nowhere, sense = np.zeros_like(y), settings.direction
+    return State(y, nowhere, 1, settings.step, None, sense, y, y, 0, 0.0, (), f"no start: {why}")
+
+
+def _started(
+    scaled: Scaled, y: Array, t: Array, orientation: int, settings: Settings, lam: float | None = None
+) -> State:
+    first, sense = _point(scaled, y, t, "start", False, 0.0, lam), _sign(t[-1]) or settings.direction
+    return State(y, t, orientation, settings.step, None, sense, y, t, 1, 0.0, (first,))
 
 
 def follow(problem: Equations, state: State, settings: Settings | None = None) -> Iterator[State]:

@@ -20,7 +20,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from ..data import Array
-from .curve import Lost, Segment, Settings, State, advance, root
+from .curve import Lost, Segment, Settings, State, across, advance, root
 from .newton import CONVERGED, Equations, Scaled, correct, norm, unit
 
 
@@ -55,8 +55,9 @@ class Peak:
         return self.status == CONVERGED
 
 
-SEARCH = Settings(folds=False, branch_points=False, step=0.01)
-"""How the curve is followed to its peak, if not told otherwise."""
+SEARCH = Settings(folds=False, branch_points=False, step=0.01, resolution=1e-4)
+"""How the curve is followed to its peak, if not told otherwise. Contacts of many points have a kink
+at every sample of each of them: these are located to 1e-4."""
 
 DIP = 0.02
 """Fall of ln g behind a peak that ends the climb. Contacts that switch sample by sample make many small peaks on the
@@ -66,14 +67,18 @@ way up; the highest of those that lie within a smaller dip of each other is take
 def peak(problem: Rated, x: Array, lam: float, settings: Settings | None = None) -> Peak:
     """The peak uphill from a guess (n,) at lambda, whichever way that is. One that fails says why."""
     settings, scaled = settings or SEARCH, Scaled(problem)
-    y = scaled.pack(x, lam)
-    border, newton = unit(len(y)), replace(settings.newton, iterations=40, last_resort=True)
-    found = correct(scaled, y, border, float(border @ y), newton)
-    if not found.ok or found.tangent is None:
-        return Peak(x, lam, math.nan, False, f"no start: {found.status}", border)
-    t, y = found.tangent / norm(found.tangent), found.y
-    sense = 1 if t[-1] >= 0 else -1
-    return _climbed(problem, State(y, t, found.sign, settings.step, None, sense, y, t, 1, 0.0, ()), settings)
+    border = unit(len(np.atleast_1d(x)) + 1)
+    begun = across(scaled, scaled.pack(x, lam), border, settings)
+    if begun.status:
+        return Peak(x, lam, math.nan, False, begun.status, border)
+    slope = _Slope(problem)
+    here = slope.at(begun.y, begun.tangent)
+    uphill = begun if here.slope >= 0 else _reversed(begun)
+    found = _ahead(slope, uphill, settings)
+    if not found.converged or math.log(found.value / here.value) > DIP:
+        return found
+    other = _ahead(slope, _reversed(uphill), settings)  # that peak is hardly higher than the beginning
+    return other if other.converged and other.value > found.value else found
 
 
 def placed(problem: Rated, x: Array, lam: float) -> Peak:
@@ -98,18 +103,6 @@ def placed(problem: Rated, x: Array, lam: float) -> Peak:
 
 BESIDE_TOP = 1e-3
 """Scaled length of curve within which the top lies of a peak whose height is known to some seven digits."""
-
-
-def _climbed(problem: Rated, state: State, settings: Settings) -> Peak:
-    """Uphill, and the other way too where that peak is hardly higher than the beginning."""
-    slope = _Slope(problem)
-    begun = slope.at(state.y, state.tangent)
-    uphill = state if begun.slope >= 0 else _reversed(state)
-    found = _ahead(slope, uphill, settings)
-    if not found.converged or math.log(found.value / begun.value) > DIP:
-        return found
-    other = _ahead(slope, _reversed(uphill), settings)
-    return other if other.converged and other.value > found.value else found
 
 
 def _ahead(slope: _Slope, state: State, settings: Settings) -> Peak:

@@ -234,7 +234,13 @@ def judged(
     top = int(good[np.argmax(size[good])])
     asked = np.flatnonzero(response.converged & response.asked)  # at a fold the least error is a jump
     some = asked[np.unique(np.linspace(0, len(asked) - 1, min(LOOKED_AT, len(asked))).round().astype(int))]
-    left = [_kept_left_out(problem, response, i, journal, series) for i in some]
+
+    def looked(i: int) -> dict[str, Any]:
+        f = float(response.frequency[i])
+        share = partial(left_out, problem, response.x[i], 2 * np.pi * f)
+        return once(journal, f"{series}, left out", f, lambda: {"share": share()})
+
+    left = [float(looked(i)["share"]) for i in some]
     worst = some[np.argsort(left)[-2:]]
     places = {float(response.frequency[i]): (float(size[i]), response.x[i]) for i in (top, *worst)}
     places |= {peak.frequency: (peak.amplitude, peak.x) for peak in peaks}
@@ -246,19 +252,6 @@ def judged(
             e, floor = Error(**{one.name: row[one.name] for one in fields(Error)}), FLOOR * float(size[top])
             found.append(Judged(point, e, e.over(floor), e.likely(floor)))
     return found
-
-
-def _kept_left_out(
-    problem: Problem,
-    response: HarmonicResponse,
-    i: int,
-    journal: Journal | None,
-    series: str,
-) -> float:
-    """`left_out` at a point of a sweep, kept before or computed now."""
-    f, x = float(response.frequency[i]), response.x[i]
-    looked = once(journal, f"{series}, left out", f, lambda: {"share": left_out(problem, x, 2 * np.pi * f)})
-    return float(looked["share"])
 
 
 def _estimated(problem: Problem, frequency: float, x: Array) -> dict[str, Any]:
@@ -287,7 +280,7 @@ class Enough:
 
 
 def enough(
-    problem: Problem, point: Point, tolerance: float = 0.01, output: int = 0, most: int = 48, floor: float = 0.0,
+    problem: Problem, point: Point, tolerance: float = 0.01, most: int = 48, floor: float = 0.0,
     first: Error | None = None,
 ) -> Enough:  # fmt: skip
     """Harmonics and samples doubled until the read-out's estimated error is within a tolerance (a share of it).
@@ -296,15 +289,12 @@ def enough(
         point: a solution of the problem. most: harmonics that are tried. floor: see `Error.over`. first: the point's
             error, if it is known.
     """
-    found: list[Error] = []
-    while True:
-        found.append(first if first and not found else error(problem, point.x, point.Omega, output))
-        if found[-1].over(floor) <= tolerance:
-            return Enough(problem, point, tuple(found), True)
+    found = [first or error(problem, point.x, point.Omega)]
+    while found[-1].over(floor) > tolerance:
         larger = finer(problem, more(problem.harmonics), 2 * samples_of(problem))
-        if larger.harmonics > most:
-            return Enough(problem, point, tuple(found), False)
-        following = newton(larger.at(point.Omega), found[-1].x)
-        if not following.converged:
+        following = newton(larger.at(point.Omega), found[-1].x) if larger.harmonics <= most else None
+        if following is None or not following.converged:
             return Enough(problem, point, tuple(found), False)
         problem, point = larger, following
+        found.append(error(problem, point.x, point.Omega))
+    return Enough(problem, point, tuple(found), True)

@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..continuation import Point, Settings, State, follow, start
-from ..data import Array
+from ..data import Array, largest
 from ..errors import UserError
 from ..results.checks import Checks
 from ..results.files import Response, write_response
@@ -209,9 +209,7 @@ def backbone(
         NotConverged: no state of rest under the steady loads is found.
     """
     problem, rest = about_rest(problem)
-    curve = _Curve(replace(problem, stiffness=tuple(HELD * k for k in problem.stiffness), share=0.0), output)
-    z, omega = curve.linear(problem, mode)
-    curve.x_scale[:-2] *= _growth(problem, mode)
+    curve, z, omega = _Curve.of(problem, mode, output)
     settings = settings or SETTINGS
     bounds = np.log([low, high])
     settings = replace(settings, low=float(bounds[0]) - 1e-9, high=float(bounds[1]), targets=tuple(np.log(asked)))
@@ -233,7 +231,7 @@ def motion(problem: Problem, found: Backbone, at: int) -> tuple[Problem, Solved]
     """The balance that point number `at` of a nonlinear mode solves, fed as it is there, and its solution."""
     Omega, xi = float(found.Omega[at]), float(2 * found.damping[at] * found.Omega[at])
     curve = _Curve(replace(about_rest(problem)[0], share=0.0), 0)
-    return curve._fed(xi), Solved(Omega, found.x[at], CONVERGED, 0.0, 0)
+    return curve._fed(xi), Solved(Omega, found.x[at])
 
 
 def about_rest(problem: Problem) -> tuple[Problem, Array]:
@@ -301,16 +299,14 @@ def sliding_amplitude(problem: Problem, mode: int) -> float:
     return float(problem.length / curve.x_scale[0])
 
 
-def error(problem: Problem, found: Backbone, at: int, mode: int = 0, output: int = 0) -> Error:
+def error(problem: Problem, found: Backbone, at: int, mode: int = 0) -> Error:
     """Estimated error of the damping ratio of a nonlinear mode's point number `at`, by the mode of the same amplitude
     with more samples and harmonics (see `accuracy.error`). Other arguments: as of `backbone`."""
     problem, rest = about_rest(problem)
     A = float(found.amplitude[at])
 
     def solved(finer: Problem, x: Array) -> Reading:
-        curve = _Curve(replace(finer, stiffness=tuple(HELD * k for k in finer.stiffness), share=0.0), output)
-        curve.linear(finer, mode)
-        curve.x_scale[:-2] *= _growth(finer, mode)
+        curve = _Curve.of(finer, mode)[0]
         curve.hold(rest)
         known = [found.Omega[at], 2 * found.damping[at] * found.Omega[at]]
         state = start(curve, np.append(x / curve.units(A)[0], known), float(np.log(A)))
@@ -330,6 +326,15 @@ class _Curve:
         self.x_scale: Array = np.ones(problem.size + 2)
         self.lam_scale = 1.0
 
+    @classmethod
+    def of(cls, stuck: Problem, mode: int, output: int = 0) -> tuple[_Curve, Array, float]:
+        """The curve of a mode, scaled, with what `linear` gives."""
+        stiff = tuple(HELD * k for k in stuck.stiffness)
+        curve = cls(replace(stuck, stiffness=stiff, share=0.0), output)
+        z, omega = curve.linear(stuck, mode)
+        curve.x_scale[:-2] *= _growth(stuck, mode)
+        return curve, z, omega
+
     def linear(self, stuck: Problem, mode: int) -> tuple[Array, float]:
         """The mode with sticking contacts as a guess, and its frequency; sets the scales."""
         omega, shapes = stuck_modes(stuck)
@@ -346,7 +351,7 @@ class _Curve:
         if not (moved > 1e-9 * reach).any():
             raise UserError(f"{at} does not move the contacts, so it is linear; take another")
         seen = complex(part.output[self.output] @ q - part.output_residual[self.output] @ (k @ d))
-        if abs(seen) < 1e-9 * np.abs(part.output[self.output]).max(initial=0.0) * np.abs(q).max():
+        if abs(seen) < 1e-9 * largest(part.output[self.output]) * np.abs(q).max():
             raise UserError(f"{at} does not move the read-out; take another")
         C = part.viscous(float(omega[mode]))
         xi = float((q.conj() @ C @ q).real / (q.conj() @ part.M @ q).real)
@@ -367,7 +372,7 @@ class _Curve:
 
     def hold(self, rest: Array) -> None:
         """Set `held` by x (size,) at rest."""
-        self.held = float(np.abs(rest).max(initial=0.0)) * self.problem.length / self.x_scale[0]
+        self.held = largest(rest) * self.problem.length / self.x_scale[0]
 
     def units(self, A: float) -> tuple[Array, Array]:
         """(n,) of x at an amplitude, and their derivatives by its logarithm: A / length, of the mean not less than of
@@ -408,7 +413,7 @@ class _Curve:
     def checks(self, x: Array, Omega: float, xi: float) -> Checks:
         """Of a point of the mode: the force that feeds the losses supplies xi v . M v."""
         fed = self._fed(xi)
-        found = operating(fed, Solved(Omega, x, CONVERGED, 0.0, 0))
+        found = operating(fed, Solved(Omega, x))
         supplied = 2 * np.pi * xi * found.kinetic / Omega  # J per cycle; its share of `damped` is taken back
         return checks(fed, replace(found, supplied=found.supplied + supplied, damped=found.damped + supplied))
 

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import KW_ONLY, dataclass, field
+from functools import partial
 from typing import Any, TypeVar
 
 import numpy as np
 
-from ..data import Array, Indices
+from ..data import Array, Indices, largest
 from ..results.series import of_solutions
 from ..units import METRES, Quantity
 
@@ -20,8 +21,7 @@ class FrequencyResponse:
     Attributes:
         frequency: (f,) Hz. monitor: (f,) complex 0-peak displacement of the monitored row, m.
         slip: (f, c) complex 0-peak displacement of each slider, m. dissipated: (f,) energy per cycle, J.
-        converged: (f,) bool. limit: the friction limits, N, for reports. normal_swing: (f, c) 0-peak
-            amplitude of each contact's normal force, N; beyond the normal force the contact would lift off.
+        converged: (f,) bool.
         quantity: what the monitored row measures; m stands for its unit.
         supplied: (f,) work of the excitation, damped: (f,) loss in the bodies' own damping, J per cycle.
         balance, counted, motion: (f,), see `results.checks.Checks`. All of these are empty where nothing is in contact.
@@ -33,15 +33,14 @@ class FrequencyResponse:
     slip: Array
     dissipated: Array
     converged: Array
-    limit: Array
-    normal_swing: Array
-    quantity: Quantity = field(kw_only=True, default=METRES)
-    supplied: Array = field(kw_only=True, default_factory=lambda: np.zeros(0))
-    damped: Array = field(kw_only=True, default_factory=lambda: np.zeros(0))
-    balance: Array = field(kw_only=True, default_factory=lambda: np.zeros(0))
-    counted: Array = field(kw_only=True, default_factory=lambda: np.zeros(0))
-    motion: Array = field(kw_only=True, default_factory=lambda: np.zeros(0))
-    added: Array = field(kw_only=True, default_factory=lambda: np.zeros(0, dtype=bool))
+    _: KW_ONLY
+    quantity: Quantity = METRES
+    supplied: Array = field(default_factory=partial(np.zeros, 0))
+    damped: Array = field(default_factory=partial(np.zeros, 0))
+    balance: Array = field(default_factory=partial(np.zeros, 0))
+    counted: Array = field(default_factory=partial(np.zeros, 0))
+    motion: Array = field(default_factory=partial(np.zeros, 0))
+    added: Array = field(default_factory=partial(np.zeros, 0, dtype=bool))
 
     @property
     def asked(self) -> Array:
@@ -92,8 +91,7 @@ STILL = 1e-10
 def still(response: FrequencyResponse) -> bool:
     """Whether nothing moves the first read-out, so that its peaks are none."""
     ok = response.converged
-    moved = float(np.abs(response.slip[ok]).max(initial=0.0))
-    return bool(ok.any()) and float(np.abs(response.monitor[ok]).max()) <= STILL * moved
+    return bool(ok.any()) and largest(response.monitor[ok]) <= STILL * largest(response.slip[ok])
 
 
 def hidden(frequency: Array, modes: Array, damping: Array) -> list[float]:

@@ -11,6 +11,7 @@ import hashlib
 import json
 import os
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -252,14 +253,10 @@ def kept(kind: str, law: str, tolerance: float, make: Callable[[], Table], where
     where = where or folder()
     path = None if where is None else where / f"{kind}-{law[:16]}-{tolerance:.0e}.npz"
     if path is not None and path.exists():
-        try:
+        with suppress(UserError):
             return read(path, kind, law)
-        except UserError:
-            pass
     table = make()
     if path is not None:
-        try:
+        with suppress(UserError):  # a full disk is no reason to lose the answer
             write(table, path)
-        except UserError:  # a full disk is no reason to lose the answer
-            pass
     return table

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
@@ -10,18 +10,17 @@ import numpy as np
 import scipy.optimize
 
 from ..continuation import CONVERGED, newton
-from ..data import Array
+from ..data import Array, largest
 from ..errors import UserError
-from ..results.journal import Journal
+from ..progress import Report
+from ..results.journal import Journal, once
 from ..results.tones import TwoTones
+from ..series import Torus, commensurate, differentiated, summed
 from ..settings.mistakes import numbered
 from ..units import hertz
 from . import reduced
 from .readout import measured
-from .torus import Torus, commensurate, with_mean
 from .two_tone import Stacked, TwoTone
-
-Report = Callable[[str], None]
 
 SMALLEST = 1.0 / 64
 """Share of the loads by which a solution is led from little load to the whole one at least."""
@@ -30,7 +29,7 @@ FADED = 1e-6
 """Share of the largest amplitude below which a free second tone has died out."""
 
 
-class Point(NamedTuple):
+class TwoTonePoint(NamedTuple):
     """A solution. first, second: rad/s. x: (n,) unknowns. status. error: see `continuation.Solution`."""
 
     first: float
@@ -44,7 +43,7 @@ class Point(NamedTuple):
 class Solved(TwoTones):
     """`TwoTones` that were solved for here. Attributes: points. balances: (f,) of each."""
 
-    points: tuple[Point, ...] = field(default=())
+    points: tuple[TwoTonePoint, ...] = field(default=())
     balances: tuple[TwoTone, ...] = field(default=())
 
     def error_estimate(self, i: int = 0, readout: int = 0) -> float:
@@ -65,7 +64,7 @@ class Solved(TwoTones):
         a, b = (_amplitudes(*one)[readout] for one in ((self.balances[i], own), (finer, other)))
         known = {tuple(k): v for k, v in zip(self.pairs.tolist(), a, strict=True)}
         pairs = [(0, 0), *map(tuple, finer.torus.pairs.tolist())]
-        size = np.abs(a[1:]).max(initial=0.0) or 1.0
+        size = largest(a[1:]) or 1.0
         turn = _turned(known, dict(zip(pairs, b, strict=True))) if self.balances[i].free else 0.0
         change = [known.get(k, 0.0) - v * np.exp(1j * k[1] * turn) for k, v in zip(pairs, b, strict=True)]
         return float(3 * np.abs(change).max() / size)
@@ -78,13 +77,9 @@ def _turned(a: dict[Any, complex], b: dict[Any, complex]) -> float:
 
 def refined(b: TwoTone) -> TwoTone:
     """With twice the harmonics, and one more for laws that answer odd with odd ones, twice the samples and turns."""
-    return of_order(b, 2 * b.torus.order + 1, 4 * b.torus.count, 2 * b.least)
-
-
-def of_order(b: TwoTone, order: int, count: int, least: int) -> TwoTone:
-    """The same balance with other numbers of harmonics, of samples and of turns in the line."""
-    torus = replace(b.torus, order=order, count=count)
-    other = replace(b, torus=torus, contacts=tuple(one.on(torus) for one in b.contacts), least=least)
+    torus = replace(b.torus, order=2 * b.torus.order + 1, count=4 * b.torus.count)
+    contacts = tuple(one.on(torus) for one in b.contacts)
+    other = replace(b, torus=torus, contacts=contacts, least=2 * b.least)
     return other if b.reference is None else replace(other, reference=_coefficients(b, b.reference, other))
 
 
@@ -105,7 +100,7 @@ def _spread(b: TwoTone, x: Array, other: TwoTone) -> Array:
     return np.concatenate([v.ravel(), x[b.size :]])
 
 
-def solve(b: TwoTone, first: float, second: float, starts: Sequence[Array]) -> Point:
+def solve(b: TwoTone, first: float, second: float, starts: Sequence[Array]) -> TwoTonePoint:
     """A motion at two frequencies (rad/s), from one of several starts or led there from little load."""
     found = None
     for x in starts:
@@ -120,14 +115,14 @@ def solve(b: TwoTone, first: float, second: float, starts: Sequence[Array]) -> P
         second = float(found.x[-1])
         if status == CONVERGED and not _vibrates(b, found.x):
             status = "the second tone has died out: the motion repeats with the first one; start from another motion"
-    return Point(first, second, found.x, status, found.error)
+    return TwoTonePoint(first, second, found.x, status, found.error)
 
 
 def _vibrates(b: TwoTone, x: Array) -> bool:
     """Whether there is a second tone."""
     v = b.displacement(x) / b.problem.scale
     with_second = np.repeat(b.torus.pairs[:, 1] != 0, 2)
-    return bool(np.abs(v[1:][with_second]).max(initial=0.0) > FADED * np.abs(v).max(initial=0.0))
+    return largest(v[1:][with_second]) > FADED * largest(v)
 
 
 def _led(b: TwoTone, first: float) -> Any:
@@ -143,40 +138,21 @@ def _led(b: TwoTone, first: float) -> Any:
     return found
 
 
-@dataclass(frozen=True)
-class Kept:
-    """Finished points of a sweep, by their number, in an open journal; none without one."""
-
-    journal: Journal | None = None
-
-    def of(self, i: int) -> Point | None:
-        one = None if self.journal is None else self.journal.of(SERIES).get(float(i))
-        if one is None:
-            return None
-        return Point(float(one["first"]), float(one["second"]), one["x"], str(one["status"]), float(one["error"]))
-
-    def keep(self, i: int, point: Point) -> None:
-        if self.journal is not None:
-            self.journal.keep(SERIES, i, point._asdict())
-
-
 SERIES = "two tones"
 """Of the journal."""
 
 
 def swept(
-    b: TwoTone, first: Array, second: Array, start: Array | None, report: Report, kept: Kept | None = None
+    b: TwoTone, first: Array, second: Array, start: Array | None, report: Report, kept: Journal | None = None
 ) -> Solved:  # fmt: skip
-    """Motions at frequencies (f,), rad/s, each from its neighbours. start: (n,) unknowns of the first one. kept: those
-    that are known from a run that did not end, and where each is kept the moment it is found."""
-    kept = kept or Kept()
-    points, balances, known = list[Point](), list[TwoTone](), [] if start is None else [start]
+    """Motions at frequencies (f,), rad/s, each from its neighbours. start: (n,) unknowns of the first one. kept: holds
+    those that are known from a run that did not end, and each by its number the moment it is found."""
+    points, balances, known = list[TwoTonePoint](), list[TwoTone](), [] if start is None else [start]
     for i, (one, two) in enumerate(zip(first.tolist(), second.tolist(), strict=True)):
         here = b.at(one, known[-1][-1] if b.free else two)
-        found = kept.of(i)
-        if found is None:
-            found = solve(here, one, two, [*known[::-1][:1], *([] if b.free else [np.zeros(b.size)])])
-            kept.keep(i, found)
+        starts = [*known[::-1][:1], *([] if b.free else [np.zeros(b.size)])]
+        row = once(kept, SERIES, i, lambda: solve(here, one, two, starts)._asdict())  # noqa: B023
+        found = TwoTonePoint(**row)
         points.append(found)
         balances.append(here)
         if found.status == CONVERGED:
@@ -185,7 +161,7 @@ def swept(
     return of_points(points, balances)
 
 
-def of_points(points: Sequence[Point], balances: Sequence[TwoTone]) -> Solved:
+def of_points(points: Sequence[TwoTonePoint], balances: Sequence[TwoTone]) -> Solved:
     """What a reader asks of solved points."""
     b, turn = balances[0], 2 * np.pi
     works = np.array([_powers(*one) for one in zip(balances, points, strict=True)])
@@ -201,7 +177,7 @@ def of_points(points: Sequence[Point], balances: Sequence[TwoTone]) -> Solved:
     )  # fmt: skip
 
 
-def _said(points: Sequence[Point], b: TwoTone) -> tuple[str, ...]:
+def _said(points: Sequence[TwoTonePoint], b: TwoTone) -> tuple[str, ...]:
     """What a reader must know: common periods."""
     for p in points:
         if small := commensurate(p.first, p.second, b.torus.order):
@@ -224,7 +200,7 @@ class _Shown(NamedTuple):
     sign: Array
 
 
-def _shown(b: TwoTone, p: Point) -> _Shown:
+def _shown(b: TwoTone, p: TwoTonePoint) -> _Shown:
     v = b.displacement(p.x)
     force = b.forces(v, p.first, p.second, slopes=False)[0]
     views, w = b.views(p.first, p.second), b.torus.frequencies(p.first, p.second)
@@ -235,14 +211,14 @@ def _shown(b: TwoTone, p: Point) -> _Shown:
     return _Shown(parts, np.append(0.0, np.abs(w)), q, list(F), stacked.sign)
 
 
-def _amplitudes(b: TwoTone, p: Point) -> Array:
+def _amplitudes(b: TwoTone, p: TwoTonePoint) -> Array:
     """(w, P + 1) complex, of the pairs as they are named."""
     s = _shown(b, p)
     each = [reduced.monitored(part, q, F) for part, q, F in zip(s.parts, s.q, s.F, strict=True)]
     return np.array([y if sign > 0 else y.conj() for y, sign in zip(each, s.sign, strict=True)]).T
 
 
-def _powers(b: TwoTone, p: Point) -> list[float]:
+def _powers(b: TwoTone, p: TwoTonePoint) -> list[float]:
     """W: of the loads of either tone, in the bodies, into the contacts by harmonics, and by the contacts' own count."""
     s, supplied, damped = _shown(b, p), [0.0, 0.0], 0.0
     for k, part, w, q, F in zip(b.torus.pairs, s.parts[1:], s.w[1:], s.q[1:], s.F[1:], strict=True):
@@ -252,7 +228,7 @@ def _powers(b: TwoTone, p: Point) -> list[float]:
             damped += lost * w / (2 * np.pi)
     v = b.displacement(p.x)
     into = b.forces(v, p.first, p.second, slopes=False)[0]
-    speed = b.torus.differentiated(b.torus.frequencies(p.first, p.second)) @ v
+    speed = differentiated(b.torus.frequencies(p.first, p.second)) @ v
     exchanged = 0.5 * float((into[1:] * speed[1:]).sum())
     return [*supplied, damped, exchanged, b.lost(p.x, p.first)]
 
@@ -269,13 +245,13 @@ def from_time(b: TwoTone, time: Array, d: Array, first: float, around: float) ->
     for one in b.contacts:
         offset[one.group.first] = one.group.offset
     moved = d.T - offset
-    size = float(np.abs((moved - moved.mean(axis=0)) / b.problem.scale).max(initial=0.0))
+    size = largest((moved - moved.mean(axis=0)) / b.problem.scale)
     b = replace(b, problem=replace(b.problem, length=b.problem.length * (0.1 * size or 1.0)))
     y = moved / b.problem.scale
     few = replace(b.torus, order=min(b.torus.order, 5))
 
     def fitted(second: float, torus: Torus, which: Any = slice(None)) -> tuple[Array, float]:
-        E = with_mean(time[:, None] * torus.frequencies(first, second)[which])
+        E = summed(time[:, None] * torus.frequencies(first, second)[which])
         c, *_ = np.linalg.lstsq(E, y, rcond=None)
         return c, float(np.square(E @ c - y).sum())
 

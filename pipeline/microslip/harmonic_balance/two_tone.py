@@ -26,13 +26,13 @@ from ..contact.law import Law
 from ..data import Array, ComplexArray
 from ..errors import UserError
 from ..programs import program
+from ..series import Torus, closed, commensurate, differentiated
 from ..system.assembly import Assembly, Linear
 from . import problem as balance
 from . import reduced
 from .by_hand import ElasticSpring
 from .forces import AFT
 from .problem import Group, Problem
-from .torus import Torus, closed, commensurate
 
 CYCLES = 100
 """Marched at most along the closed line."""
@@ -42,7 +42,7 @@ PERIODICITY = 1e-10
 
 
 @dataclass(frozen=True, eq=False)
-class Contacts:
+class TwoToneContacts:
     """Equal contacts. Attributes: group. model: of their forces on the closed line. ground: (c n, 3) m/s under them."""
 
     group: Group
@@ -63,7 +63,7 @@ class Contacts:
         """Of all points."""
         return self.model.law
 
-    def on(self, torus: Torus) -> Contacts:
+    def on(self, torus: Torus) -> TwoToneContacts:
         """The same on another line."""
         return replace(self, model=replace(self.model, torus=torus))
 
@@ -87,7 +87,7 @@ class TwoTone:
 
     problem: Problem
     parts: dict[tuple[int, int], Linear]
-    contacts: tuple[Contacts, ...]
+    contacts: tuple[TwoToneContacts, ...]
     torus: Torus
     second: float
     free: bool = False
@@ -179,7 +179,7 @@ class TwoTone:
         if not self.free:
             return R, A, tones[0].ravel()
         assert self.reference is not None
-        phase = (self.torus.differentiated(self.torus.pairs[:, 1].astype(float)) @ self.reference / p.scale).ravel()
+        phase = (differentiated(self.torus.pairs[:, 1]) @ self.reference / p.scale).ravel()
         off = (v - self.reference) / p.scale
         size = np.linalg.norm(phase) or 1.0
         big = np.block([[A, tones[1].reshape(-1, 1)], [phase[None] / size, np.zeros((1, 1))]])
@@ -201,7 +201,7 @@ class TwoTone:
         return force, over, tones
 
     def _of(
-        self, one: Contacts, u: Array, first: float, second: float, slopes: bool
+        self, one: TwoToneContacts, u: Array, first: float, second: float, slopes: bool
     ) -> tuple[Array, Array, Array]:  # fmt: skip
         """(c, k, W) forces of equal contacts, (c, k, W, k, W) slopes and (2, c, k, W) those over the frequencies."""
         t, none = self.torus, np.zeros((2, *u.shape))
@@ -209,7 +209,7 @@ class TwoTone:
             period = self.period(first, second)
             F, S = one.model.forces(u, period) if slopes else (one.model.force(u, period), np.zeros(0))
             return F.copy(), S, none
-        rates = [t.values @ t.differentiated(t.pairs[:, i].astype(float)) for i in (0, 1)]
+        rates = [t.values @ differentiated(t.pairs[:, i]) for i in (0, 1)]
         ahead = first * rates[0] + second * rates[1]
         F, S, D = map(np.asarray, _pointwise(one.law, one.kinematics, u, one.ground, t.values, ahead))
         found = np.einsum("ws,scj->cjw", t.transform, F)
@@ -240,7 +240,7 @@ class TwoTone:
                 period = self.period(*own)
                 total += sum(float(c.lost.sum()) for c in one.model.point_cycles(u, period)) / period
             else:
-                ahead = self.torus.values @ self.torus.differentiated(self.torus.frequencies(*own))
+                ahead = self.torus.values @ differentiated(self.torus.frequencies(*own))
                 F = np.asarray(_pointwise(one.law, one.kinematics, u, one.ground, self.torus.values, ahead)[0])
                 total += float((F * np.einsum("sw,cjw->scj", ahead, u)).sum() / len(F))
         return total
@@ -337,7 +337,7 @@ def of(
     return made.at(first, second)
 
 
-def _contacts(g: Group, grounds: Sequence[Any], torus: Torus) -> Contacts:
+def _contacts(g: Group, grounds: Sequence[Any], torus: Torus) -> TwoToneContacts:
     assert isinstance(g.model, AFT)
     patch, n = g.model.patch, len(g.contacts)
     ground = np.zeros((n, len(patch.points), 3))
@@ -347,7 +347,7 @@ def _contacts(g: Group, grounds: Sequence[Any], torus: Torus) -> Contacts:
                 raise UserError("ground: wavy ground has frequencies of its own; leave waviness out")
             ground[i, :, 1:] = moves.velocity * np.array([np.cos(moves.angle), np.sin(moves.angle)])
     made = replace(g.model, samples=torus.count, cycles=CYCLES, periodicity=PERIODICITY, torus=torus)
-    found = Contacts(g, made, ground.reshape(-1, 3))
+    found = TwoToneContacts(g, made, ground.reshape(-1, 3))
     if found.remember and ground.any():
         raise UserError("ground: moves under a contact that remembers; take friction by the velocity alone")
     return found

@@ -21,10 +21,11 @@ from numpy.typing import ArrayLike
 
 from ..data import Array
 from ..errors import UserError
+from ..harmonic_balance.reduced import own_coordinates
 from ..settings.arguments import Index, Rows, Vector, checked, numbers
 from ..settings.numbers import Positive
 from ..system.assembly import Assembly, Linear
-from .estimate import Estimate, accepted, covariance, misfit
+from .identification import Estimate, accepted, covariance, misfit
 from .linear import held
 from .ring import Tuned
 from .scatter import Scatter
@@ -70,8 +71,7 @@ class Stuck:
         ring = self.tuned.mistuned([(s, np.ones((self.tuned.sectors, self.tuned.modes(s))))])
         part, other = self.tuned.whole.joined(1), ring.joined(1)
         stiff, viscous = (other.stiff - part.stiff) / 3, other.C - part.C
-        ends = np.cumsum([0] + [len(m.groups[0].M_r) for m in ring.components])
-        own = [slice(a, b) for a, b in zip(ends[:-1], ends[1:], strict=True)]
+        own = own_coordinates(ring, 0)
         return [(s, stiff[s, s], viscous[s, s]) for s in own if stiff[s, s].any()]
 
     def amplitudes(self, frequency: float, deviation: Array) -> tuple[Array, Array]:

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..data import Array
+from ..data import Array, largest
 
 Respond = Callable[[float], Array | None]
 """(w,) amplitudes of the read-outs at a frequency (Hz); None where there is no solution."""
@@ -115,7 +115,7 @@ class _Search:
     ) -> None:  # fmt: skip
         self.respond, self.follow, self.at_once, self.tells = respond, follow, at_once, tells
         self.low, self.high = float(min(frequency)), float(max(frequency))
-        self.width = float(np.abs(np.diff(frequency)).max(initial=0.0))
+        self.width = largest(np.diff(frequency))
         self.known: dict[float, Array] = {}
         self.failed: list[float] = []
         self.tried: set[tuple[float, float, float, bool]] = set()

@@ -38,9 +38,6 @@ ABSOLUTE = "added_mass", "gap"
 MODAL = "frequency", "damping"
 """Those of which every mode of a body has its own."""
 
-DISTRIBUTIONS = "normal", "lognormal", "uniform"
-ARRANGEMENTS = "given", "shuffled", "drawn"
-
 
 @checked_fields
 @dataclass(frozen=True)
@@ -81,10 +78,6 @@ class Scatter:
             raise UserError(f"{self.of}: nothing scatters; give a deviation above zero, or values that are known")
         if given > 1:
             raise UserError(f"{self.of}: give one of deviation, values that are known, and others")
-        self._heard()
-
-    def _heard(self) -> None:
-        """Raise `UserError` for what is given and nothing depends on."""
         drawn = self.deviation > 0
         for key, name, depends in (
             ("component", "body", self.of in OF_BLADES), ("contact", "contact", self.of in OF_CONTACTS),

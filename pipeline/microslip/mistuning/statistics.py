@@ -144,7 +144,7 @@ class Envelope:
 
 
 @dataclass(frozen=True)
-class Fit:
+class FittedTail:
     """A distribution fitted to highest amplitudes.
 
     Attributes:
@@ -162,7 +162,7 @@ class Fit:
 SHARES = 0.5, 0.95, 0.99, 0.999
 
 
-def fits(values: Array) -> list[Fit]:
+def fits(values: Array) -> list[FittedTail]:
     """The extreme-value distribution and Weibull's, fitted to (n,) highest amplitudes by maximum likelihood."""
     from scipy.stats import genextreme, weibull_min
 
@@ -181,7 +181,7 @@ def fits(values: Array) -> list[Fit]:
         off = np.maximum(np.abs(made.cdf(x) - steps), np.abs(made.cdf(x) - steps + 1 / len(x)))
         tail = float(off[int(0.9 * len(x)) :].max())
         told = {share: float(made.ppf(share)) for share in SHARES}
-        found.append(Fit(name, dict(zip(names, map(float, p), strict=True)), float(off.max()), tail, told))
+        found.append(FittedTail(name, dict(zip(names, map(float, p), strict=True)), float(off.max()), tail, told))
     return found
 
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..bifurcation.branches import Branch
+from ..bifurcation.branches import DiagramBranch
 from ..bifurcation.diagram import Diagram
 from ..units import Quantity
 from .plots import COLOURS, panels
@@ -37,7 +37,7 @@ def portraits_picture(found: Diagram, figure: Figure, title: str, unit: str) -> 
     figure.suptitle(title, fontweight="bold")
 
 
-def _portraits(found: Diagram, branch: Branch, axes: Axes, parameter_unit: str) -> None:
+def _portraits(found: Diagram, branch: DiagramBranch, axes: Axes, parameter_unit: str) -> None:
     for k, i in enumerate(dict.fromkeys(np.linspace(0, len(branch) - 1, SHOWN).round().astype(int).tolist())):
         orbit = branch.orbit(found.system, i)
         y = found.system.seen(orbit.sampled(16), orbit.p)[:, 0]

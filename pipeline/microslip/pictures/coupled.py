@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from ..harmonic_balance.envelope import Envelope, OverOrders
-    from ..harmonic_balance.identification import Identified, NodalDiagram
+    from ..harmonic_balance.identification import IdentifiedStiffness, NodalDiagram
 
 BLUE, RED = "#1f5f99", "#b3261e"
 
@@ -40,7 +40,7 @@ def _logarithmic(axes: Axes, label: str) -> None:
 
 
 def nodal_diameter_picture(
-    diagrams: Sequence[NodalDiagram], figure: Figure, title: str, found: Identified | None = None
+    diagrams: Sequence[NodalDiagram], figure: Figure, title: str, found: IdentifiedStiffness | None = None
 ) -> None:
     """Frequencies over the nodal diameter for several contact stiffnesses, with what was measured (Sextro Fig. 5.4-1).
 

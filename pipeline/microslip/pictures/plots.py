@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import io
+import json
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
@@ -10,10 +12,12 @@ from typing import IO, TYPE_CHECKING, Any, TypeVar
 import numpy as np
 
 from ..data import Array, ContactState, ModalBasis, ModalGroup
+from ..files.png import CURVES, with_text
 from ..files.store import complete_or_absent
 from ..reduced.truncation import Coordinate, coordinates, percent
 from ..results.checks import UNCERTAIN
 from ..units import METRES, Quantity, rpm_text, to_rpm
+from .touch import curves_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -68,11 +72,16 @@ def save_figure(figure: Figure, path: Path) -> Path:
 
 
 def write_png(figure: Figure, to: Path | IO[bytes]) -> None:
-    """Arranged while it is drawn; `savefig` draws once more before, for formats that are cut to size."""
+    """Arranged while it is drawn; `savefig` draws once more before, for formats that are cut to size. Its curves go
+    into the file, from where pages take them."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
     figure.set_facecolor("white")
-    FigureCanvasAgg(figure).print_png(to, metadata={"Software": None})
+    drawn = io.BytesIO()
+    FigureCanvasAgg(figure).print_png(drawn, metadata={"Software": None})
+    png, curves = drawn.getvalue(), curves_of(figure)
+    png = png if curves is None else with_text(png, CURVES, json.dumps(curves, separators=(",", ":")))
+    to.write_bytes(png) if isinstance(to, Path) else to.write(png)
 
 
 def panels(

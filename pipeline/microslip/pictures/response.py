@@ -15,10 +15,12 @@ from ..case.readouts import Readout
 from ..case.run import free_response
 from ..data import Array
 from ..harmonic_balance import FrequencyResponse
+from ..harmonic_balance.response import HarmonicResponse
 from ..harmonic_balance.sweeps import overhanging
 from ..results.names import apart
 from ..units import METRES, Quantity
 from .plots import by_rows, in_shades, legend_below, mark_missing, plain_numbers, said_beside, swept
+from .touch import tell_points
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -50,7 +52,8 @@ def response_picture(
     figure.set_dpi(130)
     axes = figure.subplots()
     by, unit = shown[0].quantity.shared(_heights(result, rows, shown[0].quantity))
-    lifts = [_curves(axes, result, w, rows, style, len(shown) > 1, by) for w, style in zip(shown, STYLES, strict=False)]
+    styled, scale = zip(shown, STYLES, strict=False), (by, unit)
+    lifts = [_curves(axes, result, w, rows, style, len(shown) > 1, scale) for w, style in styled]
     if any(np.abs(line.get_ydata()).max(initial=0.0) > 0 for line in axes.get_lines()):
         axes.set_yscale("log")
         plain_numbers(axes.yaxis, (1.0,))
@@ -93,11 +96,11 @@ def _driven_by(result: CaseResult) -> str:
 
 def _curves(
     axes: Axes, result: CaseResult, w: Readout, rows: Sequence[Mapping[str, Any]], style: str, named: bool,
-    by: float,
+    scale: tuple[float, str],
 ) -> bool:  # fmt: skip
-    """Draw a read-out without contact and for every normal force, its amplitudes times a factor; whether contacts would
-    lift off somewhere."""
-    of, built = f", {w.name}" * named, result.built
+    """Draw a read-out without contact and for every normal force, its amplitudes times a factor and in that unit;
+    whether contacts would lift off somewhere."""
+    of, built, (by, unit) = f", {w.name}" * named, result.built, scale
     free = result.free
     if w.number:
         read = replace(built.assembly, outputs=built.assembly.outputs[w.number :])
@@ -112,6 +115,7 @@ def _curves(
             r = replace(r, monitor=r.outputs[:, w.number, 1])
             heights = {row["frequency_Hz"]: row[w.column] for row in rows if row["normal_force_N"] == normal}
             peaks = [(f, heights[f]) for f, _ in peaks if f in heights]
+        _tell(axes, r, by, unit, line["color"], f"F_N = {words[normal]} N{of}")
         f, amplitude = _with_peaks(r, peaks, by)
         on = ~np.isin(f, apart_from_it)
         off = np.interp(f, r.frequency, lifted(built, r)) > 0
@@ -127,6 +131,21 @@ def _curves(
                 at = [(m.frequency, by * m.amplitude) for m in motions]
                 axes.plot(*np.reshape(at, (-1, 2)).T, mark, color=line["color"], ms=4, mfc="none")
     return lifts
+
+
+def _tell(axes: Axes, r: HarmonicResponse, by: float, unit: str, colour: Any, label: str) -> None:
+    """What every point of a response is, for pages whose curves are pointed at."""
+    ok, columns = r.converged, r.columns()
+    amplitude = by * np.abs(r.monitor[ok])
+    each = {
+        "frequency in Hz": r.frequency[ok],
+        f"amplitude in {unit}": amplitude,
+        "phase in degrees": np.degrees(np.angle(r.monitor[ok])),
+        "slip in %": 100 * columns["slipping"][ok],
+        "open in %": 100 * columns["open"][ok],
+        "lost in friction in J per cycle": r.dissipated[ok],
+    }
+    tell_points(axes, r.frequency[ok], amplitude, each, colour, label)
 
 
 def _stuck_lines(axes: Axes, frequencies: Array, width: float) -> None:

@@ -10,8 +10,8 @@ import numpy as np
 from ..data import Array
 from ..exchange import vtu
 from ..rolling.strips import Tractions
-from ..rolling.study import Studied
-from ..rolling.wearing import Wearing
+from ..rolling.study import RollingAnswer
+from ..rolling.wearing import ProfileWear
 from .plots import COLOURS, legend_below, panels, plain_axes
 
 if TYPE_CHECKING:
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 LABELS = {"longitudinal": "longitudinal creepage", "lateral": "lateral creepage", "spin": "spin in 1/m"}
 
 
-def curve_picture(found: Studied, figure: Figure, title: str) -> None:
+def curve_picture(found: RollingAnswer, figure: Figure, title: str) -> None:
     """Creep forces over the friction that is held; the published FASTSIM and exact half-spaces at some points."""
     assert found.forces is not None
     (axes,) = panels(figure, (8.0, 4.8))
@@ -43,7 +43,7 @@ def curve_picture(found: Studied, figure: Figure, title: str) -> None:
     legend_below(figure)
 
 
-def traction_picture(found: Studied, figure: Figure, title: str) -> None:
+def traction_picture(found: RollingAnswer, figure: Figure, title: str) -> None:
     """Tractions over the patch, and along its middle strip."""
     assert found.tractions is not None
     t, mu = found.tractions, found.highest
@@ -83,7 +83,7 @@ def stretched(size: Array) -> float:
     return NARROW / slender if slender < NARROW else min(1 / (NARROW * slender), 1.0)
 
 
-def wearing_picture(worn: Wearing, figure: Figure, title: str) -> None:
+def wearing_picture(worn: ProfileWear, figure: Figure, title: str) -> None:
     """What is worn off both profiles, and the largest pressure over the passages."""
     left, right = panels(figure, (9.6, 4.2), 1, 2)
     bodies = {"wheel": worn.wheel, "rail": worn.rail}

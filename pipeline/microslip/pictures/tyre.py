@@ -9,8 +9,7 @@ import numpy as np
 
 from ..data import Array, ModalBasis
 from ..mesh import boundary_facets
-from ..rolling.brush import jump
-from ..rolling.slip import Studied
+from ..rolling.tyre import TyreAnswer, jump
 from .plots import COLOURS, Look, plain_panels
 from .scene import element_sides
 
@@ -21,7 +20,7 @@ TO_ITS_SIDE = 1e-6
 """Of the wheel's size: points that near to its outermost plane are of its side."""
 
 
-def tyre_picture(found: Studied, figure: Figure, title: str, wheel: ModalBasis | None = None) -> None:
+def tyre_picture(found: TyreAnswer, figure: Figure, title: str, wheel: ModalBasis | None = None) -> None:
     """Four panels, and beside them the wheel of a modal file as it stands, whole and near its patch."""
     figure.set_size_inches(9.6 if wheel is None else 13.6, 6.4)
     rest: Figure | SubFigure = figure
@@ -60,7 +59,7 @@ def tyre_picture(found: Studied, figure: Figure, title: str, wheel: ModalBasis |
     figure.suptitle(title)
 
 
-def _standing(figure: SubFigure, found: Studied, wheel: ModalBasis) -> None:
+def _standing(figure: SubFigure, found: TyreAnswer, wheel: ModalBasis) -> None:
     """Mesh of the wheel's side at rest and deformed, in its true size."""
     from matplotlib.collections import LineCollection
 

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..data import Array
-from ..vehicle.kinematics import Recorded
-from ..vehicle.study import WHEELS, Studied
+from ..vehicle.kinematics import KinematicsAnswer
+from ..vehicle.study import WHEELS, VehicleAnswer
 from .plots import COLOURS, legend_below, panels, plain_axes
 
 if TYPE_CHECKING:
@@ -24,7 +24,7 @@ def _over_angle(axes: Axes, angle: Array, values: Array, label: str, colour: str
     axes.set(ylabel=label, xlim=(0, 360), xticks=range(0, 361, 60))
 
 
-def circumference_picture(found: Studied, figure: Figure, title: str) -> None:
+def circumference_picture(found: VehicleAnswer, figure: Figure, title: str) -> None:
     """Of the wheel that is out of round most: radius, normal force and wear of the first turn."""
     name, columns = WHEELS[found.wheel], found.circumference()
     places, angle = panels(figure, (8.0, 6.4), 3, sharex=True), columns["angle_deg"]
@@ -43,7 +43,7 @@ def circumference_picture(found: Studied, figure: Figure, title: str) -> None:
     places[2].set_xlabel("angle from the mark in degrees")
 
 
-def recorded_picture(found: Recorded, figure: Figure, title: str) -> None:
+def recorded_picture(found: KinematicsAnswer, figure: Figure, title: str) -> None:
     """Normal force and wear over the circumference, by given kinematics."""
     columns = found.circumference()
     force, worn = panels(figure, (8.0, 4.6), 2, sharex=True)
@@ -54,7 +54,7 @@ def recorded_picture(found: Recorded, figure: Figure, title: str) -> None:
     worn.set_xlabel("angle from the mark in degrees")
 
 
-def growth_picture(found: Studied, figure: Figure, title: str) -> None:
+def growth_picture(found: VehicleAnswer, figure: Figure, title: str) -> None:
     """Amplitudes of the largest orders over the distance; growth of all orders over the speed, where asked."""
     several = len(found.speeds) > 0
     figure.set_size_inches(9.6 if several else 6.4, 4.4)
@@ -73,7 +73,7 @@ def growth_picture(found: Studied, figure: Figure, title: str) -> None:
         _over_speed(found, figure, place)
 
 
-def _over_speed(found: Studied, figure: Figure, axes: Axes) -> None:
+def _over_speed(found: VehicleAnswer, figure: Figure, axes: Axes) -> None:
     grown = 1e6 / found.way * found.grown
     most = float(np.abs(grown).max())
     orders = np.arange(1, found.orders + 1)

@@ -20,11 +20,12 @@ from ..bifurcation.dynamics import Dynamics
 from ..bifurcation.equilibria import Hopf
 from ..data import Array
 from ..errors import at
+from ..progress import Report
 from ..results import Journal
+from ..results.journal import once
 from ..settings.numbers import Model, Number, Positive
 from ..system.assembly import Assembly
 
-Report = Callable[[str], None]
 Under = Callable[[Mapping[str, float], str], Assembly]
 """The assembly of a case with other values of keys; the key that says so."""
 
@@ -156,18 +157,16 @@ class _Work:
         """The cycles with orbits at so many thirds of the branch checked, see `bifurcation.cycles.checked`."""
         series = f"orbits checked {name}"
         for number in dict.fromkeys((len(c.orbits) - 1) * k // 3 for k in thirds):
-            known = self.journal.of(series).get(number)
             orbit = c.orbits[number]
-            if known is not None:
-                one = Checked(
-                    Harmonics(known["c"], float(known["omega"]), orbit.p), float(known["error"]),
-                    float(known["drift"]), known["swing"], known["multipliers"],
-                )  # fmt: skip
-            else:
-                one = checked(c.system, orbit, accuracy, self.report)
-                rest = {"error": one.error, "drift": one.drift, "swing": one.swing, "multipliers": one.multipliers}
-                self.journal.keep(series, number, {"c": one.orbit.c, "omega": one.orbit.omega, **rest})
-            c = replace(c, checked={**c.checked, number: one})
+
+            def made(orbit: Harmonics = orbit, system: Dynamics = c.system) -> dict[str, Any]:
+                one = checked(system, orbit, accuracy, self.report)
+                rest = {key: value for key, value in vars(one).items() if key != "orbit"}
+                return {"c": one.orbit.c, "omega": one.orbit.omega, **rest}
+
+            row = dict(once(self.journal, series, number, made))
+            orbit = Harmonics(row.pop("c"), float(row.pop("omega")), orbit.p)
+            c = replace(c, checked={**c.checked, number: Checked(orbit, **row)})
         return c
 
 

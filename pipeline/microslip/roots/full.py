@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,12 +13,11 @@ from ..errors import UserError
 from ..linalg import quadratic, winding
 from ..linalg.quadratic import Quadratic, Window
 from ..modal.unreduced import Unreduced
+from ..progress import Report
 from ..sliding import Tangent
 from ..system.assembly import Assembly
 from ..system.spin import Spin
 from .spectrum import Spectrum
-
-Report = Callable[[str], None]
 
 
 def full_matrices(bodies: Mapping[str, Unreduced], assembly: Assembly, contacts: Sequence[Tangent]) -> Quadratic:

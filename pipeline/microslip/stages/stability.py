@@ -23,9 +23,8 @@ from ..pictures.roots import over_picture, plane_picture
 from ..report.page import fold, table
 from ..report.roots import root_table, table_lines
 from ..ring.resonances import speeds_of
-from ..roots.asked import window_of
+from ..roots.asked import window_of, write_roots
 from ..roots.diagram import diagram
-from ..roots.recorded import write_roots
 from ..roots.spectrum import spectrum
 from ..settings.body import StabilitySettings
 from ..units import rpm_text
@@ -166,11 +165,7 @@ def _answer(q: Question, report: Report) -> Answer:
         pieces.append(fold("How many roots grow at each value", table([over.parameter, "grow"], counts)))
         said.append(over.sentence)
     whole = found.complete or not asked.certify
-    return Answer([*said, *_which(q)], tables=pieces, whole=whole, files=files, lines=table_lines(found))
-
-
-def _which(q: Question) -> list[str]:
-    """Of which speed the roots are, where a modal file holds several."""
-    if q.speeds == 1:
-        return []
-    return [f"{q.state}, one of the {q.speeds} speeds of the modal file: --speed 0 to {q.speeds - 1} chooses"]
+    if q.speeds > 1:
+        which = f"{q.state}, one of the {q.speeds} speeds of the modal file"
+        said.append(f"{which}: --speed 0 to {q.speeds - 1} chooses")
+    return Answer(said, tables=pieces, whole=whole, files=files, lines=table_lines(found))

@@ -31,8 +31,7 @@ from .places import existing_files
 from .stage import Report, Stage, folder_of_case
 
 if TYPE_CHECKING:
-    from ..harmonic_balance.envelope import Envelope, OverOrders
-    from ..harmonic_balance.speed_line import SpeedResponse
+    from ..harmonic_balance.envelope import Envelope, OverOrders, SpeedResponse
 
 Bases = Mapping[str, ModalBasis]
 Tables = Mapping[str, Mapping[str, Array]]

@@ -14,7 +14,7 @@ from pydantic import BeforeValidator, Field, model_validator
 
 from ..analysis import Analysis, Answer, Files, Question
 from ..basis import read_basis
-from ..case import CaseSettings, headline
+from ..case import headline
 from ..case.assemble import Built, build
 from ..case.contacts import swept
 from ..case.problem import book_models
@@ -404,14 +404,6 @@ def _highest(found: Ensemble) -> Piece:
     return table(["sample", "amplification", "frequency in Hz", "blade", "localisation"], rows)
 
 
-def _of_a_ring(asked: Keys, case: CaseSettings) -> str:
-    return "" if case.ring else "is that of a ring; add [ring] with blades and engine_order"
-
-
-def _named(asked: Keys) -> list[str | None]:
-    return [file for s in asked.scatter for file in (s.file, *s.others.values())]
-
-
 ANALYSIS = Analysis(
     name="mistuning",
     asks=Keys,
@@ -419,13 +411,8 @@ ANALYSIS = Analysis(
     lost="some samples have no solution; samples.csv has no amplitude for them",
     needed="scatter = [{ of, deviation }]",
     verb="mistune",
-    options={
-        "samples": "at most, in the place of the case's number.",
-        "until": "ends when half of the 95 % quantile's interval is that share of it, as 2%.",
-        "rare": "further samples, chosen by a linear ring, for the 99.9 % quantile.",
-        "workers": "processes; as many as there are cores if not given. Samples are the same for any number.",
-    },
+    options=("samples", "until", "rare", "workers"),
     alone=True,
-    fits=_of_a_ring,
-    files=_named,
+    fits=lambda _, case: "" if case.ring else "is that of a ring; add [ring] with blades and engine_order",
+    files=lambda asked: [file for s in asked.scatter for file in (s.file, *s.others.values())],
 )

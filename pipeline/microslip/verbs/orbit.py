@@ -127,8 +127,9 @@ def solve(q: Question) -> Answer:
     found: Named = [(one.name, one) for one in ran]
     files: Files = {"orbit.csv": partial(write_columns, _columns(found), 8)}
     files["orbit.h5"] = lambda _: None  # is there
+    notes = [words for one in found for words in (_sentence(*one), *_chatter(*one))]
     return Answer(
-        [*_notes(found), *_messages(found, built), *_doubted(found, built, q.asked)],
+        [*notes, *_messages(found, built), *_doubted(found, built, q.asked)],
         tables=_shown(found),
         largest=None,
         whole=not any(np.isfinite(one.diverged) for _, one in found),
@@ -143,13 +144,13 @@ def _moving(found: Named, built: Built, folder: Path) -> list[Path]:
     return moving_bodies(found, built, folder)
 
 
-def _asked(asked: Keys, built: Built) -> list[recorded.Asked]:
+def _asked(asked: Keys, built: Built) -> list[recorded.Integration]:
     """The motions that a case asks for.
 
     Raises:
         UserError: nothing presses a contact that waits for it.
     """
-    motions = list[recorded.Asked]()
+    motions = list[recorded.Integration]()
     if asked.normal_force is None and (waiting := [c.interface for c in built.contacts if swept(c)]):
         raise UserError("nothing presses it; give orbit.normal_force, N", f"contacts.{waiting[0]}")
     assembly = built.pressed(asked.normal_force)
@@ -158,16 +159,16 @@ def _asked(asked: Keys, built: Built) -> list[recorded.Asked]:
     for f in asked.hertz:
         name = f"{2 * np.pi * f:.6g} rad/s" if asked.Omega else f"{f:.6g} Hz"
         driven = equations.of(assembly, 2 * np.pi * f)
-        start: orbit.Start | starts.Periodic
+        start: orbit.Start | starts.PeriodicStart
         if asked.start == "balance":
             start = starts.of_balance(driven, problem_of(built, asked.normal_force))
         else:
             start = _rest(driven, asked)
-        motions.append(recorded.Asked(name, driven, asked.settle, asked.keep, asked.samples, asked.steps, start))
+        motions.append(recorded.Integration(name, driven, asked.settle, asked.keep, asked.samples, asked.steps, start))
     return motions
 
 
-def _rest(e: equations.Equations, asked: Keys) -> orbit.Start:
+def _rest(e: equations.MotionEquations, asked: Keys) -> orbit.Start:
     """Where bodies stand, or are let go."""
     if asked.release is not None:
         with at("orbit"):
@@ -176,17 +177,12 @@ def _rest(e: equations.Equations, asked: Keys) -> orbit.Start:
     return asked.start
 
 
-def _run_up(assembly: Assembly, asked: Keys, how: RunUp) -> recorded.Asked:
+def _run_up(assembly: Assembly, asked: Keys, how: RunUp) -> recorded.Integration:
     ramp = Ramp(2 * np.pi * how.start, 2 * np.pi * how.stop, how.time, how.engine_order, how.euler)
     name = f"{how.start:.6g} to {how.stop:.6g} Hz in {how.time:.6g} s"
     driven = equations.of_ramp(assembly, ramp)
     start = _rest(driven, asked)
-    return recorded.Asked(name, driven, 0, ramp.periods, asked.samples, asked.steps, start)
-
-
-def _notes(found: Named) -> list[str]:
-    """What motions they are, in sentences."""
-    return [words for name, one in found for words in (_sentence(name, one), *_chatter(name, one))]
+    return recorded.Integration(name, driven, 0, ramp.periods, asked.samples, asked.steps, start)
 
 
 def _messages(found: Named, built: Built) -> list[str]:

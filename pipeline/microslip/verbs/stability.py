@@ -27,11 +27,10 @@ from ..pictures.roots import cycles_picture, map_picture, plane_picture, relief_
 from ..report.page import fold, say, table
 from ..report.roots import root_table, table_lines
 from ..results.journal import once
-from ..roots.asked import window_of
+from ..roots.asked import window_of, write_roots
 from ..roots.cycles import Born, Cycle, Over, born, sentence_of_relief, sentences_of
 from ..roots.full import Compared, compared, full_matrices, growing
 from ..roots.map import Axis, Map, over_map
-from ..roots.recorded import write_roots
 from ..roots.spectrum import Spectrum, spectrum
 from ..roots.waves import waves
 from ..settings.numbers import Model, NotNegative, Number, _finite_vector, _tuple
