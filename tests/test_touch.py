@@ -15,7 +15,7 @@ from matplotlib.colors import LogNorm
 
 import microslip as ms
 from microslip.files.png import CURVES, text_in, with_text
-from microslip.pictures.plots import save_figure, single_panel
+from microslip.pictures.plots import empty_figure, panels, save_figure
 from microslip.pictures.touch import curves_of, tell_points
 from microslip.reduced.coordinates import basis_in_modes
 from microslip.report.page import answer_page, page
@@ -24,7 +24,8 @@ from microslip.report.turning import outside, turning_modes
 
 def figure() -> tuple:
     """Two curves of 20 and 100 N, and the points of the first, which tell their damping."""
-    drawn, axes = single_panel(6.0, 4.0)
+    drawn = empty_figure()
+    (axes,) = panels(drawn, (6.0, 4.0))
     f = np.linspace(100.0, 200.0, 11)
     heights = [1.0 / np.hypot(150.0 - f, 5.0 * k) for k in (1, 2)]
     axes.plot(f, heights[0], "--", color="#123456", label="$F_N$ = 20 N")
@@ -54,7 +55,8 @@ def test_curves_are_those_of_the_picture(tmp_path: Path) -> None:
 
 
 def test_a_map_keeps_its_cells_and_what_is_no_curve_stays_a_picture() -> None:
-    drawn, axes = single_panel(6.0, 4.0)
+    drawn = empty_figure()
+    (axes,) = panels(drawn, (6.0, 4.0))
     z = np.array([[1.0, 10.0, np.nan], [2.0, 20.0, 200.0]])
     shades = axes.pcolormesh([0.0, 1.0, 2.0, 3.0], [0.0, 5.0, 10.0], z, norm=LogNorm(1, 200))
     drawn.colorbar(shades, label="amplitude in µm")
