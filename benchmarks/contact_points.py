@@ -31,10 +31,11 @@ import numpy as np
 
 from microslip.contact import EXAMPLES
 from microslip.contact.friction import Coulomb
-from microslip.contact.harmonics import force_harmonics, fourier
+from microslip.contact.harmonics import force_harmonics
 from microslip.contact.law import Law
 from microslip.contact.normal import Penalty
 from microslip.contact.point import PointContact, mean_inverse, mean_slopes
+from microslip.series import fourier
 
 ROOT = Path(__file__).resolve().parents[1]
 PYHARM = ROOT / "build" / "peers" / "pyharm" / "bin" / "python"

@@ -40,15 +40,14 @@ import numpy as np
 import scipy.linalg
 
 import microslip as ms
-from microslip.harmonic_balance.blocks import Dense
+from microslip.harmonic_balance.blocks import DenseMatrix
 from microslip.harmonic_balance.problem import AtFrequency, Problem
-from microslip.harmonic_balance.solver import CONVERGED, Point
 from microslip.mistuning import rare
 from microslip.mistuning.ensemble import FIRST
 from microslip.mistuning.linear import Beside, beside
 from microslip.mistuning.peaks import Highest, highest, told_by
 from microslip.mistuning.ring import Tuned
-from microslip.mistuning.samples import Asked, Sliding, amplitudes, sample
+from microslip.mistuning.samples import Asked, SlidingRing, amplitudes, sample
 from microslip.mistuning.scatter import Scatter
 from microslip.system.assembly import Assembly
 
@@ -101,7 +100,7 @@ class Plain(AtFrequency):
     """The balance with one dense matrix in every step."""
 
     def jacobian(self, slopes):
-        return Dense(self._of_sides(slopes).dense())
+        return DenseMatrix(self._of_sides(slopes).dense())
 
 
 class PlainProblem(Problem):
@@ -156,7 +155,7 @@ def peaked(what: Asked, number: int, of: Asked, kind=Problem) -> Highest:
     """A sample with its peak, as `mistuning.samples` searches for it, by any kind of balance, from the tuned ring's
     solutions that another one has found."""
     problem = kind(**own(what.problem(what.tuned.mistuned(what.deviations(number)))))
-    ring = Sliding(problem, of.tuned_points)
+    ring = SlidingRing(problem, of.tuned_points)
     return highest(ring, FREQUENCY, follow=ring.follow, at_once=ring.at_once, tells=ring.tells)
 
 
@@ -173,7 +172,7 @@ def textbook(what: Asked, number: int) -> tuple[int, float]:
             R = at.residual_of(x, force)
             if np.abs(R).max() <= 1e-8 * np.abs(x).max():
                 solved += 1
-                top = max(top, float(np.abs(amplitudes(problem, Point(at.Omega, x, CONVERGED, 0.0, 0))).max()))
+                top = max(top, float(np.abs(amplitudes(at, x)).max()))
                 break
             step, share = at.jacobian(slopes).solve(-R), 1.0
             while share > 0.02 and not np.linalg.norm(at.residual(x + share * step)) < np.linalg.norm(R):
@@ -227,7 +226,7 @@ def pyharm(what: Asked, number: int) -> ByPyHarm:
     at = int(y.max(axis=1).argmax())
     coarse = int(found["coarse"])
     told = told_by(dict(zip(f[coarse:], y[coarse:], strict=True)))
-    mine = Sliding(what.problem(ring), what.tuned_points)(f[at])
+    mine = SlidingRing(what.problem(ring), what.tuned_points)(f[at])
     return ByPyHarm(tuple(found["cpu"]), len(f), int(found["steps"].sum()), float(y[:coarse].max()),
                     max(float(y.max()), told[0] if told else 0.0), float(mine.max() / y.max() - 1))  # fmt: skip
 

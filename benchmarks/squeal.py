@@ -19,17 +19,17 @@ from pathlib import Path
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 import numpy as np
+from microslip.modal.unreduced import unreduced
 from stability import companion, condensed, cpu
 
 from microslip.basis import read_basis
 from microslip.case import load_case
 from microslip.cli import main as typed
 from microslip.linalg.quadratic import Quadratic, every_value
-from microslip.modal.unreduced import unreduced
 from microslip.roots.asked import window_of
 from microslip.roots.full import full_matrices
+from microslip.stages.analysing import Varied
 from microslip.stages.places import modal_files
-from microslip.stages.varied import Varied
 from microslip.verbs.stability import state_of
 
 ROOT = Path(__file__).resolve().parents[1]

@@ -9,7 +9,7 @@ would take minutes. SciPy integrates its one equation in scalar Python: LSODA by
 solve_ivp, whose loop is Python, and Radau, which solve_ivp alone has. ring: 24 vanes of three modes that rub on
 their neighbours in three dimensions and lift off, with dampers in the contacts and without residual compliance, over
 100 periods, Radau over 10; SciPy integrates the compiled equations with their exact Jacobian
-(`time_domain.reference.Rates`), LSODA by `solve_ivp` and by `odeint`, whose loop is compiled. batch: 1,000
+(`tests/cvode.py`), LSODA by `solve_ivp` and by `odeint`, whose loop is compiled. batch: 1,000
 starts of the impact oscillator over 120 periods by `integrate_many`, against a loop over `integrate`, of which some are
 done; both with the same steps.
 
@@ -45,7 +45,10 @@ from microslip.contact.heights import Polynomial
 from microslip.contact.law import value
 from microslip.contact.normal import Rough
 from microslip.contact.point import PointContact
-from microslip.time_domain import equations, orbit, reference
+from microslip.time_domain import equations, orbit
+
+ROOT = Path(__file__).resolve().parents[1]
+sys.path.insert(0, str(ROOT / "tests"))
 
 GOALS = (1e-3, 1e-5)
 SAMPLES = 64
@@ -152,7 +155,9 @@ def ring(blades: int, periods: int, rounds: int) -> None:
     built = ms.assemble(case, vane=ms.sample()).assembly
     system = replace(built, components=tuple(replace(c, residual_share=None) for c in built.components))
     e = equations.of(system, 2 * np.pi * 600.0)
-    rates = reference.Rates(e)
+    import cvode
+
+    rates = cvode.Rates(e)
     begin = rates.start(*orbit.begun(e, "rest"))
     each = SAMPLES // 4
     times = np.append(0.0, (periods - 1 + np.arange(1, each + 1) / each) / 600.0)
@@ -161,7 +166,7 @@ def ring(blades: int, periods: int, rounds: int) -> None:
         return e.output @ states[: len(e.omega2)] + e.output_given @ e.oscillators(times[1:]).T
 
     def told(tolerance: float) -> dict[str, Any]:
-        return {"rtol": tolerance, "atol": reference.SMALL * tolerance * rates.size}
+        return {"rtol": tolerance, "atol": cvode.SMALL * tolerance * rates.size}
 
     def own(steps: float) -> np.ndarray:
         how = {"settle": periods - 1, "keep": 1, "samples": each, "steps": int(steps)}
@@ -188,7 +193,7 @@ def ring(blades: int, periods: int, rounds: int) -> None:
 
 
 def rub(revolutions: int, rounds: int) -> None:
-    where, body = Path(__file__).resolve().parents[1], Path("build/pit-blade-rubbing/basis.h5")
+    where, body = ROOT, Path("build/pit-blade-rubbing/basis.h5")
     subprocess.run(
         [sys.executable, "-m", "microslip", "modes", "geometry/pit-blade/rubbing.toml", "-q"], cwd=where, check=True
     )

@@ -9,7 +9,7 @@ from pathlib import Path
 from matplotlib.axes import Axes
 
 import microslip as ms
-from microslip.bifurcation.drawn import draw
+from microslip.bifurcation.branches import draw
 from microslip.case import load_case
 from microslip.stages.analysing import analysed
 from microslip.stages.answer import CaseJob

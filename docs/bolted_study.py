@@ -119,7 +119,7 @@ def picture(basis: ModalBasis, left: Any, right: Any) -> None:
     sweep = settings.sweep
     f = np.linspace(sweep.start, sweep.stop, 201)
     problem = problem_of(built, 1e4, samples=16, periodicity=1e-4, cycles=10)
-    answer = response.harmonic_response(problem, f, np.zeros(12))
+    answer = response.harmonic_response(problem, f)
     right.semilogy(f, 1e6 * answer.columns()["amplitude_m"], lw=1.5, label="10 kN a bolt")
     right.set(xlabel="excitation frequency in Hz", ylabel="amplitude at the end in µm, 20 N")
     right.legend()

@@ -9,7 +9,7 @@ import numpy as np
 
 from microslip.contact.hertz import Hertz
 from microslip.contact.solids import Solid
-from microslip.rolling.half_space import Contact, linear_coefficients, pressed, steady_rolling
+from microslip.rolling.half_space import HalfSpaceContact, linear_coefficients, pressed, steady_rolling
 from microslip.rolling.half_space_influence import Grid, Pair
 from microslip.rolling.temperature import Conductor, conducted, heat_source, marched
 from microslip.rolling.wear import smoothed, strip_depth, worn
@@ -24,7 +24,7 @@ def patch(n: int) -> tuple[Grid, Any]:
     return grid, 0.8464 * grid.x**2 + 2.406 * grid.y**2
 
 
-def with_spin(n: int) -> Contact:
+def with_spin(n: int) -> HalfSpaceContact:
     grid, h = patch(n)
     return steady_rolling(h, grid, STEEL, MU, force=LOAD, creepages=(0, -6.25e-4, 0.625))
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,7 @@ import numpy as np
 from microslip.contact.friction import Coulomb, Exponential, Falling, Friction, StaticSliding, characteristic, scattered
 from microslip.contact.study import Study, study
 from microslip.pictures.contact import loops_figure, microslip_panel, motion_figure
+from microslip.pictures.plots import figure_of
 
 ROOT = Path(__file__).parents[1]
 CASES = ROOT / "pipeline" / "cases" / "contact"
@@ -67,15 +69,16 @@ def at(law: Friction, speed: np.ndarray) -> np.ndarray:
 
 
 def element() -> Any:
-    return motion_figure(of_figure("3.7-7"))
+    return figure_of(partial(motion_figure, of_figure("3.7-7")))
 
 
 def stick_slip() -> Any:
-    return motion_figure(of_figure("3.7-3"))
+    return figure_of(partial(motion_figure, of_figure("3.7-3")))
 
 
 def loops() -> Any:
-    return loops_figure(study(OWN / "contact.toml", ["motion.amplitudes=[1.0, 2.0, 4.0, 8.0]", 'name="shroud"']))
+    found = study(OWN / "contact.toml", ["motion.amplitudes=[1.0, 2.0, 4.0, 8.0]", 'name="shroud"'])
+    return figure_of(partial(loops_figure, found))
 
 
 def microslip(fig: Any) -> Any:

@@ -31,19 +31,19 @@ from microslip.data import Array, ModalBasis, ModalGroup, SpeedRange
 from microslip.modal.campbell import track_basis
 from microslip.modal.compute import modal_basis
 from microslip.modal.speed_range import frequencies_over
-from microslip.pictures import lettering, operating, plots, views
+from microslip.pictures import diagrams, lettering, operating, plots, views
 from microslip.pictures.points import points_sheet
 from microslip.pictures.response import response_picture
 from microslip.pictures.scene import quiet_vtk
 from microslip.reduced import truncation
 from microslip.reduced.compliance import contact_share, without_bulk
 from microslip.reduction import METHODS
-from microslip.stages import following
 from microslip.stages.closure import closure_stage
 from microslip.stages.job import open_job
 from microslip.stages.meshing import load_mesh, mesh_stage
 from microslip.stages.modal import modes_stage
 from microslip.stages.running import compare_book
+from microslip.verbs import optimum as lowest
 
 ROOT = HERE.parent
 BUILD = ROOT / "build" / "docs"
@@ -92,6 +92,11 @@ def drawn(fig: Any) -> Any:
     canvas = FigureCanvasAgg(fig)
     canvas.draw()
     return lettering.picture(np.asarray(canvas.buffer_rgba()))
+
+
+def picture(draw: Any, *what: Any, **how: Any) -> Any:
+    """What a function of `microslip.pictures` draws of something, as a Pillow image."""
+    return drawn(plots.figure_of(partial(draw, *what, **how)))
 
 
 def plain(axes: Any) -> None:
@@ -389,7 +394,7 @@ def spin_pit() -> None:
     right.set_xticks([], minor=True)
     right.legend(fontsize=8)
     for axes in (left, right):
-        operating.numbers_within(axes.yaxis)
+        plots.numbers_within(axes.yaxis)
     save(drawn(fig), "spin_pit")
     rows = []
     for (shape, mass), (normal, x) in all_of.items():
@@ -401,7 +406,7 @@ def spin_pit() -> None:
     best = []
     for shape, (m, strain, valid) in over_mass.items():
         i = strain.argmin()
-        best.append([shape, f"{1e3 * m[i]:.1f}", f"{1e6 * strain[i]:.0f}", "" if valid[i] else following.NOT_VALID])
+        best.append([shape, f"{1e3 * m[i]:.1f}", f"{1e6 * strain[i]:.0f}", "" if valid[i] else lowest.NOT_VALID])
     fill("dampers.md", "mass", table(["damper", "best mass, g", "largest strain there, µm/m", "validity"], best))
 
 
@@ -411,9 +416,9 @@ def strain_over_mass(shape: str) -> tuple[Array, Array, Array]:
     with contextlib.chdir(BUILD):  # where `companion` has left the bodies
         typed([*asked.split(), "--points", "9"])
     text = (BUILD / f"build/spin-pit-{shape}/optimum.csv").read_text(encoding="utf-8")
-    rows = [row for row in csv.DictReader(text.splitlines()) if row["what"].startswith(following.RESONANCE)]
+    rows = [row for row in csv.DictReader(text.splitlines()) if row["what"].startswith(lowest.RESONANCE)]
     mass, strain = (np.array([float(row[k]) for row in rows]) for k in ("bodies.damper.mass_kg", "amplitude_strain"))
-    return mass, strain, np.array([following.NOT_VALID not in row["what"] for row in rows])
+    return mass, strain, np.array([lowest.NOT_VALID not in row["what"] for row in rows])
 
 
 # static contact ----------------------------------------------------------------------------------------------------
@@ -445,8 +450,8 @@ def closure() -> None:
     axes.legend(title="interference (negative: gap)", fontsize=9)
     save(drawn(fig), "closure_force")
     assert shown is not None
-    plots.closure_plot(replace(shown, name="shroud, interference 0.2 mm"), BUILD / "closure.png")
-    save(from_file(BUILD / "closure.png"), "closure_pressure")
+    shown = replace(shown, name="shroud, interference 0.2 mm")
+    save(picture(plots.closure_plot, shown), "closure_pressure")
 
 
 def closed() -> None:
@@ -591,8 +596,7 @@ def contact() -> None:
     head = ["F_N, N", "resonance, Hz", "amplitude, um", "points times cycle that are open at most, %"]
     fill("blade.md", "peaks", table(head, rows))
     PICTURES.mkdir(exist_ok=True)
-    response_picture(result, BUILD / "response.png")
-    save(from_file(BUILD / "response.png"), "blade_response")
+    save(picture(response_picture, result), "blade_response")
     with_studio(basis, lambda s: save(mode_sheet(s, (0, 1, 2, 4, 6), 0.6), "blade_modes"))
 
 
@@ -736,8 +740,7 @@ def speed() -> None:
     basis = made("shroud-campbell", "shroud", *COARSE_SHROUD, *LIGHT, "rotation.speeds_rpm=[0, 1500, 3000, 4500]")
     tracks = track_basis(basis)
     assert tracks is not None
-    plots.campbell_plot(replace(basis, name="shroud"), tracks, [2, 4, 6, 8], BUILD / "campbell.png")
-    save(from_file(BUILD / "campbell.png"), "campbell")
+    save(picture(diagrams.campbell_plot, replace(basis, name="shroud"), tracks, [2, 4, 6, 8]), "campbell")
 
 
 def speed_table(runs: dict[str, ModalBasis], speeds: dict[str, Sequence[int]]) -> None:
@@ -786,8 +789,7 @@ def rotation() -> None:
     basis = modal_basis(mesh, body(supports=[{"face": "z0"}], rotation=turning, modes={"count": 6}))
     tracks = track_basis(basis)
     assert tracks is not None
-    plots.campbell_plot(replace(basis, name="drum"), tracks, [1, 2], BUILD / "drum.png")
-    save(from_file(BUILD / "drum.png"), "drum")
+    save(picture(diagrams.campbell_plot, replace(basis, name="drum"), tracks, [1, 2]), "drum")
     times = np.linspace(0, 20, 801)
     runs = {"floating frame": beam.tip(times)[:, 1], "without stiffening": beam.tip(times, stiffened=False)[:, 1]}
     fig = figure(8.6, 3.9)
@@ -866,8 +868,7 @@ def compliance() -> None:
             shares = [truncation.percent(float(c.shares[k - 1])) for k in (5, 10, 20, 40, 60)]
             rows.append([c.label, f"{c.static:.3g} {c.unit}", *shares])
     fill("modes.md", "compliance", table(["force", "static compliance", "5 modes", "10", "20", "40", "60"], rows))
-    plots.compliance_plot(replace(basis, name="blade"), basis.groups[0, 0], BUILD / "compliance.png")
-    save(from_file(BUILD / "compliance.png"), "compliance")
+    save(picture(plots.compliance_plot, replace(basis, name="blade"), basis.groups[0, 0]), "compliance")
 
 
 BOOK = 840e6  # N/m, the normal contact stiffness that section 5.3 prints
@@ -1102,7 +1103,7 @@ def own() -> None:
     with_studio(upper, lambda s: save(mode_sheet(s, (5, 6), 0.35), "joint", smooth=True))
     save(from_file(folder / "build" / "bolted" / "pictures" / "response.png"), "joint_response")
     mast = read_basis(folder / "build" / "mast" / "basis.h5")
-    save(from_file(points_sheet(mast, mast.groups[0, 0], folder / "mast.png", 4)), "mast_modes")
+    save(picture(points_sheet, mast, mast.groups[0, 0], most=4), "mast_modes")
 
 
 def reference() -> None:
@@ -1187,13 +1188,12 @@ def identification() -> None:
 
 def rolling() -> None:
     """A wheel on a rail: creep curve and tractions; profiles that wear."""
-    from microslip.stages.answer import RollJob
-    from microslip.stages.rolling import rolling_stage
+    from microslip.stages.rolling import roll_stage
 
     wear = ["name=wheel-rail-worn", "wear={coefficient=2e-13, updates=20, passages=1e6}", "model.exact=0"]
     case = ROOT / "pipeline" / "cases" / "wheel-rail.toml"
-    worn = [file for file in rolling_stage(RollJob(case, BUILD, wear)).files if file.stem == "wearing"]
-    for file in [*rolling_stage(RollJob(case, BUILD)).files, *worn]:
+    worn = [file for file in roll_stage(case, BUILD, wear).files if file.stem == "wearing"]
+    for file in [*roll_stage(case, BUILD).files, *worn]:
         if file.suffix == ".png":
             save(from_file(file), f"rolling_{file.stem}", colours=LINES)
 
@@ -1202,10 +1202,9 @@ def unround_wheels() -> None:
     """A wheel with three lobes: wear over its circumference, and growth by order over distance and speed."""
     from PIL import Image
 
-    from microslip.stages.answer import RollJob
-    from microslip.stages.vehicle import vehicle_stage
+    from microslip.stages.rolling import roll_stage
 
-    made = vehicle_stage(RollJob(ROOT / "pipeline" / "cases" / "unround-wheel.toml", BUILD)).files
+    made = roll_stage(ROOT / "pipeline" / "cases" / "unround-wheel.toml", BUILD).files
     parts = [from_file(file) for file in made if file.suffix == ".png"]
     whole = Image.new("RGB", (max(p.width for p in parts), sum(p.height for p in parts)), "white")
     for k, part in enumerate(parts):
@@ -1215,10 +1214,9 @@ def unround_wheels() -> None:
 
 def tyre() -> None:
     """A rubber wheel whose slip jumps."""
-    from microslip.stages.answer import RollJob
-    from microslip.stages.tyre import tyre_stage
+    from microslip.stages.rolling import roll_stage
 
-    for file in tyre_stage(RollJob(ROOT / "pipeline" / "cases" / "slip-jump.toml", BUILD)).files:
+    for file in roll_stage(ROOT / "pipeline" / "cases" / "slip-jump.toml", BUILD).files:
         if file.suffix == ".png":
             save(from_file(file), "tyre", colours=LINES)
 
@@ -1277,7 +1275,7 @@ SHROUD_ORDERS = (2, 4, 6, 8, 12, 24)
 
 def cyclic() -> None:
     """Conventions of cyclic symmetry drawn, and the shrouded blade's diagrams with free and with sticking shrouds."""
-    from microslip.pictures import diagrams, ring_views
+    from microslip.pictures import ring_views
     from microslip.ring import expansion as ring
     from microslip.ring import resonances
 
@@ -1286,13 +1284,9 @@ def cyclic() -> None:
     basis = replace(made("shroud-cyclic", "shroud", *COARSE_SHROUD, *LIGHT, *speeds), name="shroud")
     closed = replace(sticking(basis), name="shroud, contacts stuck")
     with_studio(basis, lambda studio: save(ring_picture(ring_views, studio), "cyclic_ring"))
-    for name, draw, body in (
-        ("cyclic_nodal_diameters", diagrams.nodal_diameter_plot, closed),
-        ("cyclic_safe", lambda b, path: diagrams.safe_plot(at_one_speed(b, 2), SHROUD_ORDERS, path), closed),
-        ("cyclic_campbell", lambda b, path: diagrams.cyclic_campbell_plot(b, SHROUD_ORDERS, path), basis),
-    ):
-        draw(body, BUILD / f"{name}.png")
-        save(from_file(BUILD / f"{name}.png"), name)
+    save(picture(diagrams.nodal_diameter_plot, closed), "cyclic_nodal_diameters")
+    save(picture(diagrams.safe_plot, at_one_speed(closed, 2), SHROUD_ORDERS), "cyclic_safe")
+    save(picture(diagrams.cyclic_campbell_plot, basis, SHROUD_ORDERS), "cyclic_campbell")
     found = [r for r in resonances.resonances(basis, SHROUD_ORDERS) if r.family <= 3]
     fill("cyclic.md", "resonances", table(list(resonances.HEAD), [list(row) for row in resonances.rows(found)]))
     orders = (1, 6, 11, 12, 13, 18, 23, 24, 25, 30, 36)
@@ -1498,7 +1492,6 @@ def results() -> None:
     """Stresses of the test blade on a rotor, and its contacts in partial slip."""
     import result_study as study
 
-    from microslip.pictures import operating
 
     made("blade-at-speed", "blade", *study.AT_SPEED)
     with contextlib.chdir(BUILD):  # where `made` has left the body
@@ -1508,7 +1501,7 @@ def results() -> None:
         save(from_file(pictures / f"{file}.png"), name)
     basis = made("blade-rough", "blade", "mesh.size=12", *LIGHT)
     maps = study.maps(basis, 60.0, 112.0)
-    save(from_file(operating.contact_map_plot(maps, "blade: 60 N, 112 Hz", BUILD / "maps.png")), "result_contacts")
+    save(picture(operating.contact_map_plot, maps, "blade: 60 N, 112 Hz"), "result_contacts")
 
 
 def ring() -> None:

@@ -40,7 +40,7 @@ from microslip.data import (
 )
 from microslip.files.declared import declared
 from microslip.rolling.settings import RollingCase
-from microslip.rolling.slip import TyreCase
+from microslip.rolling.tyre import TyreCase
 from microslip.settings.body import BodySettings
 from microslip.settings.numbers import keys_of
 from microslip.system.settings import SystemSettings

@@ -66,7 +66,7 @@ class Highest:
 
 def frf(problem: Problem, frequency: Array) -> response.HarmonicResponse:
     """Response over frequency (Hz)."""
-    return response.of_points(problem, sweep(problem, frequency), np.zeros(len(problem.assembly.contacts)))
+    return response.of_points(problem, sweep(problem, frequency))
 
 
 def amplitudes(problem: Problem, frequency: Array) -> Array:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,7 @@ from microslip.case import load_case
 from microslip.case.assemble import build
 from microslip.data import ModalBasis
 from microslip.pictures.orbit import portraits
+from microslip.pictures.plots import save
 from microslip.time_domain import equations, orbit
 from microslip.time_domain.orbit import Orbit
 from microslip.units import counted
@@ -32,7 +34,7 @@ def motions(basis: ModalBasis) -> dict[str, dict[float, Orbit]]:
     return found
 
 
-def assembled(case: Path, changes: list[str], basis: ModalBasis) -> tuple[list[equations.Equations], Keys]:
+def assembled(case: Path, changes: list[str], basis: ModalBasis) -> tuple[list[equations.MotionEquations], Keys]:
     """The equations of a case of one body with changes, at each of its frequencies, and what it asks."""
     settings, _ = load_case(case, changes)
     built, asked = build(settings, {basis.name: basis}), settings.asked["orbit"]
@@ -54,7 +56,7 @@ def rows(found: Mapping[str, Mapping[float, Orbit]]) -> tuple[list[str], list[li
 def drawn(found: Mapping[str, Mapping[float, Orbit]], path: Path) -> Path:
     """Phase portraits as the case has them."""
     named = [(f"{w:g} rad/s", one) for w, one in found["5 %"].items()]
-    return portraits(named, path, "Impact oscillator of section 4.2")
+    return save(partial(portraits, named, title="Impact oscillator of section 4.2"), path)
 
 
 SLIDING = ROOT / "pipeline" / "cases" / "pendulum-friction.toml"
@@ -100,7 +102,8 @@ def slips(found: Mapping[str, Orbit]) -> tuple[list[str], list[list[str]]]:
 def drawn_sliding(found: Mapping[str, Orbit], path: Path) -> Path:
     """Phase portraits of the models of the book."""
     named = [(name.replace("`", ""), found[name]) for name in LIKE_THE_BOOK]
-    return portraits(named, path, "Friction oscillator of section 4.3: the arm at the disc")
+    draw = partial(portraits, named, title="Friction oscillator of section 4.3: the arm at the disc")
+    return save(draw, path)
 
 
 def against_balance() -> tuple[list[str], list[list[str]]]:

@@ -6,7 +6,7 @@ import numpy as np
 
 import microslip as ms
 from microslip.harmonic_balance.tones import Solved
-from microslip.harmonic_balance.torus import pairs_of, with_mean
+from microslip.series import pairs_of, summed
 
 RATIO = 0.5 * (np.sqrt(5.0) - 1.0)
 
@@ -29,7 +29,7 @@ def slider() -> tuple[list[str], list[list[str]]]:
         sizes = [f"{abs(found.of(*k)[0]):.6f}" for k in ((1, 0), (0, 1))]
         rows.append([f"{order} harmonics", str(samples), str(turns), *sizes, f"{found.balance[0]:.0e}"])
     orbit = ms.integrate(system, w[0], second=w[1], unit="rad/s", settle=40, keep=300, samples=64, steps=2048)
-    E = with_mean(orbit.time[:, None] * (pairs_of(21) @ np.array(w)))
+    E = summed(orbit.time[:, None] * (pairs_of(21) @ np.array(w)))
     c = np.linalg.lstsq(E, orbit.y[0], rcond=None)[0]
     rows.append(["motion in time", "", "", *(f"{np.hypot(*c[i : i + 2]):.6f}" for i in (1, 3)), ""])
     return ["", "samples of a turn", "turns", "first tone, m", "second tone, m", "power missing"], rows

@@ -42,7 +42,7 @@ def part_lines(name: str, mesh: Mesh, sets: tuple[str, ...], body: str = "Steel"
 
 def surfaces(mesh: Mesh, sets: tuple[str, ...], prefix: str = "S-", first: int = 0) -> list[str]:
     """A *SURFACE, TYPE=ELEMENT of every face, cell by cell."""
-    from microslip.mesh.deck_surfaces import sides_of
+    from microslip.mesh.deck_mesh import sides_of
 
     lines, number = [], first
     sides = {}

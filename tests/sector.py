@@ -132,7 +132,7 @@ def _group(
     omega, phi = np.sqrt(values[:count]), T @ vectors[:, :count]
     phi = phi * signs(phi[by_place(body.points)])
     shapes, m = phi.reshape(body.n_points, 3, count), count
-    B, labels = rows.stacked(chosen)
+    B, labels = rows.stacked
     modal = (B @ phi / values[:count]) @ (B @ phi).conj().T
     static = B @ T @ np.linalg.solve(H @ K @ T, H @ B.T.toarray())
     G = 2 * speed * phi.conj().T @ np.kron(np.eye(body.n_points), skew(np.array([0.0, 1.0, 0.0]))) @ (M @ phi)
@@ -141,7 +141,7 @@ def _group(
     return ModalGroup(
         speed=speed, omega=omega, kind=("normal",) * m, damping_ratio=np.full(m, 0.001), M_r=np.eye(m),
         K_r=np.diag(omega**2), C_r=np.diag(0.002 * omega), G_r=0.5 * (G - G.conj().T), phi=shapes,
-        interfaces=reduced_interfaces(rows, chosen, phi, shapes),
+        interfaces=reduced_interfaces(rows, phi, shapes),
         excitations={name: reduced_rows(v, phi, None) for name, v in rows.excitations.items()},
         monitors={name: reduced_rows(v, phi, np.zeros(3 * body.n_points)) for name, v in rows.monitors.items()},
         gauges={}, compliance=Compliance(labels, 0.5 * (static + static.conj().T), modal, False), stresses={},

@@ -19,7 +19,7 @@ from microslip.modal import rigid
 from microslip.modal.body_rows import body_rows
 from microslip.modal.boundary import fixed_dofs
 from microslip.modal.equilibrium import BodyModel, make_model
-from microslip.modal.group import inertia_of
+from microslip.modal.prepared import inertia_of
 from microslip.modal.spectrum import make_pencil, rigid_shift
 from microslip.settings.body import BodySettings
 

@@ -14,7 +14,7 @@ from test_harmonic_balance_time import group, held
 from test_report import said
 
 from microslip.case.messages import method
-from microslip.case.run import CaseResult, _Left
+from microslip.case.run import CaseResult, _Run
 from microslip.contact.friction import Coulomb
 from microslip.contact.normal import Penalty, Preload
 from microslip.contact.patch import Patch
@@ -156,15 +156,26 @@ def test_harmonics_are_added_to_a_slider():
     assert found.errors[1].readout < found.errors[0].readout / 8
 
 
+def judged(built, problem, found):
+    """What a case says of a response whose number of harmonics is given."""
+    asked = {"built": built, "tolerance": None, "errors": {}, "lost": {}, "truncation": None}
+    run = SimpleNamespace(**asked, messages=[])
+    _Run._judge(run, problem, found, [], 8.0, None)
+    return run.messages
+
+
 def test_too_few_harmonics_of_a_slider_are_told():
     """One where a Jenkins element slides is remarked on, and enough for whoever asks for no more."""
     built = SimpleNamespace(settings=SimpleNamespace(ring=None, mode="aft"))
-    problem = sliding(1)
+    rows = {"face": np.outer([0, 1, 0, 0, 0, 0], np.ones(1)), "push": np.ones(1), "tip": np.ones(1)}
+    body = group(np.array([100.0]), rows, 0.02)
+    slides = held(body, jenkins(2e4, 0.3, 2.0), [1], np.zeros(1), np.zeros(1), 1.0)
+    problem = balance.of(slides, 1, 64, length=3e-5)  # programs of the random systems
     start = readout(problem, 17.0)[0]
     known = error(problem, start.x, start.Omega)
     assert enough(problem, start, tolerance=1.01 * known.readout, first=known).reached
     assert not enough(problem, start, tolerance=0.99 * known.readout, most=4, first=known).reached
-    (message,) = _Left(built, None).out(problem, harmonic_response(problem, np.array([17.0]), np.ones(1)), [], 8.0)
+    (message,) = judged(built, problem, harmonic_response(problem, np.array([17.0])))
     assert "At F_N = 8 N the amplitude at 17 Hz" in message and "(too " in message and "at most" in message
 
 
@@ -194,14 +205,14 @@ def test_what_is_uncertain_is_drawn_lighter_and_told_first():
 
 def test_places_without_a_finer_solution_are_told_once_with_what_to_do():
     """Of all normal forces together; the first three places, and how many more."""
-    left = _Left(SimpleNamespace(settings=SimpleNamespace(balanced=3, sampled=64)), None)
-    assert left.unknown() == []
-    left.lost = {20.0: [10.0, 11.0, 12.0, 13.0, 14.0], 1e5: [7.25]}
-    (said,) = left.unknown()
+    run = SimpleNamespace(built=SimpleNamespace(settings=SimpleNamespace(balanced=3, sampled=64)), lost={})
+    assert _Run._unknown(run) == []
+    run.lost = {20.0: [10.0, 11.0, 12.0, 13.0, 14.0], 1e5: [7.25]}
+    (said,) = _Run._unknown(run)
     assert "at 10, 11, 12 Hz and 2 more under F_N = 20 N; at 7.25 Hz under F_N = 100000 N, so" in said
     assert "harmonics = 6, samples = 128" in said and "--stability" in said
-    left.lost = {float(n): [1.0] for n in range(5)}
-    assert "at 1 Hz under F_N = 2 N and 2 more normal forces, so" in left.unknown()[0]
+    run.lost = {float(n): [1.0] for n in range(5)}
+    assert "at 1 Hz under F_N = 2 N and 2 more normal forces, so" in _Run._unknown(run)[0]
 
 
 @pytest.mark.slow
@@ -210,8 +221,8 @@ def test_a_case_says_where_its_harmonics_are_too_few():
     built = SimpleNamespace(settings=SimpleNamespace(ring=None, mode="aft"))
     for harmonics, count in ((1, 1), (12, 0)):
         problem = opening(harmonics)
-        found = harmonic_response(problem, np.array([22.0, 30.0]), np.ones(1))
-        messages = _Left(built, None).out(problem, found, [], 8.0)
+        found = harmonic_response(problem, np.array([22.0, 30.0]))
+        messages = judged(built, problem, found)
         assert len(messages) == count
         assert all(re.match(r"At F_N = 8 N the amplitude at (22|30) Hz .* harmonics", r) for r in messages)
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import replace
 from itertools import permutations
 
-import jax.numpy as jnp
 import numpy as np
 import pytest
 
 from microslip.contact.friction import Coulomb
+from microslip.contact.law import value
 from microslip.contact.normal import Penalty
 from microslip.contact.patch import Patch, grid
 from microslip.contact.point import PointContact
@@ -37,9 +37,9 @@ def blade() -> ModalBasis:
 
 def sector(blades: int, order: int, normal: float = 20.0, push: float = 4.0) -> Assembly:
     """One blade that stands for a ring: its right face meets the left one of the next blade."""
-    places, areas = grid(0.02, 0.01, (4, 3))
+    places, areas = grid(0.02, 0.01, (3, 2))
     n = len(areas)
-    law = PointContact(Penalty(jnp.asarray(2e6 / n)), Coulomb(jnp.asarray(0.05)), jnp.asarray(1e6 / n))
+    law = PointContact(Penalty(value(2e6 / n)), Coulomb(value(0.05)), value(1e6 / n))
     facing = across(np.diag([1.0, 1, 1]), np.diag([-1.0, -1, 1]))
     patch = Patch("right", places, areas, law)
     sides = ContactFace("blade", "right"), ContactFace("blade", "left", facing, 1)
@@ -48,11 +48,12 @@ def sector(blades: int, order: int, normal: float = 20.0, push: float = 4.0) -> 
     return Assembly((component,), (contact,), (load,), (Output("blade", "tip", "u_x"),), Ring(blades, order))
 
 
-FINE = {"harmonics": 3, "samples": 40, "cycles": 30, "periodicity": 1e-13, "length": 1e-6}
+FINE = {"harmonics": 3, "samples": 36, "cycles": 30, "periodicity": 1e-13, "length": 1e-6}
+"""As many samples, cycles and points as in `test_assembly_cyclic`, and rings of five: one program serves all."""
 
 
-RINGS = [(b, e, form) for b, e in ((6, 1), (6, 5), (4, 2), (7, 2), (5, 0)) for form in ("relative", "sides")]
-QUICK = ((4, 2, "relative"),)
+RINGS = [(b, e, form) for b, e in ((6, 1), (6, 5), (4, 2), (5, 2), (7, 2), (5, 0)) for form in ("relative", "sides")]
+QUICK = ((5, 2, "relative"),)
 
 
 @pytest.mark.parametrize(
@@ -60,7 +61,7 @@ QUICK = ((4, 2, "relative"),)
 )
 def test_a_sector_stands_for_the_whole_ring(blades: int, order: int, form: str) -> None:
     """1e-9 of the amplitude in every harmonic of every blade, work N times, with slip and lift-off; the number of
-    samples (40) need not fit the number of blades, because every contact is marched from its own phase of the wave."""
+    samples (36) need not fit the number of blades, because every contact is marched from its own phase of the wave."""
     one, Omega = sector(blades, order), 2 * np.pi * 60.0
     lone, ring = balance.of(one, **FINE), balance.of(one.unrolled(), form=form, **FINE)
     a, b = solve(lone, Omega, []), solve(ring, Omega, [])
@@ -77,7 +78,7 @@ def test_a_sector_stands_for_the_whole_ring(blades: int, order: int, form: str) 
 @pytest.mark.parametrize("form", ["relative", "sides"])
 def test_jacobian_against_differences(form: str) -> None:
     """Central differences at a random state of a ring of five in both forms: 1e-6."""
-    ring = balance.of(sector(5, 2).unrolled(), form=form, **{**FINE, "harmonics": 1, "samples": 16})
+    ring = balance.of(sector(5, 2).unrolled(), form=form, **{**FINE, "harmonics": 1})
     rng, Omega, h = np.random.default_rng(3), 2 * np.pi * 60.0, 1e-6
     x, d = 0.5 * rng.normal(size=ring.size), rng.normal(size=ring.size)
     _, J, R_Omega = ring.evaluate(x, Omega)
@@ -92,7 +93,7 @@ def test_both_forms_are_the_same_equations() -> None:
     """A chain of three between two walls: relative motions or both sides as unknowns, 1e-9."""
     ring = sector(3, 1, normal=50.0, push=2.0).unrolled()
     between = ring.contacts[:2]
-    patch, rough = between[0].patch, Coulomb(jnp.asarray(0.3))  # as many points as between the blades: one program
+    patch, rough = between[0].patch, Coulomb(value(0.3))  # as many points as between the blades: one program
     rubs = replace(patch, law=replace(patch.law, friction=rough))
     ends = ContactFace("blade_0", "left"), ContactFace("blade_2", "right")
     walls = [preloaded_contact(f"wall_{i}", rubs, end, None, normal=30.0) for i, end in enumerate(ends)]
@@ -183,9 +184,9 @@ def test_read_outs_come_in_the_order_they_are_listed_in(form: str) -> None:
 
 def rubbing(phase: float, push: float, friction: float) -> Assembly:
     """A blade that rubs on the ground, all its loads turned by a phase."""
-    places, areas = grid(0.02, 0.01, (4, 3))
+    places, areas = grid(0.02, 0.01, (3, 2))
     n = len(areas)
-    law = PointContact(Penalty(jnp.asarray(2e6 / n)), Coulomb(jnp.asarray(friction)), jnp.asarray(1e6 / n))
+    law = PointContact(Penalty(value(2e6 / n)), Coulomb(value(friction)), value(1e6 / n))
     wall = preloaded_contact(
         "wall", Patch("right", places, areas, law), ContactFace("blade", "right"), None, normal=20.0
     )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -79,6 +80,7 @@ def test_resonances_and_their_stresses(response: Response) -> None:
 def test_what_is_not_valid_is_no_worst_resonance_and_is_drawn_as_such(response: Response, tmp_path: Path) -> None:
     """The most stressed resonance is one of another normal force, unless all would lift off."""
     from microslip.pictures.operating import over_normal_force_plot
+    from microslip.pictures.plots import save
 
     found = assess(response, small_basis(), "tip-probe")
     worst = found.highest
@@ -89,7 +91,8 @@ def test_what_is_not_valid_is_no_worst_resonance_and_is_drawn_as_such(response: 
     every = frozenset(r.normal_force for r in found.resonances)
     assert replace(found, not_valid=every).highest == worst
     lines = {"one": [(1.0, 5.0), (2.0, 1.0), (4.0, 3.0)]}
-    files = [over_normal_force_plot(lines, "y", "t", tmp_path / f"{i}.png", off) for i, off in enumerate(((), (2.0,)))]
+    draws = [partial(over_normal_force_plot, lines, "y", "t", lifted=off) for off in ((), (2.0,))]
+    files = [save(draw, tmp_path / f"{i}.png") for i, draw in enumerate(draws)]
     assert files[0].read_bytes() != files[1].read_bytes()
 
 
@@ -209,7 +212,7 @@ def test_a_picture_of_some_contacts_says_how_many(response: Response, tmp_path, 
     from microslip.pictures import operating
 
     titles: list[str] = []
-    monkeypatch.setattr(operating, "contact_map_plot", lambda maps, title, path: titles.append(title) or path)
+    monkeypatch.setattr(operating, "contact_map_plot", lambda maps, title, figure: titles.append(title))
     found = assess(response, small_basis(), "tip-probe")
     draw(found, small_basis(), "beam", tmp_path, False, {"contacts at resonance": [object()]}, contacts)
     assert titles[0].partition("\n")[2] == said

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from closed_forms.oscillators import belt, brusselator
 
-from microslip.bifurcation.diagram import Asked, diagram
+from microslip.bifurcation.diagram import DiagramPlan, diagram
 from microslip.bifurcation.shooting import Shooting
 from microslip.continuation import newton
 
@@ -83,7 +83,7 @@ def test_brusselator(tmp_path: Path) -> None:
     _, p, _, label = only(auto.run(RL0=1.4, RL1=4.0), "Hopf", 2.0)
     orbits = auto.run(IPS=2, ICP=[1, 11], IRS=label, RL0=1.4, RL1=2.51, UZR="{1: [2.5]}", DSMAX=1.0)
     *_, period = only(orbits, "target", 2.5)[2]
-    found = diagram(brusselator(), np.array([1.0, 1.5]), Asked(1.5, 2.5, nodes=16, doublings=0, step=0.2))
+    found = diagram(brusselator(), np.array([1.0, 1.5]), DiagramPlan(1.5, 2.5, nodes=16, doublings=0, step=0.2))
     assert found.hopf[0].p == pytest.approx(p, rel=1e-6)
     assert found.branches[1].parameter[-1] == 2.5 and found.branches[1].period[-1] == pytest.approx(period, rel=1e-6)
 
@@ -105,7 +105,7 @@ def test_two_masses_on_a_belt(tmp_path: Path) -> None:
     hopf = [only(still, "Hopf", near) for near in (1.2, 7.1)]
     settings = {"IPS": 2, "ICP": [1, 11], "NTST": 200, "RL0": 0.4, "RL1": 8.3, "DSMAX": 0.5, "NMX": 500}
     orbits = auto.run(**settings, IRS=hopf[0][3], DS=-0.01, UZR="{1: [3.0]}")
-    found = diagram(belt(0.5, 8.3), np.zeros(4), Asked(0.5, 8.3, doublings=0))
+    found = diagram(belt(0.5, 8.3), np.zeros(4), DiagramPlan(0.5, 8.3, doublings=0))
     assert [h.p for h in found.hopf] == pytest.approx([h[1] for h in hopf], rel=1e-6)
     branch = found["orbits 1"]
     assert branch.parameter[branch.of_kind("fold")[0]] == pytest.approx(only(orbits, "fold", 0.9)[1], rel=1e-6)

@@ -591,6 +591,7 @@ def refusal(path: Path) -> str:
     return refused(str(path), read_basis, path)
 
 
+@pytest.mark.usefixtures("untried")
 def test_missing_foreign_and_text_files(tmp_path: Path) -> None:
     (tmp_path / "text.h5").write_text("hello")
     (tmp_path / "empty.h5").write_bytes(b"")
@@ -602,6 +603,7 @@ def test_missing_foreign_and_text_files(tmp_path: Path) -> None:
     assert "is a folder" in refusal(tmp_path)
 
 
+@pytest.mark.usefixtures("untried")
 @pytest.mark.parametrize("share", [0.3, *(pytest.param(s, marks=pytest.mark.slow) for s in (0.0001, 0.01, 0.7, 0.99))])
 def test_truncated_files(copy: Path, share: float) -> None:
     data = copy.read_bytes()
@@ -609,6 +611,7 @@ def test_truncated_files(copy: Path, share: float) -> None:
     assert "damaged" in refusal(copy)
 
 
+@pytest.mark.usefixtures("untried")
 def test_a_cut_seal_leaves_a_readable_file(copy: Path) -> None:
     copy.write_bytes(copy.read_bytes()[:-10])
     assert seal_state(copy) == "absent"
@@ -717,6 +720,7 @@ def test_hostile_content_is_refused_before_it_is_read(copy: Path, tmp_path: Path
             inspect(f)
 
 
+@pytest.mark.usefixtures("untried")
 def test_open_file_leaves_nothing_open(copy: Path) -> None:
     with h5py.File(copy, "r+") as f:
         f.attrs["format_version"] = "7.1"

@@ -17,11 +17,11 @@ from refusals import refused
 from scipy.integrate import solve_ivp
 
 import microslip as ms
-from microslip.bifurcation import balance, branches, deflation, equilibria, floquet
-from microslip.bifurcation.diagram import Asked, Diagram, diagram
+from microslip.bifurcation import balance, branches, deflation, equilibria
+from microslip.bifurcation.diagram import Diagram, DiagramPlan, diagram
 from microslip.bifurcation.dynamics import Dynamics
 from microslip.bifurcation.recorded import Branches
-from microslip.bifurcation.shooting import Orbit, Shooting
+from microslip.bifurcation.shooting import PeriodicOrbit, Shooting
 
 
 def circling(z: Any, p: Any) -> Any:
@@ -42,7 +42,7 @@ def normal_form(sign: float = 1.0) -> Dynamics:
 
 @cache
 def circles() -> Diagram:
-    return diagram(normal_form(), np.zeros(2), Asked(-1.0, 1.0, nodes=8, doublings=0))
+    return diagram(normal_form(), np.zeros(2), DiagramPlan(-1.0, 1.0, nodes=8, doublings=0))
 
 
 def test_hopf_normal_form_is_found_with_its_circles() -> None:
@@ -63,7 +63,7 @@ def test_hopf_normal_form_is_found_with_its_circles() -> None:
 @pytest.mark.slow
 def test_subcritical_circles_repel() -> None:
     """Of the reversed flow: p -> -p, the circles are there before the Hopf point and their multiplier is above 1."""
-    found = diagram(normal_form(-1.0), np.zeros(2), Asked(-1.0, 1.0, nodes=8, doublings=0, points=12))
+    found = diagram(normal_form(-1.0), np.zeros(2), DiagramPlan(-1.0, 1.0, nodes=8, doublings=0, points=12))
     assert found.hopf[0].criticality == pytest.approx(2.0, abs=1e-9)
     branch = found.branches[1]
     assert not branch.stable.any() and branch.parameter[-1] != 0
@@ -88,8 +88,8 @@ def test_torus_point_and_its_multipliers() -> None:
     system, n = rotor(), 8
     turn = 2 * np.pi * np.arange(n) / n
     x = np.stack([np.cos(turn), np.sin(turn), 0 * turn, 0 * turn], axis=1)
-    problem = Shooting(system, Orbit(system, x, 2 * np.pi, -0.5), 2 * np.pi)
-    settings = Asked(-0.5, 0.5).settings
+    problem = Shooting(system, PeriodicOrbit(system, x, 2 * np.pi, -0.5), 2 * np.pi)
+    settings = DiagramPlan(-0.5, 0.5).settings
     state = start(problem, np.append(x, 2 * np.pi), -0.5, settings)
     found = [one for more, _ in orbits.follow(problem, state, settings) for one in more]
     (torus,) = [one for one in found if one.kind == "torus"]
@@ -104,17 +104,17 @@ def test_period_of_van_der_pol() -> None:
     """6.66328685932313 at mu = 1 (e.g. A. Amore, F. Fernandez, arXiv 1401.4110), and its multiplier by the trace
     exp(integral of mu (1 - x^2)) (Liouville)."""
     system = Dynamics(lambda z, p, _: jnp.stack([z[1], p * (1 - z[0] ** 2) * z[1] - z[0]]), ("x", "v"), np.full(2, 2.0))
-    found = diagram(system, np.zeros(2), Asked(-0.5, 1.0, nodes=16, doublings=0, step=0.2))
+    found = diagram(system, np.zeros(2), DiagramPlan(-0.5, 1.0, nodes=16, doublings=0, step=0.2))
     orbit = found.branches[-1].orbit(system, -1)
     assert orbit.p == pytest.approx(1.0, abs=1e-12) and orbit.period == pytest.approx(6.66328685932313, rel=1e-9)
     x = orbit.sampled(64)[:, 0]
-    (multiplier,) = floquet.multipliers(orbit)
+    (multiplier,) = orbit.multipliers
     assert np.log(multiplier.real) == pytest.approx(orbit.period * np.mean(1 - x**2), rel=1e-6)
 
 
 @cache
 def chemical() -> Diagram:
-    return diagram(brusselator(), np.array([1.0, 1.5]), Asked(1.5, 2.3, nodes=16, doublings=0, step=0.3))
+    return diagram(brusselator(), np.array([1.0, 1.5]), DiagramPlan(1.5, 2.3, nodes=16, doublings=0, step=0.3))
 
 
 def test_brusselator() -> None:
@@ -162,7 +162,7 @@ def test_derivatives_are_those_of_differences() -> None:
         np.testing.assert_allclose(J @ way + slope, (ends[0] - ends[1]) / (2 * h), rtol=1e-5, atol=1e-6)
 
 
-def by_scipy(system: Dynamics, orbit: Orbit) -> np.ndarray:
+def by_scipy(system: Dynamics, orbit: PeriodicOrbit) -> np.ndarray:
     """Multipliers of the monodromy matrix that SciPy integrates with the variational equation."""
     n = system.count
     J = jax.jit(jax.jacfwd(lambda x: system.rate(x, orbit.p, 0.0)))
@@ -183,12 +183,12 @@ def test_multipliers_are_those_of_the_variational_equation() -> None:
     system = chemical().system
     orbit = chemical().branches[1].orbit(system, -1)
     own = by_scipy(system, orbit)
-    (multiplier,) = floquet.multipliers(orbit)
+    (multiplier,) = orbit.multipliers
     assert np.abs(own - 1).min() < 1e-7 and np.abs(own - multiplier).min() < 1e-8
     for nodes in (4, 30):
         x = orbit.sampled(60)[:: 960 // nodes] if nodes == 30 else orbit.x[::4]
-        again = Orbit(system, x, orbit.period, orbit.p)
-        assert abs(floquet.multipliers(again)[0] - multiplier) < 1e-8
+        again = PeriodicOrbit(system, x, orbit.period, orbit.p)
+        assert abs(again.multipliers[0] - multiplier) < 1e-8
 
 
 def duffing() -> Dynamics:
@@ -202,7 +202,7 @@ def duffing() -> Dynamics:
 
 @pytest.mark.slow
 def test_folds_of_a_driven_oscillator_are_those_of_harmonic_balance() -> None:
-    branch = diagram(duffing(), np.zeros(2), Asked(0.9, 1.7, nodes=8, step=0.3, doublings=0))["driven"]
+    branch = diagram(duffing(), np.zeros(2), DiagramPlan(0.9, 1.7, nodes=8, step=0.3, doublings=0))["driven"]
     folds = branch.parameter[branch.of_kind("fold")]
     q = ms.structure(1.0, 1.0, 0.05, force={0: 0.4}, elements=[ms.polynomial({3: 0.05})])
     np.testing.assert_allclose(folds, ms.follow(q, 0.3, 2.5, harmonics=9, unit="rad/s").folds, rtol=1e-6)
@@ -225,7 +225,7 @@ def test_doubled_orbit_is_what_a_motion_comes_to() -> None:
     """Rossler's: beyond the doubling the orbit of one period is unstable, that of two stable, and SciPy's motion ends
     on it."""
     system = rossler()
-    asked = Asked(2.6, 3.15, nodes=16, doublings=1, attractors=(2.7,), starts=3)
+    asked = DiagramPlan(2.6, 3.15, nodes=16, doublings=1, attractors=(2.7,), starts=3)
     found = diagram(system, np.array([0.02, -0.09, 0.09]), asked)
     (one,) = found.at("period doubling")["attractor 1 at 2.7"]
     assert 2.82 < one < 2.84
@@ -274,14 +274,14 @@ def test_what_cannot_be_followed_is_refused() -> None:
     """No equilibrium, motions that grow without bounds, pairs of q'' + [[1, p], [-p, 2]] q = 0, which stand on the
     imaginary axis until they meet at p = 1/2, one value, a contact that sticks."""
     system = Dynamics(lambda z, p, _: jnp.stack([z[0] ** 2 + 1 + p**2]), ("x",), np.ones(1))
-    refused("no equilibrium", diagram, system, np.ones(1), Asked(0.0, 1.0))
+    refused("no equilibrium", diagram, system, np.ones(1), DiagramPlan(0.0, 1.0))
 
     def growing(z: Any, p: Any, angle: Any) -> Any:
         return jnp.stack([z[1], z[0] + 0.5 * z[0] ** 3 + jnp.cos(angle)])
 
     driven = Dynamics(growing, ("q", "v"), np.ones(2), 1.0, frequency=lambda p: p)
     far = np.array([50.0, 10.0])
-    refused(("no periodic motion", "begin at"), diagram, driven, far, Asked(0.5, 1.0, nodes=4))
+    refused(("no periodic motion", "begin at"), diagram, driven, far, DiagramPlan(0.5, 1.0, nodes=4))
 
     def meeting(z: Any, p: Any, _: Any) -> Any:
         return jnp.stack([z[2], z[3], -z[0] - p * z[1], p * z[0] - 2 * z[1]])
@@ -315,7 +315,9 @@ def test_motions_find_the_orbit_that_no_branch_leads_to() -> None:
         return jnp.stack([grows * z[0] - z[1], grows * z[1] + z[0]])
 
     system = Dynamics(rate, ("x", "y"), np.ones(2), 2.0)
-    found = diagram(system, np.zeros(2), Asked(0.0, 1.0, nodes=8, doublings=0, attractors=(0.5,), starts=24, seed=3))
+    found = diagram(
+        system, np.zeros(2), DiagramPlan(0.0, 1.0, nodes=8, doublings=0, attractors=(0.5,), starts=24, seed=3)
+    )
     (one,) = found.attractors
     np.testing.assert_allclose(np.linalg.norm(one.orbit.x, axis=1), 2.0, atol=1e-8)
     begun = 3.0 * np.random.default_rng(3).uniform(-1, 1, (24, 2))
@@ -361,8 +363,11 @@ def test_deflation_finds_the_three_motions_of_a_driven_oscillator() -> None:
 def test_deflated_equations_have_the_derivatives_of_differences() -> None:
     """Beside a known circle, shifted and run through twice as well, and beside an equilibrium."""
     orbit = circles().branches[1].orbit(circles().system, -1)
-    places = [deflation.Place(orbit.system, orbit=orbit), deflation.Place(orbit.system, still=np.zeros(2))]
-    turned = Orbit(orbit.system, np.roll(orbit.x, 3, axis=0), orbit.period, orbit.p)
+    places = [
+        deflation.KnownSolution(orbit.system, orbit=orbit),
+        deflation.KnownSolution(orbit.system, still=np.zeros(2)),
+    ]
+    turned = PeriodicOrbit(orbit.system, np.roll(orbit.x, 3, axis=0), orbit.period, orbit.p)
     assert places[0].distance(turned.x, turned.period)[0] < 1e-14
     assert places[0].distance(np.tile(orbit.x[::2], (2, 1)), 2 * orbit.period)[0] < 1e-14
     problem = Shooting(orbit.system, turned, orbit.period)
@@ -395,7 +400,7 @@ def test_deflation_of_a_diagram_follows_what_is_on_no_branch() -> None:
 
 def test_two_pairs_that_cross_at_one_value_are_two_hopf_points() -> None:
     """Two circles of the frequencies 1 and sqrt 3 that are born at p = 0."""
-    found = diagram(together(), np.zeros(4), Asked(-1.0, 1.0, orbits=False))
+    found = diagram(together(), np.zeros(4), DiagramPlan(-1.0, 1.0, orbits=False))
     np.testing.assert_allclose([h.p for h in found.hopf], 0.0, atol=1e-12)
     np.testing.assert_allclose(sorted(h.omega for h in found.hopf), [1.0, np.sqrt(3.0)], atol=1e-12)
 
@@ -412,7 +417,7 @@ def together() -> Dynamics:
 
 @pytest.mark.slow
 def test_orbits_are_born_at_both_of_two_hopf_points_at_one_value() -> None:
-    found = diagram(together(), np.zeros(4), Asked(-1.0, 1.0, nodes=8, doublings=0, step=0.4))
+    found = diagram(together(), np.zeros(4), DiagramPlan(-1.0, 1.0, nodes=8, doublings=0, step=0.4))
     orbits = found.branches[1:]
     np.testing.assert_allclose([b.period[-1] for b in orbits], [2 * np.pi, 2 * np.pi / np.sqrt(3.0)], rtol=1e-9)
     assert all("bound" in b.ended for b in orbits)

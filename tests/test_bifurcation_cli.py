@@ -177,6 +177,7 @@ def test_a_driven_case_is_followed_at_its_frequency(
         assert key in said and len(said.splitlines()) == 1
 
 
+@pytest.mark.usefixtures("untried")
 def test_a_file_that_holds_no_diagrams_is_refused(tmp_path: Path) -> None:
     """Missing, damaged, or another program's."""
     for name, data in (("none", None), ("bad", b"no HDF5 at all")):

@@ -7,6 +7,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from ellipses import exact
 from refusals import refused
 from test_assembly import sector
 
@@ -16,7 +17,7 @@ from microslip.contact.friction import Coulomb, StaticSliding
 from microslip.contact.harmonics import force_alone
 from microslip.contact.heights import Cut, Exponential, Linear, Polynomial, Smooth
 from microslip.contact.hertz import Hertz
-from microslip.contact.law import values
+from microslip.contact.law import value, values
 from microslip.contact.normal import Gapped, Greenwood, Penalty, Preload, Rough
 from microslip.contact.patch import Patch, equilibrium, grid
 from microslip.contact.point import PointContact
@@ -112,7 +113,7 @@ def computed() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     A, e = 1 / np.sin(0.5 * rng.uniform(0.02, np.pi, 400)) ** 2, rng.uniform(0.0, 1.0, 400) ** 2
     n = len(SIZES)
     A, e = np.concatenate([SIZES, SIZES, A]), np.concatenate([np.full(n, 1e-5), np.ones(n), np.maximum(e, 1e-3)])
-    return A, e * A, orbits.exact(A, e * A)
+    return A, e * A, exact(A, e * A)
 
 
 @pytest.mark.slow
@@ -142,8 +143,8 @@ def test_orbits_that_stick_circles_at_the_limit_and_lines() -> None:
     """One stiffness while nothing slides, without a division of nothing by nothing; a line is the thinnest ellipse."""
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        assert (orbits.exact(np.array([0.0, 0.5, 1.0, 1.0]), np.array([0.0, 0.0, 1.0, 0.0])) == 1).all()
-        found = orbits.exact(np.array([2.0, 2.0]), np.array([0.0, 2 * orbits.THINNEST]))
+        assert (exact(np.array([0.0, 0.5, 1.0, 1.0]), np.array([0.0, 0.0, 1.0, 0.0])) == 1).all()
+        found = exact(np.array([2.0, 2.0]), np.array([0.0, 2 * orbits.THINNEST]))
     assert np.allclose(found[:, 0], found[:, 1], rtol=1e-9, atol=0)
 
 
@@ -560,8 +561,8 @@ def test_points_that_begin_to_touch_later() -> None:
     """A gap per point in front of a law: of a spring its own gap; of a rough layer what each point has apart, 1e-12."""
     h = np.linspace(0, 3e-6, 12)
     plain, friction, c = number(C_N0 / 12), Coulomb(number(MU)), number(C_R0 / 12)
-    gapped = book.book_patch(patch(PointContact(Gapped(Penalty(plain), jnp.asarray(h)), friction, c)))
-    own = book.book_patch(patch(PointContact(Penalty(plain, jnp.asarray(h)), friction, c)))
+    gapped = book.book_patch(patch(PointContact(Gapped(Penalty(plain), value(h)), friction, c)))
+    own = book.book_patch(patch(PointContact(Penalty(plain, value(h)), friction, c)))
     u = motion(3)
     np.testing.assert_array_equal(gapped.force(u), own.force(u))
     whole = patch(apart(rough(12), h))

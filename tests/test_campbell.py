@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +15,8 @@ from hypothesis import strategies as st
 
 from microslip.data import Array, ModalGroup
 from microslip.modal.campbell import LINK, Tracks, crossings, mac, track, track_basis
-from microslip.pictures.plots import _ceiling, campbell_plot
+from microslip.pictures.diagrams import campbell_plot, ceiling
+from microslip.pictures.plots import save
 
 
 def shapes(n: int, m: int, seed: int = 0) -> Array:
@@ -155,9 +157,8 @@ def test_the_curves_of_a_modal_file() -> None:
 @pytest.mark.parametrize("lowest", [40.0, 500.0])
 def test_the_lowest_mode_is_seen_above_all_engine_orders(lowest: float) -> None:
     """Orders reach 100 Hz; the diagram ends above the first mode wherever it is."""
-    omega = 2 * np.pi * np.array([[lowest, 1.1 * lowest], [9e3, 9e3]])
-    tracks = Tracks(np.array([0.0, 200 * np.pi]), np.array([[0, 0], [1, 1]]), omega, np.ones((2, 1)))
-    assert _ceiling(tracks, [1]) == pytest.approx(max(120.0, 1.1 * 1.1 * lowest))
+    modes = [np.array([lowest, 1.1 * lowest]), np.array([9e3, 9e3])]
+    assert ceiling(modes, 100.0, 1.2, 1.1) == pytest.approx(max(120.0, 1.1 * 1.1 * lowest))
 
 
 def test_a_mode_of_one_speed_alone_is_drawn(tmp_path: Path) -> None:
@@ -165,4 +166,4 @@ def test_a_mode_of_one_speed_alone_is_drawn(tmp_path: Path) -> None:
     omega = np.array([[1000.0, 1010.0, 1020.0, 1040.0], [np.nan, np.nan, 3050.0, np.nan]])
     modes = np.where(np.isnan(omega), -1, np.arange(2)[:, None])
     tracks = Tracks(np.array([0.0, 100.0, 217.0, 300.0]), modes, omega, np.full((2, 3), 0.9))
-    assert campbell_plot(small.basis(), tracks, [], tmp_path / "c.png").is_file()
+    assert save(partial(campbell_plot, small.basis(), tracks, []), tmp_path / "c.png").is_file()

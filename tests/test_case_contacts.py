@@ -32,7 +32,7 @@ from microslip.contact.patch import pressure
 from microslip.contact.solids import Solid
 from microslip.errors import UserError
 from microslip.files import store
-from microslip.harmonic_balance.cost import aft_bytes
+from microslip.harmonic_balance.forces import aft_bytes
 from microslip.modal.compute import modal_basis
 from microslip.settings.body import BodySettings, validate
 from microslip.stages import checkpoint
@@ -191,6 +191,7 @@ def test_a_curved_face_is_fitted_to_hertz() -> None:
     assert (p[np.abs(contact.patch.points[:, 1]) > 0.4 * HEIGHT] == 0).all()
 
 
+@pytest.mark.usefixtures("unestimated")
 @pytest.mark.parametrize("contact", [{}, pytest.param({"fit": "exact", "points": [5, 1]}, marks=pytest.mark.slow)])
 def test_the_answer_under_one_force_knows_of_no_other(contact: dict[str, Any]) -> None:
     """A curved contact is fitted at the force that presses it: to the last bit the same, whatever forces stand beside

@@ -169,6 +169,7 @@ def test_the_response_follows_an_edited_field(tmp_path, monkeypatch, capsys) -> 
     refused_command(["respond", "case.toml"], capsys, words)
 
 
+@pytest.mark.usefixtures("unestimated")
 @pytest.mark.slow
 def test_a_field_needs_no_residual_shape(tmp_path, monkeypatch) -> None:
     """MacNeal's basis keeps residual shapes of its own rows; a field has none, and the response goes without: a fifth

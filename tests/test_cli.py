@@ -333,6 +333,7 @@ def mistakes(folder: Path) -> Path:
     return folder
 
 
+@pytest.mark.usefixtures("untried")
 @pytest.mark.parametrize(("words", "sentence"), MISTAKES, ids=lambda w: " ".join(w) if isinstance(w, list) else "")
 def test_a_mistake_gives_one_sentence_and_exit_code_2(
     mistakes: Path, words: list[str], sentence: str, capsys: pytest.CaptureFixture[str]

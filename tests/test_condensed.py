@@ -6,8 +6,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from microslip.bifurcation.balance import Balance, Harmonics
-from microslip.bifurcation.condensed import Condensed, equations
+from microslip.bifurcation.balance import Balance, CondensedBalance, Harmonics, equations
 from microslip.bifurcation.dynamics import Dynamics
 from microslip.continuation import NewtonSettings, newton
 
@@ -47,7 +46,7 @@ def near(system: Dynamics, H: int = 5) -> Harmonics:
 def test_the_same_orbit_as_of_all_coordinates(driven: bool) -> None:
     system = chain(driven)
     few = equations(system, near(system))
-    assert isinstance(few, Condensed) and len(few.unknowns(near(system))) == 11 * 2 + (not driven)
+    assert isinstance(few, CondensedBalance) and len(few.unknowns(near(system))) == 11 * 2 + (not driven)
     found = newton(few, few.unknowns(near(system)), 1.0, NewtonSettings(tolerance=1e-13))
     assert found.converged
     orbit = few.orbit(found.x, 1.0)

@@ -37,7 +37,7 @@ TABLE = ([1e-4, 1e-3, 1e-2, 1e-1], [0.5, 0.8, 0.9, 0.4])
 
 
 def value(number):
-    return jax.device_put(float(number))
+    return jnp.asarray(number, dtype=float)
 
 
 # closed forms --------------------------------------------------------------------------------------------------------

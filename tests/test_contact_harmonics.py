@@ -3,19 +3,19 @@
 import dataclasses
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 import pytest
 
 from microslip.contact import EXAMPLES
 from microslip.contact.friction import Coulomb
-from microslip.contact.harmonics import force_alone, force_harmonics, force_near, fourier
+from microslip.contact.harmonics import force_alone, force_harmonics, force_near
 from microslip.contact.heights import Polynomial, tabulated
-from microslip.contact.law import march
+from microslip.contact.law import march, value
 from microslip.contact.normal import Preload, Rough
 from microslip.contact.periodic import RECALL, periodic, unknown
 from microslip.contact.point import PointContact
 from microslip.contact.wear import worn_law
+from microslip.series import fourier
 
 ROUGH = EXAMPLES["rough point"]
 NEAR = jax.jit(force_near, static_argnames=("samples", "count", "chunk"))
@@ -47,7 +47,7 @@ def test_a_jenkins_element_has_its_closed_form() -> None:
     k, limit, x = 2e7, 40.0, 3.0
     theta = np.arccos(1 - 2 / x)
     exact = k * ((theta - np.sin(2 * theta) / 2) / np.pi + 4j * (x - 1) / (np.pi * x**2))
-    law = PointContact(Preload(jnp.asarray(100.0)), Coulomb(jnp.asarray(0.4)), jnp.asarray(k))
+    law = PointContact(Preload(value(100.0)), Coulomb(value(0.4)), value(k))
     u = np.zeros((1, 3, 3))
     u[0, 1, 1] = x * limit / k
     errors = []
@@ -59,7 +59,7 @@ def test_a_jenkins_element_has_its_closed_form() -> None:
 
 def orbit(a, b, limit):
     """First cosine and sine of the force along t1 on the path (a cos, b sin), stiffness 1."""
-    law = PointContact(Preload(jnp.asarray(1.0)), Coulomb(jnp.asarray(limit)), jnp.asarray(1.0))
+    law = PointContact(Preload(value(1.0)), Coulomb(value(limit)), value(1.0))
     u = np.zeros((1, 3, 3))
     u[0, 1, 1], u[0, 2, 2] = a, b
     return np.asarray(force_alone(law, u, 1.0, samples=4096, count=3))[0, 1, 1:]
@@ -172,8 +172,8 @@ def creeping(n):
     rng = np.random.default_rng(1)
     factor = np.exp(rng.normal(0, 1.2, (n, 3, 3))) * rng.choice([-1, 1], (n, 3, 3))
     factor[:, 0, 0] = factor[0] = 1
-    normal = Rough(jnp.asarray(76e6), jnp.asarray(7.5e-6), Polynomial())
-    law = PointContact(normal, Coulomb(jnp.asarray(0.4)), jnp.asarray(29e6))
+    normal = Rough(value(76e6), value(7.5e-6), Polynomial())
+    law = PointContact(normal, Coulomb(value(0.4)), value(29e6))
     return law, np.einsum("sh,nkh->nsk", fourier(1, 64)[0], factor * one)[:, :, None], 1 / 108
 
 
@@ -240,7 +240,7 @@ def test_what_is_known_of_a_motion_near_by_changes_no_force() -> None:
 @pytest.mark.parametrize(("slides", "most"), [(0.5, 2), (3.0, 2)])
 def test_a_constant_normal_load_takes_no_cycle_more(slides: float, most: int) -> None:
     """To and fro, sticking or sliding: the first cycle forgets the beginning, the second one shows it and is used."""
-    law = PointContact(Preload(jnp.asarray(100.0)), Coulomb(jnp.asarray(0.4)), jnp.asarray(2e7))
+    law = PointContact(Preload(value(100.0)), Coulomb(value(0.4)), value(2e7))
     t = 2 * np.pi * np.arange(64) / 64
     path = np.zeros((64, 1, 3))
     path[:, 0, 1] = slides * 2e-6 * np.cos(t - 0.3)
@@ -250,7 +250,7 @@ def test_a_constant_normal_load_takes_no_cycle_more(slides: float, most: int) ->
 
 def test_a_contact_that_is_open_where_cycles_end_takes_two() -> None:
     """It remembers nothing there, as at the very beginning; but its first cycle came from elsewhere."""
-    law = dataclasses.replace(EXAMPLES["smooth point"].law, friction=Coulomb(jnp.asarray(100.0)))
+    law = dataclasses.replace(EXAMPLES["smooth point"].law, friction=Coulomb(value(100.0)))
     t = 2 * np.pi * np.arange(64) / 64
     motion = 1e-6 * np.stack([np.sin(t + 0.05), 2 + np.cos(t), 0 * t], axis=1)[:, None]
     assert motion[-1, 0, 0] < 0 < motion[0, 0, 0]

@@ -294,7 +294,7 @@ def test_a_step_is_its_way_and_what_drags_along_it(example) -> None:
         np.testing.assert_allclose(told, expected, rtol=0, atol=1e-14 * scale(expected))
 
 
-@laws(ALIKE)
+@laws(ALIKE | {"smooth point"})  # of which test_contact_harmonics has the derivatives
 def test_the_derivative_of_a_periodic_cycle_matches_differences(example) -> None:
     """Of laws whose sliders are solved for: what `Law.recalled` promises of their state is used for it."""
     if not solved_for(example):

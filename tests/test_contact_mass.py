@@ -20,7 +20,7 @@ from microslip.contact.regularised import MassContact, integrate
 
 
 def value(number):
-    return jnp.asarray(float(number))
+    return jnp.asarray(number, dtype=float)
 
 
 ROUGH = Rough(value(1), value(1), Polynomial())

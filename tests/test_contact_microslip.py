@@ -15,7 +15,7 @@ from scipy.optimize import brentq
 
 from microslip.contact.heights import Cut, Exponential, Gaussian, Linear, Polynomial, tabulated
 from microslip.contact.hertz import Hertz
-from microslip.contact.law import history, march, values
+from microslip.contact.law import history, march, value, values
 from microslip.contact.microslip import MonotoneSlip, of
 from microslip.contact.normal import Penalty, Preload
 from microslip.contact.partial_slip import PartialSlip
@@ -64,7 +64,7 @@ def loop_work(force, tangential, samples=400):
 # Jenkins, Masing ---------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("normal", [400.0, Penalty(jnp.asarray(4e8))], ids=["constant", "spring"])
+@pytest.mark.parametrize("normal", [400.0, Penalty(value(4e8))], ids=["constant", "spring"])
 def test_jenkins_loop_dissipates_4_mu_n_times_the_path_slid(normal):
     """Exact but for the trapezoids in which sliding begins: second order of the samples, 1e-5 with 400."""
     law = jenkins(1e8, MU, normal)
@@ -77,8 +77,8 @@ CONSTANT = {
     "Jenkins": jenkins(K_T, MU, 400.0),
     "rough strips": rough_strips(K_N, R_Z, Polynomial(), K_T, MU, 12).under(400.0),
     "Mindlin": mindlin(SPHERE, MU, 8e-6, 12).under(400.0),
-    "Iwan, uniform": Iwan(Preload(jnp.asarray(400.0)), jnp.asarray(MU), jnp.asarray(K_T), *uniform(12)),
-    "Iwan, Segalman": Iwan(Preload(jnp.asarray(400.0)), jnp.asarray(MU), jnp.asarray(K_T), *segalman(12, -0.4, 0.5)),
+    "Iwan, uniform": Iwan(Preload(value(400.0)), value(MU), value(K_T), *uniform(12)),
+    "Iwan, Segalman": Iwan(Preload(value(400.0)), value(MU), value(K_T), *segalman(12, -0.4, 0.5)),
 }
 
 
@@ -131,7 +131,7 @@ def test_the_slip_path_of_a_sliding_contact_is_what_the_springs_do_not_take():
 
 
 def iwan(distribution, force=400.0):
-    return Iwan(Preload(jnp.asarray(force)), jnp.asarray(MU), jnp.asarray(K_T), *distribution)
+    return Iwan(Preload(value(force)), value(MU), value(K_T), *distribution)
 
 
 def test_iwan_of_equally_frequent_strengths_is_a_parabola():
@@ -167,7 +167,7 @@ def test_segalman_s_first_loading_and_power_law_of_dissipation(chi, beta):
 
 
 def test_iwan_with_one_slider_is_the_point_contact():
-    normal = Penalty(jnp.asarray(K_N))
+    normal = Penalty(value(K_N))
     one = Iwan(normal, jnp.asarray(MU), jnp.asarray(K_T), *uniform(1))
     t = np.linspace(0, 12, 300)
     u = along(4e-6 * np.sin(t), 3e-6 * np.cos(1.7 * t))
@@ -175,7 +175,7 @@ def test_iwan_with_one_slider_is_the_point_contact():
 
 
 def test_iwan_with_one_slider_and_two_stiffnesses_is_that_point_contact():
-    normal = Penalty(jnp.asarray(K_N))
+    normal = Penalty(value(K_N))
     one = Iwan(normal, jnp.asarray(MU), jnp.asarray(K_T), *uniform(1), jnp.asarray(0.4))
     t = np.linspace(0, 12, 300)
     u = np.column_stack([3e-6 * np.cos(1.7 * t), 4e-6 * np.sin(t), 5e-6 * np.cos(t)])[:, None]

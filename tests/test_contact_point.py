@@ -7,6 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 import test_contact_laws as contract
+from ellipses import exact
 from hypothesis import given
 from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
@@ -19,7 +20,6 @@ from microslip.contact.law import history, values
 from microslip.contact.normal import Penalty, Preload, Rough
 from microslip.contact.periodic import periodic
 from microslip.contact.point import PointContact, PointState, dragged
-from microslip.harmonic_balance.orbits import exact
 
 MU, N0, K = 0.4, 100.0, 2e7
 LIMIT = MU * N0
@@ -49,7 +49,7 @@ def third(law, u):
 
 
 def value(number):
-    return jnp.asarray(float(number))
+    return jnp.asarray(number, dtype=float)
 
 
 JENKINS = PointContact(Preload(value(N0)), Coulomb(value(MU)), value(K))

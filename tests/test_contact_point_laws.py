@@ -11,7 +11,7 @@ from microslip.contact.curves import curve, of_contact
 from microslip.contact.friction import Coulomb
 from microslip.contact.heights import Polynomial
 from microslip.contact.hertz import Hertz
-from microslip.contact.law import march
+from microslip.contact.law import march, value
 from microslip.contact.layer import Layer
 from microslip.contact.partial_slip import PartialSlip
 from microslip.contact.point_laws import curve_point, hertz_point, rough_point, round_point, smooth_point
@@ -19,7 +19,7 @@ from microslip.contact.profiles import Profile, RoundContact
 from microslip.contact.series import BULK, ContactStiffness, in_series, of_layer
 from microslip.contact.solids import Solid
 
-STEEL, MU = Solid(2.1e11, 0.3), Coulomb(jnp.asarray(0.3))
+STEEL, MU = Solid(2.1e11, 0.3), Coulomb(value(0.3))
 
 
 def forces(law, u: np.ndarray) -> np.ndarray:

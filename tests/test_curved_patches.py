@@ -17,6 +17,7 @@ from microslip.contact.curved import Line, apart, foundation_of_line, foundation
 from microslip.contact.friction import Coulomb
 from microslip.contact.heights import Polynomial
 from microslip.contact.hertz import Hertz
+from microslip.contact.law import value
 from microslip.contact.normal import Penalty, Preload, Rough
 from microslip.contact.patch import Patch, equilibrium, grid, pressed_by, pressing, pressure
 from microslip.contact.point import PointContact
@@ -31,11 +32,11 @@ from microslip.system.nodal import nodal, static_compliance
 STEEL = Solid(2.1e11, 0.3)
 PIN = Line(STEEL, STEEL, in_hole(6e-3, 6.1e-3), 15e-3)  # geometry/pin
 STRIP = 2e-3
-COULOMB = Coulomb(jnp.asarray(0.3))
+COULOMB = Coulomb(value(0.3))
 
 
 def springs(areas: Array, k: float) -> PointContact:
-    return PointContact(Penalty(jnp.asarray(k * areas)), COULOMB, jnp.asarray(k * areas))
+    return PointContact(Penalty(value(k * areas)), COULOMB, value(k * areas))
 
 
 def curved(k: float, radii: tuple[float, float], size: tuple[float, float], counts: tuple[int, int]) -> Patch:
@@ -209,8 +210,8 @@ STEP = jax.jit(lambda law, path: law.step(path, jnp.zeros_like(path), 1.0, law.i
 def test_every_law_with_a_gap_begins_later() -> None:
     """Force at u + gap is that without at u, for smooth, rough, Iwan's and strips; given normal forces are refused."""
     h, u = jnp.asarray([0.0, 1e-6, 5e-6]), jnp.asarray([4e-6, 4e-6, 4e-6])
-    rough = Rough(jnp.asarray(1e8), jnp.asarray(7.5e-6), Polynomial())
-    laws = [PointContact(rough, COULOMB, jnp.asarray(1e8)), springs(np.ones(3), 1e8),
+    rough = Rough(value(1e8), value(7.5e-6), Polynomial())
+    laws = [PointContact(rough, COULOMB, value(1e8)), springs(np.ones(3), 1e8),
             Iwan(rough, jnp.asarray(0.3), jnp.asarray(1e8), *uniform(4)),
             rough_strips(1e8, 7.5e-6, Polynomial(), 8e7, 0.3, 12)]  # fmt: skip
     laws.append(Portion(laws[0], jnp.asarray(0.25)))
@@ -221,7 +222,7 @@ def test_every_law_with_a_gap_begins_later() -> None:
 
     for law in laws:
         np.testing.assert_allclose(pressed(apart(law, h), u), pressed(law, u - h), rtol=1e-12)
-    for law in (replace(laws[0], normal=Preload(jnp.asarray(10.0))), laws[3].under(10.0)):
+    for law in (replace(laws[0], normal=Preload(value(10.0))), laws[3].under(10.0)):
         refused("the law's normal force is given", apart, law, h)
     for radii in ((0.0, 1.0), (1.0, -2.0)):
         refused("curvature: radii of", gap, np.zeros((1, 2)), radii)

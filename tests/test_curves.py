@@ -25,6 +25,7 @@ from microslip.harmonic_balance.response import operating
 from microslip.harmonic_balance.solver import newton, solve
 from microslip.results import read_response
 from microslip.stages import surveying
+from microslip.stages.answer import Written, case_job
 from microslip.system import Body, Contact, Force, Monitor, Spring, System
 
 pytestmark = pytest.mark.usefixtures("undrawn", "unjudged")
@@ -105,6 +106,10 @@ def test_over_the_frequency(case: Path, capsys: pytest.CaptureFixture[str]) -> N
     assert "is up to date" in "".join(capsys.readouterr())
 
 
+def survey(case: Path, *assignments: str, **how: Any) -> Written:
+    return surveying.survey_stage(case_job(case, None, assignments, make=False, **how), "frequency")
+
+
 @pytest.mark.slow
 def test_interrupted_and_resumed(case: Path) -> None:
     """Ctrl-C leaves a table, a picture and a response file of what was found; the next call adds the rest."""
@@ -114,16 +119,16 @@ def test_interrupted_and_resumed(case: Path) -> None:
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        surveying.survey_stage(case, None, "frequency", report=impatient)
+        survey(case, report=impatient)
     half = rows("over_frequency.csv")
     assert len(half["leg"]) >= 20 and not read_response("build/lifting/over_frequency.h5").finished
     assert Path("build/lifting/pictures/over_frequency.png").is_file()
     told: list[str] = []
-    _, sentences, _, missing = surveying.survey_stage(case, None, "frequency", report=told.append)
+    _, sentences, _, missing = survey(case, report=told.append)
     resumed = rows("over_frequency.csv")
     assert not missing and sentences and int([t for t in told if "% of the way" in t][0].split()[7]) > 20
     np.testing.assert_array_equal(resumed["frequency_Hz"][: len(half["leg"])], half["frequency_Hz"])
-    surveying.survey_stage(case, None, "frequency", force=True)
+    survey(case, force=True)
     assert rows("over_frequency.csv")["frequency_Hz"] == pytest.approx(resumed["frequency_Hz"], rel=1e-6)
     assert read_response("build/lifting/over_frequency.h5").finished
 
@@ -149,7 +154,7 @@ def test_ended_early_and_gone_on(case: Path, capsys: pytest.CaptureFixture[str])
     assert "allow more to go on (curve.points)" in said.out and "1 of 1 curve ends early" in said.err
     assert len(rows("over_frequency.csv")["leg"]) == 8
     told: list[str] = []
-    surveying.survey_stage(case, None, "frequency", ["curve.points=16"], report=told.append)
+    survey(case, "curve.points=16", report=told.append)
     assert [int(t.split()[7]) for t in told if "% of the way" in t][0] > 8
 
 
@@ -176,7 +181,7 @@ def test_one_that_comes_back_is_followed_by_another(case: Path, capsys: pytest.C
 
     begun: list[str] = []
     with pytest.raises(KeyboardInterrupt):
-        surveying.survey_stage(case, None, "frequency", there, report=impatient)
+        survey(case, *there, report=impatient)
     assert main(["respond", "case.toml", "--over", "frequency", "--set", *there]) == 0
     said, found = capsys.readouterr().out, rows("over_frequency.csv")
     assert "comes back to 103 Hz, where it began, and misses 140 Hz; another one begins there" in said

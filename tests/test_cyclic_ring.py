@@ -287,7 +287,7 @@ def test_static_compliance_at_every_nodal_diameter():
     from microslip.modal.body_rows import body_rows
 
     described = settings(6, sector())
-    B, labels = body_rows(sector(), described).stacked(described)
+    B, labels = body_rows(sector(), described).stacked
     full = whole()
     lu = sp.linalg.splu(full.K.tocsc())
     for k, group in groups():
@@ -552,6 +552,12 @@ def joined(side: str = "right", **more):
     return modal_basis(rings.bladed_sector(gap=0.0), body(**(described | more)))
 
 
+@cache
+def shut():
+    """A sector with closed shrouds; for reading only."""
+    return joined()
+
+
 def of_the_ring(basis) -> np.ndarray:
     every = [np.repeat(g.frequency[:6], 1 if k in (0, 3) else 2) for (_, k), g in basis.groups.items()]
     return np.sort(np.concatenate(every))
@@ -563,7 +569,7 @@ def test_shrouds_that_stay_closed_couple_the_sectors_as_they_do_the_ring(backend
 
     Newton ends at 1e-9 of the displacement in either; the sixth mode of a sector limits what can be compared.
     """
-    basis = joined(modes={"count": 6, "solver": backend})
+    basis = shut() if backend == "auto" else joined(modes={"count": 6, "solver": backend})
     frequency, exact = of_the_ring(basis), joined_ring()
     np.testing.assert_allclose(frequency[:20], exact[:20], rtol=1e-7)
     opened = of_the_ring(joined(closures=[]))
@@ -574,7 +580,7 @@ def test_shrouds_that_stay_closed_couple_the_sectors_as_they_do_the_ring(backend
 
 def test_either_side_may_press_on_the_other():
     """Pressing left on right gives the pressures to other nodes: the same ring to what the mesh knows of an edge."""
-    one, other = joined(), joined("left")
+    one, other = shut(), joined("left")
     for key, g in one.groups.items():
         np.testing.assert_allclose(other.groups[key].frequency[:3], g.frequency[:3], rtol=0.03)
 
@@ -582,7 +588,7 @@ def test_either_side_may_press_on_the_other():
 @pytest.mark.parametrize("method", [pytest.param("rubin", marks=pytest.mark.slow), "craig-bampton"])
 def test_reductions_keep_the_coupling_of_closed_shrouds(method):
     interface = {"name": "top", "face": "top", "t2": [0.0, 1.0, 0.0]}
-    exact = joined()
+    exact = shut()
     reduced = joined(reduction=method, interfaces=[interface], modes={"count": 12})
     for key, g in exact.groups.items():
         static = reduced.groups[key].compliance

@@ -393,6 +393,7 @@ def test_platforms_page() -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("unestimated")
 def test_own_model_page(tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
     """Everything the page says to type, pictures and friction response as well; the frequency it shows. Where its
     assemblies jump they are not followed in time, which takes up to `sweep.patience` at every place; they have
@@ -442,7 +443,7 @@ def test_rolling_page(capsys: pytest.CaptureFixture[str]) -> None:
 def test_pages_on_rolling_unround_wheels_and_tyres() -> None:
     """All keys of their cases are keys."""
     from microslip.rolling.settings import RollingCase
-    from microslip.rolling.slip import TyreCase
+    from microslip.rolling.tyre import TyreCase
     from microslip.vehicle.settings import KinematicsCase, VehicleCase
 
     blocks = [

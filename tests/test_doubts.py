@@ -75,7 +75,9 @@ stop = 1.0
 }
 
 
-@pytest.mark.parametrize("verb", ASKED)
+@pytest.mark.parametrize(
+    "verb", [pytest.param(v, marks=pytest.mark.slow) if v == "two-tones" else v for v in ASKED]
+)
 @pytest.mark.parametrize(("newtons", "doubted"), [(0.1, False), (1e5, True)])
 def test_an_amplitude_beyond_a_body_is_doubted(
     verb: str,

@@ -16,7 +16,7 @@ def modes(f: np.ndarray, *resonances: tuple[float, float, float]) -> FrequencyRe
     """Sum of single modes (Hz, damping ratio, share)."""
     a = sum(share / (f0**2 - f**2 + 2j * d * f0 * f) for f0, d, share in resonances) * 100.0**2
     zero, none = np.zeros(len(f)), np.zeros((len(f), 0))
-    return FrequencyResponse(f, np.asarray(a), none, zero, np.ones(len(f), bool), np.zeros(0), none)
+    return FrequencyResponse(f, np.asarray(a), none, zero, np.ones(len(f), bool))
 
 
 def refined_peaks(

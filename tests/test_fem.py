@@ -33,7 +33,7 @@ from microslip.fem.operators import (
     to_symmetric,
     to_tensor,
 )
-from microslip.modal.group import inertia_of
+from microslip.modal.prepared import inertia_of
 from microslip.modal.rigid import rigid_fields
 
 E, NU, RHO = STEEL["young"], STEEL["poisson"], STEEL["density"]

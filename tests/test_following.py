@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import csv
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -12,7 +14,7 @@ import pytest
 from refusals import refused, refused_command
 from test_harmonic_balance_laws import CASE, sled
 
-from microslip import cli
+from microslip.analysis import Answer
 from microslip.basis import write_basis
 from microslip.case import load_case, run_case
 from microslip.case.loaded import Loaded
@@ -20,8 +22,12 @@ from microslip.case.problem import problem_of
 from microslip.cli import main
 from microslip.errors import UserError
 from microslip.harmonic_balance import nonlinear_modes, peak, reduced
-from microslip.stages import following
+from microslip.stages import multipliers
+from microslip.stages.analysing import Varied, analysed
+from microslip.stages.answer import CaseJob, written
+from microslip.stages.multipliers import stability_of_points
 from microslip.units import METRES
+from microslip.verbs import backbone, optimum
 
 pytestmark = pytest.mark.usefixtures("undrawn", "unjudged")
 
@@ -45,7 +51,7 @@ def there(place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.fixture
 def figures(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> list[Any]:
     """What would be drawn in an empty folder."""
-    from microslip.pictures import following as drawing
+    from microslip.pictures import plots as drawing
 
     made: list[Any] = []
     monkeypatch.setattr(drawing, "save_figure", lambda figure, path: made.append(figure) or path)
@@ -53,10 +59,20 @@ def figures(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> list[Any]:
     return made
 
 
-def of_case(name: str) -> following.Case:
-    case = following.Case(Path("case.toml"), {"name": name}, {}, Path("build") / name)
-    vars(case)["quantity"] = METRES
-    return case
+def of_case(name: str, mode: str = "aft") -> Any:
+    """What of a case a table and its picture need."""
+    settings = SimpleNamespace(name=name, mode=mode)
+    return SimpleNamespace(settings=settings, contacts=(), assembly=SimpleNamespace(outputs=()))
+
+
+def page_of(answer: Answer, name: str) -> Path:
+    """The files of an optimum; its page."""
+    return written(answer, "optimum", Path("build") / name, name, True).files[0]
+
+
+def job(*assignments: str, report: Callable[[str], None] = lambda _: None) -> CaseJob:
+    """The sled's case on its way."""
+    return CaseJob(Path("case.toml"), {"sled": Path("basis.h5")}, Path("build/sled"), assignments, report=report)
 
 
 def table(name: str) -> list[dict[str, str]]:
@@ -77,12 +93,12 @@ def test_backbone(capsys: pytest.CaptureFixture[str]) -> None:
 
 
 def one_point(folder: Path, monkeypatch: pytest.MonkeyPatch, points: int) -> None:
-    """The sled on one point, one harmonic, few samples; its case in a folder of its own."""
+    """The sled on one point, one harmonic; its case in a folder of its own."""
     monkeypatch.chdir(folder)
     write_basis(folder / "basis.h5", sled())
     one = CASE.replace("points = [4, 2]", "points = [1, 1]").replace("harmonics = 2", "harmonics = 1")
     one = one.replace("points = 25", f"points = {points}").replace("[5.0, 1e5]", "[40.0]")
-    one = one.replace("samples = 32", "samples = 16")
+    one = one.replace("samples = 32", "samples = 64")  # as in test_curves: one program
     one = one.replace("start = 35.0\nstop = 200.0", "start = 60.0\nstop = 100.0")
     (folder / "case.toml").write_text(one)
 
@@ -135,9 +151,9 @@ def test_what_is_wrong_with_an_optimum_is_said_before_a_sweep(
 ) -> None:
     """A key of no contact, one that is misspelled, and a value that is wrong at the far end alone."""
     one_point(tmp_path, monkeypatch, points=3)
-    case, told = cli._followed(Path("case.toml"), None, ()), list[str]()
+    told, asked = list[str](), (f"optimum.over={over}", "optimum.low=0.1", f"optimum.high={high}")
     with pytest.raises(UserError, match=f"case.toml: .*{words}"):
-        following.optimum_over(case, over, 0.1, high, report=told.append)
+        analysed("optimum", job(*asked, report=told.append))
     assert not told
 
 
@@ -163,8 +179,7 @@ def test_the_error_of_a_backbone_is_what_more_harmonics_and_samples_change(
     """One harmonic and sixteen samples at the most damped point, against nine and 256: on the side that is said, and
     within the bound; what is likely is it but for a third."""
     one_point(tmp_path, monkeypatch, points=3)
-    case = cli._followed(Path("case.toml"), None, ())
-    built = case.plain
+    built = job().built()
     coarse, fine = (
         nonlinear_modes.about_rest(problem_of(built, 40.0, form="relative", **more))[0]
         for more in ({}, {"harmonics": 9, "samples": 256})
@@ -179,43 +194,43 @@ def test_the_error_of_a_backbone_is_what_more_harmonics_and_samples_change(
     exact = float(np.interp(amplitude, whole.amplitude, whole.damping))
     off = found.damping[at] / exact - 1
     assert abs(off) < e.readout and e.likely() == pytest.approx(off, rel=0.34)
-    assert following.remarks_on_backbones({40.0: found}, case)[0].startswith("The damping ratio at ")
+    followed = {40.0: backbone.FollowedMode(found, coarse, mode)}
+    assert backbone.remarks(followed, built, print)[0].startswith("The damping ratio at ")
 
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("unestimated")
 def test_what_was_found_stays_when_it_is_interrupted(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Ctrl-C at the second normal force, the third value, the third point: the rows before it are in the table."""
+    """Ctrl-C at the second normal force, the third value, the third point: the same command goes on from there."""
 
-    def stop_at(words: str, *names: str) -> list[str]:
-        said: list[str] = []
+    def stopped(work: Callable[[CaseJob], object], words: str, *assignments: str) -> list[str]:
+        """What is said when it goes on."""
 
         def report(text: str) -> None:
-            said.append(text)
             if text.startswith(words):
                 raise KeyboardInterrupt
 
         with pytest.raises(KeyboardInterrupt):
-            opened = cli._followed(Path("case.toml"), None, ())
-            {"backbone": following.backbones, "stability": following.stabilities}[names[0]](opened, report=report)
-        return said
+            work(job(*assignments, report=report))
+        said: list[str] = []
+        work(job(*assignments, report=said.append))
+        return [text for text in said if "% of the amplitudes" in text or "stability" in text or "resonance" in text]
 
-    said = stop_at("backbone at F_N = 40 N, 2 of 2", "backbone")
-    assert "backbone at F_N = 8 N, 1 of 2" in said and any(t.startswith("100 of 100 %") for t in said)
-    assert {r["normal_force_N"] for r in table("backbone.csv")} == {"8"}
+    again = stopped(partial(analysed, "backbone"), "backbone at F_N = 40 N, 2 of 2")
+    assert sum(text.startswith("100 of 100 %") for text in again) == 1
+    assert {r["normal_force_N"] for r in table("backbone.csv")} == {"8", "40"}
     assert main(["respond", "case.toml", "-q"]) == 0
-    stop_at("3 of ", "stability")
-    assert len(table("stability.csv")) == 2
-    begun = []
-
-    def third(text: str) -> None:
-        begun.extend([text] if text.startswith("highest resonance at ") and ":" not in text else [])
-        if len(begun) == 3:
-            raise KeyboardInterrupt
-
-    with pytest.raises(KeyboardInterrupt):
-        following.optimum_over(cli._followed(Path("case.toml"), None, ()), points=4, report=third)
-    assert [r["what"] for r in table("optimum.csv")] == ["highest resonance"] * 2
+    found = []
+    with monkeypatch.context() as counting:
+        work = multipliers.stability
+        counting.setattr(multipliers, "stability", lambda *given: found.append(1) or work(*given))
+        stopped(stability_of_points, "3 of ")
+    assert len(found) == len(table("stability.csv")) > 2
+    with monkeypatch.context() as counting:
+        highest, looked = peak.highest, list[object]()
+        counting.setattr(peak, "highest", lambda *given: looked.append(1) or highest(*given))
+        stopped(partial(analysed, "optimum"), "highest resonance at 23", "optimum.points=4")
+    assert len(looked) == sum(r["what"] == "highest resonance" for r in table("optimum.csv"))
 
 
 def test_optima_of_several_cases_stand_on_one_picture(figures: list[Any]) -> None:
@@ -225,35 +240,35 @@ def test_optima_of_several_cases_stand_on_one_picture(figures: list[Any]) -> Non
         case = of_case(name)
         heights = {mass: 1e-6 * (mass / best + best / mass) for mass in (1.0, 3.0, 9.0)}
         peaks = {mass: peak.HighestPeak(600.0, a, np.zeros(1), "converged") for mass, a in heights.items()}
-        before = following.found_before(["light"] * (name == "heavy"), over, case)
-        *_, page = following.write_optimum(peak.Optimum(best, peaks[best], "converged", peaks, {}), over, case, before)
+        before = optimum.found_before(["light"] * (name == "heavy"), over, METRES)
+        found = peak.Optimum(best, peaks[best], "converged", peaks, {})
+        page = page_of(optimum.answer(found, over, case, before), name)
     heights = 1e-6 * np.array([2, 10 / 3, 82 / 9])
     np.testing.assert_allclose(before["light"], [[1, 3, 9], [300 / np.pi] * 3, heights, [1] * 3])
     assert "light: lowest at bodies.vane.mass = 1 kg, 2 µm at 95.493 Hz." in page.read_text()
     assert [t.get_text() for t in figures[-1].legends[0].get_texts()] == ["light", "heavy"] and not figures[0].legends
     assert Path("build/light/optimum.csv").read_text().startswith("bodies.vane.mass_kg,frequency_Hz,amplitude_m,what")
     Path("light").mkdir()  # a case of that name beside its products
-    assert list(following.found_before(["light"], over, case)) == ["light"]
-    assert list(following.found_before(["build/light"], over, case)) == ["light"]
+    assert list(optimum.found_before(["light"], over, METRES)) == ["light"]
+    assert list(optimum.found_before(["build/light"], over, METRES)) == ["light"]
     for other, said in (("light", "not friction, "), ("none", "type microslip optimum none")):
-        refused(said, following.found_before, [other], "friction", case)
+        refused(said, optimum.found_before, [other], "friction", METRES)
 
 
 def test_an_optimum_where_contacts_would_lift_off_is_marked(figures: list[Any]) -> None:
     """In the book's mode, beyond 1 % of points and time: in the table, the sentence, the picture and beside others."""
-    case = of_case("pit")
-    vars(case)["plain"] = SimpleNamespace(settings=SimpleNamespace(mode="book"), contacts=())
+    case = of_case("pit", "book")
     share = {1.0: 0.005, 2.0: 0.14, 3.0: 0.33}
     peaks = {
         m: peak.HighestPeak(600.0, 1e-6 / m, np.zeros(1), "converged", np.array([0.0, o])) for m, o in share.items()
     }
     found = peak.Optimum(3.0, peaks[3.0], "converged", peaks, {})
-    *_, page = following.write_optimum(found, "mass", case)
+    page = page_of(optimum.answer(found, "mass", case, {}), "pit")
     what = [row["what"] for row in csv.DictReader(Path("build/pit/optimum.csv").open())]
     marked = "highest resonance; not valid: contacts would lift off"
     assert what == ["highest resonance", marked, marked, "optimum: converged"]
     assert "is lowest; not valid" in page.read_text()
-    np.testing.assert_array_equal(following.found_before(["pit"], "mass", case)["pit"][3], [1, 0, 0])
+    np.testing.assert_array_equal(optimum.found_before(["pit"], "mass", METRES)["pit"][3], [1, 0, 0])
     dotted, solid = figures[0].axes[0].get_lines()[:2]
     assert np.isfinite(dotted.get_ydata()).all() and list(np.isfinite(solid.get_ydata())) == [True, False, False]
     assert "doubtful or not valid, see the table" in [t.get_text() for t in figures[0].legends[0].get_texts()]
@@ -264,7 +279,7 @@ def test_what_was_not_found_stands_in_the_table_with_its_commas(figures: list[An
     said = "energy: contacts take less than their laws count, by 14 %; raise samples"
     peaks = {m: peak.HighestPeak(600.0, 1e-6 / m, np.zeros(1), s) for m, s in ((1.0, "converged"), (2.0, said))}
     found = peak.Optimum(1.0, peaks[1.0], f"lost between 1 and 2: {said}", peaks, {})
-    *_, page = following.write_optimum(found, "mass", of_case("pit"))
+    page = page_of(optimum.answer(found, "mass", of_case("pit"), {}), "pit")
     rows = list(csv.DictReader(Path("build/pit/optimum.csv").open()))
     assert rows[1]["amplitude_m"] == rows[1]["frequency_Hz"] == ""
     crosses = [line for line in figures[0].axes[0].get_lines() if line.get_marker() == "x"]
@@ -299,15 +314,12 @@ def test_a_lowest_place_at_an_end_is_an_answer_and_says_where_to_look(
     one_point(tmp_path, monkeypatch, points=9)
     band = ["--set", "sweep.start=100", "--set", "sweep.stop=140"]
     monkeypatch.setattr(Loaded, "extent", 1e-7)  # a body so small that its motion is doubted
-    (Path("build/sled/pictures")).mkdir(parents=True)
-    for former in ("optimum.html", "pictures/optimum.png"):
-        (Path("build/sled") / former).write_text("of an earlier run")
     asked = ["optimum", "case.toml", "--low", "20", "--high", "30", "--points", "2", *band]
     assert main(asked) == 0
-    out, err = capsys.readouterr()
+    out = capsys.readouterr().out
     assert "normal force = 20 N: the highest resonance" in out
     assert "is lowest of all from 20 to 30 N" in out and "look there with --low below 20" in out
-    assert " moves by " in err and " moves by " in Path("build/sled/optimum.html").read_text()
+    assert " moves by " in out and " moves by " in Path("build/sled/optimum.html").read_text()
     assert [r["what"] for r in table("optimum.csv")[:2]] == ["highest resonance"] * 2
 
 
@@ -315,14 +327,20 @@ def test_an_angle_is_followed_through_nothing(monkeypatch: pytest.MonkeyPatch) -
     """Angles in equal steps from below 0 to above it; everything else in equal ratios."""
     asked = []
     monkeypatch.setattr(peak, "optimum", lambda make, values, *_, **__: asked.append(values))
-    case = cli._followed(Path("case.toml"), None, ())
+    case = job()
+    built, varied = case.built(), Varied(case.path, case.raw, case.bases)
+
+    def question(**keys: Any) -> Any:
+        return SimpleNamespace(asked=optimum.Keys(**keys), built=built, varied=varied, kept=None, report=print)
+
     with monkeypatch.context() as turned:  # a case of one body has no key of the kind
-        turned.setattr(following.Case, "with_", lambda *_: None)
-        following.optimum_over(case, "bodies.sled.turn", -4.0, 4.0, 5)
-    following.optimum_over(case, "friction", 0.1, 0.4, 3)
+        turned.setattr(optimum, "_with", lambda *_: None)
+        optimum.search(question(over="bodies.sled.turn", low=-4.0, high=4.0, points=5))
+    friction = question(over="friction", low=0.1, high=0.4, points=3)
+    optimum.search(friction)
     np.testing.assert_allclose(asked[0], [-4, -2, 0, 2, 4])
     np.testing.assert_allclose(asked[1], [0.1, 0.2, 0.4])
-    changed = [case.with_("friction", value).settings.contacts for value in asked[1]]
+    changed = [optimum._with(friction, value).settings.contacts for value in asked[1]]
     assert [c.coefficient for contacts in changed for c in contacts] == list(asked[1])
 
 

@@ -15,7 +15,7 @@ from microslip.harmonic_balance.problem import Problem
 from microslip.harmonic_balance.solver import solve
 from microslip.system import Body, Contact, Force, Monitor, Spring, System
 
-BLADES, HARMONICS = 12, 3
+BLADES, HARMONICS = 12, 1
 RUB = {"normal_stiffness": 2e6, "tangential_stiffness": 1e6, "includes": "surface", "friction": 0.3, "points": [1, 1]}
 RUB |= {"normal_force": 20.0, "width": 0.01, "height": 0.01}
 
@@ -39,7 +39,7 @@ def ring(contacts: int, blades: int = BLADES) -> Problem:
     gaps = [{"interface": f"right{i}", "against": f"left{i}", "against_sector": 1, **RUB} for i in range(contacts)]
     case = {"body": "blade", "excitation": "push", "amplitude": 5.0, "monitor": "tip", "direction": "x",
             "ring": {"blades": blades, "engine_order": 2, "model": "full"}, "contacts": gaps}  # fmt: skip
-    return balanced(ms.assemble(case, blade=blade(contacts)), HARMONICS, 48)
+    return balanced(ms.assemble(case, blade=blade(contacts)), HARMONICS, 32)
 
 
 @pytest.mark.parametrize("contacts", [1, 2, 3])

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
-import jax.numpy as jnp
 import numpy as np
 import pytest
 from refusals import refused, refused_command
@@ -201,18 +201,16 @@ def test_what_moving_ground_gives_is_its_force_times_its_way(taken_along: orbit.
 
 
 def test_the_picture_of_a_motion_has_the_loss_of_its_table(
-    taken_along: orbit.Orbit, monkeypatch: pytest.MonkeyPatch
+    taken_along: orbit.Orbit,
 ) -> None:
     """On moving ground a loop's area is no loss: what stands in the picture is the table's, whatever that says. A long
     title stands in the picture with all of its letters."""
-    from microslip.pictures import orbit as drawing
+    from microslip.pictures.orbit import orbit_picture
+    from microslip.pictures.plots import figure_of
 
-    figures: list = []
-    monkeypatch.setattr(drawing, "save_figure", lambda figure, path: figures.append(figure) or path)
     long = ", ".join(["title", *15 * ["and it does not come back"]])
     row = {"lost_in_contacts_J_per_period": 123.4}
-    drawing.orbit_picture(taken_along, row, Path("orbit.png"), long)
-    (figure,) = figures
+    figure = figure_of(partial(orbit_picture, taken_along, row, title=long))
     titles = [figure.get_suptitle(), *(axes.get_title() for axes in figure.axes)]
     (said,) = [" ".join(t.split()) for t in titles if " J" in t]
     assert said == f"{long}; contacts lose 123.4 J a period"
@@ -222,6 +220,7 @@ def test_the_picture_of_a_motion_has_the_loss_of_its_table(
     assert any("force in N" in axes.get_ylabel() for axes in figure.axes)  # its loops are drawn
 
 
+@pytest.mark.slow
 def test_many_points_that_creep_together_carry_what_one_does() -> None:
     """Four points of a rigid patch, each with a quarter, on ground without waves: the turns of the braking agree."""
     friction = Exponential(value(0.8), value(0.55), value(100.0))
@@ -375,7 +374,7 @@ def test_moving_ground_is_assembled_from_a_dict_and_needs_no_excitation() -> Non
         normal_force=20.0,
     )  # fmt: skip
     assert pressed.assembly.contacts[0].preload[0] == pytest.approx(20.0)
-    for made in (pressed, rubbing(rate(Coulomb(jnp.asarray(0.3))), Ground(V), 1.0)):
+    for made in (pressed, rubbing(rate(Coulomb(value(0.3))), Ground(V), 1.0)):
         refused(("harmonic balance cannot take", "microslip orbit"), ms.harmonic_response, made, [100.0])
     still = {key: value for key, value in BRAKE.items() if key not in ("ground", "law")}
     alone = {"body": "vane", "monitor": "probe", "contacts": [{**still, "normal_force": 20.0}]}

@@ -27,7 +27,7 @@ from microslip.linalg.gyroscopic import (
 from microslip.modal.campbell import crossings, gyroscopic_change, track_gyroscopic
 from microslip.modal.compute import modal_basis
 from microslip.modal.equilibrium import equilibrium, make_model
-from microslip.modal.run_up import run_up_terms
+from microslip.modal.invariants import run_up_terms
 from microslip.reduced.coordinates import in_modes
 from microslip.report.body import report_html
 from microslip.units import to_rpm

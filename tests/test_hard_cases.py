@@ -9,13 +9,13 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import partial
 
-import jax.numpy as jnp
 import numpy as np
 import pytest
 from test_harmonic_balance_time import beam_in_space, cantilever, duffing, group, held
 
 import microslip as ms
 from microslip.contact.friction import Coulomb
+from microslip.contact.law import value
 from microslip.contact.normal import Penalty
 from microslip.contact.point import PointContact
 from microslip.continuation import Branch, Settings, trace
@@ -28,7 +28,7 @@ from microslip.system.assembly import Assembly
 def gap() -> Assembly:
     """A mass that closes a gap of a tenth: it hardens, and slides where it touches."""
     rows = {"face": np.vstack([np.eye(3)[:, :2], np.zeros((3, 2))]), "push": np.array([1.0, 0.6]), "tip": np.eye(2)[0]}
-    law = PointContact(Penalty(jnp.asarray(3.0)), Coulomb(jnp.asarray(0.3)), jnp.asarray(2.0))
+    law = PointContact(Penalty(value(3.0)), Coulomb(value(0.3)), value(2.0))
     offset = np.array([-0.1, 0.0])
     return held(group(np.array([1.0, 1.2]), rows, 0.02), law, [0, 1], np.zeros(2), offset, 0.02)
 

@@ -130,7 +130,7 @@ def marched_amplitude(m: float, k: float, c: float, kt: float, limit: float, f: 
 
 def curve(f: np.ndarray, height: np.ndarray) -> FrequencyResponse:
     zero, none = np.zeros(len(f)), np.zeros((len(f), 0))
-    return FrequencyResponse(f, height.astype(complex), none, zero, np.ones(len(f), bool), np.zeros(0), none)
+    return FrequencyResponse(f, height.astype(complex), none, zero, np.ones(len(f), bool))
 
 
 @pytest.mark.parametrize(("dip", "found"), [(0.003, [2.0]), (0.03, [1.0, 2.0])])

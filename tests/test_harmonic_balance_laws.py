@@ -128,12 +128,12 @@ def modes_with_rows(seed: int = 3) -> tuple[ModalGroup, np.ndarray, np.ndarray]:
 def test_linear_limit_is_modal_superposition() -> None:
     """Pressed so hard that nothing opens, held so fast that nothing slides: springs; harmonics 0, 2, 3 vanish."""
     g, force, watched = modes_with_rows()
-    places, areas = grid(0.072, 0.005, (4, 3))
-    law = PointContact(Penalty(value(3e6 / 12)), Coulomb(value(1e6)), value(1e6 / 12))
+    places, areas = grid(0.072, 0.005, (3, 2))
+    law = PointContact(Penalty(value(3e6 / 6)), Coulomb(value(1e6)), value(1e6 / 6))
     patch = Patch("face", places, areas, law)
     frequency = np.linspace(20, 300, 5)
-    problem = of_body(g, (patch,), np.array([1e5]), force, watched, samples=16)
-    r = harmonic_response(problem, frequency, np.array([1.0]))
+    problem = of_body(g, (patch,), np.array([1e5]), force, watched, samples=36, cycles=30)  # as rings of tests
+    r = harmonic_response(problem, frequency)
     K = g.K_r + g.interfaces["face"].rows.T @ problem.stiffness[0] @ g.interfaces["face"].rows
     Omega = 2 * np.pi * frequency
     exact = [watched @ np.linalg.solve(K - w**2 * g.M_r + 1j * w * g.C_r, force) for w in Omega]
@@ -151,7 +151,7 @@ def test_the_reference_stiffness_does_not_matter(scale: float) -> None:
     problem = of_body(g, (rough_patch((3, 2), 8e6),), np.array([20.0]), 5 * force, watched, harmonics=1, samples=16)
     other = replace(problem, stiffness=(scale * problem.stiffness[0],))
     frequency = np.array([40.0, 60.0])
-    a, b = (harmonic_response(p, frequency, np.ones(1)) for p in (problem, other))
+    a, b = (harmonic_response(p, frequency) for p in (problem, other))
     assert a.converged.all() and b.converged.all() and a.slipping.max() > 0
     np.testing.assert_allclose(a.harmonics, b.harmonics, rtol=0, atol=1e-7 * np.abs(a.monitor).max())
 
@@ -167,7 +167,7 @@ def test_one_harmonic_and_a_constant_force_are_the_closed_form() -> None:
     for samples in (64, 256):
         patch = point(Preload(value(2.0)), kt, 0.3)
         problem = of_body(g, (patch,), np.array([2.0]), one, one, harmonics=1, samples=samples)
-        r = harmonic_response(problem, frequency, np.array([limit]))
+        r = harmonic_response(problem, frequency)
         assert r.converged.all()
         errors.append(float(np.abs(r.monitor - exact.monitor).max() / np.abs(exact.monitor).max()))
     assert errors[1] < 2e-4 and errors[0] > 8 * errors[1]
@@ -295,7 +295,7 @@ def test_jenkins_oscillator_against_time_integration(f: float) -> None:
     g, one = oscillator(), np.array([1.0])
     patch = point(Preload(value(2.0)), 2e4, 0.3)
     problem = of_body(g, (patch,), np.array([2.0]), one, one, harmonics=21, samples=2048, length=1e-4)
-    r = harmonic_response(problem, np.array([f]), np.array([0.6]))
+    r = harmonic_response(problem, np.array([f]))
     q, lost = marched(g, patch.law, problem, one, f, 80, 2048)
     u = in_time(problem, r, 2048)[:, 1]
     assert r.converged.all() and r.slipping[0, 0] > 0.05
@@ -311,7 +311,7 @@ def swinging(load: tuple[float, float, float], harmonics: int, samples: int) -> 
         three_dof(0.03), (patch,), np.array([8.0]), np.array(load), np.array([0, 1.0, 0]), harmonics=harmonics,
         samples=samples, cycles=3, length=1e-4,
     )  # fmt: skip
-    return problem, harmonic_response(problem, np.array([22.0]), np.ones(1))
+    return problem, harmonic_response(problem, np.array([22.0]))
 
 
 @pytest.mark.slow
@@ -363,9 +363,9 @@ def test_a_point_that_fails_is_recorded_and_the_sweep_goes_on(monkeypatch: pytes
 
     newton = solver.newton
     monkeypatch.setattr(solver, "newton", stubborn)
-    one, problem = np.ones(1), slider(1, 64)
+    problem = slider(1, 64)
     told: list[str] = []
-    r = harmonic_response(problem, np.array([19.0, 20.0, 21.0]), one, told.append)
+    r = harmonic_response(problem, np.array([19.0, 20.0, 21.0]), told.append)
     assert r.converged.tolist() == [True, False, True] and "no convergence" in r.status[1]
     assert told[1:] == [
         "2 of 3 frequencies: 20 Hz",
@@ -381,7 +381,7 @@ def test_a_body_that_only_its_contact_holds() -> None:
     g = body(np.vstack([np.eye(3), np.zeros((3, 3))]), np.array([0.0, 100.0, 100.0]))
     force = np.array([6.0, 0.5, 0.0])
     problem = of_body(g, (rough_patch((3, 2), 8e6),), np.array([8.0]), force, force, harmonics=1, samples=16)
-    r = harmonic_response(problem, np.array([20.0, 40.0]), np.ones(1))
+    r = harmonic_response(problem, np.array([20.0, 40.0]))
     assert r.converged.all()
     for x, f in zip(r.x, r.frequency, strict=True):
         assert problem.at(2 * np.pi * f).force(x)[0, 0] == pytest.approx(0.0, abs=8e-8)  # beyond the preload
@@ -395,7 +395,7 @@ def test_a_body_that_walks_away_is_no_solution() -> None:
     force = np.array([6.0, 0.5, 0.0])
     patch = Patch("face", np.zeros((1, 2)), np.ones(1), rough_patch((1, 1), 8e6).law)
     r = harmonic_response(
-        of_body(g, (patch,), np.array([8.0]), force, force, samples=128, cycles=10), np.array([20.0]), np.ones(1)
+        of_body(g, (patch,), np.array([8.0]), force, force, samples=128, cycles=10), np.array([20.0])
     )
     assert not r.converged.any() and np.isfinite(r.error).all() and np.isfinite(r.x).all()
 
@@ -527,7 +527,7 @@ def test_a_case_says_when_sliders_are_settled(tmp_path: Path) -> None:
         built = build(settings, {"sled": sled()})
         problem = problem_of(built, 5.0)
         assert getattr(problem.groups[0].model, "periodicity", None) == periodicity
-        found[periodicity] = harmonic_response(problem, np.array([60.0]), np.ones(1)).monitor[0]
+        found[periodicity] = harmonic_response(problem, np.array([60.0])).monitor[0]
     assert found[1e-10] == pytest.approx(found[0.0], rel=1e-8)
     assert found[1e-2] == pytest.approx(found[0.0], rel=1e-2)
     (message,) = not_periodic(5.0, np.array([4e-3]), settings)

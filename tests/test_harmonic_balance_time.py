@@ -14,8 +14,7 @@ from closed_forms.beams import beam_element
 from integrator import Start, Steady, extrapolated, steady
 
 from microslip.contact.friction import Coulomb
-from microslip.contact.harmonics import fourier
-from microslip.contact.law import Law, settings
+from microslip.contact.law import Law, settings, value
 from microslip.contact.normal import Penalty, Preload
 from microslip.contact.patch import Patch, grid
 from microslip.contact.point import PointContact
@@ -24,6 +23,7 @@ from microslip.harmonic_balance import problem as balance
 from microslip.harmonic_balance import response
 from microslip.harmonic_balance.response import Operating
 from microslip.harmonic_balance.solver import solve
+from microslip.series import fourier
 from microslip.system import Body, Force, Monitor, Spring, System
 from microslip.system import Contact as Face
 from microslip.system.assembly import Assembly, Contact, ContactFace, Load, Output, across, preloaded_contact
@@ -86,7 +86,7 @@ def duffing() -> Assembly:
     """q'' + 0.05 q' + q + 0.05 q^3 = 0.4 cos t."""
     one = np.ones(1)
     rows = {"face": np.outer([0, 1, 0, 0, 0, 0], one), "push": one, "tip": one}
-    return held(group(one, rows, 0.025), Cubic(jnp.asarray(0.05)), [1], np.zeros(1), np.zeros(1), 0.4)
+    return held(group(one, rows, 0.025), Cubic(value(0.05)), [1], np.zeros(1), np.zeros(1), 0.4)
 
 
 def bending(elements: int) -> tuple[Array, Array]:
@@ -106,7 +106,7 @@ def cantilever() -> Assembly:
     squares, shapes = bending(10)
     tip = shapes[-2]
     rows = {"face": np.outer([0, 1, 0, 0, 0, 0], tip), "push": tip, "tip": tip}
-    law = PointContact(Preload(jnp.asarray(1.0)), Coulomb(jnp.asarray(0.25)), jnp.asarray(20.0))
+    law = PointContact(Preload(value(1.0)), Coulomb(value(0.25)), value(20.0))
     return held(group(np.sqrt(squares), rows, 0.03), law, [1], np.zeros(1), np.zeros(1), 0.3)
 
 
@@ -114,7 +114,7 @@ def slider(harmonics: int, samples: int, ratio: float = 0.02, force: float = 1.0
     """1 kg, 100 rad/s, a Jenkins element of 2e4 N/m that slides at 0.6 N, after 30 um."""
     one = np.ones(1)
     rows = {"face": np.outer([0, 1, 0, 0, 0, 0], one), "push": one, "tip": one}
-    law = PointContact(Preload(jnp.asarray(2.0)), Coulomb(jnp.asarray(0.3)), jnp.asarray(2e4))
+    law = PointContact(Preload(value(2.0)), Coulomb(value(0.3)), value(2e4))
     rubs = held(group(np.array([100.0]), rows, ratio), law, [1], np.zeros(1), np.zeros(1), force)
     return balance.of(rubs, harmonics, samples, length=3e-5)
 
@@ -133,7 +133,7 @@ def beam_in_space() -> Assembly:
     n[:4], t2[4:8], t1[8] = tip, tip, 1.4
     push = np.concatenate([middle, 0.8 * middle, [0.7]])
     rows = {"face": np.vstack([n, t1, t2, np.zeros((3, 9))]), "push": push, "tip": n + t2}
-    law = PointContact(Penalty(jnp.asarray(40.0)), Coulomb(jnp.asarray(0.3)), jnp.asarray(25.0))
+    law = PointContact(Penalty(value(40.0)), Coulomb(value(0.3)), value(25.0))
     pressed = np.array([1.0, 0, 0])
     return held(group(omega, rows, 0.04), law, [0, 1, 2], pressed, pressed / 40.0, 3.0)
 
@@ -149,7 +149,7 @@ def ring_of_four() -> Assembly:
     spring = Spring("ground", "tip", (1e5, 3e5, 9e5, 100.0, 200.0, 300.0))
     blade = System("blade", [tip], [spring], faces, [push], [Monitor("tip", "tip")], ratio=0.04).basis()
     places, areas = grid(0.02, 0.01, (2, 1))
-    law = PointContact(Penalty(jnp.asarray(1e6)), Coulomb(jnp.asarray(0.2)), jnp.asarray(5e5))
+    law = PointContact(Penalty(value(1e6)), Coulomb(value(0.2)), value(5e5))
     facing = across(np.diag([1.0, 1, 1]), np.diag([-1.0, -1, 1]))
     patch = Patch("right", places, areas, law)
     contact = preloaded_contact(
@@ -207,7 +207,7 @@ def orders(values: list[Array]) -> Array:
 def test_the_integrator_is_of_second_order() -> None:
     """Against the exact answer of the linear beam, which nothing but springs holds, and by itself where it slides."""
     stuck = cantilever()
-    law = replace(stuck.contacts[0].patch.law, friction=Coulomb(jnp.asarray(1e3)))
+    law = replace(stuck.contacts[0].patch.law, friction=Coulomb(value(1e3)))
     contact = replace(stuck.contacts[0], patch=replace(stuck.contacts[0].patch, law=law))
     linear, Omega = replace(stuck, contacts=(contact,)), 3.9
     part = linear.joined(1)

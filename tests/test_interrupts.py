@@ -23,7 +23,7 @@ ROOT = Path(__file__).resolve().parents[1]
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="signals of POSIX systems")
 
 
-def slider() -> equations.Equations:
+def slider() -> equations.MotionEquations:
     return equations.of(ms.structure(1.0, 1.0, 0.02, force={0: 0.3}, elements=[ms.jenkins(1.0, 0.2)]), 0.8)
 
 
@@ -31,9 +31,9 @@ def test_ctrl_c_at_random_moments_of_a_motion_ends_it_and_loses_nothing(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Each is heard, though HDF5 is writing at most of them; the motion has the bits of one that nobody disturbed."""
-    for module in (samples, orbit):
+    for module in (recorded, orbit):
         monkeypatch.setattr(module, "PAUSE", 0.0)
-    path, asked = tmp_path / "orbit.h5", recorded.Asked("it", slider(), 0, 100, 16, 512)
+    path, asked = tmp_path / "orbit.h5", recorded.Integration("it", slider(), 0, 100, 16, 512)
     whole = recorded.run(tmp_path / "whole.h5", [asked])[0]
     draw, heard = random.Random(1), 0
     before = signal.getsignal(signal.SIGINT)
@@ -55,9 +55,9 @@ def test_ctrl_c_at_random_moments_of_a_motion_ends_it_and_loses_nothing(
 
 def test_how_large_a_file_of_motions_will_be_is_told(tmp_path, monkeypatch):
     """Of a large one, before its first sample: what all of its arrays take, events left out."""
-    told, asked = list[str](), recorded.Asked("it", slider(), 0, 100, 16, 512)
-    for announced in (samples.ANNOUNCED, 1e3):
-        monkeypatch.setattr(samples, "ANNOUNCED", announced)
+    told, asked = list[str](), recorded.Integration("it", slider(), 0, 100, 16, 512)
+    for announced in (recorded.ANNOUNCED, 1e3):
+        monkeypatch.setattr(recorded, "ANNOUNCED", announced)
         found = recorded.run(tmp_path / "orbit.h5", [asked], fresh=True, report=told.append)[0]
     size = sum(found.array(name).nbytes for name in samples.UNITS)
     (said,) = [text for text in told if " MB" in text]
@@ -66,14 +66,14 @@ def test_how_large_a_file_of_motions_will_be_is_told(tmp_path, monkeypatch):
 
 def test_no_period_of_a_motion_is_computed_twice(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Ended at the 20th of 60 periods, far within the second between two states that are kept: 41 are left."""
-    looks, asked = list[int](), recorded.Asked("it", slider(), 0, 60, 16, 512)
+    looks, asked = list[int](), recorded.Integration("it", slider(), 0, 60, 16, 512)
 
     def ended_at(number: int) -> None:
         looks.append(number)
         if len(looks) == number:
             raise KeyboardInterrupt
 
-    monkeypatch.setattr(samples, "PAUSE", 1e6)
+    monkeypatch.setattr(recorded, "PAUSE", 1e6)
     monkeypatch.setattr(orbit, "look", lambda: ended_at(20))
     with pytest.raises(KeyboardInterrupt):
         recorded.run(tmp_path / "orbit.h5", [asked])
@@ -201,7 +201,7 @@ from microslip import cli, progress
 from microslip.time_domain import equations, orbit, recorded, samples
 
 slider = ms.structure(1.0, 1.0, 0.02, force={0: 0.3}, elements=[ms.jenkins(1.0, 0.2)])
-asked = recorded.Asked("it", equations.of(slider, 0.8), 5, 40000, 16, 512)
+asked = recorded.Integration("it", equations.of(slider, 0.8), 5, 40000, 16, 512)
 
 def work(*words, **more):
     print("begins", flush=True)

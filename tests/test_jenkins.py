@@ -35,7 +35,7 @@ def test_six_springs_are_those_of_an_even_patch(slider: int) -> None:
     np.testing.assert_allclose(stuck_stiffness(patch, np.zeros(6)), six, rtol=1e-12, atol=1e-6)
 
 
-@pytest.mark.parametrize("slider", [1, 2])
+@pytest.mark.parametrize("slider", [1, pytest.param(2, marks=pytest.mark.slow)])
 def test_one_harmonic_is_the_closed_form(slider: int) -> None:
     """A block pushed along the sliders, so that they slide as one; the error falls with the square of the samples."""
     springs = [Spring("ground", "block", (4e5, 3e5, 2e5))]
@@ -56,14 +56,14 @@ def test_one_harmonic_is_the_closed_form(slider: int) -> None:
     )
     assert closed.converged.all() and (np.abs(closed.contact[:, slider]) > 2 * held / k).any()
     errors = []
-    for samples in (64, 256):
+    for samples in (24, 96):  # as cases of tests have
         contact = preloaded_contact("rub", four(held, slider), ContactFace("block", "rub"), None, normal=2.0)
         loads, outputs = (Load("block", "push"),), (Output("block", "tip", "u_y" if slider == 1 else "u_x"),)
         problem = balance.of(Assembly((Component("block", {0: group}),), (contact,), loads, outputs), 1, samples)
-        found = harmonic_response(problem, f, np.array([held]))
+        found = harmonic_response(problem, f)
         assert found.converged.all()
         errors.append(np.abs(found.monitor - closed.monitor).max() / np.abs(closed.monitor).max())
-    assert errors[1] < 3e-4 and errors[0] > 8 * errors[1]
+    assert errors[1] < 2e-3 and errors[0] > 8 * errors[1]
 
 
 def test_a_cycle_takes_what_the_law_counts_and_gives_nothing_back() -> None:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from refusals import refused_command
+from refusals import refused, refused_command
 from test_ring_down import CASE, SYSTEM
 
 import microslip as ms
@@ -72,6 +72,20 @@ def test_points_ridge_and_optimum(folder: Path, monkeypatch: pytest.MonkeyPatch,
     best = np.nanargmin(table["amplitude_m"])
     assert ridge.facts["optimal_normal_force_N"] == pytest.approx(table["normal_force_N"][best], rel=1e-6)
     assert np.nanmin(ridge["amplitude"]) == pytest.approx(table["amplitude_m"][best], rel=1e-6)
+
+
+def test_an_analysis_from_python(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Its datasets and sentences; nothing is written beside the case."""
+    case = folder / "case.toml"
+    case.write_text(case.read_text().replace("points = 25", "points = 7"))
+    answer = ms.analyse("map", "case.toml", forces=3, low=20.0)
+    ridge = answer.data[""]
+    assert ridge["normal_force"][[0, -1]] == pytest.approx([20.0, 60.0])
+    assert ridge.facts["optimal_normal_force_N"] in ridge["normal_force"] and "lowest" in answer.sentences[0]
+    assert ridge.to_xarray()["amplitude"].attrs["units"] == "m"
+    assert not list((folder / "build").glob("rung/*"))
+    refused("ring-down", ms.analyse, "colours", "case.toml")
+    refused("map.high", ms.analyse, "map", "case.toml", high=-1.0)
 
 
 def test_mistakes_name_their_keys(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:

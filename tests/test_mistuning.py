@@ -17,14 +17,15 @@ from microslip.case import load_case
 from microslip.data import ModalBasis
 from microslip.errors import UserError
 from microslip.harmonic_balance import problem as balance
-from microslip.harmonic_balance.solver import newton, solve
+from microslip.harmonic_balance.solver import Point, newton, solve
 from microslip.mistuning import ensemble, rare
 from microslip.mistuning.linear import answer, beside
 from microslip.mistuning.peaks import Highest, highest
 from microslip.mistuning.ring import Tuned
-from microslip.mistuning.samples import Asked, Sample, Sliding, Sticking, amplitudes, sample
+from microslip.mistuning.samples import Asked, Sample, SlidingRing, StickingRing, read, sample
+from microslip.mistuning.samples import amplitudes as amplitudes_at
 from microslip.mistuning.scatter import OF_CONTACTS, Scatter
-from microslip.mistuning.sensitivity import Linearised, sensitivities, softening, spread
+from microslip.mistuning.sensitivity import LinearisedRing, sensitivities, softening, spread
 from microslip.mistuning.statistics import Envelope, fits, quantile
 from microslip.mistuning.weibull import exponent
 from microslip.settings.mistakes import validate
@@ -38,6 +39,11 @@ RUB = {
 FINE = {"harmonics": 1, "samples": 32}
 SLIPS = 337.0
 """Hz, where friction holds the amplitude back; below 330 Hz and from 345 Hz contacts of six vanes stick."""
+
+
+def amplitudes(p: balance.Problem, point: Point) -> np.ndarray:
+    """(w,) complex amplitudes of the read-outs at a solution."""
+    return amplitudes_at(p.at(point.Omega), point.x)
 
 
 def sector(
@@ -69,9 +75,9 @@ def test_uniform_deviations_move_the_ring_as_one(tuned: Tuned) -> None:
     """All blades stiffer by (1 + d)^2 are a sector of such blades: the sum rule of first order holds with it."""
     s = Scatter("frequency", 1e-3)
     ring = tuned.mistuned([(s, np.full((6, 2), 0.02))])
-    y = Sticking(ring)(290.0)
+    y = StickingRing(ring)(290.0)
     other = Tuned(replace(tuned.sector, components=_stiffer(tuned.sector, 0.02)), {})
-    assert y == pytest.approx(Sticking(other.whole)(290.0)[0], rel=1e-10)
+    assert y == pytest.approx(StickingRing(other.whole)(290.0)[0], rel=1e-10)
 
 
 def _stiffer(one: Assembly, by: float) -> tuple[object, ...]:
@@ -208,22 +214,22 @@ def test_a_mistuned_ring_in_a_flow() -> None:
     probe = g.monitors["probe"].rows[g.monitors["probe"].labels.index(one.outputs[0].label)]
     expected = np.abs(np.kron(np.eye(6), probe) @ np.linalg.solve(A, force))
     s = Scatter("frequency", 0.01)
-    found = Sticking(ring.mistuned([(s, np.repeat(d[:, None], 2, axis=1))]))(287.0)
+    found = StickingRing(ring.mistuned([(s, np.repeat(d[:, None], 2, axis=1))]))(287.0)
     assert found == pytest.approx(expected, rel=1e-10)
-    assert np.abs(Sticking(ring.whole)(287.0) / expected - 1).max() > 0.01
+    assert np.abs(StickingRing(ring.whole)(287.0) / expected - 1).max() > 0.01
 
 
 def test_modal_files_of_single_blades_in_a_flow() -> None:
     """The same file again is the same ring."""
     ring = flown()
     same = Scatter("modal_file", others={4: ring.sector})
-    found = Sticking(ring.mistuned([(same, same.drawn(6, 1, 0, 0, 0))]))(287.0)
-    assert found == pytest.approx(Sticking(ring.whole)(287.0), rel=1e-12)
+    found = StickingRing(ring.mistuned([(same, same.drawn(6, 1, 0, 0, 0))]))(287.0)
+    assert found == pytest.approx(StickingRing(ring.whole)(287.0), rel=1e-12)
 
 
 def _sliding(asked: Asked) -> bool:
     """Whether friction changes what the tuned ring does."""
-    lone = Sticking(asked.tuned.whole)(float(asked.frequency[0]))
+    lone = StickingRing(asked.tuned.whole)(float(asked.frequency[0]))
     now = np.abs(amplitudes(asked.problem(asked.tuned.whole), asked.tuned_points[0]))
     return bool(np.abs(now / lone - 1).max() > 0.01)
 
@@ -254,7 +260,7 @@ def test_sensitivities_are_one_sided_where_sliding_begins() -> None:
     def moves(f: float, d: float = 0.0) -> tuple[float, float]:
         whole = ring.mistuned([(s, np.full((6, 2), d))])
         p = balance.of(whole, form="sides", **FINE)
-        return float(np.abs(amplitudes(p, solve(p, 2 * np.pi * f, [])))[0]), float(Sticking(whole)(f)[0])
+        return float(np.abs(amplitudes(p, solve(p, 2 * np.pi * f, [])))[0]), float(StickingRing(whole)(f)[0])
 
     def slope(f: float) -> float:
         asked = Asked(ring, (s,), np.array([f]), balance=FINE)
@@ -351,7 +357,7 @@ def test_stress_at_the_worst_node(stuck: bool) -> None:
     tuned = Tuned(replace(one, components=(replace(one.components[0], groups={0: replace(g, gauges=gauge)}),)), {})
     asked = Asked(tuned, (s,), np.linspace(335, 339, 5), balance=FINE, stuck=stuck)
     ring = tuned.mistuned(asked.deviations(0))
-    found, respond = sample(asked, 0), Sticking(ring) if stuck else Sliding(asked.problem(ring))
+    found, respond = sample(asked, 0), StickingRing(ring) if stuck else SlidingRing(asked.problem(ring))
     respond(found.top.frequency)
     q = np.concatenate(respond.coordinates(found.top.frequency)).reshape(6, 2)
     probe = tuned.sector.components[0].groups[0].monitors["probe"]
@@ -478,14 +484,14 @@ def test_one_transposed_solution_holds_all_sensitivities(tuned: Tuned, of: str) 
     """From the left (one solution) as from the right (one a mode): all modes of a blade to 1e-9."""
     s, body = Scatter(of, 0.003, together=0.0), 2
     asked = Asked(tuned, (s,), np.array([SLIPS]), balance=FINE)
-    now = Linearised.of(asked.problem(tuned.whole), asked.tuned_points[0])
+    now = LinearisedRing.of(asked.problem(tuned.whole), asked.tuned_points[0])
     _, found = sensitivities(asked, s, asked.tuned_points[0])
     for mode in range(2):
         push = [softening(now.at, body, s, mode, h) @ now.q[h][body] for h in (0, 1)]
         assert found[body, mode] == pytest.approx(_forward(now, body, push), rel=1e-9)
 
 
-def _forward(now: Linearised, body: int, push: list[np.ndarray]) -> float:
+def _forward(now: LinearisedRing, body: int, push: list[np.ndarray]) -> float:
     """Change of the first read-out's amplitude by forces on a body, of the harmonics 0 and 1."""
     own = slice(body * 12, body * 12 + 12)
     R = np.zeros((3, now.at.problem.count))
@@ -493,7 +499,12 @@ def _forward(now: Linearised, body: int, push: list[np.ndarray]) -> float:
     moved = [np.linalg.solve(A, f) for (A, _), f in zip(parts, push, strict=True)]
     mean, first = (rows @ q for (_, rows), q in zip(parts, moved, strict=True))
     R[0, own], R[1, own], R[2, own] = mean.real, first.real, -first.imag
-    dy = now.after(R)[1] - (now.at.problem.parts[1][body].output @ moved[1])
+    p = now.at.problem
+    v = p.displacement(now.matrix.solve(-(R / p.scale).ravel()))
+    changed = now.felt(v)
+    held = np.hstack([v[:, s] @ k.T for s, k in zip(p.slices, p.stiffness, strict=True)])
+    dq = now.at.coordinates(changed - held, 0.0)[1]
+    dy = read(now.at, dq, changed, 0.0) - (p.parts[1][body].output @ moved[1])
     return float((np.conj(now.y[0]) * dy[0]).real / np.abs(now.y[0]))
 
 
@@ -504,7 +515,7 @@ def test_the_linear_ring_is_the_ring_that_sticks(tuned: Tuned) -> None:
     linear = beside(asked)
     for i in range(4):
         d = asked.deviations(i)
-        sticks = Sticking(tuned.mistuned(d))
+        sticks = StickingRing(tuned.mistuned(d))
         for f in (320.0, 333.3, 337.0):
             y = linear.amplitudes(np.array([(2 * np.pi * f) ** 2]), linear.own(d))
             assert y[0] == pytest.approx(sticks(f), rel=1e-3)
@@ -539,7 +550,7 @@ def test_chosen_samples_of_a_ring_that_sticks(tuned: Tuned, tmp_path: Path) -> N
 def test_the_linear_ring_answers_as_contacts_do_on_average(tuned: Tuned) -> None:
     """k u is the mean over all phases of the tangent's force, turned back: 1e-12."""
     asked = Asked(tuned, (Scatter("frequency", 0.002),), np.array([SLIPS]), balance=FINE)
-    now = Linearised.of(asked.problem(tuned.whole), asked.tuned_points[0])
+    now = LinearisedRing.of(asked.problem(tuned.whole), asked.tuned_points[0])
     k, turns = answer(now.at, now.slopes), np.exp(2j * np.pi * np.arange(8) / 8)
     u, S = np.random.default_rng(0).normal(size=(6, 2)) @ [1, 1j], now.slopes[0][0]
     back = []

@@ -13,13 +13,13 @@ import numpy as np
 import pytest
 import scipy.stats
 from refusals import refused
-from test_mistuning import FINE, SLIPS, sector
+from test_mistuning import FINE, SLIPS, amplitudes, sector
 
 from microslip.harmonic_balance.forces import _with_slopes, beside
 from microslip.mistuning import ensemble
 from microslip.mistuning.peaks import Highest
 from microslip.mistuning.ring import Tuned
-from microslip.mistuning.samples import Asked, Sample, Sticking, amplitudes
+from microslip.mistuning.samples import Asked, Sample, StickingRing
 from microslip.mistuning.scatter import Scatter
 from microslip.mistuning.statistics import fits
 from microslip.system.assembly import Assembly
@@ -42,7 +42,7 @@ def test_a_circulant_ring_in_closed_form() -> None:
         d, D, w0 = right - turn * left, g.damping_ratio[0], g.omega[0]
         read = g.monitors["probe"].rows[g.monitors["probe"].labels.index(one.outputs[0].label), 0]
         q = 2.0 * g.excitations["magnet"].rows[0, 0] / (w0**2 - w**2 + 2j * D * w0 * w + (d.conj().T @ k @ d)[0, 0])
-        assert Sticking(ring.whole)(287.0) == pytest.approx(np.full(6, abs(read * q)), rel=1e-10)
+        assert StickingRing(ring.whole)(287.0) == pytest.approx(np.full(6, abs(read * q)), rel=1e-10)
 
 
 def test_a_run_ends_when_its_interval_is_narrow(tuned: Tuned) -> None:
@@ -121,7 +121,7 @@ def test_many_samples_are_counted_at_no_cost(
 
     kept, ordered = list[int](), list[int]()
     monkeypatch.setattr(ensemble, "sample", made)
-    monkeypatch.setattr(ensemble, "_keep", lambda file, inputs, found: kept.append(len(found)))
+    monkeypatch.setattr(ensemble, "_keep", lambda file, inputs, rows, **_: kept.append(len(rows)))
     monkeypatch.setattr(ensemble, "quantile", lambda x, *given: ordered.append(len(x)) or of(x, *given))
     asked = Asked(tuned, (Scatter("frequency", 0.01),), np.array([286.0, 287.0, 288.0]), stuck=True)
     found = ensemble.run(asked, count, workers=1, file=tmp_path / "m.npz")
@@ -178,7 +178,7 @@ def test_a_ring_damped_by_its_stuck_modes() -> None:
     which is none; ratios of bodies do not scatter, as there are none; modes that are mixed are refused."""
     for given in ((0.005,), (0.005, 0.05)):
         one = _damped(sector(), given)
-        assert Sticking(one.unrolled())(337.2) == pytest.approx(np.full(6, Sticking(one)(337.2)[0]), rel=1e-9)
+        assert StickingRing(one.unrolled())(337.2) == pytest.approx(np.full(6, StickingRing(one)(337.2)[0]), rel=1e-9)
     ring = Tuned(one, {})
     faster = ring.mistuned([(Scatter("frequency", 0.1), np.full((6, 2), 0.1))])
     assert all(not m.groups[0].C_r.any() for m in faster.components)

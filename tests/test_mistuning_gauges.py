@@ -4,18 +4,18 @@ from __future__ import annotations
 
 from functools import cache
 
-import jax.numpy as jnp
 import numpy as np
 import pytest
 from refusals import refused
 
 from microslip.contact.friction import Coulomb
+from microslip.contact.law import value
 from microslip.contact.normal import Penalty
 from microslip.contact.patch import Patch
 from microslip.contact.point import PointContact
 from microslip.mistuning.gauges import Stuck, blades_from_gauges
 from microslip.mistuning.ring import Tuned
-from microslip.mistuning.samples import Sticking
+from microslip.mistuning.samples import StickingRing
 from microslip.mistuning.scatter import Scatter
 from microslip.system import Body, Contact, Force, Monitor, Spring, System
 from microslip.system.assembly import Assembly, ContactFace, Load, Output, across, preloaded_contact
@@ -33,7 +33,7 @@ def ring(blades: int) -> Stuck:
         "blade", [Body("tip", 1.0, free="x y")], [Spring("ground", "tip", (1e6, 2.2e6, 1.0))], faces,
         [Force("gas", "tip", (1, 0.4, 0))], [Monitor("tip", "tip")], ratio=0.002,
     ).basis()  # fmt: skip
-    law = PointContact(Penalty(jnp.asarray(2e4)), Coulomb(jnp.asarray(0.3)), jnp.asarray(1e4))
+    law = PointContact(Penalty(value(2e4)), Coulomb(value(0.3)), value(1e4))
     facing = across(np.diag([1.0, 1, 1]), np.diag([-1.0, -1, 1]))
     sides = ContactFace("blade", "right"), ContactFace("blade", "left", facing, 1)
     contact = preloaded_contact("shroud", Patch("right", np.zeros((1, 2)), np.array([1e-6]), law), *sides, normal=20.0)
@@ -50,7 +50,7 @@ def test_the_model_is_that_of_a_sample():
     """A ring of which a sample is made, factorised afresh, to rounding; on, beside and above its resonances."""
     stuck, d = ring(5), np.random.default_rng(1).normal(0, 0.02, 5)
     s = Scatter("frequency", deviation=0.02)
-    sample = Sticking(stuck.tuned.mistuned([(s, np.repeat(d[:, None], 2, axis=1))]))
+    sample = StickingRing(stuck.tuned.mistuned([(s, np.repeat(d[:, None], 2, axis=1))]))
     for f in (150.0, 162.0, 236.0):
         assert np.allclose(np.abs(stuck.amplitudes(f, d)[0]), sample(f), rtol=1e-10)
 

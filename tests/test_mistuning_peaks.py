@@ -10,10 +10,9 @@ import scipy.optimize
 from test_mistuning import FINE, sector
 
 from microslip.harmonic_balance.solver import CONVERGED, Point
-from microslip.mistuning.branch import Branch
 from microslip.mistuning.peaks import highest
 from microslip.mistuning.ring import Tuned
-from microslip.mistuning.samples import Asked, Sliding
+from microslip.mistuning.samples import Arc, Asked, SlidingRing
 
 LOW, HIGH = 94.0, 111.0
 Curve = Callable[[float], np.ndarray]
@@ -135,10 +134,10 @@ def test_a_contact_that_opens() -> None:
     asked = Asked(tuned, (), np.zeros(0), balance=FINE)
     fine, walks = np.arange(343.0, 357.0, 1.0), []
     for grid in (fine, fine[::-1]):
-        walk = Sliding(asked.problem(tuned.whole))
+        walk = SlidingRing(asked.problem(tuned.whole))
         walks.append(np.array([0.0 if (y := walk(f)) is None else y.max() for f in grid]))
     top = max(walk.max() for walk in walks)
-    ring = Sliding(asked.problem(tuned.whole))
+    ring = SlidingRing(asked.problem(tuned.whole))
     found = highest(ring, np.arange(342.0, 358.0, 5.0), follow=ring.follow, at_once=ring.at_once, tells=ring.tells)
     assert found.missed < 0.1
     assert top / found.amplitude - 1 <= found.missed
@@ -200,7 +199,7 @@ def test_nothing_is_followed_to_where_it_leads_anyway(told: bool) -> None:
 
 def test_what_a_solution_leads_to_is_told_by_those_beyond_it() -> None:
     """Of x = (f, f^2) a line through two points leads to a third one nearby; of one that jumps it does not."""
-    ring = Sliding(Bent([0.0, 1.0], [0.0, 1.0]))
+    ring = SlidingRing(Bent([0.0, 1.0], [0.0, 1.0]))
     for f, height in ((1.0, 0.0), (1.2, 0.0), (1.4, 0.0), (1.6, 0.5)):
         ring.known[f] = Point(2 * np.pi * f, np.array([f, f**2 - height]), CONVERGED, 0.0, 0)
     assert ring.tells(1.4, 1.2) and ring.tells(1.0, 1.2)
@@ -240,9 +239,9 @@ def test_a_solution_is_followed_round_sharp_corners() -> None:
     for the end of one that has to go to 12.8 only."""
     bent = Bent([1.0, 2.0, 2.1, 3.0, 3.5], [10.0, 12.0, 11.7, 13.0, 10.0])
     begin = Point(10.2, np.array([1.1]), CONVERGED, 0.0, 0)
-    points, ends = Branch(bent, begin, 14.0, 2.0).onward()
+    points, ends = Arc(bent, begin, 14.0, 2.0).onward()
     assert ends and 13.0 - 0.01 < points[-1].Omega <= 13.0
     assert all(a.Omega < b.Omega for a, b in zip(points, points[1:], strict=False))
-    points, ends = Branch(bent, begin, 12.8, 2.0).onward()
+    points, ends = Arc(bent, begin, 12.8, 2.0).onward()
     assert not ends and points[-1].Omega >= 12.8
     assert points[-1].x == pytest.approx(2.1 + (points[-1].Omega - 11.7) / 1.3 * 0.9)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import jax.numpy as jnp
 import numpy as np
 import pytest
 from refusals import refused
@@ -14,6 +13,7 @@ from test_harmonic_balance_time import slider
 
 import microslip as ms
 from microslip.contact.friction import Coulomb
+from microslip.contact.law import value
 from microslip.contact.normal import Penalty
 from microslip.contact.patch import Patch, grid
 from microslip.contact.point import PointContact
@@ -114,7 +114,7 @@ def two_modes(normal, harmonics=3, force=1.0, second=55.0):
     rows[3] = 0.0, 60.0  # turns the patch about its normal: its points slide one after the other
     g = body(rows, 2 * np.pi * np.array([30.0, second]), 0.003)
     places, areas = grid(0.02, 0.01, (8, 1))
-    law = PointContact(Penalty(jnp.asarray(4e5)), Coulomb(jnp.asarray(0.3)), jnp.asarray(5e3))
+    law = PointContact(Penalty(value(4e5)), Coulomb(value(0.3)), value(5e3))
     return of_body(
         g, (Patch("face", places, areas, law),), np.array([normal]), force * np.array([1.0, 0.0]),
         np.array([1.0, -0.5]), harmonics=harmonics, samples=128, length=1e-4,
@@ -194,8 +194,8 @@ def test_a_body_of_one_mode_without_damping():
     """Its only eigenvalue is its own geometric mean; what the contacts see is finite beside it."""
     problem = sliding(ratio=0.0)
     seen = problem.eliminated[0].at(150.0)
-    assert np.isfinite(seen.compliance).all()
-    assert seen.compliance[0, 1, 0, 0] == pytest.approx(1 / (3e4 - 150.0**2), rel=1e-12)
+    assert np.isfinite(seen[..., 1:]).all()
+    assert seen[0, 1, 0, 1] == pytest.approx(1 / (3e4 - 150.0**2), rel=1e-12)
 
 
 def test_mistakes():

@@ -332,7 +332,7 @@ def linear_patch(counts=(6, 2), normal=100.0, friction=0.3):
 
 def marched_map(patch, side, u, samples=2048):
     """The map of a patch whose law is marched through the cycle of its coordinates, 0.01 s long."""
-    from microslip.harmonic_balance.point_cycles import traced
+    from microslip.harmonic_balance.forces import traced
     from microslip.operating.contact_maps import contact_map
 
     force, c = traced(patch.law, patch.kinematics, u, 0.01, samples, 100)

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from types import SimpleNamespace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -17,6 +17,7 @@ from microslip.operating.fatigue import endurance
 from microslip.operating.motion import displacement
 from microslip.operating.stress import cycle_stress
 from microslip.pictures import operating
+from microslip.pictures.plots import figure_of, save
 
 LIMITS = MaterialLimits(fatigue_strength=300e6, tensile_strength=900e6, yield_strength=700e6)
 
@@ -40,56 +41,50 @@ def test_curves(tmp_path):
     curves = {n: (f, np.where(f > 190, np.nan, n / (1 + (f - 150) ** 2))) for n in (1.0, 10.0, 100.0)}
     peaks = {"first": [(0.0, 9.0), (1.0, 3.0), (10.0, 1.0), (99.0, 5.0)]}
     shown = [
-        operating.over_frequency_plot(curves, "amplitude in µm", "t", tmp_path / "a.png"),
-        operating.over_normal_force_plot(peaks, "y", "t", tmp_path / "b.png"),
-    ]  # fmt: skip
+        save(partial(operating.over_frequency_plot, curves, "amplitude in µm", "t"), tmp_path / "a.png"),
+        save(partial(operating.over_normal_force_plot, peaks, "y", "t"), tmp_path / "b.png"),
+    ]
     assert all(0.01 < dark(p) < 0.6 for p in shown)
 
 
-def kept(monkeypatch) -> list[Any]:
-    """The figures that are saved from now on."""
-    figures: list[Any] = []
-    monkeypatch.setattr(operating, "save_figure", lambda figure, path: figures.append(figure) or path)
-    return figures
-
-
-def test_a_legend_rises_and_is_read_by_rows(tmp_path, monkeypatch):
+def test_a_legend_rises_and_is_read_by_rows():
     """The smallest normal force is named first; eight in two rows."""
-    figures, f = kept(monkeypatch), np.linspace(100, 200, 5)
-    operating.over_frequency_plot({float(n): (f, n + f) for n in range(1, 9)}, "y", "t", tmp_path / "a.png")
-    (legend,) = figures[0].legends
+    f = np.linspace(100, 200, 5)
+    curves = {float(n): (f, n + f) for n in range(1, 9)}
+    (legend,) = figure_of(partial(operating.over_frequency_plot, curves, "y", "t")).legends
     told = [int(text.get_text().split()[-2]) for text in legend.get_texts()]
     columns = [told[i : i + 2] for i in (0, 2)] + [[n] for n in told[4:]]
     assert [c[0] for c in columns] + [c[1] for c in columns if len(c) > 1] == list(range(1, 9))
 
 
-def test_curves_that_coincide_are_all_seen_and_what_is_missing_is_marked(tmp_path, monkeypatch):
+def test_curves_that_coincide_are_all_seen_and_what_is_missing_is_marked():
     """Each is thinner than the one it covers; a cross for every point without a solution, told once and last."""
-    figures, f = kept(monkeypatch), np.linspace(100, 200, 5)
+    f = np.linspace(100, 200, 5)
     y = np.array([1.0, np.nan, 3, 4, 5])
-    operating.over_frequency_plot({1.0: (f, y), 2.0: (f, y), 3.0: (f, f)}, "y", "t", tmp_path / "a.png")
-    lines = figures[0].axes[0].get_lines()
+    curves = {1.0: (f, y), 2.0: (f, y), 3.0: (f, f)}
+    figure = figure_of(partial(operating.over_frequency_plot, curves, "y", "t"))
+    lines = figure.axes[0].get_lines()
     drawn = [line.get_linewidth() for line in lines if line.get_label().startswith("$F_N$")]
     assert drawn == sorted(set(drawn), reverse=True) and len(drawn) == 3
     crosses = [line.get_xydata() for line in lines if line.get_marker() == "x"]
     assert [list(c[:, 0]) for c in crosses] == [[125.0], [125.0]] and crosses[0][0, 1] != crosses[1][0, 1]
-    assert [t.get_text() for t in figures[0].legends[0].get_texts()].count("did not converge") == 1
+    assert [t.get_text() for t in figure.legends[0].get_texts()].count("did not converge") == 1
 
 
-def test_words_beside_the_places_tell_their_range(tmp_path, monkeypatch):
-    figures, cycle = kept(monkeypatch), cycle_stress(motion())
+def test_words_beside_the_places_tell_their_range():
+    cycle = cycle_stress(motion())
     share = np.linspace(0, 1, len(cycle.mean))
     low = replace(cycle, amplitude=1e6 * share, mean=1.4e6 * share - 4e5)
-    operating.haigh_plot(low, LIMITS, endurance(low, LIMITS), "t", tmp_path / "h.png")
-    assert any("mean stress -0.4 to 1 MPa" in text.get_text() for text in figures[0].axes[0].texts)
+    figure = figure_of(partial(operating.haigh_plot, low, LIMITS, endurance(low, LIMITS), "t"))
+    assert any("mean stress -0.4 to 1 MPa" in text.get_text() for text in figure.axes[0].texts)
 
 
 def test_haigh_diagram(tmp_path):
     cycle = cycle_stress(motion())
     worst = endurance(cycle, LIMITS)
-    assert 0.01 < dark(operating.haigh_plot(cycle, LIMITS, worst, "t", tmp_path / "h.png")) < 0.6
+    assert 0.01 < dark(save(partial(operating.haigh_plot, cycle, LIMITS, worst, "t"), tmp_path / "h.png")) < 0.6
     still = replace(cycle, amplitude=0 * cycle.amplitude)
-    operating.haigh_plot(still, LIMITS, endurance(still, LIMITS), "t", tmp_path / "h.png")
+    save(partial(operating.haigh_plot, still, LIMITS, endurance(still, LIMITS), "t"), tmp_path / "h.png")
 
 
 @pytest.mark.parametrize("harmonics", [1, 3])
@@ -143,7 +138,8 @@ def test_stressed_body_and_contact_maps(tmp_path):
     side = small_basis().groups[0, 0].interfaces["right"]
     found = marched_map(patch, side, u)
     scattered = replace(found, places=found.places + 1e-4 * np.sin(np.arange(24)).reshape(12, 2))
-    assert dark(operating.contact_map_plot([found, scattered, found], "t", tmp_path / "m.png")) > 0.05
+    draw = partial(operating.contact_map_plot, [found, scattered, found], "t")
+    assert dark(save(draw, tmp_path / "m.png")) > 0.05
     if (reason := can_draw()) is not None:
         pytest.skip(reason)
     from microslip.pictures.scene import quiet_vtk

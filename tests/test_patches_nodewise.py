@@ -15,6 +15,7 @@ from meshes import brick
 from refusals import refused
 
 from microslip.contact.friction import Coulomb
+from microslip.contact.law import value
 from microslip.contact.normal import Penalty
 from microslip.contact.patch import Patch, equilibrium, pressed_by, pressure
 from microslip.contact.point import PointContact
@@ -35,7 +36,7 @@ SIZE = (0.02, 0.016, 0.012)
 
 
 def law(areas: Array, mu: float = 0.3) -> PointContact:
-    return PointContact(Penalty(jnp.asarray(FOUNDATION * areas)), Coulomb(jnp.asarray(mu)),
+    return PointContact(Penalty(value(FOUNDATION * areas)), Coulomb(value(mu)),
                         jnp.asarray(0.8 * FOUNDATION * areas))  # fmt: skip
 
 
@@ -199,7 +200,7 @@ def bar_pressed(group: ModalGroup, tolerance: float = 1e-4) -> tuple[Array, int]
     found = nodal((bar, "right"), tolerance=tolerance)
     side, _ = found.sides(ContactFace("bar", "right"), None)
     k = jnp.asarray(2.3e12 * found.areas)
-    patch = Patch("right", found.points, found.areas, PointContact(Penalty(k), Coulomb(jnp.asarray(0.3)), k),
+    patch = Patch("right", found.points, found.areas, PointContact(Penalty(k), Coulomb(value(0.3)), k),
                   found.shapes)  # fmt: skip
     u = equilibrium(patch, 3000.0, compliance=static_compliance([(bar, side, 1.0)]))
     return pressure(patch, u), found.count - 6

@@ -6,7 +6,6 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
 
-import jax.numpy as jnp
 import numpy as np
 import pytest
 import scipy.optimize
@@ -15,6 +14,7 @@ from test_harmonic_balance_laws import body, modes_with_rows, rough_patch
 import microslip as ms
 from microslip.analyses import balanced
 from microslip.contact.friction import Coulomb
+from microslip.contact.law import value
 from microslip.contact.normal import Penalty
 from microslip.contact.patch import Patch, grid
 from microslip.contact.point import PointContact
@@ -22,10 +22,9 @@ from microslip.continuation import NO_OPTIMUM, Settings, extremum, lowest, peak,
 from microslip.harmonic_balance import peak as peaks
 from microslip.harmonic_balance.peak import highest, optimum, resonance
 from microslip.harmonic_balance.readout import amplitude
-from microslip.harmonic_balance.refinement import filled_response
-from microslip.harmonic_balance.response import of_body, operating, refined_peaks
+from microslip.harmonic_balance.response import filled_response, of_body, operating, refined_peaks
 from microslip.harmonic_balance.solver import solve, sweep
-from microslip.stages.following import missed, optimum_message
+from microslip.verbs.optimum import missed, optimum_message
 
 
 @dataclass(frozen=True)
@@ -284,10 +283,10 @@ def test_amplitude_of_a_readout_and_its_derivatives():
     """The value is what the response reports; derivatives against differences, slipping, opening, every form."""
     g, force, watched = modes_with_rows()
     patch = rough_patch((3, 2), 8e6)
-    problem = of_body(g, (patch,), np.array([20.0]), 8 * force, watched, harmonics=2, samples=32, length=1e-5)
+    problem = of_body(g, (patch,), np.array([20.0]), 8 * force, watched, harmonics=1, samples=16, length=1e-5)
     Omega, rng = 2 * np.pi * 47.0, np.random.default_rng(1)
     point = solve(problem, Omega, [])
-    for harmonic in (0, 1, 2):
+    for harmonic in (0, 1):
         found = amplitude(problem.at(Omega), point.x, *problem.at(Omega).forces(point.x), harmonic=harmonic)
         assert found.value == pytest.approx(operating(problem, point).outputs[0, harmonic], rel=1e-12)
     x = point.x + 0.2 * rng.normal(size=problem.size)
@@ -310,7 +309,7 @@ def pressed(normal, samples=256):
     """Two modes of 30 and 55 Hz that slide along t1 over eight points, pressed by a normal force (N)."""
     g, force, watched = two_modes()
     places, areas = grid(0.02, 0.01, (8, 1))
-    law = PointContact(Penalty(jnp.asarray(4e5)), Coulomb(jnp.asarray(0.3)), jnp.asarray(5e3))
+    law = PointContact(Penalty(value(4e5)), Coulomb(value(0.3)), value(5e3))
     return of_body(
         g, (Patch("face", places, areas, law),), np.array([normal]), force, watched, harmonics=1, samples=samples,
         length=1e-4,
@@ -351,7 +350,7 @@ def test_a_resonance_narrower_than_a_step_is_found_as_a_response_finds_it():
     patch, band = rough_patch((3, 2), 4e5), 2 * np.pi * np.linspace(28, 48, 6)
     problem = of_body(g, (patch,), np.array([1e4]), force, watched, harmonics=2, samples=32, length=1e-5)
     top = highest(problem, band)
-    response = filled_response(problem, band / (2 * np.pi), np.zeros(1))
+    response = filled_response(problem, band / (2 * np.pi))
     best = max(refined_peaks(problem, response), key=lambda one: one.amplitude)
     assert np.sqrt(top.peak.value) == pytest.approx(best.amplitude, rel=1e-12)
     part, k = problem.parts[1][0], problem.stiffness[0]
@@ -409,7 +408,7 @@ def masses(normal):
     rows = np.zeros((6, 3))
     rows[1] = modes[2]
     g = body(rows, np.sqrt(squares), 0.004)
-    law = PointContact(Penalty(jnp.asarray(1e4)), Coulomb(jnp.asarray(0.3)), jnp.asarray(5e3))
+    law = PointContact(Penalty(value(1e4)), Coulomb(value(0.3)), value(5e3))
     patch = Patch("face", np.zeros((1, 2)), np.ones(1), law)
     return of_body(
         g, (patch,), np.array([normal]), modes[0], modes[2], harmonics=1, samples=48, length=1e-4
@@ -452,7 +451,7 @@ def test_a_top_at_the_end_of_the_band_is_no_peak():
 def test_where_one_resonance_takes_over_from_another():
     """Two modes driven by p and 1/p, the contact stuck: peaks p a and b / p are lowest together at p^2 = b / a."""
     g, _, _ = two_modes()
-    law = PointContact(Penalty(jnp.asarray(4e5)), Coulomb(jnp.asarray(1e6)), jnp.asarray(5e3))
+    law = PointContact(Penalty(value(4e5)), Coulomb(value(1e6)), value(5e3))
 
     def driven(p):
         patch = Patch("face", np.zeros((1, 2)), np.ones(1), law)

@@ -6,6 +6,7 @@ import os
 import subprocess
 import sys
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import meshes
@@ -18,7 +19,7 @@ from hypothesis import strategies as st
 from microslip import pictures
 from microslip.data import ContactState, ModalBasis
 from microslip.pictures import lettering, scene
-from microslip.pictures.plots import closure_plot
+from microslip.pictures.plots import closure_plot, figure_of, save
 
 pytest.importorskip("pyvista")
 pytest.importorskip("matplotlib")
@@ -198,8 +199,8 @@ def test_pressures_of_many_closures_fit_on_a_page(count: int, speeds: tuple[floa
     one, basis, force = np.ones(len(x)), small.basis(speeds), np.array([0.0, 0.0, 240.0])
     state = ContactState("a", "b", "", "open", 0, 240.0, 1.0, 0.0, 1.0, 0.0, force, x[0], x, 1e6 * one, one, 1e-6 * one)
     groups = {k: replace(g, contacts={f"c{i}": state for i in range(count)}) for k, g in basis.groups.items()}
-    path = closure_plot(replace(basis, groups=groups), tmp_path / "closure.png")
-    assert path is not None and closure_plot(basis, path) is None
+    path = save(partial(closure_plot, replace(basis, groups=groups)), tmp_path / "closure.png")
+    assert not figure_of(partial(closure_plot, basis)).axes
     with Image.open(path) as image:
         assert max(image.size) < 2000 and min(image.size) > 150
 

@@ -26,7 +26,7 @@ WORDS = {"sized", "percent", "number", "hertz", "rpm_text", "_energy", "_number"
 
 CARRY = WORDS | set(
     """
-    _amount _metres abs array astype columns counted dict enumerate float fromkeys in_modes int
+    _sized in_shades in_unit abs array astype columns counted dict enumerate float fromkeys in_modes int
     items len list max min open_studio range replace reshape reversed round scale shared sorted
     span stack str to_rpm tolist tuple unique values zip
     """.split()

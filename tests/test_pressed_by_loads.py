@@ -13,8 +13,8 @@ from microslip.case.problem import forces_of, pressed_by, problem_of
 from microslip.errors import NotConverged, UserError
 from microslip.harmonic_balance import nonlinear_modes
 from microslip.harmonic_balance import problem as balance
-from microslip.stages.following import counted_from_1
 from microslip.system import Body, Contact, Force, Monitor, Spring, System
+from microslip.verbs.backbone import counted_from_1
 
 HELD, NORMAL, TANGENTIAL = 1e5, 3e6, 1e6
 
@@ -30,7 +30,8 @@ def pressed(force: float, **contact: Any) -> Any:
     law = {"normal_stiffness": NORMAL, "tangential_stiffness": TANGENTIAL, "includes": "surface", "friction": 0.3}
     patch = {"width": 0.01, "height": 0.01, "points": [2, 2]}
     case = {
-        "monitor": "held:a", "direction": "x", "harmonics": 1, "bodies": [{"name": "held"}, {"name": "loose"}],
+        "monitor": "held:a", "direction": "x", "harmonics": 1, "samples": 24,
+        "bodies": [{"name": "held"}, {"name": "loose"}],
         "excitations": [{"row": "held:push", "amplitude": 1.0},
                         {"row": "loose:press", "amplitude": force, "harmonic": 0}],
         "contacts": [{"interface": "held:face", "against": "loose:face", "interference": 0.0,
@@ -73,7 +74,7 @@ def test_modes_that_do_not_bend_are_refused() -> None:
     free = ms.structure(np.eye(2), [[1.0, -1.0], [-1.0, 1.0]], force={0: 1.0}, elements=[ms.jenkins(1.0, 1.0, 0, 1)])
     apart = ms.structure(np.eye(2), np.diag([1.0, 4.0]), output=1, elements=[ms.jenkins(1.0, 1.0, 0)])
     problem = balance.of(free, harmonics=1, form="relative")
-    with pytest.raises(UserError, match=r"^--mode 1: is a rigid motion.*the first is --mode 2, 0\.31"):
+    with pytest.raises(UserError, match=r"^mode: 1: is a rigid motion.*the first is --mode 2, 0\.31"):
         counted_from_1(problem, 1)
     assert counted_from_1(problem, 2) == 1
     for system, mode in ((free, 0), (apart, 1)):

@@ -187,6 +187,7 @@ def test_another_process_finds_them(tmp_path: Path) -> None:
     assert said[0] == said[1] and held[0] == held[1] and held[0]
 
 
+@pytest.mark.slow
 def test_a_process_that_has_lowered_nothing_finds_lapack(tmp_path: Path) -> None:
     """It called what nobody had looked for, and ended."""
     solve = f"""

@@ -14,7 +14,7 @@ from random_systems import AT_HOME, HARD, Verdict, at_home, compared, drawn, int
 
 from microslip.harmonic_balance import accuracy, reduced, response
 from microslip.harmonic_balance import problem as balance
-from microslip.harmonic_balance.point_cycles import Cycle
+from microslip.harmonic_balance.forces import Cycle
 from microslip.results.checks import COUNTED
 from microslip.system.assembly import Assembly
 

@@ -359,7 +359,8 @@ def test_hermitian_problems_reduce_as_their_real_twins(method):
 def test_friction_response_is_the_same_through_every_method_that_is_statically_exact():
     """Peaks of a stuck block between rigid neighbours: MacNeal's residual, and coordinates without mass or of force."""
     case = case_model().model_validate({
-        "name": "c", "body": "test", "excitation": "push", "monitor": "look", "direction": "y",
+        "name": "c", "body": "test", "excitation": "push", "monitor": "look", "direction": "y", "harmonics": 1,
+        "samples": 24,
         "contacts": [
             {"interface": "tip", "law": "jenkins", "normal_stiffness": 1e9, "tangential_stiffness": 1e9, "friction": 1}
         ],

@@ -9,12 +9,12 @@ import pytest
 from scipy.optimize import brentq
 from test_harmonic_balance_time import Cubic, group, held
 
-from microslip.contact.law import settings
+from microslip.contact.law import settings, value
 from microslip.data import Array
 from microslip.errors import UserError
 from microslip.harmonic_balance import problem as balance
 from microslip.harmonic_balance.checkpoint import labels, resumed_response
-from microslip.harmonic_balance.refinement import HALVINGS, filled_response
+from microslip.harmonic_balance.response import HALVINGS, filled_response
 from microslip.harmonic_balance.sweeps import hidden
 from microslip.results import open_journal
 
@@ -55,7 +55,7 @@ def test_a_fold_has_a_point_on_either_side(points: int) -> None:
     """A sweep upwards comes along the lower motion to the fold where that one ends, of the closed form: the last point
     before it and the first one behind it are added, a small share of a step apart."""
     frequency = np.linspace(0.6, 1.1, points) / (2 * np.pi)
-    found = filled_response(spring(Cubic(jnp.asarray(-0.004))), frequency, ONE)
+    found = filled_response(spring(Cubic(value(-0.004))), frequency)
     step = frequency[1] - frequency[0]
     low, high = 2 * np.pi * found.frequency[found.added]
     assert low <= fold(0.8, 0.96) <= high and high - low == pytest.approx(2 * np.pi * step / 2**HALVINGS)
@@ -67,9 +67,9 @@ def test_a_fold_has_a_point_on_either_side(points: int) -> None:
 
 def test_added_points_are_kept(tmp_path: Path) -> None:
     """Stopped between the two points of a fold, and run once more when all is known: the same points, nothing new."""
-    problem, frequency = spring(Cubic(jnp.asarray(-0.004))), np.linspace(0.6, 1.1, 11) / (2 * np.pi)
-    head = {"case": "duffing", "labels": labels(problem)}
-    whole, told = filled_response(problem, frequency, ONE), list[str]()
+    problem, frequency = spring(Cubic(value(-0.004))), np.linspace(0.6, 1.1, 11) / (2 * np.pi)
+    head = {"case": "duffing", "labels": labels(problem.assembly)}
+    whole, told = filled_response(problem, frequency), list[str]()
 
     def impatient(text: str) -> None:
         told.append(text)
@@ -79,7 +79,7 @@ def test_added_points_are_kept(tmp_path: Path) -> None:
     for count in range(3):
         with open_journal(tmp_path / "points", "abc", head) as journal:
             try:
-                found, _ = resumed_response(problem, frequency, ONE, journal, "one", impatient)
+                found, _ = resumed_response(problem, frequency, journal, "one", impatient)
             except UserError:
                 assert count == 0
                 continue
@@ -101,7 +101,7 @@ def test_points_without_a_solution_have_one_beside_them() -> None:
     """The linear oscillator, whose amplitude passes 1 m at two frequencies: there are added points, its 64 samples a
     cycle just not beyond; what lies between is told as what it is."""
     frequency = np.linspace(0.6, 1.4, 5) / (2 * np.pi)
-    found = filled_response(spring(Brittle(jnp.asarray(0.0))), frequency, ONE)
+    found = filled_response(spring(Brittle(value(0.0))), frequency)
     linear = lambda omega: 0.3 / np.hypot(1 - omega**2, 0.05 * omega)  # noqa: E731
     whole = [brentq(lambda omega: linear(omega) - 1.0, *ends) for ends in ((0.6, 1.0), (1.0, 1.4))]
     omega = 2 * np.pi * found.frequency[found.added]

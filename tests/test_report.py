@@ -84,7 +84,7 @@ def test_the_page_is_whole_and_loads_nothing(tmp_path: Path) -> None:
     links = [v for v in tags.loads if not v.startswith("data:image/")]
     assert len(pictures) == len(names)
     assert links and all(v.startswith("#") and v[1:] in tags.ids for v in links)
-    assert not {"script", "link", "iframe", "object"} & tags.names
+    assert not {"link", "iframe", "object"} & tags.names and "<script src" not in page
     assert "url(" not in page and "@import" not in page and 'name="viewport"' in page
     assert "Only a beam." in said(page)
 
@@ -136,7 +136,7 @@ def test_every_text_is_escaped(tmp_path: Path) -> None:
     response = {NASTY: NASTY, "list": [NASTY], "rows": [{NASTY: NASTY}]}
     page = report_html(nasty, {NASTY: picture}, [NASTY], response)
     tags = parsed(page)
-    assert "script" not in tags.names
+    assert "<script>alert" not in page and page.count("<script") == 3  # the modes, the program, what it draws
     assert "".join(tags.words).count('<script>alert("x")</script>&amp;\'"') > 12
 
 

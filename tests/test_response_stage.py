@@ -28,7 +28,7 @@ from microslip.files import store
 from microslip.results import read_response
 from microslip.stages import response as making
 from microslip.stages import running
-from microslip.stages.following import open_case
+from microslip.stages.answer import CaseJob, case_job
 from microslip.stages.surveying import survey_stage
 from microslip.units import METRES, Quantity
 
@@ -93,6 +93,7 @@ def computed(told: list[str]) -> list[str]:
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("unestimated")
 def test_interrupted_and_resumed(folder: Path) -> None:
     """Ctrl-C at the sixth point: five are kept, and readable; the next call computes four, and the peak."""
 
@@ -117,7 +118,7 @@ def test_interrupted_and_resumed(folder: Path) -> None:
 
 QUICK = (
     CASE.replace('law = "smooth"\npoints = [2, 2]\n', 'law = "jenkins"\n').replace("points = 9", "points = 4")
-    .replace("samples = 24", "samples = 8").replace("[50.0]", "[1e4]").split("[material_limits]")[0]
+    .replace("[50.0]", "[1e4]").split("[material_limits]")[0]
 )  # fmt: skip
 """Linear, as it sticks, and without margins: it costs little."""
 
@@ -210,6 +211,7 @@ def test_read_outs_share_a_picture_where_they_are_few_and_of_one_unit() -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("unestimated")
 def test_what_was_spoiled_is_made_again(folder: Path) -> None:
     """A table cut short, edited, gone; pictures, pages, HDF5 and VTU alike: the same bytes as before, and no point is
     computed twice."""
@@ -270,7 +272,7 @@ def test_killed_at_any_write_by_another_case(folder: Path, monkeypatch: pytest.M
     """`respond`, `respond --set amplitude=4` killed at its first, second, ... write, `respond`: the first answer."""
     (folder / "case.toml").write_text(QUICK)
     monkeypatch.setattr(making, "_assessed", lambda *_: None)  # which takes a second, and writes more of the same
-    monkeypatch.setattr("microslip.pictures.response.response_picture", lambda _, path, *__: path.write_bytes(b"p"))
+    monkeypatch.setattr("microslip.pictures.response.response_picture", lambda *_, **__: None)
     respond(folder)
     build, replaced, written = folder / "build" / "vane", os.replace, 0
     whole = {p: p.read_bytes() for p in (build / "response.csv", build / "response.h5", build / "response.json")}
@@ -369,6 +371,7 @@ def count(points: Path) -> int:
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("unestimated")
 def test_another_normal_force_adds_and_another_friction_begins_anew(folder: Path) -> None:
     few = CASE.replace("points = 9", "points = 3")
     (folder / "case.toml").write_text(few)
@@ -589,7 +592,7 @@ def test_as_many_harmonics_as_the_error_asks_for(folder: Path) -> None:
             raise KeyboardInterrupt
 
     with pytest.raises(UserError, match=r'"auto" is found by microslip respond .*; run it first, or give a number'):
-        survey_stage(folder / "case.toml", None, "load")
+        survey_stage(case_job(folder / "case.toml", make=False), "load")
     with pytest.raises(KeyboardInterrupt):
         respond(folder, report=impatient)
     (said,) = [t for t in begun if "an error of about" in t]
@@ -603,8 +606,8 @@ def test_as_many_harmonics_as_the_error_asks_for(folder: Path) -> None:
     assert (found.arrays["harmonics"] == H).all() and found.monitor("middle").shape[2] == H + 1
     assert f",{H}," in (build / "response.csv").read_text().splitlines()[1]
     assert f"<td>{H}</td>" in (build / "response.html").read_text()
-    opened = open_case(folder / "case.toml", {"sled": folder / "basis.h5"}, build)
-    assert opened.plain.settings.harmonics == H and opened.plain.settings.sampled >= 8 * H
+    opened = CaseJob(folder / "case.toml", {"sled": folder / "basis.h5"}, build, swept=True)
+    assert opened.settings.harmonics == H and opened.settings.sampled >= 8 * H
 
 
 def turning_sample(folder: Path) -> None:
@@ -616,6 +619,7 @@ def turning_sample(folder: Path) -> None:
     write_basis(folder / "basis.h5", replace(basis, groups={(0, 0): with_angle}))
 
 
+@pytest.mark.usefixtures("unestimated")
 @pytest.mark.parametrize(("name", "kind", "of"), [
     ("root", "gauges", Quantity("1")), pytest.param("twist", "angles", Quantity("rad"), marks=pytest.mark.slow),
 ])  # fmt: skip
@@ -650,6 +654,7 @@ def test_a_strain_gauge_is_strain_everywhere_and_an_angle_is_rad(
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("unestimated")
 def test_the_axis_of_a_strain_gauge_says_so(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The response's picture and the comparison with the book's mode."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -735,6 +740,7 @@ def test_what_jenkins_elements_do_not_follow_is_told(folder: Path) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("unestimated")
 def test_a_coarse_sweep_is_told_where_it_matters(folder: Path) -> None:
     """A message beside a resonance in the band, none where the band has none."""
     assert any("is wide against a resonance with sticking" in t for t in respond(folder, "sweep.points=3")[0])

@@ -354,6 +354,7 @@ def test_unfinished_response_is_read_from_its_journal(tmp_path):
     assert not found.finished and found.series[0].parameters == {"normal_force": 10.0}
 
 
+@pytest.mark.usefixtures("untried")
 def test_damaged_and_foreign_files_get_one_sentence(tmp_path):
     path = tmp_path / "response.h5"
     refused("no such response", read_response, path)

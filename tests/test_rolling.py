@@ -28,7 +28,7 @@ from microslip.errors import UserError
 from microslip.rolling.contact_table import ContactTable
 from microslip.rolling.contact_table import forces as contact_forces
 from microslip.rolling.ellipse import combined, ellipses
-from microslip.rolling.profiles import Profile, polynomial
+from microslip.rolling.profiles import CrossSection, polynomial
 from microslip.rolling.strips import forces, poses
 from microslip.rolling.wheelset import Track
 
@@ -305,7 +305,7 @@ def test_a_table_tells_its_error_and_is_read_with_it(tmp_path: Path) -> None:
 # --- profiles and poses --------------------------------------------------------------------------------------------
 
 
-def track(wheel: Profile | None = None, rail: Profile | None = None) -> Track:
+def track(wheel: CrossSection | None = None, rail: CrossSection | None = None) -> Track:
     """Two circles: a hollow wheel of 0.5 m on a rail of 0.3 m."""
     return Track(wheel or ms.circle(0.5), rail or ms.circle(0.3), 0.46, 0.75, 0.75, ELASTIC)
 
@@ -433,7 +433,7 @@ def test_two_patches_share_the_vertical_force_by_their_stiffness() -> None:
     """A rail with two equal crowns below a flat wheel: half each, and Hertz' force of the approach in both."""
     y = np.linspace(-0.03, 0.03, 1201)
     z = np.minimum((y - 0.012) ** 2, (y + 0.012) ** 2) / 0.2
-    rail = Profile(y, np.minimum(z, 6e-4))
+    rail = CrossSection(y, np.minimum(z, 6e-4))
     found = ms.patches(track(polynomial([0.0]), rail), ms.Pose(), "right", 5e4)
     assert len(found) == 2
     np.testing.assert_allclose(sorted(p.on_rail for p in found), [-0.012, 0.012], atol=1e-4)
@@ -496,7 +496,7 @@ def test_jumps_are_flagged_and_not_read_across() -> None:
     """A rail with two crowns below a convex wheel, which touches both in the middle and one of them on either side."""
     y = np.linspace(-0.03, 0.03, 1201)
     z = np.minimum((y - 0.012) ** 2, (y + 0.012) ** 2) / 0.2
-    two = track(polynomial([-1.0]), Profile(y, np.minimum(z, 6e-4)))
+    two = track(polynomial([-1.0]), CrossSection(y, np.minimum(z, 6e-4)))
     table = ms.contact_table(two, 2e4, 3e-3, 0.01, points=(5, 2), checked=1)
     assert (table.jumping, "not known" in table.sentence()) in ((1.0, True), (0.0, False))
     read = table.forces(np.linspace(-3e-3, 3e-3, 25), 0.0, 1.0, MU)

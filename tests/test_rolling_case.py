@@ -22,10 +22,9 @@ from microslip.contact.solids import Solid
 from microslip.errors import UserError
 from microslip.pictures.rolling import stretched
 from microslip.rolling.behind import even
-from microslip.rolling.laws import Surface
-from microslip.rolling.rolled import COLD
+from microslip.rolling.laws import COLD, RoughSurface
 from microslip.rolling.settings import load_rolling
-from microslip.rolling.study import Studied, rows_of_patches, study
+from microslip.rolling.study import RollingAnswer, rows_of_patches, study
 from microslip.rolling.temperature import falling
 from microslip.rolling.wearing import wearing
 
@@ -38,7 +37,7 @@ def there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
 
 
-def studied(*changes: str) -> Studied:
+def studied(*changes: str) -> RollingAnswer:
     return study(load_rolling(CASE, [*FEW, "creep.spin=0.0", *changes])[0], CASE)
 
 
@@ -241,7 +240,8 @@ def test_rough_bodies_carry_the_same_force_and_are_softer() -> None:
     takes its part along, (t/h)' = -k s, with (3.3-4) for h and the depth that makes the force F_N. Smooth bodies are
     the limit; all that slides carries mu F_N."""
     smooth = ms.creep_forces([1e-9, 2e-3, 5e-2], 0, 0, 8e-3, 4e-3, 82e3, 0.3, 82e9, 0.28)
-    rough = [ms.forces_by_characteristic([1e-9, 2e-3, 5e-2], 0, 0, **PATCH, surface=Surface(Polynomial(), value(R)))
+    rough = [ms.forces_by_characteristic([1e-9, 2e-3, 5e-2], 0, 0, **PATCH,
+                                         surface=RoughSurface(Polynomial(), value(R)))
              for R in (1e-13, 9.267e-5 / 2)]  # fmt: skip
     np.testing.assert_allclose(rough[0].x, smooth.x, rtol=1e-6)
     np.testing.assert_allclose(rough[1].x[2], -0.3 * 82e3, rtol=1e-6)

@@ -9,14 +9,14 @@ import pytest
 from microslip.contact.solids import Solid
 from microslip.rolling import exact as beside
 from microslip.rolling.settings import load_rolling
-from microslip.rolling.study import Studied, study
+from microslip.rolling.study import RollingAnswer, study
 from microslip.rolling.wheelset import across
 
 ROOT = Path(__file__).resolve().parents[1]
 CASE = ROOT / "pipeline" / "cases" / "wheel-rail.toml"
 
 
-def studied(*changes: str) -> Studied:
+def studied(*changes: str) -> RollingAnswer:
     return study(load_rolling(CASE, ["creep.points=31", *changes])[0], CASE)
 
 

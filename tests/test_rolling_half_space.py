@@ -12,9 +12,16 @@ from microslip.contact.hertz import Hertz
 from microslip.contact.solids import Solid
 from microslip.data import Array
 from microslip.errors import UserError
-from microslip.rolling.half_space import Contact, linear_coefficients, pressed, rolled, shifted, steady_rolling
+from microslip.rolling.half_space import (
+    HalfSpaceContact,
+    linear_coefficients,
+    normal_contact,
+    pressed,
+    rolled,
+    shifted,
+    steady_rolling,
+)
 from microslip.rolling.half_space_influence import ALL, Grid, Pair, influence, influence_ahead, rectangle
-from microslip.rolling.half_space_normal import normal_contact
 
 STEEL = Pair(82e9, 0.28)
 UNLIKE = Pair(80e9, 0.3, 0.12)
@@ -132,7 +139,7 @@ def test_bodies_apart_feel_nothing() -> None:
 # tangential --------------------------------------------------------------------------------------------------------
 
 
-def judged(c: Contact) -> None:
+def judged(c: HalfSpaceContact) -> None:
     """|p| <= g; no slip below it; slip against the traction at it."""
     size, slip, touching = np.hypot(*c.traction), np.hypot(*c.slip), c.touching
     assert (size <= c.bound * (1 + 1e-6) + 1e-3).all()

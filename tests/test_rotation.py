@@ -87,7 +87,7 @@ def test_forces_balance_and_the_tangent_is_their_derivative(hot):
     difference = (unbalance(model, speed, state.u + h * v) - unbalance(model, speed, state.u - h * v)) / (2 * h)
     Kv = (model.d.pattern.full(state.K) @ v.reshape(-1))[model.free.free]
     assert np.abs(Kv - difference).max() < 1e-6 * np.abs(Kv).max()
-    _, dK = stiffness_slope(model, speed, state, solver)
+    _, dK = stiffness_slope(model, state, solver)
     low, high = (equilibrium(model, np.sqrt(speed**2 + s), "nonlinear", solver, state) for s in (-2e3, 2e3))
     assert np.abs((high.K - low.K) / 4e3 - dK).max() < 1e-5 * np.abs(dK).max()
 

@@ -303,7 +303,7 @@ def test_static_compliance_of_a_held_body(solver):
     """B K^-1 B^T of a dense direct solution."""
     what = {**CLAMPED, **ROWS}
     group = the_group(STOCKY, modes={"count": 8, "solver": solver}, **what)
-    B, labels = body_rows(STOCKY, body(**what)).stacked(body(**what))
+    B, labels = body_rows(STOCKY, body(**what)).stacked
     K, _ = operators(STOCKY)
     free = np.setdiff1d(np.arange(len(K)), (3 * STOCKY.face_points("x0")[:, None] + np.arange(3)).ravel())
     B = B.toarray()[:, free]
@@ -354,7 +354,7 @@ def test_inertia_relief_of_a_free_body(count, shape, n, atol):
         "monitors": [{"name": "probe", "point": (np.array(shape) * [0.3, 0.4, 0.6]).tolist()}],
     }  # fmt: skip
     group = the_group(mesh, count, **what)
-    B = body_rows(mesh, body(**what)).stacked(body(**what))[0].toarray()
+    B = body_rows(mesh, body(**what)).stacked[0].toarray()
     K, M = operators(mesh)
     R = rigid_fields(mesh.points, mesh.points.mean(axis=0)).reshape(-1, 6)
     w, Q = np.linalg.eigh(R.T @ M @ R)
@@ -386,7 +386,7 @@ def test_hinged_body_has_its_inertia_relief_too():
     mesh = with_sets(mesh, hinge=edge)
     what = {"free": True, "supports": [{"face": "hinge"}], "interfaces": ROWS["interfaces"][:1]}
     group = the_group(mesh, 5, **what)
-    B = body_rows(mesh, body(**what)).stacked(body(**what))[0].toarray()
+    B = body_rows(mesh, body(**what)).stacked[0].toarray()
     K, M = operators(mesh)
     free = np.setdiff1d(np.arange(len(K)), (3 * edge[:, None] + np.arange(3)).ravel())
     values, vectors = scipy.linalg.eigh(K[np.ix_(free, free)], M[np.ix_(free, free)])

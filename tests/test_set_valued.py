@@ -35,7 +35,7 @@ def test_a_ball_comes_to_rest_after_infinitely_many_impacts() -> None:
     rest, errors = first * (1 + RESTITUTION) / (1 - RESTITUTION), []
     for tau in (1e-4, 2.5e-5):
         s = Stepper(ball, tau)
-        _, seen, events, _ = s.run(s.start(np.zeros(1), np.zeros(1)), np.full(100, round(0.02 / tau)))
+        _, seen, events, _ = s.run(s.start(np.zeros(1), np.zeros(1)), np.full(64, round(0.032 / tau)))
         found = events[events[:, 2] == 0, 0]
         errors.append(max(np.abs(found[:20] - impacts).max(), abs(found[-1] - rest)))
         assert abs(seen.q[-1, 0] - HEIGHT) < 1e-7 and abs(seen.q_dot[-1, 0]) < 1e-9
@@ -78,7 +78,7 @@ def test_dry_friction_takes_the_same_from_every_half_swing() -> None:
     assert float(now.worst) < 1e-15
 
 
-def rod(n: int) -> equations.Equations:
+def rod(n: int) -> equations.MotionEquations:
     """A rod of length, mass and stiffness one, n elastic modes and the residual flexibility of the others, before a
     rigid wall."""
     k = np.arange(n + 1)
@@ -151,7 +151,6 @@ def test_what_cannot_be_is_refused() -> None:
     refused("only a motion in time", ms.harmonic_response, rigid, [0.1])
     ball = ms.structure(1.0, 0.0, steady={0: GRAVITY}, elements=[ms.stop(math.inf, HEIGHT)])
     refused('begin from "rest"', ms.integrate, ball, 1.0)
-    refused("cannot be integrated", ms.integrate, ball, 1.0, start="rest", method="reference")
     refused("only a rigid stop", ms.stop, 1e5, 0.0, restitution=0.5)
     refused("one side", ms.stop, math.inf, 0.1, both=True)
     refused("restitution", ms.stop, math.inf, 0.1, restitution=1.5)
@@ -170,7 +169,7 @@ def test_nothing_begins_behind_what_is_rigid() -> None:
         behind = f"start: begins {0.1 if gap < 0 else 0.4} m behind stop 1"
         refused(behind, ms.integrate, swing, 0.2, start=start)
     refused("0.4 m behind stop 1", ms.integrate_many, swing, 0.2, [[0.0], [0.5]], [[0.0], [0.0]])
-    ms.integrate(swing, 0.2, settle=0, keep=1, start={"displacement": {0: 0.1}})  # where it touches
+    ms.integrate(swing, 0.2, settle=0, keep=1, samples=64, start={"displacement": {0: 0.1}})  # where it touches
 
 
 # ground that moves ---------------------------------------------------------------------------------------------------
@@ -219,7 +218,7 @@ def test_sliding_that_saws_is_told() -> None:
     assert not ms.integrate(belt, 0.2, unit="rad/s", settle=0, keep=1, samples=64).messages
 
 
-def rubbing_block(law: object, ground: Ground | None, force: float = 0.0) -> equations.Equations:
+def rubbing_block(law: object, ground: Ground | None, force: float = 0.0) -> equations.MotionEquations:
     """A mass on a spring along the ground, free along the normal, pressed on it by 14 N."""
     from test_ground import rubbing
 

@@ -295,6 +295,7 @@ def test_the_wheel_offers_its_bodies_and_meshes_them(tmp_path: Path) -> None:
     assert "contact_tip" in type_("mesh", "pendulum", *coarse)
 
 
+@pytest.mark.slow
 def test_the_source_archive_makes_the_same_wheel(tmp_path: Path) -> None:
     with tarfile.open(build("sdist", tmp_path / "sdist")) as archive:
         archive.extractall(tmp_path, **({"filter": "data"} if hasattr(tarfile, "data_filter") else {}))

@@ -4,18 +4,18 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import jax.numpy as jnp
 import numpy as np
 import pytest
 from refusals import refused
 from test_speed_range import TOP, ranged
 
 from microslip.contact.friction import Coulomb
+from microslip.contact.law import value
 from microslip.contact.normal import Penalty
 from microslip.contact.patch import Patch, grid
 from microslip.contact.point import PointContact
+from microslip.harmonic_balance import envelope, response
 from microslip.harmonic_balance import problem as balance
-from microslip.harmonic_balance import response, speed_line
 from microslip.harmonic_balance.solver import solve
 from microslip.modal.campbell import crossings, track_basis
 from microslip.modal.speed_range import basis_at
@@ -29,7 +29,7 @@ ORDER = 4
 def rubbing(push: float = 1e4) -> Assembly:
     """A blade whose tip rubs on a wall, pushed by a pressure."""
     places, areas = grid(0.02, 0.003, (3, 1))
-    law = PointContact(Penalty(jnp.asarray(1e6 / 3)), Coulomb(jnp.asarray(0.3)), jnp.asarray(5e5 / 3))
+    law = PointContact(Penalty(value(1e6 / 3)), Coulomb(value(0.3)), value(5e5 / 3))
     wall = preloaded_contact("wall", Patch("tip", places, areas, law), ContactFace("blade", "tip"), None, normal=1.0)
     component = Component("blade", {0: ranged().groups[0, 0]})
     return Assembly((component,), (wall,), (Load("blade", "gas", push),), (Output("blade", "end", "u_x"),))
@@ -60,7 +60,7 @@ def speeds(count: int = 12) -> np.ndarray:
 def test_every_speed_is_the_response_of_the_body_at_that_speed() -> None:
     """Against a problem built for three of the speeds alone, from groups of the range and forces by hand, started
     cold: 1e-7 of the amplitude. The contact slides at some and sticks at others."""
-    found = speed_line.along(at_speed, speeds(), ORDER, **FINE)
+    found = envelope.along(at_speed, speeds(), ORDER, **FINE)
     assert found.converged.all()
     np.testing.assert_allclose(found.frequency, ORDER * speeds() / 60, rtol=1e-14)
     np.testing.assert_allclose(found.normal[:, 0], pressed(speeds()), rtol=1e-3)  # the means of friction bend the blade
@@ -84,7 +84,7 @@ def test_a_free_blade_resonates_where_the_campbell_diagram_crosses() -> None:
     for n in near:
         at = replace(free, components=(turning(float(n)),))
         part = at.part(at.components[0], 1)
-        w = 2 * np.pi * float(speed_line.frequency(ORDER, n))
+        w = 2 * np.pi * float(envelope.frequency(ORDER, n))
         amplitude.append(abs((part.output @ np.linalg.solve(part.K - w**2 * part.M + 1j * w * part.C, part.load))[0]))
     assert near[int(np.argmax(amplitude))] == pytest.approx(meets.speed * 30 / np.pi, rel=5e-4)
     at_rest = ranged().groups[0, 0].frequency[0] * 60 / ORDER
@@ -93,10 +93,10 @@ def test_a_free_blade_resonates_where_the_campbell_diagram_crosses() -> None:
 
 def test_mistakes_are_told() -> None:
     for words, call in (
-        ("one or more speeds", lambda: speed_line.along(at_speed, np.zeros(0), 2)),
-        ("all above 0", lambda: speed_line.along(at_speed, np.array([0.0, 10.0]), 2)),
-        ("stand in no ring", lambda: speed_line.along(at_speed, np.array([8000.0]))),
-        ("0 is steady", lambda: speed_line.along(at_speed, np.array([8000.0]), 0)),
-        ("outside the speed range", lambda: speed_line.along(at_speed, np.array([2 * TOP]), 4)),
+        ("one or more speeds", lambda: envelope.along(at_speed, np.zeros(0), 2)),
+        ("all above 0", lambda: envelope.along(at_speed, np.array([0.0, 10.0]), 2)),
+        ("stand in no ring", lambda: envelope.along(at_speed, np.array([8000.0]))),
+        ("0 is steady", lambda: envelope.along(at_speed, np.array([8000.0]), 0)),
+        ("outside the speed range", lambda: envelope.along(at_speed, np.array([2 * TOP]), 4)),
     ):
         refused(words, call)

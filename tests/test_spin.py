@@ -17,8 +17,7 @@ from microslip.basis.integrals import convected
 from microslip.case.assemble import build
 from microslip.case.settings import case_model
 from microslip.data import Array, ModalBasis, ModalGroup
-from microslip.modal.compute import modal_basis
-from microslip.modal.unreduced import unreduced
+from microslip.modal.compute import modal_basis, unreduced
 from microslip.roots.full import full_matrices
 from microslip.settings.mistakes import validate
 from microslip.system.assembly import Assembly

@@ -28,10 +28,9 @@ from microslip.linalg.quadratic import Window, every_root, every_value
 from microslip.pictures.moving import moving_shape
 from microslip.roots.spectrum import spectrum
 from microslip.roots.waves import waves
-from microslip.stages.analysing import analysed
+from microslip.stages.analysing import Varied, analysed
 from microslip.stages.answer import CaseJob
 from microslip.stages.places import modal_files
-from microslip.stages.varied import Varied
 from microslip.system.ground import turning
 from microslip.verbs.stability import State, moving, shapes, state_of
 

@@ -23,7 +23,7 @@ from microslip.harmonic_balance import problem as balance
 from microslip.harmonic_balance.forces import AFT
 from microslip.harmonic_balance.problem import Group, Problem
 from microslip.harmonic_balance.solver import newton
-from microslip.harmonic_balance.stability import Orbit, Settings, _carrier, judged, multipliers, orbit, stability
+from microslip.harmonic_balance.stability import ForcedOrbit, Settings, _carrier, judged, multipliers, orbit, stability
 from microslip.system.assembly import Assembly, Contact, ContactFace, Linear
 
 
@@ -85,7 +85,7 @@ def value(number):
 def moving(law, rows, M, C, K, harmonics, Omega, **more):
     """An orbit of one point contact whose three displacements (3, 2 H + 1) are given."""
     displacement = np.vstack([harmonics, np.zeros_like(harmonics)])
-    return Orbit(M, C, K, rows, np.zeros((6, 6)), (law,), (ONE_POINT,), np.asarray(displacement), Omega, **more)
+    return ForcedOrbit(M, C, K, rows, np.zeros((6, 6)), (law,), (ONE_POINT,), np.asarray(displacement), Omega, **more)
 
 
 def along(*directions):
@@ -134,7 +134,7 @@ def hill(orbit, slope):
 
     Args:
         slope: (c (2 H + 1), c (2 H + 1)) derivative k of the contact forces' harmonics, the harmonics in the order of
-            `Orbit.displacement`, the c rows of each together.
+            `ForcedOrbit.displacement`, the c rows of each together.
     """
     coefficients, m = orbit.displacement.shape[1], len(orbit.M)
     D = orbit.Omega * derivative(coefficients // 2)
@@ -372,7 +372,7 @@ def test_what_a_motion_reaches_is_all_that_changes():
     """A patch of 8 points, some of which slide: the map of everything, column by column, has the same largest
     multipliers as the map on what perturbations of the motion reach; a slider that sticks all the time adds 1s, one
     that slides adds how it forgets offsets across its path, along which nothing moves here."""
-    law = PointContact(Penalty(value(1e5)), Coulomb(value(0.3)), jnp.asarray([3e4] * 4 + [3e3] * 3 + [1e-3]))
+    law = PointContact(Penalty(value(1e5)), Coulomb(value(0.3)), value([3e4] * 4 + [3e3] * 3 + [1e-3]))
     places = np.column_stack([np.linspace(-0.01, 0.01, 8), np.zeros(8)])
     problem = one_mode(
         law, 8.0, [0.0, 2.5], [1e5, 1e4], [10.0, 4.0], (0, 1), length=1e-4, samples=128,

@@ -19,7 +19,7 @@ from microslip.case import load_case
 from microslip.cli import main
 from microslip.contact.law import Law, number, settings
 from microslip.harmonic_balance import tones, two_tone
-from microslip.harmonic_balance.torus import closed, commensurate, pairs_of, with_mean
+from microslip.series import closed, commensurate, pairs_of, summed
 
 GOLDEN = 0.5 * (np.sqrt(5.0) - 1.0)
 BOTH: dict[str, Any] = {"force": {0: 0.2}, "second_force": {0: 0.1}}
@@ -66,7 +66,7 @@ class VanDerPol(Law):
 
 def fitted(time: Any, y: Any, first: float, second: float, order: int) -> Any:
     """(P + 1,) amplitudes of two-tone series that fit a motion in time best."""
-    E = with_mean(time[:, None] * (pairs_of(order) @ np.array([first, second])))
+    E = summed(time[:, None] * (pairs_of(order) @ np.array([first, second])))
     c = np.linalg.lstsq(E, y, rcond=None)[0]
     return np.append(abs(c[0]), np.hypot(c[1::2], c[2::2]))
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import csv
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -24,8 +24,7 @@ from microslip.fem.loads import pressure
 from microslip.fem.operators import stiffness
 from microslip.linalg import eigen
 from microslip.modal.equilibrium import equilibrium, make_model
-from microslip.rolling.brush import Brush, fitted, jump, parabola, reached
-from microslip.rolling.slip import Studied, row
+from microslip.rolling.tyre import Brush, TyreAnswer, fitted, jump, parabola, reached, row
 from microslip.stages.job import open_job
 from microslip.stages.modal import modes_stage
 
@@ -93,27 +92,24 @@ def test_the_patch_follows_its_load() -> None:
     assert (b.carried([1e-2, 1e-2], [40.0, 0.0])[1], b.lengthened(10.0)) == (0.0, 0.5)
 
 
-def test_the_picture_names_the_time_constants_of_the_table(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_the_picture_names_the_time_constants_of_the_table() -> None:
     """Of the same jumps, though it shows the first four passes of them alone."""
     pytest.importorskip("matplotlib")
-    from microslip.pictures import tyre
+    from microslip.pictures.plots import figure_of
+    from microslip.pictures.tyre import tyre_picture
 
-    figures: list[Any] = []
-    monkeypatch.setattr(tyre, "save_figure", lambda figure, path: figures.append(figure) or path)
     patch = SimpleNamespace(
         x=np.zeros(1), pressure=np.ones(1), highest=1.0, middle=0.0, length=BRUSH.length, force=40.0
     )
     case = SimpleNamespace(jumps=SimpleNamespace(targets=[0.05, 0.3], shown=0.05))
-    studied = Studied(case, patch, BRUSH, 0.0)  # type: ignore[arg-type]
-    tyre.tyre_picture(studied, tmp_path / "tyre.png", "t")
-    lines = figures[0].axes[2].lines
+    studied = TyreAnswer(case, patch, BRUSH, 0.0)  # type: ignore[arg-type]
+    lines = figure_of(partial(tyre_picture, studied, title="t")).axes[2].lines
     for way, fit in (("up", lines[1]), ("down", lines[3])):
         assert fit.get_label() == f"exponential of {studied.constants[f'{way}_fitted_s'][0]:.3g} s"
         assert fit.get_xdata()[-1] == pytest.approx(4 * PASS, rel=0.06)
     told = {**studied.constants, "up_fitted_s": np.array([0.123, 0.5])}  # what the table says is what stands there
     vars(studied)["constants"] = told
-    tyre.tyre_picture(studied, tmp_path / "tyre.png", "t")
-    assert figures[1].axes[2].lines[1].get_label() == "exponential of 0.123 s"
+    assert figure_of(partial(tyre_picture, studied, title="t")).axes[2].lines[1].get_label() == "exponential of 0.123 s"
 
 
 def test_numbers_that_are_none_of_a_brush() -> None:

@@ -34,7 +34,7 @@ interface = "sole"
 interference = {FORCE / STIFFNESS}
 width = 10e-3
 height = 20e-3
-points = [1, 1]
+points = [2, 1]
 normal_stiffness = {STIFFNESS}
 tangential_stiffness = {STIFFNESS}
 friction = {MU}
@@ -74,7 +74,7 @@ def integral(found: Dataset, values: Array) -> Array:
     return np.append(0.0, np.cumsum(steps))
 
 
-def test_a_point_under_a_force_wears_evenly(case: Path) -> None:
+def test_points_under_a_force_wear_evenly(case: Path) -> None:
     """Slip and force stay, so that the depth grows with the hours: I_W mu F_N 4 s f / A."""
     (case / "case.toml").write_text(PRESSED)
     found = worn(f"wear.frequency={DRIVEN}")
@@ -82,12 +82,12 @@ def test_a_point_under_a_force_wears_evenly(case: Path) -> None:
     np.testing.assert_allclose(np.ptp(found["amplitude"]), 0.0, atol=1e-12)
     way = 2 * slip(found, np.array([FORCE])) * DRIVEN * HOUR * found["time"]
     points = ms.load("build/worn/wear_depth.h5")
-    assert points["contact"].tolist() == ["sole"] and points["area"] == pytest.approx(AREA)
+    assert points["contact"].tolist() == 2 * ["sole"] and points["area"] == pytest.approx(AREA / 2)
     exact = COEFFICIENT * MU * FORCE * way / AREA
     np.testing.assert_allclose(found["largest_depth"], exact, rtol=2e-3)
 
 
-def test_a_point_that_overlaps_loses_its_preload(case: Path) -> None:
+def test_points_that_overlap_lose_their_preload(case: Path) -> None:
     """dN/dt = -k_N I_W mu N 4 s f / A: an exponential if the slip stayed; here it grows."""
     found = worn(f"wear.frequency={DRIVEN}")
     force = found["pressing"]
@@ -112,7 +112,7 @@ def test_jumps_that_are_halved_leave_a_quarter_of_the_error(case: Path) -> None:
 def test_a_pressed_patch_wears_until_the_pressure_is_even(case: Path) -> None:
     """Two points under one force: k_N (depth_2 - depth_1) = N_1 - N_2 falls by the rate
     k_N I_W mu 4 s f / A of one point, and the total stays."""
-    (case / "case.toml").write_text(PRESSED.replace("points = [1, 1]", "points = [2, 1]"))
+    (case / "case.toml").write_text(PRESSED)
     w, asked = wearing(), Keys(coefficient=COEFFICIENT, hours=4.0)
     row = begun(w, Surface(np.array([0.0, 0.2 * FORCE / STIFFNESS]), np.zeros(0)))
     rows = [row | {"jump": 0.05}]
@@ -127,6 +127,7 @@ def test_a_pressed_patch_wears_until_the_pressure_is_even(case: Path) -> None:
     np.testing.assert_allclose(uneven, exact, rtol=0.01)
 
 
+@pytest.mark.slow
 def test_a_rough_point_wears_as_the_book_has_it(case: Path) -> None:
     """Under a constant force V(u*) = F* (1 + t*), V of the new surface (3.3-21), t* by (3.9-10)."""
     (case / "case.toml").write_text(ROUGH)
@@ -153,6 +154,8 @@ def test_a_resonance_is_followed_until_the_contact_is_lost(case: Path) -> None:
         "case.toml",
         "--set",
         "contacts.sole.interference=1e-5",
+        "--set",
+        "contacts.sole.points=[1,1]",
         "--set",
         "wear.hours=2",
     ]

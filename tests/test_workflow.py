@@ -21,7 +21,7 @@ from microslip.errors import UserError
 from microslip.files import store
 from microslip.settings.meant import meant
 from microslip.settings.toml import load_toml
-from microslip.stages import following, meshing, modal, places, response, running
+from microslip.stages import meshing, modal, places, response, running
 from microslip.stages.job import Job, open_job
 from microslip.stages.stage import PACKAGE, Made, Stage, _imported, folder_of_case, hash_of_code
 
@@ -411,7 +411,12 @@ def whole(tmp_path_factory: pytest.TempPathFactory, undrawn_file: None, unjudged
 
 
 @pytest.mark.parametrize(
-    "wanted", [response.Wanted("resonances"), response.Wanted("none"), response.Wanted("all", False)]
+    "wanted",
+    [
+        response.Wanted("resonances"),
+        pytest.param(response.Wanted("none"), marks=pytest.mark.slow),
+        response.Wanted("all", False),
+    ],
 )
 def test_stresses_and_pictures_can_be_left_out(wanted, whole, tmp_path):
     """The stress of a resonance does not depend on whether it is drawn over the whole sweep."""
@@ -551,14 +556,19 @@ def test_no_verb_overwrites_another_case_of_one_name(
 
 
 def test_a_case_that_is_moved_or_renamed_gives_way(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """What is followed from a case is of that case too. Moved with its products it is the same."""
+    """What is asked of a case is of that case too. Moved with its products it is the same."""
     first, moved = tmp_path / "first" / "case.toml", tmp_path / "moved"
     first.parent.mkdir()
     shutil.copyfile(SAMPLE, first)
     shutil.copytree(first.parent, tmp_path / "second")
     monkeypatch.chdir(first.parent)
     folder = folder_of_case(Path("case.toml"), "sample")
-    following.Case(Path("case.toml"), {}, {}, folder).table("backbone.csv", ["a"], [])
+
+    def work() -> Made:
+        store.write_text(folder / "backbone.json", "{}")
+        return Made()
+
+    Stage(folder / "backbone.json", (), case=Path("case.toml")).make({}, work)
     shutil.move(first.parent, moved)
     monkeypatch.chdir(moved)
     assert folder_of_case(Path("case.toml"), "sample") == folder

@@ -8,13 +8,13 @@ import jax.numpy as jnp
 from microslip.contact.examples import Example
 from microslip.contact.friction import Coulomb
 from microslip.contact.heights import Polynomial
-from microslip.contact.law import Array, settings
+from microslip.contact.law import Array, settings, value
 from microslip.contact.normal import Penalty, Rough
 from microslip.contact.point import PointContact, PointState
 
-COULOMB = Coulomb(jnp.asarray(0.3))
+COULOMB = Coulomb(value(0.3))
 STIFFNESS = jnp.asarray(0.9e8)
-ROUGH = Rough(jnp.asarray(2.4e8), jnp.asarray(12e-6), Polynomial())
+ROUGH = Rough(value(2.4e8), value(12e-6), Polynomial())
 
 
 @settings
@@ -73,7 +73,7 @@ class Prestressed(PointContact):
 
 PRINTED = Example(Printed(ROUGH, COULOMB, STIFFNESS), 1.2e-5, 8e-6)
 BOX = Example(Box(ROUGH, COULOMB, STIFFNESS), 1.2e-5, 8e-6)
-JUMP = Example(PointContact(Offset(jnp.asarray(2.4e8)), COULOMB, STIFFNESS), 1e-5, 1e-5)
+JUMP = Example(PointContact(Offset(value(2.4e8)), COULOMB, STIFFNESS), 1e-5, 1e-5)
 PRESTRESSED = Example(Prestressed(ROUGH, COULOMB, STIFFNESS), 1.2e-5, 8e-6)
 
 

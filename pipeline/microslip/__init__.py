@@ -26,6 +26,7 @@ PUBLIC = {
     "bifurcation.dynamics": "Dynamics",
     "bifurcation.recorded": "read_bifurcation",
     "analyses": "harmonic_response two_tones follow backbone integrate integrate_many run_up bifurcate mistune",
+    "stages.analysing": "analyse",
     "mistuning.scatter": "Scatter",
     "mistuning.identification": "blades_from_modes",
     "mistuning.gauges": "blades_from_gauges",

@@ -34,9 +34,10 @@ if TYPE_CHECKING:
 
     from .bifurcation.diagram import Diagram
     from .bifurcation.dynamics import Dynamics
-    from .harmonic_balance.tones import Kept, Solved
+    from .harmonic_balance.tones import Solved
     from .mistuning.ensemble import Ensemble
     from .mistuning.scatter import Scatter
+    from .results import Journal
     from .time_domain.many import Reached
     from .time_domain.orbit import Orbit
 
@@ -172,7 +173,7 @@ def harmonic_response(
 def two_tones(
     system: System, first: Frequencies, second: Frequencies, *, free: bool = False, harmonics: Count = 5,
     samples: Count | None = None, turns: Count | None = None, start: Orbit | None = None,
-    unit: Unit = "Hz", kept: Kept | None = None, report: Report = lambda _: None,
+    unit: Unit = "Hz", kept: Journal | None = None, report: Report = lambda _: None,
 ) -> Solved:  # fmt: skip
     """Quasi-periodic vibration of two frequencies without a common period, by harmonic balance over both.
 
@@ -182,8 +183,9 @@ def two_tones(
         free: the second frequency is that of a self-excited vibration, unknown, and ``second`` a guess within 15 %; no
             load has a second tone then. start: a motion in time to begin from then, of `integrate`; if not given 200
             periods of the first tone from rest, and a hundred that are kept.
-        harmonics: H: pairs (k1, k2) with |k1| + |k2| <= H are balanced. samples: of a turn of the faster angle, 8 H and
-            32 at least if not given. turns: of it in the line along which contacts that remember are marched; as many.
+        harmonics: H: pairs (k1, k2) with ``abs(k1) + abs(k2) <= H`` are balanced. samples: of a turn of the faster
+            angle, 8 H and 32 at least if not given. turns: of it in the line along which contacts that remember are
+            marched; as many.
         kept: finished points of a run that did not end. report: is told what is under way.
 
     Returns:
@@ -378,8 +380,7 @@ def integrate(
     settle: Index = 100, keep: Count = 20,
     samples: Count = 256, steps: Count | None = None,
     start: Literal["static", "rest", "balance"] | Mapping[str, Any] = "static",
-    method: Literal["stepper", "reference"] = "stepper", tolerance: Positive = 1e-9, file: Path | Text | None = None,
-    report: Report = lambda _: None,
+    file: Path | Text | None = None, report: Report = lambda _: None,
 ) -> Orbit:  # fmt: skip
     """Motion in time under harmonic loads, from rest (Sextro, section 4.1).
 
@@ -399,8 +400,6 @@ def integrate(
             "velocity": ...}``, m and m/s, each of all coordinates or coordinate -> value, of bodies from modal files
             those of their modes; ``{"mode": 1, "amplitude": ...}``, of the first read-out in a mode of the bodies
             without their contacts.
-        method: ``reference`` is CVODE, an integrator for stiff equations that chooses its own steps by a relative
-            tolerance: slower, of laws that are differential equations, and what the stepper is proved on.
         file: samples are written there as they come and read when they are asked for, so that a long motion needs no
             more memory than a short one; a run that was killed is gone on with. report: is told what is under way.
 
@@ -410,8 +409,8 @@ def integrate(
 
     Raises:
         UserError: steps that are too few for the springs of the contacts; contacts that the start presses deeper than
-            steady loads do; a law that ``reference`` cannot integrate, a start or a file that it does not take.
-        NotConverged: no state of rest, or no vibration to start on, is found, or ``reference`` gave up.
+            steady loads do.
+        NotConverged: no state of rest, or no vibration to start on, is found.
 
     Examples:
         A mass that hits a stop once in every period:
@@ -421,27 +420,24 @@ def integrate(
         >>> ms.integrate(hammer, 1.5, unit="rad/s").repeats
         1
     """
-    from .time_domain import equations, orbit, recorded, reference, starts
+    from .time_domain import equations, orbit, recorded, starts
 
     assembly = whole_of(system)
     turn = 2 * np.pi * HERTZ[unit]
     found = equations.of(assembly, turn * frequency, None if second is None else turn * second)
     if second is not None and start == "balance":
         raise UserError('second: "balance" begins on a periodic vibration; take "static" or "rest"')
-    rest: Any = starts.released(found, start) if isinstance(start, Mapping) else start
-    if method == "reference":
-        if rest == "balance" or file is not None:
-            raise UserError('method: "reference" begins on no vibration, and writes no file; use the stepper')
-        return reference.run(found, settle, keep, samples, rest, tolerance, report)
-    begin: orbit.Start | starts.Periodic
-    if start == "balance":
+    begin: orbit.Start | starts.PeriodicStart
+    if isinstance(start, Mapping):
+        begin = starts.released(found, start)
+    elif start == "balance":
         many = IN_TIME if isinstance(system, Assembly) else None
         begin = starts.of_balance(found, balanced(system, many, many and 16 * many))
     else:
-        begin = rest
+        begin = start
     if file is None:
         return orbit.run(found, settle, keep, samples, steps, begin, report)
-    asked = recorded.Asked(f"{frequency:.6g} {unit}", found, settle, keep, samples, steps, begin)
+    asked = recorded.Integration(f"{frequency:.6g} {unit}", found, settle, keep, samples, steps, begin)
     return recorded.run(file, [asked], report=report)[0]
 
 
@@ -522,7 +518,7 @@ def run_up(
     found = equations.of_ramp(whole_of(system), ramp)
     if file is None:
         return orbit.run(found, 0, ramp.periods, samples, steps, begin, report)
-    asked = recorded.Asked(f"{start:.6g} to {stop:.6g} {unit}", found, 0, ramp.periods, samples, steps, begin)
+    asked = recorded.Integration(f"{start:.6g} to {stop:.6g} {unit}", found, 0, ramp.periods, samples, steps, begin)
     return recorded.run(file, [asked], report=report)[0]
 
 
@@ -595,7 +591,7 @@ def bifurcate(
     if len(begin) != made.count:
         raise UserError(f"bifurcate: x: has {len(begin)} numbers; the system has {made.count}")
     made.check(begin, start)
-    asked = diagram.Asked(
+    asked = diagram.DiagramPlan(
         start, stop, orbits, doublings, nodes, step, points, tuple(attractors), starts, deflate=tuple(deflate)
     )
     return diagram.diagram(made, begin, asked, report=report)

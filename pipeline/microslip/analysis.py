@@ -20,6 +20,8 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
+from .settings.texts import texts_of
+
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
@@ -29,8 +31,8 @@ if TYPE_CHECKING:
 GROUP = "microslip.analysis"
 
 
-Files = dict[str, Callable[[Path], Any]]
-"""Names below the folder of an answer -> what writes them."""
+Files = dict[str, Callable[[Any], Any]]
+"""Names below the folder of an answer -> what writes them there; of a PNG, what draws it into a figure."""
 
 
 class Data(Protocol):
@@ -59,7 +61,7 @@ class Question:
         asked: the keys of the analysis, a model of its `Analysis.asks`. built: the case's assembly,
             a `case.assemble.Built`. kept: what is finished, for a run that goes on. report: is told
             what is under way. varied: the case with other values of its keys, and meshes of its
-            bodies, a `stages.varied.Varied`. folder: of the answer, where a run may keep what it
+            bodies, a `stages.analysing.Varied`. folder: of the answer, where a run may keep what it
             will go on with in files of its own; inputs: hash of what they depend on besides the
             keys of the analysis; fresh: they are to be made anew.
     """
@@ -82,12 +84,12 @@ class Answer:
         sentences: the result first. data: end of the files' names -> what they hold; the first one
             without an end. diagrams: likewise. tables: pieces of the page (`report.page`). largest:
             amplitude of the first read-out, of which is told whether it looks like a number in a
-            wrong unit; None where the sentences tell all that is to be said of the case. whole:
-            whether nothing of it was lost. missing: what was asked for and is not known, in words.
-        files: other files by their names, below the folder of the answer -> what writes them; PNG
-            files are made where pictures are wanted, and shown on the page. moving: writes bodies
-            that move below that folder, where pictures are wanted. lines: of a table for the
-            terminal.
+            wrong unit; None where the sentences tell all that is to be said of the case. judged:
+            what else `case.headline.doubted` looks at. whole: whether nothing of it was lost.
+            missing: what was asked for and is not known, in words.
+        files: see `Files`; PNG files are made where pictures are wanted, and shown on the page.
+            moving: writes bodies that move below that folder, where pictures are wanted. lines: of
+            a table for the terminal.
     """
 
     sentences: Sequence[str]
@@ -95,6 +97,7 @@ class Answer:
     diagrams: Mapping[str, Drawing] = field(default_factory=dict)
     tables: Sequence[Any] = ()
     largest: float | None = 0.0
+    judged: Mapping[str, Any] = field(default_factory=dict)
     whole: bool = True
     files: Files = field(default_factory=dict)
     moving: Callable[[Path], Sequence[Path]] = lambda _: ()
@@ -113,8 +116,8 @@ class Analysis:
         lost: what has happened where an answer is not whole, for a reader.
         needed: keys without which a case asks for nothing; "": the table may be left out.
         swept: whether it is about the case's sweep, which must be given.
-        verb: another one, as it is written here. options: keys that are options of the verb too ->
-            what the help says of them, as written here.
+        verb: another one. options: keys, of a class `Keys`, that are options of the verb too. Both
+            are read where they are written, without loading the module.
         several: whether a case may have several such tables, whose keys have a name; `asked` is
             a tuple of them.
         alone: whether its sweep is for it, so that `microslip run` makes no response of the case.
@@ -130,7 +133,7 @@ class Analysis:
     needed: str = ""
     swept: bool = True
     verb: str = ""
-    options: Mapping[str, str] = field(default_factory=dict)
+    options: Sequence[str] = ()
     several: bool = False
     alone: bool = False
     band: Callable[[Mapping[str, Any]], Mapping[str, float]] = lambda _: {}
@@ -173,7 +176,8 @@ def file_of(name: str) -> Path:
 
 
 class Verb(NamedTuple):
-    """A verb as its module says it. Attributes: name. help: the head of the module. options: `Analysis.options`."""
+    """A verb as its module says it. Attributes: name. help: the head of the module. options: key ->
+    what it is, of `Analysis.options`."""
 
     name: str
     help: str
@@ -183,7 +187,11 @@ class Verb(NamedTuple):
 def verb_of(name: str) -> Verb:
     """The verb of an analysis, whose module is not loaded."""
     tree = ast.parse(file_of(name).read_text(encoding="utf-8"))
-    made = [n.value for n in tree.body if isinstance(n, ast.Assign) and ast.unparse(n.targets[0]) == "ANALYSIS"]
+    made = [
+        n.value for n in tree.body if isinstance(n, ast.Assign) and ast.unparse(n.targets[0]) == "ANALYSIS"
+    ]
     keys = {k.arg: k.value for call in made for k in getattr(call, "keywords", ())}
-    verb, options = (ast.literal_eval(keys[key]) if key in keys else None for key in ("verb", "options"))
-    return Verb(verb or name.replace("_", "-"), ast.get_docstring(tree) or name, options or {})
+    verb, options = (ast.literal_eval(keys[key]) if key in keys else "" for key in ("verb", "options"))
+    texts = {of[1]: text for of, text in texts_of(tree).items() if of[0] == "Keys"}
+    said = {key: " ".join(texts[key].split()) for key in options}
+    return Verb(verb or name.replace("_", "-"), ast.get_docstring(tree) or name, said)

@@ -6,6 +6,7 @@ from __future__ import annotations
 import codecs
 import inspect
 import io
+import json
 import logging
 import os
 import re
@@ -22,15 +23,14 @@ from cyclopts import App, CycloptsError, Parameter
 from . import __version__, interrupts
 from .errors import NotConverged, UserError
 from .progress import announced, progress
+from .settings.meant import case_file, meant
 
 if TYPE_CHECKING:
     from .analysis import Verb
     from .basis.checks import Check
     from .data import ModalBasis
     from .results import Response
-    from .stages.answer import CaseJob, Written
-    from .stages.following import Case
-    from .stages.stage import Report
+    from .stages.answer import Written
 
 os.environ.setdefault("NUMPY_MADVISE_HUGEPAGE", "0")  # read by numpy when it is loaded: the system zeroes whole huge
 # pages, which costs more than they save (0.7 of 8.6 CPU seconds of the modes of 60,000 degrees of freedom)
@@ -223,9 +223,8 @@ def run(
     """
     from .analysis import places
     from .basis import read_basis
-    from .settings.meant import meant
     from .stages.job import holds_a_case_alone, open_job, system_file
-    from .stages.places import is_case, is_rolling, is_tyre
+    from .stages.places import is_case, rolls
     from .stages.response import Wanted
     from .stages.running import run_body, run_case_file, run_system, unsolved
     from .stages.summary import frequency_lines
@@ -235,7 +234,7 @@ def run(
     wanted = Wanted("none" if no_stress else "all", not no_pictures)
     path = meant(path)
     path = path / "case.toml" if holds_a_case_alone(path) else path
-    if is_rolling(path) or is_tyre(path):
+    if rolls(path):
         return roll(path, no_pictures=no_pictures, set_=set_, force=force, quiet=quiet)
     if (system := system_file(path)) is not None:
         with progress(f"run {system}", quiet) as report:
@@ -335,7 +334,7 @@ def respond(
     from .stages.response import Wanted, response_of_case
     from .stages.stage import folder_of_case
 
-    case = _case_file(case)
+    case = case_file(case)
     if over is not None:
         _survey(case, basis, over.replace("-", "_"), set_, force, quiet)
         return
@@ -350,17 +349,16 @@ def respond(
             wanted = Wanted("none" if no_stress else stresses, not no_pictures)
             table, converged = running.respond(case, basis, list(set_), force, report, log=log, wanted=wanted)
         if stability:
-            from .stages import following
+            from .stages.answer import case_job
+            from .stages.multipliers import stability_of_points
 
-            opened = _followed(case, basis, set_)
-            found = following.stabilities(opened, report)
-            report(following.unstable(found))
-            files = following.write_stabilities(found, opened)
+            job = case_job(case, basis, set_, force, report, not no_pictures, make=False)
+            found = stability_of_points(job)
     for line in map(sentence, pairs if compare_book else ()):
         _say(line, quiet)
     _say(table, quiet)
-    for file in files if stability else ():
-        _say(file, quiet)
+    if stability:
+        _tell(found, quiet, "")
     if not converged:
         raise NotConverged(running.unsolved(table.parent, compare_book))
 
@@ -375,33 +373,16 @@ def identify(
         case: a case.toml with [identification], or the folder that holds it.
         basis: the modal file, as for respond.
     """
-    _survey(_case_file(case), basis, "identification", set_, force, quiet)
+    _survey(case_file(case), basis, "identification", set_, force, quiet)
 
 
 def _survey(case: Path, basis: Path | None, kind: str, set_: Sequence[str], force: bool, quiet: bool) -> None:
+    from .stages.answer import case_job
     from .stages.surveying import survey_stage
 
     with progress(f"{kind.replace('_', ' ')} of {case}", quiet) as report:
-        found = survey_stage(case, basis, kind, list(set_), force, report)
+        found = survey_stage(case_job(case, basis, set_, force, report, make=False), kind)
     _tell(found, quiet, f"{found.missing}; {{page}} holds what was found")
-
-
-def _case_job(
-    case: Path, set_: Sequence[str], force: bool, report: Report, no_pictures: bool, basis: Path | None = None
-) -> CaseJob:
-    """A case on its way. basis: see respond; modal files are made where they are not up to date if not given."""
-    from .case import load_case
-    from .stages.answer import CaseJob
-    from .stages.places import existing_files, modal_files
-    from .stages.stage import folder_of_case
-
-    settings, _ = load_case(case, list(set_))
-    folder = folder_of_case(case, settings.name)
-    if basis is not None:
-        files = existing_files(settings, basis, Path("."))
-    else:
-        files = modal_files(settings, Path("."), report)
-    return CaseJob(case, files, folder, set_, force, report, not no_pictures)
 
 
 def _tell(found: Written, quiet: bool, lost: str) -> None:
@@ -426,17 +407,11 @@ def roll(
     Args:
         case: a case.toml with [wheel] and [rail], or with [tyre], the folder that holds it, its name, or its products.
     """
-    from .stages.answer import RollJob
-    from .stages.places import is_kinematics, is_tyre, is_vehicle
-    from .stages.rolling import rolling_stage
-    from .stages.tyre import tyre_stage
-    from .stages.vehicle import kinematics_stage, vehicle_stage
+    from .stages.rolling import roll_stage
 
-    case = _case_file(case)
-    kinds = ((is_vehicle, vehicle_stage), (is_kinematics, kinematics_stage), (is_tyre, tyre_stage))
-    stage = next((stage for is_kind, stage in kinds if is_kind(case)), rolling_stage)
+    case = case_file(case)
     with progress(f"roll {case}", quiet) as report:
-        found = stage(RollJob(case, Path("build"), set_, force, report, not no_pictures))
+        found = roll_stage(case, Path("build"), set_, force, report, not no_pictures)
     _tell(found, quiet, "the run ended early; {page} says why, and holds what was found")
 
 
@@ -452,7 +427,6 @@ def stability(
             whose contacts slide, with [stability].
         speed: of a modal file, or a body with a mesh: which of its speeds, counted from 0; the first if not given.
     """
-    from .settings.meant import meant
     from .stages.places import is_case
     from .stages.stability import stability_stage
 
@@ -466,97 +440,6 @@ def stability(
     with progress(f"stability {path}", quiet) as report:
         found = stability_stage(path, list(set_), force, report, not no_pictures, speed)
     _tell(found, quiet, "roots in the window are missing; {page} says what")
-
-
-@app.command
-def backbone(
-    case: Path, basis: Path | None = None, /, *, mode: int | None = None, low: float | None = None,
-    high: float | None = None, set_: Set = (), quiet: Quiet = False,
-) -> None:  # fmt: skip
-    """Nonlinear mode of a case: frequency and damping over the amplitude, at every normal force.
-
-    Args:
-        case: a case.toml, or the folder that holds it.
-        basis: see respond.
-        mode: number of the mode with sticking contacts, 1 the lowest; the one that answers the excitation most in the
-            band of the sweep if not given.
-        low: smallest amplitude of the first read-out, m (m/m of a gauge); a thirtieth of where the contacts begin to
-            slide if not given.
-        high: largest amplitude, m; thirty times that if not given.
-    """
-    from .files.store import making
-    from .stages import following
-
-    case = _case_file(case)
-    with progress(f"backbone {case}", quiet) as report:
-        opened = _followed(case, basis, set_)
-        with making(opened.folder / "backbone.csv", report):
-            found = following.backbones(opened, mode, low, high, report)
-            remarks = following.remarks_on_backbones(found, opened, mode, report)
-            files = following.write_backbones(found, opened, remarks)
-    for file in files:
-        _say(file, quiet)
-    if why := following.unreached(found):
-        raise NotConverged(f"{why}; backbone.csv holds what was found")
-
-
-@app.command
-def optimum(
-    case: Path, basis: Path | None = None, /, *, over: str = "normal_force", low: float | None = None,
-    high: float | None = None, points: int = 6, beside: tuple[str, ...] = (), set_: Set = (), quiet: Quiet = False,
-) -> None:  # fmt: skip
-    """The normal force, or another setting, at which the highest resonance of a case is lowest.
-
-    Args:
-        case: a case.toml, or the folder that holds it.
-        basis: see respond.
-        over: normal_force, a key of the contacts (friction, tangential_stiffness, ...: of all), or any key of the
-            case by its dotted name, or of its system.toml behind "system.".
-        low: first value of the range that is searched; the smallest of sweep.normal_forces if not given.
-        high: last value of it; the largest of sweep.normal_forces if not given.
-        points: values from one end to the other at which a sweep looks for it first.
-        beside: a case whose optimum over the same setting was found before, drawn on the same picture; may be repeated.
-    """
-    from .files.store import making
-    from .stages import following
-
-    case = _case_file(case)
-    over = "normal_force" if over == "normal-force" else over  # as respond has it
-    with progress(f"optimum {case}", quiet) as report:
-        opened = _followed(case, basis, set_)
-        with making(opened.folder / "optimum.csv", report):
-            others = following.found_before(beside, over, opened)
-            found = following.optimum_over(opened, over, low, high, points, report)
-            remarks = following.remarks_on_optimum(found, over, opened, report)
-            files = following.write_optimum(found, over, opened, others, remarks)
-    _say(following.told(found, over, opened), quiet)
-    for file in files:
-        _say(file, quiet)
-    if why := following.missed(found, over):
-        raise NotConverged(why)
-
-
-def _case_file(case: Path) -> Path:
-    """A case.toml, the one in a folder, of a name or of products, or the one that travels with the package."""
-    from .settings.meant import meant
-
-    if str(case) == "sample" and not case.exists():
-        return PACKAGE / "samples" / "case.toml"
-    case = meant(case, case=True)
-    return case / "case.toml" if case.is_dir() else case
-
-
-def _followed(case: Path, basis: Path | None, assignments: Sequence[str]) -> Case:
-    """A case with its modal files, for what is followed from it."""
-    from .case import load_case
-    from .stages.following import open_case
-    from .stages.places import existing_files
-    from .stages.stage import folder_of_case
-
-    settings, _ = load_case(case, list(assignments))
-    folder = folder_of_case(case, settings.name)
-    files = existing_files(settings, basis, Path("."))
-    return open_case(case, files, folder, assignments)
 
 
 @app.command
@@ -925,10 +808,11 @@ def _analyse(
     """The answer of an analysis."""
     from .analysis import analyses
     from .stages.analysing import analysed
+    from .stages.answer import case_job
 
     with progress(f"{verb} {case}", quiet) as report:
-        found = analysed(name, _case_job(case, set_, force, report, no_pictures, basis))
-    _tell(found, quiet, f"{analyses()[name].lost}; {{page}} says which and why")
+        found = analysed(name, case_job(case, basis, set_, force, report, not no_pictures))
+    _tell(found, quiet, f"{found.missing or analyses()[name].lost}; {{page}} says which and why")
 
 
 def _verb(name: str, said: Verb) -> Callable[..., None]:
@@ -936,15 +820,17 @@ def _verb(name: str, said: Verb) -> Callable[..., None]:
 
     def verb(
         case: Path, basis: Path | None = None, /, *, no_pictures: NoPictures = False, set_: Set = (),
-        force: Force = False, quiet: Quiet = False, **keys: str | None,
+        force: Force = False, quiet: Quiet = False, **keys: tuple[str, ...],
     ) -> None:  # fmt: skip
-        more = [f"{name}.{key}={value}" for key, value in keys.items() if value is not None]
-        _analyse(name, said.name, _case_file(case), basis, no_pictures, [*set_, *more], force, quiet)
+        given = {key: values[0] if len(values) == 1 else json.dumps(values) for key, values in keys.items() if values}
+        more = [f"{name}.{key}={value}" for key, value in given.items()]
+        _analyse(name, said.name, case_file(case), basis, no_pictures, [*set_, *more], force, quiet)
 
     of = inspect.signature(verb, eval_str=True)
     kept = [p for p in of.parameters.values() if p.kind is not p.VAR_KEYWORD]
-    options = {key: Annotated[str | None, Parameter(help=what)] for key, what in said.options.items()}
-    more = [inspect.Parameter(key, inspect.Parameter.KEYWORD_ONLY, default=None, annotation=kind)
+    how = {key: Parameter(help=what, show_default=False) for key, what in said.options.items()}
+    options = {key: Annotated[tuple[str, ...], of_key] for key, of_key in how.items()}
+    more = [inspect.Parameter(key, inspect.Parameter.KEYWORD_ONLY, default=(), annotation=kind)
             for key, kind in options.items()]  # fmt: skip
     verb.__signature__ = of.replace(parameters=[*kept, *more])  # type: ignore[attr-defined]
     verb.__annotations__ = {p.name: p.annotation for p in (*kept, *more)}

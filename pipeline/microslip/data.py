@@ -1,4 +1,4 @@
-"""The nouns of microslip: frozen dataclasses of plain arrays in SI units. No numerics live here.
+"""The nouns of microslip: frozen dataclasses of plain arrays in SI units. No numerics but `largest` live here.
 
 Changing one is ``dataclasses.replace``. Conventions (frames, signs, orders) stand in ``docs/conventions.md``.
 """
@@ -22,6 +22,11 @@ Array = NDArray[Any]
 ComplexArray = NDArray[np.complex128]
 Indices = NDArray[np.signedinteger[Any]]
 Flags = NDArray[np.bool_]
+
+
+def largest(values: Array) -> float:
+    """The largest size of the numbers of an array, 0 of none."""
+    return float(np.abs(values).max(initial=0.0))
 
 
 @dataclass(frozen=True)

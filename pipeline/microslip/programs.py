@@ -70,7 +70,8 @@ class Program:
         words = (static_argnames,) if isinstance(static_argnames, str) else static_argnames
         self._names = {*words, *(names[i] for i in numbers)}
         self._numbers = {i for i, name in enumerate(names) if name in self._names}
-        self.options = {**(options or {}), **_left_out()} if KNOWN else None
+        left_out = {"xla_disable_hlo_passes": LEFT_OUT} if LEFT_OUT else {}
+        self.options = {**(options or {}), **left_out} if KNOWN else None
         self.traced = jax.jit(function, static_argnames=tuple(self._names))
         self.made: dict[Any, Callable[..., Any]] = {}
         _ALL.add(self)
@@ -132,10 +133,6 @@ often = partial(Program, options={"xla_cpu_prefer_vector_width": 512})
 
 seldom = partial(Program, options={"xla_cpu_use_fusion_emitters": False, "xla_backend_optimization_level": 0})
 """The same of what is called some dozens of times: compiled in a quarter of the time, half as fast."""
-
-
-def _left_out() -> dict[str, str]:
-    return {"xla_disable_hlo_passes": LEFT_OUT} if LEFT_OUT else {}
 
 
 def _named(kwargs: dict[str, Any], names: set[str]) -> list[tuple[str, Any]]:

@@ -367,15 +367,9 @@ def _durations() -> Durations:
     """Title and folder -> s that its last runs took, and were expected to; nothing of what is no such file."""
     try:
         found: Any = json.loads((_place() or Path(os.devnull)).read_text(encoding="utf-8"))
-        return {str(k): [_took(one) for one in v] for k, v in found.items() if v}
+        return {k: [(float(s), e and float(e)) for s, e in v] for k, v in found.items() if v}
     except (OSError, ValueError, TypeError, AttributeError):
         return {}
-
-
-def _took(one: Any) -> tuple[float, float | None]:
-    """Of a file, of an older version too, which told how long a run took alone."""
-    seconds, expected = one if isinstance(one, list) else (one, None)
-    return float(seconds), float(expected) if expected else None
 
 
 def _duration(seconds: float) -> str:

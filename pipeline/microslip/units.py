@@ -95,7 +95,7 @@ class Quantity:
 
     def column(self, name: str) -> str:
         """Name of a column: ``amplitude`` -> ``amplitude_m``, ``amplitude_rad``, ``amplitude_strain``."""
-        return f"{name}_{_COLUMNS.get(self.unit, self.unit)}"
+        return f"{name}_{_COLUMNS.get(self.unit, self.unit).replace('/', '_')}"
 
     @property
     def said(self) -> str:
@@ -112,12 +112,23 @@ class Quantity:
         return self.scale(max(max((abs(v) for v in values if math.isfinite(v)), default=0.0), 2e-6))
 
     def scale(self, value: float) -> tuple[float, str]:
-        """Factor and name of that unit: 0.00193 m -> (1e3, "mm")."""
-        factors = (1.0, ""), (1e3, "m"), (1e6, "µ"), (1e9, "n")
-        factor, prefix = next(((f, p) for f, p in factors if abs(value) * f >= 1), factors[2])
+        """Factor and name of that unit: 0.00193 m -> (1e3, "mm"). Forces and pressures alone have larger units."""
+        least, factor, name = _TAKEN.get(self.unit, (math.inf, 1.0, ""))
+        if abs(value) >= least:
+            return factor, name
+        factors = _PREFIXES[0 if self.unit in ("N", "Pa") else 3 :]
+        smallest = (1e9, "n") if self.unit == "J" else (1e6, "µ")
+        factor, prefix = next(((f, p) for least, f, p in factors if abs(value) * f >= least), smallest)
         return factor, f"{prefix}{self.said}"
 
 
+_PREFIXES = (
+    (1.0, 1e-9, "G"), (1.0, 1e-6, "M"), (10.0, 1e-3, "k"), (1.0, 1.0, ""), (1.0, 1e3, "m"), (1.0, 1e6, "µ"),
+    (1.0, 1e9, "n"),
+)  # fmt: skip
+"""The smallest number that stands before a unit of this prefix, its factor, and the prefix."""
+_TAKEN = {"s": (7200.0, 1 / 3600, "h"), "N/m": (1e5, 1e-6, "N/µm")}
+"""Unit -> from which value on the trade takes another one, its factor, and its name."""
 _COLUMNS = {"1": "strain"}
 METRES = Quantity()
 

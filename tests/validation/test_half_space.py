@@ -18,7 +18,7 @@ from scipy.optimize import brentq
 from microslip.contact.hertz import Hertz
 from microslip.contact.solids import Solid
 from microslip.data import Array
-from microslip.rolling.half_space import Contact, linear_coefficients, pressed, rolled, shifted, steady_rolling
+from microslip.rolling.half_space import HalfSpaceContact, linear_coefficients, pressed, rolled, shifted, steady_rolling
 from microslip.rolling.half_space_influence import Grid, Pair
 
 STEEL = Pair(82e9, 0.28)
@@ -39,7 +39,7 @@ def agrees(found: dict[str, float], printed: str) -> None:
     assert not wrong, wrong
 
 
-def elements(c: Contact) -> tuple[int, int, int]:
+def elements(c: HalfSpaceContact) -> tuple[int, int, int]:
     """In contact, sticking, slipping."""
     stick = int(c.sticking.sum())
     return int(c.touching.sum()), stick, int(c.touching.sum()) - stick
@@ -48,7 +48,7 @@ def elements(c: Contact) -> tuple[int, int, int]:
 # Carter ------------------------------------------------------------------------------------------------------------
 
 
-def carter(n: int) -> tuple[Contact, Grid]:
+def carter(n: int) -> tuple[HalfSpaceContact, Grid]:
     """A cylinder of 500 mm, half contact width 1 mm, stick zone .6 of it; n elements and four more; 200 mm wide."""
     dx = 2e-3 / n
     grid = Grid(n + 4, 1, dx, 0.2)
@@ -144,7 +144,7 @@ def test_onset_of_rolling_as_printed() -> None:
 # Cattaneo ----------------------------------------------------------------------------------------------------------
 
 
-def cattaneo(n: int, reach: float) -> Contact:
+def cattaneo(n: int, reach: float) -> HalfSpaceContact:
     """A ball of 50 mm, a = 1 mm, F_x = -7/8 mu F_n: the inner half of the radius sticks."""
     grid = Grid.around(reach, reach, n, n)
     force = -7 / 8 * 0.4 * 9.1954

@@ -16,9 +16,9 @@ import pytest
 from closed_forms.oscillators import belt
 from scipy.integrate import solve_ivp
 
-from microslip.bifurcation import balance, deflation, floquet
-from microslip.bifurcation.branches import SPECIAL, Branch
-from microslip.bifurcation.diagram import Asked, Diagram, diagram
+from microslip.bifurcation import balance, deflation
+from microslip.bifurcation.branches import SPECIAL, DiagramBranch
+from microslip.bifurcation.diagram import Diagram, DiagramPlan, diagram
 from microslip.bifurcation.dynamics import Dynamics
 
 pytestmark = pytest.mark.slow
@@ -26,19 +26,19 @@ pytestmark = pytest.mark.slow
 
 @cache
 def load() -> Diagram:
-    return diagram(belt(0.2, 9.8), np.zeros(4), Asked(0.2, 9.8, doublings=2, nodes=32))
+    return diagram(belt(0.2, 9.8), np.zeros(4), DiagramPlan(0.2, 9.8, doublings=2, nodes=32))
 
 
 @cache
 def velocity() -> Diagram:
-    asked = Asked(5.0, 2.3, doublings=0, attractors=(3.8,), starts=48)
+    asked = DiagramPlan(5.0, 2.3, doublings=0, attractors=(3.8,), starts=48)
     return diagram(belt(2.3, 5.0, "v_0", B=20.0), np.zeros(4), asked)
 
 
 @cache
 def damping() -> Diagram:
     """Load and velocity are chosen, 8 m and 1 m/s, as in pipeline/cases/belt.toml."""
-    return diagram(belt(0.06, 1.0, "D", B=8.0), np.zeros(4), Asked(1.0, 0.06, doublings=1))
+    return diagram(belt(0.06, 1.0, "D", B=8.0), np.zeros(4), DiagramPlan(1.0, 0.06, doublings=1))
 
 
 def test_hopf_point_h2() -> None:
@@ -52,9 +52,9 @@ def test_hopf_point_h1_contradicts_h2() -> None:
     H2 at 6.70 m."""
     one, two = (point.p for point in load().hopf)
     assert one == pytest.approx(1.1834, rel=1e-4) and one / two == pytest.approx(0.1670, rel=1e-3)
-    other = diagram(belt(0.5, 8.0, D=0.0946), np.zeros(4), Asked(0.5, 8.0, orbits=False))
+    other = diagram(belt(0.5, 8.0, D=0.0946), np.zeros(4), DiagramPlan(0.5, 8.0, orbits=False))
     assert [p.p for p in other.hopf] == pytest.approx([1.1196, 6.6976], rel=1e-4)
-    faster = diagram(belt(1.0, 14.0, v_0=1.3), np.zeros(4), Asked(1.0, 14.0, orbits=False))
+    faster = diagram(belt(1.0, 14.0, v_0=1.3), np.zeros(4), DiagramPlan(1.0, 14.0, orbits=False))
     assert faster.hopf[0].p / faster.hopf[1].p == pytest.approx(one / two, rel=1e-6)
 
 
@@ -120,7 +120,7 @@ def in_time(found: Diagram, p: float, x: np.ndarray, time: float) -> np.ndarray:
     return solve_ivp(lambda _, x: np.asarray(f(x, p)), (0, time), x, method="LSODA", rtol=1e-9, atol=1e-11).y[:, -1]
 
 
-def chosen(branch: Branch) -> list[int]:
+def chosen(branch: DiagramBranch) -> list[int]:
     """Three points of a branch, evenly along it, whose motions need not be looked at for long."""
     if branch.still:
         clear = np.abs(branch.multipliers[:, 0].real) > 0.01
@@ -147,7 +147,7 @@ def test_stability_of_every_branch_is_what_motions_do() -> None:
                     orbit, way, lasts = x, vectors[:, k].real, 2.0 / abs(values[k].real)
                 else:
                     one = branch.orbit(found.system, i)
-                    values, vectors = np.linalg.eig(floquet.monodromy(one))
+                    values, vectors = np.linalg.eig(one.monodromy)
                     k = int(np.argmin(np.abs(values - branch.multipliers[i, 0])))
                     periods = np.ceil(2.0 / abs(np.log(abs(values[k]) + 1e-300)))
                     orbit, way, lasts = one.sampled(64), vectors[:, k].real, periods * one.period

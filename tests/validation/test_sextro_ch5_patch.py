@@ -5,13 +5,13 @@ Figs. 5.2-4 to 5.2-7 are in tests/test_book_mode.py. The approach of Fig. 5.2-2 
 
 from __future__ import annotations
 
-import jax.numpy as jnp
 import numpy as np
 import pytest
 from scipy.integrate import quad
 
 from microslip.contact.friction import Coulomb
 from microslip.contact.heights import Polynomial
+from microslip.contact.law import value
 from microslip.contact.normal import Rough
 from microslip.contact.patch import Patch, grid, pressing
 from microslip.contact.point import PointContact
@@ -21,8 +21,8 @@ C_N0, C_R0, R_Z, MU, B0, H0 = 840e6, 80e6, 7.5e-6, 0.2, 0.072, 0.005
 
 def patch(n_y: int, n_z: int) -> Patch:
     n = n_y * n_z
-    normal = Rough(jnp.asarray(C_N0 / n), jnp.asarray(R_Z), Polynomial())
-    law = PointContact(normal, Coulomb(jnp.asarray(MU)), jnp.asarray(C_R0 / n))
+    normal = Rough(value(C_N0 / n), value(R_Z), Polynomial())
+    law = PointContact(normal, Coulomb(value(MU)), value(C_R0 / n))
     return Patch("right", *grid(B0, H0, (n_y, n_z)), law)
 
 

@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 from microslip.data import Array
-from microslip.rolling.half_space import Contact, steady_rolling
+from microslip.rolling.half_space import HalfSpaceContact, steady_rolling
 from microslip.rolling.half_space_influence import Grid, Pair
 from microslip.rolling.temperature import Conductor, conducted, falling, heat_source, marched, settled
 from microslip.rolling.wear import depth_along, revolution, strip_depth
@@ -30,7 +30,7 @@ MIDDLE = 16
 
 
 @cache
-def rolling(creepage: float) -> Contact:
+def rolling(creepage: float) -> HalfSpaceContact:
     """A wheel that is driven: negative creepage."""
     return steady_rolling(DISTANCE, GRID, STEEL, 0.3, approach=0.02 * A, creepages=(-creepage, 0, 0))
 
@@ -98,7 +98,7 @@ def test_fig_6_7_3_temperatures_rise_from_adhesion_to_the_trailing_edge() -> Non
 
 def with_heat(creepage: float, cold: float, vanishing: float) -> tuple[float, Array]:
     """F_x/(mu_0 F_n) and temperature with friction that falls with it."""
-    last: list[Contact] = []
+    last: list[HalfSpaceContact] = []
     grid = Grid.around(1.1 * A, 1.1 * A, 23, 23)
     h = (grid.x**2 + grid.y**2) / (2 * R)
 
@@ -151,7 +151,7 @@ def test_fig_6_8_1_depths_behave_like_temperatures_along_x_and_like_a_parabola_a
 
 
 @cache
-def penetrated(approach: float) -> tuple[Array, Contact] | None:
+def penetrated(approach: float) -> tuple[Array, HalfSpaceContact] | None:
     """Full slip of .06, or the bodies apart."""
     grid = Grid.around(1.8 * A, 1.8 * A, 30, 30)
     h = (grid.x**2 + grid.y**2) / (2 * R)

@@ -1,8 +1,8 @@
-"""Branches of a diagram as arrays, in memory and in files."""
+"""Branches of a diagram as arrays, in memory, in files, and in matplotlib's axes."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,12 +15,13 @@ from ..errors import UserError
 from ..files import hdf5, store
 from ..units import Quantity, counted
 from .dynamics import Dynamics
-from .orbits import Found, extremes
-from .shooting import Orbit
+from .orbits import OrbitPoint, extremes
+from .shooting import PeriodicOrbit
 
 if TYPE_CHECKING:
     import pandas
     import xarray
+    from matplotlib.axes import Axes
 
 EQUILIBRIA = "equilibria"
 
@@ -33,7 +34,7 @@ LOST = ("stuck", "no start", "points")
 
 
 @dataclass(frozen=True, eq=False)
-class Branch:
+class DiagramBranch:
     """Equilibria, or periodic orbits, along one curve.
 
     Attributes:
@@ -65,7 +66,7 @@ class Branch:
     def __repr__(self) -> str:
         special = ", ".join(f"{len(self.of_kind(k))} {k}" for k in SPECIAL if len(self.of_kind(k)))
         points = f"{counted(len(self), 'point')}{special and f' ({special})'}"
-        return f"<Branch {self.name}: {points}, {int(self.stable.sum())} stable; ended: {self.ended}>"
+        return f"<DiagramBranch {self.name}: {points}, {int(self.stable.sum())} stable; ended: {self.ended}>"
 
     @property
     def still(self) -> bool:
@@ -86,9 +87,9 @@ class Branch:
         """Numbers of the points of a kind."""
         return np.flatnonzero(self.kind == kind)
 
-    def orbit(self, system: Dynamics, i: int) -> Orbit:
+    def orbit(self, system: Dynamics, i: int) -> PeriodicOrbit:
         """The i-th orbit."""
-        return Orbit(system, self.x[i], float(self.period[i]), float(self.parameter[i]), self.turns)
+        return PeriodicOrbit(system, self.x[i], float(self.period[i]), float(self.parameter[i]), self.turns)
 
     def stretches(self) -> Iterator[tuple[slice, bool]]:
         """Parts of one stability, each with the first point of the next one, and whether they are stable. Where
@@ -107,38 +108,38 @@ class Branch:
         return pandas.DataFrame(columns(self))
 
 
-def of_orbits(name: str, born: str, ended: str, found: list[Found], each: int = 8) -> Branch:
+def of_orbits(name: str, born: str, ended: str, found: list[OrbitPoint], each: int = 8) -> DiagramBranch:
     """A branch of periodic orbits, read at so many times a node."""
-    orbits = [one.orbit for one in found]
+    orbits = [point.orbit for point in found]
     ends = [extremes(o.system.seen(o.sampled(each), o.p)) for o in orbits]
-    return Branch(
+    return DiagramBranch(
         name, born, ended, orbits[0].turns, orbits[0].system.named,
         np.array([o.p for o in orbits]), np.array([o.period for o in orbits]), np.array([o.x for o in orbits]),
         np.array([largest for largest, _ in ends]), np.array([smallest for _, smallest in ends]),
-        np.array([one.multipliers for one in found]), np.array([one.stable for one in found]),
-        np.array([one.kind for one in found]), orbits[0].system.units,
+        np.array([point.multipliers for point in found]), np.array([point.stable for point in found]),
+        np.array([point.kind for point in found]), orbits[0].system.units,
     )  # fmt: skip
 
 
-def joined(back: Branch, forth: Branch) -> Branch:
+def joined(back: DiagramBranch, forth: DiagramBranch) -> DiagramBranch:
     """Two branches that begin at the same point, as one: the first one from its end to its beginning, then the second.
     It ended as both did."""
     both: dict[str, Any] = {key: np.concatenate([getattr(back, key)[:0:-1], getattr(forth, key)]) for key in ARRAYS}
-    said = [one.ended for one in (back, forth)]
-    ended = next((words for words in said if words.startswith(LOST)), f"{said[0]}; {said[1]}")
+    ends = [branch.ended for branch in (back, forth)]
+    ended = next((words for words in ends if words.startswith(LOST)), f"{ends[0]}; {ends[1]}")
     return replace(forth, ended=ended, **both)
 
 
 class Collected:
     """Branches over one parameter, found or read."""
 
-    branches: tuple[Branch, ...]
+    branches: tuple[DiagramBranch, ...]
 
-    def __getitem__(self, name: str) -> Branch:
-        known = {b.name: b for b in self.branches}
-        if name not in known:
-            raise UserError(f"branch '{name}': there are {', '.join(known)}")
-        return known[name]
+    def __getitem__(self, name: str) -> DiagramBranch:
+        by_name = {b.name: b for b in self.branches}
+        if name not in by_name:
+            raise UserError(f"branch '{name}': there are {', '.join(by_name)}")
+        return by_name[name]
 
     def at(self, kind: str) -> dict[str, Array]:
         """Branch -> values of the parameter at its points of a kind: ``Hopf``, ``fold``, ``period doubling``,
@@ -159,20 +160,52 @@ class Collected:
         return self.to_dataframe().rename_axis("point").to_xarray()
 
 
-def columns(branch: Branch) -> dict[str, Any]:
+def columns(branch: DiagramBranch) -> dict[str, Any]:
     """Column -> values of a table."""
-    found: dict[str, Any] = {"branch": np.array([branch.name] * len(branch)), "kind": branch.kind,
+    table: dict[str, Any] = {"branch": np.array([branch.name] * len(branch)), "kind": branch.kind,
                              "parameter": branch.parameter, "stable": branch.stable.astype(int),
                              "period_s": branch.period}  # fmt: skip
     for i, name in enumerate(branch.outputs):
         column = Quantity(branch.units[i]).column if branch.units else str
         for what in ("largest", "smallest"):
-            found[column(f"{name.replace(' ', '_')}_{what}")] = getattr(branch, what)[:, i]
+            table[column(f"{name.replace(' ', '_')}_{what}")] = getattr(branch, what)[:, i]
     first = np.abs(branch.multipliers).max(axis=1, initial=0.0)
     decisive = branch.multipliers[:, 0] if branch.multipliers.shape[1] else np.zeros(len(branch), complex)
-    return found | {"multiplier_real": decisive.real, "multiplier_imaginary": decisive.imag} | (
+    return table | {"multiplier_real": decisive.real, "multiplier_imaginary": decisive.imag} | (
         {} if branch.still else {"multiplier_size": first}
     )  # fmt: skip
+
+
+MARKS = {"Hopf": ("o", "Hopf point"), "fold": ("D", "fold"), "period doubling": ("s", "period doubling"),
+         "torus": ("^", "torus point"), "branch point": ("X", "branch point")}  # fmt: skip
+
+
+def draw(
+    branches: Sequence[DiagramBranch], dots: Sequence[tuple[float, float]], axes: Axes, axis: str, read_out: int = 0
+) -> None:
+    """Branches in the axes: lines where stable, dashes where not, marks where something happens."""
+    top = max(float(np.abs(b.swing[:, read_out]).max(initial=0.0)) for b in branches)
+    name, units = branches[0].outputs[read_out], branches[0].units
+    factor, unit = Quantity(units[read_out]).scale(top) if units else (1.0, "")
+    for i, branch in enumerate(branches):
+        y = factor * branch.swing[:, read_out]
+        colour = "#30343c" if branch.still else f"C{(i - 1) % 10}"
+        axes.plot([], [], "-", color=colour, lw=2.2, label=branch.name)
+        for part, stable in branch.stretches():
+            style = "-" if stable else (0, (4, 3))
+            axes.plot(branch.parameter[part], y[part], ls=style, color=colour, lw=2.2 if stable else 1.0)
+    for kind in SPECIAL:
+        places = [(float(b.parameter[i]), factor * float(b.swing[i, read_out])) for b in branches
+                  for i in b.of_kind(kind)]  # fmt: skip
+        if places:
+            mark, words = MARKS[kind]
+            axes.plot(*np.array(places).T, mark, color="white", mec="#30343c", ms=6, label=words, zorder=5)
+    if dots:
+        x, y = np.array(dots).T
+        axes.plot(x, factor * y, ".", color="#30343c", ms=9, label="motions come here", zorder=6)
+    axes.plot([], [], ls=(0, (4, 3)), color="#30343c", lw=1.0, label="unstable")
+    axes.set(xlabel=axis, ylabel=f"{name}: amplitude in {unit}".removesuffix(" in "))
+    axes.legend(fontsize=8, frameon=False, loc="upper left", bbox_to_anchor=(1.0, 1.0))
 
 
 TEXTS = ("name", "born", "ended")
@@ -181,7 +214,7 @@ ARRAYS = {"parameter": "", "period": "s", "x": "", "largest": "", "smallest": ""
           "kind": ""}  # fmt: skip
 
 
-def put(group: h5py.Group, branch: Branch) -> None:
+def put(group: h5py.Group, branch: DiagramBranch) -> None:
     for key in TEXTS:
         group.attrs[key] = getattr(branch, key)
     group.attrs["turns"] = branch.turns
@@ -192,23 +225,23 @@ def put(group: h5py.Group, branch: Branch) -> None:
         hdf5.put(group, key, values.astype(np.int8) if values.dtype == bool else values, unit)
 
 
-def get(group: h5py.Group) -> Branch:
+def get(group: h5py.Group) -> DiagramBranch:
     texts: dict[str, Any] = {key: str(group.attrs[key]) for key in TEXTS}
     arrays: dict[str, Any] = {key: group[key][()] for key in ARRAYS}
     arrays["multipliers"] = arrays["multipliers"] + 1j * group["multipliers" + hdf5.IMAGINARY][()]
     arrays["stable"], arrays["kind"] = arrays["stable"].astype(bool), np.char.decode(arrays["kind"], "utf-8")
     lists: dict[str, Any] = {key: tuple(str(group.attrs.get(key, "")).splitlines()) for key in LISTS}
-    return Branch(turns=int(group.attrs["turns"]), **lists, **texts, **arrays)
+    return DiagramBranch(turns=int(group.attrs["turns"]), **lists, **texts, **arrays)
 
 
-def write(path: Path, branch: Branch, inputs: str) -> None:
+def write(path: Path, branch: DiagramBranch, inputs: str) -> None:
     """A finished branch, with the hash of what it depends on."""
     with hdf5.sealed(path) as file:
         file.attrs["inputs"] = inputs
         put(file, branch)
 
 
-def kept(path: Path, inputs: str) -> Branch | None:
+def kept(path: Path, inputs: str) -> DiagramBranch | None:
     """A finished branch of the same inputs, if it is there and as it was written."""
     if not path.is_file() or hdf5.seal_state(path) != "intact":
         return None

@@ -14,18 +14,15 @@ import scipy.integrate
 from ..continuation import NewtonSettings, Settings, branch_off, follow, newton
 from ..data import Array, ComplexArray
 from ..harmonic_balance.accuracy import SAFETY
-from . import equilibria, floquet, flow
-from .balance import Harmonics, summed
+from ..progress import Report
+from . import equilibria, flow
+from .balance import Harmonics, equations, summed
 from .branches import LOST
-from .condensed import equations
-from .diagram import Asked, diagram
+from .diagram import DiagramPlan, diagram
 from .dynamics import Dynamics
 from .equilibria import Hopf
-from .orbits import extremes
-from .shooting import Orbit
-from .switching import OFF
-
-Report = Callable[[str], None]
+from .orbits import OFF, extremes
+from .shooting import PeriodicOrbit, is_stable
 
 PERIODS = 5
 """Of a motion in time that an orbit is checked by."""
@@ -61,7 +58,7 @@ class Checked:
 
     @property
     def stable(self) -> bool:
-        return floquet.is_stable(self.multipliers)
+        return is_stable(self.multipliers)
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,7 +128,7 @@ def cycles(
     Raises:
         UserError: no equilibrium near x.
     """
-    still = diagram(system, x, Asked(start, stop, orbits=False))
+    still = diagram(system, x, DiagramPlan(start, stop, orbits=False))
     wanted = [h for h in still.hopf if band[0] <= h.omega <= band[1]]
     return [_born_at(system, h, harmonics, (start, stop), points, report) for h in wanted]
 
@@ -150,8 +147,8 @@ def _born_at(
     first = branch_off(problem, problem.unknowns(problem.reference), hopf.p, (problem.way(way), 0.0), asked)
     orbits, ended = list[Harmonics](), ""
     for state in follow(problem, first, asked):
-        for one in state.found:
-            orbit = problem.orbit(one.x, one.lam)
+        for point in state.found:
+            orbit = problem.orbit(point.x, point.lam)
             orbits.append(orbit)
         ended = state.status
         report(f"limit cycle {len(orbits)} of {points}, {state.y[-1] * system.parameter_scale:.6g}")
@@ -168,14 +165,20 @@ def in_time(system: Dynamics, orbit: Harmonics, periods: int = PERIODS) -> tuple
 
     turns = np.append((np.arange(periods)[:, None] + TURNS).ravel(), periods)
     times = turns * 2 * np.pi / orbit.omega
-    own = orbit.at(turns) / size
+    motion = orbit.at(turns) / size
     run = scipy.integrate.solve_ivp(
-        rate, (0.0, times[-1]), own[0], method="DOP853", t_eval=times, rtol=FINE, atol=FINE * np.ptp(own, axis=0).max()
+        rate,
+        (0.0, times[-1]),
+        motion[0],
+        method="DOP853",
+        t_eval=times,
+        rtol=FINE,
+        atol=FINE * np.ptp(motion, axis=0).max(),
     )
     if not run.success:
         return float("inf"), np.full(len(system.named), np.nan)
     seen = system.seen(run.y.T[-len(TURNS) :] * size, orbit.p)
-    return float(np.abs(run.y.T - own).max() / (np.ptp(own, axis=0).max() / 2)), _swing(seen)
+    return float(np.abs(run.y.T - motion).max() / (np.ptp(motion, axis=0).max() / 2)), _swing(seen)
 
 
 def _turns(orbit: Harmonics) -> Array:
@@ -204,10 +207,10 @@ def refined(
         c = np.zeros((2 * H + 1, system.count))
         c[: len(orbit.c)] = orbit.c
         problem = equations(system, replace(orbit, c=c))
-        found = newton(problem, problem.unknowns(problem.reference), orbit.p, NewtonSettings(last_resort=False))
-        if not found.converged:
+        solution = newton(problem, problem.unknowns(problem.reference), orbit.p, NewtonSettings(last_resort=False))
+        if not solution.converged:
             return orbit, np.inf
-        orbit = problem.orbit(found.x, orbit.p)
+        orbit = problem.orbit(solution.x, orbit.p)
         turns = np.arange(4 * H) / (4 * H)
         y = orbit.at(turns) / size
         change = np.abs(summed(H, turns) @ (orbit.c - c) / size).max() / (np.ptp(y, axis=0).max() / 2)
@@ -217,8 +220,8 @@ def refined(
     return orbit, error
 
 
-def multipliers(system: Dynamics, orbit: Harmonics) -> ComplexArray:
-    """Floquet multipliers of an orbit, the largest first, see `floquet.multipliers`.
+def cycle_multipliers(system: Dynamics, orbit: Harmonics) -> ComplexArray:
+    """Floquet multipliers of an orbit, the largest first, see `PeriodicOrbit.multipliers`.
 
     Steps of the flow follow the motion, which may be small, and not what leaves it: nodes are so many that a step from
     one to the next is short enough for the fastest root.
@@ -226,7 +229,7 @@ def multipliers(system: Dynamics, orbit: Harmonics) -> ComplexArray:
     period = 2 * np.pi / orbit.omega
     fastest = np.abs(equilibria.eigenvalues(system, orbit.at(np.zeros(1))[0], orbit.p)).max()
     nodes = flow.BLOCK * int(np.ceil(max(period * fastest / (FASTEST * flow.BLOCK), 1)))
-    return floquet.multipliers(Orbit(system, orbit.at(np.arange(nodes) / nodes), period, orbit.p))
+    return PeriodicOrbit(system, orbit.at(np.arange(nodes) / nodes), period, orbit.p).multipliers
 
 
 def checked(
@@ -236,7 +239,7 @@ def checked(
     if accuracy is None:
         return Checked(orbit, np.nan, *in_time(system, orbit), np.zeros(0, dtype=complex))
     fine, error = refined(system, orbit, accuracy, report=report)
-    return Checked(fine, error, *in_time(system, fine), multipliers(system, fine))
+    return Checked(fine, error, *in_time(system, fine), cycle_multipliers(system, fine))
 
 
 def _rate(system: Dynamics) -> Any:

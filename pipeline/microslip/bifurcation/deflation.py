@@ -12,7 +12,7 @@ and run through any number of times, or an equilibrium, which has every period: 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -21,10 +21,10 @@ import scipy.interpolate
 
 from ..continuation import Equations, NewtonSettings, newton
 from ..data import Array
-from . import floquet
+from ..progress import Report
 from .dynamics import Dynamics
-from .orbits import Found
-from .shooting import Orbit, Shooting
+from .orbits import OrbitPoint
+from .shooting import PeriodicOrbit, Shooting
 
 REPEATS = 12
 """Times up to which an orbit that is run through several times is seen to be."""
@@ -55,11 +55,11 @@ TRIES = NewtonSettings(iterations=25, halvings=4, forced=0, last_resort=False)
 
 
 @dataclass(frozen=True, eq=False)
-class Place:
+class KnownSolution:
     """A known solution: an orbit, or where an equilibrium is. Attributes: orbit. still: (n,)."""
 
     system: Dynamics
-    orbit: Orbit | None = None
+    orbit: PeriodicOrbit | None = None
     still: Array | None = None
 
     @cached_property
@@ -107,7 +107,7 @@ class Deflated:
     """The equations of shooting, deflated: `continuation.Equations`."""
 
     problem: Shooting
-    known: Sequence[Place]
+    known: Sequence[KnownSolution]
 
     @property
     def x_scale(self) -> Array:
@@ -131,9 +131,9 @@ class Deflated:
 
 
 def coexisting(
-    system: Dynamics, p: float, still: Sequence[Array], orbits: Sequence[Orbit], nodes: int,
-    report: Callable[[str], None] = lambda _: None,
-) -> list[Found]:  # fmt: skip
+    system: Dynamics, p: float, still: Sequence[Array], orbits: Sequence[PeriodicOrbit], nodes: int,
+    report: Report = lambda _: None,
+) -> list[OrbitPoint]:  # fmt: skip
     """Periodic orbits at p that are none of the known ones, with their multipliers.
 
     From guesses between all that is known, and small vibrations; what is found is known for the guesses after it, and
@@ -142,21 +142,24 @@ def coexisting(
     Args:
         still: (n,) equilibria, or of a driven system a point from which guesses begin. orbits: known at p.
     """
-    known = [*(Place(system, still=x) for x in still), *(Place(system, orbit=one) for one in orbits)]
-    found, left, tried = list[Found](), list(_first(system, p, known, nodes)), 0
+    known = [
+        *(KnownSolution(system, still=x) for x in still),
+        *(KnownSolution(system, orbit=orbit) for orbit in orbits),
+    ]
+    points, left, tried = list[OrbitPoint](), list(_first(system, p, known, nodes)), 0
     while left and tried < GUESSES:
         guess, tried = left.pop(0), tried + 1
-        one = _another(guess, [k for k in known if k.orbit or system.frequency is None])
-        report(f"deflation at {p:.6g}: {len(found)} orbits from {tried} guesses, {len(left)} left")
-        if one is not None:
-            found.append(Found(one, floquet.multipliers(one), "target"))
-            place = Place(system, orbit=one)
+        orbit = _another(guess, [k for k in known if k.orbit or system.frequency is None])
+        report(f"deflation at {p:.6g}: {len(points)} orbits from {tried} guesses, {len(left)} left")
+        if orbit is not None:
+            points.append(OrbitPoint(orbit, "target"))
+            place = KnownSolution(system, orbit=orbit)
             left += _between(place, known, nodes)
             known.append(place)
-    return found
+    return points
 
 
-def _another(guess: Orbit, known: Sequence[Place]) -> Orbit | None:
+def _another(guess: PeriodicOrbit, known: Sequence[KnownSolution]) -> PeriodicOrbit | None:
     """The orbit to which Newton's method leads from a guess, by the deflated equations and then by those of shooting
     alone; None where it leads nowhere, or to what is known."""
     problem: Shooting = Shooting(guess.system, guess, guess.period)
@@ -167,19 +170,19 @@ def _another(guess: Orbit, known: Sequence[Place]) -> Orbit | None:
     once = _shortened(problem.orbit(solution.x, guess.p))
     again = Shooting(guess.system, once, guess.period)
     solution = newton(again, again.unknowns(once), guess.p, TRIES)
-    one = again.orbit(solution.x, guess.p)
-    if not solution.converged or one.period < 1e-3 * guess.period:
+    orbit = again.orbit(solution.x, guess.p)
+    if not solution.converged or orbit.period < 1e-3 * guess.period:
         return None
-    swings = np.ptp(one.x / np.asarray(one.system.scale), axis=0).max() > NEAR
-    new = all(place.distance(one.x, one.period)[0] > NEAR**2 for place in known)
-    return one if swings and new else None
+    swings = np.ptp(orbit.x / np.asarray(orbit.system.scale), axis=0).max() > NEAR
+    new = all(place.distance(orbit.x, orbit.period)[0] > NEAR**2 for place in known)
+    return orbit if swings and new else None
 
 
-def _shortened(orbit: Orbit) -> Orbit:
+def _shortened(orbit: PeriodicOrbit) -> PeriodicOrbit:
     """The orbit run through once."""
     if orbit.system.frequency is not None:
         return orbit
-    place, m = Place(orbit.system, orbit=orbit), len(orbit.x)
+    place, m = KnownSolution(orbit.system, orbit=orbit), len(orbit.x)
     x = place.at(m)
     times = [k for k in range(2, REPEATS + 1) if np.abs(place.at(m, 1 / k) - x).max() < NEAR]
     if not times:
@@ -188,7 +191,7 @@ def _shortened(orbit: Orbit) -> Orbit:
     return replace(orbit, x=nodes, period=orbit.period / times[-1])
 
 
-def _first(system: Dynamics, p: float, known: Sequence[Place], nodes: int) -> Iterator[Orbit]:
+def _first(system: Dynamics, p: float, known: Sequence[KnownSolution], nodes: int) -> Iterator[PeriodicOrbit]:
     """Guesses between all that is known, and vibrations of every pair of roots of the equilibria."""
     for i, place in enumerate(known):
         yield from _between(place, known[:i], nodes)
@@ -196,7 +199,7 @@ def _first(system: Dynamics, p: float, known: Sequence[Place], nodes: int) -> It
         if place.still is None:
             continue
         if system.frequency is not None:
-            yield Orbit(system, np.tile(place.still, (nodes, 1)), 2 * np.pi / float(system.frequency(p)), p)
+            yield PeriodicOrbit(system, np.tile(place.still, (nodes, 1)), 2 * np.pi / float(system.frequency(p)), p)
             continue
         values, vectors = np.linalg.eig(np.asarray(system.still(place.still, p)[1]))
         turn = np.exp(2j * np.pi * np.arange(nodes) / nodes)[:, None]
@@ -204,10 +207,10 @@ def _first(system: Dynamics, p: float, known: Sequence[Place], nodes: int) -> It
             way = (turn * vectors[:, k]).real
             way /= np.sqrt(np.mean((way / np.asarray(system.scale)) ** 2) * system.count)
             for size in SIZES:
-                yield Orbit(system, place.still + size * way, 2 * np.pi / float(values[k].imag), p)
+                yield PeriodicOrbit(system, place.still + size * way, 2 * np.pi / float(values[k].imag), p)
 
 
-def _between(place: Place, others: Sequence[Place], nodes: int) -> Iterator[Orbit]:
+def _between(place: KnownSolution, others: Sequence[KnownSolution], nodes: int) -> Iterator[PeriodicOrbit]:
     """Guesses on the straight way from one known solution to others, and beyond orbits, away from equilibria."""
     if place.orbit is None:
         return
@@ -219,8 +222,8 @@ def _between(place: Place, others: Sequence[Place], nodes: int) -> Iterator[Orbi
             if place.system.frequency is not None:  # what resonates is larger and of another phase
                 for u, late in itertools.product(LARGER, LATER):
                     later = np.roll(x, round(late * nodes), axis=0)
-                    yield Orbit(one.system, size * (y + u * (later - y)), period, one.p)
+                    yield PeriodicOrbit(one.system, size * (y + u * (later - y)), period, one.p)
         else:
             y, period = other.at(nodes, other.shift(x)), other.orbit.period
         for u in BETWEEN if other.orbit else (*BETWEEN, *BEYOND):
-            yield Orbit(one.system, size * (y + u * (x - y)), period + u * (one.period - period), one.p)
+            yield PeriodicOrbit(one.system, size * (y + u * (x - y)), period + u * (one.period - period), one.p)

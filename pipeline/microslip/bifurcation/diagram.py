@@ -9,30 +9,29 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..continuation import Lost, Scaled, Settings, newton, start
+from ..continuation import Lost, Scaled, Settings, advance, newton, start
 from ..continuation.curve import State
 from ..data import Array
 from ..errors import UserError
 from ..process import prepare
+from ..progress import Report
 from ..units import counted
-from . import deflation, equilibria, floquet, flow, orbits, switching
+from . import deflation, equilibria, flow, orbits
 from .basin import Attractor, attractors
-from .branches import EQUILIBRIA, Branch, Collected, joined, of_orbits
-from .drawn import draw
+from .branches import EQUILIBRIA, Collected, DiagramBranch, draw, joined, of_orbits
 from .dynamics import Dynamics
 from .equilibria import Hopf
-from .shooting import Orbit, Shooting
+from .shooting import PeriodicOrbit, Shooting
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-Report = Callable[[str], None]
-Kept = Callable[[str], Branch | None]
+Kept = Callable[[str], DiagramBranch | None]
 """A finished branch of a name, if there is one."""
 
 
 @dataclass(frozen=True)
-class Asked:
+class DiagramPlan:
     """What a diagram is to show, see the keys of `verbs.bifurcation`."""
 
     start: float
@@ -67,10 +66,10 @@ class Diagram(Collected):
     """
 
     system: Dynamics
-    branches: tuple[Branch, ...]
+    branches: tuple[DiagramBranch, ...]
     hopf: tuple[Hopf, ...]
     attractors: tuple[Attractor, ...] = ()
-    deflated: tuple[orbits.Found, ...] = ()
+    deflated: tuple[orbits.OrbitPoint, ...] = ()
     messages: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
@@ -84,20 +83,20 @@ class Diagram(Collected):
 
 
 @dataclass(eq=False)
-class _Work:
+class _DiagramWork:
     """A diagram on its way."""
 
     system: Dynamics
-    asked: Asked
+    asked: DiagramPlan
     kept: Kept
-    keep: Callable[[Branch], None]
+    keep: Callable[[DiagramBranch], None]
     report: Report
-    found: list[Branch] = field(default_factory=list)
+    found: list[DiagramBranch] = field(default_factory=list)
     seen: list[Attractor] = field(default_factory=list)
-    deflated: list[orbits.Found] = field(default_factory=list)
+    deflated: list[orbits.OrbitPoint] = field(default_factory=list)
     messages: list[str] = field(default_factory=list)
 
-    def add(self, name: str, make: Callable[[], Branch]) -> Branch:
+    def add(self, name: str, make: Callable[[], DiagramBranch]) -> DiagramBranch:
         """A branch, from where it is kept or made now."""
         branch = self.kept(name)
         if branch is None:
@@ -112,8 +111,8 @@ class _Work:
 
 
 def diagram(
-    system: Dynamics, x: Array, asked: Asked, kept: Kept = lambda _: None,
-    keep: Callable[[Branch], None] = lambda _: None, report: Report = lambda _: None,
+    system: Dynamics, x: Array, asked: DiagramPlan, kept: Kept = lambda _: None,
+    keep: Callable[[DiagramBranch], None] = lambda _: None, report: Report = lambda _: None,
 ) -> Diagram:  # fmt: skip
     """Equilibria from x (n,) at the start, orbits from every Hopf point, doubled ones from every period doubling that
     changes stability. Of a driven system: what a motion from x comes to, and what is doubled from there.
@@ -127,25 +126,29 @@ def diagram(
         UserError: there is no equilibrium, or no orbit of a driven system, near x.
     """
     prepare()
-    work = _Work(system, asked, kept, keep, report)
+    work = _DiagramWork(system, asked, kept, keep, report)
+    points: tuple[Hopf, ...] = ()
     if system.frequency is not None:
         _doublings(work, work.add(DRIVEN, lambda: _driven(work, x)), asked.doublings)
         for p in asked.deflate:
             _beside(work, p, [np.asarray(x, dtype=float)])
-        return Diagram(system, tuple(work.found), (), (), tuple(work.deflated), tuple(work.messages))
-    still = work.add(EQUILIBRIA, lambda: _equilibria(system, x, asked))
-    points = tuple(_hopf(system, still, i) for i in still.of_kind("Hopf"))
-    if asked.orbits:
-        for i, point in enumerate(points, 1):
-            if not _is_known(work, point):
-                _born_at(work, f"orbits {i}", point)
-        for p in asked.attractors:
-            _coexisting(work, still, p)
-        for p in asked.deflate:
-            _beside(work, p, _resting(work, still, p))
-    return Diagram(
-        system, tuple(work.found), points, tuple(work.seen), tuple(work.deflated), tuple(work.messages)
-    )  # fmt: skip
+    else:
+        still = work.add(EQUILIBRIA, lambda: _equilibria(system, x, asked))
+        points = tuple(_hopf(system, still, i) for i in still.of_kind("Hopf"))
+        if asked.orbits:
+            _orbits(work, still, points)
+    return Diagram(system, tuple(work.found), points, tuple(work.seen), tuple(work.deflated), tuple(work.messages))
+
+
+def _orbits(work: _DiagramWork, still: DiagramBranch, points: Sequence[Hopf]) -> None:
+    """The branches of orbits of a free system."""
+    for i, point in enumerate(points, 1):
+        if not _is_known(work, point):
+            _born_at(work, f"orbits {i}", point)
+    for p in work.asked.attractors:
+        _coexisting(work, still, p)
+    for p in work.asked.deflate:
+        _beside(work, p, _resting(work, still, p))
 
 
 DRIVEN = "driven"
@@ -155,7 +158,7 @@ LEFT = 60
 """Periods that a driven motion is left alone before an orbit is looked for where it is."""
 
 
-def _driven(work: _Work, x: Array) -> Branch:
+def _driven(work: _DiagramWork, x: Array) -> DiagramBranch:
     """The orbits of the period of what drives, from where a motion from x is after `LEFT` of them."""
     system, asked = work.system, work.asked
     assert system.frequency is not None
@@ -165,7 +168,7 @@ def _driven(work: _Work, x: Array) -> Branch:
     for i in range(asked.nodes - 1):
         run, angle = flow.left_alone(system), 2 * np.pi * i / asked.nodes
         nodes.append(np.asarray(run(nodes[-1][None], asked.start, period / asked.nodes, angle))[0])
-    problem = Shooting(system, Orbit(system, np.array(nodes), period, asked.start), period)
+    problem = Shooting(system, PeriodicOrbit(system, np.array(nodes), period, asked.start), period)
     status = "it becomes infinite"
     if np.isfinite(nodes).all():
         state = start(problem, np.array(nodes).ravel(), asked.start, asked.settings)
@@ -178,62 +181,64 @@ def _driven(work: _Work, x: Array) -> Branch:
     return followed(DRIVEN, "start", problem, state, asked.settings, work.report)
 
 
-def _coexisting(work: _Work, still: Branch, p: float) -> None:
+def _coexisting(work: _DiagramWork, still: DiagramBranch, p: float) -> None:
     """The branches of attractors at p that are on none which is known."""
     system, asked = work.system, work.asked
     work.report(f"{asked.starts} motions at {p:.6g}")
     centre = still.x[int(np.argmin(np.abs(still.parameter - p))), 0]
-    found = attractors(system, centre, p, asked.starts, asked.seed, asked.nodes)
-    work.seen += found
-    if (others := asked.starts - round(sum(a.share for a in found) * asked.starts)) > 0:
+    stable_orbits = attractors(system, centre, p, asked.starts, asked.seed, asked.nodes)
+    work.seen += stable_orbits
+    if (others := asked.starts - round(sum(a.share for a in stable_orbits) * asked.starts)) > 0:
         words = f"of {asked.starts} motions {others} came to rest, or to no periodic motion that was recognised"
         work.messages.append(f"at {p:.6g}: {words}")
-    _new_ones(work, "attractor", [a.orbit for a in found])
+    _new_ones(work, "attractor", [a.orbit for a in stable_orbits])
 
 
-def _beside(work: _Work, p: float, still: Sequence[Array]) -> None:
+def _beside(work: _DiagramWork, p: float, still: Sequence[Array]) -> None:
     """The branches of orbits that deflation finds at p beside equilibria and attractors, and that are on none which is
     known."""
     known = [a.orbit for a in work.seen if a.orbit.p == p]
-    found = deflation.coexisting(work.system, p, still, known, work.asked.nodes, work.report)
-    work.deflated += found
-    _new_ones(work, "orbit", [one.orbit for one in found])
+    points = deflation.coexisting(work.system, p, still, known, work.asked.nodes, work.report)
+    work.deflated += points
+    _new_ones(work, "orbit", [point.orbit for point in points])
 
 
-def _resting(work: _Work, still: Branch, p: float) -> list[Array]:
+def _resting(work: _DiagramWork, still: DiagramBranch, p: float) -> list[Array]:
     """The equilibria (n,) at p."""
     x, away = still.x[:, 0], still.parameter - p
     near = np.flatnonzero(away[:-1] * away[1:] <= 0)
-    found = [newton(equilibria.Still(work.system), x[i], p) for i in near]
+    solutions = [newton(equilibria.Still(work.system), x[i], p) for i in near]
     unlike: list[Array] = []
-    for one in (s.x for s in found if s.converged):
-        if all(np.abs((one - y) / work.system.scale).max() > deflation.NEAR for y in unlike):
-            unlike.append(one)
+    for x_new in (s.x for s in solutions if s.converged):
+        if all(np.abs((x_new - y) / work.system.scale).max() > deflation.NEAR for y in unlike):
+            unlike.append(x_new)
     return unlike
 
 
-def _new_ones(work: _Work, what: str, found: Sequence[Orbit]) -> None:
+def _new_ones(work: _DiagramWork, what: str, found: Sequence[PeriodicOrbit]) -> None:
     """Branches through orbits that are on none which is known."""
-    for number, one in enumerate(found, 1):
-        if not any(_passes(b, one) for b in work.found):
-            name = f"{what} {number} at {one.p:.6g}"
-            branch = work.add(name, partial(_both_ways, name, f"{what} at {one.p:.6g}", one, work.asked, work.report))
+    for number, orbit in enumerate(found, 1):
+        if not any(_passes(b, orbit) for b in work.found):
+            name = f"{what} {number} at {orbit.p:.6g}"
+            branch = work.add(
+                name, partial(_both_ways, name, f"{what} at {orbit.p:.6g}", orbit, work.asked, work.report)
+            )
             _doublings(work, branch, work.asked.doublings)
 
 
-def _passes(branch: Branch, orbit: Orbit) -> bool:
+def _passes(branch: DiagramBranch, orbit: PeriodicOrbit) -> bool:
     """Whether a branch passes an orbit, by its period, or twice that, and extremes between two neighbouring points."""
     if branch.still:
         return False
     y = orbit.system.seen(orbit.sampled(), orbit.p)
-    own = np.concatenate([y.max(axis=0), y.min(axis=0)])
+    extremes_of = np.concatenate([y.max(axis=0), y.min(axis=0)])
     size = float(np.ptp(y, axis=0).max())
     away = branch.parameter - orbit.p
     for i in np.flatnonzero(away[:-1] * away[1:] <= 0):
         u = away[i] / (away[i] - away[i + 1]) if away[i] != away[i + 1] else 0.0
         period = (1 - u) * branch.period[i] + u * branch.period[i + 1]
         ends = np.concatenate([branch.largest, branch.smallest], axis=1)
-        apart = np.abs((1 - u) * ends[i] + u * ends[i + 1] - own).max() / size
+        apart = np.abs((1 - u) * ends[i] + u * ends[i + 1] - extremes_of).max() / size
         if abs(period / orbit.period - 1) < CLOSE and apart < CLOSE:
             return True
     return False
@@ -243,7 +248,7 @@ CLOSE = 0.02
 """Difference of periods and extremes, over their sizes, up to which an orbit is on a branch."""
 
 
-def _both_ways(name: str, born: str, orbit: Orbit, asked: Asked, report: Report) -> Branch:
+def _both_ways(name: str, born: str, orbit: PeriodicOrbit, asked: DiagramPlan, report: Report) -> DiagramBranch:
     """The branch through an orbit, to both sides."""
     problem = Shooting(orbit.system, orbit, orbit.period)
     parts = []
@@ -254,9 +259,9 @@ def _both_ways(name: str, born: str, orbit: Orbit, asked: Asked, report: Report)
     return joined(*parts)
 
 
-def _equilibria(system: Dynamics, x: Array, asked: Asked) -> Branch:
-    settings = asked.settings
-    state = equilibria.first(system, x, asked.start, settings)
+def _equilibria(system: Dynamics, x: Array, asked: DiagramPlan) -> DiagramBranch:
+    settings, problem = asked.settings, equilibria.Still(system)
+    state = start(problem, x, asked.start, settings)
     if state.status:
         raise UserError(
             f"no equilibrium is found near the start: {state.status}; begin at another value of the parameter, or give "
@@ -264,7 +269,7 @@ def _equilibria(system: Dynamics, x: Array, asked: Asked) -> Branch:
         )
     rows: list[tuple[Array, float, str]] = [(p.x, p.lam, p.kind) for p in state.found]
     while not state.status:
-        before, state = state, equilibria.next_one(system, state, settings)
+        before, state = state, advance(problem, state, settings)
         new: list[tuple[Array, float, str]] = [(p.x, p.lam, p.kind) for p in state.found]
         passed = equilibria.hopf_between(system, before, state, settings)
         new += [(h.x, h.p, "Hopf") for h in passed if settings.low <= h.p <= settings.high]
@@ -272,7 +277,7 @@ def _equilibria(system: Dynamics, x: Array, asked: Asked) -> Branch:
     X, P = np.array([r[0] for r in rows]), np.array([r[1] for r in rows])
     values = np.array([equilibria.eigenvalues(system, a, b) for a, b in zip(X, P, strict=True)])
     seen = np.array([system.seen(a, b) for a, b in zip(X, P, strict=True)])
-    return Branch(
+    return DiagramBranch(
         EQUILIBRIA, "the start", state.status, 1, system.named, P, np.full(len(P), np.nan), X[:, None], seen, seen,
         values, values.real.max(axis=1) <= 0, np.array([r[2] for r in rows]),
         system.units,
@@ -284,7 +289,7 @@ def _ahead(system: Dynamics, state: State, x: Array, p: float) -> float:
     return float(state.tangent @ (Scaled(equilibria.Still(system)).pack(x, p) - state.y))
 
 
-def _hopf(system: Dynamics, still: Branch, i: int) -> Hopf:
+def _hopf(system: Dynamics, still: DiagramBranch, i: int) -> Hopf:
     """The Hopf point of a branch; of several at one place each has a pair of its own."""
     rows = still.of_kind("Hopf")
     place = np.column_stack([still.x[rows, 0] / system.scale, still.parameter[rows] / system.parameter_scale])
@@ -295,22 +300,22 @@ def _hopf(system: Dynamics, still: Branch, i: int) -> Hopf:
     return equilibria.hopf(system, still.x[i, 0], float(still.parameter[i]), float(omega))
 
 
-def _is_known(work: _Work, point: Hopf) -> bool:
+def _is_known(work: _DiagramWork, point: Hopf) -> bool:
     """Whether a branch of orbits has ended at the Hopf point."""
     ends = [b for b in work.found if not b.still and b.ended == orbits.COLLAPSED]
     return any(abs(b.parameter[-1] - point.p) < 1e-2 * work.system.parameter_scale
                and abs(b.period[-1] * point.omega / (2 * np.pi) - 1) < 1e-2 for b in ends)  # fmt: skip
 
 
-def _born_at(work: _Work, name: str, point: Hopf) -> None:
-    def make() -> Branch:
-        begun = switching.born_at(work.system, point, work.asked.nodes, work.asked.settings)
+def _born_at(work: _DiagramWork, name: str, point: Hopf) -> None:
+    def make() -> DiagramBranch:
+        begun = orbits.born_at(work.system, point, work.asked.nodes, work.asked.settings)
         return followed(name, f"Hopf point at {point.p:.6g}", *begun, work.asked.settings, work.report)
 
     _doublings(work, work.add(name, make), work.asked.doublings)
 
 
-def _doublings(work: _Work, parent: Branch, levels: int) -> None:
+def _doublings(work: _DiagramWork, parent: DiagramBranch, levels: int) -> None:
     """The orbits of twice the period at every period doubling by which a branch gains or loses its stability, and so
     on: those of orbits that are unstable on both sides are left, they are many and nothing comes to them."""
     places = [i for i in parent.of_kind("period doubling") if parent.stable[max(i - 1, 0) : i + 2 : 2].any()]
@@ -321,14 +326,14 @@ def _doublings(work: _Work, parent: Branch, levels: int) -> None:
         name = f"{parent.name} doubled {number}"
         born = f"period doubling at {orbit.p:.6g} of {parent.name}"
 
-        def make(name: str = name, born: str = born, orbit: Orbit = orbit) -> Branch:
-            begun = switching.doubled_at(orbit, work.asked.settings)
+        def make(name: str = name, born: str = born, orbit: PeriodicOrbit = orbit) -> DiagramBranch:
+            begun = orbits.doubled_at(orbit, work.asked.settings)
             return followed(name, born, *begun, work.asked.settings, work.report)
 
         _doublings(work, work.add(name, make), levels - 1)
 
 
-def is_same(orbit: Orbit, branch: Branch, system: Dynamics) -> bool:
+def is_same(orbit: PeriodicOrbit, branch: DiagramBranch, system: Dynamics) -> bool:
     """Whether a branch of orbits of twice the period ends at an orbit."""
     if branch.ended != orbits.COLLAPSED:
         return False
@@ -338,19 +343,19 @@ def is_same(orbit: Orbit, branch: Branch, system: Dynamics) -> bool:
 
 def followed(
     name: str, born: str, problem: Shooting, state: State, settings: Settings, report: Report = lambda _: None
-) -> Branch:  # fmt: skip
+) -> DiagramBranch:  # fmt: skip
     """A branch of orbits to its end."""
-    found, ended = list[orbits.Found](), ""
+    points, ended = list[orbits.OrbitPoint](), ""
     try:
         for more, status in orbits.follow(problem, state, settings):
-            found += more
+            points += more
             ended = status
-            if found:
-                report(f"{name}: {len(found)} of {settings.points} points, {found[-1].orbit.p:.6g}")
+            if points:
+                report(f"{name}: {len(points)} of {settings.points} points, {points[-1].orbit.p:.6g}")
     except (Lost, FloatingPointError) as error:
         ended = f"stuck: {error or 'the orbit was lost'}"
-    if not found:
+    if not points:
         x = problem.reference.x
-        at = orbits.Found(problem.reference, floquet.multipliers(problem.reference), "start")
+        at = orbits.OrbitPoint(problem.reference, "start")
         return of_orbits(name, born, ended or f"no start from {len(x)} nodes", [at])
-    return of_orbits(name, born, ended, found)
+    return of_orbits(name, born, ended, points)

@@ -69,10 +69,11 @@ class Dynamics:
         prepare()  # or it would be traced in single precision
         zero = jnp.zeros(())
         f = jax.eval_shape(lambda x, p: jnp.asarray(self.rate(x, p, zero)), jnp.asarray(x), jnp.asarray(float(p)))
-        for key, found, count in (("rate", f, self.count), ("read", self.seen(x, p), len(self.named))):
-            if np.shape(found) != (count,) or not np.issubdtype(found.dtype, np.floating):
+        for key, result, count in (("rate", f, self.count), ("read", self.seen(x, p), len(self.named))):
+            if np.shape(result) != (count,) or not np.issubdtype(result.dtype, np.floating):
                 raise UserError(
-                    f"Dynamics: {key}: gives {found.dtype} of shape {np.shape(found)}; let it give {count} real numbers"
+                    f"Dynamics: {key}: gives {result.dtype} of shape {np.shape(result)}; let it give {count} real "
+                    "numbers"
                 )
 
     def seen(self, x: Array, p: float) -> Array:
@@ -132,7 +133,7 @@ class Dynamics:
 
             value, Ja = jax.jvp(f, (x,), (a,))
             Jb = jax.jvp(f, (x,), (b,))[1]
-            one = jnp.stack([re @ a - im @ b - 1, re @ b + im @ a])
-            return jnp.concatenate([value, Ja + w * b, Jb - w * a, one])
+            normalised = jnp.stack([re @ a - im @ b - 1, re @ b + im @ a])
+            return jnp.concatenate([value, Ja + w * b, Jb - w * a, normalised])
 
         return jax.jit(lambda z, re, im: (F(z, re, im), jax.jacfwd(F)(z, re, im)))

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.linalg
 
-from ..continuation import Lost, Scaled, Segment, Settings, advance, root, start
+from ..continuation import Lost, Scaled, Segment, Settings, root
 from ..continuation.curve import State
 from ..data import Array, ComplexArray
 from ..errors import UserError
@@ -53,8 +53,8 @@ class Hopf:
 
 def eigenvalues(system: Dynamics, x: Array, p: float) -> ComplexArray:
     """(n,) of the linearised system, the largest real part first."""
-    found = np.linalg.eigvals(np.asarray(system.still(x, p)[1])).astype(complex)
-    return found[np.argsort(-found.real, kind="stable")]
+    values = np.linalg.eigvals(np.asarray(system.still(x, p)[1])).astype(complex)
+    return values[np.argsort(-values.real, kind="stable")]
 
 
 def hopf_between(system: Dynamics, before: State, after: State, settings: Settings) -> list[Hopf]:
@@ -71,7 +71,7 @@ def hopf_between(system: Dynamics, before: State, after: State, settings: Settin
     ends = [eigenvalues(system, s.y[:-1] * scaled.x_scale, s.y[-1] * scaled.lam_scale) for s in (before, after)]
     counts = sorted(int((e.real > 0).sum()) for e in ends)
     segment = Segment(before.y, after.y, before.tangent, after.tangent, False)
-    found = list[Hopf]()
+    points = list[Hopf]()
     for k in range(counts[0], counts[1] - 1, 2):
         try:
             y, _ = root(scaled, segment, settings, real(k), 1e-6)
@@ -81,10 +81,12 @@ def hopf_between(system: Dynamics, before: State, after: State, settings: Settin
         values = eigenvalues(system, x, p)
         pairs = values[values.imag > 1e-6 * np.abs(values).max()]
         if len(pairs):
-            one = _sought(system, x, p, float(pairs[np.argmin(np.abs(pairs.real))].imag))
-            new = [h for h in (one, *_beside(system, one)) if not any(_is_same(system, h, other) for other in found)]
-            found += new[:1]
-    return found
+            point = _sought(system, x, p, float(pairs[np.argmin(np.abs(pairs.real))].imag))
+            new = [
+                h for h in (point, *_beside(system, point)) if not any(_is_same(system, h, other) for other in points)
+            ]
+            points += new[:1]
+    return points
 
 
 NEAR = 1e-5
@@ -109,15 +111,15 @@ def _is_same(system: Dynamics, one: Hopf, other: Hopf) -> bool:
 
 def _sought(system: Dynamics, x: Array, p: float, omega: float) -> Hopf:
     try:
-        found = hopf(system, x, p, omega)
+        point = hopf(system, x, p, omega)
     except (Lost, np.linalg.LinAlgError) as error:
         _refuse_alike(system, x, p, omega, NEAR)
         raise UserError(
             f"near {p:.4g} of the parameter no single pair of roots crosses the imaginary axis at {omega:.4g} rad/s: "
             "without damping pairs run along it until two of them meet; give the bodies damping"
         ) from error
-    _refuse_alike(system, found.x, found.p, found.omega, ALIKE)
-    return found
+    _refuse_alike(system, point.x, point.p, point.omega, ALIKE)
+    return point
 
 
 ALIKE = 1e-9
@@ -185,12 +187,3 @@ def lyapunov(system: Dynamics, x: Array, p: float, omega: float) -> float:
 def _eigenvector(J: Array, value: complex) -> ComplexArray:
     values, vectors = np.linalg.eig(J)
     return vectors[:, np.argmin(np.abs(values - value))]
-
-
-def first(system: Dynamics, x: Array, p: float, settings: Settings) -> State:
-    """The state from which equilibria are followed, `continuation.start`."""
-    return start(Still(system), x, p, settings)
-
-
-def next_one(system: Dynamics, state: State, settings: Settings) -> State:
-    return advance(Still(system), state, settings)

@@ -98,14 +98,14 @@ def blocks(m: int) -> int:
 def pieces(system: Dynamics, x: Any, p: float, period: float, turns: int) -> Pieces:
     """The ends of m pieces of equal time, which together last one period, from x (m, n); turns: of what drives."""
     m, run = len(x), _pieces(system)
-    parts = [run(one, begin, 1.0 / m, p, period, float(turns)) for one, begin in _parts(x)]
-    return Pieces(*(np.concatenate(found) for found in zip(*parts, strict=True)))
+    parts = [run(nodes, begin, 1.0 / m, p, period, float(turns)) for nodes, begin in _parts(x)]
+    return Pieces(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
 
 
 def samples(system: Dynamics, x: Any, p: float, period: float, turns: int, each: int) -> Any:
     """(m, each, n) of every one of m pieces at equal times, its beginning included and its end not."""
     m, run = len(x), _samples(system, each)
-    parts = [run(one, begin, 1.0 / m, p, period, float(turns)) for one, begin in _parts(x)]
+    parts = [run(nodes, begin, 1.0 / m, p, period, float(turns)) for nodes, begin in _parts(x)]
     return np.concatenate([np.asarray(part) for part in parts])
 
 

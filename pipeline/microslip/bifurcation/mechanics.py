@@ -29,7 +29,7 @@ EXACT = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
-class Over:
+class ParametricEquations:
     """The equations of an assembly over a parameter, as polynomials of Chebyshev in jax: all its numbers, which makes
     derivatives over the parameter exact.
 
@@ -54,7 +54,7 @@ class Over:
         return jax.tree_util.tree_unflatten(self.tree, [leaf(c) for c in self.series])
 
 
-def over(make: Make, low: float, high: float) -> Over:
+def over(make: Make, low: float, high: float) -> ParametricEquations:
     """The equations of assemblies over a parameter, at as many values of it as they need.
 
     Raises:
@@ -63,20 +63,18 @@ def over(make: Make, low: float, high: float) -> Over:
     like = sliding.points_moved(make(0.5 * (low + high)))
     for count in (5, 9, 17, 33, HIGHEST):
         x = np.cos(np.pi * (np.arange(count) + 0.5) / count)
-        found = [jax.tree_util.tree_flatten(sliding.of(make(_value(low, high, one)), like)) for one in x]
-        if len({str(tree) for _, tree in found}) > 1:
+        values = 0.5 * (low + high + (high - low) * x)
+        equations = [jax.tree_util.tree_flatten(sliding.of(make(float(p)), like)) for p in values]
+        if len({str(tree) for _, tree in equations}) > 1:
             text = "laws of contacts change in kind with it; take another one, or a shorter range"
             raise UserError(text, "parameter")
-        columns = zip(*(leaves for leaves, _ in found), strict=True)
+        columns = zip(*(leaves for leaves, _ in equations), strict=True)
         series = [_series(x, np.array([np.asarray(leaf) for leaf in leaves])) for leaves in columns]
-        if all(_is_short(c) for c in series):
-            return Over(low, high, found[0][1], [_cut(c) for c in series])
+        ends = [np.abs(c[-2:]).max(initial=0.0) <= EXACT * np.abs(c).max(initial=0.0) for c in series]
+        if all(ends):
+            return ParametricEquations(low, high, equations[0][1], [_cut(c) for c in series])
     text = "the equations do not change smoothly with it; take a shorter range"
     raise UserError(text, "parameter")
-
-
-def _value(low: float, high: float, x: float) -> float:
-    return float(0.5 * (low + high + (high - low) * x))
 
 
 def _series(x: Array, values: Array) -> Array:
@@ -84,11 +82,6 @@ def _series(x: Array, values: Array) -> Array:
     angle = np.outer(np.arange(len(x)), np.arccos(x))
     weights = np.cos(angle) * np.where(np.arange(len(x)) == 0, 1.0, 2.0)[:, None] / len(x)
     return np.tensordot(weights, values, 1)
-
-
-def _is_short(series: Array) -> bool:
-    size = np.abs(series).max(initial=0.0)
-    return bool(np.abs(series[-2:]).max(initial=0.0) <= EXACT * size)
 
 
 def _cut(series: Array) -> Array:
@@ -122,19 +115,19 @@ def dynamics(make: Make, low: float, high: float, frequency: float | None = None
         return x[..., :m] @ np.asarray(equations.at(jnp.asarray(p)).output).T
 
     labels = [f"q{i + 1}" for i in range(m)] + [f"v{i + 1}" for i in range(m)] + [f"x{i + 1}" for i in range(n - 2 * m)]
-    one = make(0.5 * (low + high))
-    names = tuple(f"{w.monitor} {w.label}" for w in one.outputs)
-    units = tuple(measured(one, i).unit for i in range(len(names)))
+    assembly = make(0.5 * (low + high))
+    names = tuple(f"{w.monitor} {w.label}" for w in assembly.outputs)
+    units = tuple(measured(assembly, i).unit for i in range(len(names)))
     shown = read if names else None
     return Dynamics(rate, tuple(labels), size(middle), high - low, driven, names, shown, units, bends(equations))
 
 
-def bends(equations: Over) -> Array:
+def bends(equations: ParametricEquations) -> Array:
     """(n, r) what moves the points of contacts, as displacements and as velocities, and what their laws remember."""
     every = jax.tree_util.tree_unflatten(equations.tree, equations.series)
     m = every.push.shape[-1]
-    moved = np.concatenate([np.zeros((1, m)), *(np.asarray(p.moved).reshape(-1, m) for p in every.points)])
-    _, sizes, ways = np.linalg.svd(moved, full_matrices=False)
+    rows = np.concatenate([np.zeros((1, m)), *(np.asarray(p.moved).reshape(-1, m) for p in every.points)])
+    _, sizes, ways = np.linalg.svd(rows, full_matrices=False)
     ways = ways[sizes > EXACT * max(sizes[0], 1e-300)].T
     memory = np.eye(equations.at(jnp.asarray(equations.low)).order - 2 * m)
     return np.asarray(scipy.linalg.block_diag(ways, ways, memory))
@@ -151,6 +144,8 @@ def size(s: sliding.Sliding) -> Array:
     values, X = np.linalg.eigh(0.5 * np.asarray(s.K + s.K.T))
     w = np.sqrt(np.maximum(np.abs(values), 1e-6 * np.abs(values).max(initial=1e-300)))
     push = np.abs(np.asarray(s.push)) + np.abs(np.asarray(s.cosine)).sum(0) + np.abs(np.asarray(s.sine)).sum(0)
-    found = np.linalg.norm(still[:m]) + np.linalg.norm(np.abs(X.T @ push) / w**2) or 1.0
+    displacement = np.linalg.norm(still[:m]) + np.linalg.norm(np.abs(X.T @ push) / w**2) or 1.0
     mean = float(np.exp(np.mean(np.log(w))))
-    return np.concatenate([np.full(m, found), np.full(m, found * mean), np.full(s.order - 2 * m, found)])
+    return np.concatenate(
+        [np.full(m, displacement), np.full(m, displacement * mean), np.full(s.order - 2 * m, displacement)]
+    )

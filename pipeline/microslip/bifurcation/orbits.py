@@ -1,4 +1,5 @@
-"""Branches of periodic orbits: followed point by point, with the bifurcations passed on the way."""
+"""Branches of periodic orbits: begun at a Hopf point or where a period doubles, followed point by point, with the
+bifurcations passed on the way."""
 
 from __future__ import annotations
 
@@ -8,26 +9,62 @@ from typing import Literal
 
 import numpy as np
 
-from ..continuation import Lost, Scaled, Segment, Settings, advance, root
+from ..continuation import Lost, Scaled, Segment, Settings, advance, branch_off, root
 from ..continuation.curve import State
 from ..data import Array, ComplexArray
-from . import floquet
-from .shooting import Orbit, Shooting
+from .dynamics import Dynamics
+from .equilibria import Hopf
+from .shooting import PeriodicOrbit, Shooting
 
 Kind = Literal["start", "regular", "fold", "period doubling", "torus", "branch point", "target", "bound"]
 
 
 @dataclass(frozen=True)
-class Found:
-    """An orbit of a branch, its Floquet multipliers (`floquet.multipliers`), and what happens there."""
+class OrbitPoint:
+    """An orbit of a branch, and what happens there."""
 
-    orbit: Orbit
-    multipliers: ComplexArray
+    orbit: PeriodicOrbit
     kind: Kind
 
     @property
+    def multipliers(self) -> ComplexArray:
+        return self.orbit.multipliers
+
+    @property
     def stable(self) -> bool:
-        return floquet.is_stable(self.multipliers)
+        return self.orbit.stable
+
+
+OFF = 2e-3
+"""Size of the first step off a branch, in scales of the coordinates."""
+
+
+def born_at(system: Dynamics, hopf: Hopf, nodes: int, settings: Settings) -> tuple[Shooting, State]:
+    """The orbits born at a Hopf point: their equations, and the first of them."""
+    turn = np.exp(2j * np.pi * np.arange(nodes) / nodes)
+    way = (turn[:, None] * hopf.shape).real
+    way = way / np.sqrt(np.mean((way / np.asarray(system.scale)) ** 2) * system.count)
+    guess = PeriodicOrbit(system, hopf.x + OFF * way, 2 * np.pi / hopf.omega, hopf.p)
+    problem = Shooting(system, guess, guess.period)
+    ahead = np.append(way, 0.0), 0.0
+    return problem, branch_off(problem, problem.unknowns(guess), hopf.p, ahead, settings)
+
+
+def doubled_at(orbit: PeriodicOrbit, settings: Settings) -> tuple[Shooting, State]:
+    """The orbits of twice the period that are born where a Floquet multiplier passes -1, and the first of them."""
+    values, vectors = np.linalg.eig(orbit.monodromy)
+    first = vectors[:, np.argmin(np.abs(values + 1))].real
+    ways = [first]
+    for piece in orbit.derivatives[:-1]:
+        ways.append(piece @ ways[-1])
+    half = np.array(ways)
+    way: Array = np.concatenate([half, -half])
+    way = way / np.sqrt(np.mean((way / np.asarray(orbit.system.scale)) ** 2) * orbit.system.count)
+    twice = np.concatenate([orbit.x, orbit.x]) + OFF * way
+    guess = PeriodicOrbit(orbit.system, twice, 2 * orbit.period, orbit.p, 2 * orbit.turns)
+    problem = Shooting(orbit.system, guess, guess.period)
+    ahead = np.append(way, 0.0) if problem.free else way.ravel(), 0.0
+    return problem, branch_off(problem, problem.unknowns(guess), orbit.p, ahead, settings)
 
 
 COLLAPSED = "collapsed: the branch is back where it was born, or ends at another point of that kind"
@@ -49,7 +86,7 @@ def _top(y: Array, closed: bool) -> Array:
     return here + np.where(smooth, (after - before) ** 2 / (8 * np.where(smooth, bend, 1.0)), 0.0)
 
 
-def follow(problem: Shooting, state: State, settings: Settings) -> Iterator[tuple[list[Found], str]]:
+def follow(problem: Shooting, state: State, settings: Settings) -> Iterator[tuple[list[OrbitPoint], str]]:
     """What each step along a branch finds, in order, and why the branch ended ("" while it goes on).
 
     The phase of every step counts from the orbit before it, so that no orbit is too far from the reference.
@@ -62,46 +99,55 @@ def follow(problem: Shooting, state: State, settings: Settings) -> Iterator[tupl
         if state.status.startswith("stuck"):
             yield [], state.status
             return
-        found = [_at(problem, p.x, p.lam, p.kind) for p in state.found]
-        last = found[-1] if found else here
-        passed = _passed(problem, previous, state, here, last, settings) if found else []
+        points = [OrbitPoint(problem.orbit(p.x, p.lam), p.kind) for p in state.found]
+        last = points[-1] if points else here
+        passed = _passed(problem, previous, state, here, last, settings) if points else []
         passed = [one for one in passed if settings.low <= one.orbit.p <= settings.high]
         ended = state.status or _collapsed(problem, here.orbit, last.orbit)
         if ended == COLLAPSED:
             yield [], ended
             return
-        yield sorted([*passed, *found], key=lambda one: _ahead(problem, previous, one)), ended
+        yield sorted([*passed, *points], key=lambda one: _ahead(problem, previous, one)), ended
         here = last
         problem = replace(problem, reference=here.orbit)
 
 
-def _found(problem: Shooting, y: Array, kind: Kind) -> Found:
+def _found(problem: Shooting, y: Array, kind: Kind) -> OrbitPoint:
     scaled = Scaled(problem)
-    return _at(problem, y[:-1] * scaled.x_scale, float(y[-1] * scaled.lam_scale), kind)
+    return OrbitPoint(problem.orbit(y[:-1] * scaled.x_scale, float(y[-1] * scaled.lam_scale)), kind)
 
 
-def _at(problem: Shooting, x: Array, lam: float, kind: Kind) -> Found:
-    orbit = problem.orbit(x, lam)
-    return Found(orbit, floquet.multipliers(orbit), kind)
-
-
-def _ahead(problem: Shooting, state: State, one: Found) -> float:
+def _ahead(problem: Shooting, state: State, one: OrbitPoint) -> float:
     """How far along the tangent of a state."""
     return float(state.tangent @ (Scaled(problem).pack(problem.unknowns(one.orbit), one.orbit.p) - state.y))
 
 
-TESTS: dict[Kind, Callable[[ComplexArray], float]] = {
-    "period doubling": floquet.doubling,
-    "torus": floquet.torus,
-}
+def doubling(multipliers: ComplexArray) -> float:
+    """Changes its sign where a multiplier passes -1."""
+    return float(np.prod(1 + multipliers).real)
+
+
+def torus(multipliers: ComplexArray) -> float:
+    """Changes its sign where a pair passes the unit circle, or two real ones of the product 1."""
+    i, j = np.triu_indices(len(multipliers), 1)
+    return float(np.prod(multipliers[i] * multipliers[j] - 1).real)
+
+
+def _is_torus(multipliers: ComplexArray) -> bool:
+    """Whether `torus` is zero by a complex pair on the unit circle, and not by two real multipliers."""
+    pairs = multipliers[np.abs(multipliers.imag) > 1e-7 * np.abs(multipliers)]
+    return bool(np.abs(np.abs(pairs) - 1).min(initial=np.inf) < 1e-5)
+
+
+TESTS: dict[Kind, Callable[[ComplexArray], float]] = {"period doubling": doubling, "torus": torus}
 
 
 def _passed(
-    problem: Shooting, before: State, after: State, first: Found, last: Found, settings: Settings
-) -> list[Found]:  # fmt: skip
+    problem: Shooting, before: State, after: State, first: OrbitPoint, last: OrbitPoint, settings: Settings
+) -> list[OrbitPoint]:  # fmt: skip
     """Period doublings and torus points between two neighbouring states."""
     segment = Segment(before.y, after.y, before.tangent, after.tangent, False)
-    found = []
+    points = []
     for kind, test in TESTS.items():
         if test(first.multipliers) * test(last.multipliers) >= 0:
             continue
@@ -110,15 +156,15 @@ def _passed(
             return test(_found(problem, y, "regular").multipliers)
 
         try:
-            one = _found(problem, root(Scaled(problem), segment, settings, value)[0], kind)
+            point = _found(problem, root(Scaled(problem), segment, settings, value)[0], kind)
         except Lost:
             continue
-        if kind != "torus" or floquet.passing_pair(one.multipliers) is not None:
-            found.append(one)
-    return found
+        if kind != "torus" or _is_torus(point.multipliers):
+            points.append(point)
+    return points
 
 
-def _collapsed(problem: Shooting, before: Orbit, after: Orbit) -> str:
+def _collapsed(problem: Shooting, before: PeriodicOrbit, after: PeriodicOrbit) -> str:
     """Whether the branch has passed the point where its orbits are no more than an equilibrium, or one half of them:
     what they are beside that then has the opposite sign."""
     swing = [o.x - o.x.mean(axis=0) for o in (before, after)]

@@ -12,8 +12,7 @@ from ..files import hdf5, store
 from ..files.hostile import reading, refuse_damaged
 from ..settings.arguments import checked
 from . import branches
-from .branches import Branch, Collected
-from .drawn import draw
+from .branches import Collected, DiagramBranch, draw
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -30,7 +29,7 @@ class Branches(Collected):
     name: str
     parameter: str
     unit: str
-    branches: tuple[Branch, ...]
+    branches: tuple[DiagramBranch, ...]
 
     def __len__(self) -> int:
         return len(self.branches)
@@ -48,10 +47,10 @@ def write_bifurcation(path: Path, diagrams: Sequence[Branches]) -> Path:
     """All diagrams of a case, complete or not at all."""
     with hdf5.sealed(path) as file:
         file.attrs["format"], file.attrs["version"] = FORMAT, VERSION
-        for one in diagrams:
-            group = file.create_group(one.name)
-            group.attrs["parameter"], group.attrs["unit"] = one.parameter, one.unit
-            for i, branch in enumerate(one.branches):
+        for diagram in diagrams:
+            group = file.create_group(diagram.name)
+            group.attrs["parameter"], group.attrs["unit"] = diagram.parameter, diagram.unit
+            for i, branch in enumerate(diagram.branches):
                 branches.put(group.create_group(f"branch_{i}"), branch)
     return path
 

@@ -15,15 +15,17 @@ from functools import cached_property
 
 import jax
 import numpy as np
+import scipy.linalg
 
-from ..data import Array
+from ..data import Array, ComplexArray
 from . import flow
 from .dynamics import Dynamics
 
 
 @dataclass(frozen=True, eq=False)
-class Orbit:
-    """A periodic orbit. Attributes: system. x: (m, n) nodes at equal times, the first at 0. period: s. p."""
+class PeriodicOrbit:
+    """A periodic orbit. Attributes: system. x: (m, n) nodes at equal times, the first at 0. period: s. p. turns: k of
+    what drives in a period."""
 
     system: Dynamics
     x: Array
@@ -32,23 +34,50 @@ class Orbit:
     turns: int = 1
 
     def __repr__(self) -> str:
-        return f"<Orbit: period {self.period:.6g} s at {self.p:.6g}, {len(self.x)} nodes>"
+        return f"<PeriodicOrbit: period {self.period:.6g} s at {self.p:.6g}, {len(self.x)} nodes>"
 
     def sampled(self, each: int = 8) -> Array:
         """(m each, n) at equal times of one period."""
-        found = flow.samples(self.system, self.x, self.p, self.period, self.turns, each)
-        return np.asarray(found.reshape(-1, self.system.count))
+        x = flow.samples(self.system, self.x, self.p, self.period, self.turns, each)
+        return np.asarray(x.reshape(-1, self.system.count))
 
     @cached_property
     def derivatives(self) -> Array:
         """(m, n, n) of the ends of the pieces over their beginnings."""
-        found = flow.pieces(self.system, self.x, self.p, self.period, self.turns)
-        return np.asarray(found.dx[:, :, : self.system.count])
+        ends = flow.pieces(self.system, self.x, self.p, self.period, self.turns)
+        return np.asarray(ends.dx[:, :, : self.system.count])
 
     @cached_property
-    def slope(self) -> Array:
-        """(n,) x' at the first node."""
-        return np.asarray(flow.rates(self.system)(self.x, self.p, 0.0))[0]
+    def monodromy(self) -> Array:
+        """(n, n) derivative of where a period leads, over the first node."""
+        product = np.eye(self.system.count)
+        for piece in self.derivatives:
+            product = piece @ product
+        return product
+
+    @cached_property
+    def multipliers(self) -> ComplexArray:
+        """Floquet multipliers, the largest first: (n,) of a driven orbit; (n - 1,) of a free one, without the one along
+        the orbit, which is 1: those of the map of the plane across the flow onto itself."""
+        M, size = self.monodromy, np.asarray(self.system.scale)
+        if self.system.frequency is None:
+            slope = np.asarray(flow.rates(self.system)(self.x, self.p, 0.0))[0]
+            across = scipy.linalg.null_space((slope / size)[None])
+            M = across.T @ (M @ (across * size[:, None]) / size[:, None])
+        values = np.linalg.eigvals(M).astype(complex)
+        return values[np.argsort(-np.abs(values), kind="stable")]
+
+    @property
+    def stable(self) -> bool:
+        return is_stable(self.multipliers)
+
+
+STABLE = 1e-7
+"""By which a multiplier may stand beyond the unit circle and count as on it."""
+
+
+def is_stable(multipliers: ComplexArray) -> bool:
+    return bool(np.abs(multipliers).max(initial=0.0) < 1 + STABLE)
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +89,7 @@ class Shooting:
     """
 
     system: Dynamics
-    reference: Orbit
+    reference: PeriodicOrbit
     long: float
 
     @property
@@ -88,14 +117,14 @@ class Shooting:
         slopes = np.asarray(flow.rates(self.system)(self.reference.x, self.reference.p, 0.0))
         return (slopes / np.asarray(self.system.scale) ** 2).ravel()
 
-    def unknowns(self, orbit: Orbit) -> Array:
+    def unknowns(self, orbit: PeriodicOrbit) -> Array:
         return np.append(orbit.x, orbit.period) if self.free else orbit.x.ravel()
 
-    def orbit(self, x: Array, p: float) -> Orbit:
+    def orbit(self, x: Array, p: float) -> PeriodicOrbit:
         """Of unknowns."""
         nodes = x[: self.count * self.system.count].reshape(self.count, -1)
         period = float(x[-1]) if self.free else self._driven(p)[0]
-        return Orbit(self.system, nodes.copy(), period, float(p), self.reference.turns)
+        return PeriodicOrbit(self.system, nodes.copy(), period, float(p), self.reference.turns)
 
     def _driven(self, p: float) -> tuple[float, float]:
         """T and its derivative over p of a driven orbit."""

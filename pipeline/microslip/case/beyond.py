@@ -22,8 +22,7 @@ from ..harmonic_balance.response import HarmonicResponse
 from ..harmonic_balance.stability import Settings as Multipliers
 from ..harmonic_balance.stability import Stability, orbit, stability
 from ..results import Journal
-from ..time_domain.stepped import Settled
-from ..time_domain.swept import DOWN, REST, SAME, UP, Sweeps, on_two_motions
+from ..time_domain.swept import DOWN, REST, SAME, UP, SettledMotion, Sweeps, on_two_motions
 from ..units import Quantity, percent
 from .assemble import build
 from .curves import Followed, Keep, curves
@@ -49,9 +48,9 @@ class Beyond:
 
     normal: float
     gap: tuple[float, float] = (0.0, 0.0)
-    up: Sequence[Settled] = ()
-    down: Sequence[Settled] = ()
-    rest: Sequence[Settled] = ()
+    up: Sequence[SettledMotion] = ()
+    down: Sequence[SettledMotion] = ()
+    rest: Sequence[SettledMotion] = ()
     quantity: Quantity = field(default_factory=Quantity)
     why: str = ""
     cut: tuple[str, float] | None = None
@@ -62,19 +61,17 @@ class Beyond:
     stability: Sequence[Mapping[int, Stability]] = ()
 
     @property
-    def two(self) -> list[tuple[Settled, Settled]]:
+    def two(self) -> list[tuple[SettledMotion, SettledMotion]]:
         """The lower and the higher motion where sweeps upwards and downwards are on different ones, by frequency."""
         return on_two_motions(self.up, self.down)
 
-    def beside(self, frequency: float, amplitude: float) -> list[Settled]:
+    def beside(self, frequency: float, amplitude: float) -> list[SettledMotion]:
         """The motions of either sweep next to a frequency (Hz) that are as high as an amplitude."""
-        next_to = [
-            min(way, key=lambda m: abs(m.frequency - frequency)) for way in (self.up, self.down) if way
-        ]
+        next_to = [min(way, key=lambda m: abs(m.frequency - frequency)) for way in (self.up, self.down) if way]
         return [m for m in next_to if m.like(amplitude, SAME)]
 
     @property
-    def irregular(self) -> list[Settled]:
+    def irregular(self) -> list[SettledMotion]:
         """Motions without a period."""
         return [m for m in (*self.up, *self.down, *self.rest) if m.irregular]
 

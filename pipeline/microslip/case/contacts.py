@@ -18,7 +18,7 @@ from ..data import Array, Interface
 from ..errors import UserError, at, of_file
 from ..files.store import ordinary
 from ..harmonic_balance.accuracy import more
-from ..harmonic_balance.cost import GIB, aft_bytes, of_this_machine
+from ..harmonic_balance.forces import GIB, aft_bytes, of_this_machine
 from ..reduced.compliance import SURFACE
 from ..system.assembly import Contact, ContactFace, preloaded_contact
 from ..system.component import Component

@@ -17,7 +17,7 @@ from ..errors import UserError, in_its_file
 from ..harmonic_balance import families
 from ..harmonic_balance.accuracy import Error
 from ..harmonic_balance.checkpoint import Spend, labels, points_of_curve, resumed_curve
-from ..harmonic_balance.envelope import largest
+from ..harmonic_balance.envelope import largest_resonance
 from ..harmonic_balance.families import Family
 from ..harmonic_balance.growing import verdict
 from ..harmonic_balance.problem import Problem
@@ -272,7 +272,7 @@ def _followed(
 ) -> Followed:
     """A curve with its points, kept in a series of the journal."""
     told = {**journal.head.get("parameters", {}), one.name: {"normal_force": normal}}
-    journal.say({**journal.head, "parameters": told, "labels": labels(problem), "over": OF_SERIES[one.over]})
+    journal.say({**journal.head, "parameters": told, "labels": labels(problem.assembly), "over": OF_SERIES[one.over]})
     report(f"curve over the {one.over.replace('_', ' ')}, {one.label}")
     branch, rows = resumed_curve(family, journal, one.name, report, how, spend)
     return replace(one, rows=rows, status=branch.status or CUT)
@@ -317,7 +317,7 @@ def _resonance(
     key = f"{normal}, {s.start} to {s.stop} Hz by {s.points}"
     if key not in known:
         report(f"resonance between {s.start:g} and {s.stop:g} Hz")
-        top = largest(problem, np.linspace(s.start, s.stop, s.points))
+        top = largest_resonance(problem, s.grid)
         if top.missing:
             raise UserError(f"{top.missing}; widen the sweep, or give a frequency (Hz)", "curve.frequency")
         known[key] = top.frequency

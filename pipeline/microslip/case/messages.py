@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..contact.harmonics import fourier
 from ..contact.jenkins import Jenkins
 from ..data import Array
 from ..harmonic_balance import FrequencyResponse
@@ -19,8 +18,8 @@ from ..harmonic_balance.response import HarmonicResponse, unsolved
 from ..harmonic_balance.sweeps import overhanging
 from ..results.checks import UNCERTAIN, cause
 from ..results.names import apart
-from ..time_domain.stepped import Settled
-from ..time_domain.swept import nearer
+from ..series import fourier
+from ..time_domain.swept import SettledMotion, nearer
 from ..units import Quantity, counted, percent
 from .assemble import Built
 from .problem import book_models
@@ -329,7 +328,7 @@ def _in_time(b: Beyond) -> list[str]:
     return [*said, *_cut(b), *_wild(b)]
 
 
-def _span(motions: Sequence[Settled], words: str = "") -> str:
+def _span(motions: Sequence[SettledMotion], words: str = "") -> str:
     """Where motions are, in words."""
     f = [m.frequency for m in motions]
     low, high = min(f), max(f)
@@ -347,7 +346,7 @@ def _cut(b: Beyond) -> list[str]:
     ]
 
 
-def _from_rest(b: Beyond, two: Sequence[tuple[Settled, Settled]]) -> list[str]:
+def _from_rest(b: Beyond, two: Sequence[tuple[SettledMotion, SettledMotion]]) -> list[str]:
     """Which of two motions is reached from rest, in ranges of frequency."""
     at = {low.frequency: (low, high) for low, high in two}
     known = sorted((m for m in b.rest if m.frequency in at), key=lambda m: m.frequency)
@@ -363,7 +362,7 @@ def _from_rest(b: Beyond, two: Sequence[tuple[Settled, Settled]]) -> list[str]:
     return [f"From rest it comes to {', to '.join(runs)}."]
 
 
-def _left(b: Beyond, two: Sequence[tuple[Settled, Settled]]) -> list[str]:
+def _left(b: Beyond, two: Sequence[tuple[SettledMotion, SettledMotion]]) -> list[str]:
     """Where each sweep leaves the motion on which it comes."""
     said = []
     for way, motions, other, pair in (("up", b.up, b.down, two[-1]), ("down", b.down, b.up, two[0])):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ..data import ComplexArray
-from ..harmonic_balance.checkpoint import array_of, labels_of
+from ..harmonic_balance.checkpoint import array_of, labels
 from ..harmonic_balance.readout import measured
 from ..results.series import Series
 from ..system.assembly import Assembly
@@ -39,7 +39,7 @@ class Readout:
 def readouts(a: Assembly) -> list[Readout]:
     """Those of an assembly in its order, each once."""
     found: dict[tuple[str, str], Readout] = {}
-    rows = labels_of(a)
+    rows = labels(a)
     for i, w in enumerate(a.outputs):
         array = array_of(a, w)
         short = array.split("/", 1)[1]

@@ -12,28 +12,26 @@ import scipy.linalg
 from ..data import Array, ComplexArray, ModalBasis
 from ..errors import UserError, at, in_its_file
 from ..harmonic_balance import FrequencyResponse
-from ..harmonic_balance.accuracy import FLOOR, Error, enough, judged
+from ..harmonic_balance.accuracy import FLOOR, enough, judged
 from ..harmonic_balance.book import normal_law
 from ..harmonic_balance.checkpoint import labels, resumed_response
-from ..harmonic_balance.cost import GIB
+from ..harmonic_balance.forces import GIB
 from ..harmonic_balance.growing import verdict
 from ..harmonic_balance.problem import Problem
 from ..harmonic_balance.readout import measured
 from ..harmonic_balance.reduced import stuck, stuck_damping
-from ..harmonic_balance.refinement import filled_response
-from ..harmonic_balance.response import HarmonicResponse, Resonance, parted, refined_peaks
-from ..harmonic_balance.solver import Point
+from ..harmonic_balance.response import HarmonicResponse, Resonance, filled_response, parted, refined_peaks
 from ..harmonic_balance.sweeps import gaps, still
 from ..results import Journal
 from ..results.checks import UNCERTAIN
-from ..system.assembly import Assembly, Linear
+from ..system.assembly import Linear
 from ..units import Quantity, counted, percent
 from . import edges, headline
 from . import messages as say
 from .assemble import Built, build
 from .beyond import Beyond, beyond
 from .checkpoint import series_name
-from .contacts import memory_of, swept
+from .contacts import memory_of
 from .edges import Rising
 from .problem import normal_forces, pressed_by, problem_of
 from .readouts import Readout, readouts
@@ -41,8 +39,8 @@ from .settings import FIRST_HARMONICS, CaseSettings
 from .weak_springs import raising
 
 Keep = Callable[[Built], AbstractContextManager[Journal]]
-Peaks = dict[float, list[tuple[float, float]]]
-Answer = tuple[dict[float, "HarmonicResponse"], Peaks, Peaks, tuple[Array, Array], list[str]]
+Peaks = list[tuple[float, float]]
+"""Hz and amplitude of each."""
 
 
 @dataclass(frozen=True)
@@ -96,14 +94,6 @@ class CaseResult:
         return readouts(self.built.pressed(None))[: len(asked)]
 
 
-class _TooFew(Exception):
-    """A resonance needs more harmonics (never leaves this module)."""
-
-    def __init__(self, harmonics: int, said: str) -> None:
-        super().__init__(said)
-        self.harmonics = harmonics
-
-
 @in_its_file
 def run_case(
     settings: CaseSettings, basis: ModalBasis | Mapping[str, ModalBasis],
@@ -122,59 +112,145 @@ def run_case(
     Raises:
         UserError: names that the modal files do not hold, see `assemble.build`.
     """
-    if not settings.looks_for_harmonics:
-        return _run(settings, basis, report, keep, None)
-    tolerance = settings.harmonics_error or headline.TRUNCATION
-    while True:
-        try:
-            return _run(settings.with_harmonics(begin), basis, report, keep, tolerance)
-        except _TooFew as found:
-            begin = found.harmonics
-            report(str(found))
-
-
-def _run(
-    settings: CaseSettings, basis: ModalBasis | Mapping[str, ModalBasis],
-    report: Callable[[str], None], keep: Keep | None, tolerance: float | None,
-) -> CaseResult:  # fmt: skip
-    """`run_case` with a number of harmonics; tolerance: of their error, if it is looked at."""
     bases = basis if isinstance(basis, Mapping) else {b.name: basis for b in settings.components}
-    built = build(settings, bases)
-    sweep = settings.sweep
-    frequency = np.linspace(sweep.start, sweep.stop, sweep.points)
-    forces = normal_forces(built)
-    left = _Left(built, tolerance)
-    _book_can(built)
-    with at("sweep.normal_forces"):  # before anything is kept
-        for normal in forces:
-            built.pressed(normal)
-    with keep(built) if keep else nullcontext() as journal:
-        responses, resonances, folds, stuck, messages = _answered(built, forces, frequency, report, journal, left)
-    free = free_response(built, frequency)
-    idle = [normal for normal, r in responses.items() if still(r)]
-    resonances |= {normal: [] for normal in idle}
-    at_the_ends = edges.rising({n: r for n, r in responses.items() if n not in idle}, resonances)
-    messages = [
-        *built.messages,
-        *say.by_the_book(built),
-        *say.between_equilibria(built),
-        *raising(built, max(forces, default=None)),
-        *say.of_stuck_modes(built, max(forces, default=None)),
-        *messages,
-        *left.unknown(),
-        *say.too_coarse(settings, *stuck),
-        *say.not_converged(responses),
-        *say.not_found(responses, resonances),
-        *say.idle(idle),
-        *say.folded(folds, measured(built.assembly)),
-        *headline.doubted(built, largest_of(responses), max(forces, default=None)),
-        *say.overhangs(responses, resonances),
-        *edges.messages(at_the_ends),
-    ]
-    return CaseResult(
-        settings, responses, free, stuck[0], resonances, built.speed, tuple(messages), built,
-        tuple(at_the_ends), left.most, stuck[1], left.errors, folds,
-    )  # fmt: skip
+    tolerance, own = None, settings
+    if settings.looks_for_harmonics:
+        tolerance, own = settings.harmonics_error or headline.TRUNCATION, settings.with_harmonics(begin)
+    while True:
+        run = _Run(build(own, bases), tolerance, report)
+        _book_can(run.built)
+        forces = normal_forces(run.built)
+        with at("sweep.normal_forces"):  # before anything is kept
+            for normal in forces:
+                run.built.pressed(normal)
+        with keep(run.built) if keep else nullcontext() as journal:
+            enough = all(run.respond(normal, journal) for normal in forces or (None,))
+        if enough:
+            return run.result(max(forces, default=None))
+        own = settings.with_harmonics(run.needed)
+
+
+class _Run:
+    """Responses of a case with one number of harmonics, as they are found; see `CaseResult`.
+
+    tolerance: of their error, where their number is looked for; None: it is given. needed: how many a resonance
+    turned out to need. lost: normal force (N) -> Hz, where no solution with more of them was found, and nobody knows
+    the error.
+    """
+
+    def __init__(self, built: Built, tolerance: float | None, report: Callable[[str], None]) -> None:
+        self.built, self.tolerance, self.report = built, tolerance, report
+        self.frequency = built.settings.sweep.grid
+        self.responses: dict[float, HarmonicResponse] = {}
+        self.resonances, self.folds = dict[float, Peaks](), dict[float, Peaks]()
+        self.errors, self.lost = dict[float, dict[float, float]](), dict[float, list[float]]()
+        self.stuck = self.stuck_damping = np.zeros(0)
+        self.messages, self.needed = list[str](), 0
+        self.truncation: float | None = None
+        _report_memory(built, report)
+
+    def respond(self, normal: float | None, journal: Journal | None) -> bool:
+        """The response under a normal force (N; None: the contacts have their own), its peaks, and what speaks against
+        it; False where it needs more harmonics, see `needed`."""
+        built, problem = self.built, problem_of(self.built, normal)
+        key = pressed_by(built, problem) if normal is None else normal
+        self.report(f"friction response at a normal force of {key:g} N")
+        if journal is None:
+            found = filled_response(problem, self.frequency, self.report)
+            peaks = refined_peaks(problem, found)
+        else:
+            name = series_name(key)
+            parameters = {**journal.head.get("parameters", {}), name: {"normal_force": key}}
+            journal.say({**journal.head, "parameters": parameters, "labels": labels(problem.assembly)})
+            found, peaks = resumed_response(problem, self.frequency, journal, name, self.report)
+        peaks, turns = parted(found, peaks)
+        self.responses[key] = found
+        self.folds[key] = [(fold.frequency, fold.amplitude) for fold in turns]
+        self.resonances[key] = [(peak.frequency, peak.amplitude) for peak in peaks]
+        self.messages += say.not_periodic(key, found.unsteady, built.settings)
+        self.messages += say.lifting(built, problem, found, key) + say.pulling(built, found, key)
+        self.messages += say.across(problem, found, key) + _verdict(problem, found, key)
+        if key == max(self.responses):
+            part = problem.assembly.joined(1)
+            stiffness = problem.assembly.stiffness
+            self.stuck, self.stuck_damping = stuck(part, stiffness), stuck_damping(part, stiffness)
+        return still(found) or self._judge(problem, found, peaks, key, journal)
+
+    def _judge(
+        self, problem: Problem, found: HarmonicResponse, peaks: list[Resonance], key: float, journal: Journal | None
+    ) -> bool:  # fmt: skip
+        """What harmonics and samples that are left out would change at the places that are judged
+        (`accuracy.judged`); False where more harmonics are needed, and would be enough."""
+        if not headline.is_estimated(self.built, problem, ring=self.tolerance is not None):
+            return True
+        looked_at = judged(problem, found, peaks, journal, series_name(key))
+        for look in looked_at if self.tolerance is not None else ():
+            floor = FLOOR * float(np.abs(found.monitor[found.converged]).max(initial=0.0))
+            more = enough(problem, look.point, self.tolerance or 0.0, floor=floor, first=look.error)
+            self.needed = more.problem.harmonics
+            if self.needed > problem.harmonics:
+                self.report(
+                    f"at F_N = {key:g} N and {look.point.Omega / (2 * np.pi):.6g} Hz an error of about "
+                    f"{percent(look.bound)} is left with {counted(problem.harmonics, 'harmonic')}; all once more with "
+                    f"{self.needed}"
+                )
+                return False
+        if not looked_at:
+            return True
+        self.errors[key] = {look.point.Omega / (2 * np.pi): look.likely for look in looked_at}
+        if unknown := [look.point.Omega / (2 * np.pi) for look in looked_at if not np.isfinite(look.bound)]:
+            self.lost[key] = unknown
+        point, e, share, likely = max(looked_at, key=lambda look: look.bound)
+        self.truncation = max(self.truncation or 0.0, share)
+        where = f"At F_N = {key:g} N the amplitude at {point.Omega / (2 * np.pi):.6g} Hz"
+        if np.isfinite(share) and share > (self.tolerance or headline.TRUNCATION):
+            self.messages.append(
+                headline.uncertain(where, e, share, likely)
+                if self.tolerance is None
+                else f"{where} is uncertain by about {percent(share)} with {counted(problem.harmonics, 'harmonic')}, "
+                "above harmonics_error; no solution with more was found."
+            )
+        return True
+
+    def result(self, largest: float | None) -> CaseResult:
+        """All of it, with what a reader must know. largest: normal force (N) that the sweep presses by."""
+        built, settings, responses = self.built, self.built.settings, self.responses
+        idle = [normal for normal, r in responses.items() if still(r)]
+        self.resonances |= {normal: [] for normal in idle}
+        rising = edges.rising({n: r for n, r in responses.items() if n not in idle}, self.resonances)
+        messages = [
+            *built.messages,
+            *say.by_the_book(built),
+            *say.between_equilibria(built),
+            *raising(built, largest),
+            *say.of_stuck_modes(built, largest),
+            *self.messages,
+            *self._unknown(),
+            *say.too_coarse(settings, self.stuck, self.stuck_damping),
+            *say.not_converged(responses),
+            *say.not_found(responses, self.resonances),
+            *say.idle(idle),
+            *say.folded(self.folds, measured(built.assembly)),
+            *headline.doubted(built, largest_of(responses), largest),
+            *say.overhangs(responses, self.resonances),
+            *edges.messages(rising),
+        ]
+        return CaseResult(
+            settings, responses, free_response(built, self.frequency), self.stuck, self.resonances, built.speed,
+            tuple(messages), built, tuple(rising), self.truncation, self.stuck_damping, self.errors, self.folds,
+        )  # fmt: skip
+
+    def _unknown(self) -> list[str]:
+        """A message on all places whose error nobody knows, and what to do about them."""
+        if not self.lost:
+            return []
+        s = self.built.settings
+        return [
+            f"With twice the harmonics and samples no solution was found {say.at_places(self.lost)}, so how uncertain "
+            f"amplitudes are there is not known: respond with more of them (harmonics = {2 * s.balanced}, samples = "
+            f"{2 * s.sampled}; its points begin at their neighbours) and more sweep.points there; if these fail too, "
+            "microslip respond CASE --stability tells whether what was found is stable."
+        ]
 
 
 def largest_of(responses: Mapping[float, HarmonicResponse]) -> float:
@@ -213,32 +289,6 @@ def with_motions(
     return replace(result, beyond=tuple(found))
 
 
-def _answered(
-    built: Built, forces: tuple[float, ...], frequency: Array, report: Callable[[str], None], journal: Journal | None,
-    left: _Left,
-) -> Answer:  # fmt: skip
-    """Responses, resonances and folds by normal force, sticking frequencies and their damping, messages."""
-    responses: dict[float, HarmonicResponse] = {}
-    resonances, folds, stiff, messages = {}, {}, (np.zeros(0), np.zeros(0)), []
-    _report_memory(built, report)
-    for normal in forces or (None,):
-        problem = problem_of(built, normal)
-        key = pressed_by(built, problem) if normal is None else normal
-        report(f"friction response at a normal force of {key:g} N")
-        limits = np.array([c.coefficient * (key if swept(c) else c.normal_force or 0.0) for c in built.contacts])
-        found, peaks = _swept(problem, frequency, limits, report, journal, key)
-        peaks, turns = parted(found, peaks)
-        folds[key] = [(one.frequency, one.amplitude) for one in turns]
-        responses[key], resonances[key] = found, [(one.frequency, one.amplitude) for one in peaks]
-        messages += say.not_periodic(key, found.unsteady, built.settings)
-        messages += say.lifting(built, problem, found, key) + say.pulling(built, found, key)
-        messages += say.across(problem, found, key) + _verdict(problem, found, key)
-        messages += [] if still(found) else left.out(problem, found, peaks, key, journal)
-        if key == max(responses):
-            stiff = _stuck(problem.assembly)
-    return responses, resonances, folds, stiff, messages
-
-
 def _verdict(problem: Problem, found: HarmonicResponse, normal: float) -> list[str]:
     """Whether the highest point is stable, where the linear part feeds motions."""
     if not found.converged.any():
@@ -256,26 +306,6 @@ def _report_memory(built: Built, report: Callable[[str], None]) -> None:
     if needed > 1:
         points = max(len(p.points) for p in patches)
         report(f"up to {points} points, {s.balanced} harmonics, {s.sampled} samples: about {needed:.3g} GiB of memory")
-
-
-def _stuck(assembly: Assembly) -> tuple[Array, Array]:
-    """(m,) eigenfrequencies in Hz with sticking contacts, and their damping ratios."""
-    part = assembly.joined(1)
-    return stuck(part, assembly.stiffness), stuck_damping(part, assembly.stiffness)
-
-
-def _swept(
-    problem: Problem, frequency: Array, limits: Array, report: Callable[[str], None], journal: Journal | None,
-    normal: float,
-) -> tuple[HarmonicResponse, list[Resonance]]:  # fmt: skip
-    """One sweep and its peaks, from what a journal holds of it and what is computed now."""
-    if journal is None:
-        found = filled_response(problem, frequency, limits, report)
-        return found, refined_peaks(problem, found)
-    name = series_name(normal)
-    parameters = {**journal.head.get("parameters", {}), name: {"normal_force": normal}}
-    journal.say({**journal.head, "parameters": parameters, "labels": labels(problem)})
-    return resumed_response(problem, frequency, limits, journal, name, report)
 
 
 def _book_can(built: Built) -> None:
@@ -309,7 +339,7 @@ def free_response(built: Built, frequency: Array) -> FrequencyResponse:
     q = np.concatenate([_moved(part, Omega) for Omega in portions])
     zero, none = np.zeros(len(frequency)), np.zeros((len(frequency), 0))
     moved = q @ part.output[0] + part.output_given[0]
-    return FrequencyResponse(frequency, moved, none, zero, np.ones(len(frequency), dtype=bool), np.zeros(0), none)
+    return FrequencyResponse(frequency, moved, none, zero, np.ones(len(frequency), dtype=bool))
 
 
 def _moved(part: Linear, Omega: Array) -> ComplexArray:
@@ -332,79 +362,3 @@ def _about_resonances(part: Linear, frequency: Array) -> Array:
     apart = np.sinh(np.linspace(-5.5, 5.5, 101))
     found = (roots.imag - apart[:, None] * roots.real).ravel() / (2 * np.pi)
     return found[(found > frequency[0]) & (found < frequency[-1])]
-
-
-class _Left:
-    """What harmonics and samples that are left out would change.
-
-    tolerance: their number is looked for, until the share of an amplitude is within it; None: it is given. most: the
-    largest share, None where nothing is judged. errors: normal force (N) -> Hz -> share, of what is judged. lost:
-    normal force (N) -> Hz, where no solution with more of them was found, and nobody knows the share.
-    """
-
-    def __init__(self, built: Built, tolerance: float | None) -> None:
-        self.built, self.tolerance, self.most = built, tolerance, None
-        self.errors: dict[float, dict[float, float]] = {}
-        self.lost: dict[float, list[float]] = {}
-
-    most: float | None
-
-    def out(
-        self,
-        problem: Problem,
-        found: HarmonicResponse,
-        peaks: list[Resonance],
-        normal: float,
-        journal: Journal | None = None,
-    ) -> list[str]:
-        """A message where harmonics or samples are too few at a place that is judged (`accuracy.judged`).
-
-        The book's mode is one harmonic by what it is, and of a whole ring its sector says the same: neither is judged.
-
-        Raises:
-            _TooFew: more of them are enough, where their number is looked for.
-        """
-
-        if not headline.is_estimated(self.built, problem, ring=self.tolerance is not None):
-            return []
-        looked_at = judged(problem, found, peaks, journal, series_name(normal))
-        for point, estimate, share, _ in looked_at if self.tolerance is not None else ():
-            self._enough(problem, found, point, estimate, share, normal)
-        if not looked_at:
-            return []
-        self.errors[normal] = {one.point.Omega / (2 * np.pi): one.likely for one in looked_at}
-        if lost := [one.point.Omega / (2 * np.pi) for one in looked_at if not np.isfinite(one.bound)]:
-            self.lost[normal] = lost
-        point, e, share, likely = max(looked_at, key=lambda one: one.bound)
-        self.most = max(self.most or 0.0, share)
-        where = f"At F_N = {normal:g} N the amplitude at {point.Omega / (2 * np.pi):.6g} Hz"
-        if share <= (headline.TRUNCATION if self.tolerance is None else self.tolerance) or not np.isfinite(share):
-            return []
-        if self.tolerance is not None:
-            balanced = counted(problem.harmonics, "harmonic")
-            return [f"{where} is uncertain by about {percent(share)} with {balanced}, above "
-                    "harmonics_error; no solution with more was found."]  # fmt: skip
-        return [headline.uncertain(where, e, share, likely)]
-
-    def unknown(self) -> list[str]:
-        """A message on all places whose error nobody knows, and what to do about them."""
-        if not self.lost:
-            return []
-        s = self.built.settings
-        return [
-            f"With twice the harmonics and samples no solution was found {say.at_places(self.lost)}, so how uncertain "
-            f"amplitudes are there is not known: respond with more of them (harmonics = {2 * s.balanced}, samples = "
-            f"{2 * s.sampled}; its points begin at their neighbours) and more sweep.points there; if these fail too, "
-            "microslip respond CASE --stability tells whether what was found is stable."
-        ]
-
-    def _enough(
-        self, problem: Problem, found: HarmonicResponse, point: Point, estimate: Error, share: float, normal: float
-    ) -> None:
-        """Raise `_TooFew` where more harmonics are enough for a point."""
-
-        floor = FLOOR * float(np.abs(found.monitor[found.converged]).max(initial=0.0))
-        e = enough(problem, point, self.tolerance or headline.TRUNCATION, floor=floor, first=estimate)
-        if (n := e.problem.harmonics) > problem.harmonics:
-            said = f"at F_N = {normal:g} N and {point.Omega / (2 * np.pi):.6g} Hz an error of about {percent(share)}"
-            raise _TooFew(n, f"{said} is left with {counted(problem.harmonics, 'harmonic')}; all once more with {n}")

@@ -8,12 +8,14 @@ from functools import cache
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
+import numpy as np
 from pydantic import BeforeValidator, Field, PrivateAttr, create_model, model_validator
 
 from ..analysis import GROUP, Analysis, analyses
 from ..contact.friction import OfCoulomb
 from ..contact.point import OfPoint
 from ..contact.settings import ContactLaw
+from ..data import Array
 from ..errors import UserError
 from ..operating.fatigue import MaterialLimits
 from ..reduced.compliance import BULK_AND_SURFACE
@@ -273,6 +275,11 @@ class Sweep(Model):
     """[s] CPU time for each place where the sweep jumps or has no solution, of motions in time
     (seven tenths of it), the curve about it and its stability; what compiles is not counted;
     0: none of these"""
+
+    @property
+    def grid(self) -> Array:
+        """(points,) Hz."""
+        return np.linspace(self.start, self.stop, self.points)
 
     @model_validator(mode="after")
     def _rising(self) -> Sweep:

@@ -10,13 +10,18 @@ from typing import Any
 import numpy as np
 
 from ..contact.friction import OfCoulomb
-from ..data import Array, ModalBasis
+from ..data import ModalBasis
 from ..errors import UserError, in_its_file
-from ..harmonic_balance import envelope, speed_line
-from ..harmonic_balance.envelope import Envelope, OverOrders
-from ..harmonic_balance.identification import Identified, Measured, NodalDiagram, identify, nodal_diagram
+from ..harmonic_balance import envelope
+from ..harmonic_balance.envelope import Envelope, OverOrders, SpeedResponse
+from ..harmonic_balance.identification import (
+    IdentifiedStiffness,
+    MeasuredFrequency,
+    NodalDiagram,
+    identify,
+    nodal_diagram,
+)
 from ..harmonic_balance.problem import Problem
-from ..harmonic_balance.speed_line import SpeedResponse
 from ..results.names import apart
 from ..system.assembly import Assembly
 from .assemble import Built, build
@@ -131,7 +136,7 @@ def over_speeds(
     rpm = np.linspace(asked.start_rpm, asked.stop_rpm, asked.points)
     order = abs(settings.base_order)
     models = partial(models_of, settings)
-    return speed_line.along(at, rpm, order, report, keep, models, harmonics=settings.balanced, **settings.marching)
+    return envelope.along(at, rpm, order, report, keep, models, harmonics=settings.balanced, **settings.marching)
 
 
 def _at_speed(settings: CaseSettings, turning: list[str], rpm: float) -> CaseSettings:
@@ -197,15 +202,11 @@ def over_ranges(
     ) -> Problem:  # fmt: skip
         return problem_of(at(damping_ratio, friction), normal_force).loaded(load)
 
-    return envelope.envelope(problem, asked.given, _frequency(settings), report, keep)
-
-
-def _frequency(settings: CaseSettings) -> Array:
-    return np.linspace(settings.sweep.start, settings.sweep.stop, settings.sweep.points)
+    return envelope.envelope(problem, asked.given, settings.sweep.grid, report, keep)
 
 
 @in_its_file
-def identification(settings: CaseSettings, bases: Bases) -> tuple[Identified, list[NodalDiagram]]:
+def identification(settings: CaseSettings, bases: Bases) -> tuple[IdentifiedStiffness, list[NodalDiagram]]:
     """The contact stiffness that meets a case's measured frequency, and diagrams of rising stiffness with it.
 
     Raises:
@@ -217,7 +218,7 @@ def identification(settings: CaseSettings, bases: Bases) -> tuple[Identified, li
     wrong = [m.nodal_diameter for m in (asked.fit, *asked.measured) if m.nodal_diameter > most]
     if wrong:
         raise UserError(f"nodal diameter {wrong[0]}: the ring has 0 to {most}; correct it", "identification")
-    fit, *others = (Measured(m.nodal_diameter, m.frequency, m.mode - 1) for m in (asked.fit, *asked.measured))
+    fit, *others = (MeasuredFrequency(m.nodal_diameter, m.frequency, m.mode - 1) for m in (asked.fit, *asked.measured))
     found = identify(a, fit, asked.ratio, others)
     drawn = sorted({*asked.stiffnesses, found.stiffness})
     return found, [nodal_diagram(a, c, asked.ratio, modes=asked.modes) for c in drawn]

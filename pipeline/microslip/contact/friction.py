@@ -146,7 +146,7 @@ class Exponential(Friction):
 
 
 EXPONENTIAL_44 = Exponential(
-    jnp.asarray(0.14 * 2.14 * np.pi / 2), jnp.asarray(0.14 * np.pi / 2), jnp.asarray(2.0)
+    np.asarray(0.14 * 2.14 * np.pi / 2), np.asarray(0.14 * np.pi / 2), np.asarray(2.0)  # type: ignore[arg-type]
 )  # a_1 (1 + a_2 exp(-b_1 |v|)) arctan(b_2 v), whose arctan tends to pi/2 (errata to 4.4-9: no factor 2/pi)
 
 

@@ -8,13 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
-from typing import Any
 
 import jax
 import jax.numpy as jnp
-import numpy as np
 
 from ..programs import inner
+from ..series import fourier
 from .law import Array, Law, Scalar, point_axes
 from .periodic import Known, near, unknown, with_slopes
 
@@ -23,23 +22,6 @@ CHUNK = 120
 
 CHUNK_ALONE = 480
 """The same of forces without tangents: the fewer parts, the less often each operation begins."""
-
-
-def fourier(harmonics: int, samples: int) -> tuple[Any, Any]:
-    """(s, 2 H + 1) values of 1, cos, sin, cos 2, ... at the samples, and (2 H + 1, s) its inverse, the transform; of
-    numpy.
-
-    Raises:
-        ValueError: fewer than 2 H + 1 samples cannot hold H harmonics.
-    """
-    if samples < 2 * harmonics + 1:
-        raise ValueError(f"{samples} samples cannot hold {harmonics} harmonics; take at least {2 * harmonics + 1}")
-    t = 2 * np.pi * np.arange(samples) / samples
-    pairs = [f(h * t) for h in range(1, harmonics + 1) for f in (np.cos, np.sin)]
-    values = np.column_stack([np.ones(samples), *pairs])
-    weights = np.full(2 * harmonics + 1, 2.0 / samples)
-    weights[0] = 1.0 / samples
-    return values, weights[:, None] * values.T
 
 
 @partial(inner, static_argnames=("samples", "count", "chunk"))

@@ -146,19 +146,14 @@ def start(problem: Equations, x: Array, lam: float, settings: Settings | None = 
     settings = settings or Settings()
     scaled = Scaled(problem)
     y = scaled.pack(x, lam)
-    found = correct(scaled, y, unit(len(y)), y[-1], replace(settings.newton, iterations=40, last_resort=True))
-    empty = State(y, np.zeros_like(y), 1, settings.step, None, settings.direction, y, y, 0, 0.0, ())
-    if not found.ok:
-        return replace(empty, status=f"no start: {found.status}")
-    y = found.y
-    D = scaled(y)[1]
-    t = tangent(D, 1)
+    corrected = _first(scaled, y, unit(len(y)), settings)
+    if not corrected.ok:
+        return _no_start(y, corrected.status, settings)
+    t = tangent(scaled(corrected.y)[1], 1)
     if t is None:
-        return replace(empty, status="no start: singular derivative: start elsewhere")
+        return _no_start(y, "singular derivative: start elsewhere", settings)
     orientation = -1 if t[-1] * settings.direction < 0 else 1
-    t = t * orientation
-    first = _point(scaled, y, t, "start", False, 0.0, lam)
-    return State(y, t, orientation, settings.step, None, _sign(t[-1]) or settings.direction, y, t, 1, 0.0, (first,))
+    return _started(scaled, corrected.y, t * orientation, orientation, settings, lam)
 
 
 def branch_off(
@@ -170,18 +165,35 @@ def branch_off(
     Args:
         direction: of x (n,) and of lambda, in their units, in which the curve is to be followed.
     """
-    settings = settings or Settings()
     scaled = Scaled(problem)
-    y = scaled.pack(x, lam)
     ahead = scaled.pack(*direction)
-    ahead = ahead / norm(ahead)
-    found = correct(scaled, y, ahead, float(ahead @ y), replace(settings.newton, iterations=40, last_resort=True))
-    empty = State(y, np.zeros_like(y), 1, settings.step, None, settings.direction, y, y, 0, 0.0, ())
-    if not found.ok or found.tangent is None:
-        return replace(empty, status=f"no start: {found.status}")
-    y, t = found.y, found.tangent / norm(found.tangent)  # border . tangent = 1: it goes ahead
-    first = _point(scaled, y, t, "start", False, 0.0)
-    return State(y, t, found.sign, settings.step, None, _sign(t[-1]) or settings.direction, y, t, 1, 0.0, (first,))
+    return across(scaled, scaled.pack(x, lam), ahead / norm(ahead), settings or Settings())
+
+
+def across(scaled: Scaled, y: Array, border: Array, settings: Settings) -> State:
+    """The first point on the plane through a scaled guess y across a border, in which the curve is to be followed."""
+    corrected = _first(scaled, y, border, settings)
+    if not corrected.ok or corrected.tangent is None:
+        return _no_start(y, corrected.status, settings)
+    t = corrected.tangent / norm(corrected.tangent)  # border . tangent = 1: it goes ahead
+    return _started(scaled, corrected.y, t, corrected.sign, settings)
+
+
+def _first(scaled: Scaled, y: Array, border: Array, settings: Settings) -> Corrected:
+    newton = replace(settings.newton, iterations=40, last_resort=True)
+    return correct(scaled, y, border, float(border @ y), newton)
+
+
+def _no_start(y: Array, why: str, settings: Settings) -> State:
+    nowhere, sense = np.zeros_like(y), settings.direction
+    return State(y, nowhere, 1, settings.step, None, sense, y, y, 0, 0.0, (), f"no start: {why}")
+
+
+def _started(
+    scaled: Scaled, y: Array, t: Array, orientation: int, settings: Settings, lam: float | None = None
+) -> State:
+    first, sense = _point(scaled, y, t, "start", False, 0.0, lam), _sign(t[-1]) or settings.direction
+    return State(y, t, orientation, settings.step, None, sense, y, t, 1, 0.0, (first,))
 
 
 def follow(problem: Equations, state: State, settings: Settings | None = None) -> Iterator[State]:
@@ -288,10 +300,10 @@ def _angle(a: Array, b: Array) -> float:
 
 def _tried(scaled: Scaled, state: State, guess: Array, length: float, settings: Settings) -> _Trial:
     """Correct a predicted point, judge."""
-    found = correct(scaled, guess, state.tangent, float(state.tangent @ guess), settings.newton, REACH * length)
-    if not found.ok:
+    corrected = correct(scaled, guess, state.tangent, float(state.tangent @ guess), settings.newton, REACH * length)
+    if not corrected.ok:
         return _Trial(False, 0.5)
-    return _judged(state, found, length, settings)
+    return _judged(state, corrected, length, settings)
 
 
 def predicted(state: State, length: float, settings: Settings) -> Array:
@@ -356,15 +368,15 @@ def _crossed(scaled: Scaled, state: State, length: float, settings: Settings, fa
 
 def _aimed(scaled: Scaled, state: State, guess: Array, border: Array, length: float, settings: Settings) -> _Trial:
     """Correct a guess with a border of its own; good if the curve goes on from the new point away from the last."""
-    found = correct(scaled, guess, border, float(border @ guess), settings.newton)
-    if not found.ok:
+    corrected = correct(scaled, guess, border, float(border @ guess), settings.newton)
+    if not corrected.ok:
         return _Trial(False)
-    t, chord = _oriented(found, state.orientation), found.y - state.y
+    t, chord = _oriented(corrected, state.orientation), corrected.y - state.y
     far = norm(chord) > 30 * length
     if far or not chord @ t > 0 or norm(chord) < 0.01 * length:
         return _Trial(False)
     bends = not _smooth(state.tangent, chord, t, settings.angle)
-    trial = _Trial(True, 0.5, False, bends, found.y, t, found.contraction)
+    trial = _Trial(True, 0.5, False, bends, corrected.y, t, corrected.contraction)
     return replace(trial, good=not bends or _is_kink(scaled, state, trial, length, settings))
 
 
@@ -377,9 +389,9 @@ def _between(scaled: Scaled, segment: Segment, u: float, settings: Settings, rea
     border = segment.border
     value = float((1 - u) * (border @ segment.a) + u * (border @ segment.b))
     for guess in segment.guesses(u):
-        found = correct(scaled, guess, border, value, settings.newton)
-        if found.ok and norm(found.y - guess) <= max(norm(segment.b - segment.a), reach):
-            return found.y, _oriented(found, found.sign), found.sign, found.pivots
+        corrected = correct(scaled, guess, border, value, settings.newton)
+        if corrected.ok and norm(corrected.y - guess) <= max(norm(segment.b - segment.a), reach):
+            return corrected.y, _oriented(corrected, corrected.sign), corrected.sign, corrected.pivots
     return None
 
 
@@ -494,10 +506,10 @@ def _at(scaled: Scaled, segment: Segment, lam: float, settings: Settings) -> tup
     span = segment.b[-1] - segment.a[-1]
     guess = segment.guesses(float((lam - segment.a[-1]) / span))[0]
     guess[-1] = lam
-    found = correct(scaled, guess, unit(len(guess)), lam, settings.newton)
-    if found.ok and norm(found.y - guess) <= 0.5 * norm(segment.b - segment.a):
-        t = _oriented(found, 1)
-        return found.y, t if t @ segment.border > 0 else -t
+    corrected = correct(scaled, guess, unit(len(guess)), lam, settings.newton)
+    if corrected.ok and norm(corrected.y - guess) <= 0.5 * norm(segment.b - segment.a):
+        t = _oriented(corrected, 1)
+        return corrected.y, t if t @ segment.border > 0 else -t
     try:
         return root(scaled, segment, settings, lambda y, t: float(y[-1]) - lam)
     except Lost:
@@ -527,25 +539,25 @@ def _taken(
     """The state after a step, with what was passed on the way."""
     sense = _sign(trial.tangent[-1]) or state.sense
     passed, bound = _passed(scaled, state, trial, sense, settings)
-    found = sorted([*extra, *passed], key=lambda p: p.arclength)
+    points = sorted([*extra, *passed], key=lambda p: p.arclength)
     arclength = _along(state, trial.y)
     status = ""
     if bound is not None:
-        found = [p for p in found if settings.low <= p.lam <= settings.high]
+        points = [p for p in points if settings.low <= p.lam <= settings.high]
         status = f"bound: lambda has reached {bound:g}"
     elif _closed(state, trial.y, trial.tangent):
         last = _along(state, state.origin)
-        found = [p for p in found if p.arclength <= last]
-        found.append(_point(scaled, state.origin, state.origin_tangent, "start", False, last))
+        points = [p for p in points if p.arclength <= last]
+        points.append(_point(scaled, state.origin, state.origin_tangent, "start", False, last))
         status = "closed: the curve is back at its start"
     else:
-        found.append(_point(scaled, trial.y, trial.tangent, "regular", trial.kink, arclength))
-        if state.count + len(found) >= settings.points:
+        points.append(_point(scaled, trial.y, trial.tangent, "regular", trial.kink, arclength))
+        if state.count + len(points) >= settings.points:
             status = f"points: {settings.points} are found; allow more to go on"
     return replace(
         state, y=trial.y, tangent=trial.tangent, step=_next_step(state, trial, length, settings), before=state.y,
-        before_tangent=None if trial.kink else state.tangent, sense=sense, count=state.count + len(found),
-        arclength=arclength, found=tuple(found), status=status,
+        before_tangent=None if trial.kink else state.tangent, sense=sense, count=state.count + len(points),
+        arclength=arclength, found=tuple(points), status=status,
     )  # fmt: skip
 
 
@@ -553,21 +565,21 @@ def _passed(
     scaled: Scaled, state: State, trial: _Trial, sense: int, settings: Settings
 ) -> tuple[list[Point], float | None]:
     """Fold and targets between the last point and the new one, and the bound if it is reached."""
-    pieces, found = [Segment(state.y, trial.y, state.tangent, trial.tangent, trial.kink)], []
+    pieces, points = [Segment(state.y, trial.y, state.tangent, trial.tangent, trial.kink)], []
     if sense != state.sense and (settings.folds or settings.targets):
         y, t = _fold(scaled, pieces[0], settings)
         pieces = [replace(pieces[0], b=y, tb=t), replace(pieces[0], a=y, ta=t)]
         if settings.folds:
-            found.append(_point(scaled, y, t, "fold", trial.kink, _along(state, y)))
+            points.append(_point(scaled, y, t, "fold", trial.kink, _along(state, y)))
     for piece in pieces:
         for lam, is_bound in _values(piece, scaled.lam_scale, settings):
             here = _at(scaled, piece, lam / scaled.lam_scale, settings)
             if here is not None:
                 kind: Kind = "bound" if is_bound else "target"
-                found.append(_point(scaled, *here, kind, trial.kink, _along(state, here[0]), lam))
+                points.append(_point(scaled, *here, kind, trial.kink, _along(state, here[0]), lam))
             if is_bound:
-                return found, lam
-    return found, None
+                return points, lam
+    return points, None
 
 
 def _along(state: State, y: Array) -> float:

@@ -20,7 +20,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from ..data import Array
-from .curve import Lost, Segment, Settings, State, advance, root
+from .curve import Lost, Segment, Settings, State, across, advance, root
 from .newton import CONVERGED, Equations, Scaled, correct, norm, unit
 
 
@@ -55,8 +55,9 @@ class Peak:
         return self.status == CONVERGED
 
 
-SEARCH = Settings(folds=False, branch_points=False, step=0.01)
-"""How the curve is followed to its peak, if not told otherwise."""
+SEARCH = Settings(folds=False, branch_points=False, step=0.01, resolution=1e-4)
+"""How the curve is followed to its peak, if not told otherwise. Contacts of many points have a kink
+at every sample of each of them: these are located to 1e-4."""
 
 DIP = 0.02
 """Fall of ln g behind a peak that ends the climb. Contacts that switch sample by sample make many small peaks on the
@@ -66,14 +67,18 @@ way up; the highest of those that lie within a smaller dip of each other is take
 def peak(problem: Rated, x: Array, lam: float, settings: Settings | None = None) -> Peak:
     """The peak uphill from a guess (n,) at lambda, whichever way that is. One that fails says why."""
     settings, scaled = settings or SEARCH, Scaled(problem)
-    y = scaled.pack(x, lam)
-    border, newton = unit(len(y)), replace(settings.newton, iterations=40, last_resort=True)
-    found = correct(scaled, y, border, float(border @ y), newton)
-    if not found.ok or found.tangent is None:
-        return Peak(x, lam, math.nan, False, f"no start: {found.status}", border)
-    t, y = found.tangent / norm(found.tangent), found.y
-    sense = 1 if t[-1] >= 0 else -1
-    return _climbed(problem, State(y, t, found.sign, settings.step, None, sense, y, t, 1, 0.0, ()), settings)
+    border = unit(len(np.atleast_1d(x)) + 1)
+    begun = across(scaled, scaled.pack(x, lam), border, settings)
+    if begun.status:
+        return Peak(x, lam, math.nan, False, begun.status, border)
+    slope = _Slope(problem)
+    here = slope.at(begun.y, begun.tangent)
+    uphill = begun if here.slope >= 0 else _reversed(begun)
+    top = _ahead(slope, uphill, settings)
+    if not top.converged or math.log(top.value / here.value) > DIP:
+        return top
+    other = _ahead(slope, _reversed(uphill), settings)  # that peak is hardly higher than the beginning
+    return other if other.converged and other.value > top.value else top
 
 
 def placed(problem: Rated, x: Array, lam: float) -> Peak:
@@ -88,28 +93,16 @@ def placed(problem: Rated, x: Array, lam: float) -> Peak:
     uphill = uphill if slope(y, uphill) >= 0 else -uphill
     here, top = slope.at(y, uphill), None
     ahead = y + BESIDE_TOP * uphill
-    found = correct(slope.scaled, ahead, uphill, float(uphill @ ahead), SEARCH.newton)
-    if found.ok and found.tangent is not None:
-        tangent = found.tangent * np.sign(found.tangent @ uphill) / norm(found.tangent)
-        behind = slope.at(found.y, tangent)
+    corrected = correct(slope.scaled, ahead, uphill, float(uphill @ ahead), SEARCH.newton)
+    if corrected.ok and corrected.tangent is not None:
+        tangent = corrected.tangent * np.sign(corrected.tangent @ uphill) / norm(corrected.tangent)
+        behind = slope.at(corrected.y, tangent)
         top = _pinned(slope, here, behind, False, SEARCH) if behind.slope < 0 else None
     return replace(top or _peak(slope, here), kink=False)
 
 
 BESIDE_TOP = 1e-3
 """Scaled length of curve within which the top lies of a peak whose height is known to some seven digits."""
-
-
-def _climbed(problem: Rated, state: State, settings: Settings) -> Peak:
-    """Uphill, and the other way too where that peak is hardly higher than the beginning."""
-    slope = _Slope(problem)
-    begun = slope.at(state.y, state.tangent)
-    uphill = state if begun.slope >= 0 else _reversed(state)
-    found = _ahead(slope, uphill, settings)
-    if not found.converged or math.log(found.value / begun.value) > DIP:
-        return found
-    other = _ahead(slope, _reversed(uphill), settings)
-    return other if other.converged and other.value > found.value else found
 
 
 def _ahead(slope: _Slope, state: State, settings: Settings) -> Peak:
@@ -188,8 +181,8 @@ def _pinned(slope: _Slope, low: _Place, high: _Place, bends: bool, settings: Set
         y, t = root(slope.scaled, segment, settings, slope, 1e-6)  # where g is level
     except Lost:
         return None
-    found = _peak(slope, slope.at(y, t))
-    return found if found.value >= max(low.value, high.value) else None
+    top = _peak(slope, slope.at(y, t))
+    return top if top.value >= max(low.value, high.value) else None
 
 
 def _peak(slope: _Slope, at: _Place, status: str = CONVERGED) -> Peak:
@@ -260,22 +253,22 @@ def lowest(
         highest: the highest peak at a value, `rated`. values: rising or falling. tolerance: of ln g, by
             which a lower peak would go unseen. most: peaks at most between the values.
     """
-    found = {float(value): highest(float(value)) for value in values}
-    ends = min(found), max(found)
-    known = sorted(value for value, peak in found.items() if peak.converged)
+    peaks = {float(value): highest(float(value)) for value in values}
+    ends = min(peaks), max(peaks)
+    known = sorted(value for value, peak in peaks.items() if peak.converged)
     if not known:
         first = float(values[0])
-        return Lowest(first, found[first], found[first].status, found)
-    i = min(range(len(known)), key=lambda k: found[known[k]].value)
-    at = i if found[known[i]].rate < 0 else i - 1
+        return Lowest(first, peaks[first], peaks[first].status, peaks)
+    i = min(range(len(known)), key=lambda k: peaks[known[k]].value)
+    at = i if peaks[known[i]].rate < 0 else i - 1
     status = NO_OPTIMUM
     if 0 <= at < len(known) - 1:
-        status = _valley(highest, found, known[at], known[at + 1], tolerance, most)
+        status = _valley(highest, peaks, known[at], known[at + 1], tolerance, most)
     if status in ("kink", "two peaks"):
-        _between(highest, found, most)
-    found = dict(sorted(found.items()))
-    best = min((value for value, peak in found.items() if peak.converged), key=lambda value: found[value].value)
-    return Lowest(best, found[best], NO_OPTIMUM if best in ends else status, found)
+        _between(highest, peaks, most)
+    peaks = dict(sorted(peaks.items()))
+    best = min((value for value, peak in peaks.items() if peak.converged), key=lambda value: peaks[value].value)
+    return Lowest(best, peaks[best], NO_OPTIMUM if best in ends else status, peaks)
 
 
 NEAR = 5e-3

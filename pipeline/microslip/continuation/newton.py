@@ -81,10 +81,9 @@ def newton(problem: Equations, x: Array, lam: float, settings: NewtonSettings | 
     """Solve R(x, lam) = 0 for x, from a guess (n,): steps halved until the residual falls, kinks allowed for."""
     scaled = Scaled(problem)
     y = scaled.pack(x, lam)
-    found = correct(scaled, y, unit(len(y)), y[-1], settings or NewtonSettings())
-    return Solution(
-        found.y[:-1] * scaled.x_scale, float(lam), found.ok, found.status, found.iterations, scaled.count, found.error
-    )
+    c = correct(scaled, y, unit(len(y)), y[-1], settings or NewtonSettings())
+    x = c.y[:-1] * scaled.x_scale
+    return Solution(x, float(lam), c.ok, c.status, c.iterations, scaled.count, c.error)
 
 
 class Scaled:
@@ -269,8 +268,8 @@ def _resort(
         there = _place(z, *scaled.bordered(z), weights, border, value)
         return there.residual, there.B
 
-    found = scipy.optimize.root(both, y, jac=True, method="hybr").x
-    again = correct(scaled, found, border, value, replace(settings, last_resort=False))
+    start = scipy.optimize.root(both, y, jac=True, method="hybr").x
+    again = correct(scaled, start, border, value, replace(settings, last_resort=False))
     return replace(again, iterations=again.iterations + iterations) if again.ok else failed
 
 

@@ -153,7 +153,14 @@ def changed(problem: Problem, at: Reading, solved: Solve) -> Error:
     Args:
         solved: finds the solution of a finer problem from a start x (size,).
     """
-    sampled, first = _resolved(problem, at, solved)
+    samples = DENSER * samples_of(problem)
+    while True:  # until one sample lies where each contact sticks
+        sampled = finer(problem, problem.harmonics, samples, seldom=True)
+        first = solved(sampled, at.x)
+        solved_for = np.isfinite(first.read)
+        if not solved_for or not samples or samples > FINEST or not _blind(sampled, first.x, first.Omega):
+            break
+        samples *= 2
     larger = finer(sampled, more(problem.harmonics), seldom=True)
     second = solved(larger, np.concatenate([first.x, np.zeros(larger.size - problem.size)]))
     by_samples = by_harmonics = np.inf
@@ -169,18 +176,6 @@ def changed(problem: Problem, at: Reading, solved: Solve) -> Error:
 def _read(problem: Problem, x: Array, Omega: float, output: int) -> float:
     at = problem.at(Omega)
     return abs(amplitude(at, x, *at.forces(x), output).value)
-
-
-def _resolved(problem: Problem, at: Reading, solved: Solve) -> tuple[Problem, Reading]:
-    """With more samples, as many as it takes for one to lie where each contact sticks, and its solution."""
-    samples = DENSER * samples_of(problem)
-    while True:
-        sampled = finer(problem, problem.harmonics, samples, seldom=True)
-        found = solved(sampled, at.x)
-        known = np.isfinite(found.read)
-        if not known or not samples or samples > FINEST or not _blind(sampled, found.x, found.Omega):
-            return sampled, found
-        samples *= 2
 
 
 def _blind(problem: Problem, x: Array, Omega: float) -> bool:
@@ -234,31 +229,24 @@ def judged(
     top = int(good[np.argmax(size[good])])
     asked = np.flatnonzero(response.converged & response.asked)  # at a fold the least error is a jump
     some = asked[np.unique(np.linspace(0, len(asked) - 1, min(LOOKED_AT, len(asked))).round().astype(int))]
-    left = [_kept_left_out(problem, response, i, journal, series) for i in some]
-    worst = some[np.argsort(left)[-2:]]
+
+    def looked(i: int) -> dict[str, Any]:
+        f = float(response.frequency[i])
+        share = partial(left_out, problem, response.x[i], 2 * np.pi * f)
+        return once(journal, f"{series}, left out", f, lambda: {"share": share()})
+
+    missing = [float(looked(i)["share"]) for i in some]
+    worst = some[np.argsort(missing)[-2:]]
     places = {float(response.frequency[i]): (float(size[i]), response.x[i]) for i in (top, *worst)}
     places |= {peak.frequency: (peak.amplitude, peak.x) for peak in peaks}
-    found = []
+    estimates = []
     for f, (height, x) in sorted(places.items(), key=lambda place: place[0]):
         row = once(journal, f"{series}, errors", f, partial(_estimated, problem, f, x))
         if row and np.isclose(row["amplitude"], height, rtol=1e-3, atol=0):
             point = Point(2 * np.pi * f, row["solution"], CONVERGED, row["residual"], row["steps"])
             e, floor = Error(**{one.name: row[one.name] for one in fields(Error)}), FLOOR * float(size[top])
-            found.append(Judged(point, e, e.over(floor), e.likely(floor)))
-    return found
-
-
-def _kept_left_out(
-    problem: Problem,
-    response: HarmonicResponse,
-    i: int,
-    journal: Journal | None,
-    series: str,
-) -> float:
-    """`left_out` at a point of a sweep, kept before or computed now."""
-    f, x = float(response.frequency[i]), response.x[i]
-    looked = once(journal, f"{series}, left out", f, lambda: {"share": left_out(problem, x, 2 * np.pi * f)})
-    return float(looked["share"])
+            estimates.append(Judged(point, e, e.over(floor), e.likely(floor)))
+    return estimates
 
 
 def _estimated(problem: Problem, frequency: float, x: Array) -> dict[str, Any]:
@@ -267,8 +255,8 @@ def _estimated(problem: Problem, frequency: float, x: Array) -> dict[str, Any]:
     point = solve(problem, 2 * np.pi * frequency, [x])
     if not point.converged:
         return {}
-    told = {"solution": point.x, "residual": point.error, "steps": point.iterations}
-    return told | vars(error(problem, point.x, point.Omega))
+    row = {"solution": point.x, "residual": point.error, "steps": point.iterations}
+    return row | vars(error(problem, point.x, point.Omega))
 
 
 @dataclass(frozen=True)
@@ -287,7 +275,7 @@ class Enough:
 
 
 def enough(
-    problem: Problem, point: Point, tolerance: float = 0.01, output: int = 0, most: int = 48, floor: float = 0.0,
+    problem: Problem, point: Point, tolerance: float = 0.01, most: int = 48, floor: float = 0.0,
     first: Error | None = None,
 ) -> Enough:  # fmt: skip
     """Harmonics and samples doubled until the read-out's estimated error is within a tolerance (a share of it).
@@ -296,15 +284,12 @@ def enough(
         point: a solution of the problem. most: harmonics that are tried. floor: see `Error.over`. first: the point's
             error, if it is known.
     """
-    found: list[Error] = []
-    while True:
-        found.append(first if first and not found else error(problem, point.x, point.Omega, output))
-        if found[-1].over(floor) <= tolerance:
-            return Enough(problem, point, tuple(found), True)
+    errors = [first or error(problem, point.x, point.Omega)]
+    while errors[-1].over(floor) > tolerance:
         larger = finer(problem, more(problem.harmonics), 2 * samples_of(problem))
-        if larger.harmonics > most:
-            return Enough(problem, point, tuple(found), False)
-        following = newton(larger.at(point.Omega), found[-1].x)
-        if not following.converged:
-            return Enough(problem, point, tuple(found), False)
+        following = newton(larger.at(point.Omega), errors[-1].x) if larger.harmonics <= most else None
+        if following is None or not following.converged:
+            return Enough(problem, point, tuple(errors), False)
         problem, point = larger, following
+        errors.append(error(problem, point.x, point.Omega))
+    return Enough(problem, point, tuple(errors), True)

@@ -11,7 +11,7 @@ from typing import Protocol
 import numpy as np
 import scipy.linalg
 
-from ..data import Array
+from ..data import Array, largest
 
 
 class Matrix(Protocol):
@@ -34,7 +34,7 @@ SINGULAR = 1e-10
 
 
 @dataclass(frozen=True, eq=False)
-class Dense:
+class DenseMatrix:
     """Attributes: A: (size, size)."""
 
     A: Array
@@ -44,7 +44,7 @@ class Dense:
 
     @property
     def transposed(self) -> Matrix:
-        return Dense(self.A.T)
+        return DenseMatrix(self.A.T)
 
     @cached_property
     def _factors(self) -> tuple[Array, Array]:
@@ -59,13 +59,13 @@ class Dense:
         pivots = np.abs(np.diag(self._factors[0]))
         if pivots.min(initial=1.0) > SINGULAR * pivots.max(initial=0.0):
             step = scipy.linalg.lu_solve(self._factors, right, check_finite=False)
-            if np.abs(step).max(initial=0.0) < 1e10 * np.abs(right).max(initial=1e-300):
+            if largest(step) < 1e10 * np.abs(right).max(initial=1e-300):
                 return step
         return np.linalg.lstsq(self.A, right, rcond=SINGULAR)[0]
 
 
 @dataclass(frozen=True, eq=False)
-class Cyclic:
+class CyclicMatrix:
     """Parts that each know only the one before and the one behind, the last one the first perhaps.
 
     Attributes:
@@ -80,21 +80,19 @@ class Cyclic:
     order: Array
 
     def dense(self) -> Array:
-        begins = np.cumsum([0, *(len(d) for d in self.diagonal)])
-        A, n = np.zeros((begins[-1], begins[-1])), len(self.diagonal)
+        n, pieces = len(self.diagonal), dict[tuple[int, int], Array]()
         for i, d in enumerate(self.diagonal):
-            for j, block in ((i, d), ((i + 1) % n, self.behind[i]), ((i - 1) % n, self.before[i])):
+            for j, block in ((i + 1, self.behind[i]), (i - 1, self.before[i]), (i, d)):
                 if block is not None:
-                    A[begins[i] : begins[i + 1], begins[j] : begins[j + 1]] += block
-        out = np.empty_like(A)
-        out[np.ix_(self.order, self.order)] = A
-        return out
+                    pieces[i, j % n] = block
+        return assembled(pieces, n, self.order)
 
     @property
     def transposed(self) -> Matrix:
         n, turn = len(self.diagonal), lambda block: None if block is None else block.T
         behind = [turn(self.before[(i + 1) % n]) for i in range(n)]
-        return Cyclic([d.T for d in self.diagonal], behind, [turn(self.behind[i - 1]) for i in range(n)], self.order)
+        before = [turn(self.behind[i - 1]) for i in range(n)]
+        return CyclicMatrix([d.T for d in self.diagonal], behind, before, self.order)
 
     def solve(self, right: Array) -> Array:
         """See `Matrix`. Blocks of less than the largest size are filled up by a unit matrix."""
@@ -112,7 +110,7 @@ class Cyclic:
         found[self.order] = around(D, after, before, r)[filled]
         if np.isfinite(found).all() and np.abs(found).max() < 1e10 * np.abs(right).max(initial=1e-300):
             return found
-        return Dense(self.dense()).solve(right)
+        return DenseMatrix(self.dense()).solve(right)
 
 
 def around(D: Array, behind: Array, before: Array, r: Array) -> Array:
@@ -161,26 +159,27 @@ def one_plus(pieces: dict[tuple[int, int], Array], sizes: list[int], coefficient
     for block, s in zip(diagonal, sizes, strict=True):
         block.flat[:: coefficients * s + 1] += 1.0
     if n == 1:
-        return Dense(diagonal[0])
+        return DenseMatrix(diagonal[0])
     if n > 2 and (row := in_a_row(n, pieces)):
         behind, before = [*row[1:], row[0]], [row[-1], *row[:-1]]
-        return Cyclic(
+        return CyclicMatrix(
             [diagonal[i] for i in row],
             [pieces.get(pair) for pair in zip(row, behind, strict=True)],
             [pieces.get(pair) for pair in zip(row, before, strict=True)],
             _order(sizes, coefficients, row),
         )
-    order = _order(sizes, coefficients, range(n))
-    begins = np.cumsum([0, *(coefficients * s for s in sizes)])
+    return DenseMatrix(assembled(pieces, n, _order(sizes, coefficients, range(n))))
+
+
+def assembled(pieces: dict[tuple[int, int], Array], n: int, order: Array) -> Array:
+    """(size, size) of the blocks (i, j) of n parts; order: see `CyclicMatrix`."""
+    begins = np.cumsum([0, *(len(pieces[i, i]) for i in range(n))])
     A = np.zeros((begins[-1], begins[-1]))
-    for i in range(n):
-        A[begins[i] : begins[i + 1], begins[i] : begins[i + 1]] = diagonal[i]
     for (i, j), block in pieces.items():
-        if i != j:
-            A[begins[i] : begins[i + 1], begins[j] : begins[j + 1]] = block
+        A[begins[i] : begins[i + 1], begins[j] : begins[j + 1]] = block
     out = np.empty_like(A)
     out[np.ix_(order, order)] = A
-    return Dense(out)
+    return out
 
 
 def in_a_row(n: int, pairs: Iterable[tuple[int, int]]) -> list[int]:

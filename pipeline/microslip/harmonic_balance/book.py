@@ -32,8 +32,8 @@ from ..contact.sliders import Iwan, Strips
 from ..data import Array, ComplexArray
 from ..errors import UserError
 from ..programs import inner
+from .forces import Cycle, Traced, above_rounding
 from .orbits import TOLERANCE, Orbits, orbits
-from .point_cycles import Cycle, Traced, above_rounding
 from .tables import Spline, Table, in_chunks, kept, law_hash, refined
 
 NORMAL_TOLERANCE = 1e-3
@@ -306,7 +306,7 @@ def orbit_force(table: Orbits, spring: jax.Array, limit: jax.Array, t: jax.Array
     return jnp.stack([force[0].real, -force[0].imag, force[1].real, -force[1].imag])
 
 
-class Sliding(NamedTuple):
+class PointSliders(NamedTuple):
     """Normal force (..., n) N of a mean approach, and springs and limits (m, ..., n) of the m sliders of a point."""
 
     pressed: jax.Array
@@ -314,7 +314,7 @@ class Sliding(NamedTuple):
     limits: jax.Array
 
 
-def sliders(law: Law, mean: jax.Array, strips: int) -> Sliding:
+def sliders(law: Law, mean: jax.Array, strips: int) -> PointSliders:
     """The sliders of a law at a mean approach (..., n), m, which both their springs and limits are taken from.
 
     Args:
@@ -326,20 +326,21 @@ def sliders(law: Law, mean: jax.Array, strips: int) -> Sliding:
         depth, shares = (_spread(x, mean.ndim) for x in (law.at * law.depth, law.shares))
         overlap = jnp.maximum(approach - depth, 0.0)
         pressed = law.stiffness_0 * shares * overlap
-        return Sliding(pressed.sum(axis=0), jnp.where(overlap > 0, law.stiffness_t * shares, 0.0), law.mu * pressed)
+        springs = jnp.where(overlap > 0, law.stiffness_t * shares, 0.0)
+        return PointSliders(pressed.sum(axis=0), springs, law.mu * pressed)
     if isinstance(law, PointContact | Iwan) and isinstance(law.normal, Gapped):
         return sliders(replace(law, normal=law.normal.normal), mean - law.normal.gap, strips)
     if isinstance(law, Iwan):
         pressed, spring = law.normal.force(mean), law.stiffness * law.normal.share(mean)
         shares, strengths = (_spread(x, mean.ndim) for x in (law.shares, law.strengths))
-        return Sliding(pressed, spring * shares, law.mu * pressed * strengths)
+        return PointSliders(pressed, spring * shares, law.mu * pressed * strengths)
     assert isinstance(law, PointContact) and isinstance(law.friction, Coulomb)
     pressed, spring = law.normal.force(mean), law.stiffness_1 * law.normal.share(mean)
     if not strips:
-        return Sliding(pressed, spring[None], (law.friction.mu * pressed)[None])
+        return PointSliders(pressed, spring[None], (law.friction.mu * pressed)[None])
     assert isinstance(law.normal, Rough)
     shares, parts = _cut(law.normal, mean, strips)
-    return Sliding(pressed, law.stiffness_1 * shares, law.friction.mu * parts)
+    return PointSliders(pressed, law.stiffness_1 * shares, law.friction.mu * parts)
 
 
 def _cut(normal: Rough, mean: jax.Array, count: int) -> tuple[jax.Array, jax.Array]:
@@ -351,8 +352,8 @@ def _cut(normal: Rough, mean: jax.Array, count: int) -> tuple[jax.Array, jax.Arr
     edges = first + (jnp.clip(x, first, last) - first) * (1 - left)
     area, volume = normal.heights.area(edges), normal.heights.volume(edges)
     shares = jnp.diff(area, axis=0)
-    pressed = shares * x - (jnp.diff(edges * area, axis=0) - jnp.diff(volume, axis=0))
-    return shares, normal.stiffness_0 * normal.roughness * jnp.maximum(pressed, 0.0)
+    forces = shares * x - (jnp.diff(edges * area, axis=0) - jnp.diff(volume, axis=0))
+    return shares, normal.stiffness_0 * normal.roughness * jnp.maximum(forces, 0.0)
 
 
 def normal_law(law: Law, strips: int = 0) -> Normal | Strips:
@@ -388,7 +389,7 @@ SAMPLES = 64
 
 
 @settings
-class Points:
+class BookPoints:
     """Everything that the points of one contact need.
 
     Attributes:
@@ -423,7 +424,7 @@ def _motion(G: jax.Array, u: jax.Array) -> tuple[jax.Array, jax.Array]:
 
 
 @inner
-def _resultants(points: Points, G: jax.Array, u: jax.Array) -> jax.Array:
+def _resultants(points: BookPoints, G: jax.Array, u: jax.Array) -> jax.Array:
     """(c, k, 3) resultants of (c, k, 3) coordinates."""
 
     def one(u: jax.Array) -> jax.Array:
@@ -436,7 +437,7 @@ def _resultants(points: Points, G: jax.Array, u: jax.Array) -> jax.Array:
 
 
 @inner
-def _with_slope(points: Points, G: jax.Array, u: jax.Array) -> tuple[jax.Array, jax.Array]:
+def _with_slope(points: BookPoints, G: jax.Array, u: jax.Array) -> tuple[jax.Array, jax.Array]:
     """(c, k, 3) resultants and (c, k, 3, k, 3) their derivative; derivatives point by point, then contracted.
 
     The normal force does not know of the tangential motion, so both are moved at the same time: five directions
@@ -477,7 +478,7 @@ class BookPatch:
     """
 
     patch: Patch
-    points: Points
+    points: BookPoints
     tables: tuple[Table, ...]
     diagonal: bool = False
 
@@ -535,7 +536,7 @@ class BookPatch:
 
 
 @inner
-def _point_cycles(points: Points, G: jax.Array, u: jax.Array) -> tuple[jax.Array, ...]:
+def _point_cycles(points: BookPoints, G: jax.Array, u: jax.Array) -> tuple[jax.Array, ...]:
     """(c, n) J dissipated in the plane, and shares of the cycle that are slip and open."""
     wave = jnp.asarray(np.cos(2 * np.pi * (np.arange(SAMPLES) + 0.5) / SAMPLES))
 
@@ -553,7 +554,7 @@ def _point_cycles(points: Points, G: jax.Array, u: jax.Array) -> tuple[jax.Array
 
 
 @inner
-def _of_points(points: Points, G: jax.Array, u: jax.Array) -> jax.Array:
+def _of_points(points: BookPoints, G: jax.Array, u: jax.Array) -> jax.Array:
     """(c, n, 3, 3) mean, cos and sin of the forces of the points along n, t1, t2, N; the sum of them is `_resultants`'.
 
     No mean of the tangential forces.
@@ -569,7 +570,7 @@ def _of_points(points: Points, G: jax.Array, u: jax.Array) -> jax.Array:
 
 
 @inner
-def _stiffness(points: Points, G: jax.Array, u: jax.Array) -> jax.Array:
+def _stiffness(points: BookPoints, G: jax.Array, u: jax.Array) -> jax.Array:
     """(c, k, k) the complex stiffness of every point in the axes of the contact, contracted."""
 
     def one(u: jax.Array) -> jax.Array:
@@ -644,6 +645,6 @@ def book_patch(
     law, share = (patch.law.whole, patch.law.share) if isinstance(patch.law, Portion) else (patch.law, jnp.asarray(1.0))
     normal, normal_known = swings(normal_law(law, strips), normal_tolerance, where)
     plane, plane_known = orbits(tolerance, where)
-    points = Points(law, normal, plane, share, strips)
+    points = BookPoints(law, normal, plane, share, strips)
     known = tuple(t for t in (plane_known, normal_known) if t is not None)
     return BookPatch(patch, points, known, diagonal)

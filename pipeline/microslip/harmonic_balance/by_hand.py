@@ -26,10 +26,9 @@ from ..contact.normal import Preload
 from ..contact.patch import Patch
 from ..contact.periodic import Known
 from ..contact.point import PointContact
-from ..data import Array, Indices
-from .forces import AFT, Forces
-from .point_cycles import Cycle, Traced, above_rounding
-from .torus import Torus
+from ..data import Array, Indices, largest
+from ..series import Torus
+from .forces import AFT, Cycle, Forces, Traced, above_rounding
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,19 +110,25 @@ class JenkinsPlay(OneCoordinate):
     """A spring in series with a slider, under a constant normal force."""
 
     @cached_property
+    def numbers(self) -> tuple[float, float, float]:
+        """Of the point: its spring, N/m, what its slider holds, N, and its normal force, N."""
+        law, zero = self.patch.law, jnp.zeros(1)
+        if isinstance(law, Jenkins):
+            return float(np.asarray(law.along)), float(np.asarray(law.held)), 0.0
+        assert isinstance(law, PointContact)
+        normal = law.normal.force(zero)
+        holds = law.friction.coefficient(zero, normal, zero) * normal
+        return float(np.asarray(law.stiffness_1)), float(holds[0]), float(np.asarray(normal)[0])
+
+    @cached_property
     def spring(self) -> float:
         """Stiffness along the coordinate, N/m."""
-        law = self.patch.law
-        return float(np.asarray(law.along if isinstance(law, Jenkins) else self._point.stiffness_1)) * self._length**2
+        return self.numbers[0] * self._length**2
 
     @cached_property
     def width(self) -> float:
         """How far the coordinate is from the slider while this is dragged."""
-        law, zero = self.patch.law, jnp.zeros(1)
-        if isinstance(law, Jenkins):
-            return float(np.asarray(law.held)) * self._length / self.spring
-        normal = self._point.normal.force(zero)
-        return float((self._point.friction.coefficient(zero, normal, zero) * normal)[0]) * self._length / self.spring
+        return self.numbers[1] * self._length / self.spring
 
     def force(self, u: Array, period: float) -> Array:
         path, places, _ = self._sliders(u)
@@ -141,23 +146,11 @@ class JenkinsPlay(OneCoordinate):
         force, none = self.spring * (path - places), np.zeros(1)
         mean = 0.5 * (force + np.roll(force, 1, axis=1))
         moved, slid = (x - np.roll(x, 1, axis=1) for x in (path, places))
-        slips = np.abs(slid) > 1e-9 * np.abs(moved).max(initial=0.0)
+        slips = np.abs(slid) > 1e-9 * largest(moved)
         lost = self.spring * self.width * (np.abs(slid) * slips).sum(axis=1)
         work = above_rounding(force * self._speed(u), 1), (mean * slid * slips).sum(axis=1), lost, slips.mean(axis=1)
         cycles = [Cycle(d, s, f, c, none, 0.0) for d, s, f, c in np.transpose(work)[..., None]]
-        return [Traced(f, one) for f, one in zip(self._of_points(force, self._normal), cycles, strict=True)]
-
-    @property
-    def _normal(self) -> float:
-        """N, of the point."""
-        if isinstance(self.patch.law, Jenkins):
-            return 0.0
-        return float(np.asarray(self._point.normal.force(jnp.zeros(1)))[0])
-
-    @property
-    def _point(self) -> PointContact:
-        assert isinstance(self.patch.law, PointContact)
-        return self.patch.law
+        return [Traced(f, one) for f, one in zip(self._of_points(force, self.numbers[2]), cycles, strict=True)]
 
     def _sliders(self, u: Array) -> tuple[Array, Array, Indices]:
         """(c, s) the coordinate over a cycle, places of its slider, samples that dragged it there (-1: none)."""

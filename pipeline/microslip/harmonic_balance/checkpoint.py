@@ -6,6 +6,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import fields
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -20,23 +21,22 @@ from ..system.assembly import Assembly, Output
 from ..system.component import Component
 from .checks import forces_on, judged
 from .families import Family, followed
-from .point_cycles import Cycle
+from .forces import Cycle
 from .problem import Problem
-from .refinement import Solved, filled_response
-from .response import HarmonicResponse, Operating, Resonance, highest, operating
+from .response import HarmonicResponse, Operating, Resonance, Solved, filled_response, highest, operating
 from .solver import CONVERGED, Point, Report
 from .sweeps import brackets, resonances
 
 
 def resumed_response(
-    problem: Problem, frequency: Array, limit: Array, journal: Journal, series: str, report: Report = lambda _: None
+    problem: Problem, frequency: Array, journal: Journal, series: str, report: Report = lambda _: None
 ) -> tuple[HarmonicResponse, list[Resonance]]:
-    """`refinement.filled_response` and its refined peaks; what a series of the journal holds already is not computed.
+    """`response.filled_response` and its refined peaks; what a series of the journal holds already is not computed.
 
     Points of another `frequency` have no place in the series: each one was begun at its neighbours.
 
     Args:
-        frequency: Hz. limit: (patches,) friction limits, N, for reports. series: its name. Peaks are kept as well, with
+        frequency: Hz. series: its name. Peaks are kept as well, with
             ``peak`` = the frequency, Hz, of the point that they were searched from, and what searches gave in a
             series of its own.
 
@@ -44,24 +44,14 @@ def resumed_response(
         The response and its resonances: of the maxima of one plateau the highest.
     """
     rows = journal.of(series)
-    held = {key: restored(problem, row) for key, row in rows.items() if not row["peak"] or _same(row["peak"], key)}
+    points = {key: restored(problem, row) for key, row in rows.items() if not row["peak"] or _same(row["peak"], key)}
 
     def keep(f: float, solved: Solved, added: bool) -> None:
         journal.keep(series, f, record(problem, *solved) | {"frequency": f, "added": int(added)})
 
-    response = filled_response(problem, frequency, limit, report, held, keep)
-    peaks = [_peak(problem, response, bracket, journal, series, report) for bracket in brackets(response)]
-    return response, resonances(response, [peak for peak in peaks if peak])
+    response = filled_response(problem, frequency, report, points, keep)
 
-
-def _peak(
-    problem: Problem, response: HarmonicResponse, bracket: tuple[int, int, int], journal: Journal, series: str,
-    report: Report,
-) -> Resonance | None:  # fmt: skip
-    """The peak beside a point of a sweep, if there is one, kept before or searched for now."""
-    beside = float(response.frequency[bracket[1]])
-
-    def searched() -> dict[str, Any]:
+    def searched(bracket: tuple[int, int, int], beside: float) -> dict[str, Any]:
         report(f"peak near {beside:.6g} Hz")
         found = highest(problem, response, bracket)
         if found is None:
@@ -69,12 +59,16 @@ def _peak(
         point, amplitude = found
         f, rows = point.Omega / (2 * np.pi), journal.of(series)
         f = next((key for key in rows if _same(key, f)), f)  # a point of the sweep stays what it is
-        kept = rows.get(f) or record(problem, point, operating(problem, point))
-        journal.keep(series, f, kept | {"peak": beside})
+        row_of_point = rows.get(f) or record(problem, point, operating(problem, point))
+        journal.keep(series, f, row_of_point | {"peak": beside})
         return {"frequency": f, "amplitude": amplitude, "x": point.x}
 
-    row = once(journal, f"{series}, searches for peaks", beside, searched)
-    return Resonance(**row) if row else None
+    peaks, searches = list[Resonance](), f"{series}, searches for peaks"
+    for bracket in brackets(response):
+        beside = float(response.frequency[bracket[1]])
+        row = once(journal, searches, beside, partial(searched, bracket, beside))
+        peaks += [Resonance(**row)] if row else []
+    return response, resonances(response, peaks)
 
 
 def _same(frequency: float, other: float) -> bool:
@@ -193,17 +187,16 @@ def record(problem: Problem, point: Point, found: Operating) -> dict[str, Any]:
         if any(len(f) for f in forces):
             kept[f"bodies/{component.name}/forces"] = rectangle(forces)
     for name, cycle in found.cycles.items():
-        kept |= _of_contact(f"contacts/{name}", found.relative[name], found.force[name], cycle)
+        own: dict[str, Any] = {"displacement": found.relative[name], "force": found.force[name]}
+        own |= {key: float(getattr(cycle, key).sum()) for key in SUMS}
+        own |= {key: float(getattr(cycle, key).mean()) for key in MEANS}
+        own["unsteady"] = float(cycle.unsteady)
+        kept |= {f"contacts/{name}/{key}": value for key, value in own.items()}
     return kept
 
 
-def _of_contact(name: str, relative: Array, force: Array, cycle: Cycle) -> dict[str, Any]:
-    return {
-        f"{name}/displacement": relative, f"{name}/force": force, f"{name}/dissipated": float(cycle.dissipated.sum()),
-        f"{name}/by_slip": float(cycle.by_slip.sum()), f"{name}/lost": float(cycle.lost.sum()),
-        f"{name}/slipping": float(cycle.slipping.mean()),
-        f"{name}/open": float(cycle.open.mean()), f"{name}/unsteady": float(cycle.unsteady),
-    }  # fmt: skip
+SUMS, MEANS = ("dissipated", "by_slip", "lost"), ("slipping", "open")
+"""What is kept of the points of a `Cycle`: sums and means."""
 
 
 def restored(problem: Problem, row: dict[str, Any]) -> tuple[Point, Operating]:
@@ -219,13 +212,15 @@ def restored(problem: Problem, row: dict[str, Any]) -> tuple[Point, Operating]:
     names = [c.name for c in problem.assembly.contacts]
     cycles = {}
     for name in names:
-        d, s, lost, slips, opened = (
-            np.array([row[f"contacts/{name}/{k}"]]) for k in ("dissipated", "by_slip", "lost", "slipping", "open")
-        )
-        cycles[name] = Cycle(d, s, lost, slips, opened, row[f"contacts/{name}/unsteady"])
-    found = Operating(
+        kept: list[Any] = [np.array([row[f"contacts/{name}/{key}"]]) for key in SUMS + MEANS]
+        cycles[name] = Cycle(*kept, *[row[f"contacts/{name}/unsteady"]])
+    a, q = problem.assembly, {}
+    for m in a.components:
+        sizes = [m.at(a.index(h)).group.n_modes for h in range(problem.harmonics + 1)]
+        q[m.name] = [one[:n] for one, n in zip(row[f"bodies/{m.name}/q"], sizes, strict=True)]
+    motion = Operating(
         point.Omega,
-        {m.name: _ragged(problem, m, row[f"bodies/{m.name}/q"]) for m in problem.assembly.components},
+        q,
         _outputs_of(problem, row),
         {name: row[f"contacts/{name}/displacement"] for name in names},
         {name: row[f"contacts/{name}/force"] for name in names},
@@ -236,7 +231,7 @@ def restored(problem: Problem, row: dict[str, Any]) -> tuple[Point, Operating]:
         cycles,
         checks,
     )
-    return point, found
+    return point, motion
 
 
 def array_of(a: Assembly, w: Output) -> str:
@@ -258,21 +253,16 @@ def _outputs(a: Assembly) -> dict[str, dict[str, int]]:
     return out
 
 
-def labels(problem: Problem) -> dict[str, list[str]]:
+def labels(a: Assembly) -> dict[str, list[str]]:
     """Name of an array -> its rows, for the head of a journal; the first row of the first one is the first read-out."""
-    return labels_of(problem.assembly)
-
-
-def labels_of(a: Assembly) -> dict[str, list[str]]:
-    """The same of an assembly."""
     return {name: list(rows) for name, rows in _outputs(a).items()}
 
 
 def _outputs_of(problem: Problem, row: dict[str, Any]) -> ComplexArray:
     """(w, H + 1) the read-outs in the order of the assembly, from a kept point."""
     places, a = _outputs(problem.assembly), problem.assembly
-    found = [row[name][list(places[name]).index(w.label)] for w in a.outputs for name in [array_of(a, w)]]
-    return np.array(found, dtype=complex).reshape(-1, problem.harmonics + 1)
+    read = [row[of][list(places[of]).index(w.label)] for w in a.outputs for of in [array_of(a, w)]]
+    return np.array(read, dtype=complex).reshape(-1, problem.harmonics + 1)
 
 
 def rectangle(rows: list[ComplexArray]) -> ComplexArray:
@@ -281,10 +271,6 @@ def rectangle(rows: list[ComplexArray]) -> ComplexArray:
     for to, row in zip(out, rows, strict=True):
         to[: len(row)] = row
     return out
-
-
-def _ragged(problem: Problem, component: Component, q: ComplexArray) -> list[ComplexArray]:
-    return [row[: component.at(problem.assembly.index(h)).group.n_modes] for h, row in enumerate(q)]
 
 
 def beside(problem: Problem, component: Component, harmonic: int, found: Operating) -> ComplexArray:

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..data import Array, ComplexArray
+from ..data import Array, ComplexArray, largest
 from ..results.checks import MOTION, Checks, resting, shares, work
+from ..series import amplitudes
 from ..system.component import Component
 from .problem import Problem
 from .solver import Point
@@ -34,17 +35,19 @@ def checks(problem: Problem, found: Operating) -> Checks:
 
 def _apart(problem: Problem, found: Operating) -> float:
     """See `Checks.motion`."""
-    away = largest = 0.0
-    each = [_moving(problem, m, found) for m in problem.assembly.components]
-    sides = {key: moved for one in each for key, moved in one.items()}
+    away = far = 0.0
+    sides: dict[tuple[int, int], tuple[ComplexArray, Array]] = {}
+    for m in problem.assembly.components:
+        sides |= _moving(problem, m, found)
     for i, contact in enumerate(problem.assembly.contacts):
-        G, u = contact.patch.kinematics, found.relative[contact.name]
-        seen = np.column_stack([u[:, 0] - contact.offset, u[:, 1::2] - 1j * u[:, 2::2]])
+        G = contact.patch.kinematics
+        seen = np.ascontiguousarray(amplitudes(found.relative[contact.name].T).T)
+        seen[:, 0] -= contact.offset
         (first, most), (second, other) = sides[i, 0], sides.get((i, 1), (0.0, 0.0))
-        away = max(away, float(np.abs(G @ (first - second - seen)).max(initial=0.0)))
-        could = float((np.abs(G) @ (most + other + np.abs(contact.offset))).max(initial=0.0))
-        largest = max(largest, float(np.abs(G @ seen).max(initial=0.0)), LEFT / MOTION * could)
-    return away / largest if largest else 0.0
+        away = max(away, largest(G @ (first - second - seen)))
+        could = largest(np.abs(G) @ (most + other + np.abs(contact.offset)))
+        far = max(far, largest(G @ seen), LEFT / MOTION * could)
+    return away / far if far else 0.0
 
 
 LEFT = 1e-12
@@ -95,7 +98,7 @@ def forces_on(
         if side.rows is not None:  # a patch that deforms has no rows of the compliance
             continue
         contact, F = a.contacts[i], found.force[a.contacts[i].name]
-        at = F[:, 0] - contact.preload if harmonic == 0 else F[:, 2 * harmonic - 1] - 1j * F[:, 2 * harmonic]
+        at = amplitudes(F.T)[harmonic] if harmonic else F[:, 0] - contact.preload
         six = np.conj(side.frame.T * side.phase(index, a.blades)) @ at * (1.0 if second else -1.0)
         for label, value in zip(side.labels, six, strict=True):
             if label in place:

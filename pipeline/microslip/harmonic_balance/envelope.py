@@ -1,12 +1,15 @@
-"""Resonances over the engine order, and envelopes of responses over ranges of what is not known exactly.
+"""Resonances over the engine order, and envelopes of responses over ranges of what is not known exactly; vibration
+along an engine-order line.
 
-Sextro Figs. 5.5-2 and 5.4-2. Many responses of one system: each starts where one of its neighbours ended.
+Sextro Figs. 5.5-2 and 5.4-2. Many responses of one system: each starts where one of its neighbours ended. Along an
+engine-order line speed and frequency are tied together, f = e n / 60: at every speed the bodies are those of that
+speed, contacts are pressed by what presses them there, and the steady loads are that speed's.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import KW_ONLY, dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -15,15 +18,17 @@ from ..data import Array, ComplexArray, Indices
 from ..errors import UserError
 from ..operating.motion import Motion, motion_of
 from ..operating.stress import stress_peaks
+from ..results.series import of_solutions
+from ..system.assembly import Assembly
 from ..units import METRES, Quantity
+from . import problem as balance
 from . import response
 from .checkpoint import beside, rectangle
-from .problem import Problem
+from .problem import Forces, Problem
 from .readout import measured
 from .reduced import stuck
-from .refinement import Solved, filled_response
-from .response import Operating
-from .solver import CONVERGED, Point, Report
+from .response import HarmonicResponse, Operating, Solved, filled_response, of_points, operating
+from .solver import Point, Report, solve
 
 # --- resonance over engine order -------------------------------------------------------------------------------------
 
@@ -49,9 +54,10 @@ class OverOrders:
     failed: Indices
     stress: Array
     stressed_at: Array
-    missing: Sequence[str] = field(kw_only=True, default=())
-    quantity: Quantity = field(kw_only=True, default=METRES)
-    normal_force: float = field(kw_only=True, default=float("nan"))
+    _: KW_ONLY
+    missing: Sequence[str] = ()
+    quantity: Quantity = METRES
+    normal_force: float = np.nan
 
     @property
     def lost(self) -> Array:
@@ -60,7 +66,7 @@ class OverOrders:
 
     def columns(self) -> dict[str, Array]:
         """Name -> column, for a table."""
-        found = {
+        table = {
             "engine_order": self.order.astype(float),
             "wave": self.index.astype(float),
             "resonance_Hz": self.frequency,
@@ -69,10 +75,10 @@ class OverOrders:
             "failed_points": self.failed.astype(float),
         }
         if any(self.missing):
-            found["missing"] = np.array(self.missing)
+            table["missing"] = np.array(self.missing)
         if np.isfinite(self.stress).any():
-            found |= {"stress_amplitude_Pa": self.stress, "frequency_of_stress_Hz": self.stressed_at}
-        return found
+            table |= {"stress_amplitude_Pa": self.stress, "frequency_of_stress_Hz": self.stressed_at}
+        return table
 
 
 @dataclass(frozen=True)
@@ -126,13 +132,12 @@ def over_orders(
     for i, e in enumerate(orders):
         report(f"engine order {e}{under}, {i + 1} of {len(orders)}")
         problem = build(int(e))
-        top = largest(problem, np.linspace(*band, points), report)
+        top = largest_resonance(problem, np.linspace(*band, points), report)
         f = top.frequency
         modes = stuck(problem.parts[1][0], problem.stiffness[0]) if len(problem.parts[1]) == 1 else np.zeros(0)
         near = modes[np.abs(modes - f).argmin()] if len(modes) and np.isfinite(f) else np.nan
-        rows.append(
-            (int(e), problem.assembly.index(1), f, top.amplitude, near, top.failed, top.stress, top.stressed_at)
-        )
+        index, size, stress = problem.assembly.index(1), top.amplitude, (top.stress, top.stressed_at)
+        rows.append((int(e), index, f, size, near, top.failed, *stress))
         columns = (np.array(column) for column in zip(*rows, strict=True))
         missing.append(top.missing)
         whole = OverOrders(*columns, missing=tuple(missing), quantity=measured(problem.assembly))
@@ -153,24 +158,23 @@ class Largest:
     amplitude: float
     failed: int
     missing: str = ""
-    stress: float = float("nan")
-    stressed_at: float = float("nan")
+    stress: float = np.nan
+    stressed_at: float = np.nan
 
 
-def largest(problem: Problem, frequency: Array, report: Report = lambda _: None) -> Largest:
+def largest_resonance(problem: Problem, frequency: Array, report: Report = lambda _: None) -> Largest:
     """The largest resonance of a band, looked for as a response looks for its own, and the largest stress on the
     way."""
     solved: list[Solved] = []
-    limit = np.zeros(len(problem.assembly.contacts))
-    found = filled_response(problem, frequency, limit, report, keep=lambda f, one, _: solved.append(one))
-    failed = int((~found.converged).sum())
+    swept = filled_response(problem, frequency, report, keep=lambda f, one, _: solved.append(one))
+    failed = int((~swept.converged).sum())
     report("resonances between the points")
-    peaks, folds = response.parted(found, response.refined_peaks(problem, found))
+    peaks, folds = response.parted(swept, response.refined_peaks(problem, swept))
     if not peaks:
-        return Largest(np.nan, np.nan, failed, response.no_resonance(found, folds))
-    known = [motion for point, motion in solved if response.judged(point, motion.checks).converged]
-    tops = [response.operating(problem, Point(2 * np.pi * p.frequency, p.x, CONVERGED, 0.0, 0)) for p in peaks]
-    motion = motion_of_read(problem, [*known, *tops])
+        return Largest(np.nan, np.nan, failed, response.no_resonance(swept, folds))
+    motions = [motion for point, motion in solved if response.judged(point, motion.checks).converged]
+    tops = [response.operating(problem, Point(2 * np.pi * p.frequency, p.x)) for p in peaks]
+    motion = motion_of_read(problem, [*motions, *tops])
     top = max(peaks, key=lambda peak: peak.amplitude)
     one = Largest(top.frequency, top.amplitude, failed)
     if motion is None:
@@ -213,7 +217,8 @@ class Envelope:
     monitor: ComplexArray
     converged: Array
     iterations: Array
-    quantity: Quantity = field(kw_only=True, default=METRES)
+    _: KW_ONLY
+    quantity: Quantity = METRES
 
     @property
     def low(self) -> Array:
@@ -286,13 +291,12 @@ def envelope(
         length = length or problem.length
         problem = replace(problem, length=length)  # one unit for the unknowns of all combinations
         # Starts from the neighbouring combination at every frequency saved a fifth of Newton's steps and no time.
-        limit = np.zeros(len(problem.assembly.contacts))
-        found = response.harmonic_response(problem, frequency, limit, report, start)
-        start = found.x[0] if found.converged[0] else None
-        rows.append((found.monitor, found.converged, found.iterations))
+        swept = response.harmonic_response(problem, frequency, report, start)
+        start = swept.x[0] if swept.converged[0] else None
+        rows.append((swept.monitor, swept.converged, swept.iterations))
         columns = [np.array(column) for column in zip(*rows, strict=True)]
         done = np.array(values[: i + 1])
-        whole = Envelope(np.asarray(frequency), tuple(ranges), done, *columns, quantity=found.quantity)
+        whole = Envelope(np.asarray(frequency), tuple(ranges), done, *columns, quantity=swept.quantity)
         keep(whole)
     return whole
 
@@ -305,3 +309,87 @@ def _snake(values: list[list[float]]) -> Iterator[list[float]]:
     for i, rest in enumerate(_snake(values[1:])):
         for v in values[0] if i % 2 == 0 else values[0][::-1]:
             yield [v, *rest]
+
+
+# along an engine-order line ----------------------------------------------------------------------
+
+
+Build = Callable[[float], Assembly]
+"""Rotation speed in rpm -> the assembly at that speed."""
+
+
+@dataclass(frozen=True)
+class SpeedResponse(HarmonicResponse):
+    """`HarmonicResponse` along an engine-order line.
+
+    Attributes:
+        rpm: (s,). order: base engine order, of the first harmonic. normal: (s, contacts) mean normal forces, N.
+    """
+
+    rpm: Array
+    order: int
+    normal: Array
+
+    def columns(self) -> dict[str, Array]:
+        forces = {f"normal_force_{i + 1}_N": force for i, force in enumerate(self.normal.T)}
+        return {"speed_rpm": self.rpm, **super().columns(), **of_solutions(forces, self.converged)}
+
+
+def frequency(order: int, rpm: Array) -> Array:
+    """Hz of an engine order at rotation speeds in rpm."""
+    return abs(order) * np.asarray(rpm, dtype=float) / 60
+
+
+def along(
+    build: Build, rpm: Array, order: int | None = None, report: Report = lambda _: None,
+    keep: Callable[[SpeedResponse], None] = lambda _: None,
+    models: Callable[[Assembly], dict[int, Forces] | None] = lambda _: None, **settings: Any,
+) -> SpeedResponse:  # fmt: skip
+    """Steady vibration at every speed, each started from the one or two before it.
+
+    Args:
+        build: see `Build`; contacts that stay the same keep their `Patch`, so that nothing is compiled twice. rpm: (s,)
+            in the order in which they are run through. order: base engine order, of the first harmonic; the ring's if
+            None. keep: is given what there is after every speed. models: of an assembly's contacts, see `problem.of`;
+            the marched laws if None. settings: others of `problem.of`.
+
+    Raises:
+        UserError: no speed, one that is not above 0, no engine order.
+    """
+    speeds = np.asarray(rpm, dtype=float)
+    if not len(speeds) or not (speeds > 0).all():
+        raise UserError("speeds: an engine-order line needs one or more speeds in rpm, all above 0")
+    motions, normal, done = list[Operating](), [], list[Point]()
+    for i, n in enumerate(speeds):
+        assembly = build(float(n))
+        problem = balance.of(assembly, models=models(assembly), **settings)
+        settings.setdefault("length", problem.length)  # one unit for the unknowns of all speeds
+        base = _order(problem.assembly, order)
+        f = float(frequency(base, n))
+        done.append(solve(problem, 2 * np.pi * f, _starts(done, f)))
+        motions.append(operating(problem, done[-1]))
+        normal.append([float(F[0, 0]) for F in motions[-1].force.values()])
+        words = "" if done[-1].converged else ", not converged"
+        report(f"{i + 1} of {len(speeds)} speeds: {n:.6g} rpm, {f:.6g} Hz{words}")
+        responded = of_points(problem, done, motions)
+        whole = SpeedResponse(**vars(responded), rpm=speeds[: i + 1], order=base, normal=np.array(normal))
+        keep(whole)
+    return whole
+
+
+def _order(assembly: Assembly, order: int | None) -> int:
+    if order is None and assembly.ring is None:
+        raise UserError("engine order: the bodies stand in no ring, which would tell it; give one")
+    base = abs(assembly.ring.order if order is None and assembly.ring else order or 0)
+    if not base:
+        raise UserError("engine order: 0 is steady; an engine-order line needs one that vibrates")
+    return base
+
+
+def _starts(done: list[Point], f: float) -> list[Array]:
+    good = [p for p in done[-2:] if p.converged]
+    if len(good) < 2 or good[0].Omega == good[1].Omega:
+        return [p.x for p in good[-1:]]
+    a, b = good
+    share = (2 * np.pi * f - b.Omega) / (b.Omega - a.Omega)
+    return [b.x + share * (b.x - a.x), b.x]

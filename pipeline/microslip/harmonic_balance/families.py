@@ -17,11 +17,11 @@ import numpy as np
 from .. import continuation
 from ..continuation import Branch, Settings, State
 from ..continuation.newton import norm
-from ..data import Array
+from ..data import Array, largest
 from ..errors import UserError
 from .problem import AtFrequency, Problem
-from .reduced import stuck, stuck_damping, untouched
-from .solver import CONVERGED, OverLoad, Point, Report, solve
+from .reduced import sticking_and_free
+from .solver import CONVERGED, OverLoad, Point, Report, led, solve
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,8 +141,8 @@ class Family:
         passed = [at for at, width in self.narrow.tolist() if low < at < high and high - low > width]
         if not passed:
             return False
-        seen = HIGHER * max(float(np.abs(s.y[:-1]).max(initial=0.0)) for s in (before, after))
-        hit = {p.lam: float(np.abs(p.x / self.equations.x_scale).max(initial=0.0)) for p in after.found}
+        seen = HIGHER * max(largest(s.y[:-1]) for s in (before, after))
+        hit = {p.lam: largest(p.x / self.equations.x_scale) for p in after.found}
         return any(hit.get(at, np.inf) > seen for at in passed)
 
 
@@ -173,13 +173,9 @@ def of_frequency(problem: Problem, low: float, high: float) -> Family:
 def _resonances(problem: Problem) -> Array:
     """(m, 2) rad/s of the modes with sticking contacts and of those without, and the half-power widths of the damped
     ones; between both friction makes resonances wide."""
-    part, k = problem.assembly.joined(1), problem.assembly.stiffness
-    found = []
-    for one, held in ((part, k), (untouched(part), np.zeros((0, 0)))):
-        Omega = 2 * np.pi * stuck(one, held)
-        found.append(np.column_stack([Omega, 2 * Omega * stuck_damping(one, held)]))
-    modes = np.concatenate(found)
-    return modes[modes[:, 1] > 0]
+    modes, damping = sticking_and_free(problem.assembly)
+    Omega = 2 * np.pi * modes
+    return np.column_stack([Omega, 2 * Omega * damping])[damping > 0]
 
 
 def of_load(problem: Problem, frequency: float, low: float, high: float) -> Family:
@@ -271,8 +267,7 @@ def _own(problem: Problem, Omega: float, known: Array) -> Point:
     by little. From afar Newton's method comes to any of several motions, and it is the last resort."""
     at, guess = problem.at(Omega), np.concatenate([known, np.zeros(problem.size - len(known))])
     eased = Eased(at, at.residual(guess), problem.x_scale)
-    settings = Settings(low=0.0, high=1.0, points=150, step=0.05, step_max=0.3, branch_points=False)
-    branch = continuation.trace(eased, guess, 0.0, settings)
+    branch = led(eased, guess, 1.0)
     last = branch.points[-1] if branch.points else None
     return solve(problem, Omega, [last.x, guess] if last and last.lam == 1.0 else [guess])
 

@@ -7,23 +7,25 @@ displacements u (c, k, W).
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache, partial
-from typing import Any, Protocol
+from pathlib import Path
+from typing import Any, NamedTuple, Protocol
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 
-from ..contact.harmonics import CHUNK, CHUNK_ALONE, force_harmonics, force_near, fourier
-from ..contact.law import Law, point_axes
+from ..contact.harmonics import CHUNK, CHUNK_ALONE, force_harmonics, force_near
+from ..contact.law import Law, State, Step, point_axes
 from ..contact.patch import Patch, thinned
 from ..contact.periodic import Known, periodic, unknown, with_slopes
+from ..contact.point import PointContact
 from ..data import Array
 from ..programs import often, program, seldom
-from .point_cycles import Cycle, Traced, derivative, needs_rate, traced
-from .torus import Torus
+from ..series import Torus, derivative, fourier
 
 
 class Forces(Protocol):
@@ -77,7 +79,7 @@ class AFT:
 
     def waves(self, coefficients: int) -> tuple[Array, Array]:
         """(s, W) of the series at the samples of a cycle, and (W, s) its coefficients from samples."""
-        return _waves(coefficients // 2, self.samples) if self.torus is None else self.torus.waves
+        return fourier(coefficients // 2, self.samples) if self.torus is None else self.torus.waves
 
     def ahead(self, coefficients: int) -> Array:
         """(s, W) derivative of the series over the time in cycles, at the samples."""
@@ -163,14 +165,8 @@ class AFT:
 
 
 @lru_cache(maxsize=8)
-def _waves(harmonics: int, samples: int) -> tuple[Array, Array]:
-    values, transform = fourier(harmonics, samples)
-    return np.asarray(values), np.asarray(transform)
-
-
-@lru_cache(maxsize=8)
 def _ahead(harmonics: int, samples: int) -> Array:
-    return 2 * np.pi * _waves(harmonics, samples)[0] @ derivative(2 * harmonics + 1)
+    return 2 * np.pi * fourier(harmonics, samples)[0] @ derivative(2 * harmonics + 1)
 
 
 def repeated(law: Law, n: int, times: int) -> Law:
@@ -271,3 +267,145 @@ def _path(G: jax.Array, u: jax.Array, values: jax.Array) -> jax.Array:
 def _summed(G: jax.Array, force: jax.Array, c: int, transform: jax.Array) -> jax.Array:
     """(c, k, W) of forces (s, c n, 3)."""
     return jnp.einsum("ws,scni,nia->caw", transform, force.reshape(len(force), c, -1, 3), G)
+
+
+# what points do in a cycle -----------------------------------------------------------------------
+
+
+def needs_rate(law: Law) -> bool:
+    """Whether the force depends on the speed of the motion, and not on its path alone."""
+    return not (isinstance(law, PointContact) and law.friction.constant and law.damping is None)
+
+
+class Cycle(NamedTuple):
+    """What the n points of a patch do in one cycle.
+
+    Attributes:
+        dissipated: (n,) J, work done on the points. by_slip: (n,) J, friction force times the path slid; without what
+            area that opens under load takes with it. lost: (n,) J that the law itself counts, see `Law.lost`.
+            slipping, open: (n,) share of the cycle.
+        unsteady: largest change of a resultant's sample against the cycle before, over the largest resultant force.
+    """
+
+    dissipated: Array
+    by_slip: Array
+    lost: Array
+    slipping: Array
+    open: Array
+    unsteady: float
+
+    @property
+    def taken(self) -> Array:
+        """(n,) J that the law counts as lost; the work done on the points where it counts nothing."""
+        return np.where(np.isfinite(self.lost), self.lost, self.dissipated)
+
+
+class Traced(NamedTuple):
+    """What a force model makes of the points of a patch in time: force (s, n, 3) N of s samples of a cycle along n, t1,
+    t2, the first one at the cycle's beginning, and the sums over the cycle."""
+
+    force: Array
+    cycle: Cycle
+
+
+def traced(
+    law: Law, G: Array, u: Array, period: float, samples: int, count: int, periodicity: float = 0.0,
+    waves: tuple[Array, Array] | None = None,
+) -> Traced:  # fmt: skip
+    """One more cycle than the force is found from, looked at in time.
+
+    Args:
+        law: of n points. G: (n, 3, k) kinematics. u: (k, 2 H + 1) mean, cos, sin, cos 2, ... period: s.
+        samples: of a cycle. count: cycles marched at most before. periodicity: see `contact.periodic.periodic`.
+        waves: (s, W) of another series at the samples, and its derivative over the time in cycles.
+    """
+    if waves is None:
+        values = np.asarray(fourier(u.shape[1] // 2, samples)[0])
+        waves = values, 2 * np.pi * values @ derivative(u.shape[1])
+    parts = _point_cycles(law, G, u, float(period), *waves, count, periodicity)
+    dissipated, by_slip, lost, slipping, open_ = (np.asarray(p) for p in parts[:5])
+    return Traced(parts[6], Cycle(dissipated, by_slip, lost, slipping, open_, float(parts[5])))
+
+
+def above_rounding(terms: Any, axes: Any) -> Any:
+    """Sums of works that come and go over axes of an array; zero where what is left is rounding of what came."""
+    total = terms.sum(axis=axes)
+    return total * (abs(total) > ROUNDING * abs(terms).sum(axis=axes))
+
+
+ROUNDING = 1e-13
+"""Share of the work that goes to and fro in a cycle below which what is lost is not told from zero."""
+
+OF_STEPS = 1e-10
+"""The same of what the law counts, which adds up the rounding of every step and of a cycle that is periodic so far."""
+
+
+@partial(seldom, static_argnames=("count",))
+def _point_cycles(
+    law: Law, G: jax.Array, u: jax.Array, period: jax.Array | float, values: jax.Array, ahead: jax.Array, count: int,
+    periodicity: jax.Array | float,
+) -> tuple[jax.Array, ...]:  # fmt: skip
+    samples = len(values)
+    path, ahead = (jnp.einsum("sk,nia,ak->sni", v, G, u) for v in (values, ahead))
+    before, state = periodic(law, path, period, count, periodicity)[:2]
+    moved = path - jnp.roll(path, 1, axis=0)
+    dt = period / samples
+
+    def one(state: State, row: tuple[jax.Array, ...]) -> tuple[State, tuple[jax.Array, ...]]:
+        force, after = law.step(row[0], row[1] / dt, dt, state)
+        lost = law.lost(Step(row[0], row[1], dt, row[2], force, state, after))
+        return after, (force, law.slip(after) - law.slip(state), lost)
+
+    _, (force, slid, lost) = jax.lax.scan(one, state, (path, moved, jnp.roll(before, 1, axis=0)))
+    mean = 0.5 * (force + jnp.roll(force, 1, axis=0))
+    open_ = force[..., 0] <= 0
+    moves = jnp.abs(slid).max(axis=-1) > 1e-9 * jnp.abs(moved).max()
+    slips = moves & ~open_
+    change = jnp.einsum("nia,sni->sa", G, force - before)[:, :3]
+    size = jnp.abs(jnp.einsum("nia,sni->sa", G, force)[:, :3]).max()
+    unsteady = jnp.where(size > 0, jnp.abs(change).max() / jnp.where(size > 0, size, 1.0), 0.0)
+    by_slip = jnp.sum(mean[..., 1:] * slid * moves[..., None], axis=(0, 2))
+    works = force * ahead / samples
+    work, lost = above_rounding(works, (0, 2)), lost.sum(axis=0)
+    lost = jnp.where(abs(lost) < OF_STEPS * abs(works).sum(axis=(0, 2)), 0.0, lost)  # not a number stays one
+    return work, by_slip, lost, slips.mean(axis=0), open_.mean(axis=0), unsteady, force
+
+
+# memory ------------------------------------------------------------------------------------------
+
+
+GIB = 2.0**30
+
+BASE = 0.5 * GIB
+"""Of a process with its packages and compiled programs."""
+
+
+def aft_bytes(points: int, coordinates: int, harmonics: int, samples: int, contacts: int = 1) -> float:
+    """Peak of the memory that a response with the law of a patch takes; measured it is within a factor of 2, and up to
+    3 times less with thousands of samples of laws whose memory is solved for.
+
+    At the peak stand either the derivatives, W = 2 H + 1: the tangents of the force along 3 W harmonics in every sample
+    of `CHUNK` points, then (3, W, 3, W) of every point, twice, and half contracted (k, W, 3, W); or ten
+    histories (3 a sample and point) of one cycle that is looked at in time.
+
+    Args:
+        points: of a patch. coordinates: k of it. contacts: equal ones, evaluated together.
+    """
+    W, n = 2 * harmonics + 1, points * contacts
+    derivatives = samples * 3 * W * min(n, CHUNK) * 3 + n * W * W * (2 * 9 + 3 * coordinates)
+    return BASE + 8.0 * max(derivatives, 10 * samples * points * 3)
+
+
+def of_this_machine() -> float:
+    """Bytes that a process may have: the machine's, or what a control group leaves of them; infinite if unknown."""
+    try:
+        found = float(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"))
+    except (AttributeError, ValueError, OSError):
+        return float("inf")
+    for name in ("memory.max", "memory/memory.limit_in_bytes"):
+        try:
+            text = Path("/sys/fs/cgroup", name).read_text(encoding="ascii").strip()
+        except (OSError, UnicodeDecodeError):
+            continue
+        found = min(found, float(text)) if text.isdecimal() else found
+    return found

@@ -11,7 +11,7 @@ import numpy as np
 import scipy.linalg
 
 from ..contact.point import saws
-from ..data import Array
+from ..data import Array, largest
 from ..errors import UserError
 from ..system.assembly import Assembly, Linear
 from ..units import hertz
@@ -48,10 +48,10 @@ def growing(assembly: Assembly) -> list[str]:
 
 def _feeds(C: Array, K: Array) -> bool:
     """Whether a damping (m, m) or a stiffness (m, m) can give a free motion energy."""
-    if np.abs(K - K.conj().T).max(initial=0.0) > NEUTRAL * np.abs(K).max(initial=0.0):
+    if largest(K - K.conj().T) > NEUTRAL * largest(K):
         return True
     lowest = np.linalg.eigvalsh(0.5 * (C + C.conj().T)).min(initial=0.0)
-    return bool(lowest < -NEUTRAL * np.abs(C).max(initial=0.0))
+    return bool(lowest < -NEUTRAL * largest(C))
 
 
 def _fastest(part: Linear, K: Array) -> complex | None:
@@ -68,13 +68,14 @@ def _fastest(part: Linear, K: Array) -> complex | None:
 
 def fed(assembly: Assembly) -> list[str]:
     """`growing`, and what static friction above the sliding one does between two samples."""
-    names = [c.name for c in assembly.contacts if saws(c.patch.law)]
-    return growing(assembly) + [
-        f"Static friction above the sliding one ({name}): a point without mass sticks again as soon as it has slipped, "
-        "so sliding friction saws between both values and the answer hangs on samples; write law = \"rate\", or "
-        "friction that falls with the speed."
-        for name in ([", ".join(names)] if names else [])
-    ]  # fmt: skip
+    names, sentences = [c.name for c in assembly.contacts if saws(c.patch.law)], growing(assembly)
+    if names:
+        sentences.append(
+            f"Static friction above the sliding one ({', '.join(names)}): a point without mass sticks again as soon as "
+            "it has slipped, so sliding friction saws between both values and the answer hangs on samples; write law "
+            '= "rate", or friction that falls with the speed.'
+        )
+    return sentences
 
 
 def verdict(problem: Problem, x: Array, Omega: float, at: str) -> list[str]:

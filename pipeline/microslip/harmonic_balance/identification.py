@@ -26,7 +26,7 @@ and as good as rigid."""
 
 
 @dataclass(frozen=True)
-class Measured:
+class MeasuredFrequency:
     """A measured frequency: mode `mode` (from 0) of the nodal diameter of an index (see `Ring.index`), Hz."""
 
     index: int
@@ -54,7 +54,7 @@ class NodalDiagram:
 
 
 @dataclass(frozen=True, eq=False)
-class Identified:
+class IdentifiedStiffness:
     """A contact stiffness that gives one measured frequency.
 
     Attributes:
@@ -65,10 +65,10 @@ class Identified:
 
     stiffness: float
     ratio: float
-    fitted: Measured
+    fitted: MeasuredFrequency
     limits: tuple[float, float]
     sensitivity: float
-    measured: tuple[Measured, ...]
+    measured: tuple[MeasuredFrequency, ...]
     predicted: Array
 
     @property
@@ -132,21 +132,19 @@ class Coupling:
         k = stiffness * self.unit
         k = k @ np.linalg.inv(np.eye(len(k)) + self.residual @ k)
         K = self.K + self.rows.conj().T @ k @ self.rows
-        return np.sqrt(np.maximum(_eigenvalues(0.5 * (K + K.conj().T), self.M), 0.0)) / (2 * np.pi)
+        K = 0.5 * (K + K.conj().T)
+        try:
+            values = scipy.linalg.eigh(K, self.M, eigvals_only=True)
+        except np.linalg.LinAlgError:  # coordinates without mass: the finite ones
+            inverse = scipy.linalg.eigh(self.M, K, eigvals_only=True)
+            values = 1 / inverse[inverse > 1e-14 * inverse.max()][::-1]
+        return np.sqrt(np.maximum(values, 0.0)) / (2 * np.pi)
 
     @property
     def scale(self) -> float:
         """N/m, what the highest mode has at a contact."""
         moved = np.einsum("am,ab,bm->m", self.rows.conj(), self.unit, self.rows).real
         return float(np.abs(np.diag(self.K)).max() / max(moved.max(initial=0.0), 1e-300))
-
-
-def _eigenvalues(K: Array, M: Array) -> Array:
-    try:
-        return scipy.linalg.eigh(K, M, eigvals_only=True)
-    except np.linalg.LinAlgError:  # coordinates without mass: the finite ones
-        inverse = scipy.linalg.eigh(M, K, eigvals_only=True)
-        return 1 / inverse[inverse > 1e-14 * inverse.max()][::-1]
 
 
 def coupling(assembly: Assembly, index: int, ratio: float) -> Coupling:
@@ -170,7 +168,9 @@ def nodal_diagram(
     return NodalDiagram(np.array(waves), np.array(found), stiffness, ratio)
 
 
-def identify(assembly: Assembly, fit: Measured, ratio: float, measured: Sequence[Measured] = ()) -> Identified:
+def identify(
+    assembly: Assembly, fit: MeasuredFrequency, ratio: float, measured: Sequence[MeasuredFrequency] = ()
+) -> IdentifiedStiffness:
     """The contact stiffness that gives one measured frequency, and what it predicts for others.
 
     Args:
@@ -198,15 +198,15 @@ def identify(assembly: Assembly, fit: Measured, ratio: float, measured: Sequence
     )
     stiffness, h = float(np.exp(root)), 1e-3
     slope = float(np.log(f(stiffness * np.exp(h)) / f(stiffness * np.exp(-h))) / (2 * h))
-    known = tuple(measured) if fit in measured else (fit, *measured)
-    predicted = np.array([_Mode(assembly, m, ratio)(stiffness) for m in known])
-    return Identified(stiffness, ratio, fit, (low, high), slope, known, predicted)
+    measured_all = tuple(measured) if fit in measured else (fit, *measured)
+    predicted = np.array([_Mode(assembly, m, ratio)(stiffness) for m in measured_all])
+    return IdentifiedStiffness(stiffness, ratio, fit, (low, high), slope, measured_all, predicted)
 
 
 class _Mode:
     """The frequency (Hz) of one mode over the stiffness (N/m)."""
 
-    def __init__(self, assembly: Assembly, of: Measured, ratio: float) -> None:
+    def __init__(self, assembly: Assembly, of: MeasuredFrequency, ratio: float) -> None:
         self.coupling, self.of = coupling(assembly, of.index, ratio), of
         if of.mode >= len(self.coupling.K):
             raise UserError(

@@ -21,8 +21,8 @@ from functools import cached_property
 
 import numpy as np
 
-from ..data import Array, ComplexArray, Indices
-from .blocks import Dense, Matrix, around
+from ..data import Array, ComplexArray, Indices, largest
+from .blocks import DenseMatrix, Matrix, around
 
 LEFT = 1e-6
 """Share of the right side that a step may leave: of Newton's method, which sees the rest in the next one."""
@@ -54,8 +54,8 @@ class Sides:
         """(p, r) sides of each of some parts, m where there are fewer than r."""
         each = [np.flatnonzero(self.part == i) for i in parts]
         out = np.full((len(each), max(map(len, each), default=0)), len(self.part))
-        for row, own in zip(out, each, strict=True):
-            row[: len(own)] = own
+        for row, sides in zip(out, each, strict=True):
+            row[: len(sides)] = sides
         return out
 
     @cached_property
@@ -65,12 +65,12 @@ class Sides:
         pairs = np.array(np.nonzero(self.part[:, None] == self.part))
         i, j = self.contact[pairs]
         pairs = pairs[:, np.lexsort((j, i))]
-        both = self.contact[pairs]
-        begins = np.flatnonzero(np.append(True, (np.diff(both) != 0).any(axis=0))[: pairs.shape[1]])
-        return pairs, begins, both[:, begins]
+        contacts = self.contact[pairs]
+        begins = np.flatnonzero(np.append(True, (np.diff(contacts) != 0).any(axis=0))[: pairs.shape[1]])
+        return pairs, begins, contacts[:, begins]
 
     @cached_property
-    def ring(self) -> Ring | None:
+    def ring(self) -> RingOfGaps | None:
         """The smallest gaps that the contacts are those of, so many each, of which each meets the one behind and the
         one before alone; None where others meet."""
         (i, j), n = self.met[2], len(self.of_contacts[0])
@@ -80,12 +80,12 @@ class Sides:
                 away = (gap[j] - gap[i]) % count
                 whole = n % each == 0 and (count > 3 or each == 1)  # of three gaps each meets all
                 if whole and np.isin(away, (0, 1, count - 1)).all():
-                    return Ring(gap, place, np.where(away == count - 1, 2, away), count, each)
+                    return RingOfGaps(gap, place, np.where(away == count - 1, 2, away), count, each)
         return None
 
 
 @dataclass(frozen=True, eq=False)
-class Ring:
+class RingOfGaps:
     """Contacts in the gaps of a ring.
 
     Attributes:
@@ -181,7 +181,7 @@ class Apart:
         given = s.sign[:, None, None] * force[s.contact]
         moved = free - self._made(given, "loose")
         off = force - _across(S, self._relative(moved))
-        if not np.abs(off).max(initial=0.0) <= LEFT * np.abs(force).max(initial=0.0):
+        if not largest(off) <= LEFT * largest(force):
             return None
         out = R.copy()
         for one in self.each:
@@ -214,7 +214,7 @@ class Apart:
             return ring.solved(i, j, blocks, right)
         A = np.zeros((n, s, n, s))
         A[i, :, j] = blocks
-        return Dense(A.reshape(n * s, n * s)).solve(right.ravel()).reshape(n, s)
+        return DenseMatrix(A.reshape(n * s, n * s)).solve(right.ravel()).reshape(n, s)
 
 
 def apart(sides: Sides, each: list[tuple[Parts, ComplexArray]]) -> Apart | None:

@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..continuation import Point, Settings, State, follow, start
-from ..data import Array
+from ..data import Array, largest
 from ..errors import UserError
 from ..results.checks import Checks
 from ..results.files import Response, write_response
@@ -87,9 +87,9 @@ class Backbone:
 
     def columns(self) -> dict[str, Array]:
         """Heading -> (k,) numbers; nan where a motion fails its checks."""
-        column, found = self.quantity.column("amplitude"), {"frequency_Hz": self.frequency}
+        column, table = self.quantity.column("amplitude"), {"frequency_Hz": self.frequency}
         passed = np.array([not c.failure for c in self.checks], dtype=bool)
-        return {column: self.amplitude, **of_solutions({**found, "damping_ratio": self.damping}, passed)}
+        return {column: self.amplitude, **of_solutions({**table, "damping_ratio": self.damping}, passed)}
 
     def to_dataframe(self) -> Any:
         """The table of `columns` as a `pandas.DataFrame`."""
@@ -131,12 +131,12 @@ class Backbone:
         Raises:
             UserError: a file that is no response stands there.
         """
-        known = {"frequency": self.frequency, "parameter": self.amplitude, "damping_ratio": self.damping, "x": self.x}
-        known |= {f"checks/{n.name}": np.array([getattr(c, n.name) for c in self.checks]) for n in fields(Checks)}
+        arrays = {"frequency": self.frequency, "parameter": self.amplitude, "damping_ratio": self.damping, "x": self.x}
+        arrays |= {f"checks/{n.name}": np.array([getattr(c, n.name) for c in self.checks]) for n in fields(Checks)}
         status = tuple(c.failure or CONVERGED for c in self.checks)
         labels = {"parameter": (self.quantity.unit,)}
-        told = {"stuck": self.stuck}
-        series = Series("nonlinear mode", told, self.amplitude, status, known, labels, OVER_AMPLITUDE)
+        parameters = {"stuck": self.stuck}
+        series = Series("nonlinear mode", parameters, self.amplitude, status, arrays, labels, OVER_AMPLITUDE)
         write_response(path, Response("nonlinear mode", "aft", (series,), description=self.status, labels=labels))
         return Path(path)
 
@@ -209,9 +209,7 @@ def backbone(
         NotConverged: no state of rest under the steady loads is found.
     """
     problem, rest = about_rest(problem)
-    curve = _Curve(replace(problem, stiffness=tuple(HELD * k for k in problem.stiffness), share=0.0), output)
-    z, omega = curve.linear(problem, mode)
-    curve.x_scale[:-2] *= _growth(problem, mode)
+    curve, z, omega = _Curve.of(problem, mode, output)
     settings = settings or SETTINGS
     bounds = np.log([low, high])
     settings = replace(settings, low=float(bounds[0]) - 1e-9, high=float(bounds[1]), targets=tuple(np.log(asked)))
@@ -224,16 +222,16 @@ def backbone(
     A = np.exp([p.lam for p in points])
     Omega, xi = (np.array([p.x[i] for p in points]) for i in (-2, -1))
     x = np.array([p.x[:-2] * curve.units(a)[0] for p, a in zip(points, A, strict=True)]).reshape(len(A), len(z) - 2)
-    found = tuple(curve.checks(*one) for one in zip(x, Omega, xi, strict=True))
+    checked = tuple(curve.checks(*one) for one in zip(x, Omega, xi, strict=True))
     status = _in_words(state.status, points, low, high, quantity)
-    return Backbone(A, Omega, xi / (2 * Omega) if len(A) else xi, x, omega, status, found, quantity)
+    return Backbone(A, Omega, xi / (2 * Omega) if len(A) else xi, x, omega, status, checked, quantity)
 
 
 def motion(problem: Problem, found: Backbone, at: int) -> tuple[Problem, Solved]:
     """The balance that point number `at` of a nonlinear mode solves, fed as it is there, and its solution."""
     Omega, xi = float(found.Omega[at]), float(2 * found.damping[at] * found.Omega[at])
     curve = _Curve(replace(about_rest(problem)[0], share=0.0), 0)
-    return curve._fed(xi), Solved(Omega, found.x[at], CONVERGED, 0.0, 0)
+    return curve._fed(xi), Solved(Omega, found.x[at])
 
 
 def about_rest(problem: Problem) -> tuple[Problem, Array]:
@@ -301,16 +299,14 @@ def sliding_amplitude(problem: Problem, mode: int) -> float:
     return float(problem.length / curve.x_scale[0])
 
 
-def error(problem: Problem, found: Backbone, at: int, mode: int = 0, output: int = 0) -> Error:
+def error(problem: Problem, found: Backbone, at: int, mode: int = 0) -> Error:
     """Estimated error of the damping ratio of a nonlinear mode's point number `at`, by the mode of the same amplitude
     with more samples and harmonics (see `accuracy.error`). Other arguments: as of `backbone`."""
     problem, rest = about_rest(problem)
     A = float(found.amplitude[at])
 
     def solved(finer: Problem, x: Array) -> Reading:
-        curve = _Curve(replace(finer, stiffness=tuple(HELD * k for k in finer.stiffness), share=0.0), output)
-        curve.linear(finer, mode)
-        curve.x_scale[:-2] *= _growth(finer, mode)
+        curve = _Curve.of(finer, mode)[0]
         curve.hold(rest)
         known = [found.Omega[at], 2 * found.damping[at] * found.Omega[at]]
         state = start(curve, np.append(x / curve.units(A)[0], known), float(np.log(A)))
@@ -330,6 +326,15 @@ class _Curve:
         self.x_scale: Array = np.ones(problem.size + 2)
         self.lam_scale = 1.0
 
+    @classmethod
+    def of(cls, stuck: Problem, mode: int, output: int = 0) -> tuple[_Curve, Array, float]:
+        """The curve of a mode, scaled, with what `linear` gives."""
+        stiff = tuple(HELD * k for k in stuck.stiffness)
+        curve = cls(replace(stuck, stiffness=stiff, share=0.0), output)
+        z, omega = curve.linear(stuck, mode)
+        curve.x_scale[:-2] *= _growth(stuck, mode)
+        return curve, z, omega
+
     def linear(self, stuck: Problem, mode: int) -> tuple[Array, float]:
         """The mode with sticking contacts as a guess, and its frequency; sets the scales."""
         omega, shapes = stuck_modes(stuck)
@@ -346,7 +351,7 @@ class _Curve:
         if not (moved > 1e-9 * reach).any():
             raise UserError(f"{at} does not move the contacts, so it is linear; take another")
         seen = complex(part.output[self.output] @ q - part.output_residual[self.output] @ (k @ d))
-        if abs(seen) < 1e-9 * np.abs(part.output[self.output]).max(initial=0.0) * np.abs(q).max():
+        if abs(seen) < 1e-9 * largest(part.output[self.output]) * np.abs(q).max():
             raise UserError(f"{at} does not move the read-out; take another")
         C = part.viscous(float(omega[mode]))
         xi = float((q.conj() @ C @ q).real / (q.conj() @ part.M @ q).real)
@@ -367,7 +372,7 @@ class _Curve:
 
     def hold(self, rest: Array) -> None:
         """Set `held` by x (size,) at rest."""
-        self.held = float(np.abs(rest).max(initial=0.0)) * self.problem.length / self.x_scale[0]
+        self.held = largest(rest) * self.problem.length / self.x_scale[0]
 
     def units(self, A: float) -> tuple[Array, Array]:
         """(n,) of x at an amplitude, and their derivatives by its logarithm: A / length, of the mean not less than of
@@ -408,9 +413,9 @@ class _Curve:
     def checks(self, x: Array, Omega: float, xi: float) -> Checks:
         """Of a point of the mode: the force that feeds the losses supplies xi v . M v."""
         fed = self._fed(xi)
-        found = operating(fed, Solved(Omega, x, CONVERGED, 0.0, 0))
-        supplied = 2 * np.pi * xi * found.kinetic / Omega  # J per cycle; its share of `damped` is taken back
-        return checks(fed, replace(found, supplied=found.supplied + supplied, damped=found.damped + supplied))
+        motion = operating(fed, Solved(Omega, x))
+        supplied = 2 * np.pi * xi * motion.kinetic / Omega  # J per cycle; its share of `damped` is taken back
+        return checks(fed, replace(motion, supplied=motion.supplied + supplied, damped=motion.damped + supplied))
 
     def _fed(self, xi: float) -> Problem:
         parts = tuple(tuple(replace(p, C=p.C - xi * p.M) for p in one) for one in self.problem.parts)

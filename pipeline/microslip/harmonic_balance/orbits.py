@@ -20,7 +20,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from ..contact.law import settings
-from ..data import Array, ComplexArray
+from ..data import Array
 from ..programs import inner
 from .tables import Spline, Table, fitted, in_chunks, kept, read, refined
 
@@ -162,14 +162,14 @@ def sticking(A: Array, B: Array, samples: int = 512) -> Array:
     return in_chunks(some, _settled(A, B), A, B)[0]
 
 
-def _settled(A: Array, B: Array, samples: int = 128) -> Array:
+def _settled(A: Array, B: Array) -> Array:
     """(2, n) force at the apex of steady orbits; those that change are marched on, to 480 half cycles at most."""
     F = np.stack([np.ones_like(A), np.zeros_like(A)])
     open_ = np.arange(len(A))
 
     def some(f: jax.Array, a: jax.Array, b: jax.Array) -> tuple[jax.Array, jax.Array]:
         for _ in range(16):
-            before, f = f, -half_cycle(f, a, b, samples)[0]
+            before, f = f, -half_cycle(f, a, b, 128)[0]
         return f, jnp.abs(f - before).max(axis=0)
 
     for _ in range(30):
@@ -178,28 +178,6 @@ def _settled(A: Array, B: Array, samples: int = 128) -> Array:
         if not len(open_):
             break
     return F
-
-
-def exact(eta: Array, zeta: Array) -> ComplexArray:
-    """(2, n) K_eta*, K_zeta* of orbits with half-axes eta_A* >= zeta_A* >= 0, computed and not looked up; of lines the
-    limit of thin ellipses."""
-    A, B = np.asarray(eta, dtype=float), np.asarray(zeta, dtype=float)
-    found, slides = np.ones((2, len(A)), dtype=complex), A > 1
-    A, B = A[slides], np.maximum(B, THINNEST * A)[slides]
-    parts = _harmonics(A, B)
-    found[:, slides] = (parts[::2] + 1j * parts[1::2]) / np.stack([A, B])
-    return found
-
-
-def _harmonics(A: Array, B: Array) -> Array:
-    """(4, n) harmonics of any orbits beyond A = 1: smooth ones by the smooth method, the others by the return map."""
-    found = np.zeros((4, len(A)))
-    never = (A < 50) & (A > _longest_sticking(B / A) * (1 - 1e-9))
-    if never.any():
-        found[:, never] = _never_sticking(A[never], B[never])
-    if not never.all():
-        found[:, ~never] = sticking(A[~never], B[~never])
-    return found
 
 
 def _never_sticking(A: Array, B: Array) -> Array:
@@ -240,13 +218,13 @@ def _shares(s: Array) -> Array:
 _EDGE: dict[str, Array] = {}
 
 
-def _edge(nodes: int = 129) -> Array:
+def _edge() -> Array:
     """Coefficients of rho(s), by which tan(theta_c / 2) = rho e / sqrt(1 - e) with A_c = 1 / sin^2(theta_c / 2).
 
     Found by halving. Very thin ellipses follow the law rho / sqrt(1 - e) = a + b e^2 of those that can be computed.
     """
     if "rho" not in _EDGE:
-        e = _shares(np.linspace(0.0, 1.0, nodes))
+        e = _shares(np.linspace(0.0, 1.0, 129))
         computed = (e > 0.04) & (e < 1 - ROUND)
         inside = e[computed]
         low, high = np.full(inside.shape, 1.38), np.full(inside.shape, 2.2)

@@ -16,9 +16,8 @@ from ..continuation import Lowest, Peak, lowest, placed, rated
 from ..data import Array
 from .problem import Problem
 from .readout import WithOutput, measured
-from .refinement import filled_response
-from .response import HarmonicResponse, no_resonance, operating, parted, refined_peaks, unsolved
-from .solver import CONVERGED, Point, Report
+from .response import HarmonicResponse, filled_response, no_resonance, operating, parted, refined_peaks, unsolved
+from .solver import Point, Report
 
 Make = Callable[[float], Problem]
 """The problem at a value of the parameter; its scales must not depend on the value (give `length` to `problem.of`)."""
@@ -75,8 +74,7 @@ class Top(NamedTuple):
 def highest(problem: Problem, Omega: Array, report: Report = lambda _: None) -> Top:
     """The highest peak of the first read-out in a band, Omega (f,) in rad/s, looked for as a response looks for its
     resonances. A band in which none is known gives one that says why."""
-    limit = np.zeros(len(problem.assembly.contacts))
-    return top_of(problem, filled_response(problem, Omega / (2 * np.pi), limit, report))
+    return top_of(problem, filled_response(problem, Omega / (2 * np.pi), report))
 
 
 def top_of(problem: Problem, response: HarmonicResponse) -> Top:
@@ -98,7 +96,7 @@ def opened(problem: Problem, peak: Peak) -> Array | None:
     """(c,) share of its points and time at which each contact is open; nothing of a peak that is not known."""
     if not peak.converged:
         return None
-    cycles = operating(problem, Point(peak.lam, peak.x, CONVERGED, 0.0, 0)).cycles.values()
+    cycles = operating(problem, Point(peak.lam, peak.x)).cycles.values()
     return np.array([float(cycle.open.mean()) for cycle in cycles])
 
 

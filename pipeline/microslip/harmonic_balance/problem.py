@@ -8,7 +8,7 @@ with the number of its blades, not with its cube.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from itertools import product
@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 import scipy.linalg
 
+from .. import series
 from ..data import Array, ComplexArray, Indices
 from ..errors import UserError
 from ..process import prepare
@@ -25,9 +26,8 @@ from ..system.assembly import Assembly, Linear, stuck_modes
 from ..units import hertz
 from . import blocks, by_hand, reduced
 from .blocks import Matrix
-from .forces import AFT, Forces
+from .forces import AFT, Cycle, Forces, Traced
 from .joints import Apart, Joints, Parts, Sides, apart
-from .point_cycles import Cycle, Traced
 from .reduced import Coefficients, Driven, Eliminated, Poles, ReadOuts, Seen, View
 
 SOFTER = 0.7
@@ -45,6 +45,14 @@ RELATIVE_AT_MOST = 8
 
 Tried = list[tuple[Array, Array, Any]]
 """Of every group of contacts the displacements (n, k, W) that were tried, the forces, and what is known of them."""
+
+
+def grouped(keys: Iterable[Any]) -> list[list[int]]:
+    """Numbers of equal keys, in the order of the first of each."""
+    found: dict[Any, list[int]] = {}
+    for i, key in enumerate(keys):
+        found.setdefault(key, []).append(i)
+    return list(found.values())
 
 
 @dataclass(frozen=True, eq=False)
@@ -225,19 +233,15 @@ class Problem:
     @cached_property
     def waves(self) -> list[list[int]]:
         """The mean, and the harmonics by the wave of the ring that the components move in."""
-        found: dict[int, list[int]] = {}
-        for h in range(1, self.harmonics + 1):
-            found.setdefault(self.assembly.index(h), []).append(h)
-        return [[0], *found.values()]
+        alike = grouped(self.assembly.index(h + 1) for h in range(self.harmonics))
+        return [[0], *([h + 1 for h in own] for own in alike)]
 
     @cached_property
     def alike(self) -> list[tuple[Indices, Indices]]:
         """Of n parts with as many coordinates their numbers, and (n, c) these."""
-        found: dict[int, list[int]] = {}
-        for i, s in enumerate(self.slices):
-            found.setdefault(s.stop - s.start, []).append(i)
-        begins = np.array(self.begins)
-        return [(np.array(parts), begins[parts, None] + np.arange(c)) for c, parts in found.items()]
+        begins, counts = np.array(self.begins), [part.count for part in self.parts[0]]
+        each = grouped(counts)
+        return [(np.array(parts), begins[parts, None] + np.arange(counts[parts[0]])) for parts in each]
 
     @cached_property
     def kind(self) -> list[tuple[int, int]]:
@@ -269,7 +273,17 @@ class Problem:
     def places(self) -> list[list[tuple[int, tuple[int, int], slice, slice, float]]]:
         """Of each group: (contact of it, parts, coordinates of the force's part, of the motion's, sign) of all places
         where the derivative of a force by a motion stands."""
-        return [_places(g, np.array(self.begins)) for g in self.groups]
+        begins, out = np.array(self.begins), []
+        for g in self.groups:
+            sides: list[tuple[Any, float]] = [(g.first, 1.0)]
+            sides += [] if g.second is None else [(g.second, -1.0)]
+            found = []
+            for n, ((row, plus), (column, minus)) in product(range(len(g.first)), product(sides, sides)):
+                i, j = (int(np.searchsorted(begins, side[n, 0], "right")) - 1 for side in (row, column))
+                at, to = (slice(s[n, 0] - begins[k], s[n, -1] + 1 - begins[k]) for s, k in ((row, i), (column, j)))
+                found.append((n, (i, j), at, to, plus * minus))
+            out.append(found)
+        return out
 
     @cached_property
     def ranks(self) -> list[Indices]:
@@ -311,18 +325,20 @@ class Problem:
 
     def at(self, Omega: float) -> AtFrequency:
         """The problem at one frequency (rad/s)."""
-        if self._poles is not None:
-            found = [reduced.joined(poles, Omega) for poles in self._poles]
-            if all(both is not None for both in found):
-                return AtFrequency(self, Omega, tuple(both for both in found if both is not None))
-        elif all(views := [one.at(Omega) for one in self.eliminated]):
-            return AtFrequency(self, Omega, self.stacked([v for v in views if v]))
+        if self._poles is None:
+            views = [one.at(Omega) for one in self.eliminated]
+        else:
+            views = [reduced.joined(poles, Omega) for poles in self._poles]
+        finite = [view for view in views if view is not None]
+        if len(finite) == len(views):
+            both = self.stacked(finite) if self._poles is None else tuple(finite)
+            return AtFrequency(self, Omega, both)
         softer = self._softer
         return AtFrequency(softer, Omega, softer.stacked([one.directly(Omega) for one in softer.eliminated]))
 
     def stacked(self, views: Sequence[View]) -> tuple[ComplexArray, ...]:
-        """Of each of `alike`, (n, 2, H + 1, c, 1 + c) `View.both` of its parts."""
-        return tuple(np.array([views[i].both for i in parts]) for parts, _ in self.alike)
+        """Of each of `alike`, (n, ...) `View` of its parts."""
+        return tuple(np.array([views[i] for i in parts]) for parts, _ in self.alike)
 
     @cached_property
     def read(self) -> list[ReadOuts]:
@@ -335,7 +351,8 @@ class Problem:
         out = []
         for parts, _ in self.alike:
             each = [found for i in parts if (found := self.eliminated[i].poles) is not None]
-            if len(each) < len(parts) or not _same([[(one.harmonics, one.values) for one in own] for own in each]):
+            kinds = {tuple((tuple(p.harmonics), p.values.shape) for p in own) for own in each}
+            if len(each) < len(parts) or len(kinds) > 1:
                 return None
             out.append([Poles.of(together) for together in zip(*each, strict=True)])
         return out
@@ -343,13 +360,11 @@ class Problem:
     @cached_property
     def driven(self) -> list[tuple[Indices, list[Driven]]]:
         """Parts by their numbers, and by harmonics whose matrices are the same, what moves the coordinates of them."""
-        found: dict[Any, list[int]] = {}
-        for parts, _ in self.alike:
-            for i in parts:
-                key = tuple((tuple(d.harmonics), d.given.shape) for d in self.eliminated[i].driven)
-                found.setdefault(key, []).append(int(i))
-        each = [(parts, zip(*(self.eliminated[i].driven for i in parts), strict=True)) for parts in found.values()]
-        return [(np.array(parts), [Driven.of(together) for together in own]) for parts, own in each]
+        order = np.concatenate([parts for parts, _ in self.alike])
+        moved = [self.eliminated[i].driven for i in order]
+        kinds = grouped(tuple((tuple(d.harmonics), d.given.shape) for d in own) for own in moved)
+        each = [(order[same], zip(*(moved[i] for i in same), strict=True)) for same in kinds]
+        return [(parts, [Driven.of(together) for together in own]) for parts, own in each]
 
     @cached_property
     def _softer(self) -> Problem:
@@ -366,11 +381,16 @@ class Problem:
         """(W, c) harmonics of the contact coordinates from the preloaded state, m and rad."""
         return x.reshape(self.coefficients, -1) * self.scale
 
-    def relative(self, x: Array) -> dict[int, Array]:
-        """Contact -> (k, W) relative displacement as the law measures it, with the preloaded state."""
+    def relative(self, x: Array) -> list[Array]:
+        """Of every contact (k, W) its displacement as the law measures it, with the preloaded state."""
         v = self.displacement(x)
-        found = {i: one for g in self.groups for i, one in zip(g.contacts, g.relative(v), strict=True)}
-        return {i: found[i] for i in sorted(found)}
+        return self.by_contact([g.relative(v) for g in self.groups])
+
+    def by_contact(self, values: Sequence[Any]) -> list[Any]:
+        """What belongs to every contact, from what belongs to every group."""
+        pairs = zip(self.groups, values, strict=True)
+        each = {i: one for g, many in pairs for i, one in zip(g.contacts, many, strict=True)}
+        return [each[i] for i in range(len(each))]
 
 
 @dataclass(frozen=True, eq=False)
@@ -453,17 +473,16 @@ class AtFrequency:
 
     def tried(self, x: Array, near: Tried | None = None) -> tuple[Array, Tried]:
         """`residual`, and what it is of. near: of a motion near by."""
-        groups, moved = self.problem.groups, self._moved(self.problem.displacement(x))
-        known = [k for *_, k in near] if near else [None] * len(groups)
-        found = [g.near(u, self.period, k) for g, u, k in zip(groups, moved, known, strict=True)]
-        tried = [(u, F, k) for u, (F, k) in zip(moved, found, strict=True)]
+        moved = self._moved(x)
+        before = [k for *_, k in near] if near else [None] * len(moved)
+        pairs = zip(moved, before, strict=True)
+        tried = [(u, *g.near(u, self.period, k)) for (g, u), k in pairs]
         return self.residual_of(x, self.along([F for _, F, _ in tried])), tried
 
     def slopes(self, x: Array, whole: bool) -> list[Array]:
         """Of every group of contacts `Group.slope`, or the whole derivative."""
-        groups, moved = self.problem.groups, self._moved(self.problem.displacement(x))
-        both = list(zip(groups, moved, strict=True))
-        return [g.forces(u, self.period)[1] if whole else g.slope(u, self.period) for g, u in both]
+        moved = self._moved(x)
+        return [g.forces(u, self.period)[1] if whole else g.slope(u, self.period) for g, u in moved]
 
     def secant(self, slopes: list[Array], before: Tried, after: Tried) -> list[Array]:
         """Derivatives of the contact forces that tell the change of each contact's force from one motion to another.
@@ -483,34 +502,27 @@ class AtFrequency:
 
     def evaluate(self, x: Array) -> tuple[Array, Array, Array]:
         """See `Problem.evaluate`."""
-        v = self.problem.displacement(x)
-        moved = self._moved(v)
-        force, slopes = self._forces(moved)
-        R, rate = self._residual(x, moved, self._excess(v, force))
+        force, slopes = self.forces(x)
+        R, rate = self._residual(x, force)
         return R, self.jacobian(slopes).dense(), rate
 
     def force(self, x: Array) -> Array:
         """(W, c) contact forces less the preload along the coordinates, N and N m."""
-        moved = self._moved(self.problem.displacement(x))
-        return self.along([g.force(u, self.period) for g, u in zip(self.problem.groups, moved, strict=True)])
+        return self.along([g.force(u, self.period) for g, u in self._moved(x)])
 
     def forces(self, x: Array) -> tuple[Array, list[Array]]:
         """`force`, and of every group of contacts its derivative (n, k, W, k, W)."""
-        return self._forces(self._moved(self.problem.displacement(x)))
-
-    def _moved(self, v: Array) -> list[Array]:
-        """Of every group of contacts `Group.relative`."""
-        return [g.relative(v) for g in self.problem.groups]
-
-    def _forces(self, moved: list[Array]) -> tuple[Array, list[Array]]:
-        both = [g.forces(u, self.period) for g, u in zip(self.problem.groups, moved, strict=True)]
+        both = [g.forces(u, self.period) for g, u in self._moved(x)]
         return self.along([F for F, _ in both]), [S for _, S in both]
+
+    def _moved(self, x: Array) -> list[tuple[Group, Array]]:
+        """Every group of contacts with `Group.relative`."""
+        v = self.problem.displacement(x)
+        return [(g, g.relative(v)) for g in self.problem.groups]
 
     def undefined(self, x: Array) -> str:
         """Whose law has no finite force, or derivative of it, at x; nothing if all have, or x is not finite itself."""
-        v = self.problem.displacement(x)
-        for g in self.problem.groups if np.isfinite(v).all() else ():
-            u = g.relative(v)
+        for g, u in self._moved(x) if np.isfinite(x).all() else ():
             F, S = g.forces(u, self.period)
             for what, value in (("force", F), ("derivative of its force", S)):
                 bad = np.flatnonzero(~np.isfinite(value).all(axis=tuple(range(1, value.ndim))))
@@ -561,8 +573,19 @@ class AtFrequency:
 
     def rate(self, x: Array, force: Array) -> Array:
         """(size,) dR/dOmega."""
-        v = self.problem.displacement(x)
-        return self._residual(x, self._moved(v), self._excess(v, force))[1]
+        return self._residual(x, force)[1]
+
+    def force_rates(self, x: Array) -> Array | None:
+        """(W, c) derivatives of the contact forces over Omega at the same displacements; None where
+        they are zero, as of most laws."""
+        moved = self._moved(x)
+        rates = [g.rate(u, self.period) for g, u in moved]
+        if all(r is None for r in rates):
+            return None
+        slower = -self.period / self.Omega
+        pairs = zip(moved, rates, strict=True)
+        given = [np.zeros_like(u) if r is None else r * slower for (_, u), r in pairs]
+        return self.along(given, preload=False)
 
     def load_rate(self) -> Array:
         """(size,) dR/dshare, of the loads that are not steady."""
@@ -578,7 +601,7 @@ class AtFrequency:
     def coordinates(self, excess: Array, share: float) -> list[list[ComplexArray]]:
         """The same, under a share of the loads that are not steady and (W, c) contact forces beyond those of the
         stiffness taken into the parts."""
-        p, g = self.problem, self.amplitudes(excess)
+        p, g = self.problem, series.amplitudes(excess)
         found: dict[tuple[int, int], ComplexArray] = {}
         for parts, each in p.driven:
             own = np.array([g[:, p.slices[i]] for i in parts])
@@ -586,12 +609,6 @@ class AtFrequency:
                 q = one.coordinates(self.Omega, share, own)
                 found |= {(h, i): q[n, j] for j, h in enumerate(one.harmonics) for n, i in enumerate(parts)}
         return [[found[h, i] for i in range(len(p.slices))] for h in range(len(g))]
-
-    def amplitudes(self, v: Array) -> ComplexArray:
-        """(H + 1, c) complex amplitudes of (W, c) real ones."""
-        out = np.empty((len(v) // 2 + 1, v.shape[1]), complex)
-        out[0], out[1:] = v[0], v[1::2] - 1j * v[2::2]
-        return out
 
     def _excess(self, v: Array, force: Array) -> Array:
         """(W, c) p: forces less the preload, less what the reference stiffness makes of the displacement."""
@@ -606,15 +623,13 @@ class AtFrequency:
         away = self._applied(self._excess(p.displacement(x), force), slice(1))
         return x + (away / p.scale).ravel()
 
-    def _residual(self, x: Array, moved: list[Array], excess: Array) -> tuple[Array, Array]:
+    def _residual(self, x: Array, force: Array) -> tuple[Array, Array]:
         """R and dR/dOmega."""
         p = self.problem
-        away = self._applied(excess, slice(2))
-        rates = [g.rate(u, self.period) for g, u in zip(p.groups, moved, strict=True)]
-        if any(r is not None for r in rates):
-            zero = [np.zeros((len(g.first), g.first.shape[1], p.coefficients)) for g in p.groups]
-            given = [z if r is None else r * (-self.period / self.Omega) for r, z in zip(rates, zero, strict=True)]
-            away[1] += self._applied(self.along(given, preload=False), slice(1), 0.0)[0]
+        away = self._applied(self._excess(p.displacement(x), force), slice(2))
+        rates = self.force_rates(x)
+        if rates is not None:
+            away[1] += self._applied(rates, slice(1), 0.0)[0]
         R, rate = (away / p.scale).reshape(2, -1)
         return x + R, rate
 
@@ -644,18 +659,6 @@ class AtFrequency:
     def _real(self) -> list[Coefficients]:
         """Of each of `Problem.alike`."""
         return [Coefficients.of(both) for both in self.both]
-
-
-def _places(g: Group, begins: Indices) -> list[tuple[int, tuple[int, int], slice, slice, float]]:
-    """See `Problem.places`."""
-    sides: list[tuple[Any, float]] = [(g.first, 1.0)] + ([] if g.second is None else [(g.second, -1.0)])
-    found = []
-    for n in range(len(g.first)):
-        for (row, plus), (column, minus) in product(sides, sides):
-            i, j = (int(np.searchsorted(begins, side[n, 0], "right")) - 1 for side in (row, column))
-            at, to = (slice(s[n, 0] - begins[k], s[n, -1] + 1 - begins[k]) for s, k in ((row, i), (column, j)))
-            found.append((n, (i, j), at, to, plus * minus))
-    return found
 
 
 def of(
@@ -689,8 +692,9 @@ def of(
     together = together or assembly.stuck_damping is not None or bool(assembly.flow)
     contacts = assembly.contacts
     begins, where = _numbered(assembly, together)
+    kind: Callable[[Any], Any] = id if models else by_hand.alike
     groups = []
-    for same in _equal(assembly, marched=not models):
+    for same in grouped((kind(c.patch), c.second is None) for c in contacts):
         patches = [contacts[i].patch for i in same]
         model = (models or {}).get(same[0]) or by_hand.model(patches, samples, cycles, periodicity)
         first = np.array([where[i, 0] for i in same])
@@ -722,10 +726,10 @@ def _no_stiffer(part: Linear, stiffness: Array) -> Array:
     if not elastic.size:
         return stiffness
     yields = (np.abs(part.rows @ shapes) ** 2 / np.maximum(squares, elastic.min())).sum(axis=1)
-    over = np.diag(stiffness) * (yields + np.diag(part.residual)) / STIFFER
-    if not (over > 1).any():
+    excess = np.diag(stiffness) * (yields + np.diag(part.residual)) / STIFFER
+    if not (excess > 1).any():
         return stiffness
-    less = 1 / np.sqrt(np.maximum(over, 1.0))
+    less = 1 / np.sqrt(np.maximum(excess, 1.0))
     return stiffness * less * less[:, None]
 
 
@@ -750,15 +754,12 @@ RIGID = 1e-9
 
 def _eliminated(assembly: Assembly, harmonics: int, together: bool) -> tuple[tuple[Linear, ...], ...]:
     """`eliminated` in the harmonics 0 to H; those of one wave that nothing drives are the same."""
-    driven, known, found = {x.harmonic for x in assembly.loads}, dict[int, tuple[Linear, ...]](), []
-    for h in range(harmonics + 1):
-        if h == 0 or h in driven:
-            found.append(eliminated(assembly, h, together))
-            continue
-        if (wave := assembly.index(h)) not in known:
-            known[wave] = eliminated(assembly, h, together)
-        found.append(known[wave])
-    return tuple(found)
+    driven, made = {0, *(x.harmonic for x in assembly.loads)}, dict[Any, tuple[Linear, ...]]()
+    kinds = [(True, h) if h in driven else (False, assembly.index(h)) for h in range(harmonics + 1)]
+    for h, kind in enumerate(kinds):
+        if kind not in made:
+            made[kind] = eliminated(assembly, h, together)
+    return tuple(made[kind] for kind in kinds)
 
 
 def eliminated(assembly: Assembly, harmonic: int, together: bool) -> tuple[Linear, ...]:
@@ -766,12 +767,6 @@ def eliminated(assembly: Assembly, harmonic: int, together: bool) -> tuple[Linea
     if together:
         return (assembly.joined(harmonic),)
     return tuple(assembly.part(m, harmonic) for m in assembly.components)
-
-
-def _same(each: Sequence[Sequence[tuple[Array, Array]]]) -> bool:
-    """Whether all have the same first arrays, and second ones of the same shapes."""
-    kinds = {tuple((tuple(first), second.shape) for first, second in one) for one in each}
-    return len(kinds) <= 1
 
 
 def _numbered(assembly: Assembly, together: bool) -> tuple[tuple[int, ...], dict[tuple[int, int], Array]]:
@@ -784,24 +779,14 @@ def _numbered(assembly: Assembly, together: bool) -> tuple[tuple[int, ...], dict
     return tuple(int(b) for b in np.cumsum([0, *counts[:-1]])), where
 
 
-def _equal(assembly: Assembly, marched: bool) -> list[list[int]]:
-    """Contacts of one patch, or of patches that are alike where they are marched (`by_hand.alike`); and all with a
-    second side or none."""
-    found: dict[Any, list[int]] = {}
-    for i, c in enumerate(assembly.contacts):
-        key = by_hand.alike(c.patch) if marched else id(c.patch)
-        found.setdefault((key, c.second is None), []).append(i)
-    return list(found.values())
-
-
 def moves_by(assembly: Assembly) -> float:
     """About how far the contacts move before they slide or close, m: the unit of the unknowns. Where none is pressed or
     gapes, how far the loads move the stiffest."""
     pairs = [(abs(float(c.preload[0])) * 0.3, float(np.diag(c.stiffness)[:2][-1])) for c in assembly.contacts]
     gaps = [-float(c.offset[0]) for c in assembly.contacts]
-    told = [c.length for c in assembly.contacts if c.length]
-    moved = max([*(limit / k for limit, k in pairs if k), *gaps, *told], default=0.0)
-    if moved <= 0:
+    lengths = [c.length for c in assembly.contacts if c.length]
+    reach = max([*(limit / k for limit, k in pairs if k), *gaps, *lengths], default=0.0)
+    if reach <= 0:
         stiffest = max((float(np.diag(c.stiffness)[:3].max()) for c in assembly.contacts), default=0.0)
-        moved = max((abs(x.amplitude) for x in assembly.loads), default=0.0) / stiffest if stiffest else 0.0
-    return max(moved, 1e-9)
+        reach = max((abs(x.amplitude) for x in assembly.loads), default=0.0) / stiffest if stiffest else 0.0
+    return max(reach, 1e-9)

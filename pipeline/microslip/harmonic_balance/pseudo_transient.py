@@ -19,12 +19,12 @@ from dataclasses import replace
 import numpy as np
 import scipy.linalg
 
-from ..data import Array, ComplexArray
+from ..data import Array, ComplexArray, largest
 from ..errors import UserError
 from ..system.assembly import Linear
 from .forces import AFT
 from .problem import AtFrequency, Problem
-from .reduced import Eliminated
+from .reduced import Eliminated, own_coordinates
 
 Places = list[list[ComplexArray]]
 """Harmonic -> part -> (m,) amplitudes of the bodies' coordinates, as `AtFrequency.modal` gives them."""
@@ -153,6 +153,5 @@ def _component(problem: Problem, part: int, motion: Array) -> str:
     components = problem.assembly.components
     if len(problem.parts[0]) > 1:
         return components[part].name
-    ends = np.cumsum([0, *(len(problem.assembly.part(m, 0).M) for m in components)])
-    size = [float(np.abs(motion[a:b]).max(initial=0.0)) for a, b in zip(ends[:-1], ends[1:], strict=True)]
+    size = [largest(motion[s]) for s in own_coordinates(problem.assembly, 0)]
     return components[int(np.argmax(size))].name

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..data import Array, ComplexArray
+from .. import continuation
+from ..continuation import SEARCH, Peak, Settings
+from ..data import Array, ComplexArray, largest
+from ..series import amplitudes
 from ..system.assembly import Assembly
 from ..units import METRES, Quantity
-from .problem import AtFrequency, Group, Problem
+from .problem import AtFrequency, Problem
 
 
 def measured(assembly: Assembly, output: int = 0) -> Quantity:
@@ -45,7 +48,7 @@ def amplitude(
     """
     p, h = at.problem, harmonic
     share = p.share if h else 1.0
-    v, f = at.amplitudes(p.displacement(x))[h], at.amplitudes(force)[h]
+    v, f = amplitudes(p.displacement(x))[h], amplitudes(force)[h]
     of_force, of_motion = np.zeros(p.count, dtype=complex), np.zeros(p.count, dtype=complex)
     value, by_Omega = 0.0j, 0.0j
     for part, seen, k, s in zip(p.parts[h], at.seen[h], p.stiffness, p.slices, strict=True):
@@ -59,8 +62,9 @@ def amplitude(
     by_v = _through(p, of_force, slopes, h)
     for wave, unit in _waves(h):
         by_v[wave] += unit * of_motion
-    for (_, unit), rate in _force_rates(at, x, h):
-        by_Omega += complex(unit * (of_force @ rate))
+    if (rates := at.force_rates(x)) is not None:
+        for wave, unit in _waves(h):
+            by_Omega += complex(unit * (of_force @ rates[wave]))
     return Amplitude(complex(value), (by_v * p.scale).ravel(), complex(by_Omega))
 
 
@@ -73,27 +77,12 @@ def _through(p: Problem, weights: ComplexArray, slopes: list[Array], harmonic: i
     """(W, c) derivative of weights (c,) times the forces' amplitude."""
     out = np.zeros((p.coefficients, p.count), dtype=complex)
     for g, S in zip(p.groups, slopes, strict=True):
-        own = weights[g.first] - (0.0 if g.second is None else weights[g.second])
-        found = sum(unit * np.einsum("nk,nklz->znl", own, S[:, :, wave]) for wave, unit in _waves(harmonic))
-        for side, sign in _sides(g):
-            out[:, side] += sign * found
+        weight = weights[g.first] - (0.0 if g.second is None else weights[g.second])
+        gained = sum(unit * np.einsum("nk,nklz->znl", weight, S[:, :, wave]) for wave, unit in _waves(harmonic))
+        out[:, g.first] += gained
+        if g.second is not None:
+            out[:, g.second] -= gained
     return out
-
-
-def _sides(g: Group) -> list[tuple[Array, float]]:
-    return [(g.first, 1.0)] + ([] if g.second is None else [(g.second, -1.0)])
-
-
-def _force_rates(at: AtFrequency, x: Array, harmonic: int) -> list[tuple[tuple[int, complex], Array]]:
-    """Derivatives (c,) of the forces with respect to Omega at the same displacements; of most laws there are none."""
-    p, v = at.problem, at.problem.displacement(x)
-    rates = [g.rate(g.relative(v), at.period) for g in p.groups]
-    if all(r is None for r in rates):
-        return []
-    zero = [np.zeros((*g.first.shape, p.coefficients)) for g in p.groups]
-    given = [z if r is None else r * (-at.period / at.Omega) for r, z in zip(rates, zero, strict=True)]
-    whole = at.along(given, preload=False)
-    return [((wave, unit), whole[wave]) for wave, unit in _waves(harmonic)]
 
 
 class WithOutput:
@@ -132,3 +121,10 @@ class WithOutput:
             at = self.problem.at(Omega)
             self._kept = (key, Omega, at, *at.forces(x))
         return self._kept[2:]
+
+
+def climbed(problem: Problem, x: Array, Omega: float, settings: Settings = SEARCH) -> Peak:
+    """The peak of the first read-out uphill from a motion x (size,) at Omega (rad/s), along the curve;
+    its steps are shares of the motion where that is large."""
+    large = max(problem.x_scale, largest(x))
+    return continuation.peak(WithOutput(replace(problem, x_scale=large)), x, Omega, settings)

@@ -24,12 +24,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
-from ..data import Array, ComplexArray
-from ..system.assembly import Linear, stuck_modes
+from ..data import Array, ComplexArray, largest
+from ..system.assembly import Assembly, Linear, stuck_modes
 
 
 @dataclass(frozen=True)
@@ -55,17 +56,23 @@ class Seen:
 def seen(part: Linear, stiffness: Array, Omega: float, harmonic: int) -> Seen:
     """A part in one harmonic of Omega (rad/s). stiffness: (c, c) k."""
     B, T, w = part.yielding, part.rows, harmonic * Omega
-    P, W = (np.linalg.inv(np.eye(part.count) + a) for a in (B @ stiffness, stiffness @ B))
-    held = stiffness @ P
+    P, W, held, stiff = taken_in(part, stiffness)
     A = part.stiff - w**2 * part.M + 1j * w * part.C + T.conj().T @ held @ T
     driven = part.load - T.conj().T @ (held @ part.given)
-    size = _size(part.stiff + T.conj().T @ held @ T, part.M, part.C, w)
-    X = solved(A, np.column_stack([driven, T.conj().T @ W]), size)
+    X = solved(A, np.column_stack([driven, T.conj().T @ W]), size := _size(stiff, part.M, part.C, w))
     slope = -2 * harmonic * w * part.M + 1j * harmonic * part.C
     Y = -solved(A, slope @ X, size).astype(complex)
     reference, D = P @ (T @ X[:, 0] + part.given), P @ (T @ X[:, 1:] + B)
     rates = P @ (T @ Y)
     return Seen(reference, D, X[:, 0], X[:, 1:], rates[:, 0], rates[:, 1:], Y[:, 0], Y[:, 1:])
+
+
+def taken_in(part: Linear, k: Array) -> tuple[Array, Array, Array, ComplexArray]:
+    """P = (1 + B k)^-1, W = (1 + k B)^-1, k' = k P and K + T^H k' T of a part with a stiffness (c, c)
+    of its contacts taken into it."""
+    B, T = part.yielding, part.rows
+    P, W = (np.linalg.inv(np.eye(part.count) + a) for a in (B @ k, k @ B))
+    return P, W, k @ P, part.stiff + T.conj().T @ (k @ P) @ T
 
 
 LOST = 1e-3
@@ -95,25 +102,9 @@ def _size(stiff: ComplexArray, M: Array, C: Array, w: Any) -> Array:
     return np.abs(stiff) + w**2 * np.abs(M) + np.abs(w * C)
 
 
-@dataclass(frozen=True, eq=False)
-class View:
-    """One part at one frequency in the harmonics 0 to H, as seen from its c contact coordinates.
-
-    Attributes: as those of `Seen`, the harmonics in front, and before these the value and its derivative with respect
-        to Omega: both (2, H + 1, c, 1 + c), the reference in the first column.
-    """
-
-    both: ComplexArray
-
-    @property
-    def reference(self) -> ComplexArray:
-        """(2, H + 1, c)."""
-        return self.both[..., 0]
-
-    @property
-    def compliance(self) -> ComplexArray:
-        """(2, H + 1, c, c)."""
-        return self.both[..., 1:]
+View = ComplexArray
+"""(..., 2, H + 1, c, 1 + c) of a part at one frequency: value and derivative with respect to Omega, in the harmonics 0
+to H, as seen from its c contact coordinates; reference in the first column, then compliance, see `Seen`."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,7 +124,7 @@ class Coefficients:
 
     @classmethod
     def of(cls, both: ComplexArray) -> Coefficients:
-        """Of (n, 2, H + 1, c, 1 + c) `View.both`."""
+        """Of n `View`."""
         n, two, count, c, _ = both.shape
         rows = np.empty((n, two, count - 1, 2, c, 1 + c), complex)
         rows[:, :, :, 0] = both[:, :, 1:]
@@ -202,8 +193,8 @@ class Poles:
     def _falling(self) -> ComplexArray:
         return -self._turning
 
-    def at(self, Omega: float) -> ComplexArray | None:
-        """(..., 2, g, c, 1 + c) see `View.both`, at a frequency (rad/s); None where it or one of its harmonics is,
+    def at(self, Omega: float) -> View | None:
+        """(..., 2, g, c, 1 + c) see `View`, at a frequency (rad/s); None where it or one of its harmonics is,
         within `MET`, an eigenvalue."""
         away = Omega * self._turning - self.values[..., None, :]
         if not self._damped and (np.abs(away) <= self._near).any():
@@ -231,37 +222,30 @@ class Eliminated:
     def at(self, Omega: float) -> View | None:
         """As seen from the contacts at a frequency (rad/s); None where it is that of a resonance without damping, so
         that the numbers subtracted are without bounds."""
-        if self.poles is None:
-            return self._far(Omega)
-        both = joined(self.poles, Omega)
-        return None if both is None else View(both)
+        if self.poles is not None:
+            return joined(self.poles, Omega)
+        views = [seen(part, self.stiffness, Omega, h) for h, part in enumerate(self.parts)]
+        for s in views:  # how fast the coordinates change with the frequency
+            moved = np.column_stack([s.modal, s.modal_compliance])
+            rates = np.column_stack([s.modal_rate, s.modal_compliance_rate])
+            if not Omega * largest(rates) * MET <= largest(moved):
+                return None
+        return _view(views)
 
     @cached_property
     def driven(self) -> list[Driven]:
         """By equal matrices, what loads and contact forces beyond those of k do."""
-        found = []
+        out = []
         for same in self._same:
-            part, T, k = self.parts[same[0]], self.parts[same[0]].rows, self.stiffness
-            P, W = (np.linalg.inv(np.eye(part.count) + a) for a in (part.yielding @ k, k @ part.yielding))
-            held = k @ P
+            part, T = self.parts[same[0]], self.parts[same[0]].rows
+            _, W, held, stiff = taken_in(part, self.stiffness)
             loads = np.array([self.parts[i].load - T.conj().T @ (held @ self.parts[i].given) for i in same])
-            stiff, given = part.stiff + T.conj().T @ held @ T, (T.conj().T @ W).T
-            found.append(Driven(np.array(same), stiff, part.M, part.C, loads, given))
-        return found
+            out.append(Driven(np.array(same), stiff, part.M, part.C, loads, (T.conj().T @ W).T))
+        return out
 
     def directly(self, Omega: float) -> View:
         """The same from the equations themselves: at a single frequency less work than the eigenvalues."""
         return _view([seen(part, self.stiffness, Omega, h) for h, part in enumerate(self.parts)])
-
-    def _far(self, Omega: float) -> View | None:
-        """`directly`, or None as `at` says: by how fast the coordinates change with the frequency."""
-        found = [seen(part, self.stiffness, Omega, h) for h, part in enumerate(self.parts)]
-        for s in found:
-            moved = np.column_stack([s.modal, s.modal_compliance])
-            rates = np.column_stack([s.modal_rate, s.modal_compliance_rate])
-            if not Omega * np.abs(rates).max(initial=0.0) * MET <= np.abs(moved).max(initial=0.0):
-                return None
-        return _view(found)
 
     @cached_property
     def _same(self) -> list[list[int]]:
@@ -281,26 +265,24 @@ class Eliminated:
 
         So it is of a body that moves freely without its contacts feeling it, or whose eigenvectors nearly coincide.
         """
-        found = [self._of(group) for group in self._same]
-        return None if any(one is None for one in found) else [one for one in found if one is not None]
+        each = [self._of(group) for group in self._same]
+        return None if any(one is None for one in each) else [one for one in each if one is not None]
 
     def _of(self, harmonics: list[int]) -> Poles | None:
-        part, k = self.parts[harmonics[0]], self.stiffness
-        m = len(part.M)
+        part = self.parts[harmonics[0]]
+        m, T = len(part.M), part.rows
         if not 0 < m <= POLES_AT_MOST:
             return None
-        T, B = part.rows, part.yielding
-        P, right = (np.linalg.inv(np.eye(part.count) + a) for a in (B @ k, k @ B))
-        held = k @ P
-        below = -np.linalg.solve(part.M, np.hstack([part.stiff + T.conj().T @ held @ T, part.C]))
+        P, right, held, stiff = taken_in(part, self.stiffness)
+        below = -np.linalg.solve(part.M, np.hstack([stiff, part.C]))
         values, V = np.linalg.eig(np.block([[np.zeros((m, m)), np.eye(m)], [below]]))
         if np.abs(values).min() <= 1e-13 * np.abs(values).max():
             return None
         W = np.linalg.solve(V, np.vstack([np.zeros((m, m)), np.linalg.inv(part.M)]))
-        given = [self.parts[h].given for h in harmonics]
-        loads = [self.parts[h].load - T.conj().T @ (held @ e) for h, e in zip(harmonics, given, strict=True)]
+        loaded = [self.parts[h].given for h in harmonics]
+        loads = [self.parts[h].load - T.conj().T @ (held @ e) for h, e in zip(harmonics, loaded, strict=True)]
         driven = np.array([np.column_stack([f, T.conj().T @ right]) for f in loads])
-        static = np.array([P @ np.column_stack([e, B]) for e in given])
+        static = np.array([P @ np.column_stack([e, part.yielding]) for e in loaded])
         poles = Poles(np.array(harmonics), values, P @ T @ V[:m], W @ driven, static)
         return poles if self._right(poles) else None
 
@@ -317,19 +299,19 @@ class Eliminated:
                 return False
             exact = seen(self.parts[h], self.stiffness, float(Omega) / max(h, 1), h)
             for a, b in ((both[0, -1, :, 1:], exact.compliance), (both[0, -1, :, 0], exact.reference)):
-                if not np.abs(a - b).max(initial=0.0) <= 1e-10 * np.abs(b).max(initial=1e-300):
+                if not largest(a - b) <= 1e-10 * np.abs(b).max(initial=1e-300):
                     return False
         return True
 
 
-def joined(poles: Sequence[Poles], Omega: float) -> ComplexArray | None:
-    """(..., 2, H + 1, c, 1 + c) see `View.both`, of all harmonics together; None where `Poles.at` is."""
-    found = [group.at(Omega) for group in poles]
-    if len(found) == 1 or any(one is None for one in found):
-        return found[0] if len(found) == 1 else None
+def joined(poles: Sequence[Poles], Omega: float) -> View | None:
+    """Of all harmonics together; None where `Poles.at` is."""
+    each = [group.at(Omega) for group in poles]
+    if len(each) == 1 or any(one is None for one in each):
+        return each[0] if len(each) == 1 else None
     *n, _, c, columns = poles[0].static.shape
     both = np.empty((*n, 2, sum(len(group.harmonics) for group in poles), c, columns), complex)
-    for group, one in zip(poles, found, strict=True):
+    for group, one in zip(poles, each, strict=True):
         both[..., group.harmonics, :, :] = one
     return both
 
@@ -376,7 +358,7 @@ POLES_AT_MOST = 120
 def _view(found: Sequence[Seen]) -> View:
     values = [np.column_stack([s.reference, s.compliance]) for s in found]
     rates = [np.column_stack([s.reference_rate, s.compliance_rate]) for s in found]
-    return View(np.array([values, rates]))
+    return np.array([values, rates])
 
 
 def _alike(a: Linear, b: Linear) -> bool:
@@ -413,10 +395,10 @@ def monitored(part: Linear | ReadOuts, q: ComplexArray, force: ComplexArray, sha
 def read(parts: Sequence[Linear | ReadOuts], q: ComplexArray, force: ComplexArray, share: float = 1.0) -> ComplexArray:
     """(w, g) read-outs by coordinates (g, m), contact forces (g, c) less the preload, and a share of the loads, over g
     harmonics of one wave; parts (g,), equal but for the loads. What is rounding is zero."""
-    output, given = parts[0].output, np.array([part.output_given for part in parts]).T
-    found = output @ q.T - parts[0].output_residual @ force.T + share * given
+    output, loaded = parts[0].output, np.array([part.output_given for part in parts]).T
+    values = output @ q.T - parts[0].output_residual @ force.T + share * loaded
     moved = np.sqrt((output != 0) @ np.abs(q.T) ** 2)  # of the coordinates that a read-out has to do with
-    return np.where(np.abs(found) <= READS * np.linalg.norm(output, axis=1)[:, None] * moved, 0.0, found)
+    return np.where(np.abs(values) <= READS * np.linalg.norm(output, axis=1)[:, None] * moved, 0.0, values)
 
 
 def work(
@@ -475,8 +457,23 @@ def stuck_damping(part: Linear, stiffness: Array) -> Array:
     if part.residual_loss is not None:
         force = np.linalg.solve(np.eye(part.count) + stiffness @ part.residual, stiffness @ (part.rows @ shapes))
         lost += _of_each(part.residual_loss, force)
-    held = values > 1e-9 * np.abs(values).max(initial=0.0)
+    held = values > 1e-9 * largest(values)
     return np.divide(lost, 2 * values, out=np.zeros_like(lost), where=held)
+
+
+def own_coordinates(assembly: Assembly, harmonic: int) -> list[slice]:
+    """Of each component, its coordinates among those of all."""
+    groups = [m.at(assembly.index(harmonic)).group for m in assembly.components]
+    ends = np.cumsum([0, *(len(group.M_r) for group in groups)]).tolist()
+    return [slice(begin, end) for begin, end in pairwise(ends)]
+
+
+def sticking_and_free(assembly: Assembly) -> tuple[Array, Array]:
+    """(m,) Hz of the modes with sticking contacts, then of those without contacts, and damping ratios."""
+    part = assembly.joined(1)
+    pairs = ((part, assembly.stiffness), (untouched(part), np.zeros((0, 0))))
+    modes, damping = zip(*((stuck(one, k), stuck_damping(one, k)) for one, k in pairs), strict=True)
+    return np.concatenate(modes), np.concatenate(damping)
 
 
 def _of_each(A: Array, shapes: Array) -> Array:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -11,19 +12,20 @@ import scipy.optimize
 
 from ..contact.patch import Patch
 from ..continuation import SEARCH
-from ..continuation import peak as climbed
-from ..data import Array, ComplexArray, Compliance, ModalGroup, Rows
+from ..data import Array, ComplexArray, Compliance, ModalGroup, Rows, largest
 from ..results.checks import BALANCE, EXCHANGED, UNCHECKED, Checks, exchanged
 from ..results.series import of_solutions, without_rounding
+from ..series import amplitudes
 from ..system.assembly import Assembly, ContactFace, Load, Output, preloaded_contact
 from ..system.component import Component
 from ..units import counted
 from . import problem as balance
-from . import reduced
+from . import reduced, sweeps
 from .checks import checks, judged
-from .point_cycles import Cycle, Traced
+from .forces import Cycle, Traced
 from .problem import Problem
-from .readout import WithOutput, measured
+from .readout import climbed, measured
+from .reduced import own_coordinates, sticking_and_free
 from .solver import CONVERGED as CONVERGED
 from .solver import Point as Point
 from .solver import Report, solve, sweep
@@ -70,8 +72,11 @@ def operating(problem: Problem, point: Point) -> Operating:
     forces = [g.force(u, at.period) for g, u in zip(p.groups, relative, strict=True)]
     cycles = [g.point_cycles(u, at.period) for g, u in zip(p.groups, relative, strict=True)]
     beyond = at.along(forces)
-    q, f = at.modal(point.x, beyond), at.amplitudes(beyond)
+    q, f = at.modal(point.x, beyond), amplitudes(beyond)
     alone = at.coordinates(0 * beyond, p.share)
+    bodies, each = p.assembly.components, q
+    if len(p.slices) < len(bodies):
+        each = [[one[s] for s in own_coordinates(p.assembly, h)] for h, (one,) in enumerate(q)]
     outputs, work, driven = np.zeros((len(p.assembly.outputs), p.harmonics + 1), complex), np.zeros(4), 0.0
     for hs in p.waves:
         for i, s in enumerate(p.slices):
@@ -81,9 +86,9 @@ def operating(problem: Problem, point: Point) -> Operating:
             if hs[0]:
                 work += reduced.work(parts, at.Omega, hs, own, F, share)
                 driven += reduced.work(parts, at.Omega, hs, np.array([alone[h][i] for h in hs]), 0 * F, share)[2]
-    found = Operating(
+    motion = Operating(
         at.Omega,
-        {m.name: [_own(p, i, h, q[h]) for h in range(p.harmonics + 1)] for i, m in enumerate(p.assembly.components)},
+        {m.name: list(own) for m, own in zip(bodies, zip(*each, strict=True), strict=True)},
         outputs,
         _by_contact(p, relative),
         _by_contact(p, forces),
@@ -94,7 +99,7 @@ def operating(problem: Problem, point: Point) -> Operating:
         float(work[3]),
         _by_contact(p, cycles),
     )
-    return replace(found, checks=checks(p, found))
+    return replace(motion, checks=checks(p, motion))
 
 
 def traced(problem: Problem, found: Operating) -> dict[str, Traced]:
@@ -105,23 +110,13 @@ def traced(problem: Problem, found: Operating) -> dict[str, Traced]:
 
 
 def _by_contact(p: Problem, values: Sequence[Any]) -> dict[str, Any]:
-    """Contact -> its value, in the order of the assembly, from values by groups."""
-    found = {i: one for g, many in zip(p.groups, values, strict=True) for i, one in zip(g.contacts, many, strict=True)}
-    return {c.name: found[i] for i, c in enumerate(p.assembly.contacts)}
-
-
-def _own(p: Problem, component: int, harmonic: int, q: list[ComplexArray]) -> ComplexArray:
-    """(m,) coordinates of one component out of those of the parts."""
-    components = p.assembly.components
-    if len(q) == len(components):
-        return q[component]
-    sizes = [len(m.at(p.assembly.index(harmonic)).group.M_r) for m in components]
-    return np.split(q[0], np.cumsum(sizes)[:-1])[component]
+    """Contact -> its value, from values by groups."""
+    return dict(zip((c.name for c in p.assembly.contacts), p.by_contact(values), strict=True))
 
 
 @dataclass(frozen=True)
 class HarmonicResponse(FrequencyResponse):
-    """`FrequencyResponse` whose points hold all harmonics; `monitor`, `slip` and `normal_swing` are of the first one.
+    """`FrequencyResponse` whose points hold all harmonics; `monitor` and `slip` are of the first one.
 
     Attributes:
         x: (f, k) unknowns, see `Problem`. harmonics: (f, H + 1) complex 0-peak amplitudes of the first read-out, m; the
@@ -148,7 +143,7 @@ class HarmonicResponse(FrequencyResponse):
     def columns(self) -> dict[str, Array]:
         name, a = self.quantity.column, without_rounding(self.harmonics)
         more = {name(f"amplitude_{h}"): np.abs(a[:, h]) for h in range(2, a.shape[1])}
-        found = {
+        table = {
             name("mean"): a[:, 0].real,
             **more,
             "slip_dissipated_J": self.by_slip,
@@ -157,21 +152,21 @@ class HarmonicResponse(FrequencyResponse):
         }
         return {
             **super().columns(),
-            **of_solutions(found, self.converged),
+            **of_solutions(table, self.converged),
             "harmonics": np.full(len(self.frequency), self.harmonics.shape[1] - 1.0),
             "iterations": self.iterations.astype(float),
         }
 
 
 def harmonic_response(
-    problem: Problem, frequency: Array, limit: Array, report: Report = lambda _: None, start: Array | None = None
+    problem: Problem, frequency: Array, report: Report = lambda _: None, start: Array | None = None
 ) -> HarmonicResponse:
-    """`sweep`, and what a reader asks of its points. limit: (patches,) friction limits, N, for reports."""
-    return of_points(problem, sweep(problem, frequency, report, start), limit)
+    """`sweep`, and what a reader asks of its points."""
+    return of_points(problem, sweep(problem, frequency, report, start))
 
 
 def of_points(
-    problem: Problem, points: Sequence[Point], limit: Array, found: Sequence[Operating] = (), asked: Array | None = None
+    problem: Problem, points: Sequence[Point], found: Sequence[Operating] = (), asked: Array | None = None
 ) -> HarmonicResponse:
     """What a reader asks of solved points, in order of their frequencies where some of them were added.
 
@@ -185,28 +180,25 @@ def of_points(
         points, found = [points[i] for i in order], [found[i] for i in order]
     rows = [_looked_at(problem, f) for f in found]
     parts = {key: np.array([row[key] for row in rows]) for key in rows[0]}
+    frequency = np.array([p.Omega for p in points]) / (2 * np.pi)
+    added = np.zeros(len(points), dtype=bool)
+    if asked is not None:
+        added = np.abs(frequency[:, None] - asked).min(axis=1) > 1e-12 * np.abs(asked).max()
     return HarmonicResponse(
-        frequency=np.array([p.Omega for p in points]) / (2 * np.pi),
+        frequency=frequency,
         converged=np.array([p.converged for p in points]),
-        limit=np.asarray(limit, dtype=float),
         x=np.array([p.x for p in points]),
         status=tuple(p.status for p in points),
         error=np.array([p.error for p in points]),
         iterations=np.array([p.iterations for p in points]),
         quantity=measured(problem.assembly),
-        added=np.zeros(len(points), bool) if asked is None else _not_in([p.Omega for p in points], asked),
+        added=added,
         **parts,
     )
 
 
-def _not_in(Omega: Sequence[float], asked: Array) -> Array:
-    """(f,) whether a point (rad/s) is none of the frequencies (Hz) asked for."""
-    near = np.abs(np.asarray(Omega)[:, None] / (2 * np.pi) - np.asarray(asked)).min(axis=1)
-    return near > 1e-12 * np.abs(asked).max()
-
-
 def _looked_at(problem: Problem, found: Operating) -> dict[str, Any]:
-    u, F = list(found.relative.values()), list(found.force.values())
+    u = list(found.relative.values())
     first = [one[:, 1] - 1j * one[:, 2] for one in u]
     harmonics = found.outputs[0] if len(found.outputs) else np.zeros(problem.harmonics + 1, dtype=complex)
     cycles = list(found.cycles.values())
@@ -215,7 +207,6 @@ def _looked_at(problem: Problem, found: Operating) -> dict[str, Any]:
         "harmonics": harmonics,
         "outputs": found.outputs,
         "slip": [max(d[1:3] if len(d) > 2 else d, key=abs) for d in first],
-        "normal_swing": [np.hypot(one[0, 1], one[0, 2]) for one in F],
         "contact": np.vstack(u) if u else np.zeros((0, problem.coefficients)),
         "dissipated": sum(float(c.dissipated.sum()) for c in cycles),
         "by_slip": sum(float(c.by_slip.sum()) for c in cycles),
@@ -284,11 +275,11 @@ def unsolved(response: HarmonicResponse, folds: Sequence[Resonance] = ()) -> str
     """Where the curve turns back, how many points have no solution, and where the first one is; nothing where there is
     none of these."""
     failed = np.flatnonzero(~response.converged)
-    said = [f"the curve turns back at {one.frequency:.6g} Hz, at a fold" for one in folds]
+    parts = [f"the curve turns back at {one.frequency:.6g} Hz, at a fold" for one in folds]
     if len(failed):
         points = counted(len(response.frequency), "point")
-        said.append(f"{len(failed)} of {points} did not converge, first at {response.frequency[failed[0]]:.6g} Hz")
-    return "; ".join(said)
+        parts.append(f"{len(failed)} of {points} did not converge, first at {response.frequency[failed[0]]:.6g} Hz")
+    return "; ".join(parts)
 
 
 def parted(
@@ -307,8 +298,8 @@ def refined_peaks(problem: Problem, response: HarmonicResponse) -> list[Resonanc
     read-out that does not move."""
     if still(response):
         return []
-    found = [highest(problem, response, bracket) for bracket in brackets(response)]
-    return resonances(response, [Resonance(p.Omega / (2 * np.pi), a, p.x) for p, a in filter(None, found)])
+    tops = [highest(problem, response, bracket) for bracket in brackets(response)]
+    return resonances(response, [Resonance(p.Omega / (2 * np.pi), a, p.x) for p, a in filter(None, tops)])
 
 
 def highest(problem: Problem, response: HarmonicResponse, bracket: tuple[int, int, int]) -> tuple[Point, float] | None:
@@ -319,10 +310,10 @@ def highest(problem: Problem, response: HarmonicResponse, bracket: tuple[int, in
     points but not beyond the band. Where the climb fails the highest of the points stands for it.
     """
     f, (low, top, high) = response.frequency, bracket
-    own = Point(2 * np.pi * float(f[top]), response.x[top], CONVERGED, response.error[top], 0)
-    tried = [(own, float(abs(response.monitor[top])))]
+    begin = Point(2 * np.pi * float(f[top]), response.x[top], CONVERGED, response.error[top], 0)
+    tried = [(begin, float(abs(response.monitor[top])))]
 
-    def amplitude(at: float, start: Array = own.x) -> float:
+    def amplitude(at: float, start: Array = begin.x) -> float:
         point = solve(problem, 2 * np.pi * at, [start])
         found = operating(problem, point)
         point = judged(point, found.checks)
@@ -338,7 +329,7 @@ def highest(problem: Problem, response: HarmonicResponse, bracket: tuple[int, in
     if _closed_in(tried):
         return near, height
     band = replace(SEARCH, low=2 * np.pi * float(f[0]), high=2 * np.pi * float(f[-1]))
-    found = climbed(WithOutput(problem), near.x, near.Omega, band)
+    found = climbed(problem, near.x, near.Omega, band)
     if found.converged and band.low < found.lam < band.high and amplitude(found.lam / (2 * np.pi), found.x) >= height:
         return tried[-1]
     return near, height
@@ -357,3 +348,124 @@ def _closed_in(tried: list[tuple[Point, float]]) -> bool:
     if not 0 < i < len(height) - 1 or min(height[i - 1], height[i + 1]) < height[i] - little:
         return False
     return bool((np.diff(height[: i + 1]) > -little).all() and (np.diff(height[i:]) < little).all())
+
+
+# points that a sweep is not asked for ------------------------------------------------------------
+
+
+Solved = tuple[Point, Operating]
+
+
+def filled_response(
+    problem: Problem, frequency: Array, report: Report = lambda _: None,
+    known: Mapping[float, Solved] | None = None, keep: Callable[[float, Solved, bool], None] = lambda *_: None,
+) -> HarmonicResponse:  # fmt: skip
+    """`response.harmonic_response`, with points added where the sweep may step over a resonance (`hidden`), past a fold
+    or past the last solution beside none (`last_solutions`).
+
+    Args:
+        known: Hz -> what was found before. keep: told of every other
+            point as soon as it is found: Hz, what was found, and whether it is added.
+    """
+    asked, solved = [float(f) for f in frequency], dict(known or {})
+
+    def take(f: float, point: Point, added: bool = False) -> None:
+        point = replace(point, Omega=2 * np.pi * f, slope=None)  # as it comes back from where it is kept
+        solved[f] = point, operating(problem, point)
+        keep(f, solved[f], added)
+
+    sweep(problem, frequency, report, known={f: solved[f][0] for f in asked if f in solved}, keep=take)
+    more = hidden(problem, frequency)
+    for f in more:
+        if f not in solved:
+            report(f"a point is added at {f:.6g} Hz, a mode between two of the sweep")
+            take(f, between(problem, [solved[g][0] for g in asked], f), True)
+    for low, high in pairwise(sorted([*asked, *more])):
+        one, other = solved[low][0], solved[high][0]
+        before = [f for f in solved if low < f < high]
+        if len(before) < one.converged + other.converged:
+            said_last = ""
+            for point in last_solutions(problem, one, other):
+                words = f"a point is added at {point.Omega / (2 * np.pi):.6g} Hz, where the curve ends"
+                if words != said_last:  # both sides of a fold may read alike
+                    report(said_last := words)
+                take(point.Omega / (2 * np.pi), point, True)
+    chosen = asked + [f for f in solved if f not in asked]
+    points, motions = zip(*(solved[f] for f in chosen), strict=True)
+    return of_points(problem, points, motions, frequency)
+
+
+def hidden(problem: Problem, frequency: Array) -> list[float]:
+    """Hz of resonances that a sweep may step over, see `sweeps.hidden`: of sticking contacts, and of none."""
+    if not problem.assembly.loads:
+        return []
+    modes_and_damping = sticking_and_free(problem.assembly)
+    return sweeps.hidden(np.asarray(frequency, dtype=float), *modes_and_damping)
+
+
+def between(problem: Problem, points: Sequence[Point], frequency: float) -> Point:
+    """The solution at a frequency (Hz), begun at the nearest of others."""
+    Omega = 2 * np.pi * frequency
+    good = sorted((p for p in points if p.converged), key=lambda p: abs(p.Omega - Omega))
+    return solve(problem, Omega, [p.x for p in good[:1]])
+
+
+HALVINGS = 12
+"""Times that the distance of two points is halved to find where the curve of solutions ends between them; a resonance
+that is narrower than what is left cannot be told from a fold."""
+
+JUMP = 0.2
+"""Share of the vibration by which two points may differ and be of one curve."""
+
+
+def last_solutions(problem: Problem, low: Point, high: Point) -> list[Point]:
+    """Where the curve of solutions through a point ends before the next one: the last solutions on either side.
+
+    It ends at a fold, beyond which the vibration is another one, or where no solution is found. None are told if both
+    points are of one curve.
+    """
+    ends_asked = (low.Omega, high.Omega)
+    for _ in range(HALVINGS):
+        both = low.converged and high.converged
+        if both and _apart(problem, low.x, high.x) <= JUMP:
+            return []
+        low, high = (_with_slope(problem, p) for p in (low, high))
+        good = [p for p in (low, high) if p.converged]
+        if not good or (both and _lead_to_each_other(problem, low, high)):
+            return []
+        at = problem.at(0.5 * (low.Omega + high.Omega))
+        middle = next((p for g in good if (p := newton(at, g.x, most=20, slope=g.slope)).converged), None)
+        if middle is None and both:
+            break
+        if middle is None:  # the end lies on this side of the middle
+            nothing = Point(at.Omega, good[0].x, "", np.inf, 0)
+            low, high = (low, nothing) if low.converged else (nothing, high)
+        elif _apart(problem, low.x, middle.x) < _apart(problem, middle.x, high.x) if both else low.converged:
+            low = middle
+        else:
+            high = middle
+    return [p for p in (low, high) if p.converged and p.Omega not in ends_asked]
+
+
+def _with_slope(problem: Problem, point: Point) -> Point:
+    """A solution with the derivative of its contact forces."""
+    if not point.converged or point.slope is not None:
+        return point
+    return replace(point, slope=problem.at(point.Omega).forces(point.x)[1])
+
+
+def _lead_to_each_other(problem: Problem, low: Point, high: Point) -> bool:
+    """Whether the contacts of each point, linear as they are there, lead to the other one: between them is a resonance
+    that is narrow because damping is low."""
+    for a, b in ((low, high), (high, low)):
+        at = problem.at(b.Omega)
+        reached = a.x + at.jacobian(a.slope).solve(-at.residual(a.x))
+        if not _apart(problem, reached, b.x) <= JUMP:
+            return False
+    return True
+
+
+def _apart(problem: Problem, x: Array, y: Array) -> float:
+    """Difference of two vibrations over the larger one; where their means are may be undetermined."""
+    x, y = x[problem.count :], y[problem.count :]
+    return largest(x - y) / max(largest(x), largest(y), 1e-300)

@@ -77,9 +77,10 @@ class Motions(Series):
     @cached_property
     def labels(self) -> Mapping[str, tuple[str, ...]]:
         """Name of an array -> its rows."""
-        return (
-            {n: tuple(rows) for n, rows in labels(self.problem(float(self.parameter[0]))).items()} if len(self) else {}
-        )
+        if not len(self):
+            return {}
+        assembly = self.problem(float(self.parameter[0])).assembly
+        return {name: tuple(rows) for name, rows in labels(assembly).items()}
 
     @cached_property
     def _rows(self) -> list[dict[str, Any]]:

@@ -11,16 +11,16 @@ from typing import Any
 import numpy as np
 
 from .. import continuation
-from ..data import Array
+from ..data import Array, largest
 from ..errors import NotConverged, UserError
 from ..interrupts import look
+from ..progress import Report as Report
 from ..settings.mistakes import bounded
 from ..units import hertz
 from . import pseudo_transient
 from .forces import AFT
-from .problem import AWAY, NO_NUMBER, AtFrequency, Problem, Tried
+from .problem import AWAY, NO_NUMBER, AtFrequency, Problem
 
-Report = Callable[[str], None]
 CONVERGED = "converged"
 TURNS = "turns back"
 FROM_ABOVE = "nor from the frequency above"
@@ -39,9 +39,9 @@ class Point:
 
     Omega: float
     x: Array
-    status: str
-    error: float
-    iterations: int
+    status: str = CONVERGED
+    error: float = 0.0
+    iterations: int = 0
     slope: Any = None
     history: tuple[float, ...] = ()
 
@@ -107,28 +107,32 @@ def newton(
     if at.lost:
         return Point(at.Omega, np.full_like(x, np.nan), at.lost, np.nan, 0)
     start, fresh, history, left_over = x, False, list[float](), rises
+
+    def ended(status: str, iterations: int, error: float, slope: Any = None) -> Point:
+        return Point(at.Omega, x, status, error, iterations, slope, tuple(history))
+
     halved, last, whole = np.inf, 0, False
     R, seen = at.tried(x)
-    contraction = _contraction(at.problem)
-    reference, error = float(np.abs(at.reference).max(initial=0.0)) or 1.0, np.inf  # where nothing drives, the length
+    many = any(isinstance(g.model, AFT) and g.model.many for g in at.problem.groups)
+    contraction = OF_MANY if many and len(at.problem.slices) == 1 else CONTRACTION
+    reference, error = largest(at.reference) or 1.0, np.inf  # where nothing drives, the length
     for count in range(most):
         look()
-        size = np.clip(np.abs(x).max(initial=0.0), 1e-3 * reference, 1e3 * reference)
-        error = float(np.abs(R).max(initial=0.0) / size)
+        size = np.clip(largest(x), 1e-3 * reference, 1e3 * reference)
+        error = float(largest(R) / size)
         history.append(error)
         if not np.isfinite(error):
-            return Point(at.Omega, x, at.undefined(x) or "not a number", error, count, history=tuple(history))
+            return ended(at.undefined(x) or "not a number", count, error)
         if error <= max(tolerance, min(ROUNDING * (at.rounding[0] / size + at.rounding[1]), AT_MOST)):
-            return Point(at.Omega, x, CONVERGED, error, count, slope=slope, history=tuple(history))
+            return ended(CONVERGED, count, error, slope)
         if error < 0.5 * halved:
             halved, last = error, count
         elif patience is not None and count - last >= patience:
-            words = f"|R|/|x| = {halved:.1e} was not halved in {patience} steps"
-            return Point(at.Omega, x, words, error, count, history=tuple(history))
+            return ended(f"|R|/|x| = {halved:.1e} was not halved in {patience} steps", count, error)
         if slope is None:
             slope, fresh = at.slopes(x, whole), True
             if not all(np.isfinite(S).all() for S in slope):
-                return Point(at.Omega, x, at.undefined(x) or "not a number", error, count, history=tuple(history))
+                return ended(at.undefined(x) or "not a number", count, error)
         step = at.jacobian(slope).solve(-R)
         left, shown = at.tried(x + step, seen)
         before, after = np.linalg.norm(R), np.linalg.norm(left)
@@ -137,39 +141,23 @@ def newton(
             x, R, seen = x + step, left, shown
             continue
         whole = whole or fresh
-        if fresh and not rises:
-            x, R, seen = _shortened(at, x, R, step, left, shown)
-        elif fresh and (after < before or left_over and np.isfinite(after)):
+        if fresh and not rises:  # the longest of 1, 1/2, ... of the step that lowers |R|
+            share = 1.0
+            while not np.linalg.norm(left) < before and share > SHORTEST:
+                share *= 0.5
+                left, shown = at.tried(x + share * step, shown)
+            x, R, seen = x + share * step, left, shown
+        elif after < before or fresh and left_over and np.isfinite(after):
             left_over -= not after < before
             x, R, seen = x + step, left, shown
         elif fresh:
             break
-        elif after < before:  # of an old derivative: it is of a place no nearer than this one
-            x, R, seen = x + step, left, shown
-        slope, fresh = None, False
+        slope, fresh = None, False  # an old one that does not serve is taken anew, here or there
     if rises:
         again = newton(at, start, tolerance, most, rises=0)
-        told = (*history, *again.history)
-        return replace(again, iterations=len(history) + again.iterations, history=told)
-    words = f"no convergence in {most} steps, |R|/|x| = {error:.1e}"
-    return Point(at.Omega, x, words, error, most, history=tuple(history))
-
-
-def _contraction(problem: Problem) -> float:
-    """`CONTRACTION` or `OF_MANY`."""
-    many = any(isinstance(g.model, AFT) and g.model.many for g in problem.groups)
-    return OF_MANY if many and len(problem.slices) == 1 else CONTRACTION
-
-
-def _shortened(
-    at: AtFrequency, x: Array, R: Array, step: Array, left: Array, shown: Tried
-) -> tuple[Array, Array, Tried]:  # fmt: skip
-    """x, R and what it is of after the longest of 1, 1/2, ... of a step that lowers |R|, or the last of them."""
-    share = 1.0
-    while not np.linalg.norm(left) < np.linalg.norm(R) and share > SHORTEST:
-        share *= 0.5
-        left, shown = at.tried(x + share * step, shown)
-    return x + share * step, left, shown
+        whole_way = (*history, *again.history)
+        return replace(again, iterations=len(history) + again.iterations, history=whole_way)
+    return ended(f"no convergence in {most} steps, |R|/|x| = {error:.1e}", most, error)
 
 
 def solve(
@@ -265,17 +253,14 @@ def _rises(problem: Problem) -> int:
     return RISES if len(problem.slices) == 1 else 0
 
 
-def from_rest(problem: Problem, Omega: float, most: int = 60) -> Point:
+def from_rest(problem: Problem, Omega: float) -> Point:
     """The vibration that the assembly comes to from rest, in pseudo-time with steps that grow (`slow`).
 
     Where the place of a body remains undetermined, the one that it came to is taken, if the mean forces balance there.
-
-    Args:
-        most: steps of pseudo-time.
     """
     at, spent, rate, rises = problem.at(Omega), 0, FIRST * Omega, _rises(problem)
     q, point = pseudo_transient.at_rest(problem), Point(Omega, np.zeros(problem.size), "", np.inf, 0)
-    for count in range(most):
+    for count in range(SLOW):
         step = pseudo_transient.slowly(at, rate, q)
         trial = newton(step, point.x, TOLERANCE, most=20 if rises else 10, slope=point.slope, rises=rises)
         spent += trial.iterations
@@ -285,13 +270,16 @@ def from_rest(problem: Problem, Omega: float, most: int = 60) -> Point:
         point, q = trial, step.modal(trial.x, step.force(trial.x))
         rate *= 0.5
         if rate < LAST * Omega and count % 3 == 0:
-            found = _ended(at, point, q)
-            spent += found.iterations
-            if found.converged or found.away:
-                return replace(found, iterations=spent)
+            last = _ended(at, point, q)
+            spent += last.iterations
+            if last.converged or last.away:
+                return replace(last, iterations=spent)
     error = float(np.abs(at.residual(point.x)).max() / max(np.abs(point.x).max(), 1e-300))
-    return Point(Omega, point.x, f"no rest in {most} steps of pseudo-time", error, spent)
+    return Point(Omega, point.x, f"no rest in {SLOW} steps of pseudo-time", error, spent)
 
+
+SLOW = 60
+"""Steps of pseudo-time at most."""
 
 FIRST = 0.3
 """Rate of the first step of pseudo-time over the frequency of the vibration."""
@@ -306,18 +294,18 @@ TOLERANCE = 1e-9
 def _ended(at: AtFrequency, point: Point, q: pseudo_transient.Places) -> Point:
     """Newton's method where pseudo-time ends; where that fails, with the place of what nothing holds left as it is."""
     rises = _rises(at.problem)
-    found = newton(at, point.x, most=20 if rises else 10, slope=point.slope, rises=rises)
-    if found.converged or not pseudo_transient.unheld(at.problem):
-        return found
-    held = pseudo_transient.in_place(at, q)
-    fixed = newton(held, point.x, most=20)
-    spent = found.iterations + fixed.iterations
+    direct = newton(at, point.x, most=20 if rises else 10, slope=point.slope, rises=rises)
+    if direct.converged or not pseudo_transient.unheld(at.problem):
+        return direct
+    in_place = pseudo_transient.in_place(at, q)
+    fixed = newton(in_place, point.x, most=20)
+    spent = direct.iterations + fixed.iterations
     if not fixed.converged:
-        return replace(found, iterations=spent)
+        return replace(direct, iterations=spent)
     last = newton(at, fixed.x, most=1)
     if last.converged:
         return replace(last, iterations=spent)
-    force, whom = pseudo_transient.unbalanced(at, q, held.modal(fixed.x, held.force(fixed.x)))
+    force, whom = pseudo_transient.unbalanced(at, q, in_place.modal(fixed.x, in_place.force(fixed.x)))
     words = (
         f"{whom} {AWAY}: nothing balances a mean force of {force:.2g} N on it; give the body weak_springs or a spring"
     )
@@ -345,12 +333,17 @@ UNFINISHED = (
 )
 
 
-def _raised(problem: Problem, Omega: float, most: int = 150) -> Point:
+def led(family: continuation.Equations, x: Array, whole: float) -> continuation.Branch:
+    """The curve of solutions from x (size,) at 0 to the whole of what is changed, which may turn back on its way."""
+    settings = continuation.Settings(low=0.0, high=whole, points=150, step=0.05, step_max=0.3, branch_points=False)
+    return continuation.trace(family, x, 0.0, settings)
+
+
+def _raised(problem: Problem, Omega: float) -> Point:
     """The load from nothing to its whole size along the curve of solutions, which may turn back on its way."""
     at, whole = problem.at(Omega), problem.share
-    family = OverLoad(at, max(float(np.abs(at.reference).max(initial=0.0)), 1e-3))
-    settings = continuation.Settings(low=0.0, high=whole, points=most, step=0.05, step_max=0.3, branch_points=False)
-    branch = continuation.trace(family, replace(at, problem=at.problem.loaded(0.0)).reference, 0.0, settings)
+    family = OverLoad(at, max(largest(at.reference), 1e-3))
+    branch = led(family, replace(at, problem=at.problem.loaded(0.0)).reference, whole)
     spent = sum(p.evaluations for p in branch.points)
     if branch.points and branch.points[-1].lam == whole:
         point = newton(at, branch.points[-1].x)
@@ -365,7 +358,7 @@ def _raised(problem: Problem, Omega: float, most: int = 150) -> Point:
 
 def sweep(
     problem: Problem, frequency: Array, report: Report = lambda _: None, start: Array | None = None,
-    known: Mapping[float, Point] | None = None, keep: Callable[[Point], None] = lambda _: None,
+    known: Mapping[float, Point] | None = None, keep: Callable[[float, Point], None] = lambda *_: None,
 ) -> list[Point]:  # fmt: skip
     """Solutions at frequencies (Hz) in the given order, each started from its neighbours. A failure is recorded.
 
@@ -375,7 +368,7 @@ def sweep(
 
     Args:
         start: (k,) where the first point starts; the sticking contact if None. known: Hz -> point that was found
-            before. keep: told of every other point as soon as it is found.
+            before. keep: told of every other frequency and its point as soon as it is found.
 
     Raises:
         UserError: no frequency, or one that is not positive.
@@ -398,45 +391,38 @@ def sweep(
         if good:
             starts = [_ahead(good, 2 * np.pi * f), good[-1].x] if len(good) > 1 else [good[-1].x]
         began = time.perf_counter()
-        point = solve(problem, 2 * np.pi * float(f), starts, report=partial(_also, report, told))
+
+        def also(said: str, told: str = told) -> None:
+            report(f"{told}; {said}")
+
+        point = solve(problem, 2 * np.pi * float(f), starts, report=also)
         done.append(replace(point, slope=None))
-        keep(done[-1])
+        keep(float(f), done[-1])
         solved += 1
-        left = sum(float(f) not in known for f in frequency[i + 1 :])
-        if solved == TIMED and (said := _long(time.perf_counter() - began, left)):
-            report(said)
+        left, each = sum(float(f) not in known for f in frequency[i + 1 :]), time.perf_counter() - began
+        if solved == TIMED and each * left > LONG:
+            report(
+                f"warning: {left} frequencies are left and the last one took {each:.3g} s, so they take about "
+                f"{each * left / 60:.3g} minutes; fewer points, harmonics or samples of the contacts take less"
+            )
     for i in range(len(done) - 2, -1, -1):  # from the other side, along which there may be a way
         if not (done[i].converged or done[i].away or done[i].walked) and done[i + 1].converged:
             report(f"{i + 1} of {len(frequency)} frequencies: {hertz(frequency[i])} once more, from above")
             done[i] = _walked(problem, done[i + 1], done[i])
-            keep(done[i])
+            keep(float(frequency[i]), done[i])
     return done
-
-
-def _also(report: Report, told: str, said: str) -> None:
-    report(f"{told}; {said}")
 
 
 LONG, TIMED = 600.0, 3
 """s that a sweep may take before it is told how long it will, and the point that tells it: those before it compile."""
 
 
-def _long(each: float, left: int) -> str:
-    """What to say of so many points that take so many seconds each."""
-    if each * left <= LONG:
-        return ""
-    return (
-        f"warning: {left} frequencies are left and the last one took {each:.3g} s, so they take about "
-        f"{each * left / 60:.3g} minutes; fewer points, harmonics or samples of the contacts take less"
-    )
-
-
 def _walked(problem: Problem, known: Point, failed: Point) -> Point:
     """The failed point, reached from a known one in steps of frequency that are shortened where need be."""
-    last, step, spent = known, 1.0, failed.iterations
+    last, step, spent, way = known, 1.0, failed.iterations, failed.Omega - known.Omega
     while step > 1 / 64:
-        Omega = last.Omega + step * (failed.Omega - known.Omega)
-        Omega = failed.Omega if abs(Omega - known.Omega) >= abs(failed.Omega - known.Omega) else Omega
+        Omega = last.Omega + step * way
+        Omega = failed.Omega if abs(Omega - known.Omega) >= abs(way) else Omega
         point = newton(problem.at(Omega), last.x, most=30)
         spent += point.iterations
         if not point.converged:
@@ -466,7 +452,7 @@ def _ahead(points: list[Point], Omega: float) -> Array:
     """Solutions carried on to another frequency by the polynomial, of first order or more, that tells the last best."""
     *known, last = points
     orders = range(2, len(points))
-    missed = [np.abs(carried(known[-n:], last.Omega) - last.x).max(initial=0.0) for n in orders]
+    missed = [largest(carried(known[-n:], last.Omega) - last.x) for n in orders]
     return carried(points[-orders[int(np.argmin(missed))] :] if missed else points, Omega)
 
 

@@ -24,9 +24,10 @@ import numpy as np
 
 from ..contact.law import Law, State
 from ..contact.periodic import periodic
-from ..data import Array, ComplexArray
+from ..data import Array, ComplexArray, largest
 from ..errors import UserError
 from ..programs import inner
+from ..series import derivative, summed
 from .problem import Problem
 
 Loss = Literal["", "fold", "flip", "Neimark-Sacker"]
@@ -36,7 +37,7 @@ SETTLED = 1e-10
 
 
 @dataclass(frozen=True)
-class Orbit:
+class ForcedOrbit:
     """A periodic motion of M q'' + C q' + K q + T^T F = f(t), d = T q - B F, and all that moves along with it.
 
     Attributes:
@@ -71,7 +72,7 @@ class Orbit:
         return [slice(int(a), int(b)) for a, b in zip(ends, ends[1:], strict=False)]
 
 
-def orbit(problem: Problem, x: Array, Omega: float) -> Orbit:
+def orbit(problem: Problem, x: Array, Omega: float) -> ForcedOrbit:
     """The motion in time that unknowns x (k,) of a problem stand for at Omega (rad/s).
 
     Raises:
@@ -80,7 +81,7 @@ def orbit(problem: Problem, x: Array, Omega: float) -> Orbit:
     """
     if problem.assembly.ring is not None:
         raise UserError("stability: a sector cannot tell whether the sectors of its ring stay alike; take all of them")
-    contacts, relative = problem.assembly.contacts, problem.relative(x)
+    contacts = problem.assembly.contacts
     part = problem.parts[1][0] if len(problem.parts[1]) == 1 else problem.assembly.joined(1)
     if any(np.iscomplexobj(f.K) or np.iscomplexobj(f.C) for f in problem.assembly.flow):
         raise UserError(
@@ -88,9 +89,9 @@ def orbit(problem: Problem, x: Array, Omega: float) -> Orbit:
             "the same coefficients"
         )
     models = {i: g.model for g in problem.groups for i in g.contacts}
-    return Orbit(
+    return ForcedOrbit(
         part.M, part.viscous(Omega), part.K, part.rows, part.residual, tuple(c.patch.law for c in contacts),
-        tuple(c.patch.kinematics for c in contacts), np.vstack([relative[i] for i in range(len(contacts))]), Omega,
+        tuple(c.patch.kinematics for c in contacts), np.vstack(problem.relative(x)), Omega,
         max(getattr(model, "cycles", 2) for model in models.values()),
     )  # fmt: skip
 
@@ -132,7 +133,7 @@ class Settings:
     directions: int = 600
 
 
-def stability(motion: Orbit, settings: Settings | None = None) -> Stability:
+def stability(motion: ForcedOrbit, settings: Settings | None = None) -> Stability:
     """Multipliers from two step lengths, extrapolated to none; the error is what that changed of their sizes.
 
     It is their logarithms, growth and turning angle, whose error is h^2; stiff directions, which turn through many
@@ -143,16 +144,14 @@ def stability(motion: Orbit, settings: Settings | None = None) -> Stability:
     left = list(coarse)
     best = []
     for value in fine[: s.largest]:
-        partner = left.pop(_like(value, np.array(left))) if left else value
+        # the same multiplier at another step length: of its size, then at its angle
+        others = np.array(left)
+        apart = np.abs(np.abs(others) - abs(value)) + 0.1 * np.abs(others - value)
+        partner = left.pop(int(np.argmin(apart))) if left else value
         near = abs(value - partner) < 0.5 * abs(value)
         best.append(value * np.exp(np.log(value / partner) / 3.0) if near else value)
     values = np.array(best, dtype=complex)
     return judged(values, np.abs(np.abs(values) - np.abs(fine[: s.largest])), s.margin)
-
-
-def _like(value: complex, others: ComplexArray) -> int:
-    """Which of the others is the same multiplier at another step length: of its size, then at its angle."""
-    return int(np.argmin(np.abs(np.abs(others) - abs(value)) + 0.1 * np.abs(others - value)))
 
 
 def judged(values: ComplexArray, error: Array, margin: float) -> Stability:
@@ -171,7 +170,7 @@ def judged(values: ComplexArray, error: Array, margin: float) -> Stability:
 # the map of one period ----------------------------------------------------------------------------------------------
 
 
-def multipliers(orbit: Orbit, steps: int, settings: Settings | None = None) -> ComplexArray:
+def multipliers(orbit: ForcedOrbit, steps: int, settings: Settings | None = None) -> ComplexArray:
     """(k,) all multipliers that perturbations of the motion can reach, at one step length, the largest first.
 
     Block by block the image of what was reached last is added to the space, until nothing new comes: sliders that slid
@@ -196,7 +195,7 @@ def _beyond(basis: Array, images: Array, least: float) -> Array:
     rest = images - basis @ (basis.T @ images)
     rest -= basis @ (basis.T @ rest)
     U, size, _ = np.linalg.svd(rest, full_matrices=False)
-    return U[:, size > least * max(1.0, float(np.abs(images).max(initial=0.0)))]
+    return U[:, size > least * max(1.0, largest(images))]
 
 
 class _Body(NamedTuple):
@@ -252,7 +251,7 @@ class _Memory:
         return tuple(out)
 
 
-def _carrier(orbit: Orbit, steps: int) -> tuple[Callable[[Array], Array], Array]:
+def _carrier(orbit: ForcedOrbit, steps: int) -> tuple[Callable[[Array], Array], Array]:
     """The map (N, k) -> (N, k) of one period, and the (N,) units of its coordinates: q, q', states that matter."""
     dt = orbit.period / steps
     G = tuple(jax.device_put(g) for g in orbit.kinematics)
@@ -271,16 +270,16 @@ def _carrier(orbit: Orbit, steps: int) -> tuple[Callable[[Array], Array], Array]
     return carry, _units(orbit, memory.kept(path.states))
 
 
-def _units(orbit: Orbit, leaves: list[jax.Array]) -> Array:
+def _units(orbit: ForcedOrbit, leaves: list[jax.Array]) -> Array:
     """(N,) sizes by which perturbations are measured: q that move the contacts as far as they move, the same times
     Omega, what the leaves of the states reach on the orbit."""
-    amplitude = float(np.abs(orbit.displacement[:, 1:]).max(initial=0.0)) or 1.0
-    q = np.full(len(orbit.M), amplitude / (float(np.abs(orbit.rows).max(initial=0.0)) or 1.0))
+    amplitude = largest(orbit.displacement[:, 1:]) or 1.0
+    q = np.full(len(orbit.M), amplitude / (largest(orbit.rows) or 1.0))
     parts = [np.full(int(np.prod(leaf.shape[1:])), float(jnp.abs(leaf).max(initial=0.0)) or 1.0) for leaf in leaves]
     return np.concatenate([q, q * orbit.Omega, *parts])
 
 
-def _middle(orbit: Orbit, h: float) -> _Body:
+def _middle(orbit: ForcedOrbit, h: float) -> _Body:
     """The midpoint rule: v' = (M + h C/2 + h^2 K/4)^-1 (M v - h/2 (K q + T^T F)), q' = q + h/2 v' in the middle."""
     m = len(orbit.M)
     A = orbit.M + 0.5 * h * orbit.C + 0.25 * h**2 * orbit.K
@@ -313,7 +312,9 @@ def _marched(law: Law, G: jax.Array, d: jax.Array, period: float, steps: int, co
     """Of one law: place and speed (s, n, 3), states before every step, derivatives (s, b, b) of the forces on its rows
     with respect to place and speed."""
     dt = period / steps
-    values, rates = _fourier(d.shape[1] // 2, steps)
+    middles = 2 * np.pi * (np.arange(steps) + 0.5) / steps
+    values = summed(np.outer(middles, np.arange(1, d.shape[1] // 2 + 1)))
+    rates = values @ derivative(d.shape[1])
     u = jnp.einsum("sk,nia,ak->sni", values, G, d)
     v = jnp.einsum("sk,nia,ak->sni", rates, G, d) * (2 * np.pi / period)
 
@@ -325,17 +326,6 @@ def _marched(law: Law, G: jax.Array, d: jax.Array, period: float, steps: int, co
     state = periodic(law, u, period, count, SETTLED)[:2][1]
     _, (states, slope, drag) = jax.lax.scan(one, state, (u, v))
     return u, v, states, slope, drag
-
-
-def _fourier(harmonics: int, steps: int) -> tuple[Array, Array]:
-    """(s, 2 H + 1) values of 1, cos, sin, cos 2, ... in the middles of the steps, and their derivatives."""
-    t = 2 * np.pi * (np.arange(steps) + 0.5) / steps
-    turns = [h * t for h in range(1, harmonics + 1)]
-    coefficients = [np.ones(steps), *(f(x) for x in turns for f in (np.cos, np.sin))]
-    rates = [np.zeros(steps)]
-    for h, x in enumerate(turns, 1):
-        rates += [-h * np.sin(x), h * np.cos(x)]
-    return np.column_stack(coefficients), np.column_stack(rates)
 
 
 def _tangents(law: Law, dt: float, state: State, u: jax.Array, v: jax.Array) -> tuple[jax.Array, jax.Array]:
@@ -424,12 +414,10 @@ def _pushed(
     for law, G, u, v, state, tangent in every:
         rows = slice(first, first + G.shape[2])
         first = rows.stop
-        step = partial(_step, law, dt)
-        _, (force, changed) = jax.jvp(step, (u, v, state), (G @ d[rows], G @ rate[rows], tangent))
+        moves = G @ d[rows], G @ rate[rows], tangent
+        _, (force, changed) = jax.jvp(
+            lambda u, v, state, law=law: law.step(u, v, dt, state), (u, v, state), moves
+        )
         forces.append(jnp.einsum("nia,ni->a", G, force))
         after.append(changed)
     return jnp.concatenate(forces), after
-
-
-def _step(law: Law, dt: float, u: jax.Array, v: jax.Array, state: State) -> tuple[jax.Array, State]:
-    return law.step(u, v, dt, state)

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import KW_ONLY, dataclass, field
+from functools import partial
 from typing import Any, TypeVar
 
 import numpy as np
 
-from ..data import Array, Indices
+from ..data import Array, Indices, largest
 from ..results.series import of_solutions
 from ..units import METRES, Quantity
 
@@ -20,8 +21,7 @@ class FrequencyResponse:
     Attributes:
         frequency: (f,) Hz. monitor: (f,) complex 0-peak displacement of the monitored row, m.
         slip: (f, c) complex 0-peak displacement of each slider, m. dissipated: (f,) energy per cycle, J.
-        converged: (f,) bool. limit: the friction limits, N, for reports. normal_swing: (f, c) 0-peak
-            amplitude of each contact's normal force, N; beyond the normal force the contact would lift off.
+        converged: (f,) bool.
         quantity: what the monitored row measures; m stands for its unit.
         supplied: (f,) work of the excitation, damped: (f,) loss in the bodies' own damping, J per cycle.
         balance, counted, motion: (f,), see `results.checks.Checks`. All of these are empty where nothing is in contact.
@@ -33,15 +33,14 @@ class FrequencyResponse:
     slip: Array
     dissipated: Array
     converged: Array
-    limit: Array
-    normal_swing: Array
-    quantity: Quantity = field(kw_only=True, default=METRES)
-    supplied: Array = field(kw_only=True, default_factory=lambda: np.zeros(0))
-    damped: Array = field(kw_only=True, default_factory=lambda: np.zeros(0))
-    balance: Array = field(kw_only=True, default_factory=lambda: np.zeros(0))
-    counted: Array = field(kw_only=True, default_factory=lambda: np.zeros(0))
-    motion: Array = field(kw_only=True, default_factory=lambda: np.zeros(0))
-    added: Array = field(kw_only=True, default_factory=lambda: np.zeros(0, dtype=bool))
+    _: KW_ONLY
+    quantity: Quantity = METRES
+    supplied: Array = field(default_factory=partial(np.zeros, 0))
+    damped: Array = field(default_factory=partial(np.zeros, 0))
+    balance: Array = field(default_factory=partial(np.zeros, 0))
+    counted: Array = field(default_factory=partial(np.zeros, 0))
+    motion: Array = field(default_factory=partial(np.zeros, 0))
+    added: Array = field(default_factory=partial(np.zeros, 0, dtype=bool))
 
     @property
     def asked(self) -> Array:
@@ -50,13 +49,13 @@ class FrequencyResponse:
 
     def columns(self) -> dict[str, Array]:
         """What stands in a table beside the frequency, by name and unit; nan where a point is no solution."""
-        found = {
+        table = {
             self.quantity.column("amplitude"): np.abs(self.monitor),
             "phase_rad": np.angle(self.monitor),
             "dissipated_J": self.dissipated,
             **({"supplied_J": self.supplied, "damped_J": self.damped} if len(self.supplied) else {}),
         }
-        return of_solutions(found, self.converged) | {"converged": self.converged.astype(float)}
+        return of_solutions(table, self.converged) | {"converged": self.converged.astype(float)}
 
 
 def peaks(response: FrequencyResponse) -> list[tuple[float, float]]:
@@ -77,12 +76,12 @@ def brackets(response: FrequencyResponse) -> list[tuple[int, int, int]]:
     higher than beside it inwards, for the peak may lie just inside. Points that did not converge are passed over."""
     good = np.flatnonzero(response.converged)
     where = np.searchsorted(good, tops(response))
-    found = [(int(good[i - 1]), int(good[i]), int(good[i + 1])) for i in where]
+    triples = [(int(good[i - 1]), int(good[i]), int(good[i + 1])) for i in where]
     a, last = np.where(response.converged, np.abs(response.monitor), 0.0), len(response.frequency) - 1
     ends = [(0, 0, 1), (last - 1, last, last)] if last > 0 else []
     inside = ((end, high if end == low else low) for low, end, high in ends)
     rise = [0 < a[beside] < a[end] for end, beside in inside]
-    return found + [end for end, rises in zip(ends, rise, strict=True) if rises]
+    return triples + [end for end, rises in zip(ends, rise, strict=True) if rises]
 
 
 STILL = 1e-10
@@ -92,8 +91,7 @@ STILL = 1e-10
 def still(response: FrequencyResponse) -> bool:
     """Whether nothing moves the first read-out, so that its peaks are none."""
     ok = response.converged
-    moved = float(np.abs(response.slip[ok]).max(initial=0.0))
-    return bool(ok.any()) and float(np.abs(response.monitor[ok]).max()) <= STILL * moved
+    return bool(ok.any()) and largest(response.monitor[ok]) <= STILL * largest(response.slip[ok])
 
 
 def hidden(frequency: Array, modes: Array, damping: Array) -> list[float]:
@@ -103,12 +101,12 @@ def hidden(frequency: Array, modes: Array, damping: Array) -> list[float]:
         frequency: (f,) Hz, rising. modes: (m,) Hz, with sticking contacts or without contacts: where these dissipate
             most, between both, no resonance is as narrow. damping: (m,) their ratios.
     """
-    inside = (modes > frequency[0]) & (modes < frequency[-1])
-    modes, damping = modes[inside], damping[inside]
+    in_band = (modes > frequency[0]) & (modes < frequency[-1])
+    modes, damping = modes[in_band], damping[in_band]
     below, above = (frequency[np.searchsorted(frequency, modes) + i] for i in (-1, 0))
     apart = np.minimum(modes - below, above - modes) > ONE * modes
-    found = np.sort(modes[apart & (2 * damping * modes < above - below)])
-    return found[np.diff(found, prepend=0.0) > ONE * found].tolist()
+    between = np.sort(modes[apart & (2 * damping * modes < above - below)])
+    return between[np.diff(between, prepend=0.0) > ONE * between].tolist()
 
 
 ONE = 1e-9
@@ -137,12 +135,12 @@ def overhanging(response: FrequencyResponse, peaks: Sequence[tuple[float, float]
     other motions at the same frequency, on which the sweep came along."""
     f, a = response.frequency, np.where(response.converged, np.abs(response.monitor), 0.0)
     highest = {top for _, top, _ in brackets(response)}
-    found = []
+    over = []
     for at, height in peaks:
         j = int(np.clip(np.searchsorted(f, at), 1, len(f) - 1))
         if not {j - 1, j} & highest and max(a[j - 1], a[j]) < (1 - DIP) * height:
-            found.append((at, height))
-    return found
+            over.append((at, height))
+    return over
 
 
 def ends(response: FrequencyResponse, peaks: Sequence[tuple[float, float]]) -> list[bool]:
@@ -161,11 +159,11 @@ def gaps(response: FrequencyResponse, peaks: Sequence[tuple[float, float]]) -> l
     """Hz, Hz: where a sweep jumps or leaves points without a solution, and between an overhanging peak and the place
     where the sweep passes it; those within three steps of each other are one."""
     f, step = response.frequency, _step(response)
-    found = [(float(f[low]), float(f[high])) for low, high in _breaks(response)]
-    jumps = [0.5 * (low + high) for low, high in found]
+    breaks = [(float(f[low]), float(f[high])) for low, high in _breaks(response)]
+    jumps = [0.5 * (low + high) for low, high in breaks]
     over = [(at, min(jumps, key=lambda jump: abs(jump - at), default=at)) for at, _ in overhanging(response, peaks)]
     joined = list[tuple[float, float]]()
-    for low, high in sorted([*found, *(tuple(sorted(one)) for one in over)]):
+    for low, high in sorted([*breaks, *(tuple(sorted(one)) for one in over)]):
         if joined and low - joined[-1][1] < 3 * step:
             joined[-1] = joined[-1][0], max(high, joined[-1][1])
         else:

@@ -11,6 +11,7 @@ import hashlib
 import json
 import os
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -86,8 +87,8 @@ def fitted(values: Array, flat: tuple[Flat, Flat]) -> Array:
     """(..., p + 2, q + 2) B-spline coefficients of nodal values (..., p, q), at least four along each axis."""
     along_t = np.linalg.solve(_collocation(values.shape[-1], flat[1]), _framed(values)[..., None])[..., 0]
     turned = np.swapaxes(along_t, -1, -2)
-    found = np.linalg.solve(_collocation(values.shape[-2], flat[0]), _framed(turned)[..., None])[..., 0]
-    return np.swapaxes(found, -1, -2)
+    along_both = np.linalg.solve(_collocation(values.shape[-2], flat[0]), _framed(turned)[..., None])[..., 0]
+    return np.swapaxes(along_both, -1, -2)
 
 
 def _framed(values: Array) -> Array:
@@ -140,10 +141,10 @@ def refined(
     for count in counts:
         s = np.linspace(0.0, 1.0, count)
         middle = np.sort(np.concatenate([s[:-1] + share * np.diff(s) for share in inside]))
-        values, held = function(s, s), function(middle, middle)
+        values, exact = function(s, s), function(middle, middle)
         parts = np.stack([fitted(v, ends) for v, ends in zip(values, flat, strict=True)])
-        found = np.stack([_on_grid(part, middle) for part in parts])
-        left = measure(found - held, middle, middle)
+        splined = np.stack([_on_grid(part, middle) for part in parts])
+        left = measure(splined - exact, middle, middle)
         if left.max() <= tolerance:
             break
     return parts, left
@@ -236,11 +237,11 @@ def law_hash(law: Any) -> str:
 def folder() -> Path | None:
     """Where tables are kept: `$XDG_CACHE_HOME/microslip/tables` or `~/.cache/microslip/tables`; None: nowhere."""
     try:
-        found = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache", "microslip", "tables")
-        found.mkdir(parents=True, exist_ok=True)
+        path = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache", "microslip", "tables")
+        path.mkdir(parents=True, exist_ok=True)
     except (OSError, RuntimeError):
         return None
-    return found if os.access(found, os.W_OK) else None
+    return path if os.access(path, os.W_OK) else None
 
 
 def kept(kind: str, law: str, tolerance: float, make: Callable[[], Table], where: Path | None = None) -> Table:
@@ -252,14 +253,10 @@ def kept(kind: str, law: str, tolerance: float, make: Callable[[], Table], where
     where = where or folder()
     path = None if where is None else where / f"{kind}-{law[:16]}-{tolerance:.0e}.npz"
     if path is not None and path.exists():
-        try:
+        with suppress(UserError):
             return read(path, kind, law)
-        except UserError:
-            pass
     table = make()
     if path is not None:
-        try:
+        with suppress(UserError):  # a full disk is no reason to lose the answer
             write(table, path)
-        except UserError:  # a full disk is no reason to lose the answer
-            pass
     return table

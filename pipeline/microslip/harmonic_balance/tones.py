@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
@@ -10,18 +10,17 @@ import numpy as np
 import scipy.optimize
 
 from ..continuation import CONVERGED, newton
-from ..data import Array
+from ..data import Array, largest
 from ..errors import UserError
-from ..results.journal import Journal
+from ..progress import Report
+from ..results.journal import Journal, once
 from ..results.tones import TwoTones
+from ..series import Torus, commensurate, differentiated, summed
 from ..settings.mistakes import numbered
 from ..units import hertz
 from . import reduced
 from .readout import measured
-from .torus import Torus, commensurate, with_mean
 from .two_tone import Stacked, TwoTone
-
-Report = Callable[[str], None]
 
 SMALLEST = 1.0 / 64
 """Share of the loads by which a solution is led from little load to the whole one at least."""
@@ -30,7 +29,7 @@ FADED = 1e-6
 """Share of the largest amplitude below which a free second tone has died out."""
 
 
-class Point(NamedTuple):
+class TwoTonePoint(NamedTuple):
     """A solution. first, second: rad/s. x: (n,) unknowns. status. error: see `continuation.Solution`."""
 
     first: float
@@ -44,7 +43,7 @@ class Point(NamedTuple):
 class Solved(TwoTones):
     """`TwoTones` that were solved for here. Attributes: points. balances: (f,) of each."""
 
-    points: tuple[Point, ...] = field(default=())
+    points: tuple[TwoTonePoint, ...] = field(default=())
     balances: tuple[TwoTone, ...] = field(default=())
 
     def error_estimate(self, i: int = 0, readout: int = 0) -> float:
@@ -63,11 +62,11 @@ class Solved(TwoTones):
         if other.status != CONVERGED:
             return float("inf")
         a, b = (_amplitudes(*one)[readout] for one in ((self.balances[i], own), (finer, other)))
-        known = {tuple(k): v for k, v in zip(self.pairs.tolist(), a, strict=True)}
+        by_pair = {tuple(k): v for k, v in zip(self.pairs.tolist(), a, strict=True)}
         pairs = [(0, 0), *map(tuple, finer.torus.pairs.tolist())]
-        size = np.abs(a[1:]).max(initial=0.0) or 1.0
-        turn = _turned(known, dict(zip(pairs, b, strict=True))) if self.balances[i].free else 0.0
-        change = [known.get(k, 0.0) - v * np.exp(1j * k[1] * turn) for k, v in zip(pairs, b, strict=True)]
+        size = largest(a[1:]) or 1.0
+        turn = _turned(by_pair, dict(zip(pairs, b, strict=True))) if self.balances[i].free else 0.0
+        change = [by_pair.get(k, 0.0) - v * np.exp(1j * k[1] * turn) for k, v in zip(pairs, b, strict=True)]
         return float(3 * np.abs(change).max() / size)
 
 
@@ -78,13 +77,9 @@ def _turned(a: dict[Any, complex], b: dict[Any, complex]) -> float:
 
 def refined(b: TwoTone) -> TwoTone:
     """With twice the harmonics, and one more for laws that answer odd with odd ones, twice the samples and turns."""
-    return of_order(b, 2 * b.torus.order + 1, 4 * b.torus.count, 2 * b.least)
-
-
-def of_order(b: TwoTone, order: int, count: int, least: int) -> TwoTone:
-    """The same balance with other numbers of harmonics, of samples and of turns in the line."""
-    torus = replace(b.torus, order=order, count=count)
-    other = replace(b, torus=torus, contacts=tuple(one.on(torus) for one in b.contacts), least=least)
+    torus = replace(b.torus, order=2 * b.torus.order + 1, count=4 * b.torus.count)
+    contacts = tuple(one.on(torus) for one in b.contacts)
+    other = replace(b, torus=torus, contacts=contacts, least=2 * b.least)
     return other if b.reference is None else replace(other, reference=_coefficients(b, b.reference, other))
 
 
@@ -105,59 +100,42 @@ def _spread(b: TwoTone, x: Array, other: TwoTone) -> Array:
     return np.concatenate([v.ravel(), x[b.size :]])
 
 
-def solve(b: TwoTone, first: float, second: float, starts: Sequence[Array]) -> Point:
+def solve(b: TwoTone, first: float, second: float, starts: Sequence[Array]) -> TwoTonePoint:
     """A motion at two frequencies (rad/s), from one of several starts or led there from little load."""
-    found = None
+    solution = None
     for x in starts:
         own = replace(b, reference=b.displacement(x)) if b.free else b
-        found = newton(own, x, first)
-        if found.converged:
+        solution = newton(own, x, first)
+        if solution.converged:
             break
-    if found is None or not (found.converged or b.free):
-        found = _led(b, first) or found or newton(b, np.zeros(b.size), first)
-    status = CONVERGED if found.converged else found.status
+    if solution is None or not (solution.converged or b.free):
+        solution = _led(b, first) or solution or newton(b, np.zeros(b.size), first)
+    status = CONVERGED if solution.converged else solution.status
     if b.free:
-        second = float(found.x[-1])
-        if status == CONVERGED and not _vibrates(b, found.x):
+        second = float(solution.x[-1])
+        if status == CONVERGED and not _vibrates(b, solution.x):
             status = "the second tone has died out: the motion repeats with the first one; start from another motion"
-    return Point(first, second, found.x, status, found.error)
+    return TwoTonePoint(first, second, solution.x, status, solution.error)
 
 
 def _vibrates(b: TwoTone, x: Array) -> bool:
     """Whether there is a second tone."""
     v = b.displacement(x) / b.problem.scale
     with_second = np.repeat(b.torus.pairs[:, 1] != 0, 2)
-    return bool(np.abs(v[1:][with_second]).max(initial=0.0) > FADED * np.abs(v).max(initial=0.0))
+    return largest(v[1:][with_second]) > FADED * largest(v)
 
 
 def _led(b: TwoTone, first: float) -> Any:
     """The solution of the whole loads by growing shares of them; None where one is not found."""
-    x, share, step, found = np.zeros(b.size), 0.0, 0.25, None
+    x, share, step, solution = np.zeros(b.size), 0.0, 0.25, None
     while share < 1.0:
         tried = min(1.0, share + step)
-        found = newton(replace(b, shares=(tried, tried)), x, first)
-        if found.converged:
-            x, share, step = found.x, tried, 1.5 * step
+        solution = newton(replace(b, shares=(tried, tried)), x, first)
+        if solution.converged:
+            x, share, step = solution.x, tried, 1.5 * step
         elif (step := 0.5 * step) < SMALLEST:
             return None
-    return found
-
-
-@dataclass(frozen=True)
-class Kept:
-    """Finished points of a sweep, by their number, in an open journal; none without one."""
-
-    journal: Journal | None = None
-
-    def of(self, i: int) -> Point | None:
-        one = None if self.journal is None else self.journal.of(SERIES).get(float(i))
-        if one is None:
-            return None
-        return Point(float(one["first"]), float(one["second"]), one["x"], str(one["status"]), float(one["error"]))
-
-    def keep(self, i: int, point: Point) -> None:
-        if self.journal is not None:
-            self.journal.keep(SERIES, i, point._asdict())
+    return solution
 
 
 SERIES = "two tones"
@@ -165,27 +143,25 @@ SERIES = "two tones"
 
 
 def swept(
-    b: TwoTone, first: Array, second: Array, start: Array | None, report: Report, kept: Kept | None = None
+    b: TwoTone, first: Array, second: Array, start: Array | None, report: Report, kept: Journal | None = None
 ) -> Solved:  # fmt: skip
-    """Motions at frequencies (f,), rad/s, each from its neighbours. start: (n,) unknowns of the first one. kept: those
-    that are known from a run that did not end, and where each is kept the moment it is found."""
-    kept = kept or Kept()
-    points, balances, known = list[Point](), list[TwoTone](), [] if start is None else [start]
+    """Motions at frequencies (f,), rad/s, each from its neighbours. start: (n,) unknowns of the first one. kept: holds
+    those that are known from a run that did not end, and each by its number the moment it is found."""
+    points, balances, solutions = list[TwoTonePoint](), list[TwoTone](), [] if start is None else [start]
     for i, (one, two) in enumerate(zip(first.tolist(), second.tolist(), strict=True)):
-        here = b.at(one, known[-1][-1] if b.free else two)
-        found = kept.of(i)
-        if found is None:
-            found = solve(here, one, two, [*known[::-1][:1], *([] if b.free else [np.zeros(b.size)])])
-            kept.keep(i, found)
+        here = b.at(one, solutions[-1][-1] if b.free else two)
+        starts = [*solutions[::-1][:1], *([] if b.free else [np.zeros(b.size)])]
+        row = once(kept, SERIES, i, lambda: solve(here, one, two, starts)._asdict())  # noqa: B023
+        found = TwoTonePoint(**row)
         points.append(found)
         balances.append(here)
         if found.status == CONVERGED:
-            known.append(found.x)
+            solutions.append(found.x)
         report(f"{i + 1} of {len(first)} points, {hertz(one / (2 * np.pi))} and {hertz(found.second / (2 * np.pi))}")
     return of_points(points, balances)
 
 
-def of_points(points: Sequence[Point], balances: Sequence[TwoTone]) -> Solved:
+def of_points(points: Sequence[TwoTonePoint], balances: Sequence[TwoTone]) -> Solved:
     """What a reader asks of solved points."""
     b, turn = balances[0], 2 * np.pi
     works = np.array([_powers(*one) for one in zip(balances, points, strict=True)])
@@ -201,7 +177,7 @@ def of_points(points: Sequence[Point], balances: Sequence[TwoTone]) -> Solved:
     )  # fmt: skip
 
 
-def _said(points: Sequence[Point], b: TwoTone) -> tuple[str, ...]:
+def _said(points: Sequence[TwoTonePoint], b: TwoTone) -> tuple[str, ...]:
     """What a reader must know: common periods."""
     for p in points:
         if small := commensurate(p.first, p.second, b.torus.order):
@@ -215,16 +191,17 @@ def _said(points: Sequence[Point], b: TwoTone) -> tuple[str, ...]:
 
 class _Shown(NamedTuple):
     """Of the mean and every pair: parts, |k . omega|, amplitudes of bodies q and contact forces F, conjugate where the
-    frequency is negative; (P + 1,) signs."""
+    frequency is negative; (P + 1,) signs. force: (W, c) of the contacts."""
 
     parts: list[Any]
     w: Array
     q: list[Any]
     F: list[Any]
     sign: Array
+    force: Array
 
 
-def _shown(b: TwoTone, p: Point) -> _Shown:
+def _shown(b: TwoTone, p: TwoTonePoint) -> _Shown:
     v = b.displacement(p.x)
     force = b.forces(v, p.first, p.second, slopes=False)[0]
     views, w = b.views(p.first, p.second), b.torus.frequencies(p.first, p.second)
@@ -232,17 +209,17 @@ def _shown(b: TwoTone, p: Point) -> _Shown:
     F, g = stacked.complex(force), stacked.complex(force - v @ b.problem.stiffness[0].T)
     q = [one.modal - one.modal_compliance @ own for one, own in zip(views, g, strict=True)]
     parts = [b.parts[0, 0], *(b.linear(k)[0] for k in b.torus.pairs)]
-    return _Shown(parts, np.append(0.0, np.abs(w)), q, list(F), stacked.sign)
+    return _Shown(parts, np.append(0.0, np.abs(w)), q, list(F), stacked.sign, force)
 
 
-def _amplitudes(b: TwoTone, p: Point) -> Array:
+def _amplitudes(b: TwoTone, p: TwoTonePoint) -> Array:
     """(w, P + 1) complex, of the pairs as they are named."""
     s = _shown(b, p)
     each = [reduced.monitored(part, q, F) for part, q, F in zip(s.parts, s.q, s.F, strict=True)]
     return np.array([y if sign > 0 else y.conj() for y, sign in zip(each, s.sign, strict=True)]).T
 
 
-def _powers(b: TwoTone, p: Point) -> list[float]:
+def _powers(b: TwoTone, p: TwoTonePoint) -> list[float]:
     """W: of the loads of either tone, in the bodies, into the contacts by harmonics, and by the contacts' own count."""
     s, supplied, damped = _shown(b, p), [0.0, 0.0], 0.0
     for k, part, w, q, F in zip(b.torus.pairs, s.parts[1:], s.w[1:], s.q[1:], s.F[1:], strict=True):
@@ -250,10 +227,8 @@ def _powers(b: TwoTone, p: Point) -> list[float]:
             done, lost, *_ = reduced.work([part], float(w), [1], q[None], F[None])
             supplied[int(k[0] == 0)] += done * w / (2 * np.pi)
             damped += lost * w / (2 * np.pi)
-    v = b.displacement(p.x)
-    into = b.forces(v, p.first, p.second, slopes=False)[0]
-    speed = b.torus.differentiated(b.torus.frequencies(p.first, p.second)) @ v
-    exchanged = 0.5 * float((into[1:] * speed[1:]).sum())
+    speed = differentiated(b.torus.frequencies(p.first, p.second)) @ b.displacement(p.x)
+    exchanged = 0.5 * float((s.force[1:] * speed[1:]).sum())
     return [*supplied, damped, exchanged, b.lost(p.x, p.first)]
 
 
@@ -269,13 +244,13 @@ def from_time(b: TwoTone, time: Array, d: Array, first: float, around: float) ->
     for one in b.contacts:
         offset[one.group.first] = one.group.offset
     moved = d.T - offset
-    size = float(np.abs((moved - moved.mean(axis=0)) / b.problem.scale).max(initial=0.0))
+    size = largest((moved - moved.mean(axis=0)) / b.problem.scale)
     b = replace(b, problem=replace(b.problem, length=b.problem.length * (0.1 * size or 1.0)))
     y = moved / b.problem.scale
     few = replace(b.torus, order=min(b.torus.order, 5))
 
     def fitted(second: float, torus: Torus, which: Any = slice(None)) -> tuple[Array, float]:
-        E = with_mean(time[:, None] * torus.frequencies(first, second)[which])
+        E = summed(time[:, None] * torus.frequencies(first, second)[which])
         c, *_ = np.linalg.lstsq(E, y, rcond=None)
         return c, float(np.square(E @ c - y).sum())
 
@@ -289,9 +264,9 @@ def from_time(b: TwoTone, time: Array, d: Array, first: float, around: float) ->
     def missed(second: float) -> float:
         return fitted(second, few)[1]
 
-    found = scipy.optimize.minimize_scalar(missed, bounds=bounds, method="bounded", options=options)
-    c = fitted(float(found.x), b.torus)[0]
-    x = np.append(c.ravel(), found.x)
+    fit = scipy.optimize.minimize_scalar(missed, bounds=bounds, method="bounded", options=options)
+    c = fitted(float(fit.x), b.torus)[0]
+    x = np.append(c.ravel(), fit.x)
     if not _vibrates(b, x):
         raise UserError("second: the motion in time shows no second frequency near it; correct second, or the start")
     return b, x

@@ -26,13 +26,13 @@ from ..contact.law import Law
 from ..data import Array, ComplexArray
 from ..errors import UserError
 from ..programs import program
+from ..series import Torus, closed, commensurate, differentiated
 from ..system.assembly import Assembly, Linear
 from . import problem as balance
 from . import reduced
 from .by_hand import ElasticSpring
 from .forces import AFT
 from .problem import Group, Problem
-from .torus import Torus, closed, commensurate
 
 CYCLES = 100
 """Marched at most along the closed line."""
@@ -42,7 +42,7 @@ PERIODICITY = 1e-10
 
 
 @dataclass(frozen=True, eq=False)
-class Contacts:
+class TwoToneContacts:
     """Equal contacts. Attributes: group. model: of their forces on the closed line. ground: (c n, 3) m/s under them."""
 
     group: Group
@@ -63,7 +63,7 @@ class Contacts:
         """Of all points."""
         return self.model.law
 
-    def on(self, torus: Torus) -> Contacts:
+    def on(self, torus: Torus) -> TwoToneContacts:
         """The same on another line."""
         return replace(self, model=replace(self.model, torus=torus))
 
@@ -87,7 +87,7 @@ class TwoTone:
 
     problem: Problem
     parts: dict[tuple[int, int], Linear]
-    contacts: tuple[Contacts, ...]
+    contacts: tuple[TwoToneContacts, ...]
     torus: Torus
     second: float
     free: bool = False
@@ -113,9 +113,9 @@ class TwoTone:
         Raises:
             UserError: contacts that remember while the two have a common period.
         """
-        found = replace(self, second=second, lam_scale=first)
+        other = replace(self, second=second, lam_scale=first)
         if not any(one.remember for one in self.contacts):
-            return found
+            return other
         small = commensurate(first, second, self.torus.order)
         if small and not self.free:
             raise UserError(
@@ -124,7 +124,7 @@ class TwoTone:
                 f"{small[1]} of their common frequency and use harmonic_response"
             )
         torus = replace(self.torus, turns=closed(first, second, self.least))
-        return replace(found, torus=torus, contacts=tuple(one.on(torus) for one in self.contacts))
+        return replace(other, torus=torus, contacts=tuple(one.on(torus) for one in self.contacts))
 
     def frequencies(self, x: Array, first: float) -> tuple[float, float]:
         """rad/s."""
@@ -143,12 +143,12 @@ class TwoTone:
     def views(self, first: float, second: float) -> list[reduced.Seen]:
         """Of the mean and every pair, at their frequencies; of negative ones conjugate."""
         w, k = self.torus.frequencies(first, second), self.problem.stiffness[0]
-        found = [reduced.seen(self.parts[0, 0], k, 0.0, 0)]
+        seen = [reduced.seen(self.parts[0, 0], k, 0.0, 0)]
         for pair, one in zip(self.torus.pairs, w, strict=True):
             part, share = self.linear(pair)
             part = replace(part, load=share * part.load, given=share * part.given)
-            found.append(reduced.seen(part, k, float(abs(one)), 1))
-        return found
+            seen.append(reduced.seen(part, k, float(abs(one)), 1))
+        return seen
 
     def evaluate(self, x: Array, lam: float) -> tuple[Array, Array, Array]:
         """R, dR/dx and dR/dlam; of a free second frequency with the phase condition as the last row."""
@@ -179,7 +179,7 @@ class TwoTone:
         if not self.free:
             return R, A, tones[0].ravel()
         assert self.reference is not None
-        phase = (self.torus.differentiated(self.torus.pairs[:, 1].astype(float)) @ self.reference / p.scale).ravel()
+        phase = (differentiated(self.torus.pairs[:, 1]) @ self.reference / p.scale).ravel()
         off = (v - self.reference) / p.scale
         size = np.linalg.norm(phase) or 1.0
         big = np.block([[A, tones[1].reshape(-1, 1)], [phase[None] / size, np.zeros((1, 1))]])
@@ -201,7 +201,7 @@ class TwoTone:
         return force, over, tones
 
     def _of(
-        self, one: Contacts, u: Array, first: float, second: float, slopes: bool
+        self, one: TwoToneContacts, u: Array, first: float, second: float, slopes: bool
     ) -> tuple[Array, Array, Array]:  # fmt: skip
         """(c, k, W) forces of equal contacts, (c, k, W, k, W) slopes and (2, c, k, W) those over the frequencies."""
         t, none = self.torus, np.zeros((2, *u.shape))
@@ -209,15 +209,15 @@ class TwoTone:
             period = self.period(first, second)
             F, S = one.model.forces(u, period) if slopes else (one.model.force(u, period), np.zeros(0))
             return F.copy(), S, none
-        rates = [t.values @ t.differentiated(t.pairs[:, i].astype(float)) for i in (0, 1)]
+        rates = [t.values @ differentiated(t.pairs[:, i]) for i in (0, 1)]
         ahead = first * rates[0] + second * rates[1]
         F, S, D = map(np.asarray, _pointwise(one.law, one.kinematics, u, one.ground, t.values, ahead))
-        found = np.einsum("ws,scj->cjw", t.transform, F)
+        force = np.einsum("ws,scj->cjw", t.transform, F)
         if not slopes:
-            return found, np.zeros(0), none
+            return force, np.zeros(0), none
         moved = [np.einsum("scab,sx,cbx->sca", D, rate, u, optimize=True) for rate in rates]
         by_tone = np.array([np.einsum("ws,scj->cjw", t.transform, m) for m in moved])
-        return found, self._transformed(S, D, ahead), by_tone
+        return force, self._transformed(S, D, ahead), by_tone
 
     def _transformed(self, S: Array, D: Array, ahead: Array) -> Array:
         """(c, k, W, k, W) from slopes over displacement and velocity at the samples, (S, c, k, k)."""
@@ -240,7 +240,7 @@ class TwoTone:
                 period = self.period(*own)
                 total += sum(float(c.lost.sum()) for c in one.model.point_cycles(u, period)) / period
             else:
-                ahead = self.torus.values @ self.torus.differentiated(self.torus.frequencies(*own))
+                ahead = self.torus.values @ differentiated(self.torus.frequencies(*own))
                 F = np.asarray(_pointwise(one.law, one.kinematics, u, one.ground, self.torus.values, ahead)[0])
                 total += float((F * np.einsum("sw,cjw->scj", ahead, u)).sum() / len(F))
         return total
@@ -333,11 +333,12 @@ def of(
     problem = balance.of(plain, 1, form="relative")
     torus = Torus(order, closed(first, second, turns), samples * round(1.5 * turns))  # one program for all lines
     groups = tuple(_contacts(g, grounds, torus) for g in problem.groups)
-    made = TwoTone(problem, _parts(assembly, order), groups, torus, second, free=free, lam_scale=first, least=turns)
-    return made.at(first, second)
+    parts = _parts(assembly, order)
+    balanced = TwoTone(problem, parts, groups, torus, second, free=free, lam_scale=first, least=turns)
+    return balanced.at(first, second)
 
 
-def _contacts(g: Group, grounds: Sequence[Any], torus: Torus) -> Contacts:
+def _contacts(g: Group, grounds: Sequence[Any], torus: Torus) -> TwoToneContacts:
     assert isinstance(g.model, AFT)
     patch, n = g.model.patch, len(g.contacts)
     ground = np.zeros((n, len(patch.points), 3))
@@ -347,10 +348,10 @@ def _contacts(g: Group, grounds: Sequence[Any], torus: Torus) -> Contacts:
                 raise UserError("ground: wavy ground has frequencies of its own; leave waviness out")
             ground[i, :, 1:] = moves.velocity * np.array([np.cos(moves.angle), np.sin(moves.angle)])
     made = replace(g.model, samples=torus.count, cycles=CYCLES, periodicity=PERIODICITY, torus=torus)
-    found = Contacts(g, made, ground.reshape(-1, 3))
-    if found.remember and ground.any():
+    contacts = TwoToneContacts(g, made, ground.reshape(-1, 3))
+    if contacts.remember and ground.any():
         raise UserError("ground: moves under a contact that remembers; take friction by the velocity alone")
-    return found
+    return contacts
 
 
 def _parts(assembly: Assembly, order: int) -> dict[tuple[int, int], Linear]:
@@ -360,9 +361,9 @@ def _parts(assembly: Assembly, order: int) -> dict[tuple[int, int], Linear]:
         loads = tuple(replace(x, tone=1) for x in assembly.loads if x.tone == tone or not x.harmonic)
         return replace(assembly, loads=loads).joined(harmonic)
 
-    found = {(0, 0): linear(1, 0), (1, 1): replace(assembly, loads=()).joined(1)}
+    parts = {(0, 0): linear(1, 0), (1, 1): replace(assembly, loads=()).joined(1)}
     for tone, harmonic in sorted({(x.tone, x.harmonic) for x in assembly.loads if x.harmonic}):
         if harmonic > order:
             raise UserError(f"harmonics: {order} are balanced and a load has harmonic {harmonic}; raise harmonics")
-        found[(harmonic, 0) if tone == 1 else (0, harmonic)] = linear(tone, harmonic)
-    return found
+        parts[(harmonic, 0) if tone == 1 else (0, harmonic)] = linear(tone, harmonic)
+    return parts

@@ -8,7 +8,9 @@ sixteen columns or between commas.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections import defaultdict
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -54,10 +56,60 @@ class _Card(list[str]):
 
     @property
     def where(self) -> str:
-        return f"line {self.line}: {self[0]} {_at(self, 1)}"
+        return f"line {self.line}: {self.name}"
+
+    @property
+    def name(self) -> str:
+        return f"{self[0]} {self.at(1)}"
+
+    def at(self, place: int) -> str:
+        return self[place] if place < len(self) else ""
+
+    def whole(self, place: int, otherwise: int | None = None) -> int:
+        text = self.at(place)
+        if not text and otherwise is not None:
+            return otherwise
+        if not re.fullmatch(r"[+-]?\d{1,12}", text):
+            raise Damaged(f"{self.name} holds '{text[:20]}' where a whole number belongs")
+        return int(text)
+
+    def real(self, place: int) -> float | None:
+        """A number as Nastran writes it: 1.5-3 is 1.5E-3. None: blank."""
+        text = self.at(place).replace("D", "E")
+        if not text:
+            return None
+        try:
+            return float(re.sub(r"(?<=[\d.])([+-]\d+)$", r"E\1", text) if "E" not in text else text)
+        except ValueError:
+            raise Damaged(f"{self.name} holds '{text[:20]}' where a number belongs") from None
+
+    def directions(self, place: int) -> str:
+        return "".join(name for name, digit in zip("xyzabc", "123456", strict=True) if digit in self.at(place))
 
 
-Cards = dict[str, list[_Card]]
+@dataclass
+class _Bulk:
+    """The cards of a file by their names. held: what its constraints hold."""
+
+    file: str
+    text: str
+    cards: defaultdict[str, list[_Card]]
+    raw: RawMesh
+    numbering: Numbering
+    held: Constraints = field(default_factory=Constraints)
+
+    def where(self, card: _Card) -> str:
+        return f"{self.file}, {card.where}"
+
+    def positions(self, card: _Card, numbers: Sequence[int]) -> Indices:
+        """Of nodes that a card names."""
+        return self.numbering.positions(numbers, f"{self.where(card)} names")
+
+    def numbered(self, names: Iterable[str], number: int) -> Iterator[_Card]:
+        """Cards of these names that have a number."""
+        return (card for name in names for card in self.cards[name] if card.whole(1) == number)
+
+
 _EVERY = ("xyz", "abc", "xyzabc")  # directions that mean the same in every system
 
 
@@ -67,30 +119,29 @@ def read_bdf(path: Path) -> RawMesh:
     Raises:
         Damaged: content that is inconsistent, or whose meaning would be lost.
     """
-    cards: Cards = {}
-    text = path.read_text(encoding="latin-1")
+    text, cards = path.read_text(encoding="latin-1"), defaultdict[str, list[_Card]](list)
     for card in _cards(text):
-        cards.setdefault(card[0], []).append(card)
+        cards[card[0]].append(card)
+    others = {name: c for name, c in cards.items() if name not in _READ}
     raw = _grid(cards)
-    numbering = Numbering(raw.node_id)
-    properties = _elements(cards, raw, numbering)
-    named = any(cards.get(name) for name in (*_PROPERTIES, "MAT1", *_MATERIALS))
-    raw.materials = [_material(cards, p) for p in properties] if named else []
+    bulk = _Bulk(path.name, text, cards, raw, Numbering(raw.node_id))
+    properties = _elements(bulk)
+    if any(cards[name] for name in (*_PROPERTIES, "MAT1", *_MATERIALS)):
+        raw.materials = [_material(bulk, p) for p in properties]
     if not raw.materials:
         raw.regions = []
-    _shells(cards, raw, numbering)
+    _shells(bulk)
     for name, label, first in (("SET1", "SET", 2), ("SPC1", "SPC", 3)):
-        for card in cards.get(name, []):
-            raw.add_set(f"{label} {card[1]}", _listed(card, first, numbering), numbering)
-    held = _constraints(cards, text, numbering)
-    others = {name: c for name, c in cards.items() if name not in _READ}
+        for card in cards[name]:
+            raw.add_set(f"{label} {card[1]}", _listed(card, first, bulk.numbering), bulk.numbering)
+    _constrain(bulk)
     raw.lost = [
         lost(f"{path.name}, line {c[0].line}", f"{name} ({len(c)} card{'s' * (len(c) > 1)})")
         for name, c in others.items()
         if _COUNTS.fullmatch(name)
     ]
     raw.lost += [
-        f"{path.name}, {c.where}: a material over temperature, of which MAT1 alone is read: "
+        f"{bulk.where(c)}: a material over temperature, of which MAT1 alone is read: "
         "frequencies will differ by a factor"
         for name in others
         if name.startswith("MATT")
@@ -100,9 +151,8 @@ def read_bdf(path: Path) -> RawMesh:
     raw.lost += stress
     unused = (n for n in others if not (_COUNTS.fullmatch(n) or _SILENT.fullmatch(n)))
     raw.remarks += ignored(unused, _LOADS, bool(stress))
-    raw.links = [*_rigid(cards, path.name, numbering, held), *_averages(cards, path.name, numbering, held)]
-    raw.links += _equations(cards, path.name, text, numbering, held, raw.lost)
-    add_supports(raw, held, numbering)
+    raw.links = [*_rigid(bulk), *_averages(bulk), *_equations(bulk)]
+    add_supports(raw, bulk.held, bulk.numbering)
     if not re.search(r"^\s*ENDDATA\b", text, re.IGNORECASE | re.MULTILINE):
         raw.unended = "no ENDDATA"  # a warning: decks are also kept as parts that others include
     return raw
@@ -172,31 +222,7 @@ def _fields(line: str, number: int) -> list[str]:
     return [line[:8].strip(), *(line[8 + i * width : 8 + (i + 1) * width].strip() for i in range(count))]
 
 
-def _at(card: list[str], place: int) -> str:
-    return card[place] if place < len(card) else ""
-
-
-def _whole(card: list[str], place: int, otherwise: int | None = None) -> int:
-    text = _at(card, place)
-    if not text and otherwise is not None:
-        return otherwise
-    if not re.fullmatch(r"[+-]?\d{1,12}", text):
-        raise Damaged(f"{card[0]} {_at(card, 1)} holds '{text[:20]}' where a whole number belongs")
-    return int(text)
-
-
-def _real(card: list[str], place: int) -> float | None:
-    """A number as Nastran writes it: 1.5-3 is 1.5E-3. None: blank."""
-    text = _at(card, place).replace("D", "E")
-    if not text:
-        return None
-    try:
-        return float(re.sub(r"(?<=[\d.])([+-]\d+)$", r"E\1", text) if "E" not in text else text)
-    except ValueError:
-        raise Damaged(f"{card[0]} {_at(card, 1)} holds '{text[:20]}' where a number belongs") from None
-
-
-def _listed(card: list[str], first: int, numbering: Numbering | None = None) -> list[int]:
+def _listed(card: _Card, first: int, numbering: Numbering | None = None) -> list[int]:
     """Numbers from a place on; A THRU B (BY C) is a range, of the grid points that are there."""
     words = [w for w in card[first:] if w]
     members: list[int] = []
@@ -213,45 +239,45 @@ def _listed(card: list[str], first: int, numbering: Numbering | None = None) -> 
             there = numbering.between(start, end)
             members = [*members[:-1], *there[(there - start) % step == 0].tolist()]
         elif word == "THRU":
-            raise Damaged(f"{card[0]} {_at(card, 1)} holds THRU without its ends")
+            raise Damaged(f"{card.name} holds THRU without its ends")
         elif word.isdecimal() and len(word) < 13:
             members.append(int(word))
         else:
-            raise Damaged(f"{card[0]} {_at(card, 1)} holds '{word[:20]}' where the number of a point belongs")
+            raise Damaged(f"{card.name} holds '{word[:20]}' where the number of a point belongs")
     return members
 
 
 # content -------------------------------------------------------------------------------------------------------------
 
 
-def _grid(cards: Cards) -> RawMesh:
-    if not cards.get("GRID"):
+def _grid(cards: Mapping[str, list[_Card]]) -> RawMesh:
+    if "GRID" not in cards:
         raise Damaged("it holds no GRID card")
     ids, points = [], []
     for card in cards["GRID"]:
-        ids.append(_whole(card, 1))
-        if _whole(card, 2, 0) != 0:
+        ids.append(card.whole(1))
+        if card.whole(2, 0) != 0:
             raise Damaged(f"GRID {ids[-1]} uses the local coordinate system {card[2]}; write it in the basic one")
-        points.append([_real(card, place) or 0.0 for place in (3, 4, 5)])
+        points.append([card.real(place) or 0.0 for place in (3, 4, 5)])
     return RawMesh(np.array(points), np.array(ids, dtype=np.int64))
 
 
-def _elements(cards: Cards, raw: RawMesh, numbering: Numbering) -> list[int]:
+def _elements(bulk: _Bulk) -> list[int]:
     """Add the solids; the properties that they name, in the order of their regions."""
     blocks: dict[str, list[tuple[int, int, list[int]]]] = {}
     properties: dict[int, int] = {}
     for name in _SOLIDS:
-        for card in cards.get(name, []):
-            number, region = _whole(card, 1), properties.setdefault(_whole(card, 2), len(properties))
+        for card in bulk.cards[name]:
+            number, region = card.whole(1), properties.setdefault(card.whole(2), len(properties))
             kind, nodes = _cell(name, number, card)
             blocks.setdefault(kind, []).append((number, region, nodes))
-    raw.add_solids(blocks, numbering, "an element names")
+    bulk.raw.add_solids(blocks, bulk.numbering, "an element names")
     return list(properties)
 
 
-def _cell(name: str, number: int, card: list[str]) -> tuple[str, list[int]]:
+def _cell(name: str, number: int, card: _Card) -> tuple[str, list[int]]:
     forms = _SOLIDS[name]
-    nodes = [_whole(card, place, 0) for place in range(3, len(card))]
+    nodes = [card.whole(place, 0) for place in range(3, len(card))]
     while nodes and nodes[-1] == 0:
         nodes.pop()
     if len(nodes) not in forms or min(nodes) < 1:
@@ -261,76 +287,64 @@ def _cell(name: str, number: int, card: list[str]) -> tuple[str, list[int]]:
     return kind, [nodes[i] for i in places]
 
 
-def _material(cards: Cards, property_: int) -> DeckMaterial:
+def _material(bulk: _Bulk, property_: int) -> DeckMaterial:
     """What a property's cells are made of."""
-    layered = [
-        c[0] for name in _PROPERTIES[:-1] for c in cards.get(name, []) if _whole(c, 1) == property_
-    ]
-    if layered:
+    where, nothing = f"PSOLID {property_}", np.zeros(6)
+    for layered in bulk.numbered(_PROPERTIES[:-1], property_):
         refused = "a property that is not read; write PSOLID with a MAT1, or [material] in a body.toml"
-        return DeckMaterial(f"{layered[0]} {property_}", None, None, np.zeros(6), None, "", refused)
-    solid = next((c for c in cards.get("PSOLID", []) if _whole(c, 1) == property_), None)
+        return DeckMaterial(f"{layered[0]} {property_}", None, None, nothing, refused=refused)
+    solid = next(bulk.numbered(["PSOLID"], property_), None)
     if solid is None:
-        return DeckMaterial("", None, None, np.zeros(6), None, f"of property {property_}, which no PSOLID defines")
-    number, where = _whole(solid, 2), f"PSOLID {property_}"
-    card = next((c for c in cards.get("MAT1", []) if _whole(c, 1) == number), None)
+        return DeckMaterial("", None, None, nothing, where=f"of property {property_}, which no PSOLID defines")
+    number = solid.whole(2)
+    card = next(bulk.numbered(["MAT1"], number), None)
     if card is None:
-        others = [c[0] for m in _MATERIALS for c in cards.get(m, []) if _at(c, 1) == str(number)]
-        name = f"{(others or ['MAT1'])[0]} {number}"
-        refused = "a form that is not read; write it as MAT1, or give density and stiffness in a body.toml"
-        if others:
-            return DeckMaterial(name, None, None, np.zeros(6), None, where, refused)
-        return DeckMaterial(f"{name} (missing)", None, None, np.zeros(6), None, where)
-    E, G, nu = (_real(card, place) for place in (2, 3, 4))
+        for other in (c for m in _MATERIALS for c in bulk.cards[m] if c.at(1) == str(number)):
+            refused = "a form that is not read; write it as MAT1, or give density and stiffness in a body.toml"
+            return DeckMaterial(other.name, None, None, nothing, where=where, refused=refused)
+        return DeckMaterial(f"MAT1 {number} (missing)", None, None, nothing, where=where)
+    E, G, nu, density = map(card.real, (2, 3, 4, 5))
     if E is None and G is not None and nu is not None:
         E = 2 * G * (1 + nu)
     if nu is None and E is not None and G:
         nu = E / (2 * G) - 1
+    factor = next((c.real(2) for c in bulk.cards["PARAM"] if c.at(1) == "WTMASS"), None)
+    if density is not None and factor is not None:  # which turns a weight into a mass
+        density *= factor
     name = f"MAT1 {number}"
     if E is None or nu is None:
-        return DeckMaterial(name, None, _density(cards, card), np.zeros(6), None, where)
+        return DeckMaterial(name, None, density, nothing, where=where)
     C, _ = isotropic_rows(name, np.array([[E, nu, 0.0]]))
-    expansion = turned_strain(np.full(3, _real(card, 6) or 0.0), None)
-    return DeckMaterial(name, C, _density(cards, card), expansion, None, where)
+    expansion = turned_strain(np.full(3, card.real(6) or 0.0), None)
+    return DeckMaterial(name, C, density, expansion, where=where)
 
 
-def _density(cards: Cards, card: list[str]) -> float | None:
-    """RHO times PARAM WTMASS, which turns a weight into a mass."""
-    factor = next((_real(c, 2) for c in cards.get("PARAM", []) if _at(c, 1) == "WTMASS"), None)
-    density = _real(card, 5)
-    return density if density is None or factor is None else density * factor
-
-
-def _constraints(cards: Cards, text: str, numbering: Numbering) -> Constraints:
+def _constrain(bulk: _Bulk) -> None:
     """Zero displacements: GRID's own, and those of the sets that the case control chooses, or the only one."""
-    held = Constraints(turned={_whole(c, 1) for c in cards["GRID"] if _whole(c, 6, 0) != 0})
+    held, cards = bulk.held, bulk.cards
+    held.turned = {c.whole(1) for c in cards["GRID"] if c.whole(6, 0) != 0}
     for card in cards["GRID"]:
-        held.hold(_whole(card, 1), _directions(_at(card, 7)))
-    chosen = _chosen(cards, text, held)
-    for card in cards.get("SPC1", []):
-        if _whole(card, 1) in chosen:
-            for node in _listed(card, 3, numbering):
-                held.hold(node, _directions(_at(card, 2)))
-    for card in cards.get("SPC", []):
-        for place in (2, 5) if _whole(card, 1) in chosen else ():
-            node, directions = _whole(card, place, 0), _directions(_at(card, place + 1))
-            if node and (_real(card, place + 2) or 0.0) != 0:
+        held.hold(card.whole(1), card.directions(7))
+    chosen = _chosen(bulk, held)
+    for card in cards["SPC1"]:
+        if card.whole(1) in chosen:
+            for node in _listed(card, 3, bulk.numbering):
+                held.hold(node, card.directions(2))
+    for card in cards["SPC"]:
+        for place in (2, 5) if card.whole(1) in chosen else ():
+            node = card.whole(place, 0)
+            if node and (card.real(place + 2) or 0.0) != 0:
                 held.left_out.append(f"SPC {card[1]} displaces node {node}")
             elif node:
-                held.hold(node, directions)
-    return held
+                held.hold(node, card.directions(place + 1))
 
 
-def _directions(components: str) -> str:
-    return "".join(name for name, digit in zip("xyzabc", "123456", strict=True) if digit in components)
-
-
-def _chosen(cards: Cards, text: str, held: Constraints, kind: str = "SPC") -> set[int]:
+def _chosen(bulk: _Bulk, held: Constraints, kind: str = "SPC") -> set[int]:
     """Numbers of the sets of constraints that hold, those that they are made of included."""
-    control = re.split(r"^\s*BEGIN\s+BULK", text, maxsplit=1, flags=re.IGNORECASE | re.MULTILINE)
+    control = re.split(r"^\s*BEGIN\s+BULK", bulk.text, maxsplit=1, flags=re.IGNORECASE | re.MULTILINE)
     pattern = re.compile(rf"^\s*{kind}\s*=\s*(\d{{1,9}})\b", re.IGNORECASE | re.MULTILINE)
     named = pattern.findall(control[0]) if len(control) > 1 else []
-    every = {_whole(c, 1) for name in (kind, f"{kind}1") for c in cards.get(name, [])}
+    every = {c.whole(1) for name in (kind, f"{kind}1") for c in bulk.cards[name]}
     if not named and every and len(control) > 1:
         sets = "the only set" if len(every) == 1 else "several sets"
         held.left_out.append(
@@ -345,97 +359,94 @@ def _chosen(cards: Cards, text: str, held: Constraints, kind: str = "SPC") -> se
         held.left_out.append(
             f"subcases choose several sets of {kind} ({', '.join(named)}); all of them hold here at once"
         )
-    known = every | {_whole(c, 1) for c in cards.get(f"{kind}ADD", [])}
+    unions = bulk.cards[f"{kind}ADD"]
+    known = every | {c.whole(1) for c in unions}
     if unknown := sorted(chosen - known):
         held.left_out.append(f"the set {kind} = {unknown[0]} of the case control is not defined, so it does not hold")
-    for card in cards.get(f"{kind}ADD", []):
-        if _whole(card, 1) in chosen:
+    for card in unions:
+        if card.whole(1) in chosen:
             chosen |= set(_listed(card, 2))
     return chosen
 
 
-def _refuse_turned(where: str, nodes: Iterable[int], held: Constraints) -> None:
+def _refuse_turned(bulk: _Bulk, card: _Card, nodes: Iterable[int]) -> None:
     """Raises `Damaged` if the directions of a node are those of a local system (CD)."""
-    if found := next((node for node in nodes if node in held.turned), None):
+    if turned := next((node for node in nodes if node in bulk.held.turned), None):
         raise Damaged(
-            f"{where} takes single directions of GRID {found} in a local system (CD); write it in the basic one"
+            f"{bulk.where(card)} takes single directions of GRID {turned} in a local system (CD); "
+            "write it in the basic one"
         )
 
 
-def _rigid(cards: Cards, name: str, numbering: Numbering, held: Constraints) -> Iterator[Link]:
+def _rigid(bulk: _Bulk) -> Iterator[Link]:
     """RBE2: points that follow one as a rigid body does, in some of its directions."""
-    for card in cards.get("RBE2", []):
-        where = f"{name}, {card.where}"
+    for card in bulk.cards["RBE2"]:
         listed = [word for word in card[4:] if word.isdecimal()] if "THRU" not in card else card[4:]
-        members = _listed([*card[:4], *listed], 4, numbering)
+        members = _listed(_Card([*card[:4], *listed]), 4, bulk.numbering)
         if not members:
-            raise Damaged(f"{where} couples no nodes to its node {_at(card, 2)}; add them")
-        reference = numbering.positions(np.array([_whole(card, 2)]), f"{where} names")
-        ways = _directions(_at(card, 3))
+            raise Damaged(f"{bulk.where(card)} couples no nodes to its node {card.at(2)}; add them")
+        reference, ways = bulk.positions(card, [card.whole(2)]), card.directions(3)
         if ways not in _EVERY:
-            _refuse_turned(where, [_whole(card, 2), *members], held)
-        positions = numbering.positions(np.array(members, dtype=np.int64), f"{where} names")
-        yield RigidLink(where, int(reference[0]), positions, ways)
+            _refuse_turned(bulk, card, [card.whole(2), *members])
+        yield RigidLink(bulk.where(card), int(reference[0]), bulk.positions(card, members), ways)
 
 
-def _averages(cards: Cards, name: str, numbering: Numbering, held: Constraints) -> Iterator[Link]:
+def _averages(bulk: _Bulk) -> Iterator[Link]:
     """RBE3: a point that follows others in the mean."""
-    for card in cards.get("RBE3", []):
-        where = f"{name}, {card.where}"
+    for card in bulk.cards["RBE3"]:
+        where = bulk.where(card)
         if "UM" in card:
             raise Damaged(f"{where} names its dependent displacements by UM, which is not read; leave it out")
         members: list[int] = []
         weights: list[float] = []
         place, end = 5, card.index("ALPHA") if "ALPHA" in card else len(card)
         while place < end:
-            if not _at(card, place):
+            if not card.at(place):
                 place += 1
                 continue
-            weight = _real(card, place)
-            if not set("123") <= set(_at(card, place + 1)):
-                raise Damaged(f"{where} takes single directions of its points ({_at(card, place + 1)}); 123 is read")
+            weight = card.real(place) or 0.0
+            if not set("123") <= set(card.at(place + 1)):
+                raise Damaged(f"{where} takes single directions of its points ({card.at(place + 1)}); 123 is read")
             place += 2
             while place < end and (not card[place] or card[place].isdecimal()):
                 if card[place]:
                     members.append(int(card[place]))
-                    weights.append(weight or 0.0)
+                    weights.append(weight)
                 place += 1
         if not members:
             raise Damaged(f"{where} follows no nodes; add them")
-        if _directions(_at(card, 4)) not in _EVERY:
-            _refuse_turned(where, [_whole(card, 3)], held)
-        reference = numbering.positions(np.array([_whole(card, 3)]), f"{where} names")
-        positions = numbering.positions(np.array(members, dtype=np.int64), f"{where} names")
-        yield AverageLink(where, int(reference[0]), positions, np.array(weights), _directions(_at(card, 4)))
+        ways = card.directions(4)
+        if ways not in _EVERY:
+            _refuse_turned(bulk, card, [card.whole(3)])
+        reference, positions = bulk.positions(card, [card.whole(3)]), bulk.positions(card, members)
+        yield AverageLink(where, int(reference[0]), positions, np.array(weights), ways)
 
 
-def _equations(
-    cards: Cards, name: str, text: str, numbering: Numbering, held: Constraints, left_out: list[str]
-) -> Iterator[Link]:
+def _equations(bulk: _Bulk) -> Iterator[Link]:
     """MPC of the sets that the case control chooses, or of the only one of a file without case control."""
     own = Constraints()
-    chosen = _chosen(cards, text, own, "MPC")
-    left_out += [f"{name}: {told}" for told in own.left_out]
-    for card in cards.get("MPC", []):
-        if _whole(card, 1) not in chosen:
+    chosen = _chosen(bulk, own, "MPC")
+    bulk.raw.lost += [f"{bulk.file}: {left_out}" for left_out in own.left_out]
+    for card in bulk.cards["MPC"]:
+        if card.whole(1) not in chosen:
             continue
-        where = f"{name}, {card.where}"
-        places = [p + s for p in range(2, len(card), 8) for s in (0, 3) if _at(card, p + s)]
-        nodes = numbering.positions(np.array([_whole(card, p) for p in places], dtype=np.int64), f"{where} names")
-        ways = [_whole(card, p + 1, 0) - 1 for p in places]
+        places = [p + s for p in range(2, len(card), 8) for s in (0, 3) if card.at(p + s)]
+        numbers = [card.whole(p) for p in places]
+        nodes, ways = bulk.positions(card, numbers), [card.whole(p + 1, 0) - 1 for p in places]
         if not all(0 <= way < 6 for way in ways):
-            raise Damaged(f"{where} names a component that no grid point has (1 to 6)")
-        _refuse_turned(where, [_whole(card, p) for p in places], held)
-        yield Equation(where, nodes, np.array(ways), np.array([_real(card, p + 2) or 0.0 for p in places]))
+            raise Damaged(f"{bulk.where(card)} names a component that no grid point has (1 to 6)")
+        _refuse_turned(bulk, card, numbers)
+        factors = np.array([card.real(p + 2) or 0.0 for p in places])
+        yield Equation(bulk.where(card), nodes, np.array(ways), factors)
 
 
-def _shells(cards: Cards, raw: RawMesh, numbering: Numbering) -> None:
+def _shells(bulk: _Bulk) -> None:
     """Faces by the property of the shells that lie on them."""
-    found: dict[tuple[str, int], list[list[int]]] = {}
+    facets: dict[tuple[str, int], list[list[int]]] = {}
     for name, corners in _SHELLS.items():
-        for card in cards.get(name, []):
-            nodes = [_whole(card, 3 + i) for i in range(corners)]
-            found.setdefault((f"PSHELL {_whole(card, 2, _whole(card, 1))}", corners), []).append(nodes)
-    for (label, _), facets in found.items():
-        table: Indices = np.array(facets, dtype=np.int64)
-        raw.facets.setdefault(label, []).append(numbering.positions(table, f"a shell of {label} names"))
+        for card in bulk.cards[name]:
+            nodes = [card.whole(3 + i) for i in range(corners)]
+            facets.setdefault((f"PSHELL {card.whole(2, card.whole(1))}", corners), []).append(nodes)
+    for (label, _), numbers in facets.items():
+        positions = bulk.numbering.positions(numbers, f"a shell of {label} names")
+        bulk.raw.facets.setdefault(label, []).append(positions)

@@ -22,6 +22,7 @@ class Card:
     Attributes:
         keyword: in capitals, without the star. parameters: in capitals -> as written, INPUT a path.
             lines: of data, without comments. where: ``part.inp, line 12``. place: with its path.
+            space: the instance in which it stands, in capitals; "" is the assembly.
     """
 
     keyword: str
@@ -29,6 +30,15 @@ class Card:
     lines: list[str] = field(default_factory=list)
     where: str = ""
     place: str = ""
+    space: str = ""
+
+    def text(self, key: str) -> str:
+        """A parameter as it is written; empty where there is none."""
+        return self.parameters.get(key, "")
+
+    def word(self, key: str, otherwise: str = "") -> str:
+        """A parameter in capitals."""
+        return self.parameters.get(key, otherwise).upper()
 
 
 def read_cards(path: Path) -> list[Card]:

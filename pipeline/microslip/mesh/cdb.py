@@ -104,7 +104,7 @@ def read_cdb(path: Path) -> RawMesh:
                 at = _BLOCKS[command](archive, words, lines, at + 1)
                 continue
             if command in _COMMANDS:
-                _COMMANDS[command](archive, words)
+                _COMMANDS[command](archive, [*words, *_BLANKS])
         if command in _NOT_READ:
             archive.lost.append(lost(archive.where, command))
         elif re.fullmatch(_LOADS, command):
@@ -246,6 +246,10 @@ def _read_types(archive: _Archive, words: list[str], lines: list[str], at: int) 
     raise Damaged("ETBLOCK has no end, the file is truncated")
 
 
+_BLANKS = [""] * 8
+"""Fields that a line may leave out at its end."""
+
+
 _BLOCKS = {
     "NBLOCK": _read_nodes,
     "EBLOCK": _read_elements,
@@ -258,32 +262,32 @@ _BLOCKS = {
 
 
 def _read_type(archive: _Archive, words: list[str]) -> None:
-    kind = archive.parameters.get(words[1].upper(), words[1]) if len(words) > 2 else ""
-    if str(kind).isdecimal():
+    kind = archive.parameters.get(words[1].upper(), words[1])
+    if str(kind).isdecimal() and words[2]:
         number = re.search(r"\d+$", words[2])
         archive.kinds[_whole(str(kind), "ET")] = int(number[0]) if number else 0
 
 
 def _read_option(archive: _Archive, words: list[str]) -> None:
     """KEYOPT, type, number, value."""
-    if len(words) > 3 and words[2] == "2" and words[3] == "1" and words[1].isdecimal():
+    if words[2:4] == ["2", "1"] and words[1].isdecimal():
         archive.full.add(_whole(words[1], "KEYOPT"))
 
 
 def _read_parameter(archive: _Archive, words: list[str]) -> None:
     """*SET, name, value."""
-    if len(words) > 2 and is_number(words[2]):
+    if is_number(words[2]):
         archive.parameters[words[1].upper()] = int(words[2])
 
 
 def _read_selection(archive: _Archive, words: list[str]) -> None:
     """CMSEL,S,component; every other selection, or all, is none that is known."""
-    chosen = words[0].upper() == "CMSEL" and len(words) > 2 and words[1].upper() in ("S", "")
+    chosen = words[0].upper() == "CMSEL" and words[1].upper() in ("S", "")
     archive.selected = words[2].upper() if chosen else ""
 
 
 def _read_current(archive: _Archive, words: list[str]) -> None:
-    if len(words) > 1 and words[1].isdecimal():
+    if words[1].isdecimal():
         archive.kind = _whole(words[1], "TYPE")
 
 
@@ -296,7 +300,7 @@ def _leave_out(archive: _Archive, words: list[str], kind: int | None = None) -> 
 
 def _stressed(archive: _Archive, words: list[str]) -> None:
     """PSTRES,ON, and a restart of a loaded state (ANTYPE,,RESTART,,,PERTURB)."""
-    on = words[0].upper() == "PSTRES" and len(words) > 1 and words[1].upper() in ("ON", "1")
+    on = words[0].upper() == "PSTRES" and words[1].upper() in ("ON", "1")
     if on or "PERTURB" in (word.upper() for word in words):
         archive.stressed = True
         archive.lost.append(f"{archive.where}: {words[0].upper()}: {PRESTRESSED}")
@@ -304,7 +308,7 @@ def _stressed(archive: _Archive, words: list[str]) -> None:
 
 def _behind_release(words: list[str]) -> list[str]:
     """What stands behind the command and "R5.0, count"."""
-    return words[3:] if len(words) > 1 and words[1].upper().startswith("R") else words[1:]
+    return words[3:] if words[1].upper().startswith("R") else words[1:]
 
 
 def _read_temperatures(archive: _Archive, words: list[str]) -> None:
@@ -333,7 +337,7 @@ def _read_data(archive: _Archive, words: list[str]) -> None:
 
 def _read_constant(archive: _Archive, words: list[str]) -> None:
     """MP, label, material, value[, slopes over temperature]."""
-    if len(words) > 3 and words[3]:
+    if words[3]:
         if any(real(w, "MP") for w in words[4:] if w):
             raise Damaged(f"MP,{words[1]},{words[2]} is a polynomial of temperature; write a table (MPTEMP, MPDATA)")
         material = _whole(words[2] or "1", "MP")
@@ -342,30 +346,30 @@ def _read_constant(archive: _Archive, words: list[str]) -> None:
 
 
 def _read_reference(archive: _Archive, words: list[str]) -> None:
-    if len(words) > 1 and words[1]:
+    if words[1]:
         archive.reference = real(words[1], "TREF")
 
 
 def _read_uniform(archive: _Archive, words: list[str]) -> None:
-    if words[0].upper() == "TUNIF" and len(words) > 1 and words[1]:
+    if words[0].upper() == "TUNIF" and words[1]:
         archive.uniform = real(words[1], "TUNIF")
-    elif len(words) > 2 and words[1].upper() == "TEMP" and words[2] not in ("", "_TINY"):  # how Ansys says none
+    elif words[1].upper() == "TEMP" and words[2] not in ("", "_TINY"):  # how Ansys says none
         archive.uniform = real(words[2], "BFUNIF")
 
 
 def _read_body_force(archive: _Archive, words: list[str]) -> None:
-    if len(words) > 3 and words[2].upper() == "TEMP" and words[1].lstrip("-").isdecimal():
+    if words[2].upper() == "TEMP" and words[1].lstrip("-").isdecimal() and words[3]:
         archive.nodal[_whole(words[1], "BF")] = real(words[3], "BF")
 
 
 def _refuse_temperatures(archive: _Archive, words: list[str]) -> None:
-    if len(words) > 2 and words[2].upper().startswith("TEMP"):
+    if words[2].upper().startswith("TEMP"):
         raise Damaged("BFBLOCK with temperatures is not read; write them as BF commands (CDWRITE, UNBLOCKED)")
 
 
 def _read_displacement(archive: _Archive, words: list[str]) -> None:
     """D, node or component, UX or UY or UZ or ALL, value, its imaginary part, last node, step, further labels."""
-    where, label, value, _, last, step, *more = [*words[1:], *7 * [""]]
+    where, label, value, _, last, step, *more = words[1:]
     directions = "".join("xyzabc" if w.upper() == "ALL" else _LABELS.get(w.upper(), "") for w in (label, *more))
     if not directions:
         return
@@ -393,14 +397,14 @@ _LABELS = {"UX": "x", "UY": "y", "UZ": "z", "ROTX": "a", "ROTY": "b", "ROTZ": "c
 def _read_equation(archive: _Archive, words: list[str]) -> None:
     """CE, number, constant, then node, label, factor in threes; or CE,R5.0,DEFI, length, number, constant and rows
     CE,R5.0,NODE of terms, as archives have it."""
-    if len(words) > 2 and words[1].upper().startswith("R5"):
+    if words[1].upper().startswith("R5"):
         if words[2].upper() == "DEFI":
             archive.open = words[4]
-            number, constant, terms = words[4], (words[5:6] or [""])[0], []
+            number, constant, terms = words[4], words[5], []
         else:
             number, constant, terms = archive.open, "", words[3:]
     else:
-        number, constant, terms = (words[1:2] or [""])[0], (words[2:3] or [""])[0], words[3:]
+        number, constant, *terms = words[1:]
     if constant and real(constant, "CE") != 0:
         raise Damaged(f"the constraint equation CE {number} has the constant {constant}; only 0 is read")
     archive.places.setdefault(f"CE {number}", f"{archive.where}: CE {number}")
@@ -415,7 +419,7 @@ def _read_equation(archive: _Archive, words: list[str]) -> None:
 
 def _read_coupled(archive: _Archive, words: list[str]) -> None:
     """CP, number, label, nodes: displacements that are equal."""
-    number, label, *nodes = [*words[1:], "", ""]
+    number, label, *nodes = words[1:]
     nodes, ways = [n for n in nodes if n], "xyz" if label.upper() == "ALL" else _LABELS.get(label.upper(), "")
     if len(nodes) < 2 or not ways or not all(map(is_number, nodes)):
         raise Damaged(f"CP {number} couples other things than {label or 'UX'} of two nodes or more in its line; use CE")
@@ -428,7 +432,7 @@ def _read_coupled(archive: _Archive, words: list[str]) -> None:
 
 def _read_rigid(archive: _Archive, words: list[str]) -> None:
     """CERIG, master, slave node or component, directions."""
-    master, slave, label = [*words[1:4], "", "", ""][:3]
+    master, slave, label = words[1:4]
     ways = {"": "xyzabc", "ALL": "xyzabc", "UXYZ": "xyz", "RXYZ": "abc"}.get(
         label.upper(), _LABELS.get(label.upper(), "?")
     )
@@ -494,17 +498,16 @@ def _links(archive: _Archive, numbering: Numbering) -> list[Link]:
         where = archive.places[name]
         if not terms:
             raise Damaged(f"the constraint equation {where} has no terms")
-        nodes = numbering.positions(np.array([t[0] for t in terms], dtype=np.int64), f"{where} names")
-        _refuse_turned(archive, where, [t[0] for t in terms])
-        ways = np.array(["xyzabc".index(t[1]) for t in terms])
-        found.append(Equation(where, nodes, ways, np.array([t[2] for t in terms])))
+        numbers, directions, factors = map(list, zip(*terms, strict=True))
+        nodes = numbering.positions(numbers, f"{where} names")
+        _refuse_turned(archive, where, numbers)
+        found.append(Equation(where, nodes, np.array(["xyzabc".index(d) for d in directions]), np.array(factors)))
     for master, slave, moves, where in archive.rigid:
-        members = archive.components.get(slave, [])
-        members = [int(slave)] if is_number(slave) else members
+        members = [int(slave)] if is_number(slave) else archive.components.get(slave, [])
         if not members:
             raise Damaged(f"{where} couples no nodes: '{slave}' is no node and no component of nodes")
-        reference = numbering.positions(np.array([master]), f"{where} names")
-        positions = numbering.positions(np.array(members, dtype=np.int64), f"{where} names")
+        reference = numbering.positions([master], f"{where} names")
+        positions = numbering.positions(members, f"{where} names")
         if moves not in ("xyz", "abc", "xyzabc"):
             _refuse_turned(archive, where, [master, *members])
         if moves:
@@ -625,5 +628,5 @@ def _assign_temperatures(archive: _Archive, raw: RawMesh, numbering: Numbering) 
     raw.temperature[:, 0] = archive.reference or 0.0
     raw.temperature[:, 1] = archive.reference or 0.0 if archive.uniform is None else archive.uniform
     if archive.nodal:
-        at = numbering.positions(np.array(list(archive.nodal)), "BF names")
+        at = numbering.positions(list(archive.nodal), "BF names")
         raw.temperature[at, 1] = list(archive.nodal.values())

@@ -12,6 +12,7 @@ from scipy.sparse.csgraph import connected_components
 from ..data import Equation, FaceTie, Indices, Link, Mesh
 from ..errors import UserError
 from .gates import part_numbers
+from .raw import joined
 
 
 def with_parts(mesh: Mesh) -> Mesh:
@@ -107,29 +108,27 @@ def _moved(link: Link, before: int, after: int, number: Indices) -> Link:
 def nodes_of(mesh: Mesh) -> list[Indices]:
     """Points that each link takes in, those behind its reference nodes too."""
     assert mesh.links is not None
-    found = []
-    for link in mesh.links.items:
-        if isinstance(link, FaceTie):
-            named = [mesh.set_points(n) for n in (link.slave, link.master) if n in {*mesh.faces, *mesh.point_sets}]
-        elif isinstance(link, Equation):
-            named = [link.nodes]
-        else:
-            members = link.members
-            if isinstance(members, str):
-                members = mesh.set_points(members) if members in {*mesh.faces, *mesh.point_sets} else np.zeros(0, int)
-            named = [members, np.array([link.reference])]
-        found.append(np.concatenate([np.zeros(0, dtype=np.int64), *named]))
-    behind = {int(n): np.zeros(0, dtype=np.int64) for nodes in found for n in nodes[nodes >= mesh.n_points]}
+    named = [_named(mesh, link) for link in mesh.links.items]
+    behind = {int(n): np.zeros(0, dtype=np.int64) for nodes in named for n in nodes[nodes >= mesh.n_points]}
+
+    def points_of(nodes: Indices) -> Indices:
+        return np.unique(joined([nodes[nodes < mesh.n_points], *(behind[int(n)] for n in nodes if n in behind)]))
+
     for _ in range(2):  # what a reference node moves, and what moves with that
-        for nodes in found:
-            points = np.unique(
-                np.concatenate([nodes[nodes < mesh.n_points], *(behind[int(n)] for n in nodes if n in behind)])
-            )
+        for nodes in named:
+            points = points_of(nodes)
             behind.update({int(n): np.union1d(behind[int(n)], points) for n in nodes if n in behind})
-    return [
-        np.unique(np.concatenate([nodes[nodes < mesh.n_points], *(behind[int(n)] for n in nodes if n in behind)]))
-        for nodes in found
-    ]
+    return [points_of(nodes) for nodes in named]
+
+
+def _named(mesh: Mesh, link: Link) -> Indices:
+    """Points and reference nodes that a link names."""
+    if isinstance(link, Equation):
+        return link.nodes
+    members = [link.slave, link.master] if isinstance(link, FaceTie) else [link.members]
+    sets = {*mesh.faces, *mesh.point_sets}
+    points = [mesh.set_points(m) if isinstance(m, str) else m for m in members if not isinstance(m, str) or m in sets]
+    return joined([*points, np.array(_references(link), dtype=np.int64)])
 
 
 def bodies(mesh: Mesh) -> list[list[str]]:

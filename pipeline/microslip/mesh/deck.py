@@ -38,6 +38,16 @@ class DeckConstants:
 
 
 @dataclass(frozen=True)
+class DeckSurface:
+    """A surface as its card has it. kind: of its `rows` of words: ELEMENT, NODE, or how it is made of others."""
+
+    name: str
+    kind: str
+    rows: list[list[str]]
+    card: Card
+
+
+@dataclass(frozen=True)
 class Space:
     """Where the numbers and names of an instance stand in the whole: added to numbers, put before names."""
 
@@ -52,8 +62,8 @@ class Deck:
 
     Attributes:
         spaces: instance in capitals -> its place; "" is the assembly's own (or the whole of a flat file).
-        links: constraints, contacts and loads, each with the instance it stands in, resolved at the end.
-        kinds: types of cells. card: that is read. lost: what counts and is not read, in words.
+        links: constraints, contacts and loads; sections: of solids; both resolved at the end.
+        kinds: types of cells. lost: what counts and is not read, in words.
         system: (4, 3) axes and origin in which nodes are written, or None. ignored: keywords that are not used.
     """
 
@@ -65,20 +75,19 @@ class Deck:
     written: dict[str, str] = field(default_factory=dict)
     node_sets: dict[str, list[Indices]] = field(default_factory=dict)
     cell_sets: dict[str, list[Indices]] = field(default_factory=dict)
-    surfaces: list[tuple[str, str, list[list[str]], str, Card]] = field(default_factory=list)
+    surfaces: list[DeckSurface] = field(default_factory=list)
     materials: dict[str, DeckConstants] = field(default_factory=dict)
     current: str = ""
     orientations: dict[str, Array | str] = field(default_factory=dict)
-    sections: list[tuple[str, str, str, str, str]] = field(default_factory=list)
+    sections: list[Card] = field(default_factory=list)
     temperatures: list[tuple[int, str, float]] = field(default_factory=list)
     held: list[tuple[str, str, str]] = field(default_factory=list)
-    card: Card = field(default_factory=lambda: Card(""))
     not_held: list[str] = field(default_factory=list)
     step: int = 0
     renewed: int = -1
     turned: bool = False
     spaces: dict[str, Space] = field(default_factory=lambda: {"": Space()})
-    links: list[tuple[Card, str]] = field(default_factory=list)
+    links: list[Card] = field(default_factory=list)
     system: Array | None = None
     kinds: list[str] = field(default_factory=list)
     ignored: list[str] = field(default_factory=list)
@@ -111,6 +120,22 @@ class Deck:
         """Cell numbers of the whole that a word names."""
         return self._members(self.cell_sets, word, space, cells=True)
 
+    def nodes_for(self, user: str, word: str, space: str = "") -> Indices:
+        """Likewise, for what takes them in, as messages call it.
+
+        Raises:
+            Damaged: there is no such set.
+        """
+        if (numbers := self.nodes(word, space)) is None:
+            raise Damaged(f"{user} names the node set '{word}', which is not defined")
+        return numbers
+
+    def cells_for(self, user: str, word: str, space: str = "") -> Indices:
+        """Likewise of cells."""
+        if (numbers := self.cells(word, space)) is None:
+            raise Damaged(f"{user} names the element set '{word}', which is not defined")
+        return numbers
+
     def _members(self, sets: dict[str, list[Indices]], word: str, space: str, cells: bool) -> Indices | None:
         at, tail = self.place(word, space)
         number = tail if is_number(tail) or len(self.spaces) > 2 else tail.rpartition(".")[2]
@@ -119,11 +144,20 @@ class Deck:
         name = self.key(sets, word, space)
         return None if name is None else joined(sets[name])
 
+    def surface(self, word: str, space: str = "") -> str | None:
+        """The name of a surface in the whole, or None where there is none."""
+        known = {surface.name.upper(): surface.name for surface in self.surfaces}
+        return known.get(self.key(known, word, space) or "")
+
+    def linking(self, keyword: str) -> list[Card]:
+        """Those of `links` with this keyword."""
+        return [card for card in self.links if card.keyword == keyword]
+
     def add(self, sets: dict[str, list[Indices]], name: str) -> list[Indices]:
         """The parts of a set, to add to."""
         self.written.setdefault(name.upper(), name)
         return sets.setdefault(name.upper(), [])
 
 
-Readers = dict[str, Callable[[Deck, dict[str, str], list[str]], None]]
-"""Keyword -> what reads such a card, by its parameters and data lines, into the deck."""
+Readers = dict[str, Callable[[Deck, Card], None]]
+"""Keyword -> what reads such a card into the deck."""

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from .cards import fields
+from ..errors import of_file
+from .cards import Card, fields
 from .deck import Deck, Readers
 from .raw import Damaged, Numbering, RawMesh, joined, lost
 from .supports import Constraints
@@ -15,19 +16,19 @@ _HELD = {
 }  # fmt: skip
 
 
-def _read_boundary(deck: Deck, parameters: dict[str, str], lines: list[str]) -> None:
+def _read_boundary(deck: Deck, card: Card) -> None:
     """Displacements that are zero. OP=NEW takes the place of all there was before the step."""
-    if parameters.get("OP", "").upper() == "NEW" and deck.renewed != deck.step:
+    if card.word("OP") == "NEW" and deck.renewed != deck.step:
         deck.held, deck.not_held, deck.renewed = [], [], deck.step
-    other = {"SUBMODEL", "USER", "FIXED", "BASE NAME"} & set(parameters)
-    if other or parameters.get("TYPE", "DISPLACEMENT").upper() != "DISPLACEMENT":
-        deck.not_held.append(f"a *BOUNDARY of the kind {', '.join(other) or parameters['TYPE']}")
+    other = {"SUBMODEL", "USER", "FIXED", "BASE NAME"} & set(card.parameters)
+    if other or card.word("TYPE", "DISPLACEMENT") != "DISPLACEMENT":
+        deck.not_held.append(f"a *BOUNDARY of the kind {', '.join(other) or card.parameters['TYPE']}")
         return
-    for line in lines:
+    for line in card.lines:
         words = [word.strip() for word in line.split(",")] + 3 * [""]
         try:
             directions = _HELD.get(words[1].upper()) or _zeros(words)
-            deck.held.append((words[0].strip('"'), directions, deck.card.place))
+            deck.held.append((words[0].strip('"'), directions, card.place))
         except ValueError:
             deck.not_held.append(f"the line '{line[:60]}' of *BOUNDARY")
 
@@ -46,18 +47,18 @@ def _zeros(words: list[str]) -> str:
     return "xyzabc"[first - 1 : last]
 
 
-def _read_step(deck: Deck, parameters: dict[str, str], lines: list[str]) -> None:
+def _read_step(deck: Deck, card: Card) -> None:
     deck.step += 1
 
 
-def _read_transform(deck: Deck, parameters: dict[str, str], lines: list[str]) -> None:
+def _read_transform(deck: Deck, card: Card) -> None:
     deck.turned = True
 
 
-def _read_temperature(deck: Deck, parameters: dict[str, str], lines: list[str], column: int = 1) -> None:
-    if "FILE" in parameters or "BSTEP" in parameters:
+def _read_temperature(deck: Deck, card: Card, column: int = 1) -> None:
+    if "FILE" in card.parameters or "BSTEP" in card.parameters:
         raise Damaged("*TEMPERATURE reads from a results file; write the temperatures out")
-    for line in lines:
+    for line in card.lines:
         words = fields(line)
         try:
             deck.temperatures.append((column, words[0], float(words[1])))
@@ -65,13 +66,13 @@ def _read_temperature(deck: Deck, parameters: dict[str, str], lines: list[str], 
             raise Damaged(f"*TEMPERATURE holds the line '{line[:60]}', no node (or set) and temperature") from None
 
 
-def _read_initial(deck: Deck, parameters: dict[str, str], lines: list[str]) -> None:
-    if parameters.get("TYPE", "").upper() == "TEMPERATURE":
-        _read_temperature(deck, parameters, lines, column=0)
-    elif parameters.get("TYPE", "").upper() in ("STRESS", "PLASTIC STRAIN"):
-        deck.lost.append(lost(deck.card.where, f"*INITIAL CONDITIONS, TYPE={parameters['TYPE'].upper()}"))
+def _read_initial(deck: Deck, card: Card) -> None:
+    if card.word("TYPE") == "TEMPERATURE":
+        _read_temperature(deck, card, column=0)
+    elif card.word("TYPE") in ("STRESS", "PLASTIC STRAIN"):
+        deck.lost.append(lost(card.where, f"*INITIAL CONDITIONS, TYPE={card.word('TYPE')}"))
     else:
-        deck.ignored.append(f"INITIAL CONDITIONS, TYPE={parameters.get('TYPE', '').upper()}")
+        deck.ignored.append(f"INITIAL CONDITIONS, TYPE={card.word('TYPE')}")
 
 
 def assign_temperatures(deck: Deck, raw: RawMesh, numbering: Numbering) -> None:
@@ -80,9 +81,7 @@ def assign_temperatures(deck: Deck, raw: RawMesh, numbering: Numbering) -> None:
         return
     raw.temperature = np.full((len(raw.points), 2), np.nan)
     for column, word, value in deck.temperatures:
-        members = deck.nodes(word)
-        if members is None:
-            raise Damaged(f"*TEMPERATURE names the node set '{word}', which is not defined")
+        members = deck.nodes_for("*TEMPERATURE", word)
         raw.temperature[numbering.positions(members, "*TEMPERATURE names"), column] = value
 
 
@@ -91,16 +90,11 @@ def constraints(deck: Deck) -> Constraints:
     held = Constraints(all_turned=deck.turned, left_out=list(deck.not_held))
     known = set(joined(deck.node_id).tolist())
     for word, directions, place in deck.held:
-        key, found = deck.key(deck.node_sets, word), deck.nodes(word)
-        if found is None:
-            text = f"*BOUNDARY names the node set '{word}', which is not defined"
-            raise Damaged(text, file=place)
-        if key is None and not known.issuperset(found.tolist()):
-            raise Damaged(f"*BOUNDARY names the node {word}, which is not defined", file=place)
-        if key is not None:
-            held.hold(deck.written[key], directions)
-        else:
-            held.hold(int(found[0]), directions)
+        with of_file(place):
+            key, nodes = deck.key(deck.node_sets, word), deck.nodes_for("*BOUNDARY", word)
+            if key is None and not known.issuperset(nodes.tolist()):
+                raise Damaged(f"*BOUNDARY names the node {word}, which is not defined")
+        held.hold(int(nodes[0]) if key is None else deck.written[key], directions)
     return held
 
 

@@ -11,59 +11,62 @@ from ..data import Array, AverageLink, Equation, FaceTie, Indices, Link, RigidLi
 from ..errors import of_file
 from .cards import Card, fields
 from .deck import Deck
-from .raw import Damaged, Numbering, is_number, lost, real
+from .raw import Damaged, Numbering, is_number, joined, lost, real
 
-KEYWORDS = (
-    "TIE", "EQUATION", "MPC", "KINEMATIC COUPLING", "DISTRIBUTING COUPLING", "COUPLING", "KINEMATIC", "DISTRIBUTING",
-    "RIGID BODY",
-)  # fmt: skip
 _WAYS = "xyzabc"
 
 
 @dataclass
 class _Reading:
-    """A deck whose nodes are known. left_out: what is not read, in words. points: of all nodes."""
+    """A card of a deck whose nodes are known.
+
+    Attributes:
+        points: of all nodes. following: the next card of a constraint. left_out: what is not read, in words.
+    """
 
     deck: Deck
     numbering: Numbering
     points: Array
+    card: Card = field(default_factory=lambda: Card(""))
+    following: Card | None = None
     left_out: list[str] = field(default_factory=list)
 
-    def nodes(self, word: str, card: Card, space: str) -> Indices:
+    @property
+    def where(self) -> str:
+        name = self.card.text("NAME") or self.card.text("CONSTRAINT NAME")
+        return f"{self.card.where}: *{self.card.keyword}" + (f" '{name}'" if name else "")
+
+    def nodes(self, word: str) -> Indices:
         """Positions of the nodes that a word names.
 
         Raises:
             Damaged: there is no such set.
         """
-        found = self.deck.nodes(word, space)
-        if found is None:
-            raise Damaged(f"*{card.keyword} names the node set '{word}', which is not defined")
-        return self.numbering.positions(np.unique(found), f"*{card.keyword} names")
+        numbers = self.deck.nodes_for(f"*{self.card.keyword}", word, self.card.space)
+        return self.numbering.positions(np.unique(numbers), f"*{self.card.keyword} names")
 
-    def node(self, word: str, card: Card, space: str) -> int:
-        """The position of a single node.
+    def node(self, key: str) -> int:
+        """The position of the single node that a parameter names.
 
         Raises:
             Damaged: none or several.
         """
-        if not word:
-            raise Damaged(f"*{card.keyword} names no reference node; give REF NODE")
-        found = self.nodes(word, card, space)
-        if len(found) != 1:
-            raise Damaged(f"*{card.keyword} names '{word}' as one node, but it has {len(found)}")
-        return int(found[0])
+        if not (word := self.card.text(key)):
+            raise Damaged(f"*{self.card.keyword} names no reference node; give REF NODE")
+        nodes = self.nodes(word)
+        if len(nodes) != 1:
+            raise Damaged(f"*{self.card.keyword} names '{word}' as one node, but it has {len(nodes)}")
+        return int(nodes[0])
 
-    def surface(self, word: str, card: Card, space: str) -> str:
+    def surface(self, word: str) -> str:
         """The name of a surface in the whole.
 
         Raises:
             Damaged: there is none.
         """
-        known = {name.upper(): name for name, *_ in self.deck.surfaces}
-        key = self.deck.key(known, word, space)
-        if key is None:
-            raise Damaged(f"*{card.keyword} names the surface '{word}', which is not defined")
-        return known[key]
+        if (name := self.deck.surface(word, self.card.space)) is None:
+            raise Damaged(f"*{self.card.keyword} names the surface '{word}', which is not defined")
+        return name
 
 
 def links_of(deck: Deck, numbering: Numbering, points: Array) -> tuple[list[Link], list[str]]:
@@ -72,37 +75,32 @@ def links_of(deck: Deck, numbering: Numbering, points: Array) -> tuple[list[Link
     Raises:
         Damaged: with the line, what is wrong with one.
     """
-    reading, found = _Reading(deck, numbering, points), list[Link]()
-    cards = [(card, space) for card, space in deck.links if card.keyword in KEYWORDS]
-    for number, (card, space) in enumerate(cards):
-        following = cards[number + 1][0] if number + 1 < len(cards) else None
-        with of_file(card.place):
-            found += _MAKERS[card.keyword](reading, card, space, following)
-    return found, reading.left_out
+    reading, links = _Reading(deck, numbering, points), list[Link]()
+    cards = [card for card in deck.links if card.keyword in _MAKERS]
+    for reading.card, reading.following in zip(cards, [*cards[1:], None], strict=False):
+        with of_file(reading.card.place):
+            links += _MAKERS[reading.card.keyword](reading)
+    return links, reading.left_out
 
 
-def _where(card: Card) -> str:
-    name = card.parameters.get("NAME") or card.parameters.get("CONSTRAINT NAME")
-    return f"{card.where}: *{card.keyword}" + (f" '{name}'" if name else "")
-
-
-def _tie(reading: _Reading, card: Card, space: str, following: Card | None) -> Iterator[Link]:
+def _tie(reading: _Reading) -> Iterator[Link]:
+    card = reading.card
     if "CYCLIC SYMMETRY" in card.parameters:
-        return  # see deck_cyclic
-    text = card.parameters.get("POSITION TOLERANCE", "")
+        return  # see deck_joints
+    text = card.text("POSITION TOLERANCE")
     tolerance = real(text, "POSITION TOLERANCE") if text else None
     for line in card.lines:
         words = [word.strip() for word in line.split(",")]
         if len(words) < 2 or not words[1]:
             raise Damaged(f"*TIE needs the slave and the master surface in a line, not '{line[:60]}'")
-        slave, master = (reading.surface(word, card, space) for word in words[:2])
-        yield FaceTie(_where(card), slave, master, tolerance)
+        slave, master = map(reading.surface, words[:2])
+        yield FaceTie(reading.where, slave, master, tolerance)
 
 
-def _equations(reading: _Reading, card: Card, space: str, following: Card | None) -> Iterator[Link]:
+def _equations(reading: _Reading) -> Iterator[Link]:
     if reading.deck.turned:
         raise Damaged("*EQUATION beside a *TRANSFORM may act in local directions; write global ones without it")
-    words = [word.strip() for line in card.lines for word in line.rstrip().rstrip(",").split(",")]
+    words = [word.strip() for line in reading.card.lines for word in line.rstrip().rstrip(",").split(",")]
     while words:
         if not is_number(words[0]) or int(words[0]) < 1:
             raise Damaged(f"*EQUATION begins with '{words[0][:40]}', which is no number of terms")
@@ -112,12 +110,12 @@ def _equations(reading: _Reading, card: Card, space: str, following: Card | None
             raise Damaged(f"*EQUATION announces {count} terms of three words and has {len(terms)} words")
         ways = [_direction(word) for word in terms[1::3]]
         factors = np.array([real(word, "a factor of *EQUATION") for word in terms[2::3]])
-        members = [reading.nodes(word, card, space) for word in terms[::3]]
+        members = [reading.nodes(word) for word in terms[::3]]
         length = max(map(len, members))
         if any(len(m) not in (1, length) for m in members):
             raise Damaged(f"*EQUATION names sets of {', '.join(str(len(m)) for m in members)} nodes, not equally many")
         for nodes in np.column_stack([np.broadcast_to(m, length) for m in members]):
-            yield Equation(_where(card), nodes, np.array(ways), factors)
+            yield Equation(reading.where, nodes, np.array(ways), factors)
 
 
 def _direction(word: str) -> int:
@@ -126,20 +124,20 @@ def _direction(word: str) -> int:
     return int(word) - 1
 
 
-def _mpc(reading: _Reading, card: Card, space: str, following: Card | None) -> Iterator[Link]:
-    for line in card.lines:
+def _mpc(reading: _Reading) -> Iterator[Link]:
+    for line in reading.card.lines:
         kind, *words = [*fields(line), ""]
         words = [word for word in words if word]
         if kind.upper() not in ("PIN", "TIE", "BEAM", "LINK"):
             raise Damaged(f"*MPC of the kind '{kind}' is not read; PIN, TIE, BEAM and LINK are")
         if len(words) < 2:
             raise Damaged(f"*MPC {kind} names fewer than two nodes")
-        members, other = reading.nodes(words[0], card, space), reading.nodes(words[1], card, space)
+        members, other = reading.nodes(words[0]), reading.nodes(words[1])
         if len(other) not in (1, len(members)):
             raise Damaged(f"*MPC {kind} names {len(members)} and {len(other)} nodes; give one to each, or one to all")
         for a, b in zip(members, np.broadcast_to(other, len(members)), strict=True):
             along = reading.points[a] - reading.points[b]
-            yield from _pair(kind.upper(), f"{card.where}: *MPC {kind.upper()}", int(a), int(b), along)
+            yield from _pair(kind.upper(), f"{reading.card.where}: *MPC {kind.upper()}", int(a), int(b), along)
 
 
 def _pair(kind: str, where: str, a: int, b: int, along: Array) -> Iterator[Link]:
@@ -155,20 +153,20 @@ def _pair(kind: str, where: str, a: int, b: int, along: Array) -> Iterator[Link]
             yield Equation(where, np.array([a, b]), np.array([way, way]), np.array([1.0, -1.0]))
 
 
-def _old_coupling(reading: _Reading, card: Card, space: str, following: Card | None) -> Iterator[Link]:
+def _old_coupling(reading: _Reading) -> Iterator[Link]:
     """*KINEMATIC COUPLING: nodes, first and last direction a line."""
-    reference = reading.node(card.parameters.get("REF NODE", ""), card, space)
-    for line in card.lines:
+    reference = reading.node("REF NODE")
+    for line in reading.card.lines:
         words = [word.strip() for word in line.split(",")]
         every = _ways([words[1:]])
         _refuse_turned(reading, every)
-        yield RigidLink(_where(card), reference, reading.nodes(words[0], card, space), every)
-    if not card.lines:
+        yield RigidLink(reading.where, reference, reading.nodes(words[0]), every)
+    if not reading.card.lines:
         raise Damaged("*KINEMATIC COUPLING couples no nodes to its reference node; add them")
 
 
-def _not_read(reading: _Reading, card: Card, space: str, following: Card | None) -> Iterator[Link]:
-    reading.left_out.append(lost(card.where, "*DISTRIBUTING COUPLING (write *COUPLING with *DISTRIBUTING)"))
+def _not_read(reading: _Reading) -> Iterator[Link]:
+    reading.left_out.append(lost(reading.card.where, "*DISTRIBUTING COUPLING (write *COUPLING with *DISTRIBUTING)"))
     return iter(())
 
 
@@ -188,67 +186,68 @@ def _refuse_turned(reading: _Reading, every: str) -> None:
         raise Damaged("a coupling in single directions beside a *TRANSFORM may mean local ones; write global ones")
 
 
-def _coupling(reading: _Reading, card: Card, space: str, following: Card | None) -> Iterator[Link]:
+def _coupling(reading: _Reading) -> Iterator[Link]:
+    card, following = reading.card, reading.following
     if following is None or following.keyword not in ("KINEMATIC", "DISTRIBUTING"):
         raise Damaged("*COUPLING is followed by neither *KINEMATIC nor *DISTRIBUTING; say which it is")
     if "INFLUENCE RADIUS" in card.parameters:
         raise Damaged("*COUPLING with INFLUENCE RADIUS is not read; name a surface of the nodes that it takes in")
-    reference = reading.node(card.parameters.get("REF NODE", ""), card, space)
-    members, weights = _weighed(reading, card, reading.surface(card.parameters.get("SURFACE", ""), card, space))
+    reference = reading.node("REF NODE")
+    members, weights = _weighed(reading, reading.surface(card.text("SURFACE")))
     every = _ways([[word.strip() for word in line.split(",")] for line in following.lines])
     if "ORIENTATION" in card.parameters and len(every) < 6:
         raise Damaged("*COUPLING in single directions of an ORIENTATION is not read; write *EQUATIONs")
     _refuse_turned(reading, every)
     if following.keyword == "KINEMATIC":
-        yield RigidLink(_where(card), reference, members, every)
+        yield RigidLink(reading.where, reference, members, every)
         return
-    if following.parameters.get("WEIGHTING METHOD", "UNIFORM").upper() != "UNIFORM":
+    if following.word("WEIGHTING METHOD", "UNIFORM") != "UNIFORM":
         raise Damaged("*DISTRIBUTING is read with WEIGHTING METHOD=UNIFORM alone")
-    yield AverageLink(_where(card), reference, members, weights, every)
+    yield AverageLink(reading.where, reference, members, weights, every)
 
 
-def _weighed(reading: _Reading, card: Card, surface: str) -> tuple[Indices | str, Array | None]:
+def _weighed(reading: _Reading, surface: str) -> tuple[Indices | str, Array | None]:
     """By the areas of a surface of facets, by the numbers that a surface of nodes has beside them (1 if none)."""
-    _, kind, rows, space, _ = next(s for s in reading.deck.surfaces if s[0] == surface)
-    if kind != "NODE":
+    found = next(s for s in reading.deck.surfaces if s.name == surface)
+    if found.kind != "NODE":
         return surface, None
     weights: dict[int, float] = {}
-    for name, weight in ([*row, ""][:2] for row in rows):
+    for name, weight in ([*row, ""][:2] for row in found.rows):
         number = real(weight, f"a weight of the surface '{surface}'") if weight else 1.0
-        weights.update(dict.fromkeys(reading.nodes(name, card, space).tolist(), number))
+        weights.update(dict.fromkeys(reading.nodes(name).tolist(), number))
     return np.array(list(weights), dtype=np.int64), np.array(list(weights.values()))
 
 
-def _nothing(reading: _Reading, card: Card, space: str, following: Card | None) -> Iterator[Link]:
+def _nothing(reading: _Reading) -> Iterator[Link]:
     return iter(())  # told with its *COUPLING
 
 
-def _rigid_body(reading: _Reading, card: Card, space: str, following: Card | None) -> Iterator[Link]:
-    sets = [card.parameters[k] for k in ("NSET", "PIN NSET", "TIE NSET") if k in card.parameters]
-    members = [reading.nodes(word, card, space) for word in sets]
+def _rigid_body(reading: _Reading) -> Iterator[Link]:
+    card, deck = reading.card, reading.deck
+    sets = [card.text(k) for k in ("NSET", "PIN NSET", "TIE NSET") if k in card.parameters]
+    members = [reading.nodes(word) for word in sets]
     if "ELSET" in card.parameters:
-        chosen = reading.deck.cells(card.parameters["ELSET"], space)
-        if chosen is None:
-            raise Damaged(f"*RIGID BODY names the element set '{card.parameters['ELSET']}', which is not defined")
-        for cells in (*reading.deck.solids, *reading.deck.facets):
+        chosen = deck.cells_for("*RIGID BODY", card.text("ELSET"), card.space)
+        for cells in (*deck.solids, *deck.facets):
             members.append(np.unique(cells.nodes[np.isin(cells.ids, chosen)]))
-    every = np.unique(np.concatenate([np.zeros(0, dtype=np.int64), *members]))
-    reference = reading.node(card.parameters.get("REF NODE", ""), card, space)
-    pinned = set() if "PIN NSET" not in card.parameters else {*reading.nodes(card.parameters["PIN NSET"], card, space)}
+    every = np.unique(joined(members))
+    reference = reading.node("REF NODE")
+    pinned = set() if "PIN NSET" not in card.parameters else {*reading.nodes(card.text("PIN NSET"))}
     tied = np.array([node for node in every if node != reference and node not in pinned], dtype=np.int64)
     if len(tied) or not pinned:
-        yield RigidLink(_where(card), reference, tied, _WAYS)
+        yield RigidLink(reading.where, reference, tied, _WAYS)
     if pinned:
-        yield RigidLink(_where(card), reference, np.array(sorted(pinned), dtype=np.int64))
+        yield RigidLink(reading.where, reference, np.array(sorted(pinned), dtype=np.int64))
     if "ROT NODE" in card.parameters:
-        turns = reading.node(card.parameters["ROT NODE"], card, space)
+        turns = reading.node("ROT NODE")
         for way in range(3):
             pair, ways = np.array([turns, reference]), np.array([way, 3 + way])
-            yield Equation(f"{_where(card)}, ROT NODE", pair, ways, np.array([1.0, -1.0]), first=False)
+            yield Equation(f"{reading.where}, ROT NODE", pair, ways, np.array([1.0, -1.0]), first=False)
 
 
-_MAKERS: dict[str, Callable[[_Reading, Card, str, Card | None], Iterator[Link]]] = {
+_MAKERS: dict[str, Callable[[_Reading], Iterator[Link]]] = {
     "TIE": _tie, "EQUATION": _equations, "MPC": _mpc, "KINEMATIC COUPLING": _old_coupling,
     "DISTRIBUTING COUPLING": _not_read, "COUPLING": _coupling, "KINEMATIC": _nothing, "DISTRIBUTING": _nothing,
     "RIGID BODY": _rigid_body,
 }  # fmt: skip
+KEYWORDS = tuple(_MAKERS)

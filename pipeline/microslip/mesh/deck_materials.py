@@ -6,19 +6,20 @@ import numpy as np
 
 from ..data import Array
 from ..elasticity import turned, turned_strain
+from ..errors import of_file
 from ..frames import rotation
-from .cards import numbers
+from .cards import Card, numbers
 from .deck import Deck, DeckConstants, Readers
 from .materials import isotropic_rows, orthotropic_row
 from .raw import Damaged, DeckMaterial, RawMesh
 
 
-def _read_material(deck: Deck, parameters: dict[str, str], lines: list[str]) -> None:
-    name = parameters.get("NAME", "")
+def _read_material(deck: Deck, card: Card) -> None:
+    name = card.text("NAME")
     if not name:
         raise Damaged("a *MATERIAL has no name")
     deck.current = name.upper()
-    deck.materials[deck.current] = DeckConstants(name, deck.card.place)
+    deck.materials[deck.current] = DeckConstants(name, card.place)
 
 
 def _of(deck: Deck, keyword: str) -> DeckConstants:
@@ -27,12 +28,10 @@ def _of(deck: Deck, keyword: str) -> DeckConstants:
     return deck.materials[deck.current]
 
 
-def _read_elastic(deck: Deck, parameters: dict[str, str], lines: list[str]) -> None:
-    material, kind = _of(deck, "ELASTIC"), " ".join(parameters.get("TYPE", "ISO").upper().split())
-    rows, what = (
-        numbers(lines, f"*ELASTIC of {material.name}"),
-        f"*ELASTIC, TYPE={kind} of the material {material.name}",
-    )
+def _read_elastic(deck: Deck, card: Card) -> None:
+    material, kind = _of(deck, "ELASTIC"), " ".join(card.word("TYPE", "ISO").split())
+    rows = numbers(card.lines, f"*ELASTIC of {material.name}")
+    what = f"*ELASTIC, TYPE={kind} of the material {material.name}"
     if kind.startswith("ISO"):
         if any(len(row) not in (2, 3) for row in rows) or not rows:
             raise Damaged(f"{what} needs E, nu and perhaps a temperature a line")
@@ -49,9 +48,9 @@ def _read_elastic(deck: Deck, parameters: dict[str, str], lines: list[str]) -> N
         material.stiffness = values[:9]
 
 
-def _read_density(deck: Deck, parameters: dict[str, str], lines: list[str]) -> None:
+def _read_density(deck: Deck, card: Card) -> None:
     material = _of(deck, "DENSITY")
-    rows = numbers(lines, f"*DENSITY of {material.name}")
+    rows = numbers(card.lines, f"*DENSITY of {material.name}")
     if not rows or not rows[0]:
         raise Damaged(f"*DENSITY of the material {material.name} holds no number")
     if len({row[0] for row in rows}) > 1:
@@ -59,9 +58,9 @@ def _read_density(deck: Deck, parameters: dict[str, str], lines: list[str]) -> N
     material.density = rows[0][0]
 
 
-def _read_expansion(deck: Deck, parameters: dict[str, str], lines: list[str]) -> None:
-    material, kind = _of(deck, "EXPANSION"), parameters.get("TYPE", "ISO").upper()
-    rows = numbers(lines, f"*EXPANSION of {material.name}")
+def _read_expansion(deck: Deck, card: Card) -> None:
+    material, kind = _of(deck, "EXPANSION"), card.word("TYPE", "ISO")
+    rows = numbers(card.lines, f"*EXPANSION of {material.name}")
     count = 3 if kind.startswith("ORTHO") else 1
     if not rows or any(len(row) not in (count, count + 1) for row in rows) or kind.startswith("ANISO"):
         raise Damaged(f"*EXPANSION, TYPE={kind} of the material {material.name} is not read; use ISO or ORTHO")
@@ -71,19 +70,17 @@ def _read_expansion(deck: Deck, parameters: dict[str, str], lines: list[str]) ->
     material.expansion = np.broadcast_to(values[0], 3).copy()
 
 
-def _read_section(deck: Deck, parameters: dict[str, str], lines: list[str]) -> None:
-    keys = ("ELSET", "MATERIAL", "ORIENTATION")
-    words = [parameters.get(key, "") for key in keys]
-    deck.sections.append((words[0], words[1], words[2], "", deck.card.place))
+def _read_section(deck: Deck, card: Card) -> None:
+    deck.sections.append(card)
 
 
-def _read_orientation(deck: Deck, parameters: dict[str, str], lines: list[str]) -> None:
-    name, system = parameters.get("NAME", ""), parameters.get("SYSTEM", "RECTANGULAR").upper()
+def _read_orientation(deck: Deck, card: Card) -> None:
+    name, system = card.text("NAME"), card.word("SYSTEM", "RECTANGULAR")
     key = name.upper()
-    if not system.startswith("R") or parameters.get("DEFINITION", "COORDINATES").upper() != "COORDINATES":
+    if not system.startswith("R") or card.word("DEFINITION", "COORDINATES") != "COORDINATES":
         deck.orientations[key] = f"*ORIENTATION, NAME={name} of the system {system}"
         return
-    rows = numbers(lines, f"*ORIENTATION, NAME={name}")
+    rows = numbers(card.lines, f"*ORIENTATION, NAME={name}")
     if not rows or len(rows[0]) not in (6, 9):
         raise Damaged(f"*ORIENTATION, NAME={name} needs the six coordinates of two points")
     origin = np.array(rows[0][6:9]) if len(rows[0]) == 9 else np.zeros(3)
@@ -106,23 +103,20 @@ def assign_materials(deck: Deck, raw: RawMesh) -> None:
         return
     raw.regions = [np.full(len(cells.ids), -1) for cells in deck.solids]
     known: dict[tuple[str, str], int] = {}
-    for name_of_set, material, orientation, space, place in deck.sections:
-        section = f"*SOLID SECTION, ELSET={name_of_set}"
-        if material.upper() not in deck.materials:
-            text = f"{section} names the material '{material}', which is not defined"
-            raise Damaged(text, file=place)
-        axes = deck.key(deck.orientations, orientation, space) if orientation else ""
-        if axes is None:
-            text = f"{section} names the orientation '{orientation}', which is not defined"
-            raise Damaged(text, file=place)
+    for card in deck.sections:
+        elset, material, orientation = map(card.text, ("ELSET", "MATERIAL", "ORIENTATION"))
+        section = f"*SOLID SECTION, ELSET={elset}"
+        with of_file(card.place):
+            if material.upper() not in deck.materials:
+                raise Damaged(f"{section} names the material '{material}', which is not defined")
+            axes = deck.key(deck.orientations, orientation, card.space) if orientation else ""
+            if axes is None:
+                raise Damaged(f"{section} names the orientation '{orientation}', which is not defined")
+            chosen = deck.cells_for("*SOLID SECTION", elset, card.space)
         key = (material.upper(), axes)
         if key not in known:
             known[key] = len(raw.materials)
-            raw.materials.append(_deck_material(deck, key, name_of_set))
-        chosen = deck.cells(name_of_set, space)
-        if chosen is None:
-            text = f"*SOLID SECTION names the element set '{name_of_set}', which is not defined"
-            raise Damaged(text, file=place)
+            raw.materials.append(_deck_material(deck, key, elset))
         for cells, region in zip(deck.solids, raw.regions, strict=True):
             region[np.isin(cells.ids, chosen)] = known[key]
     bare = [cells.ids[region < 0] for cells, region in zip(deck.solids, raw.regions, strict=True)]

@@ -18,15 +18,12 @@ from . import deck_conditions, deck_materials, deck_mesh
 from .cards import Card, data_of, numbers, read_cards
 from .deck import Deck
 from .deck_conditions import assign_temperatures, constraints
-from .deck_cyclic import KEYWORDS as CYCLIC
-from .deck_cyclic import sector_of
 from .deck_joints import KEYWORDS as JOINTS
-from .deck_joints import joints_of, preloads_of, unpressed, unread, unused_loads
+from .deck_joints import joints_of, preloads_of, sector_of, unread
 from .deck_links import KEYWORDS as LINKS
 from .deck_links import links_of
 from .deck_materials import assign_materials
-from .deck_mesh import CORNERS, cell_type
-from .deck_surfaces import add_surfaces
+from .deck_mesh import CORNERS, add_surfaces, cell_type
 from .instances import numbered, outline, place, placement, places
 from .raw import PRESTRESSED, Damaged, Numbering, RawMesh, ignored, joined, lost, undefined
 from .supports import add_supports
@@ -36,6 +33,7 @@ _REFUSED = {
     "ELGEN": "generates cells by *ELGEN", "ELCOPY": "copies cells by *ELCOPY",
 }  # fmt: skip
 
+_LINKING = (*LINKS, *JOINTS)
 READERS = deck_mesh.READERS | deck_materials.READERS | deck_conditions.READERS
 
 
@@ -60,7 +58,6 @@ def read_inp(path: Path) -> RawMesh:
         *numbered([card.parameters["NAME"] for card, _ in parts], spaces),
         *_replaced(raw, whole),
     ]
-    whole.ignored += unused_loads(whole)
     stress = _prestressed(found.rest)
     raw.lost += stress
     raw.remarks += ignored([f"*{word}" for word in whole.ignored], _LOADS, bool(stress))
@@ -147,7 +144,6 @@ def _part(parts: dict[str, list[Card]], instance: Card, own: list[Card]) -> Deck
 def _read(deck: Deck, cards: list[Card]) -> None:
     """Take in cards one after the other."""
     for card in cards:
-        deck.card = card
         with of_file(card.place):
             _read_card(deck, card)
 
@@ -155,18 +151,18 @@ def _read(deck: Deck, cards: list[Card]) -> None:
 def _read_card(deck: Deck, card: Card) -> None:
     if card.keyword in _REFUSED:
         raise Damaged(f"the file {_REFUSED[card.keyword]}; write out every node and cell")
-    if "INPUT" in card.parameters and card.keyword in (*LINKS, *JOINTS, *CYCLIC, *READERS):
+    if "INPUT" in card.parameters and card.keyword in (*_LINKING, *READERS):
         card.lines = [*card.lines, *data_of(Path(card.parameters.pop("INPUT")))]
-    if card.keyword in (*LINKS, *JOINTS, *CYCLIC):
-        deck.links.append((card, ""))
+    if card.keyword in _LINKING:
+        deck.links.append(card)
     if card.keyword not in READERS:
         if _COUNTS.fullmatch(card.keyword):
             deck.lost.append(lost(card.where, f"*{card.keyword}"))
-        elif card.keyword not in (*_SILENT, *LINKS, *JOINTS, *CYCLIC):
+        elif card.keyword not in (*_SILENT, *_LINKING):
             deck.ignored.append(card.keyword)
         return
-    READERS[card.keyword](deck, card.parameters, card.lines)
-    kind = card.parameters.get("TYPE", "").upper()
+    READERS[card.keyword](deck, card)
+    kind = card.word("TYPE")
     if card.keyword == "ELEMENT" and card.lines and not cell_type(kind) and kind != "DCOUP3D":
         deck.lost.append(lost(card.where, f"*ELEMENT, TYPE={kind}"))
 
@@ -217,9 +213,11 @@ def _assembled(deck: Deck) -> RawMesh:
             raw.add_set(deck.written[key], members, numbering)
     raw.links, left_out = links_of(deck, numbering, points)
     raw.sector, uncut = sector_of(deck)
-    raw.lost = [*deck.lost, *left_out, *uncut, *unpressed(deck)]
+    raw.preloads, unpressed, unused = preloads_of(deck)
+    raw.lost = [*deck.lost, *left_out, *uncut, *unpressed]
+    deck.ignored += unused
     raw.remarks += unread(deck)
-    raw.joints, raw.preloads = joints_of(deck), preloads_of(deck)
+    raw.joints = joints_of(deck)
     raw.instances = {name: numbering.positions(np.unique(ids), "") for name, ids in deck.instances.items()}
     add_supports(raw, constraints(deck), numbering)
     for cells in deck.facets:

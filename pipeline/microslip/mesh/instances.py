@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -177,9 +177,11 @@ def place(whole: Deck, part: Deck, name: str, at: Placement, space: Space) -> No
     for word, axes in part.orientations.items():
         turned = axes if isinstance(axes, str) else axes @ at.turn.T
         whole.orientations[space.prefix.upper() + word] = turned
-    whole.sections += [(*section[:3], key, section[4]) for section in part.sections]
-    whole.surfaces += [(space.prefix + s[0], *s[1:3], key, s[4]) for s in part.surfaces]
-    whole.links += [(card, key) for card, _ in part.links]
+    whole.sections += [replace(card, space=key) for card in part.sections]
+    whole.links += [replace(card, space=key) for card in part.links]
+    whole.surfaces += [
+        replace(s, name=space.prefix + s.name, card=replace(s.card, space=key)) for s in part.surfaces
+    ]
     whole.ignored += part.ignored
     whole.kinds += part.kinds
     whole.lost += [text for text in part.lost if text not in whole.lost]

@@ -13,9 +13,9 @@ from typing import Any
 import h5py
 import numpy as np
 
-from ..data import Indices
+from ..data import Flags, Indices
 from ..files.hostile import HostileFile, read_hdf5
-from ..topology import CELL_TYPES, FACET_CORNERS
+from ..topology import CELL_TYPES
 from .raw import NODES, Damaged, RawMesh
 
 _KINDS = {
@@ -56,9 +56,15 @@ def _read(file: h5py.File) -> RawMesh:
         raise Damaged("the numbers of its nodes are incomplete or stand there twice")
     raw = RawMesh(flat.reshape(3, count).T.copy(), number)
     families = _families(file, name)
-    _sets_of_nodes(raw, nodes, families)
+    for group, chosen in _named(_per_cell(nodes, "FAM", count, 0), families):
+        raw.add_points(group, np.flatnonzero(chosen))
     for kind, cells, family, ids in _cells(step, count):
-        _add(raw, kind, cells, family, ids, families)
+        if kind in CELL_TYPES:
+            raw.blocks.append((kind, cells[:, vtk_places(kind)]))
+            raw.cell_id.append(ids)
+            continue
+        for group, chosen in _named(family, families):
+            raw.add_to_set(group, kind, cells[chosen])
     return raw
 
 
@@ -123,27 +129,11 @@ def _text(name: Any) -> str:
     return data.split(b"\0")[0].decode("utf-8", "replace").strip()
 
 
-def _sets_of_nodes(raw: RawMesh, nodes: h5py.Group, families: dict[int, list[str]]) -> None:
-    family = _per_cell(nodes, "FAM", len(raw.points), 0)
+def _named(family: Indices, families: dict[int, list[str]]) -> Iterator[tuple[str, Flags]]:
+    """Names of groups, and which of the members with these families belong to each."""
     for number in np.unique(family).tolist():
         for name in families.get(number, []) if number else []:
-            raw.add_points(name, np.flatnonzero(family == number))
-
-
-def _add(
-    raw: RawMesh, kind: str, cells: Indices, family: Indices, ids: Indices, families: dict[int, list[str]]
-) -> None:
-    if kind in CELL_TYPES:
-        raw.blocks.append((kind, cells[:, vtk_places(kind)]))
-        raw.cell_id.append(ids)
-        return
-    for number in np.unique(family).tolist():
-        for name in families.get(number, []) if number else []:
-            chosen = cells[family == number]
-            if kind in FACET_CORNERS:
-                raw.facets.setdefault(name, []).append(chosen[:, : FACET_CORNERS[kind]])
-            else:
-                raw.add_points(name, np.unique(chosen))
+            yield name, family == number
 
 
 def vtk_places(cell_type: str) -> list[int]:

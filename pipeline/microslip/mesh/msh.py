@@ -172,18 +172,11 @@ def _elements(numbers: _Numbers, raw: RawMesh, groups: dict[tuple[int, int], lis
         table = numbers.whole(count * (1 + NODES[kind])).reshape(-1, 1 + NODES[kind])
         nodes = numbering.positions(table[:, 1:], "$Elements names")
         done += len(table)
-        _add(raw, kind, nodes, groups.get((int(dimension), int(entity)), []))
+        if kind in FACET_CORNERS or kind in ("vertex", "line", "line3"):
+            for name in groups.get((int(dimension), int(entity)), []):
+                raw.add_to_set(name, kind, nodes)
+        else:
+            raw.blocks.append((kind, nodes[:, to_vtk(kind)] if kind in CELL_TYPES else nodes))
     numbers.end()
     if done != total:
         raise Damaged("$Elements holds another number of cells than it announces")
-
-
-def _add(raw: RawMesh, kind: str, nodes: Indices, names: list[str]) -> None:
-    if kind in FACET_CORNERS:
-        for name in names:
-            raw.facets.setdefault(name, []).append(nodes[:, : FACET_CORNERS[kind]])
-    elif kind in ("vertex", "line", "line3"):
-        for name in names:
-            raw.add_points(name, np.unique(nodes))
-    else:
-        raw.blocks.append((kind, nodes[:, to_vtk(kind)] if kind in CELL_TYPES else nodes))

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from ..data import Array, Indices, Joint, Link, Sector
 from ..errors import UserError
+from ..topology import FACET_CORNERS
 
 NODES = {
     "vertex": 1, "line": 2, "line3": 3, "triangle": 3, "triangle6": 6, "quad": 4, "quad8": 8, "quad9": 9, "tetra": 4,
@@ -95,6 +97,13 @@ class RawMesh:
         """Add to a point set."""
         before = self.point_sets.get(name, np.zeros(0, dtype=np.int64))
         self.point_sets[name] = np.union1d(before, positions).astype(np.int64)
+
+    def add_to_set(self, name: str, kind: str, nodes: Indices) -> None:
+        """Add to a named set: facets of a type, by their corners, or the points of lines."""
+        if kind in FACET_CORNERS:
+            self.facets.setdefault(name, []).append(nodes[:, : FACET_CORNERS[kind]])
+        else:
+            self.add_points(name, np.unique(nodes))
 
     def add_set(self, name: str, numbers: Iterable[int] | Indices, numbering: Numbering) -> None:
         """Add to a point set the nodes of these numbers that are there; a remark names those that
@@ -211,16 +220,17 @@ class Numbering:
         """The numbers from first to last that nodes have, ascending."""
         return self.sorted[np.searchsorted(self.sorted, first) : np.searchsorted(self.sorted, last, "right")]
 
-    def positions(self, ids: Indices, what: str) -> Indices:
+    def positions(self, numbers: Indices | Sequence[Any], what: str) -> Indices:
         """Positions of node numbers, any shape.
 
         Raises:
             Damaged: a number that no node has.
         """
+        ids = np.asarray(numbers, dtype=np.int64)
         if not len(self.sorted):
             raise Damaged(f"{what} but there are no nodes before it")
         at = np.minimum(np.searchsorted(self.sorted, ids), len(self.sorted) - 1)
         missing = self.sorted[at] != ids
         if missing.any():
-            raise Damaged(f"{what} node {np.asarray(ids)[missing].flat[0]}, which the file does not define")
+            raise Damaged(f"{what} node {ids[missing].flat[0]}, which the file does not define")
         return self.order[at]

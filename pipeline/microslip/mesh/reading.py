@@ -284,10 +284,8 @@ def _from_meshio(mesh: Any) -> RawMesh:
             if chosen is None or not len(chosen):
                 continue
             nodes = _valid(block.data, len(points))[_valid(chosen, len(block.data))]
-            if block.type in FACET_CORNERS:
-                raw.facets.setdefault(name, []).append(nodes[:, : FACET_CORNERS[block.type]])
-            elif block.type in _IGNORED:
-                raw.add_points(name, np.unique(nodes))
+            if block.type in {*FACET_CORNERS, *_IGNORED}:
+                raw.add_to_set(name, block.type, nodes)
     return raw
 
 

@@ -73,7 +73,7 @@ def add_supports(raw: RawMesh, held: Constraints, numbering: Numbering) -> None:
         else:
             alike.setdefault(_in_order(found), []).append(node)
     for directions, nodes in alike.items():
-        members = np.unique(numbering.positions(np.array(nodes, dtype=np.int64), "a constraint names"))
+        members = np.unique(numbering.positions(nodes, "a constraint names"))
         same = (n for n, s in raw.point_sets.items() if n not in raw.supports and np.array_equal(s, members))
         name = next(same, f"held {directions}")
         raw.add_points(name, members)

@@ -168,7 +168,7 @@ _Shells = dict[int, tuple[str, Indices]]
 
 def _elements(sets: list[tuple[int, list[str]]], raw: RawMesh, numbering: Numbering) -> _Shells:
     """Add the solids; the shells by their number."""
-    solids: dict[str, tuple[list[int], list[list[int]]]] = {}
+    solids: dict[str, list[tuple[int, int, list[int]]]] = {}
     shells: dict[int, tuple[str, list[int]]] = {}
     seen: set[int] = set()
     for number, descriptor, nodes in (e for kind, lines in sets if kind == 2412 for e in _records(lines)):
@@ -178,37 +178,38 @@ def _elements(sets: list[tuple[int, list[str]]], raw: RawMesh, numbering: Number
         form = _SOLIDS.get(descriptor) or _SHELLS.get(descriptor)
         if form is None:
             raise Damaged(f"element {number} is of the I-deas type {descriptor}, which cannot be assembled")
-        if len(nodes) != len(form[1]):
-            raise Damaged(f"element {number} has {len(nodes)} nodes, its type {descriptor} ({form[0]}) {len(form[1])}")
-        placed = [nodes[i] for i in form[1]]
+        kind, places = form
+        if len(nodes) != len(places):
+            raise Damaged(f"element {number} has {len(nodes)} nodes, its type {descriptor} ({kind}) {len(places)}")
+        placed = [nodes[i] for i in places]
         if descriptor in _SHELLS:
-            shells[number] = (form[0], placed)
+            shells[number] = kind, placed[: FACET_CORNERS[kind]]
         else:
-            ids, cells = solids.setdefault(form[0], ([], []))
-            ids.append(number)
-            cells.append(placed)
-    for cell_type, (ids, cells) in solids.items():
-        raw.blocks.append((cell_type, numbering.positions(np.array(cells, dtype=np.int64), "the data set 2412 names")))
-        raw.cell_id.append(np.array(ids, dtype=np.int64))
-    corners = {n: (t, np.array(c[: FACET_CORNERS[t]], dtype=np.int64)) for n, (t, c) in shells.items()}
-    return {n: (t, numbering.positions(c, "the data set 2412 names")) for n, (t, c) in corners.items()}
+            solids.setdefault(kind, []).append((number, 0, placed))
+    raw.add_solids(solids, numbering, "the data set 2412 names")
+    raw.regions = []
+    return {n: (t, numbering.positions(c, "the data set 2412 names")) for n, (t, c) in shells.items()}
+
+
+def _taken(lines: Iterator[str], count: int, what: str) -> list[int]:
+    """So many whole numbers or more, from as many lines as they need; fewer where the lines end."""
+    numbers: list[int] = []
+    while len(numbers) < count and (line := next(lines, None)) is not None:
+        numbers += _whole(line, what) or [0]
+    return numbers
 
 
 def _records(lines: list[str]) -> Iterator[tuple[int, int, list[int]]]:
     """(number, descriptor, nodes) of solids and shells."""
-    at, what = 0, "the data set 2412"
-    while at < len(lines):
-        head = _whole(lines[at], what)
+    rest, what = iter(lines), "the data set 2412"
+    for line in rest:
+        head = _whole(line, what)
         if len(head) < 6:
-            raise Damaged(f"{what} holds the line '{lines[at].strip()[:60]}', which begins no element")
+            raise Damaged(f"{what} holds the line '{line.strip()[:60]}', which begins no element")
         number, descriptor, count = head[0], head[1], head[5]
-        at += 2 if descriptor in _BEAMS else 1
-        nodes: list[int] = []
-        while len(nodes) < count:
-            if at >= len(lines):
-                raise Damaged(f"element {number} has {len(nodes)} nodes instead of {count}")
-            nodes += _whole(lines[at], what) or [0]
-            at += 1
+        if descriptor in _BEAMS:
+            next(rest, None)
+        nodes = _taken(rest, count, what)
         if len(nodes) != count:
             raise Damaged(f"element {number} has {len(nodes)} nodes instead of {count}")
         if descriptor not in _BEAMS | _OTHERS:
@@ -218,19 +219,18 @@ def _records(lines: list[str]) -> Iterator[tuple[int, int, list[int]]]:
 def _groups(sets: list[tuple[int, list[str]]], raw: RawMesh, numbering: Numbering, shells: _Shells) -> None:
     """Groups of nodes become sets of points, groups of shells faces; solids in a group say nothing."""
     for kind, lines in ((k, l) for k, l in sets if k in _GROUPS):
-        at, what = 0, f"the data set {kind}"
-        while at + 1 < len(lines):
-            head, name = _whole(lines[at], what), lines[at + 1].strip()
+        rest, what, width = iter(lines), f"the data set {kind}", _GROUPS[kind]
+        for line in rest:
+            if (name := next(rest, None)) is None:
+                break
+            head, name = _whole(line, what), name.strip()
             if not head or not 0 <= head[-1] <= 10**8:
-                raise Damaged(f"{what} holds the line '{lines[at].strip()[:60]}', which begins no group")
-            at += 2
-            members: list[int] = []
-            while len(members) < _GROUPS[kind] * head[-1]:
-                if at >= len(lines):
-                    raise Damaged(f"the group '{name}' has fewer members than it announces")
-                members += _whole(lines[at], what) or [0]
-                at += 1
-            table = np.array(members[: _GROUPS[kind] * head[-1]], dtype=np.int64).reshape(-1, _GROUPS[kind])
+                raise Damaged(f"{what} holds the line '{line.strip()[:60]}', which begins no group")
+            count = width * head[-1]
+            members = _taken(rest, count, what)
+            if len(members) < count:
+                raise Damaged(f"the group '{name}' has fewer members than it announces")
+            table = np.array(members[:count], dtype=np.int64).reshape(-1, width)
             _group(raw, numbering, shells, name or f"group_{head[0]}", table)
 
 

@@ -19,6 +19,7 @@ from ..errors import UserError
 from ..files import store
 from ..interrupts import look
 from ..process import prepare
+from ..progress import Report
 from ..settings.mistakes import whole
 from ..units import counted, percent
 from . import rare
@@ -28,8 +29,6 @@ from .ring import positive
 from .samples import Asked, Sample, again, of_ring, sample
 from .scatter import OF_CONTACTS
 from .statistics import Envelope, Quantile, quantile
-
-Report = Callable[[str], None]
 
 COLUMNS = "amplitude", "frequency_Hz", "sector", "localisation", "missed", "unsolved", "at_end", "stress_Pa", "strain"
 """Of a sample, after its number."""
@@ -93,31 +92,31 @@ class Ensemble:
     @property
     def unsure(self) -> list[str]:
         """Warnings, in sentences: of the tuned ring's peak, by which amplifications are divided, and of samples."""
-        told, top = [], self.tuned.top
+        warnings, top = [], self.tuned.top
         if top.at_end:
-            told.append(
+            warnings.append(
                 "the tuned ring is highest at an end of the band, so amplifications are over no peak of it; widen the "
                 "sweep."
             )
         elif top.missed > UNSURE:
-            told.append(f"the tuned ring may be {_missed(top.missed)}")
+            warnings.append(f"the tuned ring may be {_missed(top.missed)}")
         ends, off = int(np.nansum(self.column("at_end"))), self.column("missed") > UNSURE
         if ends:
-            told.append(f"in {counted(ends, 'sample')} the highest is at an end of the band; widen the sweep.")
+            warnings.append(f"in {counted(ends, 'sample')} the highest is at an end of the band; widen the sweep.")
         if off.any():
             most = float(self.column("missed")[off].max())
-            told.append(f"{counted(int(off.sum()), 'sample')} may be {_missed(most)}")
+            warnings.append(f"{counted(int(off.sum()), 'sample')} may be {_missed(most)}")
         if self.again and (low := self.lacked) > LEFT + float(self.column("missed")[self.highest]):
-            told.append(
+            warnings.append(
                 f"the first search missed {percent(low)} of the highest sample's peak, so others and the quantiles may "
                 "be as low; give the sweep more points."
             )
         if unsolved := int((self.column("unsolved") > 0).sum()):
-            told.append(
+            warnings.append(
                 f"in {counted(unsolved, 'sample')} no solution was found at some frequencies of the sweep (column "
                 "unsolved); give it more points."
             )
-        return told
+        return warnings
 
     @property
     def amplification(self) -> Array:
@@ -164,18 +163,20 @@ def run(
     tuned = of_ring(asked, asked.tuned.whole, -1)
     if not np.isfinite(tuned.top.amplitude):
         raise UserError("mistuning: the tuned ring has no solution in the band; see what microslip respond says of it")
-    found = Ensemble(
-        asked, tuned, np.zeros((0, len(COLUMNS))), Envelope.empty(len(asked.frequency), tuned.top.amplitude)
-    )
-    found = _kept(file, inputs, found) if file is not None else found
+    rows, envelope = np.zeros((0, len(COLUMNS))), Envelope.empty(len(asked.frequency), tuned.top.amplitude)
+    kept = _left(file, inputs)
+    if kept.keys() >= {"rows", "sums", "bins", "grids"} and kept["rows"].ndim == 2:
+        rows = kept["rows"]
+        envelope = Envelope(envelope.unit, kept["sums"], kept["bins"], list(kept["grids"]))
+    found = Ensemble(asked, tuned, rows, envelope)
     if len(found) > samples:
         found.rows, found.envelope = found.rows[:samples], found.envelope.first(samples)
     workers = workers or min(_cores(), -(-samples // EACH))
     with _computed(asked, workers, executor) as of:
         while len(found) < samples and not _narrow(found, until):
             _more(found, of, min(samples, _next(len(found), EACH * workers)), until, samples, report)
-            if file is not None:
-                _keep(file, inputs, found)
+            e = found.envelope
+            _keep(file, inputs, rows=found.rows, sums=e.sums, bins=e.bins, grids=np.array(e.grids))
     if len(found) < samples:
         report(f"{len(found)} of {len(found)} samples{_told(found)}, the rest was not needed")
     return found
@@ -189,7 +190,12 @@ def _more(
     made, told, judged = list[list[float]](), _told(found), _next(len(found))
     for number, one in zip(range(len(found) + 1, end + 1), of(range(len(found), end)), strict=True):
         found.envelope.add(one.grid)
-        made.append(_row(one))
+        solved, top = np.isfinite(one.top.amplitude), one.top
+        unsolved = np.isnan(one.grid).all(axis=1).sum()  # what the search added elsewhere in vain is in `missed`
+        made.append(
+            [top.amplitude, top.frequency, top.output, one.localisation if solved else np.nan, top.missed,
+             unsolved, top.at_end, one.stress, one.strain]  # fmt: skip
+        )
         report(f"{number} of {samples} samples{told}")
         if number in (judged, end):
             found.rows, made, judged = np.vstack([found.rows, made]), [], _next(number)
@@ -252,46 +258,25 @@ def choose(
     report(f"{rare.EACH * samples} samples of the linear ring")
     linear = beside(asked)
     before = np.array([linear(asked.deviations(int(i))) for i in np.flatnonzero(known)])
-    told = rare.correlation(before, found.amplification[known])
+    correlated = rare.correlation(before, found.amplification[known])
     every = np.array([linear(asked.deviations(FIRST + i)) for i in range(rare.EACH * samples)])
-    pi = rare.chances(every, samples, RARE, told, int(known.sum()))
+    pi = rare.chances(every, samples, RARE, correlated, int(known.sum()))
     chosen, inputs = rare.chosen(pi, asked.seed), f"{inputs} {len(found)} {samples}"
-    high = _read(file, inputs)
+    high = _left(file, inputs).get("high", np.zeros(0))
     workers = workers or _cores()
     with _computed(asked, workers, executor) as of:
         while len(high) < len(chosen):
             part = chosen[len(high) : len(high) + EACH * workers]
             high = np.append(high, [one.top.amplitude for one in of([FIRST + int(i) for i in part])])
             report(f"{len(high)} of {len(chosen)} chosen samples")
-            if file is not None:
-                with store.complete_or_absent(file) as temporary:
-                    np.savez(temporary, high=high, inputs=np.array(inputs))
+            _keep(file, inputs, high=high)
     solved = np.isfinite(high)
-    return rare.estimate(high[solved] / found.tuned.top.amplitude, pi[chosen][solved], len(pi), RARE, told)
-
-
-def _read(file: Path | None, inputs: str) -> Array:
-    """Amplitudes of chosen samples that a run with the same inputs has left."""
-    try:
-        if file is not None and file.is_file():
-            with np.load(store.ordinary(file), allow_pickle=False) as known:
-                return np.array(known["high"]) if str(known["inputs"]) == inputs else np.zeros(0)
-    except (OSError, ValueError, KeyError):
-        pass
-    return np.zeros(0)
+    return rare.estimate(high[solved] / found.tuned.top.amplitude, pi[chosen][solved], len(pi), RARE, correlated)
 
 
 def _missed(share: float) -> str:
     why = "it jumps or bends there, or the sweep is coarse; give the sweep more points"
     return f"up to {percent(share)} higher between two points: {why}."
-
-
-def _row(one: Sample) -> list[float]:
-    top = one.top
-    solved = np.isfinite(top.amplitude)
-    unsolved = np.isnan(one.grid).all(axis=1).sum()  # points that the search added elsewhere in vain are in `missed`
-    return [top.amplitude, top.frequency, top.output, one.localisation if solved else np.nan, top.missed,
-            unsolved, top.at_end, one.stress, one.strain]  # fmt: skip
 
 
 def _narrow(found: Ensemble, until: float | None) -> bool:
@@ -358,21 +343,19 @@ def _one(number: int) -> Sample:
     return sample(_own, number)
 
 
-def _keep(file: Path, inputs: str, found: Ensemble) -> None:
-    e = found.envelope
-    with store.complete_or_absent(file) as temporary:
-        np.savez(temporary, rows=found.rows, sums=e.sums, bins=e.bins, grids=np.array(e.grids), inputs=np.array(inputs))
+def _keep(file: Path | None, inputs: str, **arrays: Array) -> None:
+    if file is not None:
+        with store.complete_or_absent(file) as temporary:
+            np.savez(temporary, **arrays, inputs=np.array(inputs))  # type: ignore[arg-type]
 
 
-def _kept(file: Path, inputs: str, found: Ensemble) -> Ensemble:
-    """What a run with the same inputs has left, or what was given."""
-    if not file.is_file():
-        return found
+def _left(file: Path | None, inputs: str) -> dict[str, Array]:
+    """The arrays that a run with the same inputs has left; none where there is none."""
     try:
-        with np.load(store.ordinary(file), allow_pickle=False) as known:
-            if str(known["inputs"]) == inputs and len(known["rows"].shape) == 2:
-                envelope = Envelope(found.envelope.unit, known["sums"], known["bins"], list(known["grids"]))
-                return Ensemble(found.asked, found.tuned, known["rows"].copy(), envelope)
+        if file is not None and file.is_file():
+            with np.load(store.ordinary(file), allow_pickle=False) as known:
+                if str(known["inputs"]) == inputs:
+                    return {name: np.array(known[name]) for name in known.files}
     except (OSError, ValueError, KeyError):
-        return found
-    return found
+        pass
+    return {}

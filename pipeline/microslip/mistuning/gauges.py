@@ -21,10 +21,11 @@ from numpy.typing import ArrayLike
 
 from ..data import Array
 from ..errors import UserError
+from ..harmonic_balance.reduced import own_coordinates
 from ..settings.arguments import Index, Rows, Vector, checked, numbers
 from ..settings.numbers import Positive
 from ..system.assembly import Assembly, Linear
-from .estimate import Estimate, accepted, covariance, misfit
+from .identification import Estimate, accepted, covariance, misfit
 from .linear import held
 from .ring import Tuned
 from .scatter import Scatter
@@ -70,8 +71,7 @@ class Stuck:
         ring = self.tuned.mistuned([(s, np.ones((self.tuned.sectors, self.tuned.modes(s))))])
         part, other = self.tuned.whole.joined(1), ring.joined(1)
         stiff, viscous = (other.stiff - part.stiff) / 3, other.C - part.C
-        ends = np.cumsum([0] + [len(m.groups[0].M_r) for m in ring.components])
-        own = [slice(a, b) for a, b in zip(ends[:-1], ends[1:], strict=True)]
+        own = own_coordinates(ring, 0)
         return [(s, stiff[s, s], viscous[s, s]) for s in own if stiff[s, s].any()]
 
     def amplitudes(self, frequency: float, deviation: Array) -> tuple[Array, Array]:
@@ -120,11 +120,11 @@ def blades_from_gauges(
         x = np.zeros(readings.blades + find_level)
         x[: readings.blades] = (start > 0) * spread * rng.standard_normal(readings.blades)
         for part in parts:
-            found = scipy.optimize.least_squares(
+            fit = scipy.optimize.least_squares(
                 part.left, x, part.slopes, x_scale="jac", bounds=(-0.9, np.inf), max_nfev=100
             )
-            x = found.x
-        best = found if best is None or found.cost < best.cost else best
+            x = fit.x
+        best = fit if best is None or fit.cost < best.cost else best
         if accepted(misfit(best.fun, beyond := len(best.fun) - len(x)), beyond):
             break
     assert best is not None
@@ -178,8 +178,8 @@ class _Readings:
     def compared(self, x: Array) -> tuple[Array, Array]:
         """ln of computed over measured amplitudes, over the noise, and the derivatives."""
         if self.last is None or self.last[0] != x.tobytes():
-            found = [self.stuck.amplitudes(f, x[: self.blades]) for f in self.frequency]
-            y, slopes = (np.array(v) for v in zip(*found, strict=True))
+            both = [self.stuck.amplitudes(f, x[: self.blades]) for f in self.frequency]
+            y, slopes = (np.array(v) for v in zip(*both, strict=True))
             rates = (y.conj()[..., None] * slopes).real / np.abs(y[..., None]) ** 2
             rates = np.concatenate([rates, np.ones((*y.shape, int(self.find_level)))], axis=2)
             own = np.log(np.abs(y) / self.amplitude) + (x[self.blades] if self.find_level else 0.0)

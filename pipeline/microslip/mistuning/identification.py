@@ -25,15 +25,66 @@ from typing import Annotated, Any
 import numpy as np
 import scipy.optimize
 from numpy.typing import ArrayLike
+from scipy.special import chdtri, ndtri
 
 from ..data import Array
 from ..errors import UserError
 from ..settings.arguments import Rows, Vector, checked, numbers
 from ..settings.numbers import Number
-from .estimate import Estimate, covariance, misfit
 
 _ROUNDING = 1e-9
 """Share of the highest eigenvalue within which two are the same."""
+
+
+DOUBTED = 1e-3
+"""Probability below which what a fit leaves is no longer put down to the noise."""
+
+
+@dataclass(frozen=True, eq=False)
+class Estimate:
+    """Attributes:
+    deviation: (N,) of each blade's frequencies, a share of the nominal ones. covariance: (N, N). misfit: root mean
+        square of what the fit leaves, over the noise, per number measured beyond those found: about 1 where model and
+        noise are as they were said to be; NaN where nothing is beyond. beyond: how many are.
+    """
+
+    deviation: Array
+    covariance: Array
+    misfit: float
+    beyond: int
+
+    @property
+    def accuracy(self) -> Array:
+        """(N,) standard deviations."""
+        return np.sqrt(np.diag(self.covariance))
+
+    @property
+    def fits(self) -> bool:
+        """Whether the noise explains the misfit. Where it does not, intervals mean nothing: model or noise is another
+        one, or the search ended beside the blades."""
+        return accepted(self.misfit, self.beyond)
+
+    def interval(self, level: float = 0.95) -> Array:
+        """(2, N) ends of the confidence intervals, by the normal distribution."""
+        return self.deviation + np.outer([-1, 1], self.accuracy) * ndtri(0.5 + level / 2)
+
+
+def misfit(left: Array, beyond: int) -> float:
+    """Of residuals over their noise, see `Estimate`."""
+    return float(np.sqrt(left @ left / beyond)) if beyond > 0 else np.nan
+
+
+def accepted(misfit: float, beyond: int) -> bool:
+    """By the chi-square distribution; true where nothing could tell."""
+    return beyond <= 0 or misfit**2 * beyond <= chdtri(beyond, DOUBTED)
+
+
+def covariance(jacobian: Array) -> Array | None:
+    """(y, y) of unknowns, from the derivatives of residuals over their noise; None where these leave some open."""
+    _, size, turned = np.linalg.svd(jacobian, full_matrices=False)
+    if len(size) < jacobian.shape[1] or size[-1] <= 1e-9 * size[0]:
+        return None
+    return (turned.T / size**2) @ turned
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,14 +118,14 @@ def blades_from_modes(
     """
     ring = _Family(np.asarray(tuned, float), np.asarray(share, float), find_tuned, np.shape(shapes)[-1])
     try:
-        found = _fitted(ring, frequency, shapes, frequency_noise, shape_noise)
+        fit = _fitted(ring, frequency, shapes, frequency_noise, shape_noise)
     except UserError:
         if not _in_columns(ring, frequency, shapes, frequency_noise, shape_noise):
             raise
         raise UserError(IN_COLUMNS) from None
-    if not found.fits and _in_columns(ring, frequency, shapes, frequency_noise, shape_noise):
+    if not fit.fits and _in_columns(ring, frequency, shapes, frequency_noise, shape_noise):
         raise UserError(IN_COLUMNS)
-    return found
+    return fit
 
 
 IN_COLUMNS = "shapes: fit as columns and not as rows; give a row for each mode, that is shapes.T"
@@ -82,11 +133,11 @@ IN_COLUMNS = "shapes: fit as columns and not as rows; give a row for each mode, 
 
 def _fitted(ring: _Family, frequency: ArrayLike, shapes: ArrayLike, noise: float, shape_noise: float) -> FromModes:
     measured = _Measured.of(ring, frequency, shapes, noise, shape_noise)
-    found = scipy.optimize.least_squares(
+    fit = scipy.optimize.least_squares(
         lambda y: measured.compare(ring, y)[0], ring.start(measured), lambda y: measured.compare(ring, y)[1],
         x_scale="jac", xtol=1e-12, ftol=1e-12, gtol=1e-12,
     )  # fmt: skip
-    return ring.identified(found.x, found.fun, found.jac)
+    return ring.identified(fit.x, fit.fun, fit.jac)
 
 
 def _in_columns(ring: _Family, frequency: ArrayLike, shapes: ArrayLike, noise: float, shape_noise: float) -> bool:

@@ -29,10 +29,11 @@ import scipy.linalg
 from ..data import Array, ComplexArray
 from ..errors import UserError
 from ..harmonic_balance.problem import AtFrequency
+from ..harmonic_balance.reduced import own_coordinates, taken_in
 from ..system.assembly import Linear
 from .peaks import TOLERANCE, highest, told_by
 from .ring import Deviations, Tuned
-from .samples import Asked, Sliding
+from .samples import Asked, SlidingRing
 from .scatter import MODAL, Scatter
 from .sensitivity import number, softening
 
@@ -64,13 +65,13 @@ class Beside:
         own = self.own(deviations)
         square = np.unique([*self.square, *self.resonances(own)])
         y = self.amplitudes(square, own)
-        known, top = dict(zip(square, y, strict=True)), float(y.max())
+        heights, top = dict(zip(square, y, strict=True)), float(y.max())
         for _ in range(ROUNDS):
-            told = told_by(known)
-            if told is None or told[0] <= (1 + TOLERANCE) * top:
+            parabola = told_by(heights)
+            if parabola is None or parabola[0] <= (1 + TOLERANCE) * top:
                 break
-            known[told[1]] = self.amplitudes(np.array([told[1]]), own)[0]
-            top = max(top, float(known[told[1]].max()))
+            heights[parabola[1]] = self.amplitudes(np.array([parabola[1]]), own)[0]
+            top = max(top, float(heights[parabola[1]].max()))
         return top
 
     def own(self, deviations: Deviations) -> Array:
@@ -141,7 +142,7 @@ def beside(asked: Asked) -> Beside:
 
 def _at_peak(asked: Asked) -> ComplexArray:
     """(relative, relative) k of the contacts of the tuned ring at its peak."""
-    respond = Sliding(asked.problem(asked.tuned.whole), asked.tuned_points)
+    respond = SlidingRing(asked.problem(asked.tuned.whole), asked.tuned_points)
     top = highest(respond, asked.frequency, follow=respond.follow, at_once=respond.at_once)
     point = respond.known[top.frequency]
     at = respond.problem.at(point.Omega)
@@ -154,18 +155,18 @@ def known_of(asked: Asked) -> list[tuple[int, Scatter]]:
     Raises:
         UserError: none.
     """
-    found = [(i, s) for i, s in enumerate(asked.scatter) if s.of in MODAL and asked.tuned.body(s).sectors == 1]
-    if not found:
+    scattered = [(i, s) for i, s in enumerate(asked.scatter) if s.of in MODAL and asked.tuned.body(s).sectors == 1]
+    if not scattered:
         raise UserError("rare: needs blades whose frequency or damping scatters, for the linear ring to tell samples")
-    return found
+    return scattered
 
 
 def held(part: Linear, k: Array) -> Linear:
     """A part with contacts of a stiffness (c, c), which may be complex, taken into it."""
     T = part.rows
-    stiff = k @ np.linalg.inv(np.eye(part.count) + part.yielding @ k)
+    _, _, stiff, K = taken_in(part, k)
     return replace(
-        part, K=part.stiff + T.T @ stiff @ T, loss=None, load=part.load - T.T @ (stiff @ part.given),
+        part, K=K, loss=None, load=part.load - T.T @ (stiff @ part.given),
         output=part.output - part.output_residual @ (stiff @ T),
         output_given=part.output_given - part.output_residual @ (stiff @ part.given),
     )  # fmt: skip
@@ -173,17 +174,16 @@ def held(part: Linear, k: Array) -> Linear:
 
 def _columns(tuned: Tuned, scatter: list[tuple[int, Scatter]], size: int) -> tuple[list[tuple[int, int, int]], Array]:
     """Of every scattered mode its number, sector and mode, and (size, n) M V of it in the ring's coordinates."""
-    ends = np.cumsum([0] + [len(m.groups[0].M_r) for m in tuned.whole.components])
-    begins = {m.name: int(b) for m, b in zip(tuned.whole.components, ends[:-1], strict=True)}
+    own = own_coordinates(tuned.whole, 0)
+    places = {m.name: s for m, s in zip(tuned.whole.components, own, strict=True)}
     modes, columns = [], []
     for i, s in scatter:
         group = tuned.body(s).groups[0]
         P = group.M_r if group.to_diagonal is None else group.M_r @ group.to_diagonal
         for sector in range(tuned.sectors):
             for mode in range(P.shape[1]):
-                at = begins[f"{tuned.body(s).name}_{sector}"]
                 columns.append(np.zeros(size))
-                columns[-1][at : at + len(P)] = P[:, mode]
+                columns[-1][places[f"{tuned.body(s).name}_{sector}"]] = P[:, mode]
                 modes.append((i, sector, mode))
     return modes, np.array(columns).T
 
@@ -197,9 +197,9 @@ def _rise(at: AtFrequency, tuned: Tuned, s: Scatter, mode: int) -> complex:
 
 def answer(at: AtFrequency, slopes: list[Array]) -> ComplexArray:
     """(relative, relative) k of all contacts, from the derivatives of their forces."""
-    found = {}
+    stiffness = {}
     for g, S in zip(at.problem.groups, slopes, strict=True):
         for i, one in zip(g.contacts, S, strict=True):
             cc, ss, cs, sc = one[:, 1, :, 1], one[:, 2, :, 2], one[:, 1, :, 2], one[:, 2, :, 1]
-            found[i] = 0.5 * (cc + ss + 1j * (cs - sc))
-    return np.asarray(scipy.linalg.block_diag(*(found[i] for i in sorted(found))))
+            stiffness[i] = 0.5 * (cc + ss + 1j * (cs - sc))
+    return np.asarray(scipy.linalg.block_diag(*(stiffness[i] for i in sorted(stiffness))))

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..data import Array
+from ..data import Array, largest
 
 Respond = Callable[[float], Array | None]
 """(w,) amplitudes of the read-outs at a frequency (Hz); None where there is no solution."""
@@ -115,7 +115,7 @@ class _Search:
     ) -> None:  # fmt: skip
         self.respond, self.follow, self.at_once, self.tells = respond, follow, at_once, tells
         self.low, self.high = float(min(frequency)), float(max(frequency))
-        self.width = float(np.abs(np.diff(frequency)).max(initial=0.0))
+        self.width = largest(np.diff(frequency))
         self.known: dict[float, Array] = {}
         self.failed: list[float] = []
         self.tried: set[tuple[float, float, float, bool]] = set()
@@ -313,16 +313,15 @@ def _height(g: Array) -> Array:
 
 def told_by(known: dict[float, Array]) -> tuple[float, float] | None:
     """The highest amplitude that parabolas tell, and its frequency (Hz), where no point is yet."""
-    at = np.array(sorted(known))
-    if len(at) < 3:
+    if len(known) < 3:
         return None
-    y = np.array([known[f] for f in at])
+    at, y = _table(known)
     tops = (y[1:-1] >= y[:-2]) & (y[1:-1] >= y[2:])
     middle, which = np.nonzero(tops)
     if not len(middle):
         return None
-    x = np.stack([at[middle], at[middle + 1], at[middle + 2]])
-    g = np.stack([y[middle, which], y[middle + 1, which], y[middle + 2, which]]) ** -2.0
+    three = middle + np.arange(3)[:, None]
+    x, g = at[three], y[three, which] ** -2.0
     left, right = (g[1] - g[0]) / (x[1] - x[0]), (g[2] - g[1]) / (x[2] - x[1])
     bend = (right - left) / (x[2] - x[0])
     with np.errstate(divide="ignore", invalid="ignore"):

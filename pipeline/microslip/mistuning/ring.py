@@ -95,16 +95,16 @@ class Tuned:
                 else:
                     heavier.append((name, s, values[:, 0]))
                 continue
-            for at, own in ((f"{name}_{j}", own) for j, own in enumerate(values)):
+            for j, own in enumerate(values):
+                at = f"{name}_{j}"
                 if s.of == "modal_file":
                     components[at] = replace(self._made(s, own), name=at, aerodynamic=components[at].aerodynamic)
                 elif s.of in OF_BLADES:
                     components[at] = deviated(components[at], s, own)
                 else:
                     contacts[at] = _met(contacts[at], s, float(own[0]))
-            for c in self.pressed_by.get(name, ()) if s.of == "mass" else ():
-                for at, own in ((f"{c}_{j}", own) for j, own in enumerate(values)):
-                    contacts[at] = _pressed(contacts[at], float(own[0]))
+                for c in self.pressed_by.get(name, ()) if s.of == "mass" else ():
+                    contacts[f"{c}_{j}"] = _pressed(contacts[f"{c}_{j}"], float(own[0]))
         for m in self.sector.components:
             if m.name in discs:
                 components[m.name] = subset.mistuned(m, discs[m.name])
@@ -139,13 +139,13 @@ class Tuned:
 
     def _flow(self, deviations: Deviations) -> tuple[Flow, ...]:
         """What the flow adds to the tuned ring, or to the one of other modal files; it knows of no deviations."""
-        found = {f.components: f for f in self.whole.flow}
+        flows = {f.components: f for f in self.whole.flow}
         for s, values in (one for one in deviations if one[0].others):
             body = self.body(s)
             blades = [replace(self._made(s, own), name=f"{body.name}_{j}") for j, own in enumerate(values)]
-            if (names := tuple(b.name for b in blades)) in found:
-                found[names] = through(blades, body.aerodynamic)
-        return tuple(found.values())
+            if (names := tuple(b.name for b in blades)) in flows:
+                flows[names] = through(blades, body.aerodynamic)
+        return tuple(flows.values())
 
     def _alike(self, s: Scatter, sector: int, other: Assembly) -> None:
         """Raise `UserError` where a body of another modal file does not fit into the place of the nominal one."""
@@ -213,16 +213,22 @@ def deviated(component: Component, s: Scatter, own: Array) -> Component:
     V = np.eye(len(group.M_r)) if group.to_diagonal is None else group.to_diagonal
     damped = bool(component.loss) or bool(group.C_r.any())  # else it is the modes of stuck contacts that are
     P, omega, D = group.M_r @ V, group.omega, damped * group.damping_ratio
+
+    def added(values: Array) -> Array:
+        return (P * values) @ P.conj().T
+
+    stiffer = (1 + own) ** 2 - 1
+    lossier = own if s.of == "damping" else stiffer
+    if component.loss:
+        loss, C = {0: component.loss[0] + added(2 * D * omega**2 * lossier)}, group.C_r
+    else:
+        loss, C = {}, group.C_r + added(2 * D * omega * own)
     if s.of == "damping":
-        C = (P * (2 * D * omega * own)) @ P.conj().T
-        loss = {0: component.loss[0] + (P * (2 * D * omega**2 * own)) @ P.conj().T} if component.loss else {}
-        changed = replace(group, C_r=group.C_r + C if not loss else group.C_r, damping_ratio=D * (1 + own))
-        return replace(component, groups={0: changed}, loss=loss)
-    stiffer, faster = (1 + own) ** 2 - 1, own
-    K = group.K_r + (P * (omega**2 * stiffer)) @ P.conj().T
-    loss = {0: component.loss[0] + (P * (2 * D * omega**2 * stiffer)) @ P.conj().T} if component.loss else {}
-    C = group.C_r if loss else group.C_r + (P * (2 * D * omega * faster)) @ P.conj().T
-    return replace(component, groups={0: replace(group, omega=omega * (1 + own), K_r=K, C_r=C)}, loss=loss)
+        changed = replace(group, C_r=C, damping_ratio=D * (1 + own))
+    else:
+        K = group.K_r + added(omega**2 * stiffer)
+        changed = replace(group, omega=omega * (1 + own), K_r=K, C_r=C)
+    return replace(component, groups={0: changed}, loss=loss)
 
 
 def _heavier(group: ModalGroup, s: Scatter, mass: float) -> ModalGroup:
@@ -240,25 +246,30 @@ def _met(contact: Contact, s: Scatter, own: float) -> Contact:
         return replace(contact, offset=contact.offset - away)
     if s.of == "normal_force":
         return _pressed(contact, own)
-    law, count = _scaled(contact.patch.law, OF_LAWS[s.of], 1 + own)
+    changed, count = _changed(contact, s.of, own)
     if not count:
-        raise UserError(f"{s.of}: no number of contact '{contact.name}' follows it, by its law {type(law).__name__}")
-    changed = replace(contact, patch=replace(contact.patch, law=law))
+        law = type(contact.patch.law).__name__
+        raise UserError(f"{s.of}: no number of contact '{contact.name}' follows it, by its law {law}")
     force = float(contact.preload[0])
     return changed if not force else changed.pressed(force)
 
 
 def _pressed(contact: Contact, own: float) -> Contact:
     force = float(contact.preload[0])
-    law, count = _scaled(contact.patch.law, OF_LAWS["normal_force"], 1 + own)
+    changed, count = _changed(contact, "normal_force", own)
     if not force and not count:
         raise UserError(f"normal_force: contact '{contact.name}' has none; give it one, or scatter its gap")
-    changed = replace(contact, patch=replace(contact.patch, law=law))
-    found = preloaded_contact(
+    pressed = preloaded_contact(
         contact.name, changed.patch, contact.first, contact.second, normal=force * (1 + own),
         compliance=contact.compliance,
     )  # fmt: skip
-    return replace(found, phase=contact.phase, length=contact.length)
+    return replace(pressed, phase=contact.phase, length=contact.length)
+
+
+def _changed(contact: Contact, of: str, own: float) -> tuple[Contact, int]:
+    """The contact with the numbers of its law that follow one of `OF_LAWS`, and how many there are."""
+    law, count = _scaled(contact.patch.law, OF_LAWS[of], 1 + own)
+    return replace(contact, patch=replace(contact.patch, law=law)), count
 
 
 def _scaled(law: Any, names: tuple[str, ...], factor: float) -> tuple[Any, int]:

@@ -9,19 +9,19 @@ from typing import Any
 
 import numpy as np
 
-from ..data import Array, ComplexArray
+from .. import series
+from ..data import Array, ComplexArray, ModalGroup
 from ..harmonic_balance import problem as balance
 from ..harmonic_balance import reduced
 from ..harmonic_balance.forces import Forces
 from ..harmonic_balance.problem import AtFrequency, Problem
 from ..harmonic_balance.reduced import Seen
 from ..harmonic_balance.solver import Point, among, carried, solve, sweep
+from ..operating.stress import counted
 from ..system.assembly import Assembly
-from .branch import Branch
 from .peaks import Highest, highest
 from .ring import Deviations, Tuned
 from .scatter import Scatter
-from .stressed import worst
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,25 +87,21 @@ def sample(asked: Asked, number: int) -> Sample:
 def of_ring(asked: Asked, ring: Assembly, number: int = 0) -> Sample:
     """A whole ring: its highest blade over the frequency."""
     top, respond = _searched(asked, ring, asked.frequency)
-    grid = np.full((len(asked.frequency), asked.tuned.sectors), np.nan)
-    places = {f: i for i, f in enumerate(top.frequencies)}
-    for row, f in enumerate(asked.frequency):
-        if float(f) in places:
-            grid[row] = top.amplitudes[places[float(f)]]
+    nothing = np.full(asked.tuned.sectors, np.nan)
+    known = dict(zip(top.frequencies.tolist(), top.amplitudes, strict=True))
+    grid = np.array([known.get(float(f), nothing) for f in asked.frequency])
     strained = worst(ring, respond.coordinates(top.frequency)) if np.isfinite(top.amplitude) else ()
     return Sample(number, top, grid, *strained)
 
 
-def _searched(asked: Asked, ring: Assembly, frequency: Array) -> tuple[Highest, Sliding | Sticking]:
-    respond = Sticking(ring) if asked.stuck else Sliding(asked.problem(ring), asked.tuned_points)
+def _searched(asked: Asked, ring: Assembly, frequency: Array) -> tuple[Highest, SlidingRing | StickingRing]:
+    respond = StickingRing(ring) if asked.stuck else SlidingRing(asked.problem(ring), asked.tuned_points)
     top = highest(respond, frequency, follow=respond.follow, at_once=respond.at_once, tells=respond.tells)
-    return top if not np.isfinite(top.amplitude) else _ended(top, respond.ended(top.frequency)), respond
-
-
-def _ended(top: Highest, y: Array) -> Highest:
-    """With (w,) amplitudes of more digits at the highest."""
-    amplitudes = np.where((top.frequencies == top.frequency)[:, None], y, top.amplitudes)
-    return replace(top, output=int(y.argmax()), amplitude=float(y.max()), amplitudes=amplitudes)
+    if np.isfinite(top.amplitude):
+        y = respond.ended(top.frequency)  # has more digits
+        every = np.where((top.frequencies == top.frequency)[:, None], y, top.amplitudes)
+        top = replace(top, output=int(y.argmax()), amplitude=float(y.max()), amplitudes=every)
+    return top, respond
 
 
 FINER, HIGH = 4, 0.5
@@ -133,7 +129,7 @@ TELLS = 0.5
 """Share of the way from one solution to another, from there on which it leads where it is carried on."""
 
 
-class Sliding:
+class SlidingRing:
     """Amplitudes of a ring with friction at any frequency, each started from what is known nearby.
 
     Attributes: problem. tuned: solutions of the ring of equal sectors, in the same units. known: Hz -> of this one.
@@ -177,7 +173,7 @@ class Sliding:
             self.known[frequency] = before
         if not arc:
             return [], False
-        points, ends = Branch(self.problem, self.known[behind], Omega, 2 * np.pi * width).onward()
+        points, ends = Arc(self.problem, self.known[behind], Omega, 2 * np.pi * width).onward()
         return [(f, self._read(f, p)) for p in points if (f := p.Omega / (2 * np.pi)) != frequency], ends
 
     def tells(self, frequency: float, behind: float) -> bool:
@@ -202,7 +198,7 @@ class Sliding:
         return self._amplitudes(point)
 
     def _amplitudes(self, point: Point) -> Array:
-        return np.abs(_amplitudes(self._at(point.Omega), point))
+        return np.abs(amplitudes(self._at(point.Omega), point.x))
 
     def _kept(self, frequency: float, point: Point) -> Array | None:
         self.slope = point.slope
@@ -242,23 +238,19 @@ class Sliding:
         return sorted(self.known.values(), key=lambda p: abs(p.Omega - Omega))[:most]
 
 
-def amplitudes(problem: Problem, point: Point, harmonic: int = 1) -> ComplexArray:
-    """(w,) complex 0-peak amplitudes of all read-outs at a solution, m."""
-    return _amplitudes(problem.at(point.Omega), point, harmonic)
+def amplitudes(at: AtFrequency, x: Array) -> ComplexArray:
+    """(w,) complex 0-peak amplitudes of all read-outs at a solution x (size,), m."""
+    force = at.force(x)
+    return read(at, at.modal(x, force)[1], force, at.problem.share)
 
 
-def _amplitudes(at: AtFrequency, point: Point, harmonic: int = 1) -> ComplexArray:
-    force = at.force(point.x)
-    return read(at, at.modal(point.x, force)[harmonic], force, at.problem.share, harmonic)
+def read(at: AtFrequency, q: list[ComplexArray], force: Array, share: float) -> ComplexArray:
+    """(w,) read-outs in the first harmonic, from the parts' coordinates, (W, c) forces and a share of the loads."""
+    F = series.amplitudes(force)[1]
+    return reduced.monitored(at.problem.read[1], np.concatenate(q), F, share)
 
 
-def read(at: AtFrequency, q: list[ComplexArray], force: Array, share: float, harmonic: int = 1) -> ComplexArray:
-    """(w,) read-outs in a harmonic, from the parts' coordinates, (W, c) forces and a share of the loads."""
-    F = at.amplitudes(force)[harmonic]
-    return reduced.monitored(at.problem.read[harmonic], np.concatenate(q), F, share)
-
-
-class Sticking:
+class StickingRing:
     """Amplitudes of a ring whose contacts stick, from the matrices of the whole of it."""
 
     def __init__(self, ring: Assembly) -> None:
@@ -274,8 +266,144 @@ class Sticking:
     follow = at_once = tells = None  # of linear equations there is one solution, found alike everywhere
 
     def coordinates(self, frequency: float) -> list[ComplexArray]:
-        """See `Sliding`."""
+        """See `SlidingRing`."""
         return [self._at(frequency).modal]
 
     def _at(self, frequency: float) -> Seen:
         return reduced.seen(self.part, self.k, 2 * np.pi * frequency, 1)
+
+
+# strained blades ------------------------------------------------------------------------------
+
+
+def worst(ring: Assembly, q: Sequence[ComplexArray]) -> tuple[float, float]:
+    """Stress amplitude (von Mises, Pa) at the worst node and strain amplitude at the worst gauge of the bodies that are
+    read, 0-peak; NaN of what their modal files do not have, or do not feel.
+
+    Args:
+        q: amplitudes of the coordinates, component by component, in pieces of any length.
+    """
+    read = {w.component for w in ring.outputs}
+    every = np.concatenate(q)
+    each = zip(ring.components, reduced.own_coordinates(ring, 0), strict=True)
+    blades = [(m.groups[0], every[s]) for m, s in each if m.name in read]
+    stress = np.array([_stress(g, a) for g, a in blades])
+    rows = [(np.abs(row @ a), np.linalg.norm(row) * np.linalg.norm(a))
+            for g, a in blades for gauge in g.gauges.values() for row in gauge.rows]  # fmt: skip
+    strain = [float(read) for read, most in rows if read > READS * most]
+    return float(np.fmax.reduce(stress, initial=np.nan)), max(strain, default=np.nan)
+
+
+READS = 1e-9
+"""Share of what a motion as large could make a gauge read, below which it reads rounding: by symmetry, say."""
+
+
+def _stress(group: ModalGroup, q: ComplexArray) -> float:
+    """Of s = Re(a exp(i t)) the largest s^T Q s over a cycle is (a^H Q a + abs(a^T Q a)) / 2."""
+    if "nodes" not in group.stresses:
+        return np.nan
+    a = group.stresses["nodes"].stress[counted(group)] @ q
+    b = a @ MISES
+    squares = (a.conj() * b).sum(axis=1).real + np.abs((a * b).sum(axis=1))
+    return float(np.sqrt(0.5 * squares.max()))
+
+
+MISES = np.diag([1.5, 1.5, 1.5, 3.0, 3.0, 3.0])
+"""Q of the von Mises stress s^T Q s of (xx, yy, zz, three shears)."""
+MISES[:3, :3] -= 0.5
+
+
+# a solution followed by its arc ------------------------------------------------------------------
+
+
+STEPS = 100
+"""At most, those in vain counted."""
+
+LONGEST, SHORTEST = 0.25, 2e-3
+"""Steps, of z."""
+
+BACK = 0.3
+"""Widths that the curve may go back before it counts as having ended."""
+
+CORRECTIONS = 6
+"""Newton steps at most."""
+
+TOLERANCE = 1e-9
+"""Of R over x."""
+
+
+class Arc:
+    """The solution through a point.
+
+    Attributes: problem. begin. to: rad/s, whereto. width: rad/s, of what is between two points of a sweep.
+    """
+
+    def __init__(self, problem: Problem, begin: Point, to: float, width: float) -> None:
+        self.problem, self.begin = problem, begin
+        self.width, self.size = float(np.copysign(width, to - begin.Omega)), float(np.linalg.norm(begin.x))
+        self.end = (to - begin.Omega) / self.width
+
+    def onward(self) -> tuple[list[Point], bool]:
+        """Points that are nearer to the frequency than all before them, the last one there, behind it, or about where
+        the curve ends; whether it ends."""
+        z = most = np.append(self.begin.x / self.size, 0.0)
+        found, h, t = list[Point](), LONGEST, self._along(self._linear(z)[2], np.append(0 * self.begin.x, 1.0))
+        for _ in range(STEPS):
+            ahead, b, count = self._corrected(z, t, h)
+            if ahead is None and h > SHORTEST:
+                h *= 0.25
+                continue
+            if ahead is None:
+                ahead, b, t = self._round(z, t)
+                h = 2 * SHORTEST
+            if ahead is None or ahead[-1] < most[-1] - BACK:
+                return found, True
+            z, t, h = ahead, self._along(b, t), min(1.5 * h if count <= 3 else h, LONGEST)
+            if z[-1] > most[-1]:
+                most = z
+                found.append(Point(self._Omega(z), self.size * z[:-1]))
+            if z[-1] >= self.end:
+                return found, False
+        return found, False
+
+    def _Omega(self, z: Array) -> float:
+        return self.begin.Omega + self.width * float(z[-1])
+
+    def _linear(self, z: Array) -> tuple[Array, Array, Array]:
+        """R, a and b, see above, in units of z."""
+        x, at = self.size * z[:-1], self.problem.at(self._Omega(z))
+        force, slopes = at.forces(x)
+        R, J = at.residual_of(x, force), at.jacobian(slopes)
+        return R / self.size, J.solve(-R) / self.size, J.solve(at.rate(x, force)) * (self.width / self.size)
+
+    def _along(self, b: Array, before: Array) -> Array:
+        """The curve's direction, on from another one."""
+        t = np.append(-b, 1.0)
+        return np.asarray(t / np.copysign(np.linalg.norm(t), t @ before))
+
+    def _corrected(self, begin: Array, t: Array, h: float) -> tuple[Array | None, Array, int]:
+        """The point a step ahead, or None, its b, and the number of corrections."""
+        z, last = begin + h * t, np.inf
+        for count in range(CORRECTIONS):
+            R, a, b = self._linear(z)
+            left = float(np.abs(R).max())
+            if left <= TOLERANCE * np.abs(z[:-1]).max():
+                return z, b, count
+            if not left <= (0.5 * last if count > 1 else np.inf):
+                break
+            last, step = left, (h - t @ (z - begin) - t[:-1] @ a) / (t[-1] - t[:-1] @ b)
+            z = z + np.append(a - b * step, step)
+            if np.linalg.norm(z - begin - h * t) > h:
+                break
+        return None, t, CORRECTIONS
+
+    def _round(self, z: Array, t: Array) -> tuple[Array | None, Array, Array]:
+        """A point behind a kink, its b and the direction to it, by the derivative a little beyond: either way that does
+        not lead back to where the curve came from."""
+        for h in (SHORTEST, 2 * SHORTEST, 4 * SHORTEST):
+            beyond = self._along(self._linear(z + h * t)[2], t)
+            for way in (beyond, -beyond):
+                found, b, _ = self._corrected(z, way, h)
+                if found is not None and np.linalg.norm(found - (z - h * t)) > 0.5 * h:
+                    return found, b, way
+        return None, t, t

@@ -38,9 +38,6 @@ ABSOLUTE = "added_mass", "gap"
 MODAL = "frequency", "damping"
 """Those of which every mode of a body has its own."""
 
-DISTRIBUTIONS = "normal", "lognormal", "uniform"
-ARRANGEMENTS = "given", "shuffled", "drawn"
-
 
 @checked_fields
 @dataclass(frozen=True)
@@ -76,15 +73,11 @@ class Scatter:
             raise UserError(f"of: '{self.of}' is none of {', '.join(known)}")
         if (self.of == "modal_file") != bool(self.others):
             raise UserError(f"{self.of}: others belong to modal_file, which needs them")
-        given = (self.deviation > 0) + bool(self.values) + bool(self.others)
-        if not given:
+        ways = (self.deviation > 0) + bool(self.values) + bool(self.others)
+        if not ways:
             raise UserError(f"{self.of}: nothing scatters; give a deviation above zero, or values that are known")
-        if given > 1:
+        if ways > 1:
             raise UserError(f"{self.of}: give one of deviation, values that are known, and others")
-        self._heard()
-
-    def _heard(self) -> None:
-        """Raise `UserError` for what is given and nothing depends on."""
         drawn = self.deviation > 0
         for key, name, depends in (
             ("component", "body", self.of in OF_BLADES), ("contact", "contact", self.of in OF_CONTACTS),
@@ -151,12 +144,12 @@ class Scatter:
             UserError: numbers cannot correlate so, as those round an odd ring that are each against the next.
         """
         apart = np.minimum(np.arange(sectors), sectors - np.arange(sectors))
-        found = np.fft.fft(self.neighbours**apart).real
-        if found.min() < -1e-9 * sectors:
+        eigenvalues = np.fft.fft(self.neighbours**apart).real
+        if eigenvalues.min() < -1e-9 * sectors:
             raise UserError(
                 f"neighbours: {self.neighbours:g} cannot hold all round a ring of {sectors} sectors; take one nearer 0"
             )
-        return np.maximum(found, 0.0)
+        return np.maximum(eigenvalues, 0.0)
 
     def _of(self, z: Array) -> Array:
         if self.distribution == "uniform":

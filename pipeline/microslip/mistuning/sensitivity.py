@@ -19,6 +19,7 @@ import numpy as np
 from ..data import Array, ComplexArray
 from ..harmonic_balance.blocks import Matrix
 from ..harmonic_balance.problem import AtFrequency, Problem
+from ..harmonic_balance.reduced import own_coordinates, taken_in
 from ..harmonic_balance.solver import Point
 from .ring import Tuned, deviated
 from .samples import Asked, read
@@ -55,8 +56,8 @@ class Approximation:
 def approximation(asked: Asked, scatter: Scatter) -> Approximation:
     """First order in the deviations of one scatter of frequencies, about the tuned ring's solutions."""
     points = asked.tuned_points
-    found = [sensitivities(asked, scatter, point) for point in points]
-    mean, S = np.array([m for m, _ in found]), np.array([s for _, s in found])
+    each = [sensitivities(asked, scatter, point) for point in points]
+    mean, S = np.array([m for m, _ in each]), np.array([s for _, s in each])
     return Approximation(np.array([p.Omega for p in points]) / (2 * np.pi), mean, S, spread(S, scatter))
 
 
@@ -72,7 +73,7 @@ def spread(S: Array, scatter: Scatter) -> Array:
 def sensitivities(asked: Asked, scatter: Scatter, point: Point) -> tuple[float, Array]:
     """Amplitude of blade 0 of the tuned ring at a solution (m), and (sectors, modes) how it changes by the relative
     deviations of every blade, at one frequency: one solution of the transposed equations."""
-    now, modes = Linearised.of(asked.problem(asked.tuned.whole), point), asked.tuned.modes(scatter)
+    now, modes = LinearisedRing.of(asked.problem(asked.tuned.whole), point), asked.tuned.modes(scatter)
     p, pushed = now.at.problem, now.pushes()
     out = np.zeros((asked.tuned.sectors, modes))
     bodies = [number(p, asked.tuned, scatter, j) for j in range(asked.tuned.sectors)]
@@ -85,7 +86,7 @@ def sensitivities(asked: Asked, scatter: Scatter, point: Point) -> tuple[float, 
 
 
 @dataclass(frozen=True, eq=False)
-class Linearised:
+class LinearisedRing:
     """A ring about its motion at one frequency.
 
     Attributes: at. force: (W, c) of the contacts. slopes: its derivatives, of each group. q: harmonic -> part -> its
@@ -99,7 +100,7 @@ class Linearised:
     y: ComplexArray
 
     @classmethod
-    def of(cls, problem: Problem, point: Point) -> Linearised:
+    def of(cls, problem: Problem, point: Point) -> LinearisedRing:
         at = problem.at(point.Omega)
         force, slopes = at.forces(point.x)
         q = at.modal(point.x, force)
@@ -117,16 +118,6 @@ class Linearised:
         moved = [np.einsum(along, S, g.relative(v) - g.relative(0 * v)) for g, S in each]
         return self.at.along(moved, preload=False)
 
-    def after(self, R: Array, force: Array | None = None) -> tuple[list[ComplexArray], ComplexArray]:
-        """First harmonics of the coordinates of every part, and of the read-outs, that (W, c) R, a change of the
-        residual in m, and (W, c) force, one of the contacts' forces, bring about."""
-        p = self.at.problem
-        v = p.displacement(self.matrix.solve(-(R / p.scale).ravel()))
-        changed = self.felt(v) + (0.0 if force is None else force)
-        held = np.hstack([v[:, s] @ k.T for s, k in zip(p.slices, p.stiffness, strict=True)])
-        dq = self.at.coordinates(changed - held, 0.0)[1]
-        return dq, read(self.at, dq, changed, 0.0)
-
     def pushes(self) -> list[list[ComplexArray]]:
         """Harmonic -> part -> (m,) z: the real part of z . S q is how much amplitude the first read-out gains where a
         part's dynamic stiffness grows by S."""
@@ -136,24 +127,24 @@ class Linearised:
         for i, (part, k, s) in enumerate(zip(p.parts[1], p.stiffness, p.slices, strict=True)):
             A, rows = self._of_part(i, 1)
             own[i] = u * np.linalg.solve(A.T, part.output[0])
-            moved = own[i] @ part.rows.conj().T @ np.linalg.inv(np.eye(part.count) + k @ part.yielding)
+            moved = own[i] @ part.rows.conj().T @ taken_in(part, k)[1]
             for out, z in ((by_force, moved + u * part.output_residual[0]), (by_motion, moved @ k)):
                 out[1, s], out[2, s] = -z.real, -z.imag
         c = self.felt(by_force, turned=True) - by_motion
         turned = self.matrix.transposed.solve((c * p.scale).ravel()).reshape(c.shape) / p.scale
-        found: list[list[ComplexArray]] = []
+        pushes: list[list[ComplexArray]] = []
         for h in range(p.harmonics + 1):
             z = turned[0] if h == 0 else turned[2 * h - 1] + 1j * turned[2 * h]
             each = [(*self._of_part(i, h), s) for i, s in enumerate(p.slices)]
-            found.append([np.asarray(-np.linalg.solve(A.T, z[s] @ rows), complex) for A, rows, s in each])
-        found[1] = [z - own[i] for i, z in enumerate(found[1])]
-        return found
+            pushes.append([np.asarray(-np.linalg.solve(A.T, z[s] @ rows), complex) for A, rows, s in each])
+        pushes[1] = [z - own[i] for i, z in enumerate(pushes[1])]
+        return pushes
 
     def _of_part(self, i: int, h: int) -> tuple[ComplexArray, ComplexArray]:
         """A part's dynamic stiffness with contacts of the stiffness taken into it, and what of it they feel."""
         p, w = self.at.problem, h * self.at.Omega
         part, k = p.parts[h][i], p.stiffness[i]
-        P, T = np.linalg.inv(np.eye(part.count) + part.yielding @ k), part.rows
+        P, T = taken_in(part, k)[0], part.rows
         A = part.stiff - w**2 * part.M + 1j * w * part.C + T.conj().T @ k @ P @ T
         return A.astype(complex), P @ T
 
@@ -168,8 +159,7 @@ def _where(p: Problem, body: int) -> tuple[int, slice]:
     """Number of the part that a body is eliminated in, and its coordinates there."""
     if len(p.slices) > 1:
         return body, slice(None)
-    ends = np.cumsum([0, *(len(m.groups[0].M_r) for m in p.assembly.components)])
-    return 0, slice(int(ends[body]), int(ends[body + 1]))
+    return 0, own_coordinates(p.assembly, 0)[body]
 
 
 def softening(at: AtFrequency, body: int, scatter: Scatter, mode: int, h: int) -> ComplexArray:

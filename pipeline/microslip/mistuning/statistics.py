@@ -99,10 +99,10 @@ class Envelope:
         """That of the first samples alone; of all where that is not known any more."""
         if count > len(self.grids):
             return self
-        found = Envelope.empty(len(self.bins), self.unit)
+        envelope = Envelope.empty(len(self.bins), self.unit)
         for grid in self.grids[:count]:
-            found.add(grid)
-        return found
+            envelope.add(grid)
+        return envelope
 
     def samples(self, sectors: int) -> int:
         """How many were taken in with a solution somewhere."""
@@ -131,20 +131,20 @@ class Envelope:
         """Column -> (f,); amplitudes in their unit, k of Sextro Eq. (5.6-17)."""
         with np.errstate(divide="ignore", invalid="ignore"):
             s = self.deviation / self.mean
-        found = self.sums[0] > 0
+        counted = self.sums[0] > 0
         return {
             "mean": self.mean,
             "deviation": self.deviation,
-            "weibull_exponent": np.where(found & (s > 0), exponent(np.where(found & (s > 0), s, 1.0)), np.nan),
-            "lowest": np.where(found, self.unit * self.sums[3], np.nan),
+            "weibull_exponent": np.where(counted & (s > 0), exponent(np.where(counted & (s > 0), s, 1.0)), np.nan),
+            "lowest": np.where(counted, self.unit * self.sums[3], np.nan),
             "quantile_2.5_percent": self.quantile(0.025),
             "quantile_97.5_percent": self.quantile(0.975),
-            "highest": np.where(found, self.unit * self.sums[4], np.nan),
+            "highest": np.where(counted, self.unit * self.sums[4], np.nan),
         }
 
 
 @dataclass(frozen=True)
-class Fit:
+class FittedTail:
     """A distribution fitted to highest amplitudes.
 
     Attributes:
@@ -162,14 +162,14 @@ class Fit:
 SHARES = 0.5, 0.95, 0.99, 0.999
 
 
-def fits(values: Array) -> list[Fit]:
+def fits(values: Array) -> list[FittedTail]:
     """The extreme-value distribution and Weibull's, fitted to (n,) highest amplitudes by maximum likelihood."""
     from scipy.stats import genextreme, weibull_min
 
     x = np.sort(np.asarray(values, dtype=float))
     if len(x) < 20 or np.ptp(x) == 0:
         return []
-    found = []
+    fitted = []
     shape, location, scale = _by_moments(x)
     for name, kind, start, given, names in (
         ("generalised extreme value", genextreme, (shape,), {"loc": location, "scale": scale},
@@ -181,8 +181,8 @@ def fits(values: Array) -> list[Fit]:
         off = np.maximum(np.abs(made.cdf(x) - steps), np.abs(made.cdf(x) - steps + 1 / len(x)))
         tail = float(off[int(0.9 * len(x)) :].max())
         told = {share: float(made.ppf(share)) for share in SHARES}
-        found.append(Fit(name, dict(zip(names, map(float, p), strict=True)), float(off.max()), tail, told))
-    return found
+        fitted.append(FittedTail(name, dict(zip(names, map(float, p), strict=True)), float(off.max()), tail, told))
+    return fitted
 
 
 def _by_moments(x: Array) -> tuple[float, float, float]:

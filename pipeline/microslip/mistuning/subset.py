@@ -101,7 +101,7 @@ def _stiffer(component: Component, added: Sequence[Array]) -> Component:
 
 def _waves(component: Component) -> list[tuple[int, StressSet]]:
     """(sign of the imaginary part, stress set) of the nodal diameters 0 to N/2."""
-    found = []
+    waves = []
     for k in range(component.sectors // 2 + 1):
         wave = component.at(k)
         points = wave.group.stresses.get(GAUSS)
@@ -109,8 +109,8 @@ def _waves(component: Component) -> list[tuple[int, StressSet]]:
             raise UserError(
                 f"{component.name}: its modal file has no strain at Gauss points; set output.gauss = true in its body"
             )
-        found.append((-1 if wave.conjugate else 1, points))
-    return found
+        waves.append((-1 if wave.conjugate else 1, points))
+    return waves
 
 
 def _of_sector(component: Component, key: str) -> Array:

@@ -13,22 +13,17 @@ from ..linalg import canonical, eigen
 from ..reduction import Reduced
 from ..settings.body import BodySettings
 from ..units import from_rpm, rpm_text
-from .body_rows import BodyRows
-from .equilibrium import BodyModel, StaticState, equilibrium, stiffness_slope
-from .group import assemble_group, searched_state
+from .equilibrium import StaticState, equilibrium, stiffness_slope
+from .group import assemble_group
+from .prepared import Prepared
 from .range_basis import Common, Guess, Settled, Solved, common_coordinates, lagrange
-from .sector import HarmonicUnknowns, Sector, sector_pencils
-from .solution import Searched, Solution, Unknowns, reduced_solution, with_spares
-from .spectrum import leading_rows, make_pencil
-
-Report = Callable[[str], None]
+from .solution import Searched, Solution, reduced_solution, searched_state
+from .spectrum import leading_rows
 
 
 def body_ranges(
-    model: BodyModel, settings: BodySettings, motions: Array, rows: BodyRows, solver: eigen.DirectSolver,
-    sector: Sector | None, settled: Mapping[float, StaticState], searched: Mapping[float, Mapping[int, Searched]],
-    report: Report,
-) -> dict[int, SpeedRange]:  # fmt: skip
+    b: Prepared, settled: Mapping[float, StaticState], searched: Mapping[float, Mapping[int, Searched]]
+) -> dict[int, SpeedRange]:
     """Nodal diameter -> one basis for all speeds of `rotation.range_rpm`. Equilibria are shared.
 
     Args:
@@ -38,7 +33,7 @@ def body_ranges(
     Raises:
         UserError: instability inside the range. NotConverged: the tolerance cannot be met.
     """
-    r = settings.rotation
+    settings, r = b.settings, b.settings.rotation
     assert r.range_rpm is not None
     if any(c.modes == "closed" for c in settings.closures):
         raise UserError(
@@ -46,36 +41,29 @@ def body_ranges(
             'range can follow; use modes = "open", or rotation.speeds_rpm alone'
         )
     low, high = (from_rpm(v) for v in r.range_rpm)
-    report(f"speed range {r.range_rpm[0]:g} to {r.range_rpm[1]:g} rpm")
-    body = _Body(model, settings, motions, rows, solver, sector, report, settled, searched)
-    found: dict[int, Common] = {}
+    b.report(f"speed range {r.range_rpm[0]:g} to {r.range_rpm[1]:g} rpm")
+    body, before = _Speeds(b, settled, searched), None
+    ranges: dict[int, Common] = {}
     try:
-        for k in sector.harmonics if sector else (0,):
-            if sector:
-                report(f"speed range of nodal diameter {k}")
-            before = found[max(found)] if found else None
-            found[k] = common_coordinates(
-                body.settled(k), body.solve(k), low, high, settings.modes.count, r.range_tolerance, report, before,
+        for k in b.harmonics:
+            if b.sector:
+                b.report(f"speed range of nodal diameter {k}")
+            ranges[k] = before = common_coordinates(
+                body.settled(k), body.solve(k), low, high, settings.modes.count, r.range_tolerance, b.report, before,
                 thrice=settings.reduction != "eigenmodes",
             )  # fmt: skip
     except UserError as error:
         if error.key == "rotation.speeds_rpm":
             error.key = "rotation.range_rpm"
         raise
-    return {k: _range(body, k, common) for k, common in found.items()}
+    return {k: _range(b, k, common) for k, common in ranges.items()}
 
 
 @dataclass
-class _Body:
+class _Speeds:
     """What the speeds and nodal diameters of a range share: equilibria, and solutions where all come at once."""
 
-    model: BodyModel
-    settings: BodySettings
-    motions: Array
-    rows: BodyRows
-    solver: eigen.DirectSolver
-    sector: Sector | None
-    report: Report
+    b: Prepared
     known: Mapping[float, StaticState]
     searched: Mapping[float, Mapping[int, Searched]]
     states: dict[float, StaticState] = field(default_factory=dict)
@@ -84,18 +72,14 @@ class _Body:
     slope_pencils: dict[float, Mapping[int, eigen.Pencil]] = field(default_factory=dict)
     solutions: dict[float, Mapping[int, Solution]] = field(default_factory=dict)
 
-    def unknowns(self, k: int) -> Unknowns:
-        if self.sector is None:
-            return self.model.free
-        return HarmonicUnknowns(self.sector.unknowns, self.sector.unknowns.transformation(k))
-
     def settled(self, k: int) -> Callable[[float, Guess], Settled]:
         """Equilibrium at a speed; Newton starts from the weighted displacements and slopes of the speeds known."""
 
         def settle(speed: float, weights: Guess) -> Settled:
             if speed not in self.states:
-                self._settle(speed, weights)
-            smooth = self.settings.rotation.prestress == "nonlinear" and not self.model.contacts
+                self.states[speed] = self.known[speed] if speed in self.known else self._settle(speed, weights)
+                self.pencils[speed] = self.b.pencils(self.states[speed].K)
+            smooth = self.b.settings.rotation.prestress == "nonlinear" and not self.b.model.contacts
             slope = (lambda fresh: self._slope(speed, fresh)[k].K) if smooth else None
             return Settled(speed, self.pencils[speed][k], self.states[speed], slope)
 
@@ -103,61 +87,50 @@ class _Body:
 
     def _slope(self, speed: float, fresh: bool) -> Mapping[int, eigen.Pencil]:
         if speed not in self.slope_pencils:
-            state = self.states[speed]
-            self.slopes[speed], dK = stiffness_slope(self.model, speed, state, self.solver, fresh)
-            self.slope_pencils[speed] = self._pencils(dK)
+            state, fresh = self.states[speed], fresh and speed not in self.known  # else other speeds came between
+            self.slopes[speed], dK = stiffness_slope(self.b.model, state, self.b.solver, fresh)
+            self.slope_pencils[speed] = self.b.pencils(dK)
         return self.slope_pencils[speed]
 
-    def _settle(self, speed: float, weights: Guess) -> None:
-        start, prestress = None, self.settings.rotation.prestress
-        if speed in self.known:
-            self.pencils[speed], self.states[speed] = self._pencils(self.known[speed].K), self.known[speed]
-            return
+    def _settle(self, speed: float, weights: Guess) -> StaticState:
+        start, prestress = None, self.b.settings.rotation.prestress
         if weights:
             u = np.sum([w * self.states[s].u for s, (w, _) in weights.items()], axis=0)
             u += np.sum([v * self.slopes[s] for s, (_, v) in weights.items() if v], axis=0)
             start = StaticState(u, None, [], np.zeros(0), prestress)
-        self.report(f"equilibrium at {rpm_text(speed)}")
-        state = equilibrium(self.model, speed, prestress, self.solver, start, self.report)
-        self.pencils[speed], self.states[speed] = self._pencils(state.K), state
-
-    def _pencils(self, K: Array) -> Mapping[int, eigen.Pencil]:
-        s = self.sector
-        if s is None:
-            return {0: make_pencil(self.model, K, self.solver)}
-        return sector_pencils(self.model, K, s.unknowns, s.condensed, s.harmonics)
+        self.b.report(f"equilibrium at {rpm_text(speed)}")
+        return equilibrium(self.b.model, speed, prestress, self.b.solver, start, self.b.report)
 
     def solve(self, k: int) -> Callable[[Settled], Solved]:
         """Certified modes, and with the methods that use them the static answers and fixed-interface modes."""
-        more = with_spares(self.settings)
+        more = self.b.with_spares()
 
         def solve(settled: Settled) -> Solved:
             speed = settled.speed
             if speed not in self.solutions:
-                common = (self.motions, self.rows, self.solver, self.sector, self.report)
-                every = self.searched.get(speed) or searched_state(self.model, more, self.states[speed], speed, *common)
-                self.solutions[speed] = {n: reduced_solution(self.model, more, s, self.rows) for n, s in every.items()}
-            found = self.solutions[speed][k]
-            shapes = [found.found.vectors]
-            if self.settings.reduction not in ("eigenmodes", "macneal"):
-                shapes += [found.reduced.vectors, found.answers]
-            return Solved(np.hstack(shapes), float(found.found.values[0]), found)
+                every = self.searched.get(speed) or searched_state(more, self.states[speed])
+                self.solutions[speed] = {n: reduced_solution(more, s) for n, s in every.items()}
+            s = self.solutions[speed][k]
+            shapes = [s.found.vectors]
+            if more.settings.reduction not in ("eigenmodes", "macneal"):
+                shapes += [s.reduced.vectors, s.answers]
+            return Solved(np.hstack(shapes), float(s.found.values[0]), s)
 
         return solve
 
 
-def _range(body: _Body, k: int, common: Common) -> SpeedRange:
-    model, settings = body.model, body.settings
-    phi = body.unknowns(k).expand(common.V, model.d.mesh.n_points)
+def _range(b: Prepared, k: int, common: Common) -> SpeedRange:
+    mesh, settings = b.model.d.mesh, b.settings
+    phi = b.unknowns(k).expand(common.V, mesh.n_points)
     r, held = settings.rotation, common.held_out
     assert r.range_rpm is not None
     return SpeedRange(
-        samples=tuple(_samples(body, k, common, phi)),
+        samples=tuple(_samples(b, k, common, phi)),
         solved=np.array([s.speed in common.solved or s.speed in common.refined for s in common.samples]),
         form=common.form,
         shift=common.shift,
         count=_kept(settings, common),
-        lead=leading_rows(body.rows, settings, phi, canonical.by_place(model.d.mesh.points))(phi),
+        lead=leading_rows(b.rows, phi, canonical.by_place(mesh.points))(phi),
         signs=6 if settings.interfaces else 0,
         held=np.array([s.speed in {h.speed for h in held} for s in common.samples]),
         slopes=common.slopes,
@@ -176,9 +149,10 @@ def _kept(settings: BodySettings, common: Common) -> int:
     return max(s.solution.kept for s in common.solved.values())
 
 
-def _samples(body: _Body, k: int, common: Common, phi: Array) -> list[ModalGroup]:
+def _samples(b: Prepared, k: int, common: Common, phi: Array) -> list[ModalGroup]:
     """The body at each sample in the common coordinates; what does not depend on speed is one array for all."""
-    B, labels = body.rows.stacked(body.settings)
+    B, labels = b.rows.stacked
+    light = replace(b, settings=_light(b.settings), report=lambda _: None)
     T = np.asarray(B @ phi) if labels else np.zeros((0, phi.shape[1]))
     known: Solution = next(iter(common.solved.values())).solution
     out: list[ModalGroup] = []
@@ -192,9 +166,7 @@ def _samples(body: _Body, k: int, common: Common, phi: Array) -> list[ModalGroup
             reduced=Reduced(common.V, ("common",) * len(omega), np.eye(len(omega)), K_r, omega, Y),
             static=0.5 * (static + static.conj().T),
         )
-        group = assemble_group(
-            body.model, _light(body.settings), settled.state, settled.speed, body.rows, s, k, lambda _: None
-        )
+        group = assemble_group(light, settled.state, s, k)
         checks = {"orthogonality": common.orthogonality, "newton_steps": float(settled.state.iterations)}
         if solved:
             checks["certified"] = float(s.found.certified)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 import scipy.sparse as sp
@@ -18,28 +19,41 @@ from .equilibrium import BodyModel, StaticState
 from .rows import Location, Locator, NodeLocator, Patch, at_node, node_patch, patch, point_rows, slope_rows, turning_row
 from .singular import Zones, singular_zones
 
-INTERFACE_LABELS = INTERFACE_ROWS
+
+@dataclass(frozen=True)
+class NamedRows:
+    """Rows B (r, 3n) with their labels. distance: m, of the point from the place asked for. direction: of a gauge,
+    whose B holds the three rows of the slope along it."""
+
+    B: sp.csr_matrix
+    labels: tuple[str, ...]
+    unit: str
+    point: Array
+    distance: float = 0.0
+    direction: Array | None = None
 
 
 @dataclass(frozen=True)
 class BodyRows:
-    """All rows on nodal displacements, named. Each value is (B (r, 3n), labels, unit, point, distance). zones: where
-    the stress is a property of the mesh."""
+    """All rows of a body's settings on nodal displacements, by name. zones: where the stress is a property of the
+    mesh."""
 
+    settings: BodySettings
     patches: Mapping[str, Patch]
     excitations: Mapping[str, NamedRows]
     monitors: Mapping[str, NamedRows]
     gauges: Mapping[str, NamedRows]
     zones: Zones = field(default_factory=Zones)
 
-    def stacked(self, settings: BodySettings) -> tuple[sp.csr_matrix, tuple[str, ...]]:
+    @cached_property
+    def stacked(self) -> tuple[sp.csr_matrix, tuple[str, ...]]:
         """Every interface (but load faces), excitation and monitor row, for the static compliance."""
         parts: list[sp.csr_matrix] = []
         labels: list[str] = []
-        for item in settings.interfaces:
+        for item in self.settings.interfaces:
             if item.role != "load":
                 parts.append(self.patches[item.name].B)
-                labels += [f"interface:{item.name}:{c}" for c in INTERFACE_LABELS]
+                labels += [f"interface:{item.name}:{c}" for c in INTERFACE_ROWS]
                 if (more := self.patches[item.name].characteristic) is not None:
                     parts.append(more)
                     labels += [f"interface:{item.name}:c{i + 1}" for i in range(more.shape[0])]
@@ -47,19 +61,7 @@ class BodyRows:
             for name, rows in named.items():
                 parts.append(rows.B)
                 labels += [f"{kind}:{name}:{label}" for label in rows.labels]
-        if not parts:
-            return sp.csr_matrix((0, 0)), ()
-        return sp.vstack(parts).tocsr(), tuple(labels)
-
-
-@dataclass(frozen=True)
-class NamedRows:
-    B: sp.csr_matrix
-    labels: tuple[str, ...]
-    unit: str
-    point: Array
-    distance: float
-    direction: Array | None = None  # of a gauge, whose B holds the three rows of the slope along it
+        return sp.vstack(parts).tocsr() if parts else sp.csr_matrix((0, 0)), tuple(labels)
 
 
 def body_rows(mesh: Mesh, settings: BodySettings) -> BodyRows:
@@ -67,38 +69,38 @@ def body_rows(mesh: Mesh, settings: BodySettings) -> BodyRows:
 
     Centrifugal excitations need the mass and are missing: see `with_centrifugal`.
     """
-    patches = {}
-    for item in settings.interfaces:
-        patches[item.name] = _interface_patch(mesh, item)
-    for excitation in settings.excitations:
-        if excitation.face is not None:
-            require_face(mesh, excitation.face, f"excitations.{excitation.name}.face", not mesh.cells)
-            if excitation.face not in patches and excitation.face in mesh.faces:
-                patches[excitation.face] = _load_patch(mesh, excitation.face)
+    patches = {item.name: _interface_patch(mesh, item) for item in settings.interfaces}
+    for e in settings.excitations:
+        if e.face is not None:
+            require_face(mesh, e.face, f"excitations.{e.name}.face", not mesh.cells)
+            if e.face not in patches and e.face in mesh.faces:
+                patches[e.face] = _load_patch(mesh, e.face)
     locator = Locator(mesh) if mesh.cells else NodeLocator(mesh)
-    n = mesh.n_points
     excitations = {e.name: _excitation(mesh, locator, e) for e in settings.excitations if not e.centrifugal}
-    monitors, gauges = {}, {}
-    for m in settings.monitors:
-        monitors[m.name] = _monitor(mesh, locator, m)
+    monitors = {m.name: _monitor(mesh, locator, m) for m in settings.monitors}
+    gauges = {}
     for g in settings.gauges:
-        place = locator.find(np.array(g.point), f"gauges.{g.name}.point")
-        direction = np.array(g.direction) / np.linalg.norm(g.direction)
-        slopes = slope_rows(n, place, direction)
+        place, direction = locator.find(np.array(g.point), f"gauges.{g.name}.point"), _unit(g.direction)
+        slopes = slope_rows(mesh.n_points, place, direction)
         gauges[g.name] = NamedRows(slopes, ("strain",), "1", place.point, place.distance, direction)
-    return BodyRows(patches, excitations, monitors, gauges, singular_zones(mesh, settings))
+    return BodyRows(settings, patches, excitations, monitors, gauges, singular_zones(mesh, settings))
 
 
-def with_centrifugal(rows: BodyRows, model: BodyModel, settings: BodySettings) -> BodyRows:
+def _unit(direction: Sequence[float] | None) -> Array:
+    vector = np.array(direction)
+    return vector / np.linalg.norm(vector)
+
+
+def with_centrifugal(rows: BodyRows, model: BodyModel) -> BodyRows:
     """The rows with those of centrifugal excitations: forces per (rad/s)^2 on the body as drawn."""
-    if not any(e.centrifugal for e in settings.excitations):
+    asked = rows.settings.excitations
+    if not any(e.centrifugal for e in asked):
         return rows
     points, M = model.d.mesh.points, model.M_full
     force = centrifugal(M, points, model.axis, model.point).reshape(1, -1)
     centre = (M @ points).sum(axis=0) / M.sum()
-    whole = NamedRows(sp.csr_matrix(force), ("centrifugal",), CENTRIFUGAL, centre, 0.0)
-    every = {e.name: whole if e.centrifugal else rows.excitations[e.name] for e in settings.excitations}
-    return replace(rows, excitations=every)
+    whole = NamedRows(sp.csr_matrix(force), ("centrifugal",), CENTRIFUGAL, centre)
+    return replace(rows, excitations={e.name: whole if e.centrifugal else rows.excitations[e.name] for e in asked})
 
 
 def _interface_patch(mesh: Mesh, item: InterfaceSettings) -> Patch:
@@ -142,47 +144,42 @@ def _monitor(mesh: Mesh, locator: Locator | NodeLocator, m: Monitor) -> NamedRow
 
 
 def _excitation(mesh: Mesh, locator: Locator | NodeLocator, e: Excitation) -> NamedRows:
+    """A force at a point, a pressure or a force on a face, or one in equal parts on a list of nodes."""
     n = mesh.n_points
+    if e.face is not None and e.face in mesh.faces:
+        blocks = face_blocks(mesh, e.face)
+        sizes = [np.linalg.norm(b.area, axis=2) for b in blocks]
+        total = sum(s.sum() for s in sizes)
+        centre = sum(np.einsum("fq,fqi->i", s, b.points) for s, b in zip(sizes, blocks, strict=True)) / total
+        if e.pressure:
+            return NamedRows(sp.csr_matrix(pressure(blocks, n).reshape(1, -1)), ("pressure",), "Pa", centre)
+        force = traction(blocks, n, _unit(e.direction) / total)
+        return NamedRows(sp.csr_matrix(force.reshape(1, -1)), ("force",), "N", centre)
     if e.face is None:
         place = _place(mesh, locator, e, f"excitations.{e.name}")
-        direction = np.array(e.direction) / np.linalg.norm(np.array(e.direction))
-        return NamedRows(point_rows(n, place, direction[None]), ("force",), "N", place.point, place.distance)
-    if e.face not in mesh.faces:
-        return _spread(mesh, e)
-    blocks = face_blocks(mesh, e.face)
-    sizes = [np.linalg.norm(b.area, axis=2) for b in blocks]
-    total = sum(s.sum() for s in sizes)
-    centre = sum(np.einsum("fq,fqi->i", s, b.points) for s, b in zip(sizes, blocks, strict=True)) / total
-    if e.pressure:
-        return NamedRows(sp.csr_matrix(pressure(blocks, n).reshape(1, -1)), ("pressure",), "Pa", centre, 0.0)
-    direction = np.array(e.direction) / np.linalg.norm(np.array(e.direction))
-    force = traction(blocks, n, direction / total)
-    return NamedRows(sp.csr_matrix(force.reshape(1, -1)), ("force",), "N", centre, 0.0)
+    else:
+        if e.pressure:
+            raise UserError(
+                f"excitations.{e.name}.pressure: a list of nodes has no facets to press on; give a direction"
+            )
+        nodes = mesh.face_points(e.face)
+        shares = np.full(len(nodes), 1 / len(nodes))
+        place = Location(nodes, shares, np.zeros((3, 1)), mesh.points[nodes].mean(axis=0), 0.0)
+    B = point_rows(n, place, _unit(e.direction)[None])
+    return NamedRows(B, ("force",), "N", place.point, place.distance)
 
 
-def _spread(mesh: Mesh, e: Excitation) -> NamedRows:
-    """A force in equal parts on a list of nodes."""
-    if e.pressure:
-        raise UserError(f"excitations.{e.name}.pressure: a list of nodes has no facets to press on; give a direction")
-    nodes = mesh.face_points(e.face or "")
-    place = Location(nodes, np.full(len(nodes), 1 / len(nodes)), np.zeros((3, 1)), mesh.points[nodes].mean(axis=0), 0.0)
-    direction = np.array(e.direction) / np.linalg.norm(np.array(e.direction))
-    return NamedRows(point_rows(mesh.n_points, place, direction[None]), ("force",), "N", place.point, 0.0)
-
-
-def reduced_interfaces(rows: BodyRows, settings: BodySettings, phi: Array, shapes: Array) -> dict[str, Interface]:
-    described = {i.name: i for i in settings.interfaces}
+def reduced_interfaces(rows: BodyRows, phi: Array, shapes: Array) -> dict[str, Interface]:
+    described = {i.name: i for i in rows.settings.interfaces}
     out = {}
     for name, p in rows.patches.items():
-        item = described.get(name)
-        keep = settings.output.patch_shapes
-        moved = (p.N @ shapes.reshape(len(shapes), -1)).reshape(len(p.points), 3, -1)
+        item, none = described.get(name), np.zeros((0, phi.shape[1]))
+        role = (item.role, item.partner, item.sector_shift) if item else ("load", "", 0)
         out[name] = Interface(
             p.origin, p.rotation, np.asarray(p.B @ phi), p.fit_residual(shapes), p.points, p.areas, p.normals,
-            moved if keep else np.zeros((0, 3, phi.shape[1])),
-            item.role if item else "load", item.partner if item else "", item.sector_shift if item else 0,
-            p.extent, p.polygon,
-            np.zeros((0, phi.shape[1])) if p.characteristic is None else np.asarray(p.characteristic @ phi), p.pattern,
+            p.moved(shapes) if rows.settings.output.patch_shapes else np.zeros((0, 3, phi.shape[1])),
+            *role, p.extent, p.polygon,
+            none if p.characteristic is None else np.asarray(p.characteristic @ phi), p.pattern,
         )  # fmt: skip
     return out
 

@@ -21,36 +21,34 @@ from ..fem.discretise import FreeUpper
 from ..fem.tied import Tied
 from ..linalg import canonical, eigen
 from ..reduction.craig_bampton import static_shapes
-from ..settings.body import BodySettings, InterfaceSettings
+from ..settings.body import InterfaceSettings
 from . import rigid
 from .body_rows import BodyRows
-from .equilibrium import BodyModel
+from .prepared import Prepared
 from .rows import Patch
 from .spectrum import make_pencil, rigid_shift, static_answers
 
 _MEMORY = 2e9  # bytes of static answers to all forces on one patch beyond which it is refused
 
 
-def with_characteristic(
-    rows: BodyRows, model: BodyModel, settings: BodySettings, motions: Array, solver: eigen.DirectSolver
-) -> BodyRows:
+def with_characteristic(b: Prepared) -> BodyRows:
     """The rows with the characteristic coordinates that the settings ask for, made at rest and kept at every speed.
 
     Raises:
         UserError: more shapes than the patch has, a patch of too many nodes.
     """
-    chosen = [i for i in settings.interfaces if i.coordinates == "characteristic"]
+    model, chosen = b.model, [i for i in b.settings.interfaces if i.coordinates == "characteristic"]
     if not chosen:
-        return rows
+        return b.rows
     assert not isinstance(model.free, CyclicUpper)
-    pencil = make_pencil(model, model.K0, solver)
-    R = model.free.unknowns_of(motions)
+    pencil = make_pencil(model, model.K0, b.solver)
+    R = model.free.unknowns_of(b.motions)
     R = rigid.mass_orthonormal(R, pencil.M) if R.shape[1] else R
     shift = rigid_shift(model) if R.shape[1] else 0.0
     few = eigen.search(pencil, R.shape[1] + 4, shift, rigid=R if R.shape[1] else None)  # factorises; a gap above R
-    patches = dict(rows.patches)
+    patches = dict(b.rows.patches)
     for item in chosen:
-        mesh, p = model.d.mesh, rows.patches[item.name]
+        mesh, p = model.d.mesh, patches[item.name]
         dofs = _patch_dofs(mesh, item, model.free)
         if item.count > len(dofs) - 6:
             raise UserError(
@@ -66,7 +64,7 @@ def with_characteristic(
         answers = static_answers(pencil, few, select, R, shift)
         shapes = _shapes(pencil, select, answers, R, p.B[:, dofs], item.count)
         patches[item.name] = _with_shapes(p, mesh, dofs, shapes)
-    return replace(rows, patches=patches)
+    return replace(b.rows, patches=patches)
 
 
 def _patch_dofs(mesh: Mesh, item: InterfaceSettings, free: FreeUpper | Tied) -> Indices:
@@ -105,7 +103,7 @@ def _with_shapes(p: Patch, mesh: Mesh, dofs: Indices, shapes: Array) -> Patch:
     whole = np.zeros((3 * mesh.n_points, shapes.shape[1]))
     whole[dofs] = shapes
     place = canonical.by_place(mesh.points)
-    moved = (p.N @ whole.reshape(mesh.n_points, -1)).reshape(len(p.points), 3, -1)
+    moved = p.moved(whole.reshape(mesh.n_points, 3, -1))
     area = p.areas.sum()
     size = np.sqrt(np.einsum("p,pic,pic->c", p.areas, moved, moved) / area) * canonical.signs(whole[place])
     moved, whole = moved / size, whole / size

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import Protocol
 
 import numpy as np
 import scipy.sparse as sp
@@ -31,6 +32,7 @@ from ..fem.operators import (
     tangent,
     tangent_tensor,
     tangent_tensor_slope,
+    to_symmetric,
 )
 from ..fem.tied import Tied
 from ..interrupts import look
@@ -39,6 +41,22 @@ from ..units import rpm_text
 from .closing import Closing
 
 Report = Callable[[str], None]
+
+
+class Unknowns(Protocol):
+    """What a pencil's unknowns mean on the mesh: `FreeUpper`, `Tied`, `modal.sector.HarmonicUnknowns`."""
+
+    def expand(self, unknowns: Array, n: int) -> Array:
+        """(3n, r) displacements of n points from the unknowns (m, r)."""
+
+    def rows(self, B: sp.csr_matrix) -> sp.csr_matrix:
+        """(r, m) rows on the unknowns, from rows (r, 3n) on all degrees of freedom."""
+
+    def restrict(self, forces: Array) -> Array:
+        """(m, r) forces on the unknowns, from forces (3n, r)."""
+
+    def unknowns_of(self, displacements: Array) -> Array:
+        """(m, r) unknowns of displacements (3n, r)."""
 
 
 @dataclass(frozen=True)
@@ -75,6 +93,11 @@ class BodyModel:
         return self.materials[block].elasticity if self.hooke is None else self.hooke[block]
 
     @property
+    def factors(self) -> Sequence[Array | None]:
+        """`factor` of each block."""
+        return [None] * len(self.d.blocks) if self.factor is None else self.factor
+
+    @property
     def loaded(self) -> bool:
         """True if something acts on the body at rest."""
         return self.thermal_strain is not None or bool(np.any(self.dead_load)) or bool(self.contacts)
@@ -90,7 +113,7 @@ class StaticState:
         the centrifugal softening, N/m: without the stiffness of contacts, whose forces stay as dead loads, but for
         those that stay closed; of a cyclic sector without those between neighbours, which depend on the nodal
         diameter (`sector.contact_between`). prestress: ``none``, ``linear``, ``nonlinear``. iterations: of Newton.
-        contacts: as they press in the state.
+        contacts: as they press in the state. speed: rad/s.
     """
 
     u: Array
@@ -100,6 +123,7 @@ class StaticState:
     prestress: str
     iterations: int = 0
     contacts: tuple[Grip, ...] = ()
+    speed: float = 0.0
 
 
 def make_model(
@@ -197,7 +221,7 @@ def equilibrium(
         return StaticState(np.zeros((n, 3)), None, zero, model.K0, prestress)
     soft = softening(model, speed) if model.spin_softening else 0.0
     if prestress == "none":
-        return StaticState(np.zeros((n, 3)), None, zero, model.K0 + soft, prestress)
+        return StaticState(np.zeros((n, 3)), None, zero, model.K0 + soft, prestress, speed=speed)
     if prestress == "linear":
         return _linear(model, speed, solver, soft)
     return _newton(model, speed, solver, start, report)
@@ -214,12 +238,11 @@ def _linear(model: BodyModel, speed: float, solver: DirectSolver, soft: Array | 
     u = model.free.expand(solver.solve(model.free.restrict(force.reshape(-1))), n).reshape(n, 3)
     H = [displacement_gradient(b, u) for b in model.d.blocks]
     stress = stress_of(model, [green_strain(h, nonlinear=False) for h in H])
-    K = _tangent(model, H, stress) + soft
-    return StaticState(u, H, stress, K, "linear")
+    return StaticState(u, H, stress, _tangent(model, H, stress) + soft, "linear", speed=speed)
 
 
 def stiffness_slope(
-    model: BodyModel, speed: float, state: StaticState, solver: DirectSolver, fresh: bool = False
+    model: BodyModel, state: StaticState, solver: DirectSolver, fresh: bool = False
 ) -> tuple[Array, Array]:
     """(n, 3) du/dOmega^2 and (p, 3, 3) dK/dOmega^2 along the equilibria through a nonlinear state without contacts.
 
@@ -229,7 +252,7 @@ def stiffness_slope(
         fresh: the solver is as Newton left it, factorised within its last steps of K; else it is factorised here.
     """
     model, free, n = heated(model), model.free, model.d.mesh.n_points
-    K = free.matrix(state.K if model.spin_softening else state.K + softening(model, speed))
+    K = free.matrix(state.K if model.spin_softening else state.K + softening(model, state.speed))
     if not (fresh and state.iterations):
         solver.factorise(K)
     force = free.restrict(centrifugal_force(model, 1.0, state.u).reshape(-1))
@@ -252,25 +275,19 @@ def _refined(solver: DirectSolver, K: Callable[[Array], Array], force: Array) ->
 def _tangent_slope(model: BodyModel, state: StaticState, du: Array) -> Array:
     """(p, 3, 3) derivative of the tangent along du (n, 3), m: that of A = F C F^T + S, with dS = C : sym(F^T dH)."""
     H = state.H or [np.zeros((*b.dx.shape, 3, 3)) for b in model.d.blocks]
-    factor: list[Array | None] = [None] * len(H) if model.factor is None else [*model.factor]
     A = []
-    for i, (b, f, h) in enumerate(zip(model.d.blocks, factor, H, strict=True)):
+    for i, (b, f, h) in enumerate(zip(model.d.blocks, model.factors, H, strict=True)):
         C = model.elasticity(i)
         dH = displacement_gradient(b, du)
-        strain = engineering(_symmetric_part(np.swapaxes(np.eye(3) + h, -1, -2) @ dH))
-        stress = _stress(C, strain)
+        E = np.swapaxes(np.eye(3) + h, -1, -2) @ dH
+        stress = _stress(C, engineering(0.5 * (E + np.swapaxes(E, -1, -2))))
         A.append(tangent_tensor_slope(C, f, h, dH, stress if f is None else stress * f[..., None]))
     return tangent(model.d, A)
 
 
-def _symmetric_part(E: Array) -> Array:
-    return 0.5 * (E + np.swapaxes(E, -1, -2))
-
-
 def _tangent(model: BodyModel, H: list[Array], stress: list[Array]) -> Array:
-    factor: list[Array | None] = [None] * len(H) if model.factor is None else [*model.factor]
-    A = [tangent_tensor(model.elasticity(i), *one) for i, one in enumerate(zip(factor, H, stress, strict=True))]
-    return tangent(model.d, A)
+    parts = enumerate(zip(model.factors, H, stress, strict=True))
+    return tangent(model.d, [tangent_tensor(model.elasticity(i), *part) for i, part in parts])
 
 
 def _newton(
@@ -332,7 +349,7 @@ def _newton_at(
             whole = not isinstance(free, CyclicUpper)  # of a sector neighbours count by nodal diameter (`sector`)
             K = _tangent(model, H, stress)
             K = closing.stiffened(K + soft if model.spin_softening else K, model.d.pattern, True, whole)
-            return StaticState(u, H, stress, K, "nonlinear", len(steps), closing.grips)
+            return StaticState(u, H, stress, K, "nonlinear", len(steps), closing.grips, omega)
         outer = closing.with_forces(level * model.dead_load + centrifugal_force(model, omega, u))
         residual = free.restrict((outer - internal_force(model.d, stress, H)).reshape(-1))
         if model.contacts or not _factors_serve(steps):
@@ -346,7 +363,10 @@ def _newton_at(
         u = u + closing.share(points + u, change, steps[-1], float(residual @ unknowns)) * change
         if not np.isfinite(steps[-1]) or np.abs(u).max() > 1e3 * size:
             break
-    raise NotConverged(_no_equilibrium(speed))
+    raise NotConverged(
+        f"no static equilibrium was found at {rpm_text(speed)}; lower the speed or the loads, or use "
+        'rotation.prestress = "linear" to see whether the state is plausible'
+    )
 
 
 def _stands(steps: list[float]) -> bool:
@@ -377,19 +397,10 @@ def what_loads(model: BodyModel, speed: float) -> str:
     return "temperature" if model.thermal_strain is not None else "closures"
 
 
-def _no_equilibrium(speed: float) -> str:
-    return (
-        f"no static equilibrium was found at {rpm_text(speed)}; lower the speed or the loads, or use "
-        'rotation.prestress = "linear" to see whether the state is plausible'
-    )
-
-
 def cauchy(state: StaticState, block: int) -> Array:
     """(e, q, 6) Cauchy stress F S F^T / det F, Pa; of a linear solution its stress C : epsilon as it is."""
     if state.H is None or state.prestress == "linear":
         return state.stress[block]
-    from ..fem.operators import to_symmetric
-
     F = np.eye(3) + state.H[block]
     S = to_symmetric(state.stress[block])
     sigma = np.matmul(np.matmul(F, S), np.swapaxes(F, -1, -2)) / np.linalg.det(F)[..., None, None]

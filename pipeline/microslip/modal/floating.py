@@ -18,7 +18,6 @@ equations, and shakes the elastic body a little: K R is no rigid motion. So the 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Protocol
 
 import numpy as np
 import scipy.linalg
@@ -32,7 +31,7 @@ from ..linalg.bordered import Bordered
 from ..reduction import Reduced
 from ..settings.body import BodySettings
 from . import rigid
-from .equilibrium import BodyModel, StaticState, centrifugal_force
+from .equilibrium import BodyModel, StaticState, Unknowns, centrifugal_force
 from .preload import determinate, without_rigid
 
 UNBALANCED = 1e-3
@@ -145,36 +144,26 @@ def balanced(model: BodyModel, coefficients: Array, solver: eigen.DirectSolver) 
     return Balanced(solver, R, M(R))
 
 
-class Unknowns(Protocol):
-    """What a pencil's unknowns mean on the mesh."""
-
-    def restrict(self, forces: Array) -> Array:
-        """(m, r) forces on the unknowns, from forces (3n, r)."""
-
-    def unknowns_of(self, displacements: Array) -> Array:
-        """(m, r) unknowns of displacements (3n, r)."""
-
-
 def floated(
-    model: BodyModel, state: StaticState, speed: float, pencil: eigen.Pencil, unknowns: Unknowns, coefficients: Array
+    model: BodyModel, state: StaticState, pencil: eigen.Pencil, unknowns: Unknowns, coefficients: Array
 ) -> tuple[eigen.Pencil, Array, Floating | None]:
     """The pencil of the elastic modes, the rigid motions (m, r) beside them, and at speed what these meet.
 
     Args:
-        speed: rad/s. coefficients: (6, r) of `rigid.rigid_fields` about the point of the axis.
+        coefficients: (6, r) of `rigid.rigid_fields` about the point of the axis.
     """
     if not coefficients.shape[1]:
         return pencil, np.zeros((pencil.n, 0), dtype=pencil.dtype), None
-    if not speed:
+    if not state.speed:
         fields = rigid.rigid_fields(model.d.mesh.points + state.u, model.point).reshape(-1, 6) @ coefficients
         R = rigid.mass_orthonormal(unknowns.unknowns_of(fields), pencil.M)
         return without_rigid(pencil, R) if model.loaded else pencil, R, None
-    found = _turning(model, state, speed, pencil, unknowns, coefficients)
+    found = _turning(model, state, pencil, unknowns, coefficients)
     return without_rigid(pencil, found.R), found.R, found
 
 
 def _turning(
-    model: BodyModel, state: StaticState, speed: float, pencil: eigen.Pencil, unknowns: Unknowns, coefficients: Array
+    model: BodyModel, state: StaticState, pencil: eigen.Pencil, unknowns: Unknowns, coefficients: Array
 ) -> Floating:
     """The rigid motions about the static state, those along and about the axis apart from the others."""
     x, n = model.d.mesh.points + state.u - model.point, model.axis
@@ -187,7 +176,8 @@ def _turning(
     t, theta = P @ across[:3], P @ across[3:]
     motion = t + np.moveaxis(np.cross(theta.T[:, None], x), 0, 2)
     turned = np.moveaxis(np.cross(theta.T[:, None], f), 0, 2)
-    spun = speed**2 * (model.M_full @ np.einsum("ab,nbk->nak", P, motion).reshape(len(x), -1)).reshape(motion.shape)
+    across_axis = np.einsum("ab,nbk->nak", P, motion).reshape(len(x), -1)
+    spun = state.speed**2 * (model.M_full @ across_axis).reshape(motion.shape)
     met = unknowns.restrict((turned - spun).reshape(3 * len(x), -1))
     met = met - MR @ (R.conj().T @ met)  # what inertia relief leaves
     values, V = _diagonal(others, met, pencil)

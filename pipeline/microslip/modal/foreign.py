@@ -11,7 +11,7 @@ import scipy.sparse as sp
 from scipy.spatial import ConvexHull, QhullError
 
 from .. import plausible
-from ..data import Array, Indices, Matrices, Mesh, ModalBasis, ModalGroup, Residual
+from ..data import Array, Flags, Indices, Matrices, Mesh, ModalBasis, ModalGroup, Residual
 from ..errors import UserError
 from ..frames import skew
 from ..linalg import canonical, eigen
@@ -23,7 +23,6 @@ from . import rigid
 from .body_rows import BodyRows, body_rows
 from .boundary import AXES, check_held, require_face
 from .group import checks_of, modal_damping, of_solution
-from .rows import Patch
 from .solution import Searched, Solution, answered, certified, reduced_on
 
 Report = Callable[[str], None]
@@ -49,9 +48,9 @@ def foreign_basis(
     mass, centre, inertia, told = _inertia(body, motions)
     messages += told + _implausible(body.mesh, mass)
     free = _free(body, settings)
-    unknowns = Unknowns(layout.column[free], layout.width)
+    unknowns = Layout(layout.column[free], layout.width)
     _refuse_missing_nodes(body, settings)
-    rows, odd = _padded(body_rows(body.mesh, settings), settings, body, layout)
+    rows, odd = _padded(body_rows(body.mesh, settings), body, layout)
     messages += odd
     solver = eigen.new_solver(settings.modes.solver)
     try:
@@ -80,7 +79,7 @@ def _refuse_unheld(
 ) -> None:
     """Raise `UserError` of rigid motions R (f, r) over the free rows that the settings do not ask for."""
     spread = np.zeros((3 * body.mesh.n_points, R.shape[1]))
-    at = free[(body.component[free] >= 0) & (body.component[free] < 3)]
+    at = free[_moves(body)[free]]
     spread[layout.column[at]] = R[np.isin(free, at)]
     if (body.component >= 3).any():
         middle, known = body.mesh.points.mean(axis=0), np.linalg.lstsq(motions[free], R, rcond=None)[0]
@@ -101,27 +100,12 @@ def values_of(settings: BodySettings) -> dict[str, float]:
 
 @dataclass(frozen=True)
 class Layout:
-    """Displacements of the nodes first, three each, then every other row, filled up to a multiple of three.
+    """Rows of foreign matrices: displacements of the nodes first, three each, then every other row, filled up to a
+    multiple of three.
 
     Attributes:
         column: (m,) place of each row. width: of the whole.
     """
-
-    column: Indices
-    width: int
-
-
-def _layout(body: Matrices) -> Layout:
-    n = body.mesh.n_points
-    moves = (body.component >= 0) & (body.component < 3)
-    others = np.cumsum(~moves) - 1
-    width = 3 * (n + -(-int((~moves).sum()) // 3))
-    return Layout(np.where(moves, 3 * body.node + body.component, 3 * n + others), width)
-
-
-@dataclass(frozen=True)
-class Unknowns:
-    """The free rows of foreign matrices in a `Layout`. column: (m,). width: of the whole."""
 
     column: Indices
     width: int
@@ -137,22 +121,32 @@ class Unknowns:
         return _wide(B, self.width)[:, self.column]
 
 
+def _layout(body: Matrices) -> Layout:
+    n, moves = body.mesh.n_points, _moves(body)
+    others = np.cumsum(~moves) - 1
+    width = 3 * (n + -(-int((~moves).sum()) // 3))
+    return Layout(np.where(moves, 3 * body.node + body.component, 3 * n + others), width)
+
+
+def _moves(body: Matrices) -> Flags:
+    """(m,) which rows are displacements of nodes."""
+    return (body.component >= 0) & (body.component < 3)
+
+
 def _wide(B: sp.csr_matrix, width: int) -> sp.csr_matrix:
     B = sp.csr_matrix(B)
     return sp.csr_matrix((B.data, B.indices, B.indptr), shape=(B.shape[0], width))
 
 
-def _padded(rows: BodyRows, settings: BodySettings, body: Matrices, layout: Layout) -> tuple[BodyRows, list[str]]:
+def _padded(rows: BodyRows, body: Matrices, layout: Layout) -> tuple[BodyRows, list[str]]:
     """Rows over the whole layout, and what is odd about them; an interface on a single node has that node's own."""
-
-    def wide(p: Patch) -> Patch:
-        return replace(p, B=_wide(p.B, layout.width), N=_wide(p.N, layout.width // 3))
 
     def named(group):  # noqa: ANN001
         return {k: replace(v, B=_wide(v.B, layout.width)) for k, v in group.items()}
 
-    patches, told = {k: wide(p) for k, p in rows.patches.items()}, []
-    for item in settings.interfaces:
+    width, told = layout.width, []
+    patches = {k: replace(p, B=_wide(p.B, width), N=_wide(p.N, width // 3)) for k, p in rows.patches.items()}
+    for item in rows.settings.interfaces:
         nodes = body.mesh.face_points(item.face)
         if len(nodes) == 1:
             B, missing = _six(body, layout, int(nodes[0]), patches[item.name].rotation)
@@ -162,7 +156,7 @@ def _padded(rows: BodyRows, settings: BodySettings, body: Matrices, layout: Layo
                     f"interface '{item.name}': node {body.mesh.node_id[nodes[0]]} has no {' '.join(missing)} in the "
                     "matrices, so it stands still there: a contact on it meets no such motion"
                 )
-    return BodyRows(patches, named(rows.excitations), named(rows.monitors), {}), told
+    return BodyRows(rows.settings, patches, named(rows.excitations), named(rows.monitors), {}), told
 
 
 def _six(body: Matrices, layout: Layout, node: int, rotation: Array) -> tuple[sp.csr_matrix, list[str]]:
@@ -180,7 +174,7 @@ def _six(body: Matrices, layout: Layout, node: int, rotation: Array) -> tuple[sp
 
 def _refuse_missing_nodes(body: Matrices, settings: BodySettings) -> None:
     """An interface needs every one of its nodes in the matrices: what a superelement has condensed is lost."""
-    moves = np.unique(body.node[(body.component >= 0) & (body.component < 3)])
+    moves = np.unique(body.node[_moves(body)])
     for item in settings.interfaces:
         require_face(body.mesh, item.face, f"interfaces.{item.name}.face", points_suffice=True)
         missing = np.setdiff1d(body.mesh.face_points(item.face), moves)
@@ -206,7 +200,7 @@ def _rigid_rows(body: Matrices) -> Array:
         return np.zeros((body.count, 6))
     fields = rigid.rigid_fields(points, points.mean(axis=0))
     R = np.zeros((body.count, 6))
-    moves = (body.component >= 0) & (body.component < 3)
+    moves = _moves(body)
     R[moves] = fields[body.node[moves], body.component[moves]]
     turns = body.component >= 3
     R[turns, body.component[turns]] = 1.0
@@ -344,7 +338,7 @@ def _shift(body: Matrices, R: Array, free: Indices, pencil: eigen.Pencil) -> flo
     """
     R = rigid.mass_orthonormal(R, pencil.M)
     least = 10 * float(np.linalg.norm(R.T @ pencil.K(R), 2))
-    others = np.flatnonzero((body.component < 0) | (body.component >= 3))[:_SINGLE]
+    others = np.flatnonzero(~_moves(body))[:_SINGLE]
     for shapes in (_quadratic(body), np.eye(body.count)[:, others] if len(others) else np.zeros((body.count, 0))):
         elastic = _quotients(pencil, shapes[free], R)
         if len(elastic):
@@ -361,7 +355,7 @@ def _quadratic(body: Matrices) -> Array:
     x = body.mesh.points - body.mesh.points.mean(axis=0)
     x = x / max(float(np.abs(x).max()), 1e-30)
     F = np.zeros((body.count, 6, 3))
-    moves = np.flatnonzero((body.component >= 0) & (body.component < 3))
+    moves = np.flatnonzero(_moves(body))
     for k, (i, j) in enumerate(((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2))):
         F[moves, k, body.component[moves]] = (x[:, i] * x[:, j])[body.node[moves]]
     return F.reshape(body.count, 18)
@@ -380,7 +374,7 @@ def _quotients(pencil: eigen.Pencil, F: Array, R: Array) -> Array:
 
 
 def _search(
-    settings: BodySettings, pencil: eigen.Pencil, unknowns: Unknowns, R: Array, shift: float, rows: BodyRows,
+    settings: BodySettings, pencil: eigen.Pencil, unknowns: Layout, R: Array, shift: float, rows: BodyRows,
     report: Report,
 ) -> Searched:  # fmt: skip
     report(f"eigenmodes: {pencil.n} free rows, solver {pencil.solver.name}")
@@ -394,7 +388,7 @@ def _search(
         raise UserError(
             f"geometry.matrices: the stiffness has {error.count} negative directions; is it K, of a stable state?"
         ) from error
-    s = answered(settings, pencil, unknowns, R, shift, found, rows, bool(R.shape[1]))
+    s = answered(pencil, unknowns, R, shift, found, rows, bool(R.shape[1]))
     if not settings.modes.certify:
         return s
     report("certifying the spectrum by the inertia count")
@@ -414,7 +408,7 @@ def _group(
     if body.circulatory is not None:
         N = reduced.vectors.T @ (body.circulatory[free][:, free] @ reduced.vectors)
     return ModalGroup(
-        **of_solution(settings, rows, s, whole, n), speed=speed, damping_ratio=ratios, C_r=C, G_r=G, N_r=N, gauges={},
+        **of_solution(rows, s, whole, n), speed=speed, damping_ratio=ratios, C_r=C, G_r=G, N_r=N, gauges={},
         stresses={}, u_static=np.zeros((n, 3)), checks={**checks_of(s), **s.indicators},
         prestress="none" if not speed else "foreign", residual=_residual(settings, s, layout.width // 3, n),
     )  # fmt: skip

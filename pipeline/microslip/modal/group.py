@@ -2,24 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from ..data import (
-    Array,
-    Compliance,
-    GyroscopicModes,
-    ModalGroup,
-    Residual,
-    RunUp,
-    StressSet,
-)
-from ..fem.cyclic import CyclicUpper
-from ..fem.discretise import Discretisation
-from ..fem.operators import per_block
+from ..data import Array, Compliance, GyroscopicModes, ModalGroup, Residual, RunUp, StressSet
 from ..linalg import eigen
 from ..linalg.gyroscopic import Certified, gyroscopic_modes
 from ..reduced.coordinates import own_stiffness
@@ -28,59 +16,15 @@ from ..settings.body import BodySettings
 from .body_rows import BodyRows, reduced_gauge, reduced_interfaces, reduced_rows
 from .closures import contact_states
 from .equilibrium import BodyModel, StaticState
-from .floating import floated
-from .invariants import inertia_invariants
-from .preload import pressed_modes
-from .run_up import run_up_terms
-from .sector import Sector
-from .solution import Searched, Solution, held_compliance, searched
-from .spectrum import make_pencil
+from .invariants import inertia_invariants, run_up_terms
+from .prepared import Prepared
+from .solution import Solution, held_compliance
 from .stress import gauss_set, nodal_set
 
-Report = Callable[[str], None]
 
-
-def inertia_of(d: Discretisation, density: float | Sequence[float]) -> tuple[float, Array, Array]:
-    """Mass (kg), centre (3,) m, inertia (3, 3) about the centre, kg m2 (Sextro Eqs. (2.3-32) to (2.3-34)).
-
-    Args:
-        density: kg/m3, one or one per block.
-    """
-    points = np.concatenate([np.einsum("qk,eki->eqi", b.N, d.mesh.points[b.cells]).reshape(-1, 3) for b in d.blocks])
-    dm = np.concatenate([rho * b.dx.reshape(-1) for rho, b in zip(per_block(d, density), d.blocks, strict=True)])
-    m = dm.sum()
-    centre = dm @ points / m
-    r = points - centre
-    second = np.einsum("p,pi,pj->ij", dm, r, r)
-    return float(m), centre, np.trace(second) * np.eye(3) - second
-
-
-def searched_state(
-    model: BodyModel, settings: BodySettings, state: StaticState, speed: float, motions: Array, rows: BodyRows,
-    solver: eigen.DirectSolver, sector: Sector | None, report: Report, pressed: Array | None = None,
-) -> dict[int, Searched]:  # fmt: skip
-    """Nodal diameter -> certified modes of one state.
-
-    Args:
-        motions: (6, r) rigid motions that are free (`rigid.coefficients_of`). pressed: centre of mass of a free body
-            under its bolts.
-    """
-    if sector is not None:
-        return sector.searched(model, settings, state, speed, motions, rows, report)
-    pencil, floating = make_pencil(model, state.K, solver), None
-    if pressed is not None:
-        pencil, R = pressed_modes(model, state, pencil, pressed)
-    else:
-        assert not isinstance(model.free, CyclicUpper)
-        pencil, R, floating = floated(model, state, speed, pencil, model.free, motions)
-    return {0: searched(model, settings, pencil, speed, R, rows, report, floating)}
-
-
-def assemble_group(
-    model: BodyModel, settings: BodySettings, state: StaticState, speed: float, rows: BodyRows, s: Solution,
-    harmonic: int, report: Report,
-) -> ModalGroup:  # fmt: skip
+def assemble_group(b: Prepared, state: StaticState, s: Solution, harmonic: int) -> ModalGroup:
     """Everything the modal file holds of one state and nodal diameter."""
+    model, settings, speed, rows = b.model, b.settings, state.speed, b.rows
     reduced, n = s.reduced, model.d.mesh.n_points
     phi = s.unknowns.expand(reduced.vectors, n)
     shapes = phi.reshape(n, 3, -1)
@@ -88,9 +32,9 @@ def assemble_group(
     Mphi = (model.M_full @ phi.reshape(n, -1)).reshape(shapes.shape)
     run_up = without_massless(run_up_terms(model, state, shapes, Mphi, harmonic), reduced)
     if (settings.output.gauss or settings.output.nodal_stress) and settings.output.stress_at(harmonic):
-        report("strain and stress modes")
+        b.report("strain and stress modes")
     group = ModalGroup(
-        **of_solution(settings, rows, s, phi, n, state.u.reshape(-1)),
+        **of_solution(rows, s, phi, n, state.u.reshape(-1)),
         speed=speed,
         damping_ratio=ratios,
         C_r=modal_damping(reduced, 2 * ratios * reduced.omega),
@@ -99,14 +43,14 @@ def assemble_group(
         gyroscopic=_gyroscopic(settings, speed, reduced, run_up, s.found, s.kept),
         invariants=None if settings.cyclic else inertia_invariants(model, state, shapes, Mphi),
         gauges={k: reduced_gauge(v, phi, state) for k, v in rows.gauges.items()},
-        stresses=_stress_sets(model, settings, state, rows, shapes, harmonic),
+        stresses=_stress_sets(b, state, shapes, harmonic),
         u_static=state.u,
         checks={**checks_of(s), **_checks(model, state), **s.indicators},
         prestress=state.prestress if (speed or model.loaded) else "none",
         harmonic=harmonic,
         spin_softening=model.spin_softening,
         contacts=contact_states(model.d.mesh, settings, state.contacts),
-        residual=_residual(model, settings, state, rows, s, harmonic),
+        residual=_residual(b, state, s, harmonic),
     )
     return group if settings.output.shapes_at(harmonic) else _without_shapes(group)
 
@@ -120,9 +64,7 @@ def _without_shapes(group: ModalGroup) -> ModalGroup:
     return replace(group, phi=group.phi[:0], interfaces=faces, residual=residual)
 
 
-def of_solution(
-    settings: BodySettings, rows: BodyRows, s: Solution, whole: Array, n: int, u: Array | None = None
-) -> dict[str, Any]:
+def of_solution(rows: BodyRows, s: Solution, whole: Array, n: int, u: Array | None = None) -> dict[str, Any]:
     """Fields of a group that its solution and the rows tell.
 
     Args:
@@ -130,46 +72,42 @@ def of_solution(
     """
     reduced = s.reduced
     shapes = whole.reshape(len(whole) // 3, 3, -1)
-    B, labels = rows.stacked(settings)
+    B, labels = rows.stacked
     T = np.asarray(B @ whole) if B.shape[0] else np.zeros((0, whole.shape[1]))
     modal = held_compliance(T, reduced, labels)
     return {
         "omega": reduced.omega, "kind": reduced.kind, "M_r": reduced.M_r, "K_r": reduced.K_r,
-        "to_diagonal": reduced.to_diagonal, "phi": shapes[: n if settings.output.shapes else 0],
-        "interfaces": reduced_interfaces(rows, settings, whole, shapes),
+        "to_diagonal": reduced.to_diagonal, "phi": shapes[: n if rows.settings.output.shapes else 0],
+        "interfaces": reduced_interfaces(rows, whole, shapes),
         "excitations": {k: reduced_rows(v, whole, None) for k, v in rows.excitations.items()},
         "monitors": {k: reduced_rows(v, whole, u) for k, v in rows.monitors.items()},
         "compliance": Compliance(labels, s.static, modal, bool((reduced.omega == 0).any()), s.eigenmodes),
     }  # fmt: skip
 
 
-def _stress_sets(
-    model: BodyModel, settings: BodySettings, state: StaticState, rows: BodyRows, shapes: Array, harmonic: int
-) -> dict[str, StressSet]:
+def _stress_sets(b: Prepared, state: StaticState, shapes: Array, harmonic: int) -> dict[str, StressSet]:
     """The sets that the settings ask for, of shapes (n, 3, m)."""
-    found: dict[str, StressSet] = {}
-    if settings.output.stress_at(harmonic):
-        if settings.output.gauss:
-            found["gauss"] = gauss_set(model, state, shapes)
-        if settings.output.nodal_stress:
-            found["nodes"] = nodal_set(model, state, shapes, harmonic, found.get("gauss"))
-    return {k: replace(s, singular=rows.zones.hold(s.points)) for k, s in found.items()}
+    sets: dict[str, StressSet] = {}
+    if b.settings.output.stress_at(harmonic):
+        if b.settings.output.gauss:
+            sets["gauss"] = gauss_set(b.model, state, shapes)
+        if b.settings.output.nodal_stress:
+            sets["nodes"] = nodal_set(b.model, state, shapes, harmonic, sets.get("gauss"))
+    return {k: replace(s, singular=b.rows.zones.hold(s.points)) for k, s in sets.items()}
 
 
-def _residual(
-    model: BodyModel, settings: BodySettings, state: StaticState, rows: BodyRows, s: Solution, harmonic: int
-) -> Residual | None:
+def _residual(b: Prepared, state: StaticState, s: Solution, harmonic: int) -> Residual | None:
     """Shapes, gauges, strain and stress of the residual attachment modes that the solver adds (MacNeal)."""
     if s.reduced.residual is None:
         return None
-    n, r = model.d.mesh.n_points, s.reduced.residual.shape[1]
+    n, r = b.model.d.mesh.n_points, s.reduced.residual.shape[1]
     whole = s.unknowns.expand(s.reduced.residual, n)
     shapes = whole.reshape(n, 3, r)
-    sets = _stress_sets(model, settings, state, rows, shapes, harmonic) if r else {}
+    sets = _stress_sets(b, state, shapes, harmonic) if r else {}
     return Residual(
         s.force_labels,
-        shapes if settings.output.shapes else np.zeros((0, 3, r)),
-        {k: reduced_gauge(v, whole, state).rows for k, v in rows.gauges.items()},
+        shapes if b.settings.output.shapes else np.zeros((0, 3, r)),
+        {k: reduced_gauge(v, whole, state).rows for k, v in b.rows.gauges.items()},
         {name: x.strain for name, x in sets.items()},
         {name: x.stress for name, x in sets.items()},
     )

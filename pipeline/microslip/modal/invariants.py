@@ -11,9 +11,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..data import Array, Invariants, ModalGroup
+from ..data import Array, Invariants, ModalGroup, RunUp
 from ..errors import NotConverged
-from ..fem.operators import displacement_gradient, green_strain, stress_stiffness
+from ..fem.operators import displacement_gradient, green_strain, spin_projector, stress_stiffness
+from ..frames import skew
 from ..linalg.eigen import DirectSolver
 from . import rigid
 from .equilibrium import BodyModel, StaticState, stress_of
@@ -37,6 +38,25 @@ def inertia_invariants(model: BodyModel, state: StaticState, shapes: Array, Msha
         model.point, float(model.M_full.sum()), Mr.sum(axis=0), r.T @ Mr, Mshapes.sum(axis=0),
         np.einsum("na,nbm->abm", r, Mshapes, optimize=True), both, np.zeros((0, m, m)),
     )  # fmt: skip
+
+
+def run_up_terms(model: BodyModel, state: StaticState, shapes: Array, Mshapes: Array, harmonic: int = 0) -> RunUp:
+    """Circulatory and softening matrices, Euler and centrifugal load per unit, on the given shapes: what a change of
+    the rotation speed does to a reduced body (Sextro Eqs. (2.1-14) to (2.1-18), (2.3-19)).
+
+    Args:
+        shapes, Mshapes: (n, 3, m) phi and M phi, real or complex. harmonic: nodal diameter of the shapes; the loads
+            turn with the sectors, so only 0 feels them.
+    """
+    left = shapes.conj()
+    N = np.einsum("nia,ij,njb->ab", left, skew(model.axis), Mshapes, optimize=True)
+    P = np.einsum("nia,ij,njb->ab", left, spin_projector(model.axis), Mshapes, optimize=True)
+    r = model.d.mesh.points + state.u - model.point
+    euler = -np.einsum("nia,ni->a", Mshapes.conj(), np.cross(model.axis, r))
+    centrifugal = np.einsum("nia,ni->a", Mshapes.conj(), r @ spin_projector(model.axis))
+    if harmonic:
+        euler, centrifugal = 0 * euler, 0 * centrifugal
+    return RunUp(0.5 * (N - N.conj().T), 0.5 * (P + P.conj().T), euler, centrifugal)
 
 
 def inertia_forces(model: BodyModel) -> Array:

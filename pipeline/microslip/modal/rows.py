@@ -43,9 +43,13 @@ class Patch:
     characteristic: sp.csr_matrix | None = None
     pattern: Array = field(default_factory=lambda: np.zeros((0, 3, 0)))
 
+    def moved(self, phi: Array) -> Array:
+        """(p, 3, m) motion of the patch's points of shapes (n, 3, m)."""
+        return (self.N @ phi.reshape(len(phi), -1)).reshape(len(self.points), 3, -1)
+
     def fit_residual(self, phi: Array) -> Array:
         """(m,) share of the patch's motion that no rigid motion explains, for shapes (n, 3, m)."""
-        u = (self.N @ phi.reshape(phi.shape[0], -1)).reshape(len(self.points), 3, -1)
+        u = self.moved(phi)
         rigid = self.B @ phi.reshape(-1, phi.shape[2])
         t = self.rotation.T @ rigid[:3]
         w = self.rotation.T @ rigid[3:]

@@ -26,14 +26,9 @@ from ..fem.cyclic import (
 from ..fem.discretise import Discretisation
 from ..linalg import eigen
 from ..linalg.condensed import Condensed, HarmonicSolver, as_complex, as_real, new_condensed
-from ..progress import Whole
 from ..settings.body import BodySettings
-from . import rigid
-from .body_rows import BodyRows
 from .boundary import refuse_uncyclic, require_face
-from .equilibrium import BodyModel, StaticState
-from .floating import floated
-from .solution import Report, Searched, certified, search
+from .equilibrium import BodyModel
 from .spectrum import pencil_parts
 
 MatVec = Callable[[Array], Array]
@@ -72,45 +67,9 @@ class Sector:
     static: CyclicUpper
     condensed: Condensed
 
-    def searched(
-        self, model: BodyModel, settings: BodySettings, state: StaticState, speed: float, motions: Array,
-        rows: BodyRows, report: Report,
-    ) -> dict[int, Searched]:  # fmt: skip
-        """Nodal diameter -> its modes and static answers.
-
-        All are searched on one factorisation of the interior (those with rigid motions on one of their own), then
-        certified.
-
-        Args:
-            motions: (6, r) rigid motions of the ring that are free, see `rigid.of_nodal_diameter`.
-
-        Raises:
-            UserError: instability, more modes than degrees of freedom. NotConverged: no certificate.
-        """
-        pencils = sector_pencils(model, state.K, self.unknowns, self.condensed, self.harmonics, state.contacts)
-        first = pencils[self.harmonics[0]]
-        report(
-            f"{len(pencils)} nodal diameters of {self.unknowns.cut.sectors} sectors: {first.n} unknowns, "
-            f"solver {first.solver.name}"
-        )
-        found = []
-        for k, pencil in pencils.items():
-            report(f"eigenmodes: nodal diameter {k}")
-            pencil.tell = report
-            unknowns = HarmonicUnknowns(self.unknowns, self.unknowns.transformation(k))
-            own = rigid.of_nodal_diameter(motions, self.unknowns.cut.rotation, self.unknowns.cut.sectors, k)
-            pencil, R, floating = floated(model, state, speed, pencil, unknowns, own)
-            found.append(search(model, settings, pencil, unknowns, speed, R, rows, f"nodal diameter {k}", floating))
-            if isinstance(report, Whole):
-                report.done += 1
-        if settings.modes.certify:
-            report("certifying the spectra by the inertia count")
-            found = certified(found)
-        return dict(zip(pencils, found, strict=True))
-
-    def close(self) -> None:
-        """Release memory."""
-        self.condensed.close()
+    def harmonic(self, k: int) -> HarmonicUnknowns:
+        """The unknowns of a nodal diameter."""
+        return HarmonicUnknowns(self.unknowns, self.unknowns.transformation(k))
 
 
 def cut_faces(mesh: Mesh, settings: BodySettings, axis: Array, point: Array) -> CutFaces:

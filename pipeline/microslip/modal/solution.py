@@ -2,41 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Protocol
 
 import numpy as np
 import scipy.sparse as sp
 
 from ..data import Array, Indices
 from ..errors import UserError
-from ..fem.discretise import FreeUpper
-from ..fem.tied import Tied
 from ..linalg import canonical, eigen
 from ..mesh import longest_over_shortest
+from ..progress import Whole
 from ..reduced.coordinates import held
 from ..reduction import METHODS, Reduced, Substructure, stuck
 from ..settings.body import BodySettings
 from ..units import rpm_text
 from .body_rows import BodyRows
-from .equilibrium import BodyModel, what_loads
-from .floating import Floating, with_rotation
-from .range_basis import SPARE
+from .equilibrium import StaticState, Unknowns, what_loads
+from .floating import Floating, floated, with_rotation
+from .preload import pressed_modes
+from .prepared import Prepared
 from .spectrum import leading_rows, rigid_shift, static_answers
 from .unconstrained import refuse_unconstrained_parts, refuse_unresolved
-
-Report = Callable[[str], None]
-
-
-class Unknowns(Protocol):
-    """What a pencil's unknowns mean on the mesh: `fem.discretise.FreeUpper`, `modes.sector.HarmonicUnknowns`."""
-
-    def expand(self, unknowns: Array, n: int) -> Array:
-        """(3n, r) displacements of n points from the unknowns (m, r)."""
-
-    def rows(self, B: sp.csr_matrix) -> sp.csr_matrix:
-        """(r, m) rows on the unknowns, from rows (r, 3n) on all degrees of freedom."""
 
 
 @dataclass(frozen=True)
@@ -84,37 +71,65 @@ class Solution:
     force_labels: tuple[str, ...] = ()
 
 
-def search(
-    model: BodyModel, settings: BodySettings, pencil: eigen.Pencil, unknowns: Unknowns, speed: float, R: Array,
-    rows: BodyRows, where: str = "", floating: Floating | None = None,
-) -> Searched:  # fmt: skip
-    """Modes and static answers of the stiffness about one state.
+def searched_state(b: Prepared, state: StaticState) -> dict[int, Searched]:
+    """Nodal diameter -> modes and static answers about one state, certified if the settings want it.
 
-    Args:
-        R: (m, r) mass-orthonormal rigid motions. where: ``nodal diameter 3``, for messages. floating: at speed.
+    Nodal diameters are searched on one factorisation of the interior (those with rigid motions on one of their own),
+    then certified together.
 
     Raises:
         UserError: instability, more modes than degrees of freedom, a part that nothing holds.
+        NotConverged: no certificate.
     """
-    shift = rigid_shift(model) if settings.free else 0.0  # a free sector floats while its cut faces are apart
-    wanted = settings.modes.count
+    pencils, found = b.pencils(state.K, state.contacts), []
+    first = next(iter(pencils.values()))
+    told = f"solver {first.solver.name}"
+    if b.sector is None:
+        b.report(f"eigenmodes: {first.n} free degrees of freedom, {told}")
+    else:
+        sectors = b.sector.unknowns.cut.sectors
+        b.report(f"{len(pencils)} nodal diameters of {sectors} sectors: {first.n} unknowns, {told}")
+    for k, pencil in pencils.items():
+        where = "" if b.sector is None else f"nodal diameter {k}"
+        if where:
+            b.report(f"eigenmodes: {where}")
+        pencil.tell, floating = b.report, None
+        if b.pressed:
+            pencil, R = pressed_modes(b.model, state, pencil, b.centre)
+        else:
+            pencil, R, floating = floated(b.model, state, pencil, b.unknowns(k), b.floats(k))
+        found.append(_searched(b, state, k, pencil, R, where, floating))
+        if where and isinstance(b.report, Whole):
+            b.report.done += 1
+    if b.settings.modes.certify:
+        b.report(f"certifying the {'spectrum' if b.sector is None else 'spectra'} by the inertia count")
+        found = certified(found)
+    return dict(zip(pencils, found, strict=True))
+
+
+def _searched(
+    b: Prepared, state: StaticState, k: int, pencil: eigen.Pencil, R: Array, where: str, floating: Floating | None
+) -> Searched:
+    """Modes and static answers of one pencil. where: ``nodal diameter 3``, for messages."""
+    shift = rigid_shift(b.model) if b.settings.free else 0.0  # a free sector floats while its cut faces are apart
+    wanted = b.settings.modes.count
     if wanted > pencil.n - 2:
         raise UserError(
             f"modes.count: {wanted} modes asked for, but the body has only {pencil.n} degrees of freedom; "
             f"ask for {pencil.n - 2} at most, or refine"
         )
-    if isinstance(unknowns, FreeUpper | Tied):
-        refuse_unconstrained_parts(model, pencil, R.shape[1])
+    if b.sector is None:
+        refuse_unconstrained_parts(b.model, pencil, R.shape[1])
     try:
         found = eigen.search(pencil, wanted, shift, rigid=R if R.shape[1] else None)
     except eigen.Unstable as error:
-        raise _divergence(settings, speed, error.count, model, where) from error
+        raise _divergence(b, state.speed, error.count, where) from error
     refuse_unresolved(pencil, found, R.shape[1])
-    return answered(settings, pencil, unknowns, R, shift, found, rows, bool(shift), floating)
+    return answered(pencil, b.unknowns(k), R, shift, found, b.rows, bool(shift), floating)
 
 
 def answered(
-    settings: BodySettings, pencil: eigen.Pencil, unknowns: Unknowns, R: Array, shift: float, found: eigen.Spectrum,
+    pencil: eigen.Pencil, unknowns: Unknowns, R: Array, shift: float, found: eigen.Spectrum,
     rows: BodyRows, floats: bool, floating: Floating | None = None,
 ) -> Searched:  # fmt: skip
     """Modes found, with the static answers of all rows and what sticking interfaces are judged by.
@@ -122,7 +137,7 @@ def answered(
     Args:
         floats: whether the body has rigid motions that nothing holds.
     """
-    B, labels = rows.stacked(settings)
+    B, labels = rows.stacked
     B = unknowns.rows(B) if B.shape[0] else sp.csr_matrix((0, pencil.n))
     answers = static_answers(pencil, found, B, R, shift)
     at = [i for i, label in enumerate(labels) if label.startswith("interface:")]
@@ -165,10 +180,10 @@ def shared_shifts(gaps: Sequence[tuple[float, float]]) -> list[float]:
     return chosen
 
 
-def reduced_solution(model: BodyModel, settings: BodySettings, s: Searched, rows: BodyRows) -> Solution:
+def reduced_solution(b: Prepared, s: Searched) -> Solution:
     """The reduction of certified modes and static answers, in one definite form."""
-    points = model.d.mesh.points
-    return reduced_on(canonical.by_place(points), len(points), settings, s, rows)
+    points = b.model.d.mesh.points
+    return reduced_on(canonical.by_place(points), len(points), b.settings, s, b.rows)
 
 
 def reduced_on(place: Indices, n: int, settings: BodySettings, s: Searched, rows: BodyRows) -> Solution:
@@ -177,7 +192,7 @@ def reduced_on(place: Indices, n: int, settings: BodySettings, s: Searched, rows
     static = np.asarray(s.B @ s.answers)
     static = 0.5 * (static + static.conj().T)
     phi = s.unknowns.expand(s.found.vectors, n)
-    lead = leading_rows(rows, settings, phi, place)
+    lead = leading_rows(rows, phi, place)
     vectors = _turned(s, lead(phi))
     phi = s.unknowns.expand(vectors, n)
     vectors = vectors * canonical.signs(lead(phi)[:6] if settings.interfaces else phi[place])
@@ -206,31 +221,6 @@ def _turned(s: Searched, rows: Array) -> Array:
     return np.hstack([rigid, canonical.turn_clusters(X[:, zero:], values[zero:], rows[:, zero:])])
 
 
-def searched(
-    model: BodyModel, settings: BodySettings, pencil: eigen.Pencil, speed: float, R: Array, rows: BodyRows,
-    report: Report, floating: Floating | None = None,
-) -> Searched:  # fmt: skip
-    """Modes and static answers of the stiffness about one state, certified if the settings want it; see `search`.
-
-    Raises:
-        UserError: instability, more modes than degrees of freedom. NotConverged: no certificate.
-    """
-    report(f"eigenmodes: {pencil.n} free degrees of freedom, solver {pencil.solver.name}")
-    pencil.tell = report
-    found = search(model, settings, pencil, model.free, speed, R, rows, floating=floating)
-    if not settings.modes.certify:
-        return found
-    report("certifying the spectrum by the inertia count")
-    return certified([found])[0]
-
-
-def with_spares(settings: BodySettings) -> BodySettings:
-    """The same, asking for a few modes more: one that comes down into the band at another speed is then known."""
-    return settings.model_copy(
-        update={"modes": settings.modes.model_copy(update={"count": settings.modes.count + SPARE})}
-    )
-
-
 def without_spares(s: Searched, count: int) -> Searched:
     """The first `count` modes, and those of a cluster that begins among them: as complete as all of them are."""
     keep, gap = eigen.first_gap(s.found.values, count)
@@ -252,31 +242,25 @@ def held_compliance(T: Array, reduced: Reduced, labels: tuple[str, ...] = ()) ->
     return held(T, labels, reduced.kind, reduced.K_r, reduced.omega, reduced.to_diagonal)
 
 
-def _divergence(
-    settings: BodySettings,
-    speed: float,
-    count: int,
-    model: BodyModel,
-    where: str,
-) -> UserError:
-    if not speed and not model.loaded:
+def _divergence(b: Prepared, speed: float, count: int, where: str) -> UserError:
+    if not speed and not b.model.loaded:
         return UserError(
             f"the stiffness has {count} negative eigenvalues although nothing loads the body: its "
             "cells are too thin to be told from rounding (edges up to "
-            f"{longest_over_shortest(model.d.mesh):.0f} times as long as the shortest of the "
+            f"{longest_over_shortest(b.model.d.mesh):.0f} times as long as the shortest of the "
             "cell), or parts of it hang together by a point or an edge only; refine the mesh, "
             "check length_unit or join the parts",
             "mesh",
         )
     remedy = "lower the speed"
-    if settings.rotation.prestress == "none" and speed:
+    if b.settings.rotation.prestress == "none" and speed:
         remedy += ', or use rotation.prestress = "nonlinear": without the stiffening by stress frequencies fall to zero'
     elif not speed:
         remedy = "it buckles under what loads it at rest: reduce that, or check the material"
     return UserError(
         f"at {rpm_text(speed)}{where and ', ' + where + ','} {count} "
         f"eigenvalue{'s are' if count > 1 else ' is'} negative: the body diverges; {remedy}",
-        what_loads(model, speed),
+        what_loads(b.model, speed),
     )
 
 

@@ -13,7 +13,6 @@ from ..fem.cyclic import CyclicUpper
 from ..fem.discretise import FreeUpper
 from ..fem.tied import Tied
 from ..linalg import eigen
-from ..settings.body import BodySettings
 from .body_rows import BodyRows
 from .equilibrium import BodyModel
 
@@ -123,17 +122,11 @@ def static_answers(pencil: eigen.Pencil, found: eigen.Spectrum, B: sp.csr_matrix
     return within + u
 
 
-def leading_rows(rows: BodyRows, settings: BodySettings, phi: Array, place: Indices) -> Callable[[Array], Array]:
+def leading_rows(rows: BodyRows, phi: Array, place: Indices) -> Callable[[Array], Array]:
     """Rows that decide signs and the basis of pairs: the first interface's, else the strongest nodes' motion."""
-    first = next((i.name for i in settings.interfaces), None)
-    chosen = _strong(phi, place)
-    if first is not None:
-        B = rows.patches[first].B
-        return lambda x: np.vstack([B @ x, x[chosen]])
-    return lambda x: x[chosen]
-
-
-def _strong(phi: Array, place: Indices) -> Indices:
-    """Degrees of freedom with the largest motion over all modes, a few of them; of ties the first in `place`."""
-    power = (np.abs(phi[place]) ** 2).sum(axis=1)
-    return place[np.argsort(-np.round(power / power.max(), 6), kind="stable")[:6]]
+    power = (np.abs(phi[place]) ** 2).sum(axis=1)  # over all modes; of ties the first in `place`
+    chosen = place[np.argsort(-np.round(power / power.max(), 6), kind="stable")[:6]]
+    if not rows.settings.interfaces:
+        return lambda x: x[chosen]
+    B = rows.patches[rows.settings.interfaces[0].name].B
+    return lambda x: np.vstack([B @ x, x[chosen]])

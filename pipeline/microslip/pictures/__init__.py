@@ -9,7 +9,7 @@ import subprocess
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -24,6 +24,8 @@ from .lettering import save_gif, save_png
 from .scene import quiet_vtk
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from .lettering import Picture
     from .views import Studio
 
@@ -109,41 +111,35 @@ def draw_all(
     drawn: dict[str, Path] = {}
     if scenes and basis.mesh.n_cells:  # a system by hand or a test has points alone
         drawn |= _scenes(basis, folder, report)
-    if not basis.mesh.n_cells:
-        drawn |= _points(basis, folder)
     report("curves")
-    first = basis.groups[min(basis.groups)]
-    if (path := plots.compliance_plot(basis, first, folder / "compliance.png")) is not None:
-        drawn["compliance"] = path
-    if (path := plots.closure_plot(basis, folder / "closure.png")) is not None:
-        drawn["closure"] = path
-    if basis.sectors > 1:
-        drawn |= _diagrams(basis, folder, engine_orders)
-    elif (tracks := track_basis(basis)) is not None:
-        drawn["campbell"] = plots.campbell_plot(basis, tracks, engine_orders, folder / "campbell.png")
+    for name, draw in _curves(basis, engine_orders).items():
+        figure = plots.figure_of(draw)
+        if figure.axes:
+            drawn[name] = plots.save_figure(figure, folder / f"{name}.png")
     return drawn
 
 
-def _points(basis: ModalBasis, folder: Path) -> dict[str, Path]:
-    """What matplotlib can show where no elements are known."""
+def _curves(basis: ModalBasis, orders: Sequence[int]) -> dict[str, Callable[[Figure], None]]:
+    """What matplotlib can show; what does not apply to the body leaves its figure empty."""
+    from . import diagrams
     from .points import points_sheet
 
-    group = _ends(basis)[0]
-    path = points_sheet(basis, group, folder / f"modes_{_rpm(group)}.png")
-    return {} if path is None else {path.stem: path}
-
-
-def _diagrams(basis: ModalBasis, folder: Path, engine_orders: Sequence[int]) -> dict[str, Path]:
-    """What only a cyclic body has."""
-    from . import diagrams
-
-    found = {
-        "nodal_diameters": diagrams.nodal_diameter_plot(basis, folder / "nodal_diameters.png"),
-        "nodal_diameters_stuck": diagrams.stuck_plot(basis, folder / "nodal_diameters_stuck.png"),
-        "safe": diagrams.safe_plot(basis, engine_orders, folder / "safe.png"),
-        "campbell": diagrams.cyclic_campbell_plot(basis, engine_orders, folder / "campbell.png"),
-    }
-    return {name: path for name, path in found.items() if path is not None}
+    found: dict[str, Callable[[Figure], None]] = {}
+    if not basis.mesh.n_cells:
+        group = _ends(basis)[0]
+        found[f"modes_{_rpm(group)}"] = partial(points_sheet, basis, group)
+    found["compliance"] = partial(plots.compliance_plot, basis, basis.groups[min(basis.groups)])
+    found["closure"] = partial(plots.closure_plot, basis)
+    if basis.sectors > 1:
+        return found | {
+            "nodal_diameters": partial(diagrams.nodal_diameter_plot, basis),
+            "nodal_diameters_stuck": partial(diagrams.stuck_plot, basis),
+            "safe": partial(diagrams.safe_plot, basis, orders),
+            "campbell": partial(diagrams.cyclic_campbell_plot, basis, orders),
+        }
+    if (tracks := track_basis(basis)) is not None:
+        found["campbell"] = partial(diagrams.campbell_plot, basis, tracks, orders)
+    return found
 
 
 def _scenes(basis: ModalBasis, folder: Path, report: Report) -> dict[str, Path]:

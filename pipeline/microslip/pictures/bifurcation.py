@@ -2,48 +2,42 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..bifurcation.branches import Branch
+from ..bifurcation.branches import DiagramBranch
 from ..bifurcation.diagram import Diagram
 from ..units import Quantity
-from .plots import COLOURS, empty_figure, plain_axes, save_figure, single_panel
+from .plots import COLOURS, panels
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 
-def diagram_picture(found: Diagram, path: Path, title: str, axis: str) -> Path:
+def diagram_picture(found: Diagram, figure: Figure, title: str, axis: str) -> None:
     """Half of the way from the smallest to the largest value of a read-out over the parameter."""
-    figure, axes = single_panel(10.5, 5.4)
+    (axes,) = panels(figure, (10.5, 5.4))
     found.plot(axes, axis)
     axes.set_title(title, fontweight="bold")
-    return save_figure(figure, path)
 
 
 SHOWN = 6
 
 
-def portraits_picture(found: Diagram, path: Path, title: str, unit: str) -> Path:
+def portraits_picture(found: Diagram, figure: Figure, title: str, unit: str) -> None:
     """Orbits of every branch in the phase plane of the first read-out, from its beginning to its end by colour."""
     shown = [b for b in found.branches if not b.still][:9]
     columns = min(len(shown), 3)
     rows = -(-len(shown) // columns)
-    figure = empty_figure(4.4 * columns + 0.4, 4.0 * rows)
-    places = figure.subplots(rows, columns, squeeze=False).ravel()
-    for axes in places[len(shown) :]:
-        axes.set_visible(False)
-    for axes, branch in zip(places, shown, strict=False):
-        plain_axes(axes)
+    places = panels(figure, (4.4 * columns + 0.4, 4.0 * rows), rows, columns, len(shown))
+    for axes, branch in zip(places, shown, strict=True):
         _portraits(found, branch, axes, unit)
     figure.suptitle(title, fontweight="bold")
-    return save_figure(figure, path)
 
 
-def _portraits(found: Diagram, branch: Branch, axes: Axes, parameter_unit: str) -> None:
+def _portraits(found: Diagram, branch: DiagramBranch, axes: Axes, parameter_unit: str) -> None:
     for k, i in enumerate(dict.fromkeys(np.linspace(0, len(branch) - 1, SHOWN).round().astype(int).tolist())):
         orbit = branch.orbit(found.system, i)
         y = found.system.seen(orbit.sampled(16), orbit.p)[:, 0]

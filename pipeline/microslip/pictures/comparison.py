@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,12 +17,14 @@ from ..data import Array, ModalBasis, ModalGroup
 from ..modal.sampling import is_solid
 from ..reduced.coordinates import in_modes
 from ..reduced.correlation import Comparison, Pair, measured_directions, nearest_points
-from . import plots
 from .lettering import INK, captioned, save_png, scaled, sheet, side_by_side
+from .plots import save
 from .scene import OUTLINE, Camera, Stage, fit, surface, view_axes
 from .views import AMPLITUDE, Studio, hertz, mode_pictures
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from .lettering import Picture
 
 Both = tuple[ModalBasis, ModalBasis]
@@ -33,10 +36,10 @@ AREA = 60_000
 """Pixels of one picture."""
 
 
-def mac_plot(found: Comparison, names: tuple[str, str], path: Path) -> Path:
+def mac_plot(found: Comparison, names: tuple[str, str], figure: Figure) -> None:
     """The MAC of every mode with every other; pairs have a frame and their number."""
     rows, columns = found.mac.shape
-    figure = plots.empty_figure(1.8 + 0.42 * min(max(columns, 6), 30), 1.6 + 0.36 * min(max(rows, 6), 30))
+    figure.set_size_inches(1.8 + 0.42 * min(max(columns, 6), 30), 1.6 + 0.36 * min(max(rows, 6), 30))
     axes = figure.add_subplot()
     drawn = axes.imshow(found.mac, cmap="Blues", vmin=0, vmax=1, origin="lower", aspect="auto")
     for p in found.pairs:
@@ -50,7 +53,6 @@ def mac_plot(found: Comparison, names: tuple[str, str], path: Path) -> Path:
         axis.set_label_text(name)
     axes.tick_params(axis="x", rotation=90)
     figure.colorbar(drawn, label="MAC; numbers: pairs, per cent", fraction=0.05)
-    return plots.save_figure(figure, path)
 
 
 @dataclass(frozen=True)
@@ -159,7 +161,8 @@ def draw_comparison(
     from . import quiet_vtk
 
     folder.mkdir(parents=True, exist_ok=True)
-    drawn: dict[str, Any] = {"mac": mac_plot(found, (bodies[0].name, bodies[1].name), folder / "mac.png")}
+    names = bodies[0].name, bodies[1].name
+    drawn = {"mac": save(partial(mac_plot, found, names), folder / "mac.png")}
     if scenes:
         quiet_vtk()
         image = pair_sheet(bodies, seen, found, key)

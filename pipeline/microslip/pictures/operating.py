@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
-from pathlib import Path
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,26 +12,27 @@ from ..data import Array
 from ..operating.cycle import at_time, farthest_at
 from ..operating.fatigue import Endurance, MaterialLimits, allowed_amplitude, vibration_margin
 from ..operating.motion import Motion, displacement
-from ..operating.stress import CycleStress, StressPeaks
-from ..units import METRES, counted
+from ..operating.stress import CycleStress
+from ..units import METRES, Quantity, counted
 from .plots import (
     COLOURS,
+    INK,
     LIGHT,
+    LIGHTER,
+    Look,
     by_rows,
-    empty_figure,
-    lighter,
-    lighter_means,
+    in_shades,
+    legend_below,
     mark_missing,
-    plain_numbers,
+    numbers_within,
+    panels,
     said_beside,
-    save_figure,
-    single_panel,
-    through,
-    widths,
+    swept,
 )
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
     from ..operating.contact_maps import ContactMap
     from .lettering import Picture
@@ -50,20 +51,13 @@ def all_sure(normal: float, frequency: Array) -> Array:
     return np.zeros(len(frequency), dtype=bool)
 
 
-def shades(count: int) -> list[tuple[float, ...]]:
-    """Colours of a rising parameter, light to dark; a single one is dark."""
-    from matplotlib import colormaps
-
-    return [tuple(colormaps["viridis"](x)) for x in np.linspace(0.05, 0.85, max(count, 1))[::-1]]
-
-
 # over frequency, over normal force ---------------------------------------------------------------------------------
 
 
 def over_frequency_plot(
-    curves: Curves, quantity: str, title: str, path: Path, lifted: Mapping[float, Array] | None = None,
+    curves: Curves, quantity: str, title: str, figure: Figure, lifted: Mapping[float, Array] | None = None,
     unsure: Unsure = all_sure,
-) -> Path:  # fmt: skip
+) -> None:  # fmt: skip
     """A quantity over the frequency (Hz) for every normal force, on a logarithmic scale.
 
     Args:
@@ -71,33 +65,25 @@ def over_frequency_plot(
             lifted: normal force, N -> which points are not valid, because contacts would lift off; they are dotted.
             unsure: see `Unsure`; curves are lighter there.
     """
-    figure, axes = single_panel(9.0, 6.0)
+    (axes,) = panels(figure, (9.0, 6.0))
     axes.set_yscale("log")
-    pairs = list(zip(shades(len(curves)), sorted(curves.items()), strict=True))
-    told = ""
-    for width, (colour, (normal, (x, y))) in zip(widths(len(pairs)), pairs, strict=True):
+    words = None
+    for line, normal, (x, y) in in_shades(curves):
         off = (lifted or {}).get(normal, np.zeros(len(x), dtype=bool))
-        if off.any():
-            axes.semilogy(*through(x, np.where(off, y, np.nan)), color=colour, linewidth=width, linestyle=":")
-            told = "dotted: contacts would lift off, not valid"
-        line = {"linestyle": ":" if off.all() else "-", "label": f"$F_N$ = {normal:g} N"}
-        fine, drawn = through(x, np.where(off, np.nan, y))
-        lighter(axes, fine, drawn, unsure(normal, fine), color=colour, linewidth=width, **line)
-    for row, (colour, (_, (x, y))) in enumerate(pairs):
-        mark_missing(axes, x[np.isnan(y)], colour, row)
+        words = "dotted: contacts would lift off, not valid" if off.any() else words
+        swept(axes, x, y, off, partial(unsure, normal), label=f"$F_N$ = {normal:g} N", **line)
+    for row, (line, _, (x, y)) in enumerate(in_shades(curves)):
+        mark_missing(axes, x[np.isnan(y)], line["color"], row)
     low, high = (f(float(f(x)) for x, _ in curves.values()) for f in (min, max))
     axes.set(xlabel="excitation frequency in Hz", ylabel=quantity, title=title, xlim=(low, high))
     numbers_within(axes.yaxis)
-    lines, names = axes.get_legend_handles_labels()
-    lines, names = by_rows(lines, names, 6)
-    figure.legend(lines, names, loc="outside lower center", ncols=6, fontsize=9, title=told or None, title_fontsize=8)
-    return save_figure(figure, path)
+    legend_below(figure, 6, *by_rows(*axes.get_legend_handles_labels(), 6), title=words, title_fontsize=8)
 
 
 def over_normal_force_plot(
-    peaks: Mapping[str, Sequence[tuple[float, float]]], quantity: str, title: str, path: Path,
+    peaks: Mapping[str, Sequence[tuple[float, float]]], quantity: str, title: str, figure: Figure,
     lifted: Collection[float] = (), unsure: Collection[tuple[float, float]] = (),
-) -> Path:  # fmt: skip
+) -> None:  # fmt: skip
     """The largest value of each resonance over the normal force (N), both logarithmic; the lowest is marked.
 
     Args:
@@ -105,7 +91,8 @@ def over_normal_force_plot(
             lifted: normal forces under which contacts would lift off, so that values are not valid: hollow. unsure:
             pairs that are uncertain: lighter.
     """
-    figure, axes = single_panel(8.0, 5.2)
+    (axes,) = panels(figure, (8.0, 5.2))
+    dot: Look = {"marker": "o", "ls": "", "markersize": 4}
     for i, (name, pairs) in enumerate(peaks.items()):
         x, y = np.array(sorted(p for p in pairs if p[0] > 0)).reshape(-1, 2).T
         if not len(x):
@@ -114,9 +101,8 @@ def over_normal_force_plot(
         colour, best = COLOURS[i % len(COLOURS)], int(np.argmin(np.where(off & ~off.all(), np.inf, y)))
         axes.loglog(x, y, "-", color=colour, linewidth=1.6, label=name)
         light = np.array([pair in unsure for pair in zip(x, y, strict=True)])
-        axes.plot(x[~off & ~light], y[~off & ~light], "o", color=colour, markersize=4)
-        axes.plot(x[~off & light], y[~off & light], "o", color=colour, markersize=4, alpha=LIGHT)
-        axes.plot(x[off], y[off], "o", color=colour, markersize=4, mfc="white")
+        for these, look in ((~off & ~light, Look()), (~off & light, Look(alpha=LIGHT)), (off, Look(mfc="white"))):
+            axes.plot(x[these], y[these], color=colour, **dot, **look)
         if 0 < best < len(x) - 1:
             axes.plot(x[best], y[best], "o", markersize=9, mfc="none", mec=colour, mew=1.6)
             how = {"ha": "center", "va": "top", "fontsize": 8.5, "color": colour}
@@ -124,62 +110,53 @@ def over_normal_force_plot(
     hollow = any(normal in lifted for pairs in peaks.values() for normal, _ in pairs)
     axes.set(xlabel="normal force in N", ylabel=quantity, title=title)
     if hollow:
-        axes.plot([], [], "o", color="0.3", markersize=4, mfc="white", label="contacts would lift off: not valid")
+        axes.plot([], [], color="0.3", mfc="white", label="contacts would lift off: not valid", **dot)
     axes.margins(y=0.15)
     for axis in (axes.xaxis, axes.yaxis):
         numbers_within(axis)
     if len(unsure):
-        axes.plot([], [], "o", color="0.3", markersize=4, alpha=LIGHT, label=lighter_means())
+        axes.plot([], [], color="0.3", alpha=LIGHT, label=LIGHTER, **dot)
     if len(peaks) > 1 or hollow or len(unsure):
         axes.legend(fontsize=9)
-    return save_figure(figure, path)
-
-
-def numbers_within(axis: Any) -> None:
-    """Numbers without powers of ten on a logarithmic axis; more of them where it spans less than a decade or two."""
-    low, high = axis.get_view_interval()
-    span = np.log10(high / low)
-    within = (1.0,) if span > 2.5 else (1.0, 2.0, 5.0) if span > 0.8 else tuple(np.arange(1.0, 10.0))
-    plain_numbers(axis, within)
 
 
 # fatigue -----------------------------------------------------------------------------------------------------------
 
 
-def haigh_plot(cycle: CycleStress, limits: MaterialLimits, worst: Endurance, title: str, path: Path) -> Path:
+def haigh_plot(cycle: CycleStress, limits: MaterialLimits, worst: Endurance, title: str, figure: Figure) -> None:
     """All places in the Haigh diagram: amplitude over mean, with the Goodman line and the line of yielding.
 
     Args:
         worst: the place to mark.
     """
-    figure, axes = single_panel(8.0, 5.4)
-    mean, amplitude = 1e-6 * cycle.mean, 1e-6 * cycle.amplitude
-    left = min(float(mean.min()), -0.15e-6 * limits.tensile_strength)
-    x = np.linspace(left, 1e-6 * limits.tensile_strength, 201)
+    (axes,) = panels(figure, (8.0, 5.4))
+    mean, amplitude, strength = 1e-6 * cycle.mean, 1e-6 * cycle.amplitude, 1e-6 * limits.tensile_strength
+    left = min(float(mean.min()), -0.15 * strength)
+    x = np.linspace(left, strength, 201)
     axes.plot(x, 1e-6 * allowed_amplitude(limits, 1e6 * x), color=COLOURS[1], linewidth=1.8, label="Goodman")
     if limits.yield_strength is not None:
         y = 1e-6 * limits.yield_strength - np.abs(x)
         axes.plot(x[y >= 0], y[y >= 0], color=COLOURS[4], linewidth=1.4, linestyle="--", label="yielding")
-    dots: dict[str, Any] = {"s": 5, "alpha": 0.35, "linewidths": 0}
     out, zones = cycle.counted, np.flatnonzero(cycle.singular)
     if len(zones):
-        axes.scatter(mean[zones], amplitude[zones], color="0.6", label="in singular zones", **dots)
-    axes.scatter(mean[out], amplitude[out], color=COLOURS[0], label="places of the body", **dots)
-    told = f"worst place: {1e-6 * worst.amplitude:.3g} MPa about {1e-6 * worst.mean:.3g} MPa,\n{_margin(worst)}"
-    axes.plot(
-        1e-6 * worst.mean, 1e-6 * worst.amplitude, "o", color="#111111", mfc="none", markersize=9, mew=1.8, label=told
-    )
-    top = max(1.15e-6 * limits.fatigue_strength, 1.1 * float(amplitude.max()))
+        axes.scatter(mean[zones], amplitude[zones], color="0.6", label="in singular zones", **_PLACES)
+    axes.scatter(mean[out], amplitude[out], color=COLOURS[0], label="places of the body", **_PLACES)
+    at = 1e-6 * worst.mean, 1e-6 * worst.amplitude
+    margin = f"reserve factor {worst.vibration:.3g}" if np.isfinite(worst.vibration) else "nothing vibrates"
+    label = f"worst place: {1e-6 * worst.amplitude:.3g} MPa about {1e-6 * worst.mean:.3g} MPa,\n{margin}"
+    axes.plot(*at, "o", color=INK, mfc="none", markersize=9, mew=1.8, label=label)
     axes.set(
         xlabel="mean stress in MPa (static and mean, compression negative)",
         ylabel="stress amplitude in MPa",
         title=title,
-        ylim=(0, top),
-        xlim=(left, 1.03e-6 * limits.tensile_strength),
+        ylim=(0, max(1.15e-6 * limits.fatigue_strength, 1.1 * float(amplitude.max()))),
+        xlim=(left, 1.03 * strength),
     )
     axes.legend(fontsize=9, loc="upper right")
     _close_up(axes, cycle)
-    return save_figure(figure, path)
+
+
+_PLACES: Look = {"s": 5, "alpha": 0.35, "linewidths": 0}
 
 
 def _close_up(axes: Axes, cycle: CycleStress) -> None:
@@ -197,16 +174,10 @@ def _close_up(axes: Axes, cycle: CycleStress) -> None:
         said_beside(axes, said, (mean.mean(), high), (40, 40), fontsize=9, color=COLOURS[0], arrowprops=line)
         return
     window = axes.inset_axes((0.52, 0.36, 0.45, 0.3))
-    window.scatter(mean, amplitude, s=5, color=COLOURS[0], alpha=0.35, linewidths=0)
+    window.scatter(mean, amplitude, color=COLOURS[0], **_PLACES)
     window.set_title("the places, enlarged", fontsize=8)
     window.set_ylim(0, 1.1 * high)
     window.tick_params(labelsize=7.5)
-
-
-def _margin(worst: Endurance) -> str:
-    if not np.isfinite(worst.vibration):
-        return "nothing vibrates"
-    return f"reserve factor {worst.vibration:.3g}"
 
 
 # contacts ----------------------------------------------------------------------------------------------------------
@@ -220,28 +191,24 @@ _PANELS = (
 )
 
 
-def contact_map_plot(maps: Sequence[ContactMap], title: str, path: Path) -> Path:
+def contact_map_plot(maps: Sequence[ContactMap], title: str, figure: Figure) -> None:
     """Pressure, traction, energy, slip and separation on every patch, a column each, seen along its normal."""
     spans = [np.maximum(np.ptp(m.places, axis=0), 1e-6) for m in maps]
-    flat = [bool(s[1] <= s[0]) for s in spans]
     slender = max(min(float(s.min() / s.max()), 1.0) for s in spans)
     high = min(4.0 * slender, 1.6)  # inches of a panel; what is wider than it needs to be stays white
-    narrow = slender > 0.4  # titles in two lines
-    beside = 0.8 if narrow else 0.62
-    figure = empty_figure(
-        max(0.8 + min(1.9 + high / slender, 5.2) * len(maps), 6.5), 0.7 + len(_PANELS) * (beside + high)
-    )
-    table = figure.subplots(len(_PANELS), len(maps), squeeze=False)
-    for j, (m, lies) in enumerate(zip(maps, flat, strict=True)):
-        for i, panel in enumerate(_PANELS):
-            _map_panel(table[i, j], m, *panel, lies, "\n" if narrow else ": ")
-        told = f"{m.name}: {m.normal_force:.4g} N, {_energy(m.loss)} a cycle{_left(m)}"
-        table[0, j].set_title(f"{told}\n{table[0, j].get_title()}", fontsize=9.5)
-        for axes in table[:-1, j]:
-            axes.tick_params(labelbottom=False)
-        table[-1, j].set_xlabel(("t1" if lies else "t2") + " in mm", fontsize=9)
+    narrow, rows = slender > 0.4, len(_PANELS)  # titles in two lines
+    wide = max(0.8 + min(1.9 + high / slender, 5.2) * len(maps), 6.5)
+    figure.set_size_inches(wide, 0.7 + rows * ((0.8 if narrow else 0.62) + high))
+    table = figure.subplots(rows, len(maps), squeeze=False)
+    for m, span, column in zip(maps, spans, table.T, strict=True):
+        lies = bool(span[1] <= span[0])
+        for axes, panel in zip(column, _PANELS, strict=True):
+            _map_panel(axes, m, *panel, lies, "\n" if narrow else ": ")
+            axes.tick_params(labelbottom=axes is column[-1])
+        words = f"{m.name}: {m.normal_force:.4g} N, {_energy(m.loss)} a cycle{_left(m)}"
+        column[0].set_title(f"{words}\n{column[0].get_title()}", fontsize=9.5)
+        column[-1].set_xlabel(("t1" if lies else "t2") + " in mm", fontsize=9)
     figure.suptitle(title, fontweight="bold")
-    return save_figure(figure, path)
 
 
 def _left(m: ContactMap) -> str:
@@ -252,11 +219,7 @@ def _left(m: ContactMap) -> str:
 
 
 def _energy(joules: float) -> str:
-    if abs(joules) < 1e-15:  # rounding of forces that give back what they took
-        return "0 J"
-    units = ((1.0, "J"), (1e3, "mJ"), (1e6, "µJ"))
-    scale, unit = next(((s, u) for s, u in units if abs(joules) * s >= 0.5), (1e9, "nJ"))
-    return f"{joules * scale:.3g} {unit}"
+    return Quantity("J").sized(joules, 3) if abs(joules) >= 1e-15 else "0 J"  # else forces give back what they took
 
 
 def _map_panel(
@@ -268,7 +231,7 @@ def _map_panel(
 
     values, places = scale * getattr(m, name), m.places if lies else m.places[:, ::-1]
     low, high = min(float(values.min()), 0.0), 100.0 if unit.startswith("%") else max(float(values.max()), 0.0)
-    how: dict[str, Any] = {"vmin": low, "vmax": high if high > low else 1.0, "cmap": colours}
+    how: Look = {"vmin": low, "vmax": high if high > low else 1.0, "cmap": colours}
     edges = grid_of(places)
     if edges is not None:
         shown: Any = axes.pcolormesh(1e3 * edges[0], 1e3 * edges[1], on_grid(places, values), **how)
@@ -285,10 +248,8 @@ def _map_panel(
 
 def _span(ends: tuple[float, float], scale: float) -> str:
     """Smallest and largest value; one where both read the same."""
-    low, high = ends
-    told = f"{scale * low:.3g} to {scale * high:.3g}"
-    same = told == f"{scale * high:.3g} to {scale * high:.3g}"
-    return f"{scale * high:.3g} everywhere, in" if same else told
+    low, high = (f"{scale * end:.3g}" for end in ends)
+    return f"{high} everywhere, in" if low == high else f"{low} to {high}"
 
 
 # the body ----------------------------------------------------------------------------------------------------------
@@ -358,9 +319,3 @@ def farthest(motion: Motion, points: int) -> tuple[Array, float, float]:
     best = farthest_at(a)
     shape = at_time(a, best, axis=0)
     return shape, float(np.linalg.norm(shape, axis=1).max()), float(np.degrees(best))
-
-
-def stress_curve(frequency: Array, peaks: StressPeaks, converged: Array | None = None) -> tuple[Array, Array]:
-    """Frequency (Hz) and largest stress amplitude (MPa) of a sweep, for `over_frequency_plot`."""
-    y = 1e-6 * peaks.amplitude
-    return frequency, y if converged is None else np.where(converged, y, np.nan)

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..data import Array, ModalBasis, ModalGroup
 from ..reduced.coordinates import in_modes
-from .plots import empty_figure, save_figure
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 MOST = 12
 COLUMNS = 4
@@ -17,21 +18,19 @@ SHARE = 0.12
 """Largest motion drawn, over the size of the body."""
 
 
-def points_sheet(basis: ModalBasis, group: ModalGroup, path: Path, most: int = MOST) -> Path | None:
-    """The first elastic modes as a sheet of three-dimensional sketches; None without shapes."""
+def points_sheet(basis: ModalBasis, group: ModalGroup, figure: Figure, most: int = MOST) -> None:
+    """The first elastic modes as a sheet of three-dimensional sketches; nothing without shapes."""
     g = group if group.to_diagonal is None else in_modes(group)
     elastic = [j for j in range(len(g.omega)) if g.omega[j] > 0][:most]
     if not len(g.phi) or not elastic:
-        return None
+        return
     rows, columns = -(-len(elastic) // COLUMNS), min(COLUMNS, len(elastic))
-    figure = empty_figure(3.0 * columns, 3.1 * rows)
+    figure.set_size_inches(3.0 * columns, 3.1 * rows)
     for place, j in enumerate(elastic, 1):
         axes: Any = figure.add_subplot(rows, columns, place, projection="3d")
         _sketch(axes, basis.mesh.points, g.phi[:, :, j].real if moves(g, j) else np.zeros_like(basis.mesh.points))
         still = "" if moves(g, j) else "\nrotations alone"
         axes.set_title(f"{j + 1}: {g.omega[j] / 2 / np.pi:.5g} Hz{still}", fontsize=10)
-    return save_figure(figure, path)
-
 
 def moves(group: ModalGroup, mode: int) -> bool:
     """Whether a mode displaces the nodes; that of a rod in torsion turns them only, and leaves rounding."""

@@ -3,61 +3,60 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..data import Array
 from ..exchange import vtu
 from ..rolling.strips import Tractions
-from ..rolling.study import Studied
-from ..rolling.wearing import Wearing
-from .plots import COLOURS, empty_figure, plain_axes, save_figure, single_panel
+from ..rolling.study import RollingAnswer
+from ..rolling.wearing import ProfileWear
+from .plots import COLOURS, legend_below, panels, plain_axes
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.collections import PolyCollection
+    from matplotlib.figure import Figure
 
 LABELS = {"longitudinal": "longitudinal creepage", "lateral": "lateral creepage", "spin": "spin in 1/m"}
 
 
-def curve_picture(found: Studied, path: Path, title: str) -> Path:
+def curve_picture(found: RollingAnswer, figure: Figure, title: str) -> None:
     """Creep forces over the friction that is held; the published FASTSIM and exact half-spaces at some points."""
     assert found.forces is not None
-    figure, axes = single_panel(8.0, 4.8)
-    x, f, held = found.over, found.forces, found.held
+    (axes,) = panels(figure, (8.0, 4.8))
+    x, f, friction = found.over, found.forces, found.held
     drawn = {"F_x": f.x, "F_y": f.y, "|F|": np.hypot(f.x, f.y)}
     for i, (name, values) in enumerate(drawn.items()):
-        if np.abs(values).max() > 1e-6 * held:
-            axes.plot(x, values / held, color=COLOURS[i], label=f"${name}/\\mu F_N$")
+        if np.abs(values).max() > 1e-6 * friction:
+            axes.plot(x, values / friction, color=COLOURS[i], label=f"${name}/\\mu F_N$")
+    hollow: dict[str, Any] = {"fillstyle": "none"}
     if found.reference is not None:
         at, of = found.reference
-        axes.plot(x[at], of, "o", markersize=4, color="0.35", fillstyle="none", label="|F| by FASTSIM, 44 x 44")
+        axes.plot(x[at], of, "o", markersize=4, color="0.35", label="|F| by FASTSIM, 44 x 44", **hollow)
     if found.exact is not None:
-        at, each = found.exact.at, np.hypot(found.exact.x, found.exact.y) / held
-        axes.plot(x[at], each, "D", markersize=6, color="black", fillstyle="none", label="|F| of exact half-spaces")
+        at, each = found.exact.at, np.hypot(found.exact.x, found.exact.y) / friction
+        axes.plot(x[at], each, "D", markersize=6, color="black", label="|F| of exact half-spaces", **hollow)
     axes.axvline(x[found.shown], color="0.6", linestyle=":", linewidth=1.0)
     axes.set(xlabel=LABELS[found.case.creep.over], ylabel="force on the wheel", title=title)
-    figure.legend(fontsize=9, loc="outside lower center", ncols=4)
-    return save_figure(figure, path)
+    legend_below(figure)
 
 
-def traction_picture(found: Studied, path: Path, title: str) -> Path:
+def traction_picture(found: RollingAnswer, figure: Figure, title: str) -> None:
     """Tractions over the patch, and along its middle strip."""
     assert found.tractions is not None
     t, mu = found.tractions, found.highest
-    figure = empty_figure(9.6, 4.6)
+    figure.set_size_inches(9.6, 4.6)
     left, right = figure.subplots(1, 2, width_ratios=[1.0, 1.15])
-    size = np.hypot(t.traction_x, t.traction_y) / 1e6
     plain_axes(right)
-    image = _cells(left, t, size)
-    step = (max(1, t.x.shape[0] // 10), max(1, t.x.shape[1] // 10))
-    pick = np.s_[step[0] // 2 :: step[0], step[1] // 2 :: step[1]]
+    image = _cells(left, t, np.hypot(t.traction_x, t.traction_y) / 1e6)
+    pick = tuple(slice(step // 2, None, step) for step in (max(1, n // 10) for n in t.x.shape))
     left.quiver(1e3 * t.x[pick], 1e3 * t.y[pick], t.traction_x[pick], t.traction_y[pick], color="white", width=0.004)
     spans = np.ptp(_corners(t), axis=(0, 1))
     stretch = stretched(spans)
-    said = "traction in MPa" if stretch == 1.0 else "traction in MPa\nx and y to scales of their own"
-    left.set(xlabel="x in mm, rolling to the right", ylabel="y in mm", title=said)
+    words = "traction in MPa" if stretch == 1.0 else "traction in MPa\nx and y to scales of their own"
+    left.set(xlabel="x in mm, rolling to the right", ylabel="y in mm", title=words)
     left.set_aspect(stretch)
     flat = stretch * spans[1] < 0.5 * spans[0]  # no higher than its colour bar is long
     figure.colorbar(image, ax=left, shrink=0.85, location="bottom" if flat else "right")
@@ -71,7 +70,6 @@ def traction_picture(found: Studied, path: Path, title: str) -> Path:
     figure.legend(fontsize=9, loc="outside lower right", ncols=3)
     over = LABELS[found.case.creep.over].split(" in ")[0]
     figure.suptitle(f"{title}: {over} {found.over[found.shown]:.4g}")
-    return save_figure(figure, path)
 
 
 NARROW = 1 / 3
@@ -85,14 +83,13 @@ def stretched(size: Array) -> float:
     return NARROW / slender if slender < NARROW else min(1 / (NARROW * slender), 1.0)
 
 
-def wearing_picture(worn: Wearing, path: Path, title: str) -> Path:
+def wearing_picture(worn: ProfileWear, figure: Figure, title: str) -> None:
     """What is worn off both profiles, and the largest pressure over the passages."""
-    figure = empty_figure(9.6, 4.2)
-    left, right = figure.subplots(1, 2)
-    for i, (name, body) in enumerate((("wheel", worn.wheel), ("rail", worn.rail))):
-        plain_axes((left, right)[i])
-        left.plot(1e3 * body.y, 1e6 * body.depth, color=COLOURS[i], label=name)
-    touched = [1e3 * body.y[body.depth > 0] for body in (worn.wheel, worn.rail)]
+    left, right = panels(figure, (9.6, 4.2), 1, 2)
+    bodies = {"wheel": worn.wheel, "rail": worn.rail}
+    for name, body in bodies.items():
+        left.plot(1e3 * body.y, 1e6 * body.depth, label=name)
+    touched = [1e3 * body.y[body.depth > 0] for body in bodies.values()]
     ends = min(y.min() for y in touched) - 3, max(y.max() for y in touched) + 3
     left.set(xlim=ends, xlabel="y of the profile in mm", ylabel="worn off in um")
     left.invert_yaxis()
@@ -101,7 +98,6 @@ def wearing_picture(worn: Wearing, path: Path, title: str) -> Path:
     right.plot(over["passages"], over["largest_pressure_Pa"] / 1e6, ".-", color=COLOURS[2])
     right.set(xlabel="passages", ylabel="largest pressure in MPa")
     figure.suptitle(f"{title}: profiles that wear")
-    return save_figure(figure, path)
 
 
 def write_tractions_vtu(t: Tractions, path: Path) -> None:

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -13,50 +12,48 @@ from ..roots.diagram import Diagram
 from ..roots.map import Map
 from ..roots.spectrum import Spectrum
 from ..units import Quantity
-from .plots import empty_figure, plain_axes, save_figure, single_panel
+from .plots import RED, legend_below, panels
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
-def plane_picture(found: Spectrum, path: Path) -> Path:
+def plane_picture(found: Spectrum, figure: Figure) -> None:
     """The roots in the complex plane."""
-    figure, axes = single_panel(7.0, 5.2)
+    (axes,) = panels(figure, (7.0, 5.2))
     found.plot(axes)
-    figure.legend(*axes.get_legend_handles_labels(), loc="outside lower center", ncols=3, frameon=False, fontsize=9)
-    return save_figure(figure, path)
+    legend_below(figure, 3, *axes.get_legend_handles_labels(), frameon=False)
 
 
-def over_picture(found: Diagram, path: Path) -> Path:
+def over_picture(found: Diagram, figure: Figure) -> None:
     """Growth rates above frequencies, over the parameter."""
-    figure = empty_figure(8.0, 7.2)
-    above, below = figure.subplots(2, 1, sharex=True)
-    for axes in (above, below):
-        plain_axes(axes)
+    above, below = panels(figure, (8.0, 7.2), 2, sharex=True)
     found.plot(above, "growth")
     found.plot(below, "frequency")
     above.set_xlabel("")
     handles, labels = above.get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=min(len(labels), 3), frameon=False, fontsize=9)
-    return save_figure(figure, path)
+    legend_below(figure, min(len(labels), 3), handles, labels, frameon=False)
 
 
-def map_picture(found: Map, full: Sequence[tuple[float, float, int]], path: Path) -> Path:
+def map_picture(found: Map, full: Sequence[tuple[float, float, int]], figure: Figure) -> None:
     """Where how many roots grow. full: states (x, y) counted in unreduced matrices, and their number there."""
-    figure, axes = single_panel(7.0, 5.2)
+    (axes,) = panels(figure, (7.0, 5.2))
     axes.grid(visible=False)
     found.plot(axes)
     for x, y, count in full:
-        axes.plot(x, y, "o", color="#c8382c" if count else "white", markeredgecolor="black", markersize=7, zorder=4)
-    return save_figure(figure, path)
+        axes.plot(x, y, "o", color=RED if count else "white", markeredgecolor="black", markersize=7, zorder=4)
 
 
-KINDS = {"supercritical": "#0b4f9c", "subcritical": "#c8382c"}
-IN_TIME = "#e8a013"
-TOLD_IN_TIME = "motions in time"
+KINDS = {"supercritical": "#0b4f9c", "subcritical": RED}
+DOTS: dict[str, Any] = {"ls": "", "marker": "o", "markeredgecolor": "black"}
+IN_TIME: dict[str, Any] = {**DOTS, "color": "#e8a013"}
+NAMED_IN_TIME = "motions in time"
 
 
-def cycles_picture(found: Sequence[Cycles], title: str, path: Path) -> Path:
+def cycles_picture(found: Sequence[Cycles], title: str, figure: Figure) -> None:
     """Amplitude of limit cycles over the parameter: in blue from supercritical Hopf points, in red from others;
     dots are motions in time."""
-    figure, axes = single_panel(7.0, 4.4)
+    (axes,) = panels(figure, (7.0, 4.4))
     scale, unit = _shared(found)
     for number, c in enumerate(found):
         columns, colour = c.columns, KINDS[c.kind]
@@ -64,13 +61,10 @@ def cycles_picture(found: Sequence[Cycles], title: str, path: Path) -> Path:
         label = f"{c.hopf.omega / (2 * np.pi):.5g} Hz, {c.kind}"
         axes.plot(columns["parameter"], height, color=colour, marker=".", label=label)
         axes.plot(c.hopf.p, 0.0, "o", color="white", markeredgecolor=colour, zorder=3)
-        axes.plot(
-            columns["parameter"], seen, "o", color=IN_TIME, markeredgecolor="black", markersize=8, zorder=4,
-            label="" if number else TOLD_IN_TIME,
-        )  # fmt: skip
+        label = "" if number else NAMED_IN_TIME
+        axes.plot(columns["parameter"], seen, markersize=8, zorder=4, label=label, **IN_TIME)
     axes.set(xlabel=title, ylabel=f"amplitude {found[0].system.named[0]} in {unit}")
     axes.legend(frameon=False, fontsize=9)
-    return save_figure(figure, path)
 
 
 def _shared(found: Sequence[Cycles]) -> tuple[float, str]:
@@ -79,13 +73,13 @@ def _shared(found: Sequence[Cycles]) -> tuple[float, str]:
     return Quantity(*found[0].system.units[:1]).shared(np.concatenate([c.columns[column] for c in found]))
 
 
-def relief_picture(found: Sequence[tuple[float, Cycles]], titles: tuple[str, str], path: Path) -> Path:
+def relief_picture(found: Sequence[tuple[float, Cycles]], titles: tuple[str, str], figure: Figure) -> None:
     """Amplitude of limit cycles upwards over two parameters, Hopf points on the ground, motions in time as dots.
 
     Args:
         found: (value of the second parameter, cycles there). titles: of the two parameters.
     """
-    figure = empty_figure(8.0, 6.2)
+    figure.set_size_inches(8.0, 6.2)
     axes: Any = figure.add_subplot(projection="3d", computed_zorder=False)
     scale, unit = _shared([c for _, c in found])
     for depth, (value, c) in enumerate(reversed(found)):  # the nearest is drawn last
@@ -98,10 +92,9 @@ def relief_picture(found: Sequence[tuple[float, Cycles]], titles: tuple[str, str
     axes.view_init(24, -62)
     axes.set_box_aspect((1.3, 1.3, 0.8), zoom=0.95)
     handles = dict(zip(*reversed(axes.get_legend_handles_labels()), strict=True))
-    names = sorted(handles, key=[*KINDS, "Hopf points", TOLD_IN_TIME].index)
+    names = sorted(handles, key=[*KINDS, "Hopf points", NAMED_IN_TIME].index)
     lines = [handles[name] for name in names]
     figure.legend(lines, names, loc="outside upper center", ncols=4, frameon=False, fontsize=9)
-    return save_figure(figure, path)
 
 
 def _wall(axes: Any, value: float, c: Cycles, order: int, scale: float) -> None:
@@ -113,6 +106,6 @@ def _wall(axes: Any, value: float, c: Cycles, order: int, scale: float) -> None:
     wall = np.concatenate([np.column_stack([x, y, z]), np.column_stack([x, y, 0 * z])[::-1]])
     axes.add_collection3d(Poly3DCollection([wall], facecolor=colour, alpha=0.18, zorder=order))
     axes.plot(x, y, z, color=colour, linewidth=1.8, zorder=order + 1, label=c.kind)
-    dot = {"ls": "", "marker": "o", "markeredgecolor": "black", "markersize": 6, "zorder": order + 2}
-    axes.plot(x[:1], y[:1], z[:1], **dot, color="white", label="Hopf points")
-    axes.plot(x[1:], y[1:], dots, **dot, color=IN_TIME, label=TOLD_IN_TIME)
+    size: dict[str, Any] = {"markersize": 6, "zorder": order + 2}
+    axes.plot(x[:1], y[:1], z[:1], color="white", label="Hopf points", **DOTS, **size)
+    axes.plot(x[1:], y[1:], dots, label=NAMED_IN_TIME, **IN_TIME, **size)

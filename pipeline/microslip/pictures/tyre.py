@@ -3,72 +3,63 @@ slip."""
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..data import Array, ModalBasis
 from ..mesh import boundary_facets
-from ..rolling.brush import jump
-from ..rolling.slip import Studied
-from .plots import COLOURS, empty_figure, plain_axes, save_figure
+from ..rolling.tyre import TyreAnswer, jump
+from .plots import COLOURS, Look, plain_panels
 from .scene import element_sides
 
 if TYPE_CHECKING:
-    from matplotlib.figure import SubFigure
+    from matplotlib.figure import Figure, SubFigure
 
 TO_ITS_SIDE = 1e-6
 """Of the wheel's size: points that near to its outermost plane are of its side."""
 
 
-def tyre_picture(found: Studied, path: Path, title: str, wheel: ModalBasis | None = None) -> Path:
+def tyre_picture(found: TyreAnswer, figure: Figure, title: str, wheel: ModalBasis | None = None) -> None:
     """Four panels, and beside them the wheel of a modal file as it stands, whole and near its patch."""
-    figure = empty_figure(9.6 if wheel is None else 13.6, 6.4)
-    if wheel is None:
-        panels = figure.subplots(2, 2)
-    else:
-        beside, rest = np.ravel(np.asarray(figure.subfigures(1, 2, width_ratios=(4.2, 9.4))))
-        _standing(beside, found, wheel)
-        panels = rest.subplots(2, 2)
-    patch, steady, one, constants = np.ravel(panels)
-    for axes in (patch, steady, one, constants):
-        plain_axes(axes)
+    figure.set_size_inches(9.6 if wheel is None else 13.6, 6.4)
+    rest: Figure | SubFigure = figure
+    if wheel is not None:
+        left, rest = np.ravel(np.asarray(figure.subfigures(1, 2, width_ratios=(4.2, 9.4))))
+        _standing(left, found, wheel)
+    patch, steady, jumps, constants = plain_panels(rest, 2, 2)
     r, b = found.row, found.brush
-    patch.plot(1e3 * r.x, 1e-3 * r.pressure, ".", color="0.6", label="points of the mesh")
     xi = np.linspace(-1, 1, 201)
     ellipse = 1e-3 * r.highest * np.sqrt(1 - xi**2)
+    patch.plot(1e3 * r.x, 1e-3 * r.pressure, ".", color="0.6", label="points of the mesh")
     patch.plot(1e3 * (r.middle + 0.5 * r.length * xi), ellipse, color=COLOURS[0], label="of the row")
     patch.legend(fontsize=8)
     half = 0.7e3 * r.length
     patch.set(xlabel="x in mm, rolling to the right", ylabel="kPa", xlim=(-half, half), title="pressure of the patch")
     slips, forces = found.steady
-    steady.plot(100 * slips, forces, color=COLOURS[0])
+    steady.plot(100 * slips, forces)
     steady.set(xlabel="slip in %", ylabel="force over normal force", ylim=(0, None), title="steady rolling")
     shown, c = found.case.jumps.shown, found.constants
     row, seen = int(np.flatnonzero(c["slip"] == shown)[0]), slice(int(np.ceil(4.0 * len(b.share))) + 1)
-    for i, (way, first, last) in enumerate((("up", 0.0, shown), ("down", shown, 0.0))):
-        time, force = jump(b, first, last, r.force)
-        constant = c[f"{way}_fitted_s"][row]
-        time, force, end = time[seen], force[seen], force[-1]
-        one.plot(time, force / r.force, color=COLOURS[i], label=f"slip {100 * first:g} to {100 * last:g} %")
+    ways = (("up", 0.0, shown, "from 0"), ("down", shown, 0.0, "back to 0"))
+    for colour, (way, first, last, name) in zip(COLOURS, ways, strict=False):
+        fitted, line = c[f"{way}_fitted_s"], Look(color=colour)
+        time, force = (values[seen] for values in jump(b, first, last, r.force))
+        constant, end = fitted[row], force[-1]
+        jumps.plot(time, force / r.force, label=f"slip {100 * first:g} to {100 * last:g} %", **line)
         fit = end + (force[0] - end) * np.exp(-time / constant)
-        one.plot(time, fit / r.force, ":", color=COLOURS[i], label=f"exponential of {constant:.3g} s")
-    one.set(xlabel="time in s", ylabel="force over normal force", title="a jump and back")
-    one.legend(fontsize=8)
-    for i, (way, name) in enumerate((("up", "from 0"), ("down", "back to 0"))):
-        constants.plot(100 * c["slip"], c[f"{way}_fitted_s"], "o-", markersize=3, color=COLOURS[i], label=name)
-        constants.plot(
-            100 * c["slip"], c[f"rigid_{way}_fitted_s"], "--", color=COLOURS[i], label=f"{name}, rigid wheel"
-        )
+        jumps.plot(time, fit / r.force, ":", label=f"exponential of {constant:.3g} s", **line)
+        constants.plot(100 * c["slip"], fitted, "o-", markersize=3, label=name, **line)
+        constants.plot(100 * c["slip"], c[f"rigid_{way}_fitted_s"], "--", label=f"{name}, rigid wheel", **line)
+    jumps.set(xlabel="time in s", ylabel="force over normal force", title="a jump and back")
+    jumps.legend(fontsize=8)
     constants.set(xlabel="slip in %", ylabel="time constant in s", title="time constants")
     constants.set_ylim(0, 1.5 * max(np.nanmax(c[f"{way}_fitted_s"]) for way in ("up", "down")))  # room for four names
     constants.legend(fontsize=8, loc="upper right", ncols=2)
     figure.suptitle(title)
-    return save_figure(figure, path)
 
 
-def _standing(figure: SubFigure, found: Studied, wheel: ModalBasis) -> None:
+def _standing(figure: SubFigure, found: TyreAnswer, wheel: ModalBasis) -> None:
     """Mesh of the wheel's side at rest and deformed, in its true size."""
     from matplotlib.collections import LineCollection
 
@@ -78,9 +69,8 @@ def _standing(figure: SubFigure, found: Studied, wheel: ModalBasis) -> None:
     flat = np.column_stack([points @ along, -points @ down]) * 1e3
     moved = flat + np.column_stack([group.u_static @ along, -group.u_static @ down]) * 1e3
     size = 1e3 * np.linalg.norm(group.u_static, axis=1)[sides].mean(axis=1)
-    whole, near = np.asarray(figure.subplots(2, 1, height_ratios=(1.5, 1)))
+    whole, near = plain_panels(figure, 2, height_ratios=(1.5, 1))
     for axes in (whole, near):
-        plain_axes(axes)
         axes.set_aspect("equal")
         axes.add_collection(LineCollection(list(flat[sides]), colors="0.75", linewidths=0.6))
         drawn = LineCollection(list(moved[sides]), array=size, cmap="viridis", linewidths=0.9)

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import base64
+import gzip
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import Any
+
+from ..files.png import CURVES, text_in
 
 
 @dataclass(frozen=True)
@@ -18,7 +21,7 @@ class Piece:
     Attributes:
         inside: sentences, rows of cells, pieces, a text, or the data of a picture. title: of a fold, the caption of a
             picture. head: of a table. tone: of sentences ("lead", "note", "warn", "bad") or of a picture ("wide").
-        name: of a picture; `fixed.html` has captions.
+        name: of a picture; `fixed.html` has captions. curves: of a picture, JSON for plotly; see `pictures.touch`.
     """
 
     kind: str
@@ -27,6 +30,7 @@ class Piece:
     head: Sequence[str] = ()
     tone: str = ""
     name: str = ""
+    curves: str = ""
 
     def __bool__(self) -> bool:
         return any(self.inside)
@@ -73,11 +77,13 @@ class Album:
 
     def take(self, name: str, caption: str = "", tone: str = "") -> Piece:
         """A picture, with nothing inside if there is none of this name."""
-        path, data = self.left.pop(name, None), ""
+        path, data, curves = self.left.pop(name, None), "", ""
         if path is not None and path.is_file():
             kind = "gif" if path.suffix.lower() == ".gif" else "png"
-            data = f"data:image/{kind};base64,{base64.b64encode(path.read_bytes()).decode()}"
-        return Piece("figure", data, caption, tone=tone, name=name)
+            picture = path.read_bytes()
+            data = f"data:image/{kind};base64,{base64.b64encode(picture).decode()}"
+            curves = text_in(picture, CURVES).replace("<", "\\u003c") if _plotly() else ""
+        return Piece("figure", data, caption, tone=tone, name=name, curves=curves)
 
     def begun(self, prefix: str, suffix: str = "", tone: str = "") -> list[Piece]:
         """All pictures whose names begin and end so."""
@@ -87,7 +93,25 @@ class Album:
 def page(title: str, pieces: Iterable[Piece], sections: Mapping[str, Sequence[Piece]] | None = None) -> str:
     """The HTML of a page: pieces, then sections with links to them; sections with nothing inside are left out."""
     told = {name: inside for name, inside in (sections or {}).items() if any(inside)}
-    return _templates().get_template("page.html").render(title=title, pieces=pieces, sections=told)
+    text = _templates().get_template("page.html").render(title=title, pieces=pieces, sections=told)
+    if 'class="curves"' not in text and 'class="body"' not in text:
+        return text
+    return text.replace("</body>", _templates().get_template("curves.html").render(program=_plotly()) + "</body>")
+
+
+def draws_curves() -> bool:
+    """Whether a page can have what is touched: the package plotly is installed."""
+    return bool(_plotly())
+
+
+@cache
+def _plotly() -> str:
+    """The program that draws curves in a browser, packed; nothing where the package plotly is not installed."""
+    try:
+        from plotly.offline import get_plotlyjs
+    except ImportError:
+        return ""
+    return base64.b64encode(gzip.compress(get_plotlyjs().encode(), mtime=0)).decode()
 
 
 @cache

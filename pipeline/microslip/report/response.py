@@ -42,9 +42,9 @@ def answer(response: Mapping[str, Any], album: Album) -> list[Piece]:
         say(*_sentences(response), tone="lead"),
         say(*response.get("beyond", ()), tone="lead"),
         say(f"{failed}." if failed else "", tone="bad"),
+        album.take(SHOWN[0]),
         _resonances(rows, _factors(response)) if rows else say(""),
         say(_of_others(response) if rows else ""),
-        album.take(SHOWN[0]),
         *album.begun(f"{SHOWN[0]} of "),
     ]
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from ..data import Array
 from ..errors import UserError
-from ..files.hdf5 import put, sealed
+from ..files.hdf5 import IMAGINARY, put, sealed
 from ..files.hostile import DAMAGE, reading, refuse_damaged
 from ..files.store import ordinary
 from ..units import Quantity
@@ -36,7 +36,8 @@ class Dataset:
     """Arrays over shared axes, as rows of a table where there is one axis.
 
     Attributes:
-        kind: what it is of, the name of an analysis. variables: name -> array. facts: what JSON can hold.
+        kind: what it is of, the name of an analysis. variables: name -> array, of numbers that may be complex, or of
+            words. facts: what JSON can hold.
     """
 
     kind: str
@@ -107,13 +108,15 @@ def read_dataset(path: Path | str) -> Dataset:
 
 def _read(path: Path) -> Dataset:
     with reading(path, FORMAT, FORMAT_VERSION, "make it again") as file:
-        variables = {}
+        variables, sizes = {}, dict[str, int]()
         for name in json.loads(file.attrs["order"]):
             array = file[name]
             axes = tuple(dimension.label for dimension in array.dims)
             unit, holds = str(array.attrs["unit"]), str(array.attrs["holds"])
             values = array.asstr()[()].astype(str) if array.dtype.kind == "S" else np.asarray(array[()])
+            if name + IMAGINARY in file:
+                values = values + 1j * file[name + IMAGINARY][()]
+            if any(sizes.setdefault(axis, n) != n for axis, n in zip(axes, values.shape, strict=True)):
+                raise ValueError("arrays of different lengths")
             variables[name] = Variable(values, unit, holds, axes)
-        if len({len(v.values) for v in variables.values()}) > 1:
-            raise ValueError("arrays of different lengths")
         return Dataset(str(file.attrs["kind"]), variables, json.loads(file.attrs["facts"]))

@@ -2,34 +2,41 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import h5py
 import numpy as np
 
 from ..data import Array, ComplexArray, Indices
-from ..errors import UserError, in_its_file
-from ..files.hdf5 import IMAGINARY, put, sealed
-from ..files.hostile import DAMAGE, reading, refuse_damaged
-from ..files.store import ordinary
+from ..errors import UserError
 from ..settings.mistakes import numbered
 from ..units import UNIT_OF_FREQUENCY, Quantity, hertz
+from .dataset import Dataset, Variable
 from .series import CONVERGED, of_solutions
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-FORMAT = "microslip-two-tones"
-FORMAT_VERSION = "1.0"
+KIND = "two_tones"
 
-UNITS = {
-    "first": "Hz", "second": "Hz", "amplitude": "", "supplied": "W", "damped": "W", "exchanged": "W", "lost": "W",
-    "error": "",
-}  # fmt: skip
-"""Array of a file -> its unit; that of amplitudes is the read-outs' own."""
+VARIABLES = {
+    "first": ("Hz", "of the first tone", ("point",)),
+    "second": ("Hz", "of the second tone", ("point",)),
+    "amplitude": ("as unit says", "of the read-outs, 0-peak", ("point", "readout", "pair")),
+    "supplied": ("W", "by the loads of either tone, in the mean", ("point", "tone")),
+    "damped": ("W", "in the bodies", ("point",)),
+    "exchanged": ("W", "that goes into contacts, by the harmonics of their forces", ("point",)),
+    "lost": ("W", "that contacts count themselves", ("point",)),
+    "error": ("1", "of the last step of Newton's method, over the size of the unknowns", ("point",)),
+    "status": ("1", "converged, or what went wrong", ("point",)),
+    "k1": ("1", "multiple of the first frequency", ("pair",)),
+    "k2": ("1", "multiple of the second frequency", ("pair",)),
+    "readout": ("1", "what is read", ("readout",)),
+    "unit": ("1", "of what is read", ("readout",)),
+    "tone": ("1", "number", ("tone",)),
+}
+"""Array of a file -> its unit, what it holds, and its axes."""
 
 OF_A_MOTION = ("amplitude", "supplied", "damped", "exchanged", "lost")
 """Arrays that tell nothing where a point was not found."""
@@ -150,20 +157,26 @@ class TwoTones:
         tones = {"frequency_1_Hz": self.first, "frequency_2_Hz": self.second}
         return {**tones, **each, **own, "lost_W": self.lost, "status": list(self.status)}
 
-    def to_xarray(self) -> Any:
-        """Everything as an `xarray.Dataset` over ``point``, ``readout`` and ``pair``; units are attributes."""
-        import xarray
+    @property
+    def data(self) -> Dataset:
+        """Everything, as `VARIABLES` say."""
+        more = {"status": self.status, "k1": self.pairs[:, 0], "k2": self.pairs[:, 1], "readout": self.readouts}
+        values = {**vars(self), **more, "unit": self.units, "tone": np.array([1, 2])}
+        variables = {name: Variable(np.asarray(values[name]), *how) for name, how in VARIABLES.items()}
+        return Dataset(KIND, variables, {"messages": list(self.messages)})
 
-        axes = {"amplitude": ("point", "readout", "pair"), "supplied": ("point", "tone")}
-        variables = {n: (axes.get(n, ("point",)), getattr(self, n), {"units": unit}) for n, unit in UNITS.items()} | {
-            "unit": ("readout", list(self.units))
-        }
-        coords = {
-            "first": variables.pop("first"), "second": variables.pop("second"), "readout": list(self.readouts),
-            "k1": ("pair", self.pairs[:, 0]), "k2": ("pair", self.pairs[:, 1]), "tone": [1, 2],
-            "status": ("point", list(self.status)),
-        }  # fmt: skip
-        return xarray.Dataset(variables, coords=coords, attrs={"messages": list(self.messages)})
+    @classmethod
+    def of_data(cls, data: Dataset) -> TwoTones:
+        """What `data` holds."""
+        arrays: dict[str, Any] = {name: data[name] for name in ("first", "second", *OF_A_MOTION, "error")}
+        words = {"readouts": "readout", "units": "unit", "status": "status"}
+        texts: dict[str, Any] = {field: tuple(data[name].tolist()) for field, name in words.items()}
+        pairs = np.column_stack([data["k1"], data["k2"]])
+        return cls(**arrays, **texts, pairs=pairs, messages=tuple(data.facts["messages"]))
+
+    def to_xarray(self) -> Any:
+        """Everything as an `xarray.Dataset` over point, readout, pair and tone; units are attributes."""
+        return self.data.to_xarray().set_coords(["first", "second", "status", "k1", "k2"])
 
     def save(self, path: Path | str) -> Path:
         """Write a file (``docs/two_tones.md``), complete or absent; `microslip.load` reads it.
@@ -171,14 +184,7 @@ class TwoTones:
         Raises:
             UserError: no permission, no space; a file that is none of two tones stands there.
         """
-        with sealed(path) as file:
-            file.attrs["format"], file.attrs["format_version"] = FORMAT, FORMAT_VERSION
-            for key in ("readouts", "units", "status", "messages"):
-                file.attrs[key] = json.dumps(list(getattr(self, key)))
-            put(file, "pairs", self.pairs)
-            for name, unit in UNITS.items():
-                put(file, name, getattr(self, name), unit)
-        return Path(path)
+        return self.data.save(path)
 
     # pictures --------------------------------------------------------------------------------------------------------
 
@@ -254,40 +260,3 @@ class TwoTones:
             said += f"; {most if one or two else f'{self.readouts[0]} does not move'}"
         bad = self.failures
         return f"<TwoTones: {said}; {f'{len(bad)} not converged: {bad[0][1]}' if bad else 'all converged'}>"
-
-
-def is_of_tones(path: Path | str) -> bool:
-    """Whether a file is one of two tones, as far as its head can be read."""
-    try:
-        with h5py.File(path, "r") as file:
-            return bool(file.attrs.get("format") == FORMAT)
-    except (OSError, *DAMAGE):
-        return False
-
-
-@in_its_file
-def read_tones(path: Path | str) -> TwoTones:
-    """What `TwoTones.save` wrote.
-
-    Raises:
-        UserError: missing, damaged, foreign or of another version.
-    """
-    path = Path(path)
-    if not ordinary(path).is_file():
-        raise UserError("no such file; save the motions first or correct the path")
-    refuse_damaged(path, "from microslip.results.tones import _read; _read(path)", "save the motions again")
-    return _read(path)
-
-
-def _read(path: Path) -> TwoTones:
-    with reading(path, FORMAT, FORMAT_VERSION, "save the motions again") as file:
-        told: dict[str, Any] = {
-            key: tuple(json.loads(file.attrs[key])) for key in ("readouts", "units", "status", "messages")
-        }
-        arrays: dict[str, Any] = {name: file[name][()] for name in (*UNITS, "pairs")}
-        arrays["amplitude"] = arrays["amplitude"] + 1j * file[f"amplitude{IMAGINARY}"][()]
-        points = len(told["status"])
-        shape = points, len(told["readouts"]), len(arrays["pairs"])
-        if arrays["amplitude"].shape != shape or any(len(arrays[name]) != points for name in UNITS):
-            raise ValueError("arrays of different lengths")
-        return TwoTones(**arrays, **told)

@@ -18,7 +18,7 @@ from ..data import Array, ModalGroup
 from ..errors import UserError
 from ..reduced.compliance import contact_share
 from .half_space_influence import ALL, Grid, Pair, influence
-from .wheelset import Patch
+from .wheelset import RollingPatch
 
 ROWS = {"normal": "u_n", "along": "u_t2", "across": "u_t1"}
 """Directions of the patch and rows of an interface whose t2 points along rolling."""
@@ -66,7 +66,7 @@ class Behind:
 
 
 def behind(
-    patch: Patch, bodies: Sequence[Solid], groups: Sequence[ModalGroup], face: str, methods: Sequence[str]
+    patch: RollingPatch, bodies: Sequence[Solid], groups: Sequence[ModalGroup], face: str, methods: Sequence[str]
 ) -> Behind:  # fmt: skip
     """Of a patch.
 
@@ -85,7 +85,9 @@ def behind(
     return Behind(local, held, rest)
 
 
-def _body(patch: Patch, face: str, name: str, solid: Solid, group: ModalGroup, method: str) -> tuple[Array, Array]:
+def _body(
+    patch: RollingPatch, face: str, name: str, solid: Solid, group: ModalGroup, method: str
+) -> tuple[Array, Array]:
     """(3,) of its modes, and of what is beside them."""
     if face not in group.interfaces:
         raise UserError(
@@ -107,6 +109,6 @@ def even(solid: Solid, along: float, across: float) -> Array:
     across (Boussinesq and Cerruti, Love 1929)."""
     grid = Grid.around(along / 2, across / 2, FINE, FINE)
     of = influence(grid, Pair.of(solid, Solid(np.inf, 0.3)))
-    one = np.full((1, FINE, FINE), 1 / (along * across))
-    means = [of(one, slice(i, i + 1), slice(i, i + 1)).mean() for i in range(ALL.stop)]
+    traction = np.full((1, FINE, FINE), 1 / (along * across))
+    means = [of(traction, slice(i, i + 1), slice(i, i + 1)).mean() for i in range(ALL.stop)]
     return np.array([means[2], *means[:2]])

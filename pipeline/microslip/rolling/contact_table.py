@@ -16,17 +16,16 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import UserError
-from ..files import hdf5
-from ..files.hostile import reading
-from ..files.store import ordinary
 from ..programs import program
+from ..progress import Report
 from ..settings import arguments
 from ..settings.arguments import Count, Index, wholes
 from ..settings.numbers import Positive
 from . import strips
 from .arguments import Frictions, NotNegatives, Positives, Reals
 from .strips import Array
-from .wheelset import Patch, Pose, Track, axle, creepages
+from .table import read_table, write_table
+from .wheelset import Pose, RollingPatch, Track, axle, creepages
 
 POINTS = (161, 4)
 """Of the lateral shift to one side, and of the yaw."""
@@ -59,13 +58,13 @@ class Patches(NamedTuple):
     normal_force: Array
 
 
-class Rolling(NamedTuple):
-    """Of n poses, both wheels, left first, and k patches each, in the axes of `wheelset.Patch`.
+class WheelForces(NamedTuple):
+    """Of n poses, both wheels, left first, and k patches each, in the axes of `wheelset.RollingPatch`.
 
     Attributes:
         patches: (n, 2, k); those of the left wheel are mirrored back. xi, eta: creepages, phi: 1/m, speed: m/s,
-            (n, 2, k). creep: `strips.Forces` of each. felt: (n, 2, 6) force and moment about the middle of the axle
-            that a wheel feels, in track axes, N and N m. roll: (n,) rad. down: (n,) z of the middle of the axle, m.
+            (n, 2, k). creep: `strips.CreepForces` of each. felt: (n, 2, 6) force and moment about the middle of the
+            axle that a wheel feels, in track axes, N and N m. roll: (n,) rad. down: (n,) z of the axle's middle, m.
             jumps: (n, 2) whether a contact jumps nearby: then it is that of the nearest pose of the table.
     """
 
@@ -74,7 +73,7 @@ class Rolling(NamedTuple):
     eta: Array
     phi: Array
     speed: Array
-    creep: strips.Forces
+    creep: strips.CreepForces
     felt: Array
     roll: Array
     down: Array
@@ -115,7 +114,7 @@ class ContactTable(NamedTuple):
     def forces(
         self, lateral: Reals, yaw: Reals, speed: Positives, friction: Frictions, *, turning: Reals | None = None,
         load: NotNegatives | None = None, xi: Reals = 0.0, eta: Reals = 0.0, phi: Reals = 0.0,
-    ) -> Rolling:  # fmt: skip
+    ) -> WheelForces:  # fmt: skip
         """Patches and forces of n poses, by the strips of `strips.creep_forces`.
 
         Args:
@@ -190,7 +189,7 @@ MISSED = ("middle of the contact on the wheel, m", "largest pressure, of its own
 def forces(
     table: ContactTable, lateral: Array, yaw: Array, speed: Array, friction: Array, turning: Array, xi: Array,
     eta: Array, phi: Array, load: Array,
-) -> Rolling:  # fmt: skip
+) -> WheelForces:  # fmt: skip
     """`ContactTable.forces` as a pure function of arrays (n,) and load (n, 2), for `jax.jit`, `vmap` and `grad`; xi,
     eta and phi are (n,) or (n, 2)."""
     side = jnp.array([-1.0, 1.0])
@@ -201,27 +200,23 @@ def forces(
     pose = lateral, yaw, 0.5 * (roll[:, 1] - roll[:, 0]), down.mean(axis=1)
     given = pose, speed, turning, friction, (xi, eta, phi), table.shear, table.poisson, weights[-1]
 
-    def at(more: Array) -> Rolling:
-        return _rolled(_pressed(patches, jnp.where(load > 0, more, 0.0)), *given)
+    def at(more: Array) -> WheelForces:
+        more = jnp.where(load > 0, more, 0.0)[..., None]
+        wide, force = jnp.cbrt(more), patches.normal_force * more
+        a, b, pressure = (v * wide for v in (patches.a, patches.b, patches.pressure))
+        return _rolled(patches._replace(a=a, b=b, pressure=pressure, normal_force=force), *given)
 
     return _balanced(at, jnp.maximum(load, EMPTY), load / table.load)
 
 
-def _pressed(p: Patches, more: Array) -> Patches:
-    """By normal forces that are so many times (n, 2) as large."""
-    more = more[..., None]
-    wide = jnp.cbrt(more)
-    return p._replace(a=p.a * wide, b=p.b * wide, pressure=p.pressure * wide, normal_force=p.normal_force * more)
-
-
-def _balanced(at: Callable[[Array], Rolling], load: Array, first: Array) -> Rolling:
+def _balanced(at: Callable[[Array], WheelForces], load: Array, first: Array) -> WheelForces:
     """Rolling where the wheels carry the load (n, 2), by secants between the logarithms of the normal forces and of the
     lift, which are nearly proportional: the share of a tangential force in the lift changes little. NaN where friction
     takes all the lift away.
 
     Two steps: to 1e-6 of the load in the mean over the benchmark's flange, 2e-4 at most, with mu = 0.3."""
 
-    def step(of: tuple[Array, ...], _: None) -> tuple[tuple[Array, ...], Rolling]:
+    def step(of: tuple[Array, ...], _: None) -> tuple[tuple[Array, ...], WheelForces]:
         before, was, x = of
         rolling = at(jnp.exp(x))
         lift = -rolling.felt[..., 2]
@@ -233,14 +228,14 @@ def _balanced(at: Callable[[Array], Rolling], load: Array, first: Array) -> Roll
     begun = jnp.log(jnp.maximum(first, EMPTY))
     start = begun, jnp.zeros_like(begun), begun
     steps = jax.lax.scan(step, start, None, length=SECANTS + 1)[1]
-    return Rolling(*jax.tree.map(lambda v: v[-1], tuple(steps)))
+    return WheelForces(*jax.tree.map(lambda v: v[-1], tuple(steps)))
 
 
 SECANTS = 2
 
 
 @program
-def _rolling(table: ContactTable, *given: Array) -> Rolling:
+def _rolling(table: ContactTable, *given: Array) -> WheelForces:
     """Of (blocks, n) arrays, block after block."""
     return jax.lax.map(lambda of: forces(table, *of), given)
 
@@ -254,7 +249,7 @@ def _mirrored(p: Patches) -> Patches:
 def _rolled(
     p: Patches, pose: tuple[Array, ...], speed: Array, turning: Array, friction: Array, more: tuple[Array, ...],
     shear: Any, poisson: Any, jumps: Array,
-) -> Rolling:  # fmt: skip
+) -> WheelForces:  # fmt: skip
     """Creepages as `wheelset.patches` has them, forces of the strips, and what the wheels feel of it."""
     lateral, yaw, roll, down = pose
     each = [v.reshape(len(v), -1, 1) for v in (lateral, yaw, roll, speed, turning, *more)]
@@ -267,12 +262,12 @@ def _rolled(
     of = xi, eta, phi, *(jnp.where(there, v, 1e-3) for v in (p.a, p.b)), jnp.maximum(p.normal_force, EMPTY)
     flat = [jnp.broadcast_to(v, p.a.shape).ravel() for v in (*of, friction[:, None, None], shear, poisson)]
     creep = strips.forces(strips.poses(*flat))
-    creep = strips.Forces(*(jnp.where(there, v.reshape(there.shape), 0.0) for v in creep))
-    return Rolling(p, xi, eta, phi, V, creep, _felt(p, creep, lateral, down[:, None, None]), pose[2], down, jumps)
+    creep = strips.CreepForces(*(jnp.where(there, v.reshape(there.shape), 0.0) for v in creep))
+    return WheelForces(p, xi, eta, phi, V, creep, _felt(p, creep, lateral, down[:, None, None]), pose[2], down, jumps)
 
 
-def _felt(p: Patches, creep: strips.Forces, lateral: Array, down: Array) -> Array:
-    """(n, 2, 6), the sum of what `wheelset.Patch.felt` tells."""
+def _felt(p: Patches, creep: strips.CreepForces, lateral: Array, down: Array) -> Array:
+    """(n, 2, 6), the sum of what `wheelset.RollingPatch.felt` tells."""
     c, s, none = jnp.cos(p.angle), jnp.sin(p.angle), jnp.zeros_like(p.angle)
     up, left = jnp.stack([none, s, -c], -1), jnp.stack([none, -c, -s], -1)
     x, y, moment = (v[..., None] for v in creep[:3])
@@ -310,7 +305,7 @@ def _mean(values: Array, weights: tuple[Array, ...]) -> Array:
 @arguments.checked
 def contact_table(
     track: Track, load: Positive, lateral: Positive, yaw: Positive, *, points: Annotated[Any, wholes(4, 2)] = POINTS,
-    checked: Count = 100, seed: Index = 0, report: Callable[[str], None] = lambda _: None,
+    checked: Count = 100, seed: Index = 0, report: Report = lambda _: None,
 ) -> ContactTable:  # fmt: skip
     """A table over poses, and its error at random ones.
 
@@ -340,7 +335,7 @@ LEAST = 1e-3
 
 def _found(
     track: Track, load: float, lateral: Array, yaw: Array, rolls: Array | None = None, friction: float = 0.0,
-    report: Callable[[str], None] = lambda _: None,
+    report: Report = lambda _: None,
 ) -> tuple[Patches, Array, Array]:  # fmt: skip
     """`Patches` (n, 2, k) of n poses, both as right wheels, the left one's of the mirrored pose; roll and down (n,)."""
     found, roll = [], 0.0
@@ -364,7 +359,7 @@ def _found(
     return patches, np.array([pose.roll for *_, pose in found]), np.array([right[0].axle[1] for _, right, _ in found])
 
 
-def _row(track: Track, found: list[Patch], sign: float, yaw: float, many: int) -> Array:
+def _row(track: Track, found: list[RollingPatch], sign: float, yaw: float, many: int) -> Array:
     """(fields, k) of a wheel."""
     out = np.zeros((len(Patches._fields), many))
     for k, p in enumerate(sorted(found, key=lambda p: -p.on_wheel)):
@@ -392,17 +387,17 @@ def _cells(p: Patches) -> Array:
 def _judged(table: ContactTable, track: Track, checked: int, seed: int) -> ContactTable:
     """With its error at random poses."""
     lateral, yaw = np.random.default_rng(seed).uniform(-1, 1, size=(2, checked)) * table.reach[:, None]
-    one, none = np.ones(checked), np.zeros(checked)
-    read = table.forces(lateral, yaw, one, MU)
+    ones, none = np.ones(checked), np.zeros(checked)
+    read = table.forces(lateral, yaw, ones, MU)
     if read.jumps.all():
         return table._replace(checked=2 * checked, jumping=1.0)
     p, roll, down = _found(track, table.load, lateral, yaw, read.roll, MU)
-    pose, free = (lateral, yaw, roll, down), one / table.radius
-    exact = _exact(_mirrored(p), pose, one, free, MU * one, (none,) * 3, table.shear, table.poisson, read.jumps)
+    pose, free = (lateral, yaw, roll, down), ones / table.radius
+    exact = _exact(_mirrored(p), pose, ones, free, MU * ones, (none,) * 3, table.shear, table.poisson, read.jumps)
     exact = jax.device_get(exact)
-    told = [_told(of, table.load) for of in (read, exact)]
-    off = [np.abs(v - w) for v, w in zip(*told, strict=True)]
-    off[1] /= told[1][1]
+    quantities = [_told(of, table.load) for of in (read, exact)]
+    off = [np.abs(v - w) for v, w in zip(*quantities, strict=True)]
+    off[1] /= quantities[1][1]
     off[3] = off[3].max(axis=-1)
     good = np.array([v[~read.jumps] for v in off])
     error = np.stack([good.mean(axis=1), np.quantile(good, 0.95, axis=1), good.max(axis=1)], axis=1)
@@ -415,7 +410,7 @@ MU = 0.3
 _exact = program(_rolled)
 
 
-def _told(r: Rolling, load: float) -> list[Array]:
+def _told(r: WheelForces, load: float) -> list[Array]:
     """Of `MISSED`, (n, 2, ...): whatever the order of the patches."""
     p, total = r.patches, r.patches.normal_force.sum(axis=-1)
     creep = np.stack([r.creep.x, r.creep.y], axis=-1).sum(axis=-2) / (MU * load)
@@ -429,14 +424,10 @@ FORMAT = "microslip-contact-table-1"
 @arguments.checked
 def write_contact_table(path: Path | str, table: ContactTable) -> Path:
     """As HDF5: a dataset an attribute, those of its patches in a group; complete or not at all."""
-    with hdf5.sealed(path) as file:
-        file.attrs.update(format=FORMAT, meaning=str(ContactTable.__doc__), patches=str(Patches.__doc__),
-                          missed=", ".join(MISSED))  # fmt: skip
-        for group, nouns in ((file, table), (file.create_group("patches"), table.patches)):
-            for name, value in nouns._asdict().items():
-                if name != "patches":
-                    hdf5.put(group, name, np.asarray(value))
-    return Path(path)
+    arrays = {name: value for name, value in table._asdict().items() if name != "patches"}
+    arrays |= {f"patches/{name}": value for name, value in table.patches._asdict().items()}
+    told = {"meaning": str(ContactTable.__doc__), "patches": str(Patches.__doc__), "missed": ", ".join(MISSED)}
+    return write_table(path, arrays, format=FORMAT, **told)
 
 
 @arguments.checked
@@ -446,7 +437,9 @@ def read_contact_table(path: Path | str) -> ContactTable:
     Raises:
         UserError: another file.
     """
-    with reading(ordinary(Path(path)), FORMAT, "", "write a table of contacts with [contacts] in a case") as file:
-        patches = Patches(*(file["patches"][name][()] for name in Patches._fields))
-        rest = {name: file[name][()] for name in ContactTable._fields if name != "patches"}
-        return ContactTable(patches=patches, **rest)
+    of_wheels = [name for name in ContactTable._fields if name != "patches"]
+    names = [*of_wheels, *(f"patches/{name}" for name in Patches._fields)]
+    arrays, _ = read_table(path, names, FORMAT, "write a table of contacts with [contacts] in a case")
+    patches = Patches(*(arrays[f"patches/{name}"] for name in Patches._fields))
+    rest: dict[str, Any] = {name: arrays[name] for name in of_wheels}
+    return ContactTable(patches=patches, **rest)

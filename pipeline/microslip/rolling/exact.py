@@ -9,9 +9,9 @@ import numpy as np
 from ..contact.solids import Solid
 from ..data import Array
 from ..errors import UserError
-from .half_space import Contact, steady_rolling
+from .half_space import HalfSpaceContact, steady_rolling
 from .half_space_influence import Grid, Pair
-from .wheelset import Patch
+from .wheelset import RollingPatch
 
 ELEMENTS = 44
 """Along and across; and twice as many, from which the answer is extrapolated: its error is of first order."""
@@ -35,7 +35,12 @@ class Exact(NamedTuple):
 
 
 def exact(
-    bodies: tuple[Solid, Solid], patch: Patch, across: tuple[Array, Array], friction: float, creep: Array, at: Array
+    bodies: tuple[Solid, Solid],
+    patch: RollingPatch,
+    across: tuple[Array, Array],
+    friction: float,
+    creep: Array,
+    at: Array,
 ) -> Exact:
     """Steady rolling at some states of a creep curve.
 
@@ -56,19 +61,21 @@ def exact(
                 raise
             if wide == WIDE[-1]:
                 raise UserError(f"the patch is more than {wide:g} times as wide as Hertz' ellipse") from error
-    less, more = (np.array([[*c.force[:2], c.moment] for c in one]).T for one in (coarse, fine))
+    less, more = (np.array([[*c.force[:2], c.moment] for c in contacts]).T for contacts in (coarse, fine))
     x, y, moment = 2 * more - less
     return Exact(at, x, y, moment, float(max(c.pressure.max() for c in fine)))
 
 
 def _along(
-    pair: Pair, patch: Patch, across: tuple[Array, Array], friction: float, states: Array, wide: float, n: int
-) -> list[Contact]:
+    pair: Pair, patch: RollingPatch, across: tuple[Array, Array], friction: float, states: Array, wide: float, n: int
+) -> list[HalfSpaceContact]:
     """One state after the other, each begun at the last one."""
     grid = Grid.around(wide * patch.a, wide * patch.b, n, n)
     distance = patch.A * grid.x**2 + np.interp(grid.y, *across, left=FAR, right=FAR)
-    found: list[Contact] = []
+    contacts: list[HalfSpaceContact] = []
     for state in states:
-        start = found[-1] if found else None
-        found.append(steady_rolling(distance, grid, pair, friction, patch.normal_force, creepages=state, start=start))
-    return found
+        start = contacts[-1] if contacts else None
+        contacts.append(
+            steady_rolling(distance, grid, pair, friction, patch.normal_force, creepages=state, start=start)
+        )
+    return contacts

@@ -15,7 +15,7 @@ from ..settings.arguments import checked, numbers
 from ..settings.numbers import Coefficient, Component, Positive
 from .arguments import Poisson, Resolution
 from .kalker import creep_coefficients
-from .strips import Forces, Tractions, blended
+from .strips import CreepForces, Tractions, blended
 
 Bound = Literal["parabolic", "elliptic"]
 
@@ -32,7 +32,7 @@ def fastsim(
     friction: Coefficient, shear: Positive, poisson: Poisson, elements: Resolution = (44, 44),
     cover: Annotated[float, numbers(0, ge=1)] = 1.1, bound: Bound = "parabolic",
     blend: bool = True,
-) -> tuple[Forces, Tractions]:  # fmt: skip
+) -> tuple[CreepForces, Tractions]:  # fmt: skip
     """Forces and tractions of one state, see `strips.creep_forces` for the arguments.
 
     Args:
@@ -66,4 +66,4 @@ def fastsim(
     moment = ((X * t[1] - Y * t[0]) * area).sum()
     share = slides.sum() / (inside > 0).sum()
     made = Tractions(X, Y, area, p, t[0], t[1], slip[0], slip[1], power)
-    return Forces(x_, y_, moment, (power * area).sum(), share), made
+    return CreepForces(x_, y_, moment, (power * area).sum(), share), made

@@ -18,6 +18,7 @@ from pydantic import Field
 
 from ..data import Array, Flags
 from ..errors import UserError
+from ..interrupts import look
 from ..settings.arguments import Vector, checked
 from ..settings.numbers import Component, NotNegative, Positive
 from .arguments import NotNegatives, Poisson, Reals
@@ -32,7 +33,6 @@ from .half_space_influence import (
     influence_ahead,
     influence_change,
 )
-from .half_space_normal import normal_contact
 from .half_space_tangential import TOLERANCE, Shear, tractions
 
 ITERATIONS = 50
@@ -42,7 +42,7 @@ Forces = Sequence[float | None]
 
 
 @dataclass(frozen=True)
-class Contact:
+class HalfSpaceContact:
     """What two half-spaces do to each other.
 
     Attributes:
@@ -115,14 +115,14 @@ class _Motion:
 @checked
 def pressed(
     distance: Reals, grid: Grid, pair: Pair, force: NotNegative | None = None, approach: Component | None = None
-) -> Contact:  # fmt: skip
+) -> HalfSpaceContact:  # fmt: skip
     """Bodies pressed together without friction.
 
     Args:
         distance: undeformed distance h(x, y) of the surfaces, broadcasts to (nx, ny), m. force: N, or approach: m.
 
     Raises:
-        UserError: see `half_space_normal.normal_contact`; the patch reaches the edge of the grid.
+        UserError: see `normal_contact`; the patch reaches the edge of the grid.
     """
     return _contact(distance, grid, pair, 0.0, force, approach, None, (0, 0, 0), (None, None), None)
 
@@ -131,8 +131,8 @@ def pressed(
 def shifted(
     distance: Reals, grid: Grid, pair: Pair, friction: NotNegatives, force: NotNegative | None = None,
     approach: Component | None = None, shift: Vector = (0, 0, 0),
-    tangential: Forces = (None, None), before: Contact | None = None,
-) -> Contact:  # fmt: skip
+    tangential: Forces = (None, None), before: HalfSpaceContact | None = None,
+) -> HalfSpaceContact:  # fmt: skip
     """Bodies pressed together, then shifted without rolling (Cattaneo's problem).
 
     Args:
@@ -152,8 +152,8 @@ def shifted(
 def steady_rolling(
     distance: Reals, grid: Grid, pair: Pair, friction: NotNegatives, force: NotNegative | None = None,
     approach: Component | None = None, creepages: Vector = (0, 0, 0),
-    tangential: Forces = (None, None), start: Contact | None = None,
-) -> Contact:  # fmt: skip
+    tangential: Forces = (None, None), start: HalfSpaceContact | None = None,
+) -> HalfSpaceContact:  # fmt: skip
     """Steady rolling towards +x.
 
     Args:
@@ -170,10 +170,10 @@ def steady_rolling(
 
 @checked
 def rolled(
-    before: Contact, distance: Reals, friction: NotNegatives, force: NotNegative | None = None,
+    before: HalfSpaceContact, distance: Reals, friction: NotNegatives, force: NotNegative | None = None,
     approach: Component | None = None, creepages: Vector = (0, 0, 0),
     tangential: Forces = (None, None), step: Positive | None = None,
-) -> Contact:  # fmt: skip
+) -> HalfSpaceContact:  # fmt: skip
     """The next moment of transient rolling towards +x, in a frame that goes with the patch.
 
     Args:
@@ -192,14 +192,14 @@ def rolled(
 
 def _rigid(grid: Grid, step: float) -> Array:
     """(3, 2, nx, ny) rigid slip per creepage; of spin a sixth of the step ahead of the centre, as CONTACT takes it."""
-    one = np.ones((grid.nx, grid.ny))
-    return np.array([[one, 0 * one], [0 * one, one], [-grid.y * one, (grid.x + step / 6) * one]])
+    ones = np.ones((grid.nx, grid.ny))
+    return np.array([[ones, 0 * ones], [0 * ones, ones], [-grid.y * ones, (grid.x + step / 6) * ones]])
 
 
 def _contact(
     distance: ArrayLike, grid: Grid, pair: Pair, friction: ArrayLike, force: float | None, approach: float | None,
-    motion: _Motion | None, given: ArrayLike, tangential: Forces, start: Contact | None,
-) -> Contact:  # fmt: skip
+    motion: _Motion | None, given: ArrayLike, tangential: Forces, start: HalfSpaceContact | None,
+) -> HalfSpaceContact:  # fmt: skip
     """Pressure and traction in turns until both stay (Panagiotopoulos); like bodies need one turn."""
     h, mu, w = grid.field(distance, "distance"), grid.field(friction, "friction"), np.array(given, float)
     if w.shape != (3,):
@@ -211,30 +211,25 @@ def _contact(
         )
     whole = influence(grid, pair)
     none = np.zeros((2, grid.nx, grid.ny))
-    now = Contact(grid, pair, none[0], none, none, none[0], 0.0, w)
+    now = HalfSpaceContact(grid, pair, none[0], none, none, none[0], 0.0, w)
     if start is not None:
         now = replace(now, pressure=start.pressure, traction=start.traction, slip=start.slip * (start.pressure > 0))
     for _ in range(ITERATIONS):
         lift = whole(now.traction, NORMAL, TANGENTIAL)[0] if pair.mismatch else 0.0
         pressure, approach_now = normal_contact(h + lift, whole, grid.area, force, approach, start=now.pressure)
-        _inside(pressure, grid)
+        sides = [pressure[0], pressure[-1], *((pressure[:, 0], pressure[:, -1]) if grid.ny > 1 else ())]
+        if any(side.any() for side in sides):  # a grid of one row is two-dimensional
+            raise UserError("grid: the patch reaches the edge of the grid and is cut off; take a larger grid")
         pressed_now = replace(now, pressure=pressure, approach=approach_now, bound=mu * pressure)
         then = pressed_now if motion is None else _sheared(pressed_now, motion, tangential, start is not None)
-        moved = max(np.abs(a - b).max() for a, b in ((then.traction, now.traction), (then.pressure, now.pressure)))
+        change = max(np.abs(a - b).max() for a, b in ((then.traction, now.traction), (then.pressure, now.pressure)))
         now, start = then, then
-        if not pair.mismatch or motion is None or moved <= 10 * TOLERANCE * pressure.max():
+        if not pair.mismatch or motion is None or change <= 10 * TOLERANCE * pressure.max():
             return now
     raise UserError(f"distance: pressure and traction have not settled after {ITERATIONS} turns; K is too large")
 
 
-def _inside(pressure: Array, grid: Grid) -> None:
-    """A patch that reaches the edge is cut off; a grid of one row is two-dimensional."""
-    sides = [pressure[0], pressure[-1], *((pressure[:, 0], pressure[:, -1]) if grid.ny > 1 else ())]
-    if any(side.any() for side in sides):
-        raise UserError("grid: the patch reaches the edge of the grid and is cut off; take a larger grid")
-
-
-def _sheared(now: Contact, motion: _Motion, tangential: Forces, warm: bool) -> Contact:
+def _sheared(now: HalfSpaceContact, motion: _Motion, tangential: Forces, warm: bool) -> HalfSpaceContact:
     """Tangential problem under a given pressure; the creepage follows where a force is given."""
     if len(tangential) != 2:
         raise UserError(f"tangential: is {tangential!r}; give F_x and F_y, N, None where the creepage is given")
@@ -247,9 +242,9 @@ def _sheared(now: Contact, motion: _Motion, tangential: Forces, warm: bool) -> C
     rigid = np.tensordot(now.motion, motion.rigid, 1) + past
     problem = Shear(motion.operator, now.grid, rigid, now.bound, motion.rigid[wanted], sums)
     traction, slip, amounts = tractions(problem, now.traction - problem.push * now.slip if warm else None)
-    found = now.motion.copy()
-    found[wanted] += amounts
-    return replace(now, traction=traction, slip=slip * now.touching, motion=found)
+    motion_then = now.motion.copy()
+    motion_then[wanted] += amounts
+    return replace(now, traction=traction, slip=slip * now.touching, motion=motion_then)
 
 
 @checked
@@ -273,10 +268,98 @@ def _coefficients(ratio: float, poisson: float, n: int) -> Array:
     grid, pair = Grid.around(ratio**0.5, ratio**-0.5, n, n), Pair(1.0, poisson)
     patch = (grid.x**2 / ratio + grid.y**2 * ratio < 1) * 1e6
     none = np.zeros((0, 2, n, n))
-    found = []
+    sums = []
     for rigid in _rigid(grid, grid.dx):
         p, _, _ = tractions(Shear(lambda g: influence_change(g, pair), grid, rigid, patch, none, np.zeros(0)))
-        found.append((-p[0].sum(), -p[1].sum(), (p[0] * grid.y - p[1] * grid.x).sum()))
-    of_x, of_y, of_spin = np.array(found) * grid.area
+        sums.append((-p[0].sum(), -p[1].sum(), (p[0] * grid.y - p[1] * grid.x).sum()))
+    of_x, of_y, of_spin = np.array(sums) * grid.area
     size = (np.count_nonzero(patch) * grid.area / np.pi) ** 0.5  # of the ellipse that the elements cover
     return np.array([of_x[0] / size**2, of_y[1] / size**2, of_spin[1] / size**3, of_spin[2] / size**4])
+
+
+# which elements touch, and how hard: conjugate gradients with p >= 0, for any undeformed distance
+
+SETTLED, MOST = 1e-10, 2000
+"""Change of the pressure over the largest one at which it has settled, and iterations at most."""
+
+
+def normal_contact(
+    distance: Array, influence: Influence, area: float, force: float | None = None, approach: float | None = None,
+    start: Array | None = None,
+) -> tuple[Array, float]:  # fmt: skip
+    """Pressure that closes the distance where it acts: p >= 0, e = h - approach + u_n >= 0, p e = 0.
+
+    Conjugate gradients on the elements that touch; those whose pressure turns negative let go, those that overlap
+    join (Polonsky and Keer, Wear 231, 1999; Vollebregt, J. Comput. Phys. 257, 2014).
+
+    Args:
+        distance: (nx, ny) undeformed distance h of the surfaces, m. influence: of the grid. area: of an element, m^2.
+            force: N, or approach: m, one of the two. start: a pressure to begin with, Pa.
+
+    Returns:
+        Pressure (nx, ny), Pa, and approach, m. No contact: zeros.
+
+    Raises:
+        UserError: neither or both of force and approach, no convergence.
+    """
+    if (force is None) == (approach is None):
+        raise UserError("force, approach: give one of the two, the other follows")
+    touching_at = float(distance.min())
+    if force == 0 or (approach is not None and approach <= touching_at):
+        return np.zeros(distance.shape), touching_at if approach is None else approach
+    load = None if force is None else force / area
+    pressure = _first(distance, influence, load, approach) if start is None or not np.any(start > 0) else start.copy()
+    return _gradients(distance, influence, pressure, load, approach)
+
+
+def _first(distance: Array, influence: Influence, load: float | None, approach: float | None) -> Array:
+    """As if the elements did not feel each other, or all of them shared the load."""
+    if load is not None:
+        return np.full(distance.shape, load / distance.size)
+    return np.maximum(approach - distance, 0) / influence(_unit(distance.shape), NORMAL, NORMAL).max()
+
+
+def _unit(shape: tuple[int, ...]) -> Array:
+    unit = np.zeros((1, *shape))
+    unit[0, shape[0] // 2, shape[1] // 2] = 1
+    return unit
+
+
+def _gradients(
+    distance: Array, influence: Influence, pressure: Array, load: float | None, approach: float | None
+) -> tuple[Array, float]:  # fmt: skip
+    def deformation(p: Array) -> Array:
+        return influence(p[None], NORMAL, NORMAL)[0]
+
+    single = float(deformation(_unit(distance.shape)[0]).max())
+    if load is not None:
+        pressure *= load / pressure.sum()
+    direction, before, fresh = np.zeros_like(distance), 1.0, True
+    for _ in range(MOST):
+        look()
+        touching = pressure > 0
+        gap = deformation(pressure) + distance
+        level = float(gap[touching].mean()) if load is not None else float(approach)  # type: ignore[arg-type]
+        gap -= level
+        here = float((gap[touching] ** 2).sum())
+        direction = np.where(touching, gap + (0 if fresh else here / before) * direction, 0)
+        answer = deformation(direction)
+        if load is not None:
+            answer -= answer[touching].mean()
+        curvature = float((answer * direction)[touching].sum())
+        joining = ~touching & (gap < 0)
+        if curvature > 0:
+            length = float((gap * direction)[touching].sum()) / curvature
+        elif joining.any():  # those that touch are at rest among themselves
+            length = 1 / single
+        else:
+            return pressure, level
+        pressure_then = np.maximum(np.where(touching, pressure - length * direction, 0), 0)
+        pressure_then[joining] = -length * gap[joining]
+        fresh, before = bool(joining.any()), here
+        if load is not None:
+            pressure_then *= load / pressure_then.sum()
+        change, pressure = np.abs(pressure_then - pressure).max(), pressure_then
+        if change <= SETTLED * pressure.max() and not fresh:
+            return pressure, level
+    raise UserError(f"distance: the pressure has not settled after {MOST} iterations; take a finer grid")

@@ -64,7 +64,7 @@ class Shear:
 
 
 @dataclass(frozen=True)
-class Tangent:
+class TangentProblem:
     """The equations linearised at a traction: stick leaves two unknowns to an element, slip one, along the circle.
 
     Attributes:
@@ -102,13 +102,13 @@ class Tangent:
 
         size = (right.size, right.size)
         matrix, inverse = (LinearOperator(size, matvec=f, dtype=np.float32) for f in (apply, precondition))
-        found, _ = gmres(
+        free_part, _ = gmres(
             matrix, (right / largest).astype(np.float32).ravel(), M=inverse, rtol=accuracy, restart=60, maxiter=4
         )
-        return self.free(largest * found.reshape(right.shape).astype(float))
+        return self.free(largest * free_part.reshape(right.shape).astype(float))
 
     @cached_property
-    def _single(self) -> Tangent:
+    def _single(self) -> TangentProblem:
         names = ("stick", "slip", "along", "stiff")
         return replace(self, **{name: getattr(self, name).astype(np.float32) for name in names})
 
@@ -172,7 +172,7 @@ def tractions(
     raise UserError(f"slip: the tractions have not settled after {ITERATIONS} iterations (change {error:.1e})")
 
 
-def _linearised(problem: Shear, trial: Array) -> Tangent:
+def _linearised(problem: Shear, trial: Array) -> TangentProblem:
     """The tangent at p - r s."""
     size = np.maximum(np.hypot(*trial), np.finfo(float).tiny)
     touching = problem.bound > 0
@@ -181,10 +181,10 @@ def _linearised(problem: Shear, trial: Array) -> Tangent:
     stiff = np.where(slip, (size / np.where(slip, problem.bound, 1) - 1) / problem.push, 0)
     across = trial / size
     along = np.stack([-across[1], across[0]])
-    return Tangent(problem.influence, stick, slip, across, along, stiff, PUSH / problem.push)
+    return TangentProblem(problem.influence, stick, slip, across, along, stiff, PUSH / problem.push)
 
 
-def _newton(problem: Shear, tangent: Tangent, p: Array, slip: Array, accuracy: float) -> tuple[Array, Array]:
+def _newton(problem: Shear, tangent: TangentProblem, p: Array, slip: Array, accuracy: float) -> tuple[Array, Array]:
     """Changes of the free tractions and of the wanted rigid slips."""
     change = tangent.solve(-(slip + tangent.stiff * p), accuracy)
     if not len(problem.wanted):

@@ -80,11 +80,11 @@ def coefficients_at(ratio: ArrayLike, poisson: ArrayLike, source: Coefficients =
     """`creep_coefficients` as a pure function of jax."""
     s, nu = jnp.broadcast_arrays(jnp.asarray(ratio, dtype=float), jnp.asarray(poisson, dtype=float))
     g = jnp.minimum(s, 1 / s)
-    found = jnp.where(g < LEAST, _asymptotes(s, nu), _between(s, jnp.maximum(g, LEAST), nu))
+    coefficients = jnp.where(g < LEAST, _asymptotes(s, nu), _between(s, jnp.maximum(g, LEAST), nu))
     if source == "book":
         c11 = 3.442 + 0.8980 * s + 0.01205 * s**2 - 0.00169 * s**3
-        found = jnp.stack([c11, 2.386 + 1.3578 * s - 0.02538 * s**2, found[2], found[3]])
-    return found
+        coefficients = jnp.stack([c11, 2.386 + 1.3578 * s - 0.02538 * s**2, coefficients[2], coefficients[3]])
+    return coefficients
 
 
 def _between(s: Array, g: Array, nu: Array) -> Array:

@@ -31,7 +31,7 @@ EVERYWHERE = (-np.inf, np.inf)
 
 
 @dataclass(frozen=True)
-class Profile:
+class CrossSection:
     """A smooth curve z(y) through points.
 
     Attributes: y, z: (k,) m, y rising. name: for sentences. noise: standard deviation of measured z, m; the curve then
@@ -46,7 +46,7 @@ class Profile:
     moved: tuple[float, float] = (0.0, 0.0)
 
     def __repr__(self) -> str:
-        return f"<Profile {self.name}: {len(self.y)} points, y from {self.y[0]:.6g} to {self.y[-1]:.6g} m>"
+        return f"<CrossSection {self.name}: {len(self.y)} points, y from {self.y[0]:.6g} to {self.y[-1]:.6g} m>"
 
     @cached_property
     def curve(self) -> CubicSpline | UnivariateSpline:
@@ -72,7 +72,7 @@ class Profile:
         inside = (at >= self.y[0]) & (at <= self.y[-1])
         return np.where(inside, curve(np.clip(at, self.y[0], self.y[-1])), np.nan)
 
-    def turned(self, angle: float) -> Profile:
+    def turned(self, angle: float) -> CrossSection:
         """Inclined by an angle (rad) towards the track: a canted rail. Its origin is the point that is highest then."""
         if not angle:
             return self
@@ -87,10 +87,10 @@ class Profile:
         return replace(turned, y=turned.y - top, z=turned.z - high, moved=moved)
 
 
-def polynomial(coefficients: Sequence[float], width: float = WIDTH) -> Profile:
+def polynomial(coefficients: Sequence[float], width: float = WIDTH) -> CrossSection:
     """z = c_0 y^2 + c_1 y^3 + ... over the width, m (6.2-12)."""
     y = np.linspace(-0.5 * width, 0.5 * width, 401)
-    return Profile(y, sum((c * y ** (k + 2) for k, c in enumerate(coefficients)), np.zeros_like(y)))
+    return CrossSection(y, sum((c * y ** (k + 2) for k, c in enumerate(coefficients)), np.zeros_like(y)))
 
 
 def has_arc(radius: float, width: float) -> bool:
@@ -98,7 +98,7 @@ def has_arc(radius: float, width: float) -> bool:
 
 
 @checked
-def circle(radius: Component, width: Positive = WIDTH) -> Profile:
+def circle(radius: Component, width: Positive = WIDTH) -> CrossSection:
     """An arc that falls to both sides of the origin, as a convex rail or a hollow wheel; a negative radius rises, m.
 
     Raises:
@@ -107,7 +107,7 @@ def circle(radius: Component, width: Positive = WIDTH) -> Profile:
     if not has_arc(radius, width):
         raise UserError(f"profile: a radius of {radius:g} m has no arc {width:g} m wide; correct one of them")
     y = np.linspace(-0.5 * width, 0.5 * width, 401)
-    return Profile(y, np.sign(radius) * (abs(radius) - np.sqrt(radius**2 - y**2)))
+    return CrossSection(y, np.sign(radius) * (abs(radius) - np.sqrt(radius**2 - y**2)))
 
 
 Mirror = Literal["", "y", "z", "yz"]
@@ -121,13 +121,13 @@ DEEP = 0.015
 def read_profile(
     path: Path | str, noise: NotNegative = 0.0, unit: Positive = 1e-3, mirror: Mirror = "",
     between: Sequence[float] = EVERYWHERE,
-) -> Profile:  # fmt: skip
+) -> CrossSection:  # fmt: skip
     """A profile of a file: ``.prr`` and ``.prw`` (points between point.begin and point.end), MiniProf's ``.ban`` and
     ``.whl``, or a table of y and z with commas or blanks between.
 
     Args:
-        noise: see `Profile`. unit: of the numbers of a table, m. mirror: axes that run the other way in the file; those
-            of MiniProf do not tell. between: y that are kept, m, after that.
+        noise: see `CrossSection`. unit: of the numbers of a table, m. mirror: axes that run the other way in the file;
+            those of MiniProf do not tell. between: y that are kept, m, after that.
 
     Raises:
         UserError: no file, no numbers; points that turn back or of another unit; arguments that are none.
@@ -200,27 +200,27 @@ DECIMAL_COMMA = re.compile(r"\d,\d.*[;\t ]\s*[-+]?\d|\d[;\t ]\s*[-+]?\d+,\d")
 
 def _header(lines: list[str]) -> tuple[float, Array, Array]:
     """Unit in m, signs and shifts of y and z, as a ``.prr`` or ``.prw`` tells them."""
-    told = dict.fromkeys(("shift.y", "shift.z", "mirror.y", "mirror.z", "rotate"), 0.0) | {"units.len.f": 1e3}
+    header = dict.fromkeys(("shift.y", "shift.z", "mirror.y", "mirror.z", "rotate"), 0.0) | {"units.len.f": 1e3}
     for line in lines:
         key, equals, value = (part.strip() for part in line.partition("="))
-        if equals and key in told and is_number(value):
-            told[key] = float(value)
-    if told["rotate"]:
+        if equals and key in header and is_number(value):
+            header[key] = float(value)
+    if header["rotate"]:
         raise UserError("rotate is not read; turn the points, or set inclination in the case")
-    if not told["units.len.f"] > 0:
+    if not header["units.len.f"] > 0:
         raise UserError("units.len.f must be greater than 0; 1000 says that the points are in mm")
-    sign = 1 - 2 * np.array([told["mirror.y"], told["mirror.z"]])
-    return 1 / told["units.len.f"], sign, np.array([told["shift.y"], told["shift.z"]])
+    sign = 1 - 2 * np.array([header["mirror.y"], header["mirror.z"]])
+    return 1 / header["units.len.f"], sign, np.array([header["shift.y"], header["shift.z"]])
 
 
 def _miniprof(lines: list[str]) -> list[str]:
     """Points as "y z" of a file of MiniProf: keys or free text before, what begins with a quotation mark left out."""
     lines = [line for line in lines if not line.startswith('"')]
-    told = dict(line.split("=", 1) for line in lines if "=" in line)
+    keys = dict(line.split("=", 1) for line in lines if "=" in line)
     for key in ("XOffset", "YOffset", "Tilt"):
-        if is_number(told.get(key, "")) and float(told[key]):
+        if is_number(keys.get(key, "")) and float(keys[key]):
             raise UserError(f"{key} is not read; save the profile with {key} applied to its points")
-    names = [name.strip() for name in told.get("ColumnDef", "X,Y").split(",")]
+    names = [name.strip() for name in keys.get("ColumnDef", "X,Y").split(",")]
     if not {"X", "Y"} <= set(names):
         raise UserError("ColumnDef names no X and Y; save the profile with both")
     rows = [line.split() for line in lines]
@@ -232,7 +232,7 @@ WIDEST = 0.5
 """m: what is wider than this, or narrower than a thousandth of it, is given in another unit."""
 
 
-def _checked(y: Array, z: Array, name: str, noise: float) -> Profile:
+def _checked(y: Array, z: Array, name: str, noise: float) -> CrossSection:
     rising = np.diff(y) * np.sign(y[-1] - y[0])
     if not (rising > 0).all():
         at = int(np.argmax(rising <= 0)) + 1
@@ -244,4 +244,4 @@ def _checked(y: Array, z: Array, name: str, noise: float) -> Profile:
     if not WIDEST / 1000 < width < WIDEST:
         raise UserError(f"is {width:.3g} m wide; profiles are given in mm (unit = 1.0 for metres)")
     order = slice(None, None, 1 if y[-1] > y[0] else -1)
-    return Profile(np.ascontiguousarray(y[order]), np.ascontiguousarray(z[order]), name, noise)
+    return CrossSection(np.ascontiguousarray(y[order]), np.ascontiguousarray(z[order]), name, noise)

@@ -21,9 +21,8 @@ from ..settings.toml import read_settings
 from .contact_table import POINTS as SHIFTS
 from .ellipse import combined
 from .kalker import Coefficients
-from .laws import Surface
-from .profiles import EVERYWHERE, WIDTH, Mirror, Profile, circle, has_arc, polynomial, read_profile
-from .rolled import Heat
+from .laws import Heat, RoughSurface
+from .profiles import EVERYWHERE, WIDTH, CrossSection, Mirror, circle, has_arc, polynomial, read_profile
 from .strips import Distribution, Spin
 from .table import ELEMENTS, POINTS
 from .temperature import Conductor
@@ -47,7 +46,7 @@ ROUGHEST = 1e-3
 """m: R_Z above this is given in another unit."""
 
 
-class Section(Model):
+class SectionKeys(Model):
     """A cross-section."""
 
     profile: Number | Annotated[Numbers, Field(min_length=1)] | FileName
@@ -70,7 +69,7 @@ class Section(Model):
     """nu"""
 
     @model_validator(mode="after")
-    def _is_an_arc(self) -> Section:
+    def _is_an_arc(self) -> SectionKeys:
         measured = isinstance(self.profile, str)
         idle = [key for key in (("width",) if measured else ("mirror", "noise", "between")) if getattr(self, key)]
         if asked := [key for key in idle if key in self.model_fields_set]:
@@ -88,7 +87,7 @@ class Section(Model):
             )
         return self
 
-    def made(self, folder: Path, outward: float) -> Profile:
+    def made(self, folder: Path, outward: float) -> CrossSection:
         """outward: 1 if a convex profile falls to its sides (a rail), -1 if it rises (a wheel)."""
         if isinstance(self.profile, str):
             return read_profile(
@@ -99,14 +98,14 @@ class Section(Model):
         return circle(outward * self.profile, self.width)
 
 
-class Wheel(Section):
+class Wheel(SectionKeys):
     """A wheel."""
 
     radius: Annotated[Positive, Field(le=BIGGEST)]
     """[m] of the running circle"""
 
 
-class Rail(Section):
+class Rail(SectionKeys):
     """A rail."""
 
     inclination: Annotated[Number, Field(ge=-0.2, le=0.2)] = 0.0
@@ -168,7 +167,7 @@ class Creep(Model):
         return self
 
 
-class Strips(Model):
+class StripKeys(Model):
     """How a patch is divided and what it is made of, see `strips.creep_forces`."""
 
     elements: Annotated[tuple[Count, Count], BeforeValidator(_tuple)] = (20, 20)
@@ -181,7 +180,7 @@ class Strips(Model):
     """with the third spring of Kalker, or the book's two"""
 
 
-class ModelOfCase(Strips):
+class ModelOfCase(StripKeys):
     """How a patch is divided and what it is made of, see `strips.creep_forces`."""
 
     exact: Annotated[int, Field(ge=0, le=1000)] = 5
@@ -351,12 +350,12 @@ class RollingCase(Model):
             UserError: a file that is none, no friction.
         """
         with at("friction"):
-            found = self.friction.friction(path, None, None)
-            if not np.max(found.highest(jnp.ones(1))) > 0:
+            friction = self.friction.friction(path, None, None)
+            if not np.max(friction.highest(jnp.ones(1))) > 0:
                 raise UserError("is 0 at all speeds; the creep force is a part of it, so give more than 0")
-        return found
+        return friction
 
-    def surface(self, path: Path) -> Surface | None:
+    def surface(self, path: Path) -> RoughSurface | None:
         """Rough, if it is asked, of files beside the case's.
 
         Raises:
@@ -368,7 +367,7 @@ class RollingCase(Model):
             heights, R_Z = self.roughness.heights(path, 1.0)
             if R_Z > ROUGHEST:
                 raise UserError(f"R_Z = {float(R_Z):g} m is no roughness; give it in m, worn rails have 1e-5")
-        return Surface(heights, value(R_Z))
+        return RoughSurface(heights, value(R_Z))
 
     @property
     def solids(self) -> tuple[Solid, Solid]:

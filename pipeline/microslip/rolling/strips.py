@@ -61,7 +61,7 @@ class Poses(NamedTuple):
     stiffness_y: Array
 
 
-class Forces(NamedTuple):
+class CreepForces(NamedTuple):
     """On body 1 at the middle of the patch, arrays (n,).
 
     Attributes: x, y: N. moment: about z, N m. power: of friction over the speed, N; the heat. sliding: share of the
@@ -79,7 +79,8 @@ class Tractions(NamedTuple):
     """Over the elements, (..., ny, nx), x and y ascending.
 
     Attributes: x, y: middles, m. area: m2. pressure, traction_x, traction_y: on body 1, Pa. slip_x, slip_y: of body 1
-        relative to 2 over the speed, s_P. power: of friction over the speed, Pa, whose integral is that of `Forces`.
+        relative to 2 over the speed, s_P. power: of friction over the speed, Pa, whose integral is that of
+        `CreepForces`.
     """
 
     x: Array
@@ -97,7 +98,7 @@ class Tractions(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Grid:
+class StripGrid:
     """Strips and their elements, without unit; the elements begin at the leading edge.
 
     Attributes:
@@ -123,7 +124,7 @@ class Grid:
 
 
 @cache
-def grid(elements: tuple[int, int], distribution: Distribution) -> Grid:
+def grid(elements: tuple[int, int], distribution: Distribution) -> StripGrid:
     """elements: (nx, ny) along and across rolling."""
     nx, ny = elements
     y, width = np.polynomial.legendre.leggauss(ny)
@@ -144,13 +145,13 @@ def grid(elements: tuple[int, int], distribution: Distribution) -> Grid:
     pressed = np.sum(chord ** (powers[0] + 1) * width) * np.sum(pressure) * 2 / nx
     sprung = np.sum(chord ** (powers[1] + 2) * width) * np.sum(stiffness * (1 - x)) * 2 / nx
     spun = np.sum(chord ** (powers[1] + 3) * width) * np.sum(stiffness * (1 - x**2)) * 2 / nx
-    return Grid(y, width, chord, x, way, pressure, stiffness, powers, float(pressed), float(sprung), float(spun))
+    return StripGrid(y, width, chord, x, way, pressure, stiffness, powers, float(pressed), float(sprung), float(spun))
 
 
 Pair = tuple[Array, ...]
 
 
-def _strip(pose: Poses, g: Grid, y: Array, chord: Array) -> tuple[Any, Array]:
+def _strip(pose: Poses, g: StripGrid, y: Array, chord: Array) -> tuple[Any, Array]:
     """What a strip is marched by, from the stretch u of an element to the next one, and the length of an element."""
     reach, across, nx = pose.a * chord, pose.b * y, len(g.x)
     length = 2 * reach / nx
@@ -172,27 +173,27 @@ def _strip(pose: Poses, g: Grid, y: Array, chord: Array) -> tuple[Any, Array]:
     return step, length
 
 
-def _elements(g: Grid) -> tuple[Array, ...]:
+def _elements(g: StripGrid) -> tuple[Array, ...]:
     return tuple(map(jnp.asarray, (g.x, g.way, g.pressure, g.stiffness)))
 
 
-def forces(pose: Poses, elements: tuple[int, int] = (20, 20), distribution: Distribution = "constant") -> Forces:
+def forces(pose: Poses, elements: tuple[int, int] = (20, 20), distribution: Distribution = "constant") -> CreepForces:
     """Forces of poses whose arrays are all (n,): pure, for `jax.jit`, `vmap` and `grad`; see `creep_forces`."""
     g = grid(elements, distribution)
     none = jnp.zeros_like(pose.a)
 
-    def strip(total: Forces, of: tuple[Array, ...]) -> tuple[Forces, None]:
+    def strip(total: CreepForces, of: tuple[Array, ...]) -> tuple[CreepForces, None]:
         y, chord, width = of
         step, length = _strip(pose, g, y, chord)
 
-        def element(carry: tuple[Pair, Pair, Forces], one: Any) -> tuple[tuple[Pair, Pair, Forces], None]:
+        def element(carry: tuple[Pair, Pair, CreepForces], one: Any) -> tuple[tuple[Pair, Pair, CreepForces], None]:
             u, before, sum_ = carry
             u, t, slid, (x, _, slides) = step(u, one)
             work = 0.5 * ((before[0] + t[0]) * slid[0] + (before[1] + t[1]) * slid[1])
             added = (t[0], t[1], x * t[1] - pose.b * y * t[0], work, slides)
-            return (u, t, Forces(*(s + a for s, a in zip(sum_, added, strict=True)))), None
+            return (u, t, CreepForces(*(s + a for s, a in zip(sum_, added, strict=True)))), None
 
-        start = (none, none), (none, none), Forces(*[none] * 5)
+        start = (none, none), (none, none), CreepForces(*[none] * 5)
         (u, t, sum_), _ = jax.lax.scan(element, start, _elements(g))
         h = 0.5 * length  # to the trailing edge, where nothing is left of u
         rigid = pose.xi - pose.phi_x * pose.b * y, pose.eta - pose.phi_y * (pose.a * chord - 0.5 * h)
@@ -202,9 +203,9 @@ def forces(pose: Poses, elements: tuple[int, int] = (20, 20), distribution: Dist
         area = length * across
         slid = sum_.sliding * area / (2 * pose.a * pose.b * float(g.chord @ g.width))
         added = *(f * area for f in sum_[:3]), power * across, slid
-        return Forces(*(s + f for s, f in zip(total, added, strict=True))), None
+        return CreepForces(*(s + f for s, f in zip(total, added, strict=True))), None
 
-    return jax.lax.scan(strip, Forces(*[none] * 5), tuple(map(jnp.asarray, (g.y, g.chord, g.width))))[0]
+    return jax.lax.scan(strip, CreepForces(*[none] * 5), tuple(map(jnp.asarray, (g.y, g.chord, g.width))))[0]
 
 
 @partial(program, static_argnums=(1, 2))
@@ -238,8 +239,8 @@ def blended(L: Array, creep: Array, a: Array, b: Array, held: Array) -> Array:
     limit = jnp.maximum(held, TINY) / of_force * jnp.sqrt(L[0] ** 2 + L[1] ** 2)
     w = jnp.minimum(1.0, jnp.sqrt(creep[0] ** 2 + creep[1] ** 2 + TINY) / limit / 3)
     square = jnp.stack([creep[0], creep[1], creep[2] * (3 * jnp.pi / 32) * a]) ** 2
-    one = (jnp.sum(square, axis=0) + TINY) / (jnp.sum(square / L, axis=0) + TINY / L[0])
-    return (1 - w) * L + w * one
+    mean = (jnp.sum(square, axis=0) + TINY) / (jnp.sum(square / L, axis=0) + TINY / L[0])
+    return (1 - w) * L + w * mean
 
 
 SLIPPERY = 1e-12
@@ -267,10 +268,10 @@ posed = program(poses, static_argnames=("elements", "distribution", "coefficient
 
 
 @partial(program, static_argnames=("elements", "distribution", "coefficients", "spin"))
-def _rolled(*given: Array, elements: tuple[int, int], distribution: Distribution, **how: Any) -> Forces:
+def _rolled(*given: Array, elements: tuple[int, int], distribution: Distribution, **how: Any) -> CreepForces:
     """Of (blocks, n) arrays."""
 
-    def block(of: tuple[Array, ...]) -> Forces:
+    def block(of: tuple[Array, ...]) -> CreepForces:
         pose = poses(*of, elements=elements, distribution=distribution, **how)
         return forces(pose, elements, distribution)
 
@@ -294,7 +295,7 @@ def creep_forces(
     xi: Reals, eta: Reals, phi: Reals, a: Positives, b: Positives, normal_force: Positives,
     friction: Frictions, shear: Positives, poisson: Poissons, *, elements: Resolution = (20, 20),
     distribution: Distribution = "constant", coefficients: Coefficients = "table", spin: Spin = "kalker",
-) -> Forces:  # fmt: skip
+) -> CreepForces:  # fmt: skip
     """Forces on body 1 of any number of states of rolling, by the strip model of Sextro, 6.5.
 
     Args:
@@ -315,7 +316,7 @@ def creep_forces(
     filled = [np.concatenate([v, np.repeat(v[-1:], -n % BLOCK)]).reshape(-1, BLOCK) for v in given]
     how = {"elements": tuple(elements), "distribution": distribution, "coefficients": coefficients, "spin": spin}
     parts = [_rolled(*(v[run] for v in filled), **how) for run in runs(n, BLOCK)]
-    return Forces(*(np.concatenate([np.asarray(p[k]).ravel() for p in parts])[:n] for k in range(5)))
+    return CreepForces(*(np.concatenate([np.asarray(p[k]).ravel() for p in parts])[:n] for k in range(5)))
 
 
 NAMES = "xi", "eta", "phi", "a", "b", "normal_force", "friction", "shear", "poisson"
@@ -343,7 +344,7 @@ def tractions(
     return over_elements(pose, grid(elements, distribution), *_marched(pose, elements, distribution))
 
 
-def over_elements(pose: Poses, g: Grid, *marched: Array) -> Tractions:
+def over_elements(pose: Poses, g: StripGrid, *marched: Array) -> Tractions:
     """marched: x, pressure, both tractions and both stretches, (ny, nx, n), from the leading edge on; length of an
     element (ny, n)."""
     *found, length = map(np.asarray, marched)

@@ -14,12 +14,12 @@ from ..data import Array
 from ..errors import UserError
 from .exact import Exact, exact
 from .fastsim import fastsim
-from .rolled import drag, rolled, sources
+from .laws import drag, rolled
 from .settings import RollingCase
-from .strips import Forces, Tractions
+from .strips import CreepForces, Tractions
 from .temperature import speed_parameter
-from .wear import strip_depth
-from .wheelset import Drag, Patch, Pose, Track, across, axle, patches, states
+from .wear import strip_work
+from .wheelset import Drag, Pose, RollingPatch, Track, across, axle, patches, states
 
 UNITS = {"longitudinal": "1", "lateral": "1", "spin": "1_per_m"}
 UNLIKE = 0.02
@@ -59,7 +59,7 @@ def without_rounding(values: Array, least: float) -> Array:
 
 
 @dataclass(frozen=True)
-class Studied:
+class RollingAnswer:
     """Attributes: patches: of the wheel, the most loaded first; none if it does not touch. creep: (3, n) xi, eta, phi
     of the curve. forces: (n,) of it. reference: some of its indices, |F|/(mu F_N) of the published FASTSIM there.
     exact: half-spaces at some states; missed: why there are none. shown: index of the state whose tractions these are.
@@ -68,14 +68,14 @@ class Studied:
 
     case: RollingCase
     track: Track
-    patches: list[Patch]
+    patches: list[RollingPatch]
     creep: Array
-    forces: Forces | None
+    forces: CreepForces | None
     reference: tuple[Array, Array] | None
     exact: Exact | None
     shown: int
     tractions: Tractions | None
-    of_pose: Forces | None
+    of_pose: CreepForces | None
     missed: str = ""
     highest: float = 0.0
     hottest: Array | None = None
@@ -122,35 +122,37 @@ class Studied:
         """What a reader came for."""
         if not self.patches or self.forces is None:
             return ["The wheel does not touch the rail: all forces are zero."]
-        p, told = self.patches[0], []
+        p, sentences = self.patches[0], []
         sides = sorted({q.side for q in self.patches})
         if len(self.patches) > 1:
             who = "The wheel touches the rail" if len(sides) == 1 else "The wheels touch the rails"
             where = "" if len(sides) == 1 else f", on the {p.side} rail"
-            told.append(f"{who} in {len(self.patches)} patches; the curve is of the most loaded{where}.")
-        told += [self._felt(side, "the wheel" if len(sides) == 1 else f"the {side} wheel") for side in sides]
-        told.append(
+            sentences.append(f"{who} in {len(self.patches)} patches; the curve is of the most loaded{where}.")
+        sentences += [self._felt(side, "the wheel" if len(sides) == 1 else f"the {side} wheel") for side in sides]
+        sentences.append(
             f"The patch is {2e3 * p.a:.3g} mm long and {2e3 * p.b:.3g} mm wide, under {p.normal_force:.5g} N with at "
             f"most {p.pressure / 1e6:.4g} MPa."
         )
         most = np.hypot(self.forces.x, self.forces.y) / self.held
         at = int(most.argmax())
-        told.append(f"The largest creep force is {most[at]:.4g} mu F_N, at a {self.case.creep.over} "
+        sentences.append(f"The largest creep force is {most[at]:.4g} mu F_N, at a {self.case.creep.over} "
                     f"{'creepage' if self.case.creep.over != 'spin' else 'value'} of {self.over[at]:.4g}.")  # fmt: skip
         if self.reference is not None:
             i, other = self.reference
             off = np.abs(np.hypot(self.forces.x, self.forces.y)[i] / self.held - other).max()
-            told.append(
+            sentences.append(
                 f"FASTSIM as published, at {len(i)} points of the curve, is at most {100 * off:.2g} % of mu F_N away."
             )
         elif self.case.is_constant:
-            told.append("FASTSIM and exact half-spaces know no roughness, so that neither stands beside this curve.")
+            sentences.append(
+                "FASTSIM and exact half-spaces know no roughness, so that neither stands beside this curve."
+            )
         else:
-            told.append(
+            sentences.append(
                 f"mu is the highest coefficient, {self.highest:.4g}; FASTSIM and exact half-spaces know none that "
                 "changes, so that neither stands beside this curve."
             )
-        return [*told, *self._inclined(), *self._beside_exact(), *self._heated(), *self._worn(), *self.warnings()]
+        return [*sentences, *self._inclined(), *self._beside_exact(), *self._heated(), *self._worn(), *self.warnings()]
 
     def _felt(self, side: str, name: str) -> str:
         rows = [row for row in self.generalised()[1] if row[1] == "wheel"]
@@ -184,11 +186,9 @@ class Studied:
         t, wear = self.pose_tractions, self.case.wear
         if t is None or wear is None:
             return {}
-        speed = np.array([p.speed for p in self.patches])
-        q, dx = sources(t, speed)
-        work = np.stack([strip_depth(s.T, d, 1.0, v) for s, d, v in zip(q, dx, speed, strict=True)])
+        width, work = strip_work(t)
         patch = np.broadcast_to(np.arange(1, len(work) + 1)[:, None], work.shape)
-        columns = {"patch": patch, "y_left_m": t.y[..., 0], "width_m": t.area[..., 0] / dx, "work_J_per_m2": work,
+        columns = {"patch": patch, "y_left_m": t.y[..., 0], "width_m": width, "work_J_per_m2": work,
                    "depth_m": wear.coefficient * work}  # fmt: skip
         return {name: values.ravel() for name, values in columns.items()}
 
@@ -225,34 +225,34 @@ class Studied:
 
     def warnings(self) -> list[str]:
         """What a person should doubt."""
-        told, wheel, rail = [], self.case.wheel, self.case.rail
+        warnings, wheel, rail = [], self.case.wheel, self.case.rail
         doubts = [plausible.modulus("wheel.young", wheel.young), plausible.modulus("rail.young", rail.young)]
         doubts.append(plausible.wheel_load(self.case.vertical_force, wheel.radius))
         doubts += [plausible.stress("The patch", q.pressure, min(wheel.young, rail.young)) for q in self.patches[:1]]
-        told += [f"warning: {text}" for text in doubts if text]
+        warnings += [f"warning: {text}" for text in doubts if text]
         if self.highest > STEEPEST:
-            told.append(f"warning: friction is {self.highest:g}; steel on steel has 0.05 to 0.6.")
+            warnings.append(f"warning: friction is {self.highest:g}; steel on steel has 0.05 to 0.6.")
         beta = mismatch(*self.case.solids)
         if abs(beta) > UNLIKE:
-            told.append(
+            warnings.append(
                 f"warning: wheel and rail are unlike (Dundurs' beta {beta:.2g}): their pressure alone shears them, "
                 "which strips, FASTSIM and Kalker's coefficients leave out and exact half-spaces do not."
             )
         if self.of_pose is not None and (self.case.heat or self.case.wear):
-            told += [*self._slow(), *self._unbalanced()]
+            warnings += [*self._slow(), *self._unbalanced()]
         for k, p in enumerate(self.patches):
             if p.conformal:
-                told.append(
+                warnings.append(
                     f"warning: patch {k + 1}: wheel and rail conform: it is {2e3 * p.b:.3g} mm wide, too wide for its "
                     "radii of curvature, so that neither body is a half-space and the numbers are a guess."
                 )
             ends = ((p.on_wheel, self.track.wheel.y), (p.on_rail, self.track.rail.y))
             if any(not y[0] <= middle - p.b <= middle + p.b <= y[-1] for middle, y in ends):
-                told.append(
+                warnings.append(
                     f"warning: patch {k + 1}, {2e3 * p.b:.3g} mm wide, reaches beyond the end of a profile, where its "
                     "shape is not known and the patch taken for an ellipse; give a wider profile (width)."
                 )
-        return told
+        return warnings
 
     def _slow(self) -> list[str]:
         """The temperatures are of sources that move fast."""
@@ -276,7 +276,7 @@ class Studied:
                 'are off by as much, less with model.spin = "book".']  # fmt: skip
 
 
-def study(case: RollingCase, path: Path) -> Studied:
+def study(case: RollingCase, path: Path) -> RollingAnswer:
     """Patches, curve and tractions of a case; its files stand beside its own.
 
     Raises:
@@ -285,19 +285,20 @@ def study(case: RollingCase, path: Path) -> Studied:
     track, friction = case.track(path.parent), case.characteristic(path)
     heat = case.heat.made() if case.heat else None
     rough, how = case.surface(path), case.model.model_dump(exclude={"exact"})
-    found, pose = _touching(case, track, drag(track, friction, heat, rough, **how))
-    creep = _creep(case, found[0] if found else None)
-    if not found:
-        return Studied(case, track, found, creep, None, None, None, 0, None, None)
-    p, c = found[0], case.creep
+    touching, pose = _touching(case, track, drag(track, friction, heat, rough, **how))
+    creep = _creep(case, touching[0] if touching else None)
+    if not touching:
+        return RollingAnswer(case, track, touching, creep, None, None, None, 0, None, None)
+    p, c = touching[0], case.creep
     highest = float(np.max(friction.highest(jnp.ones(1))))
     over = creep[list(UNITS).index(c.over)]
     shown = int(np.abs(over - (0.5 * (c.start + c.stop) if c.shown is None else c.shown)).argmin())
-    given, speed = _states(track, found, creep)
+    given, speed = states(track, [p] * creep.shape[1] + touching)  # of the curve, and of the pose
+    given[:3, : creep.shape[1]] = creep
     n = len(over)
     kept = np.array([shown, *range(n, len(speed))])
     run = rolled(given, friction, speed, kept, heat, rough, **how)
-    forces, of_pose = (Forces(*(v[part] for v in run.forces)) for part in (slice(n), slice(n, None)))
+    forces, of_pose = (CreepForces(*(v[part] for v in run.forces)) for part in (slice(n), slice(n, None)))
     reference, beside, missed = None, None, ""
     if case.is_constant and rough is None:
         at = np.unique(np.linspace(0, n - 1, 13).astype(int))
@@ -305,10 +306,10 @@ def study(case: RollingCase, path: Path) -> Studied:
         reference = at, np.array([np.hypot(f.x, f.y) for f in totals]) / (highest * p.normal_force)
         beside, missed = _exact(case, track, pose, p, creep, np.hypot(forces.x, forces.y), highest)
     patch, of_patches = (Tractions(*(v[part] for v in run.tractions)) for part in (0, slice(1, None)))
-    return Studied(
+    return RollingAnswer(
         case,
         track,
-        found,
+        touching,
         creep,
         forces,
         reference,
@@ -323,7 +324,7 @@ def study(case: RollingCase, path: Path) -> Studied:
     )
 
 
-def _touching(case: RollingCase, track: Track, dragged: Drag) -> tuple[list[Patch], Pose]:
+def _touching(case: RollingCase, track: Track, dragged: Drag) -> tuple[list[RollingPatch], Pose]:
     """Patches, the one that carries most first, and the pose; an axle rolls until both wheels carry the same."""
     pose, side, vertical = case.posed(), case.pose.side, case.vertical_force
     if side != "both":
@@ -332,15 +333,8 @@ def _touching(case: RollingCase, track: Track, dragged: Drag) -> tuple[list[Patc
     return sorted([*left, *right], key=lambda p: -p.normal_force), pose
 
 
-def _states(track: Track, found: list[Patch], creep: Array) -> tuple[Array, Array]:
-    """(8, n + patches) what `rolled` is given, of the curve and of the pose, and their speeds, m/s."""
-    given, speed = states(track, [found[0]] * creep.shape[1] + found)
-    given[:3, : creep.shape[1]] = creep
-    return given, speed
-
-
 def _exact(
-    case: RollingCase, track: Track, pose: Pose, p: Patch, creep: Array, size: Array, friction: float
+    case: RollingCase, track: Track, pose: Pose, p: RollingPatch, creep: Array, size: Array, friction: float
 ) -> tuple[Exact | None, str]:  # fmt: skip
     """At so many states of the curve as the case wants, in equal steps of the (n,) force; why not if there is none."""
     way = np.cumsum(np.abs(np.diff(size, prepend=size[:1])))
@@ -353,7 +347,7 @@ def _exact(
         return None, str(error)
 
 
-def _creep(case: RollingCase, p: Patch | None) -> Array:
+def _creep(case: RollingCase, p: RollingPatch | None) -> Array:
     c = case.creep
     fixed = [c.longitudinal, c.lateral, c.spin]
     of_pose = [p.xi, p.eta, p.phi] if p else [0.0] * 3
@@ -362,7 +356,7 @@ def _creep(case: RollingCase, p: Patch | None) -> Array:
     return np.array(rows)
 
 
-def rows_of_patches(found: list[Patch]) -> tuple[list[str], list[list[float | str]]]:
+def rows_of_patches(found: list[RollingPatch]) -> tuple[list[str], list[list[float | str]]]:
     """Head and a row for each patch, as in patches.csv."""
     head = [
         *(f"{axis}_m" for axis in AXES),

@@ -7,6 +7,7 @@ them. With xi the sign of F_x turns, with eta and phi together those of F_y and 
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial, reduce
 from operator import mul
@@ -25,7 +26,7 @@ from ..settings import arguments
 from ..settings.arguments import Count, Index, wholes
 from .arguments import Frictions, Poisson, Positives, Reals, Resolution, joined
 from .kalker import Coefficients, creep_coefficients
-from .strips import BLOCK, NAMES, SLIPPERY, Distribution, Forces, Poses, creep_forces, forces, grid, posed
+from .strips import BLOCK, NAMES, SLIPPERY, CreepForces, Distribution, Poses, creep_forces, forces, grid, posed
 
 POINTS = (19, 36, 33, 39, 13)
 """Of the size of the pull below and above 1/2, its azimuth, its polar angle, a/b."""
@@ -103,12 +104,11 @@ class CreepTable:
         if not ((ratio >= least) & (ratio <= most)).all():
             worst = float(ratio.ravel()[np.argmax(np.abs(np.log(ratio)))])
             raise UserError(f"a, b: a/b is {worst:.4g}, and the table goes from {least:.4g} to {most:.4g}")
-        p = Poses(*map(np.asarray, posed(x, y, turn, a, b, held, np.ones_like(a), G, self.poisson, **self.how)))
-        stiff = p.stiffness_x * c**2 / held
-        at, signs = placed(np.stack([x, p.eta * p.stiffness_y / p.stiffness_x, c * p.phi_x]) * stiff, ratio)
-        at = np.stack([*at, np.log(ratio), np.log(p.stiffness_y / p.stiffness_x)]).reshape(5, -1)
-        found = np.concatenate([self._between(at[:, i : i + BLOCK]) for i in range(0, at.shape[1], BLOCK)], axis=1)
-        return found.reshape(3, *x.shape) * signs * held * np.stack([np.ones_like(c), np.ones_like(c), c])
+        p = posed(x, y, turn, a, b, held, np.ones_like(a), G, self.poisson, **self.how)
+        at, signs = placed(Poses(*map(np.asarray, p)), ratio)
+        at = at.reshape(5, -1)
+        values = np.concatenate([self._between(at[:, i : i + BLOCK]) for i in range(0, at.shape[1], BLOCK)], axis=1)
+        return values.reshape(3, *x.shape) * signs * held * np.stack([np.ones_like(c), np.ones_like(c), c])
 
     def sentence(self) -> str:
         """What it is worth."""
@@ -128,10 +128,10 @@ class CreepTable:
         for (first, weight), many in zip(parts, shape, strict=True):
             index = (index * many)[:, :, None] + (first[:, None] + np.arange(weight.shape[1]))[:, None, :]
             index = index.reshape(at.shape[1], -1)
-        found = self.values.reshape(3, -1)[:, index]
+        near = self.values.reshape(3, -1)[:, index]
         for _, weight in parts[::-1]:
-            found = np.einsum("knip,np->kni", found.reshape(3, at.shape[1], -1, weight.shape[1]), weight)
-        return found[..., 0]
+            near = np.einsum("knip,np->kni", near.reshape(3, at.shape[1], -1, weight.shape[1]), weight)
+        return near[..., 0]
 
 
 def cubic(axis: Any, v: Any, ridge: Any = 0, xp: Any = np) -> tuple[Any, Any]:
@@ -147,16 +147,19 @@ def cubic(axis: Any, v: Any, ridge: Any = 0, xp: Any = np) -> tuple[Any, Any]:
     return first, xp.stack([reduce(mul, part) for part in parts], axis=1)
 
 
-def placed(pull: Any, ratio: Any, xp: Any = np) -> tuple[Any, Any]:
-    """Size, azimuth and polar angle of a (3, n) pull, and the signs of the forces that are tabulated for it; xp: numpy,
-    or jax.numpy in what is traced."""
-    u, v, w = pull
+def placed(p: Poses, ratio: Any, xp: Any = np) -> tuple[Any, Any]:
+    """(5, n) size, azimuth, polar angle, ln(a/b) and springs of poses under mu F_N, and (3, n) the signs of the forces
+    that are tabulated for them; ratio: a/b within the table. xp: numpy, or jax.numpy in what is traced."""
+    c = xp.sqrt(p.a * p.b)
+    pull = xp.stack([p.xi, p.eta * p.stiffness_y / p.stiffness_x, c * p.phi_x])
+    u, v, w = pull * p.stiffness_x * c**2 / p.normal_force
     r = xp.sqrt(u**2 + v**2 + ratio * w**2) / SATURATED
     forward, turned = xp.where(u < 0, -1.0, 1.0), xp.where(w < 0, -1.0, 1.0)
     root = ratio**0.25  # sqrt(a) where a b = 1, and 1/sqrt(b)
     polar = xp.arctan2(xp.hypot(u * root**2, v / root**2), xp.abs(w))
     azimuth = xp.arctan2(turned * v / root, xp.abs(u) * root)
-    return xp.stack([r / (1 + r), azimuth, polar]), xp.stack([forward, turned, turned])
+    at = [r / (1 + r), azimuth, polar, xp.log(ratio), xp.log(p.stiffness_y / p.stiffness_x)]
+    return xp.stack(at), xp.stack([forward, turned, turned])
 
 
 FAR = 1e4
@@ -177,11 +180,11 @@ def _pull(at: Array) -> Array:
 @partial(program, static_argnames=("elements", "distribution"))
 def _marched(
     pull: Array, ratio: Array, springs: Array, elements: tuple[int, int], distribution: Distribution
-) -> Forces:
+) -> CreepForces:
     """Forces over mu F_N of springs that are pulled, with a b and mu F_N of one."""
-    a, one = ratio**0.5, ratio**0.0
+    a, ones = ratio**0.5, ratio**0.0
     x, y = springs**-0.5, springs**0.5
-    pose = Poses(pull[0] / x, pull[1] / y, pull[2] / x, pull[2] / y, a, 1 / a, one, one, x, y)
+    pose = Poses(pull[0] / x, pull[1] / y, pull[2] / x, pull[2] / y, a, 1 / a, ones, ones, x, y)
     return forces(pose, elements, distribution)
 
 
@@ -238,11 +241,11 @@ def _missed(table: CreepTable, checked: int, seed: int) -> Array:
     """(3, 3) mean, 95 % quantile and largest error at random states, spread evenly over the axes."""
     low, high = (np.array([axis[i] for axis in table.axes[:4]])[:, None] for i in (0, -1))
     at = low + (high - low) * np.random.default_rng(seed).uniform(size=(4, checked))
-    a, one = np.exp(0.5 * at[3]), np.ones(checked)
+    a, ones = np.exp(0.5 * at[3]), np.ones(checked)
     c = np.asarray(creep_coefficients(a**2, table.poisson, table.how["coefficients"]))
     xi, eta, phi = _pull(at) / c[:3]
-    f = creep_forces(xi, eta, phi, a, 1 / a, one, one, 1.0, table.poisson, **table.how)
-    error = np.abs(table.forces(xi, eta, phi, a, 1 / a, one, one, 1.0) - np.stack([f.x, f.y, f.moment]))
+    f = creep_forces(xi, eta, phi, a, 1 / a, ones, ones, 1.0, table.poisson, **table.how)
+    error = np.abs(table.forces(xi, eta, phi, a, 1 / a, ones, ones, 1.0) - np.stack([f.x, f.y, f.moment]))
     return np.stack([error.mean(axis=1), np.quantile(error, 0.95, axis=1), error.max(axis=1)], axis=1)
 
 
@@ -255,14 +258,11 @@ def write_creep_table(path: Path | str, table: CreepTable) -> Path:
     """As HDF5: a dataset an axis, ``kalker``, ``values`` in whole steps and ``error``; complete or not at all."""
     step = np.abs(table.values).max() / FINEST
     g = grid(tuple(table.how["elements"]), table.how["distribution"])
-    with hdf5.sealed(path) as file:
-        file.attrs.update(format=FORMAT, poisson=table.poisson, checked=table.checked, values=", ".join(VALUES),
-                          step=step, spin_factor=2 * g.sprung / g.spun, error="mean, 95 % quantile, largest",
-                          meaning=str(CreepTable.__doc__), **table.how)  # fmt: skip
-        for name in (*AXES, "kalker", "error"):
-            hdf5.put(file, name, getattr(table, name))
-        hdf5.put(file, "values", np.rint(table.values / step).astype(np.int16))
-    return Path(path)
+    arrays = {name: getattr(table, name) for name in (*AXES, "kalker", "error")}
+    arrays["values"] = np.rint(table.values / step).astype(np.int16)
+    return write_table(path, arrays, format=FORMAT, poisson=table.poisson, checked=table.checked,
+                       values=", ".join(VALUES), step=step, spin_factor=2 * g.sprung / g.spun,
+                       error="mean, 95 % quantile, largest", meaning=str(CreepTable.__doc__), **table.how)  # fmt: skip
 
 
 @arguments.checked
@@ -272,9 +272,33 @@ def read_creep_table(path: Path | str) -> CreepTable:
     Raises:
         UserError: another file.
     """
-    with reading(ordinary(Path(path)), FORMAT, "", "write a table of creep forces with [table] in a case") as file:
-        parts = {name: file[name][()] for name in (*AXES, "kalker", "error")}
-        nx, ny = map(int, file.attrs["elements"])
-        how = {"elements": (nx, ny)} | {k: str(file.attrs[k]) for k in ("distribution", "coefficients")}
-        return CreepTable(**parts, values=file["values"][()] * float(file.attrs["step"]), how=how,
-                          poisson=float(file.attrs["poisson"]), checked=int(file.attrs["checked"]))  # fmt: skip
+    names = (*AXES, "kalker", "error", "values")
+    arrays, told = read_table(path, names, FORMAT, "write a table of creep forces with [table] in a case")
+    nx, ny = map(int, told["elements"])
+    how = {"elements": (nx, ny)} | {k: str(told[k]) for k in ("distribution", "coefficients")}
+    arrays["values"] = arrays["values"] * float(told["step"])
+    return CreepTable(**arrays, how=how, poisson=float(told["poisson"]), checked=int(told["checked"]))
+
+
+def write_table(path: Path | str, arrays: Mapping[str, Any], **told: Any) -> Path:
+    """A table for vehicle programs as HDF5, complete or not at all: arrays by their names, some of them in a group
+    (``group/name``), and what is told of it."""
+    with hdf5.sealed(path) as file:
+        file.attrs.update(told)
+        groups = {name: file.create_group(name) for name in dict.fromkeys(n.rpartition("/")[0] for n in arrays) if name}
+        for name, values in arrays.items():
+            above, _, own = name.rpartition("/")
+            hdf5.put(groups.get(above, file), own, np.asarray(values))
+    return Path(path)
+
+
+def read_table(
+    path: Path | str, names: Iterable[str], form: str, again: str
+) -> tuple[dict[str, Array], dict[str, Any]]:  # fmt: skip
+    """Arrays that `write_table` wrote, and what it told.
+
+    Raises:
+        UserError: another file, of which `again` says what to do.
+    """
+    with reading(ordinary(Path(path)), form, "", again) as file:
+        return {name: file[name][()] for name in names}, dict(file.attrs)

@@ -16,6 +16,7 @@ from ..errors import UserError
 from ..settings.arguments import Rows, checked
 from ..settings.numbers import NotNegative, Positive
 from .arguments import Positives
+from .strips import Tractions
 
 
 @checked
@@ -40,6 +41,13 @@ def strip_depth(source: Array, dx: float, coefficient: float, speed: float) -> A
     return depth_along(source, dx, coefficient, speed)[0]
 
 
+def strip_work(t: Tractions) -> tuple[Array, Array]:
+    """(n, ny) m widths of the strips of n patches, and the work of friction over each in a passage, J/m^2: times a
+    coefficient of wear what it takes off (6.8-6)."""
+    width = t.area[..., 0] / (t.x[..., 1] - t.x[..., 0])
+    return width, (t.power * t.area).sum(axis=-1) / width
+
+
 def deposited(depth: Array, dy: float | Array, middle: float, y: Array) -> Array:
     """Depths of strips brought to strips elsewhere; what is worn off stays the same.
 
@@ -56,14 +64,14 @@ def deposited(depth: Array, dy: float | Array, middle: float, y: Array) -> Array
     width = y[1] - y[0]
     ends = np.append(y - width / 2, y[-1] + width / 2)
     if np.ndim(dy):
-        own = np.append(0, np.cumsum(dy)) - np.sum(dy) / 2 + middle
+        edges = np.append(0, np.cumsum(dy)) - np.sum(dy) / 2 + middle
     else:
-        own = middle + dy * (np.arange(len(depth) + 1) - len(depth) / 2)
+        edges = middle + dy * (np.arange(len(depth) + 1) - len(depth) / 2)
     worn = np.flatnonzero(depth)
-    if worn.size and not (ends[0] <= own[worn[0]] and own[worn[-1] + 1] <= ends[-1]):
+    if worn.size and not (ends[0] <= edges[worn[0]] and edges[worn[-1] + 1] <= ends[-1]):
         raise UserError("y: the contact wears beyond the ends of the profile; take a wider one")
     area = np.append(0, np.cumsum(depth * dy))
-    return np.diff(np.interp(ends, own, area)) / width
+    return np.diff(np.interp(ends, edges, area)) / width
 
 
 def revolution(contact: Callable[[int], tuple[Array, float, float] | None], positions: int, y: Array) -> Array:
@@ -76,8 +84,8 @@ def revolution(contact: Callable[[int], tuple[Array, float, float] | None], posi
     Returns:
         (positions, n) m.
     """
-    found = [contact(k) for k in range(positions)]
-    return np.array([np.zeros(len(y)) if one is None else deposited(*one, y) for one in found])
+    contacts = [contact(k) for k in range(positions)]
+    return np.array([np.zeros(len(y)) if strips is None else deposited(*strips, y) for strips in contacts])
 
 
 def smoothed(depth: Array, dy: float, length: float) -> Array:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -11,19 +10,19 @@ import numpy as np
 from ..contact.friction import Friction
 from ..data import Array
 from ..errors import UserError
+from ..progress import Report
 from .ellipse import ellipses
-from .laws import Surface
-from .profiles import Profile
-from .rolled import drag, rolled, sources
+from .laws import RoughSurface, drag, rolled
+from .profiles import CrossSection
 from .settings import WIDEST, RollingCase
-from .wear import deposited, shortest_smoothing, smoothed, strip_depth
-from .wheelset import Patch, Track, patches, states
+from .wear import deposited, shortest_smoothing, smoothed, strip_work
+from .wheelset import RollingPatch, Track, patches, states
 
 STRIP = 1e-4
 """m, of the profiles that wear."""
 
 
-class Body(NamedTuple):
+class WornProfile(NamedTuple):
     """A profile that wears. Attributes: y: (n,) of its strips, m. new: (n,) z before, m. into: 1 where z points into
     the body, a rail, -1 of a wheel. depth: (n,) worn off, along z, m."""
 
@@ -33,24 +32,24 @@ class Body(NamedTuple):
     depth: Array
 
     @staticmethod
-    def of(profile: Profile, into: float) -> Body:
+    def of(profile: CrossSection, into: float) -> WornProfile:
         y = np.arange(profile.y[0], profile.y[-1], STRIP)
-        return Body(y, profile.height(y), into, np.zeros_like(y))
+        return WornProfile(y, profile.height(y), into, np.zeros_like(y))
 
-    def profile(self, smoothing: float) -> Profile:
+    def profile(self, smoothing: float) -> CrossSection:
         """As the contact sees it: the worn depth smoothed."""
-        return Profile(self.y, self.new + self.into * smoothed(self.depth, STRIP, smoothing))
+        return CrossSection(self.y, self.new + self.into * smoothed(self.depth, STRIP, smoothing))
 
     def columns(self, smoothing: float) -> dict[str, Array]:
         """Of a table that is the profile, mm, and what is worn off."""
         return {"y_mm": 1e3 * self.y, "z_mm": 1e3 * self.profile(smoothing).z, "worn_mm": 1e3 * self.depth}
 
 
-class Strips(NamedTuple):
+class StripWork(NamedTuple):
     """What a passage does to the strips of a patch, y to the left. Attributes: patch. width: (n,) m. work: (n,) of
     friction per area, J/m2."""
 
-    patch: Patch
+    patch: RollingPatch
     width: Array
     work: Array
 
@@ -69,13 +68,13 @@ class Moment(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Wearing:
+class ProfileWear:
     """Attributes: wheel, rail: in the end. moments: before, and after every update. work: of friction between them, J
     per m of the way. smoothing: of the worn depth, m. least: with which no wave of it grows at the first update, m.
     approach: of new bodies, m."""
 
-    wheel: Body
-    rail: Body
+    wheel: WornProfile
+    rail: WornProfile
     moments: list[Moment]
     work: float
     smoothing: float
@@ -96,28 +95,28 @@ class Wearing:
         )
 
     def warnings(self) -> list[str]:
-        told, last = [], self.moments[-1]
+        warnings, last = [], self.moments[-1]
         if self.smoothing < self.least:
             smooth = (
                 f"smooth over {1e3 * self.least:.2g} mm or more (wear.smoothing), or " if self.least <= WIDEST else ""
             )
-            told.append(
+            warnings.append(
                 f"warning: an update takes so much that waves of the worn profile amplify themselves: {smooth}"
                 "take more updates (wear.updates)."
             )
         if last.wheel + last.rail > self.approach:
-            told.append(
+            warnings.append(
                 f"warning: the grooves of wheel and rail are together {1e3 * (last.wheel + last.rail):.2g} mm deep, "
                 f"more than the bodies approach each other, {1e3 * self.approach:.2g} mm: no ellipse is what touches "
                 "in them, and the numbers are a guess; take fewer passages, or share them over shifts (wear.lateral)."
             )
-        return told
+        return warnings
 
 
 def wearing(
-    case: RollingCase, track: Track, friction: Friction, surface: Surface | None = None,
-    report: Callable[[str], None] = lambda _: None,
-) -> Wearing:  # fmt: skip
+    case: RollingCase, track: Track, friction: Friction, surface: RoughSurface | None = None,
+    report: Report = lambda _: None,
+) -> ProfileWear:  # fmt: skip
     """Updates of a case; wheel and rail are passed equally often.
 
     Raises:
@@ -125,7 +124,7 @@ def wearing(
     """
     asked = case.wear
     assert asked is not None and asked.passages is not None
-    bodies = [Body.of(track.wheel, -1.0), Body.of(track.rail, 1.0)]
+    bodies = [WornProfile.of(track.wheel, -1.0), WornProfile.of(track.rail, 1.0)]
     each, moments, work, least, approach = asked.passages / asked.updates, [], 0.0, 0.0, 0.0
     shifts = asked.lateral or (case.pose.lateral,)
     for k in range(asked.updates + 1):
@@ -133,19 +132,21 @@ def wearing(
             report(f"profiles that wear: {k} of {asked.updates} updates")
         wheel, rail = (body.profile(asked.smoothing) for body in bodies)
         seen = replace(track, wheel=wheel, rail=rail)
-        runs = [one for lateral in shifts for one in _run(case, seen, friction, surface, lateral)]
+        runs = [strips for lateral in shifts for strips in _run(case, seen, friction, surface, lateral)]
         moments.append(_moment(k * each, runs, bodies))
-        approach = approach or max(one.patch.approach for one in runs)
+        approach = approach or max(strips.patch.approach for strips in runs)
         if k == asked.updates:
             break
         share = each / len(shifts)
         bodies = [_worn(body, runs, asked.coefficient * share, case.pose.side) for body in bodies]
-        work += share * sum(float(one.width @ one.work) for one in runs)
+        work += share * sum(float(strips.width @ strips.work) for strips in runs)
         least = least or _shortest(runs, sum(body.depth.max() for body in bodies), track)
-    return Wearing(bodies[0], bodies[1], moments, work, asked.smoothing, least, approach)
+    return ProfileWear(bodies[0], bodies[1], moments, work, asked.smoothing, least, approach)
 
 
-def _run(case: RollingCase, track: Track, friction: Friction, surface: Surface | None, lateral: float) -> list[Strips]:
+def _run(
+    case: RollingCase, track: Track, friction: Friction, surface: RoughSurface | None, lateral: float
+) -> list[StripWork]:
     """A passage in a pose."""
     heat = case.heat.made() if case.heat else None
     how = case.model.model_dump(exclude={"exact"})
@@ -157,11 +158,10 @@ def _run(case: RollingCase, track: Track, friction: Friction, surface: Surface |
         raise UserError("wear: the wheel does not touch the rail, so nothing wears; correct pose or vertical_force")
     given, speed = states(track, found)
     t = rolled(given, friction, speed, np.arange(len(found)), heat, surface, **how).tractions
-    q, dx = sources(t, speed)
-    return [Strips(p, t.area[i, :, 0] / dx[i], strip_depth(q[i].T, dx[i], 1.0, speed[i])) for i, p in enumerate(found)]
+    return [StripWork(*each) for each in zip(found, *strip_work(t), strict=True)]
 
 
-def _worn(body: Body, runs: list[Strips], coefficient: float, side: str) -> Body:
+def _worn(body: WornProfile, runs: list[StripWork], coefficient: float, side: str) -> WornProfile:
     """After so many passages, of which the coefficient (m3/J) is the sum."""
     depth = body.depth.copy()
     turned = slice(None, None, -1 if side == "right" else 1)  # a profile's y runs to the field side
@@ -172,16 +172,16 @@ def _worn(body: Body, runs: list[Strips], coefficient: float, side: str) -> Body
     return body._replace(depth=depth)
 
 
-def _moment(passages: float, runs: list[Strips], bodies: list[Body]) -> Moment:
-    p = max((one.patch for one in runs), key=lambda p: p.pressure)
+def _moment(passages: float, runs: list[StripWork], bodies: list[WornProfile]) -> Moment:
+    p = max((strips.patch for strips in runs), key=lambda p: p.pressure)
     wheel, rail = (body.depth for body in bodies)
     worn = STRIP * float(wheel.sum() + rail.sum())
     return Moment(passages, p.pressure, p.a, p.b, float(wheel.max()), float(rail.max()), worn)
 
 
-def _shortest(runs: list[Strips], depth: float, track: Track) -> float:
+def _shortest(runs: list[StripWork], depth: float, track: Track) -> float:
     """m: `wear.shortest_smoothing` of what an update takes, as the pressure's p_0 a follows the curvature (Hertz)."""
-    p = max((one.patch for one in runs), key=lambda p: p.pressure)
+    p = max((strips.patch for strips in runs), key=lambda p: p.pressure)
     B = max(p.B, 1e-3 * p.A) * np.array([0.99, 1.01])
     e = ellipses(p.A, B, p.normal_force, track.elastic.modulus)
     gain = float(np.diff(np.log(e.pressure * e.a))[0] / (2 * np.diff(B)[0]))

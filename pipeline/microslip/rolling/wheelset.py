@@ -21,7 +21,7 @@ from ..settings.arguments import checked, checked_fields
 from ..settings.numbers import Coefficient, Component, NotNegative, Positive
 from .arguments import Angle
 from .ellipse import Elastic, ellipses, half_width
-from .profiles import Profile
+from .profiles import CrossSection
 from .strips import creep_forces
 
 
@@ -36,8 +36,8 @@ class Track:
             the middle of the track, m. elastic: both bodies.
     """
 
-    wheel: Profile
-    rail: Profile
+    wheel: CrossSection
+    rail: CrossSection
     radius: Positive
     wheel_at: Positive
     rail_at: Positive
@@ -60,7 +60,7 @@ class Pose:
         return replace(self, lateral=-self.lateral, yaw=-self.yaw, roll=-self.roll)
 
 
-class Patch(NamedTuple):
+class RollingPatch(NamedTuple):
     """One contact of one wheel; axes of `strips`: x forward, z up out of the rail, y to the left, the wheel is body 1.
 
     Attributes:
@@ -116,14 +116,14 @@ STEP = 2e-5
 
 Side = Literal["left", "right"]
 SIDES = get_args(Side)
-Drag = Callable[[list[Patch]], Array]
-"""Patches -> (k,) tangential force of each across rolling, on the wheel, in the axes of `Patch`, N."""
+Drag = Callable[[list[RollingPatch]], Array]
+"""Patches -> (k,) tangential force of each across rolling, on the wheel, in the axes of `RollingPatch`, N."""
 
 
 @checked
 def patches(
     track: Track, pose: Pose, side: Side, vertical: NotNegative, friction: Coefficient | Drag = 0.0
-) -> list[Patch]:
+) -> list[RollingPatch]:
     """Contacts of one wheel under a vertical force, the one with the largest normal force first; none if it is 0.
 
     Args:
@@ -142,7 +142,7 @@ def patches(
 @checked
 def axle(
     track: Track, pose: Pose, vertical: NotNegative, even: bool = False, friction: Coefficient | Drag = 0.0
-) -> tuple[list[Patch], list[Patch], Pose]:
+) -> tuple[list[RollingPatch], list[RollingPatch], Pose]:
     """Contacts of the left and of the right wheel of an axle, as `patches`, and its pose.
 
     Args:
@@ -194,15 +194,15 @@ def _drag(track: Track, friction: float | Drag) -> Drag:
         return friction
     if friction == 0:
         return lambda found: np.zeros(len(found))
-    return lambda found: _by_strips(track, found, friction)
+
+    def by_strips(found: list[RollingPatch]) -> Array:
+        xi, eta, phi, a, b, force, shear, poisson = states(track, found)[0]
+        return creep_forces(xi, eta, phi, a, b, force, friction, shear, poisson).y
+
+    return by_strips
 
 
-def _by_strips(track: Track, found: list[Patch], friction: float) -> Array:
-    xi, eta, phi, a, b, force, shear, poisson = states(track, found)[0]
-    return creep_forces(xi, eta, phi, a, b, force, friction, shear, poisson).y
-
-
-def states(track: Track, found: list[Patch]) -> tuple[Array, Array]:
+def states(track: Track, found: list[RollingPatch]) -> tuple[Array, Array]:
     """(8, k) xi, eta, phi, a, b, normal force, G, nu of patches, and their speeds (k,), m/s."""
     e = track.elastic
     given = [[p.xi, p.eta, p.phi, p.a, p.b, p.normal_force, e.shear, e.poisson] for p in found]
@@ -213,7 +213,7 @@ class _Carried(NamedTuple):
     """Attributes: found: patches of each side. lift: N, upward, of all forces on each. load: N, of the normal ones on
     all together."""
 
-    found: list[list[Patch]]
+    found: list[list[RollingPatch]]
     lift: list[float]
     load: float
 
@@ -229,7 +229,8 @@ def _carried(track: Track, pose: Pose, sides: tuple[str, ...], vertical: float, 
     for turn in range(30):
         height = _height(track, gaps, load)
         found = [_touching(track, pose, s, g, height) for s, g in zip(sides, gaps, strict=True)]
-        lift = _lifts(found, drag)
+        drags = iter(drag([p for of in found for p in of]))
+        lift = [sum(p.lifted(float(next(drags))) for p in of) for of in found]
         normal = sum(p.lifted(0.0) for of in found for p in of)
         if not sum(lift) > 0 or load > HELD_DOWN * vertical:
             break
@@ -251,12 +252,6 @@ HELD_DOWN = 1e3
 """Times the vertical force: more is no balance."""
 
 
-def _lifts(found: list[list[Patch]], drag: Drag) -> list[float]:
-    """N, upward, of all forces on each wheel."""
-    drags = iter(drag([p for of in found for p in of]))
-    return [sum(p.lifted(float(next(drags))) for p in of) for of in found]
-
-
 def _height(track: Track, gaps: list[Gap], vertical: float) -> float:
     """z of the axle's middle, below that of the nominal radius, where the normal forces of all patches carry a force
     (N), m."""
@@ -275,19 +270,19 @@ def _height(track: Track, gaps: list[Gap], vertical: float) -> float:
     return touch + (brentq(missing, 0.0, deep, xtol=1e-16, rtol=1e-10) if missing(0.0) > 0 else 0.0)
 
 
-def _touching(track: Track, pose: Pose, side: str, gap: Gap, height: float) -> list[Patch]:
+def _touching(track: Track, pose: Pose, side: str, gap: Gap, height: float) -> list[RollingPatch]:
     """The most loaded first."""
     found = sorted(_pressed(track, gap, height), key=lambda p: -p.force)
     middle = np.array([pose.lateral, height - track.radius])
     return [_patch(track, _seen(pose, side), gap, p, side == "left", middle) for p in found]
 
 
-def across(track: Track, pose: Pose, side: str, patch: Patch) -> tuple[Array, Array]:
+def across(track: Track, pose: Pose, side: str, patch: RollingPatch) -> tuple[Array, Array]:
     """(k,) places across a patch, ascending in its y, and the distances of both surfaces there along its normal, m."""
     left = side == "left"
     gap = _gap(track, _seen(pose, side))
-    known = np.isfinite(gap.gap)
-    y_w, arc, opened = gap.on_wheel[known], np.cumsum(gap.arc[known]), gap.gap[known]
+    finite = np.isfinite(gap.gap)
+    y_w, arc, opened = gap.on_wheel[finite], np.cumsum(gap.arc[finite]), gap.gap[finite]
     place = arc - np.interp(patch.on_wheel, y_w, arc)
     apart = (opened - np.interp(patch.on_wheel, y_w, opened)) * np.cos(patch.angle)
     return (place, apart) if left else (-place[::-1], apart[::-1])
@@ -336,8 +331,8 @@ def _gap(track: Track, pose: Pose) -> Gap:
     step = np.gradient(y)
     arc = step / np.cos(incline)
     slope = np.gradient(gap) * np.cos(incline) / arc
-    known = np.flatnonzero(np.isfinite(slope))
-    return Gap(y_w, x, y, z, gap, r, np.interp(np.arange(len(slope)), known, slope[known]), arc, step)
+    finite = np.flatnonzero(np.isfinite(slope))
+    return Gap(y_w, x, y, z, gap, r, np.interp(np.arange(len(slope)), finite, slope[finite]), arc, step)
 
 
 class Pressed(NamedTuple):
@@ -377,10 +372,10 @@ def _stretch(track: Track, gap: Gap, run: Array, level: float) -> Pressed:
     A = cosine / (2 * float(np.interp(at, np.arange(len(gap.y)), gap.radius)))
 
     B = float(_curvature(gap, at, _half_width(gap, at, A, approach)))
-    one = ellipses(A, max(B, CONFORMAL * A), 1.0, track.elastic.modulus)
-    grown = float(approach / one.approach)
-    axes = float(one.a) * grown**0.5, float(one.b) * grown**0.5
-    return Pressed(at, angle, A, B, grown**1.5, *axes, approach, float(one.pressure) * grown**0.5)
+    unit = ellipses(A, max(B, CONFORMAL * A), 1.0, track.elastic.modulus)
+    grown = float(approach / unit.approach)
+    axes = float(unit.a) * grown**0.5, float(unit.b) * grown**0.5
+    return Pressed(at, angle, A, B, grown**1.5, *axes, approach, float(unit.pressure) * grown**0.5)
 
 
 def _half_width(gap: Gap, at: float, A: float, approach: float) -> float:
@@ -419,7 +414,8 @@ def _curvature(gap: Gap, at: float, half: ArrayLike) -> Array:
 def creepages(
     speed: Any, turning: Any, radius: Any, along: Any, yaw: Any, roll: Any, angle: Any, xp: Any = np
 ) -> tuple[Any, Any, Any, Any]:
-    """Creepages xi, eta and spin phi (1/m) of a wheel on its rail, and the speed of rolling, m/s, axes of `Patch`.
+    """Creepages xi, eta and spin phi (1/m) of a wheel on its rail, and the speed of rolling, m/s, axes of
+    `RollingPatch`.
 
     The rigid velocity of the point of the wheel's surface that touches, speed x + w x r, where the axle turns by
     w = -turning (-cos(roll) sin(yaw), cos(roll) cos(yaw), sin(roll)), along the rail and along its surface across it.
@@ -439,8 +435,8 @@ def creepages(
     return (speed - back) / V, (c * left - s * fall) / V, -spun / V, V
 
 
-def _patch(track: Track, pose: Pose, gap: Gap, p: Pressed, left: bool, axle: Array) -> Patch:
-    """With its creepages, in the axes of `Patch`; mirrored back if it is of the left wheel."""
+def _patch(track: Track, pose: Pose, gap: Gap, p: Pressed, left: bool, axle: Array) -> RollingPatch:
+    """With its creepages, in the axes of `RollingPatch`; mirrored back if it is of the left wheel."""
     index = np.arange(len(gap.y))
     y_w, x, y = (float(np.interp(p.at, index, v)) for v in (gap.on_wheel, gap.x, gap.y))
     z = float(track.rail.height(y - track.rail_at))
@@ -451,8 +447,25 @@ def _patch(track: Track, pose: Pose, gap: Gap, p: Pressed, left: bool, axle: Arr
     sign = -1.0 if left else 1.0
     place = np.array([x, sign * y, z])
     conformal = p.B < CONFORMAL * p.A or p.b > track.radius * 0.1 or p.b * 2 * max(p.B, 0) > 0.3
-    return Patch(place, y - track.rail_at, y_w, sign * p.angle, p.A, p.B, p.a, p.b, p.approach, p.pressure, p.force,
-                 xi, sign * eta, sign * phi, V, bool(conformal), axle)  # fmt: skip
+    return RollingPatch(
+        place,
+        y - track.rail_at,
+        y_w,
+        sign * p.angle,
+        p.A,
+        p.B,
+        p.a,
+        p.b,
+        p.approach,
+        p.pressure,
+        p.force,
+        xi,
+        sign * eta,
+        sign * phi,
+        V,
+        bool(conformal),
+        axle,
+    )
 
 
 CONFORMAL = 0.01

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import json
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,15 +14,15 @@ import scipy.sparse as sp
 from ..data import MatrixTerm, ModalBasis
 from ..errors import UserError
 from ..exchange.choice import select
+from ..files import hdf5
 from ..linalg import quadratic
 from ..linalg.parametric import Family, family_of_group
 from ..linalg.quadratic import Quadratic, Window
+from ..progress import Report
 from ..ring.resonances import speeds_of
 from ..settings.mistakes import unfit
 from .diagram import Diagram, diagram
 from .spectrum import Spectrum, spectrum
-
-Report = Callable[[str], None]
 
 
 def roots_of(
@@ -65,14 +67,14 @@ def _family(body: Any, speed: int | None) -> Family:
         body = (body.M, body.C, body.K)
     if not isinstance(body, tuple | list) or len(body) != 3:
         raise UserError("stability: body: give a path, a modal basis or three matrices (M, C, K)")
-    found = [_matrix(A, key) for A, key in zip(body, "MCK", strict=True)]
-    sizes = {key: A.shape[0] for A, key in zip(found, "MCK", strict=True)}
+    matrices = [_matrix(A, key) for A, key in zip(body, "MCK", strict=True)]
+    sizes = {key: A.shape[0] for A, key in zip(matrices, "MCK", strict=True)}
     if len(set(sizes.values())) > 1:
         told = ", ".join(f"{key} {n} x {n}" for key, n in sizes.items())
         raise UserError(f"stability: the matrices are {told}; give them the same size")
-    if any(map(sp.issparse, found)):
-        found = [sp.csr_matrix(A) for A in found]
-    return Family(tuple(MatrixTerm(r, A) for r, A in zip(("mass", "damping", "stiffness"), found, strict=True)))
+    if any(map(sp.issparse, matrices)):
+        matrices = [sp.csr_matrix(A) for A in matrices]
+    return Family(tuple(MatrixTerm(r, A) for r, A in zip(("mass", "damping", "stiffness"), matrices, strict=True)))
 
 
 def _matrix(A: Any, key: str) -> Any:
@@ -98,3 +100,25 @@ def _window(family: Family, growth: tuple[float, float], frequency: tuple[float,
             "begins below 0 Hz; give the smaller number first"
         )
     return Window((float(growth[0]), float(growth[1])), (2 * np.pi * low, 2 * np.pi * high))
+
+
+# file --------------------------------------------------------------------------------------------
+
+
+def write_roots(path: Path, found: Spectrum, over: Diagram | None, values: Mapping[str, float]) -> None:
+    """Roots, their right and left vectors, and the roots over a range, as HDF5 with named dimensions.
+
+    Raises:
+        UserError: no permission, no space.
+    """
+    with hdf5.sealed(path) as file:
+        file.attrs["format"], file.attrs["complete"] = "microslip-roots", int(found.complete)
+        file.attrs["values"] = json.dumps(dict(values))
+        where = file.create_group("roots")
+        for name, column in found.columns.items():
+            hdf5.put(where, name, np.array(column), dims=("root",))
+        hdf5.put(where, "s", found.roots.s, "1/s", ("root",))
+        for name, vectors in (("shape", found.roots.x), ("left", found.roots.y)):
+            hdf5.put(where, name, vectors, dims=("coordinate", "root"))
+        for name, column in over.columns.items() if over else ():
+            hdf5.put(file.require_group("over"), name, column, dims=("row",))

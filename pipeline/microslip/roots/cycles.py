@@ -20,11 +20,12 @@ from ..bifurcation.dynamics import Dynamics
 from ..bifurcation.equilibria import Hopf
 from ..data import Array
 from ..errors import at
+from ..progress import Report
 from ..results import Journal
+from ..results.journal import once
 from ..settings.numbers import Model, Number, Positive
 from ..system.assembly import Assembly
 
-Report = Callable[[str], None]
 Under = Callable[[Mapping[str, float], str], Assembly]
 """The assembly of a case with other values of keys; the key that says so."""
 
@@ -140,34 +141,32 @@ class _Work:
 
         self.report(f"equations over {asked.parameter}")
         system = mechanics.dynamics(make, asked.start, asked.stop)
-        known = self.journal.of(KEPT).get(number)
-        if known is not None:
-            return [_unpacked(known, f"{i}/", system) for i in range(int(known["count"]))]
+        kept = self.journal.of(KEPT).get(number)
+        if kept is not None:
+            return [_unpacked(kept, f"{i}/", system) for i in range(int(kept["count"]))]
         begin = sliding.equilibrium(sliding.of(make(asked.start)))
         with at(f"stability.cycle: {asked.parameter}"):
-            found = cycles(system, begin, asked.start, asked.stop, harmonics, self.band, asked.points, self.report)
-        point: dict[str, Any] = {"count": len(found)}
-        for i, c in enumerate(found):
+            born = cycles(system, begin, asked.start, asked.stop, harmonics, self.band, asked.points, self.report)
+        point: dict[str, Any] = {"count": len(born)}
+        for i, c in enumerate(born):
             point |= _packed(c, f"{i}/")
         self.journal.keep(KEPT, number, point)
-        return found
+        return born
 
     def judged(self, c: Cycles, name: str, thirds: Sequence[int], accuracy: float | None) -> Cycles:
         """The cycles with orbits at so many thirds of the branch checked, see `bifurcation.cycles.checked`."""
         series = f"orbits checked {name}"
         for number in dict.fromkeys((len(c.orbits) - 1) * k // 3 for k in thirds):
-            known = self.journal.of(series).get(number)
             orbit = c.orbits[number]
-            if known is not None:
-                one = Checked(
-                    Harmonics(known["c"], float(known["omega"]), orbit.p), float(known["error"]),
-                    float(known["drift"]), known["swing"], known["multipliers"],
-                )  # fmt: skip
-            else:
-                one = checked(c.system, orbit, accuracy, self.report)
-                rest = {"error": one.error, "drift": one.drift, "swing": one.swing, "multipliers": one.multipliers}
-                self.journal.keep(series, number, {"c": one.orbit.c, "omega": one.orbit.omega, **rest})
-            c = replace(c, checked={**c.checked, number: one})
+
+            def made(orbit: Harmonics = orbit, system: Dynamics = c.system) -> dict[str, Any]:
+                one = checked(system, orbit, accuracy, self.report)
+                rest = {key: value for key, value in vars(one).items() if key != "orbit"}
+                return {"c": one.orbit.c, "omega": one.orbit.omega, **rest}
+
+            row = dict(once(self.journal, series, number, made))
+            orbit = Harmonics(row.pop("c"), float(row.pop("omega")), orbit.p)
+            c = replace(c, checked={**c.checked, number: Checked(orbit, **row)})
         return c
 
 
@@ -190,19 +189,19 @@ def sentences_of(c: Cycles, over: Cycle) -> list[str]:
     """Where a limit cycle is born, of which kind, how far it was followed; of its checked orbits their harmonics, how
     a motion in time keeps to them, and whether they are stable."""
     unit, last = f" {over.unit}" if over.unit else "", c.orbits[-1]
-    said = [
+    sentences = [
         f"Hopf point at {over.parameter} {c.hopf.p:.6g}{unit}, {c.hopf.omega / (2 * np.pi):.6g} Hz, {c.kind}: its "
         f"limit cycle by {over.harmonics} harmonics to {last.p:.4g}{unit}, {last.omega / (2 * np.pi):.6g} Hz",
         *([f"limit cycle {c.lost}"] if c.lost else []),
     ]
     for one in c.checked.values():
         wide = "" if one.error <= over.accuracy else f", more than the {over.accuracy:.1e} asked for"
-        said.append(
+        sentences.append(
             f"limit cycle at {one.orbit.p:.4g}{unit}: {one.orbit.count} harmonics, estimated error {one.error:.1e}"
             f"{wide}; in {PERIODS} periods a motion in time leaves it by {one.drift:.1e} of its amplitude; "
             f"{'stable' if one.stable else 'unstable'}, largest Floquet multiplier {abs(one.multipliers[0]):.4g}"
         )
-    return said
+    return sentences
 
 
 def sentence_of_relief(found: Born, over: Cycle) -> list[str]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -13,15 +13,15 @@ from ..linalg import quadratic
 from ..linalg.parametric import Family
 from ..linalg.quadratic import Window
 from ..linalg.sampled import Sampled, sampled
+from ..progress import Report
+from .drawing import Shown, new_axes, over
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-Report = Callable[[str], None]
-
 
 @dataclass(frozen=True, repr=False)
-class Diagram:
+class Diagram(Shown):
     """Roots in a window at values of a parameter.
 
     Attributes:
@@ -93,12 +93,6 @@ class Diagram:
                 last.append(j)
         return np.array(rows).reshape(len(rows), len(self.values))
 
-    def to_dataframe(self) -> Any:
-        """A `pandas.DataFrame`, one row a root at a value."""
-        import pandas
-
-        return pandas.DataFrame(self.columns)
-
     def to_xarray(self) -> Any:
         """An `xarray.Dataset` over branch and parameter: frequency (Hz) and growth (1/s)."""
         import xarray
@@ -116,14 +110,9 @@ class Diagram:
 
     def plot(self, axes: Axes | None = None, what: Literal["growth", "frequency"] = "growth") -> Axes:
         """Draw growth rates or frequencies over the parameter; in colour what grows somewhere."""
-        from .drawing import new_axes, over
-
-        axes = new_axes() if axes is None else axes
+        axes = axes or new_axes()
         over(axes, self, what == "frequency")
         return axes
-
-    def __repr__(self) -> str:
-        return f"<Diagram: {self.sentence}>"
 
 
 def _partners(before: ComplexArray, now: ComplexArray) -> list[tuple[int, int]]:
@@ -158,13 +147,13 @@ def diagram(
     if family.terms[0].matrix.shape[0] > quadratic.DENSE:
         low, high = float(values[0]), float(values[-1])
         basis = sampled(family, parameter, low, high, window, tolerance=tolerance, values=at, report=report)
-    found = []
+    each = []
     for value in values:
         if basis is not None:
-            found.append(basis.at(float(value))[:2])
+            each.append(basis.at(float(value))[:2])
             continue
         s = quadratic.every_value(family.at({**(at or {}), parameter: float(value)}))
         s = s[window.holds(s)]
-        found.append((s[np.argsort(s.imag, kind="stable")], 1e-12 * np.abs(s)))
-    s, error = zip(*found, strict=True)
+        each.append((s[np.argsort(s.imag, kind="stable")], 1e-12 * np.abs(s)))
+    s, error = zip(*each, strict=True)
     return Diagram(parameter, values, s, error, neutral, window, basis)

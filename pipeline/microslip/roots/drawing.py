@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from abc import ABC, abstractmethod
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -35,6 +36,27 @@ def new_axes() -> Axes:
     return plt.subplots(layout="constrained")[1]
 
 
+class Shown(ABC):
+    """What has an answer in one sentence, and columns by their names."""
+
+    @property
+    @abstractmethod
+    def sentence(self) -> str: ...
+
+    @property
+    @abstractmethod
+    def columns(self) -> dict[str, Any]: ...
+
+    def to_dataframe(self) -> Any:
+        """The columns as a `pandas.DataFrame`."""
+        import pandas
+
+        return pandas.DataFrame(self.columns)
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__}: {self.sentence}>"
+
+
 def plane(axes: Axes, found: Spectrum) -> None:
     """Growth rate to the right, frequency upwards; the side that grows is tinted."""
     verdict, kilo = np.array(found.verdict), _kilo(found.frequency)
@@ -65,9 +87,10 @@ def plane(axes: Axes, found: Spectrum) -> None:
 
 def over(axes: Axes, found: Diagram, frequency: bool) -> None:
     """Growth rates, or frequencies, over the parameter: in colour what grows anywhere, the others grey."""
-    growing, others = _sorted(found)
-    x, label = _abscissa(found)
-    every = [*growing, *others]
+    every, speed = list(found.branches), found.parameter == "speed"
+    growing = sorted((b for b in every if _grows(b, found)), key=lambda b: -float(np.nanmax(b.real)))
+    others = [b for b in every if not _grows(b, found)]
+    x, label = to_rpm(found.values) if speed else found.values, "speed in rpm" if speed else found.parameter
     kilo = _kilo(np.concatenate([b.imag[np.isfinite(b)] for b in every]) / (2 * np.pi)) if every else 1.0
 
     def values(b: ComplexArray) -> Array:
@@ -114,14 +137,6 @@ def _levels(top: float) -> Array:
     return np.arange(1, int(top / step) + 1) * step if top > step else np.array([0.5 * top])
 
 
-def _sorted(found: Diagram) -> tuple[list[ComplexArray], list[ComplexArray]]:
-    """Branches that grow anywhere, the fastest first, and the others."""
-    growing, others = list[ComplexArray](), list[ComplexArray]()
-    for b in found.branches:
-        (growing if _grows(b, found) else others).append(b)
-    return sorted(growing, key=lambda b: -float(np.nanmax(b.real))), others
-
-
 def _grows(b: ComplexArray, found: Diagram) -> bool:
     """Whether a branch grows by more than its error somewhere."""
     for value, s, error in zip(b, found.s, found.error, strict=True):
@@ -147,9 +162,3 @@ def _growth_scale(axes: Axes, growing: list[ComplexArray]) -> None:
         axes.set_yticks(ticks, [f"{t:g}" for t in ticks])
         axes.set_yticks([], minor=True)
         axes.set_ylim(low, high)
-
-
-def _abscissa(found: Diagram) -> tuple[Array, str]:
-    if found.parameter == "speed":
-        return to_rpm(found.values), "speed in rpm"
-    return found.values, found.parameter

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,13 +12,12 @@ from ..data import ComplexArray
 from ..errors import UserError
 from ..linalg import quadratic, winding
 from ..linalg.quadratic import Quadratic, Window
-from ..modal.unreduced import Unreduced
+from ..modal.compute import Unreduced
+from ..progress import Report
 from ..sliding import Tangent
 from ..system.assembly import Assembly
 from ..system.spin import Spin
 from .spectrum import Spectrum
-
-Report = Callable[[str], None]
 
 
 def full_matrices(bodies: Mapping[str, Unreduced], assembly: Assembly, contacts: Sequence[Tangent]) -> Quadratic:
@@ -65,9 +64,9 @@ def growing(Q: Quadratic, window: Window, near: ComplexArray, report: Report = l
     Raises:
         NotConverged: the matrices are singular throughout.
     """
-    found = quadratic.search(Q, window)
-    inside = window.holds(found.s)
-    roots = quadratic.refined(Q, found.s[inside], found.x[:, inside])
+    search = quadratic.search(Q, window)
+    in_window = window.holds(search.s)
+    roots = quadratic.refined(Q, search.s[in_window], search.x[:, in_window])
     report(f"{len(roots)} roots of {Q.n} coordinates; counting")
     count = winding.missed(Q, window, np.concatenate([roots.s, near[~window.holds(near)]]))
     return Spectrum(roots, window, roots.rounding, count, False)

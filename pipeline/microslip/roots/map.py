@@ -4,23 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from .. import sliding
 from ..bifurcation import mechanics
-from ..data import Array
+from ..data import Array, largest
 from ..errors import NotConverged, UserError
 from ..linalg import quadratic
 from ..linalg.quadratic import Quadratic, Window
-from ..results.journal import Journal
+from ..progress import Report
+from ..results.journal import Journal, once
 from ..system.assembly import Assembly
+from .drawing import Shown, new_axes, states
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-
-Report = Callable[[str], None]
 
 
 @dataclass(frozen=True)
@@ -42,7 +43,7 @@ class Axis:
 
 
 @dataclass(frozen=True, repr=False)
-class Map:
+class Map(Shown):
     """Roots of a window at every pair of values.
 
     Attributes:
@@ -76,13 +77,13 @@ class Map:
     @property
     def limit(self) -> Array:
         """(y,) the smallest value of x at which a root begins to grow, by straight lines; NaN where none does."""
-        found = np.full(len(self.y.values), np.nan)
+        limits = np.full(len(self.y.values), np.nan)
         for i, g in enumerate(self.growth):
             up = np.flatnonzero((g[:-1] <= 0) & (g[1:] > 0))
             if len(up):
                 j = up[0]
-                found[i] = np.interp(0.0, g[j : j + 2], self.x.values[j : j + 2])
-        return found
+                limits[i] = np.interp(0.0, g[j : j + 2], self.x.values[j : j + 2])
+        return limits
 
     @property
     def columns(self) -> dict[str, Array]:
@@ -93,22 +94,11 @@ class Map:
             "growth_1_s": self.growth.ravel(), "frequency_Hz": self.frequency.ravel(),
         }  # fmt: skip
 
-    def to_dataframe(self) -> Any:
-        """A `pandas.DataFrame`, one row a state."""
-        import pandas
-
-        return pandas.DataFrame(self.columns)
-
     def plot(self, axes: Axes | None = None) -> Axes:
         """Draw the number of roots that grow in colour, growth rates as lines, and the Hopf lines between."""
-        from .drawing import new_axes, states
-
-        axes = new_axes() if axes is None else axes
+        axes = axes or new_axes()
         states(axes, self)
         return axes
-
-    def __repr__(self) -> str:
-        return f"<Map: {self.sentence}>"
 
 
 KEPT = "rows of the map"
@@ -128,16 +118,14 @@ def over_map(
     Raises:
         UserError: what `sliding.of` refuses; contacts that remember.
     """
-    rows = {} if journal is None else journal.of(KEPT)
-    for i, value in enumerate(y.values):
-        if i not in rows:
-            report(f"{y.label} {value:.4g}, {i + 1} of {len(y.values)}")
-            rows[i] = _solved(_row(make, x, y.at(value)), x, window, neutral)
-            if journal is not None:
-                journal.keep(KEPT, i, rows[i])
-    unstable, growth, frequency = (
-        np.array([rows[i][key] for i in range(len(y.values))]) for key in ("unstable", "growth", "frequency")
-    )
+
+    def row(i: int, value: float) -> dict[str, Any]:
+        report(f"{y.label} {value:.4g}, {i + 1} of {len(y.values)}")
+        return _solved(_row(make, x, y.at(value)), x, window, neutral)
+
+    rows = [once(journal, KEPT, i, partial(row, i, value)) for i, value in enumerate(y.values)]
+    names = "unstable", "growth", "frequency"
+    unstable, growth, frequency = (np.array([r[name] for r in rows]) for name in names)
     return Map(x, y, unstable, growth, frequency, neutral, window, int(rows[0]["coordinates"]))
 
 
@@ -153,19 +141,15 @@ def _solved(row: Callable[[float], sliding.Sliding], x: Axis, window: Window, ne
         except NotConverged:
             z = None
             continue
-        roots = _roots(s, z)
+        C, K = sliding.linearised(s, z)
+        roots = quadratic.every_value(Quadratic(np.eye(len(K)), C, K))
         roots = roots[window.holds(roots)]
-        tolerance = np.maximum(neutral, quadratic.ROUNDING * np.abs(roots).max(initial=0.0))
+        tolerance = np.maximum(neutral, quadratic.ROUNDING * largest(roots))
         unstable[j] = (roots.real > tolerance).sum()
         if len(roots):
             top = roots[np.argmax(roots.real)]
             growth[j], frequency[j] = top.real, top.imag / (2 * np.pi)
     return {"unstable": unstable, "growth": growth, "frequency": frequency, "coordinates": count}
-
-
-def _roots(s: sliding.Sliding, z: Array) -> Any:
-    C, K = sliding.linearised(s, z)
-    return quadratic.every_value(Quadratic(np.eye(len(K)), C, K))
 
 
 def _row(

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,11 +11,11 @@ from ..data import Array
 from ..linalg import quadratic, winding
 from ..linalg.quadratic import Quadratic, Roots, Window
 from ..linalg.winding import Count
+from ..progress import Report
+from .drawing import Shown, new_axes, plane
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-
-Report = Callable[[str], None]
 
 DEVIATIONS = 3.0
 """Standard deviations of a growth rate, by the accuracy of the matrices, within which its sign is not decided."""
@@ -26,7 +25,7 @@ BLOCKS = (2, 4, 8)
 
 
 @dataclass(frozen=True, repr=False)
-class Spectrum:
+class Spectrum(Shown):
     """The roots s of a window, in the order of their frequencies.
 
     Attributes:
@@ -96,12 +95,6 @@ class Spectrum:
             return f"INCOMPLETE: the argument principle counts {total}"
         return f"complete: counted {total} by the argument principle"
 
-    def to_dataframe(self) -> Any:
-        """A `pandas.DataFrame`, one row a root."""
-        import pandas
-
-        return pandas.DataFrame(self.columns)
-
     def to_xarray(self) -> Any:
         """An `xarray.Dataset` over the number of the root, vectors over coordinates included."""
         import xarray
@@ -112,14 +105,9 @@ class Spectrum:
 
     def plot(self, axes: Axes | None = None) -> Axes:
         """Draw the roots in the complex plane: growth rate to the right, frequency upwards."""
-        from .drawing import new_axes, plane
-
-        axes = new_axes() if axes is None else axes
+        axes = axes or new_axes()
         plane(axes, self)
         return axes
-
-    def __repr__(self) -> str:
-        return f"<Spectrum: {self.sentence}>"
 
     @property
     def columns(self) -> dict[str, Any]:
@@ -173,6 +161,6 @@ def _judged(
 ) -> Spectrum:  # fmt: skip
     inside = window.holds(roots.s)
     if not inside.all():
-        roots, count = roots.only(inside), count and replace(count, missed=count.missed)
+        roots = roots.only(inside)
     tolerance = np.maximum(np.maximum(DEVIATIONS * accuracy * roots.spread, roots.rounding), neutral)
     return Spectrum(roots, window, tolerance, count, whole)

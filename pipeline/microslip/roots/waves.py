@@ -64,7 +64,7 @@ def waves(points: Array, u: ComplexArray, axis: Array, centre: Array) -> Waves:
     most = min(HIGHEST, (len(np.unique(np.round(phi, 6))) - 1) // 2)
     k = np.arange(most + 1)
     basis = np.hstack([np.exp(-1j * np.outer(phi, k)), np.exp(1j * np.outer(phi, k[1:]))])
-    found = np.linalg.lstsq(basis, u[rim] @ n, rcond=None)[0]
-    forward, backward = found[: most + 1], np.concatenate([found[:1], found[most + 1 :]])
+    amplitudes = np.linalg.lstsq(basis, u[rim] @ n, rcond=None)[0]
+    forward, backward = amplitudes[: most + 1], np.concatenate([amplitudes[:1], amplitudes[most + 1 :]])
     forward[0], backward[0] = 0.5 * forward[0], 0.5 * backward[0]
     return Waves(forward, backward)

@@ -34,7 +34,8 @@ def meant(path: Path, root: Path = Path("."), case: bool = False) -> Path:
     found = next((p for p in places if p.is_file()), None)
     if found is not None or path.is_file():
         return found or path
-    cases, bodies = ({p.stem for p in root.glob("pipeline/cases/*.toml")}, _bodies_in(root))
+    cases = {p.stem for p in root.glob("pipeline/cases/*.toml")}
+    bodies = {p.parent.name for p in root.glob("geometry/*/body.toml")}
     known, what = sorted(cases if case else cases | bodies), "case" if case else "body or case"
     near = difflib.get_close_matches(name, known, 1)
     said = (
@@ -43,9 +44,14 @@ def meant(path: Path, root: Path = Path("."), case: bool = False) -> Path:
     raise UserError(f"{path}: there is no {what} here or of this name; {said}")
 
 
+def case_file(case: Path, root: Path = Path(".")) -> Path:
+    """A case.toml: itself, the one in a folder, of a name or of products, or ``sample``, which travels with the
+    package."""
+    if str(case) == "sample" and not case.exists():
+        return Path(__file__).parents[1] / "samples" / "case.toml"
+    case = meant(case, root, case=True)
+    return case / "case.toml" if case.is_dir() else case
+
+
 PRODUCTS = ("basis.h5", "response.h5", "response.csv", "report.html", "response.html")
 """Files in build/NAME that stand for the case or body that they are made of."""
-
-
-def _bodies_in(root: Path) -> set[str]:
-    return {p.parent.name for p in root.glob("geometry/*/body.toml")}

@@ -8,11 +8,12 @@ import math
 import re
 import sys
 from functools import cache
-from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, PrivateAttr
+
+from .texts import texts_of
 
 LENGTH = "length"
 """Marks a number as a length in the file's unit."""
@@ -161,19 +162,10 @@ def _said(model: type[BaseModel], name: str, field: Any) -> tuple[str, str]:
 
 @cache
 def _texts(module: str) -> dict[tuple[str, str], str]:
-    """Class and key -> text below it; pydantic's own way costs every import 3 ms a class."""
     try:
-        classes = ast.walk(ast.parse(inspect.getsource(sys.modules[module])))
+        return texts_of(ast.parse(inspect.getsource(sys.modules[module])))
     except (KeyError, OSError, TypeError):
         return {}
-    return {
-        (of.name, ast.unparse(key.target)): str(text.value.value)
-        for of in classes
-        if isinstance(of, ast.ClassDef)
-        for key, text in pairwise(of.body)
-        if isinstance(key, ast.AnnAssign) and isinstance(text, ast.Expr)
-        if isinstance(text.value, ast.Constant)
-    }
 
 
 def is_length(field: Any) -> bool:

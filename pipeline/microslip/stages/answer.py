@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import cached_property
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -14,13 +14,14 @@ from ..basis import read_basis
 from ..case import CaseSettings, checkpoint, load_case
 from ..case.assemble import Built, build
 from ..data import ModalBasis
-from ..errors import UserError, of_file
+from ..errors import UserError
 from ..files import store
 from ..files.tables import columns_csv
-from ..pictures.plots import empty_figure, save_figure
+from ..pictures.plots import empty_figure, save, save_figure
 from ..report.page import answer_page
 from ..results import Journal, open_journal
 from .checkpoint import inputs_of
+from .places import existing_files, modal_files
 from .stage import Made, Report, Stage, folder_of_case, hash_of_code
 
 
@@ -64,10 +65,10 @@ def made(
     Args:
         inputs: what it depends on, besides pictures. title: of the page. case: begins the titles of diagrams.
     """
-    points, depends = stage.product.with_suffix(".points"), {**inputs, "code": hash_of_code(stage.code)}
+    points = stage.product.with_suffix(".points")
 
     def work() -> Written:
-        with open_journal(points, store.hash_settings(depends), {"case": case}, stage.force) as journal:
+        with open_journal(points, depends(stage, inputs), {"case": case}, stage.force) as journal:
             try:
                 answer = solve(journal)
             except UserError:
@@ -82,6 +83,11 @@ def made(
     return found
 
 
+def depends(stage: Stage, inputs: Mapping[str, Any]) -> str:
+    """Hash of all that the finished parts of an answer depend on."""
+    return store.hash_settings({**inputs, "code": hash_of_code(stage.code)})
+
+
 def written(answer: Answer, name: str, folder: Path, title: str, pictures: bool, case: str = "") -> Written:
     """The files of an answer, the page first, and what is said of them.
 
@@ -90,7 +96,7 @@ def written(answer: Answer, name: str, folder: Path, title: str, pictures: bool,
     """
     wanted = {file: write for file, write in answer.files.items() if pictures or not file.endswith(".png")}
     for file, write in wanted.items():
-        write(folder / file)
+        save(write, folder / file) if file.endswith(".png") else write(folder / file)
     shown = [folder / file for file in wanted if file.endswith(".png")]
     made = [*_data(name, answer, folder), *(folder / file for file in wanted if not file.endswith(".png"))]
     moving: Sequence[Path] = ()
@@ -178,38 +184,14 @@ class CaseJob:
         return inputs_of(self.raw, self.settings, self.files)
 
 
-@dataclass(frozen=True)
-class RollJob:
-    """One case of rolling contact on its way to an answer.
-
-    Attributes:
-        path: the case file. root: where the folder of its name is made. Others: see `CaseJob`.
-    """
-
-    path: Path
-    root: Path = Path("build")
-    assignments: Sequence[str] = ()
-    force: bool = False
-    report: Report = lambda _: None
-    pictures: bool = True
-
-    def stage(self, case: str, name: str, module: str) -> Stage:
-        """The stage whose product is ``name.json``, made by a module. case: its name."""
-        product = folder_of_case(self.path, case, self.root) / f"{name}.json"
-        return Stage(product, (module,), self.force, self.report, case=self.path)
-
-    def answer(
-        self, stage: Stage, case: str, raw: Mapping[str, Any], files: Iterable[Path | str],
-        title: str, solve: Callable[..., Answer],
-    ) -> Written:  # fmt: skip
-        """The answer that a stage's product holds, made where it is not up to date.
-
-        Args:
-            case: its name. raw: it as a table. files: that it names; what is missing is told where
-                it is read. title: of the page. solve: is called with a journal, and `report`.
-        """
-        there = [file for f in files if (file := self.path.parent / f).is_file()]
-        inputs = {"case": raw, "files": [store.hash_file(file) for file in there]}
-        with of_file(self.path):
-            words = f"{case}: {title}"
-            return made(stage, inputs, words, self.pictures, partial(solve, report=self.report), case)
+def case_job(
+    case: Path, basis: Path | None = None, assignments: Sequence[str] = (), force: bool = False,
+    report: Report = lambda _: None, pictures: bool = True, root: Path = Path("."), make: bool = True,
+) -> CaseJob:  # fmt: skip
+    """A case on its way. basis: of its only body; if not given its modal files are made where they are not up to date,
+    or, unless `make`, have to be there. root: where paths begin."""
+    settings, _ = load_case(case, list(assignments))
+    folder = folder_of_case(case, settings.name, root / "build")
+    made = make and basis is None
+    files = modal_files(settings, root, report) if made else existing_files(settings, basis, root)
+    return CaseJob(case, files, folder, assignments, force, report, pictures)

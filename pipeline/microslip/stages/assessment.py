@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -26,7 +27,6 @@ from .stage import Report
 
 if TYPE_CHECKING:
     from ..operating.contact_maps import ContactMap
-    from ..progress import Report
 
 ENDLESS = MaterialLimits(fatigue_strength=1e29, tensile_strength=1e30)
 """Limits of a case that gives none: the worst place is then that of the largest amplitude."""
@@ -268,24 +268,24 @@ def draw(
         Name -> file; names are those under which the report shows them.
     """
     from ..pictures import operating
+    from ..pictures.plots import save
 
     drawn: dict[str, Path] = {}
-    curves = {n: operating.stress_curve(s.frequency[i], p, s.converged[i]) for n, (s, _, i, p) in found.sweeps.items()}
+    curves = {
+        n: (s.frequency[i], np.where(s.converged[i], 1e-6 * p.amplitude, np.nan))  # MPa
+        for n, (s, _, i, p) in found.sweeps.items()
+    }
     if curves and found.everywhere:
         label, title = f"largest stress amplitude of {found.whose} in MPa", f"{case}: largest stress of {found.whose}"
-        drawn["stress over frequency"] = operating.over_frequency_plot(
-            curves, label, title, folder / "stress_over_frequency.png", found.lifted,
-            found.unsure or operating.all_sure,
-        )  # fmt: skip
+        path, unsure = folder / "stress_over_frequency.png", found.unsure or operating.all_sure
+        draw = partial(operating.over_frequency_plot, curves, label, title, lifted=found.lifted, unsure=unsure)
+        drawn["stress over frequency"] = save(draw, path)
     if lines := over_force(found):
-        drawn["stress over normal force"] = operating.over_normal_force_plot(
-            lines,
-            f"largest stress amplitude of {found.whose} in MPa",
-            f"{case}: largest stress of {found.whose} at its resonances",
-            folder / "stress_over_normal_force.png",
-            found.not_valid,
-            doubtful(found),
-        )
+        label = f"largest stress amplitude of {found.whose} in MPa"
+        title = f"{case}: largest stress of {found.whose} at its resonances"
+        path, doubts = folder / "stress_over_normal_force.png", doubtful(found)
+        plot = partial(operating.over_normal_force_plot, lines, label, title, lifted=found.not_valid, unsure=doubts)
+        drawn["stress over normal force"] = save(plot, path)
     top = found.highest
     if top is not None:
         drawn |= _at_worst(found, top, basis, case, folder, scenes)
@@ -294,7 +294,8 @@ def draw(
         path = folder / f"{title.replace(' ', '_')}.png"
         where = f", {rubs.stressed_at:.5g} Hz, $F_N$ = {rubs.normal_force:g} N" if rubs is not None else ""
         some = f"\n{len(patches)} of {contacts} contacts are shown" if len(patches) < contacts else ""
-        drawn[title] = operating.contact_map_plot(patches, f"{case}: {title}{where}{some}", path)
+        words = f"{case}: {title}{where}{some}"
+        drawn[title] = save(partial(operating.contact_map_plot, patches, words), path)
     return drawn
 
 
@@ -350,14 +351,14 @@ def _at_worst(
     found: Assessment, top: StressedResonance, basis: ModalBasis, case: str, folder: Path, scenes: bool
 ) -> dict[str, Path]:
     from ..pictures import operating
+    from ..pictures.plots import save
 
     drawn: dict[str, Path] = {}
     motion, cycle = found.at(top)
     where = f"{top.stressed_at:.5g} Hz, $F_N$ = {top.normal_force:g} N"
     if found.limits is not None:
-        drawn["Haigh diagram"] = operating.haigh_plot(
-            cycle, found.limits, top.worst, f"{case}: {where}", folder / "haigh.png"
-        )
+        haigh = partial(operating.haigh_plot, cycle, found.limits, top.worst, f"{case}: {where}")
+        drawn["Haigh diagram"] = save(haigh, folder / "haigh.png")
     if scenes and basis.mesh.n_cells:
         from ..pictures.lettering import save_png
         from ..pictures.scene import quiet_vtk

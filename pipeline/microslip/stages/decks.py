@@ -4,7 +4,6 @@ and preload."""
 from __future__ import annotations
 
 import re
-import shlex
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -13,7 +12,7 @@ import numpy as np
 
 from ..data import Array, Indices, Joint, Mesh
 from ..errors import UserError
-from ..files.store import ordinary, write_text
+from ..files.store import ordinary
 from ..mesh import UNITS, boundary_facets, read_mesh, suffix_of
 from ..mesh.cards import files_of
 from ..mesh.chosen import bodies, of_instances, with_parts
@@ -25,12 +24,11 @@ from .parts import (
     Patch,
     add_lines,
     apart_cad,
-    case_lines,
-    drive,
     joint_lines,
     meeting,
     sentence,
     shape_of,
+    with_case,
     with_names,
 )
 from .stage import Report
@@ -44,7 +42,8 @@ def import_deck(
     Raises:
         UserError: unreadable files, files that are there already.
     """
-    if suffix_of(file) != ".inp" or not _touches(file):
+    deck = [f.read_bytes() for f in files_of(file) if f.is_file()] if suffix_of(file) == ".inp" else []
+    if not any(map(PAIR.search, deck)):
         return import_file(file, folder, unit, report=report)
     unit = length_unit(unit, file)
     mesh = read_mesh(file, unit)
@@ -116,18 +115,8 @@ def _assembly(
         new = import_file(file, part.body.parent, unit, group, name=part.new_name)
         told += new.told[:-1]
         add_lines(part, joint_lines(parts, number, patches, unit))
-    flat = [patch for patch in patches if patch.normal is not None]
-    if not flat:
-        return Imported(
-            home, (*told, *said, "warning: none of the contacts is flat, so no case is written")
-        )
-    shapes = [shape_of(mesh, UNITS[unit]) for mesh in meshes]
-    driven = flat[0].parts[0]
-    rows = drive(parts[driven], _free(meshes[driven], UNITS[unit]), flat[0])
-    lines = case_lines(home, parts, flat, shapes, unit, rows, force)
-    write_text(home / "case.toml", "\n".join(lines) + "\n")
-    last = f"{home / 'case.toml'}: ready. Correct its numbers, then: microslip run {shlex.quote(str(home))}"
-    return Imported(home / "case.toml", (*told, *said, last))
+    shapes = [replace(shape_of(m, UNITS[unit]), points=_free(m, UNITS[unit])) for m in meshes]
+    return with_case(home, parts, patches, shapes, unit, [*told, *said], force)
 
 
 def _free(mesh: Mesh, metres: float) -> Array:
@@ -139,9 +128,7 @@ def _free(mesh: Mesh, metres: float) -> Array:
     return mesh.points[free if len(free) else surface] / metres
 
 
-def _touches(file: Path) -> bool:
-    found = re.compile(rb"^\s*\*\s*CONTACT\s+PAIR", re.IGNORECASE | re.MULTILINE)
-    return any(found.search(f.read_bytes()) for f in files_of(file) if f.is_file())
+PAIR = re.compile(rb"^\s*\*\s*CONTACT\s+PAIR", re.IGNORECASE | re.MULTILINE)
 
 
 Ends = tuple[int, int]

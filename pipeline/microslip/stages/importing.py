@@ -70,8 +70,11 @@ def import_file(
         raise UserError(f"{file}: there is no such file; correct the path")
     unit = length_unit(unit, file)
     name = name or body_name((folder.resolve().name if folder else "") or file.stem)
-    if file.suffix.lower() in _UNIVERSAL and _holds_modes(file):
-        return _measured(file, (folder or Path(name)) / "basis.h5", unit, name)
+    if file.suffix.lower() in _UNIVERSAL:
+        from ..exchange.measured import holds_modes
+
+        if holds_modes(file):
+            return _measured(file, (folder or Path(name)) / "basis.h5", unit, name)
     target = (folder or Path(name)) / "body.toml"
     refuse_taken(target)
     kind = suffix_of(file)
@@ -113,12 +116,6 @@ def body_name(stem: str, none: str = "part") -> str:
 
 
 _UNIVERSAL = (".uff", ".uf", ".unv", ".u")
-
-
-def _holds_modes(file: Path) -> bool:
-    from ..exchange.measured import holds_modes
-
-    return holds_modes(file)
 
 
 def _measured(file: Path, target: Path, unit: str, name: str) -> Imported:
@@ -181,14 +178,11 @@ def _fixed(mesh: Mesh) -> Indices:
 
 def _count(mesh: Mesh, held: bool) -> int:
     """How many modes are asked for: those of the sector at a nodal diameter have one cut face."""
-    cut = 0 if mesh.sector is None else 3 * len(_points_of(mesh, mesh.sector.faces[0]))
+    face = "" if mesh.sector is None else mesh.sector.faces[0]
+    cut = 3 * len(mesh.set_points(face)) if face in {*mesh.faces, *mesh.point_sets} else 0
     ties = 0 if mesh.ties is None else mesh.ties.rows.shape[0]
     fixed = len(np.unique(_fixed(mesh))) if held else 0
     return max(min(USUAL, 3 * mesh.n_points - fixed - cut - ties - 2), 1)
-
-
-def _points_of(mesh: Mesh, name: str) -> Indices:
-    return mesh.set_points(name) if name in {*mesh.faces, *mesh.point_sets} else joined(())
 
 
 def _hold(mesh: Mesh) -> bool:
@@ -294,21 +288,52 @@ def _cad(file: Path, folder: Path, unit: str, report: Report) -> tuple[list[str]
     if text.count("\nsolid ") > 1:
         apart = f"microslip import {shlex.quote(str(file))} --apart"
         told.append(f"the solids are joined to one body; each as a body of its own, with contacts between: {apart}")
-    lines = ["free = true               # nothing is held yet", "", "[geometry]", f"cad = {_beside(file, folder)}", ""]
-    lines += ["# The surfaces of the file" + (":" if reason else f", shown in {picture.name}:")]
-    lines += [f"# {line}" for line in text.splitlines()[1:]]
-    lines += ['# Part of a surface: box with cut = true; where another body lies on it: touching = "other.step".']
-    lines += ["# Name those you need, each by one of surfaces, label, colour, box:"]
-    lines += ["#[[geometry.faces]]", '#name = "clamp"', "#surfaces = [1]"]
-    lines += ["#[[geometry.faces]]", '#name = "contact"', "#surfaces = [2]", ""]
-    lines += ["[mesh]", "#size = 5.0               # a fifteenth of the diagonal if not given", ""]
-    lines += ["[material]", 'name = "steel"', "density = 7850.0          # kg/m3", "young = 2.1e11            # Pa"]
-    lines += ["poisson = 0.3", "", "#[[supports]]             # then remove free = true at the top", '#face = "clamp"']
-    lines += ["#[[interfaces]]           # where it touches its neighbour", '#name = "contact"', '#face = "contact"']
-    lines += ["#[[excitations]]          # a force of 1 N", '#name = "shaker"', "#point = [0.0, 0.0, 0.0]"]
-    lines += ["#direction = [1.0, 0.0, 0.0]", "#[[monitors]]", '#name = "tip"', "#point = [0.0, 0.0, 0.0]"]
+    shown = "" if reason else f", shown in {picture.name}"
+    surfaces = "\n".join(f"# {line}" for line in text.splitlines()[1:])
+    lines = OF_CAD.format(cad=_beside(file, folder), shown=shown, surfaces=surfaces).splitlines()
     return [*lines, *_end()], told
 
+
+OF_CAD = """\
+free = true               # nothing is held yet
+
+[geometry]
+cad = {cad}
+
+# The surfaces of the file{shown}:
+{surfaces}
+# Part of a surface: box with cut = true; where another body lies on it: touching = "other.step".
+# Name those you need, each by one of surfaces, label, colour, box:
+#[[geometry.faces]]
+#name = "clamp"
+#surfaces = [1]
+#[[geometry.faces]]
+#name = "contact"
+#surfaces = [2]
+
+[mesh]
+#size = 5.0               # a fifteenth of the diagonal if not given
+
+[material]
+name = "steel"
+density = 7850.0          # kg/m3
+young = 2.1e11            # Pa
+poisson = 0.3
+
+#[[supports]]             # then remove free = true at the top
+#face = "clamp"
+#[[interfaces]]           # where it touches its neighbour
+#name = "contact"
+#face = "contact"
+#[[excitations]]          # a force of 1 N
+#name = "shaker"
+#point = [0.0, 0.0, 0.0]
+#direction = [1.0, 0.0, 0.0]
+#[[monitors]]
+#name = "tip"
+#point = [0.0, 0.0, 0.0]
+"""
+"""A body.toml around a CAD file."""
 
 USUAL = 20
 """Modes that are asked for where the body has as many."""

@@ -65,7 +65,7 @@ class Part:
 
 @dataclass(frozen=True)
 class Shape:
-    """points: (p, 3) of the surface of a part, at which it may be driven. box: (2, 3) its low and high corner."""
+    """points: (p, 3) of the surface of a part, at which it may be driven. box: (2, 3) low and high corner of it all."""
 
     points: Array
     box: Array
@@ -123,14 +123,22 @@ def import_parts(
             told += [text.splitlines()[0] for text in written]  # a table of surfaces stands in the body.toml as well
         add_lines(part, joint_lines(parts, number, patches, unit))
     told += [sentence(parts, patch, unit) for patch in patches]
-    flat = [patch for patch in patches if patch.normal is not None]
+    return with_case(home, parts, patches, shapes, unit, told)
+
+
+def with_case(
+    home: Path, parts: Sequence[Part], patches: Sequence[Patch], shapes: Sequence[Shape], unit: str, told: list[str],
+    force: str = "1000.0]       # N",
+) -> Imported:  # fmt: skip
+    """The parts with a case.toml of those contacts that are flat. force: end of the line of its normal forces."""
+    flat, case = [patch for patch in patches if patch.normal is not None], home / "case.toml"
     if not flat:
-        return Imported(home, (*told, "warning: none of the patches is flat, so no case is written"))
+        return Imported(home, (*told, "warning: none of the contacts is flat, so no case is written"))
     driven = flat[0].parts[0]
     rows = drive(parts[driven], shapes[driven].points, flat[0])
-    write_text(home / "case.toml", "\n".join(case_lines(home, parts, flat, shapes, unit, rows)) + "\n")
-    told.append(f"{home / 'case.toml'}: ready. Correct its numbers, then: microslip run {shlex.quote(str(home))}")
-    return Imported(home / "case.toml", tuple(told))
+    write_text(case, "\n".join(case_lines(home, parts, flat, shapes, unit, rows, force)) + "\n")
+    last = f"{case}: ready. Correct its numbers, then: microslip run {shlex.quote(str(home))}"
+    return Imported(case, (*told, last))
 
 
 def _parts(files: Sequence[Path], folder: Path | None) -> tuple[Path, list[Part]]:
@@ -232,7 +240,10 @@ def _found(parts: Sequence[Part], unit: str) -> tuple[list[Shape], list[Patch]]:
             f"{named}: where they touch can be told of CAD files or of meshes, "
             "all of one kind; import the others one by one"
         )
-    shapes, patches = (_of_cad if kinds == {True} else _of_meshes)([part.file for part in parts], unit)
+    files = [part.file for part in parts]
+    shapes, patches = (
+        _of_cad(files, unit) if kinds == {True} else meeting([read_mesh(f, unit) for f in files], UNITS[unit])
+    )
     return shapes, [with_names(parts, patch, patches) for patch in patches]
 
 
@@ -252,10 +263,6 @@ def _of_cad(files: Sequence[Path], unit: str) -> tuple[list[Shape], list[Patch]]
         made.append(Patch(tuple(touch["parts"]), touch["area"], normal, np.array([touch["box"]] * 2)))
     pairs = zip(found["corners"], found["boxes"], strict=True)
     return [Shape(np.array(corners), np.reshape(box, (2, 3))) for corners, box in pairs], made
-
-
-def _of_meshes(files: Sequence[Path], unit: str) -> tuple[list[Shape], list[Patch]]:
-    return meeting([read_mesh(file, unit) for file in files], UNITS[unit])
 
 
 def meeting(meshes: Sequence[Mesh], scale: float) -> tuple[list[Shape], list[Patch]]:
@@ -301,15 +308,11 @@ def joint_lines(
         lines += ["", f"{mark}[[geometry.faces]]       # where it touches {other.name}, {patch.area:.4g} {unit}2"]
         lines += [f'{mark}name = "{name}"', f"{mark}touching = {json.dumps(beside)}"]
         if not patch.alone:
-            lines += [f"{mark}box = [{', '.join(f'{v:.6g}' for v in _widened(patch.boxes[mine]))}]"]
+            low, high = patch.boxes[mine].reshape(2, 3)
+            more = 0.01 * float(np.linalg.norm(high - low))
+            lines += [f"{mark}box = [{', '.join(f'{v:.6g}' for v in (*(low - more), *(high + more)))}]"]
         lines += [f"{mark}[[interfaces]]", f'{mark}name = "{name}"', f'{mark}face = "{name}"']
     return lines
-
-
-def _widened(box: Array) -> Array:
-    """The box by a hundredth of its size larger on every side, (6,)."""
-    more = 0.01 * float(np.linalg.norm(box[3:] - box[:3]))
-    return np.concatenate([box[:3] - more, box[3:] + more])
 
 
 def add_lines(part: Part, lines: Sequence[str]) -> None:
@@ -348,7 +351,7 @@ def drive(part: Part, corners: Array, patch: Patch) -> tuple[str, str]:
 
 def case_lines(
     home: Path, parts: Sequence[Part], patches: Sequence[Patch], shapes: Sequence[Shape], unit: str,
-    rows: tuple[str, str], pressed: str = "1000.0]       # N",
+    rows: tuple[str, str], pressed: str,
 ) -> list[str]:  # fmt: skip
     """Lines of a case.toml of the parts and their flat contacts. pressed: end of the line of its normal forces."""
     driven, n = parts[patches[0].parts[0]].name, patches[0].normal
@@ -362,23 +365,27 @@ def case_lines(
         f'name = "{body_name(home.resolve().name)}"',
         f'excitation = "{driven}:{rows[0]}"   # move it and the monitor, in its body.toml, when you clamp there',
         "amplitude = 1.0             # N",
+        f'monitor = "{driven}:{rows[1]}"',
+        f'direction = "{axis}"',
+        "bodies = [                  # weak_springs, Hz: of what nothing holds; leave them out of supported bodies",
+        bodies,
+        "]",
     ]
-    lines += [f'monitor = "{driven}:{rows[1]}"', f'direction = "{axis}"']
-    lines += [
-        "bodies = [                  # weak_springs, Hz: of what nothing holds; leave them out of supported bodies"
-    ]
-    lines += [bodies, "]"]
     for patch in patches:
         one, other = (f"{parts[i].name}:{face}" for i, face in zip(patch.parts, patch.faces, strict=True))
         area = patch.area * UNITS[unit] ** 2
-        lines += ["", "[[contacts]]", f'interface = "{one}"', f'against = "{other}"']
-        lines += [f"normal_stiffness = {NORMAL_STIFFNESS * area:.2g}   # N/m of the whole patch: a guess by its area"]
-        lines += [f"tangential_stiffness = {TANGENTIAL_STIFFNESS * area:.2g}", f"friction = {patch.friction:g}"]
-        lines += ["points = [3, 3]"]
-    lines += ["", "# A guess for free parts, about the first bending of a beam as long as all of them:"]
-    lines += ["# when you clamp one, set the band anew; microslip modes tells the frequencies.", "[sweep]"]
+        lines += [
+            "", "[[contacts]]", f'interface = "{one}"', f'against = "{other}"',
+            f"normal_stiffness = {NORMAL_STIFFNESS * area:.2g}   # N/m of the whole patch: a guess by its area",
+            f"tangential_stiffness = {TANGENTIAL_STIFFNESS * area:.2g}", f"friction = {patch.friction:g}",
+            "points = [3, 3]",
+        ]  # fmt: skip
     return [
         *lines,
+        "",
+        "# A guess for free parts, about the first bending of a beam as long as all of them:",
+        "# when you clamp one, set the band anew; microslip modes tells the frequencies.",
+        "[sweep]",
         f"start = {float(f'{low:.2g}'):g}",
         f"stop = {float(f'{high:.2g}'):g}",
         "points = 100",

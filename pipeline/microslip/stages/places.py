@@ -18,34 +18,23 @@ from .job import ASKED, bodies_of, open_job, system_file
 from .modal import modes_stage, system_stage
 from .stage import Report, is_same, origin_of
 
+WHEEL_AND_RAIL, TYRE = frozenset({"wheel", "rail"}), frozenset({"tyre", "jumps"})
+"""Keys by which a case of rolling contact is known."""
 
-def _keys(path: Path) -> set[str]:
+
+def keys_of(path: Path) -> set[str]:
+    """Of a settings file; none of anything else."""
     return set(load_toml(path)) if path.is_file() and path.suffix == ".toml" else set()
 
 
-def is_rolling(path: Path) -> bool:
+def rolls(path: Path) -> bool:
     """True for a case of rolling contact."""
-    return _keys(path) >= {"wheel", "rail"}
-
-
-def is_kinematics(path: Path) -> bool:
-    """True for a case of wear by given kinematics."""
-    return _keys(path) >= {"wheel", "rail", "kinematics"}
-
-
-def is_tyre(path: Path) -> bool:
-    """True for a case of a tyre whose slip jumps."""
-    return _keys(path) >= {"tyre", "jumps"}
-
-
-def is_vehicle(path: Path) -> bool:
-    """True for a case of rolling contact with a vehicle."""
-    return _keys(path) >= {"wheel", "rail", "vehicle"}
+    return any(keys <= keys_of(path) for keys in (WHEEL_AND_RAIL, TYRE))
 
 
 def is_case(path: Path) -> bool:
     """True for a case file (it has a sweep, or bodies of which another thing is asked), False for a body file."""
-    keys = _keys(path)
+    keys = keys_of(path)
     return bool(keys & {"body", "sweep"}) or bool(keys & {"bodies"} and keys & ASKED)
 
 

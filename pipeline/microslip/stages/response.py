@@ -8,6 +8,7 @@ import json
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -264,6 +265,7 @@ def _jumps(found: HarmonicResponse, frequency: float) -> bool:
 def _drawn(result: CaseResult, rows: list[dict[str, Any]], folder: Path) -> dict[str, Path]:
     """Title -> picture of the first read-out, with others of its unit where they are few, and of each other one."""
     from ..pictures.following import curve_plot
+    from ..pictures.plots import save
     from ..pictures.response import response_picture, together
 
     asked = result.readouts
@@ -273,11 +275,11 @@ def _drawn(result: CaseResult, rows: list[dict[str, Any]], folder: Path) -> dict
     for title, group in groups.items():
         name = re.sub(r"[^A-Za-z0-9_.-]+", "_", title.removeprefix("friction "))
         drawn[title] = folder / "pictures" / f"{name}.png"
-        with store.complete_or_absent(drawn[title]) as temporary:
-            response_picture(result, temporary, group, rows)
+        save(partial(response_picture, result, shown=group, rows=rows), drawn[title])
     if lines := [one for b in result.beyond for one in b.curves if len(one.rows) > 1]:
         title = "curve of periodic motions about jumps and gaps"
-        drawn[title] = curve_plot(lines, folder / "pictures" / "curve.png", f"{result.settings.name}: {title}")
+        draw = partial(curve_plot, lines, title=f"{result.settings.name}: {title}")
+        drawn[title] = save(draw, folder / "pictures" / "curve.png")
     return drawn
 
 

@@ -1,99 +1,160 @@
-"""Rolling contact of a case: patches and creep curve as tables, pictures and a page."""
+"""Rolling contact of a case: wheel and rail, a vehicle on unround wheels, wear by given kinematics,
+a tyre whose slip jumps; tables, pictures and a page of each."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
+from typing import Any, NamedTuple
 
 from ..analysis import Answer, Files
 from ..basis import read_basis
-from ..errors import UserError, in_its_file
+from ..errors import UserError, in_its_file, of_file
 from ..files import store
 from ..files.tables import csv_files, rows_csv
 from ..pictures.rolling import curve_picture, traction_picture, wearing_picture, write_tractions_vtu
+from ..pictures.tyre import tyre_picture
+from ..pictures.vehicle import circumference_picture, growth_picture, recorded_picture
 from ..report.page import Piece, number, say, table
+from ..report.response import number_tables
 from ..results import Journal
+from ..rolling import tyre
 from ..rolling.behind import ROWS, Behind, behind
-from ..rolling.contact_table import ContactTable, contact_table, write_contact_table
-from ..rolling.settings import RollingCase, Section, load_rolling
-from ..rolling.study import Studied, rows_of_patches, study
+from ..rolling.contact_table import contact_table, write_contact_table
+from ..rolling.settings import RollingCase, SectionKeys, load_rolling
+from ..rolling.study import RollingAnswer, rows_of_patches, study
 from ..rolling.table import creep_table, write_creep_table
-from ..rolling.wearing import Wearing, wearing
-from .answer import RollJob, Written
+from ..rolling.wearing import wearing
+from ..vehicle import kinematics
+from ..vehicle import study as vehicle
+from ..vehicle.settings import KinematicsCase, VehicleCase, load_kinematics, load_vehicle
+from .answer import Written, made
 from .job import Job, open_job
 from .modal import modes_stage
-from .places import find_body
-from .stage import Report
+from .places import TYRE, WHEEL_AND_RAIL, find_body, keys_of
+from .stage import Report, Stage, folder_of_case
 
 
-def rolling_stage(job: RollJob) -> Written:
-    """What a rolling case asks for.
+class RollingKind(NamedTuple):
+    """What rolls.
+
+    Attributes:
+        keys: by which a case is known, all of them. product: its name. title: of the page. load:
+            reads the case. bodies: of a case, key of the half-space that a body stands for -> its
+            name; "" where there is none. files: that a case names. solve: is called with the case,
+            its path, its modal files, a journal and `report`.
+    """
+
+    keys: frozenset[str]
+    product: str
+    title: str
+    load: Callable[..., tuple[Any, dict[str, Any]]]
+    bodies: Callable[[Any], Mapping[str, str]]
+    files: Callable[[Any], Sequence[str]]
+    solve: Callable[..., Answer]
+
+
+def roll_stage(
+    path: Path,
+    root: Path = Path("build"),
+    assignments: Sequence[str] = (),
+    force: bool = False,
+    report: Report = lambda _: None,
+    pictures: bool = True,
+) -> Written:
+    """What a case of rolling contact asks for, in the folder of its name below `root`; whole if it
+    did not end early. Modal files of its bodies are made where they are not up to date.
 
     Raises:
-        UserError: mistakes of the case or its profiles.
+        UserError: mistakes of the case, its bodies or its profiles.
     """
-    case, raw = load_rolling(job.path, list(job.assignments))
-    stage = job.stage(case.name, "rolling", "stages.rolling")
-    bodies = _bodies(case, job.path, job.report)
-    files: list[Path | str] = [*case.files, *(body.resolve() for body in bodies)]
+    kind = next((kind for kind in KINDS if kind.keys <= keys_of(path)), KINDS[-1])
+    case, raw = kind.load(path, list(assignments))
+    product = folder_of_case(path, case.name, root) / f"{kind.product}.json"
+    stage = Stage(product, ("stages.rolling",), force, report, case=path)
+    bodies = _bodies(kind.bodies(case), case, path, report)
+    named: list[Path | str] = [*kind.files(case), *bodies]
+    files = [path.parent / name for name in named]  # of what is missing its reader tells
+    inputs = {"case": raw, "files": [store.hash_file(file) for file in files if file.is_file()]}
+    solve = partial(kind.solve, case, path, bodies, report=report)
+    with of_file(path):
+        return made(stage, inputs, f"{case.name}: {kind.title}", pictures, solve, case.name)
 
-    solve = partial(_answer, case, job.path, bodies)
-    return job.answer(stage, case.name, raw, files, "rolling contact", solve)
 
-
-def _bodies(case: RollingCase, case_path: Path, report: Report) -> list[Path]:
-    """Modal files of wheel and rail, made where they are not up to date."""
-    if case.elastic is None:
-        return []
-    named = {"wheel": case.elastic.wheel, "rail": case.elastic.rail}
-    jobs = {key: open_job(find_body(case_path, name, Path("."))) for key, name in named.items()}
+def _bodies(named: Mapping[str, str], case: Any, path: Path, report: Report) -> list[Path]:
+    """Modal files of the bodies."""
+    jobs = {key: open_job(find_body(path, name, Path("."))) for key, name in named.items()}
     for key, job in jobs.items():
-        _of_one_material(case_path, key, job, getattr(case, key))
-    return [modes_stage(job, report=report)[0] for job in jobs.values()]
+        if key:
+            _of_one_material(path, key, job, getattr(case, key))
+    return [modes_stage(job, report=report)[0].resolve() for job in jobs.values()]
 
 
 @in_its_file
-def _of_one_material(case_path: Path, key: str, job: Job, section: Section) -> None:
-    """A body and the half-space that stands for its contact, of which one is taken out and the other put in."""
+def _of_one_material(case_path: Path, key: str, job: Job, section: SectionKeys) -> None:
+    """A body and the half-space that stands for its contact, of which one is taken out and the
+    other put in."""
     own = [getattr(job.settings.material, name, None) for name in ("young", "poisson")]
     asked = [section.young, section.poisson]
     if None not in own and own != asked:
         raise UserError(
-            f"{key}.young, {key}.poisson: {asked} in the case and {own} in {job.path}; with [elastic] "
+            f"{key}.young, {key}.poisson: {asked} in the case and {own} in {job.path}; with "
+            "[elastic] "
             "they must be the same, correct one"
         )
 
 
-def _answer(case: RollingCase, path: Path, bodies: list[Path], _: Journal, report: Report) -> Answer:
+def _wheel_on_rail(
+    case: RollingCase, path: Path, bodies: list[Path], _: Journal, report: Report
+) -> Answer:
     report("patches and creep curve")
-    found = study(case, path)
-    elastic, contacts = _behind(found, bodies), _contacts(found, report)
-    worn = _wearing(found, path, report)
-    files, said = _tables(found) | ({} if worn is None else _worn_tables(worn)), found.sentences()
+    found, worn = study(case, path), None
+    files, said, elastic = _tables(found), found.sentences(), _behind(found, bodies)
+    if case.contacts is not None:
+        how = case.contacts.model_dump()
+        contacts = contact_table(found.track, case.vertical_force, **how, report=report)
+    if case.wear is not None and case.wear.updates:
+        worn = wearing(case, found.track, case.characteristic(path), case.surface(path), report)
+        profiles = {
+            "wheel_worn.csv": worn.wheel,
+            "rail_worn.csv": worn.rail,
+        }  # in mm, as a case takes them
+        worn_tables = {name: profile.columns(worn.smoothing) for name, profile in profiles.items()}
+        files |= csv_files({"wearing.csv": worn.columns(), **worn_tables}, 10)
     if elastic is not None:
         files |= csv_files({"stiffness.csv": {"direction": ROWS, **elastic.columns()}}, 8)
         said.append(elastic.sentence())
     if case.table is not None:
         report("table of creep forces")
         how = case.model.model_dump(include={"distribution", "coefficients"})
-        table = creep_table(found.track.elastic.poisson, **case.table.model_dump(), **how)
-        files["creep_table.h5"] = lambda file: write_creep_table(file, table)
-        said.append(table.sentence())
-    if contacts is not None:
+        forces = creep_table(found.track.elastic.poisson, **case.table.model_dump(), **how)
+        files["creep_table.h5"] = lambda file: write_creep_table(file, forces)
+        said.append(forces.sentence())
+    if case.contacts is not None:
         files["contact_table.h5"] = lambda file: write_contact_table(file, contacts)
         said.append(contacts.sentence())
-    said += [worn.sentence(), *worn.warnings()] if worn is not None else []
-    drawn = _pictures(found, worn, case.name) if found.forces is not None else {}
-    return Answer(
-        said,
-        tables=[_patches(found), say(READ_AS, tone="note")],
-        files=files | drawn,
-        moving=partial(_in_paraview, found),
-    )
+    if found.forces is not None:
+        title = f"{case.name}: creep curve"
+        files["pictures/creep.png"] = partial(curve_picture, found, title=title)
+        files["pictures/tractions.png"] = partial(traction_picture, found, title=case.name)
+    if worn is not None:
+        said += [worn.sentence(), *worn.warnings()]
+    if worn is not None and found.forces is not None:
+        files["pictures/wearing.png"] = partial(wearing_picture, worn, title=case.name)
+
+    def in_paraview(folder: Path) -> list[Path]:
+        if found.forces is None or found.tractions is None or not find_spec("meshio"):
+            return []
+        write_tractions_vtu(found.tractions, file := folder / "tractions.vtu")
+        return [file]
+
+    notes = [_patches(found), say(OF_PATCHES, tone="note")]
+    return Answer(said, tables=notes, files=files, moving=in_paraview)
 
 
-def _behind(found: Studied, bodies: list[Path]) -> Behind | None:
+def _behind(found: RollingAnswer, bodies: list[Path]) -> Behind | None:
     elastic = found.case.elastic
     if elastic is None or not found.patches:
         return None
@@ -102,60 +163,29 @@ def _behind(found: Studied, bodies: list[Path]) -> Behind | None:
     return behind(found.patches[0], found.case.solids, groups, elastic.face, methods)
 
 
-def _contacts(found: Studied, report: Report) -> ContactTable | None:
-    asked = found.case.contacts
-    if asked is None:
-        return None
-    return contact_table(found.track, found.case.vertical_force, **asked.model_dump(), report=report)
-
-
-def _wearing(found: Studied, path: Path, report: Report) -> Wearing | None:
-    if found.case.wear is None or not found.case.wear.updates:
-        return None
-    return wearing(found.case, found.track, found.case.characteristic(path), found.case.surface(path), report)
-
-
-def _worn_tables(worn: Wearing) -> Files:
-    """Over the passages, and both profiles as tables in mm that a case takes."""
-    tables = {"wearing.csv": worn.columns()}
-    tables |= {f"{name}_worn.csv": getattr(worn, name).columns(worn.smoothing) for name in ("wheel", "rail")}
-    return csv_files(tables, 10)
-
-
-def _tables(found: Studied) -> Files:
+def _tables(found: RollingAnswer) -> Files:
     rows = {"patches.csv": rows_of_patches(found.patches)}
     made: Files = {}
     if found.forces is not None:
-        columns = {"creep.csv": found.columns(), "exact.csv": found.beside(), "wear.csv": found.worn()}
+        columns = {
+            "creep.csv": found.columns(),
+            "exact.csv": found.beside(),
+            "wear.csv": found.worn(),
+        }
         made, rows["forces.csv"] = csv_files(columns, 8), found.generalised()
     return made | {name: partial(store.write_text, text=rows_csv(*of)) for name, of in rows.items()}
 
 
-def _pictures(found: Studied, worn: Wearing | None, case: str) -> Files:
-    drawn: Files = {
-        "pictures/creep.png": partial(curve_picture, found, title=f"{case}: creep curve"),
-        "pictures/tractions.png": partial(traction_picture, found, title=case),
-    }
-    if worn is not None:
-        drawn["pictures/wearing.png"] = partial(wearing_picture, worn, title=case)
-    return drawn
-
-
-def _in_paraview(found: Studied, folder: Path) -> list[Path]:
-    if found.forces is None or found.tractions is None or not find_spec("meshio"):
-        return []
-    write_tractions_vtu(found.tractions, file := folder / "tractions.vtu")
-    return [file]
-
-
-READ_AS = (
-    "Forces act on the wheel, at the middle of the patch: x forward, y to the left, z up. A positive creepage means "
-    "that the wheel's surface moves forward (to the left) against the rail, and gives a negative force. Hertz' ellipse "
+OF_PATCHES = (
+    "Forces act on the wheel, at the middle of the patch: x forward, y to the left, z up. A "
+    "positive creepage means "
+    "that the wheel's surface moves forward (to the left) against the rail, and gives a negative "
+    "force. Hertz' ellipse "
     "with the mean curvature over the patch; strips of point contacts (Sextro, 6.5)."
 )
 
 
-def _patches(found: Studied) -> Piece:
+def _patches(found: RollingAnswer) -> Piece:
     head = ["y on the rail in mm", "angle in mrad", "a, b in mm", "normal force in N", "pressure in MPa",
             "creepages", "spin in 1/m"]  # fmt: skip
     rows = [
@@ -164,3 +194,96 @@ def _patches(found: Studied) -> Piece:
         for p in found.patches
     ]  # fmt: skip
     return table(head, rows)
+
+
+def _recorded(
+    case: KinematicsCase, path: Path, _: list[Path], journal: Journal, report: Report
+) -> Answer:
+    found = kinematics.recorded(case, path.parent, report, journal)
+    tables = {"circumference.csv": found.circumference(), "wear.csv": found.jumped()}
+    drawn = {"pictures/circumference.png": partial(recorded_picture, found, title=case.name)}
+    return Answer(found.sentences(), whole=not found.ended, files=csv_files(tables, 10) | drawn)
+
+
+def _unround(
+    case: VehicleCase, path: Path, _: list[Path], journal: Journal, report: Report
+) -> Answer:
+    found = vehicle.study(case, path.parent, report, journal)
+    tables = {
+        "circumference.csv": found.circumference(),
+        "growth.csv": found.growing(),
+        "speeds.csv": found.over_speed(),
+    }
+    drawn = {
+        "pictures/circumference.png": partial(circumference_picture, found, title=case.name),
+        "pictures/growth.png": partial(growth_picture, found, title=case.name),
+    }
+    return Answer(
+        found.sentences(),
+        tables=[say(OF_ANGLES, tone="note")],
+        whole=not found.ended,
+        files=csv_files(tables, 10) | drawn,
+    )
+
+
+OF_ANGLES = (
+    "Angles count from the mark of the wheel: what stands at 90 degrees rolls over the rail a "
+    "quarter of a turn after "
+    "the mark. Radii are those that the contact sees, means weighted by its pressure. Wear is "
+    "the coefficient times the frictional work over each strip (Sextro, 6.8-6), laid over the "
+    "strips of the tread."
+)
+
+
+def _tyre(case: tyre.TyreCase, _: Path, bodies: list[Path], __: Journal, report: Report) -> Answer:
+    report("jumps of slip and load")
+    wheel = read_basis(bodies[0])
+    found = tyre.study(case, wheel.groups[0, 0])
+    slips, forces = found.steady
+    tables = {
+        "loads.csv": found.loads(),
+        "constants.csv": found.constants,
+        "steady.csv": {"slip": slips, "force_over_normal_force": forces},
+    }
+    drawn = {"pictures/tyre.png": partial(tyre_picture, found, title=case.name, wheel=wheel)}
+    pieces = [*number_tables({"loads.csv": tables["loads.csv"]}), say(OF_TYRES, tone="note")]
+    return Answer(found.sentences(), tables=pieces, files=csv_files(tables, 8) | drawn)
+
+
+OF_TYRES = (
+    "A row of point contacts along the middle of the patch, each with its share of the static "
+    "pressure, is passed by "
+    "the material (Sextro, 6.10). Time constants are of the exponential that fits the force best; "
+    "the normal force "
+    "follows from the static state, large displacements and contact by Newton's method. Reached: 1 "
+    "- 1/e of the change."
+)
+
+
+def _profiles(case: Any) -> list[str]:
+    return [s.profile for s in (case.wheel, case.rail) if isinstance(s.profile, str)]
+
+
+def _elastic(case: RollingCase) -> dict[str, str]:
+    return {} if case.elastic is None else {"wheel": case.elastic.wheel, "rail": case.elastic.rail}
+
+
+KINDS = (
+    RollingKind(
+        WHEEL_AND_RAIL | {"vehicle"}, "unround", "unround wheels", load_vehicle,
+        lambda _: {}, _profiles, _unround,
+    ),
+    RollingKind(
+        WHEEL_AND_RAIL | {"kinematics"}, "unround", "wear of a wheel", load_kinematics,
+        lambda _: {}, lambda case: [*_profiles(case), case.kinematics.file], _recorded,
+    ),
+    RollingKind(
+        TYRE, "tyre", "unsteady rolling", tyre.load_tyre,
+        lambda case: {"": case.tyre.body}, lambda _: (), _tyre,
+    ),
+    RollingKind(
+        WHEEL_AND_RAIL, "rolling", "rolling contact", load_rolling,
+        _elastic, lambda case: case.files, _wheel_on_rail,
+    ),
+)  # fmt: skip
+"""The first one whose keys a case has is meant."""

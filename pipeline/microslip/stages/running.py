@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -174,6 +175,7 @@ def compare_book(
     Returns:
         The path of the table, the resonances of both, and whether every point of both converged.
     """
+    from ..pictures.plots import save
     from ..pictures.response import comparison_picture
 
     given = list(assignments or [])
@@ -194,8 +196,7 @@ def compare_book(
     of = Quantity(unit_of(next(iter(read_response(folder / "response.h5").labels))))
     store.write_text(table, comparison_table(pairs, of))
     marched, book = (_curves(f / "response.h5") for f, _ in ways.values())
-    with store.complete_or_absent(picture) as temporary:
-        comparison_picture(case, marched, book, temporary, of)
+    save(partial(comparison_picture, case, marched, book, of=of), picture)
     return table, pairs, all(converged for _, converged in found.values())
 
 

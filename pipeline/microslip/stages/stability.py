@@ -23,9 +23,8 @@ from ..pictures.roots import over_picture, plane_picture
 from ..report.page import fold, table
 from ..report.roots import root_table, table_lines
 from ..ring.resonances import speeds_of
-from ..roots.asked import window_of
+from ..roots.asked import window_of, write_roots
 from ..roots.diagram import diagram
-from ..roots.recorded import write_roots
 from ..roots.spectrum import spectrum
 from ..settings.body import StabilitySettings
 from ..units import rpm_text
@@ -36,7 +35,7 @@ from .stage import Report, Stage
 
 
 @dataclass(frozen=True)
-class Question:
+class Inquiry:
     """What is asked of which matrices.
 
     Attributes:
@@ -84,7 +83,7 @@ def stability_stage(
 @in_its_file
 def question(
     path: Path, assignments: list[str], report: Report = lambda _: None, speed: int | None = None
-) -> Question:  # fmt: skip
+) -> Inquiry:  # fmt: skip
     """What a body.toml or a modal file asks.
 
     Raises:
@@ -103,13 +102,13 @@ def question(
         raise UserError(f"--speed {speed}: is of a modal file; matrices have rotation.speeds_rpm")
     if asked is None:
         raise UserError("is missing; add [stability] with frequency = [0.0, HIGHEST] in Hz", "stability")
-    return Question(
+    return Inquiry(
         job.settings.name, job.build_folder, job.path, lambda: family(job), values_of(job.settings), window_of(asked),
         asked, matrices_inputs(job, given),
     )  # fmt: skip
 
 
-def _of_basis(file: Path, asked: StabilitySettings | None, speed: int | None) -> Question:
+def _of_basis(file: Path, asked: StabilitySettings | None, speed: int | None) -> Inquiry:
     """All roots of one of a modal file's speeds, the first if not given, or those in a window."""
     whole = read_basis(file)
     basis = select(whole, speed or 0, None)
@@ -119,7 +118,7 @@ def _of_basis(file: Path, asked: StabilitySettings | None, speed: int | None) ->
         asked = StabilitySettings(growth=(-2 * np.pi * highest, 2 * np.pi * highest), frequency=(0.0, highest))
     inputs = {"basis": store.hash_file(file), "stability": asked.model_dump(), "speed": g.speed}
     reduced, speeds = family_of_group(basis.name, g), len(speeds_of(whole))
-    return Question(
+    return Inquiry(
         basis.name, file.parent, file, lambda: reduced, {"speed": g.speed}, window_of(asked), asked, inputs, speeds
     )
 
@@ -138,7 +137,7 @@ def family(job: Job) -> Family:
         return family_of(read_matrices(given, job.folder, job.settings.length_unit, job.settings.parameters))
 
 
-def _answer(q: Question, report: Report) -> Answer:
+def _answer(q: Inquiry, report: Report) -> Answer:
     matrices, asked = q.family(), q.asked
     with of_file(q.where):
         for value in asked.range or ():
@@ -166,11 +165,7 @@ def _answer(q: Question, report: Report) -> Answer:
         pieces.append(fold("How many roots grow at each value", table([over.parameter, "grow"], counts)))
         said.append(over.sentence)
     whole = found.complete or not asked.certify
-    return Answer([*said, *_which(q)], tables=pieces, whole=whole, files=files, lines=table_lines(found))
-
-
-def _which(q: Question) -> list[str]:
-    """Of which speed the roots are, where a modal file holds several."""
-    if q.speeds == 1:
-        return []
-    return [f"{q.state}, one of the {q.speeds} speeds of the modal file: --speed 0 to {q.speeds - 1} chooses"]
+    if q.speeds > 1:
+        which = f"{q.state}, one of the {q.speeds} speeds of the modal file"
+        said.append(f"{which}: --speed 0 to {q.speeds - 1} chooses")
+    return Answer(said, tables=pieces, whole=whole, files=files, lines=table_lines(found))

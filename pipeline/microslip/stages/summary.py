@@ -128,13 +128,17 @@ def _first(g: ModalGroup, columns: int) -> str:
     return f"{_hertz_line(f[f > 0], columns)}  Hz{of}{f' beside {rigid} rigid motions' if rigid else ''}"
 
 
-def frequency_lines(basis: ModalBasis, columns: int = 5, rows: int = 15) -> list[str]:
+FEW, ROWS = 5, 15
+"""Frequencies of a line, and lines, that the end of a run shows."""
+
+
+def frequency_lines(basis: ModalBasis) -> list[str]:
     """The first elastic frequencies of each speed and nodal diameter, a line each, in few lines for the terminal."""
     table = [
-        f"{to_rpm(g.speed):8.6g} rpm{f', k = {k:3d}' if basis.sectors > 1 else ''}  {_first(g, columns)}"
-        for (_, k), g in sorted(basis.groups.items())[:rows]
+        f"{to_rpm(g.speed):8.6g} rpm{f', k = {k:3d}' if basis.sectors > 1 else ''}  {_first(g, FEW)}"
+        for (_, k), g in sorted(basis.groups.items())[:ROWS]
     ]
-    more = len(basis.groups) - rows
+    more = len(basis.groups) - ROWS
     return [*table, f"{'':8} and {more} lines more: microslip info shows them"] if more > 0 else table
 
 

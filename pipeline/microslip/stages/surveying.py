@@ -4,15 +4,14 @@ arclength; identification."""
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
-from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
 from ..analysis import Answer, Files
-from ..basis import read_basis
-from ..case import CaseSettings, checkpoint, headline, load_case, surveys
+from ..case import CaseSettings, headline, surveys
 from ..case.assemble import build
 from ..case.curves import UNITS, Followed, curves, error_of, highest
 from ..case.problem import normal_forces
@@ -25,14 +24,12 @@ from ..report.words import number_list
 from ..results import Response, read_journal, response_of, write_response
 from ..results.checks import sentence
 from ..units import counted
-from .answer import Written, answered, written
-from .checkpoint import Checkpoint, inputs_of
-from .places import existing_files
-from .stage import Report, Stage, folder_of_case
+from .answer import CaseJob, Written, answered, written
+from .checkpoint import Checkpoint
+from .stage import Report, Stage
 
 if TYPE_CHECKING:
-    from ..harmonic_balance.envelope import Envelope, OverOrders
-    from ..harmonic_balance.speed_line import SpeedResponse
+    from ..harmonic_balance.envelope import Envelope, OverOrders, SpeedResponse
 
 Bases = Mapping[str, ModalBasis]
 Tables = Mapping[str, Mapping[str, Array]]
@@ -42,53 +39,46 @@ Write = Callable[[Tables], None]
 
 
 @in_its_file
-def survey_stage(
-    case_path: Path, basis_file: Path | None, kind: str, assignments: list[str] | None = None, force: bool = False,
-    report: Report = lambda _: None,
-) -> Written:  # fmt: skip
-    """A survey of a case on modal files that are there already, in build/<case>/.
+def survey_stage(case: CaseJob, kind: str) -> Written:
+    """A survey of a case.
 
     Args:
-        kind: a key of `KINDS`, or one of `curves.OVER`. basis_file: see `respond`.
+        kind: a key of `KINDS`, or one of `curves.OVER`.
 
     Raises:
         UserError: the case does not ask for it, or asks for what cannot be.
         KeyboardInterrupt: after what a curve has found until then is written.
     """
-    settings, raw = load_case(case_path, assignments)
-    folder = folder_of_case(case_path, settings.name)
-    files = existing_files(settings, basis_file, Path("."))
-    stage = Stage(folder / f"{kind}.json", ("stages.surveying",), force, report, case=case_path)
+    case = replace(case, swept=kind != "identification")
+    product = case.folder / f"{kind}.json"
+    stage = Stage(product, ("stages.surveying",), case.force, case.report, case=case.path)
     with stage.making():
-        settings = settings if kind == "identification" else checkpoint.as_found(settings, folder)
-        if raw.get("harmonics") == "auto":
-            raw = raw | {"harmonics": settings.harmonics}
-        inputs = inputs_of(raw, settings, files)
-        return answered(stage, inputs, lambda: _work(stage, settings, raw, files, kind))
+        return answered(stage, case.inputs, partial(_work, stage, case, kind))
 
 
-def _work(stage: Stage, settings: CaseSettings, raw: dict[str, Any], files: Mapping[str, Path], kind: str) -> Written:
-    folder = stage.product.parent
+def _work(stage: Stage, case: CaseJob, kind: str) -> Written:
+    folder = case.folder
 
     def begin() -> None:
         stage.begin()
         stage.product.unlink(missing_ok=True)
 
-    told = stage.report if stage.is_unfinished else None
-    points = Checkpoint(folder / f"over_{kind}.points", raw, files, stage.force, begin, report=told)
+    told = case.report if stage.is_unfinished else None
+    file = folder / f"over_{kind}.points"
+    points = Checkpoint(file, case.raw, case.files, case.force, begin, report=told)
 
     def write(tables: Tables) -> None:
         begin()
-        stage.clear([points.file.with_suffix(".h5")])
+        stage.clear([file.with_suffix(".h5")])
         write_tables(folder, tables, 12)
 
     survey = partial(KINDS[kind], write) if kind in KINDS else partial(_curve, kind, points)
-    answer = survey(settings, {name: read_basis(file) for name, file in files.items()}, stage.report)
+    answer = survey(case.settings, case.bases, case.report)
     begin()
     name, words = kind, _TITLES.get(kind, kind)
     if kind not in KINDS:
         name, words = f"over_{kind}", f"over the {kind.replace('_', ' ')}"
-    found = written(answer, name, folder, f"{settings.name}: {words}", True)
+    found = written(answer, name, folder, f"{case.settings.name}: {words}", True)
     if not answer.whole:
         raise KeyboardInterrupt
     return found
@@ -145,11 +135,11 @@ def _orders(write: Write, settings: CaseSettings, bases: Bases, report: Report) 
     found = surveys.over_orders(settings, bases, report, lambda some: write(tables(some)))
     title = f"{settings.name}: resonances over the engine order"
     failed = _unsolved(sum(int(r.failed.sum()) for r in found.values()))
-    draw: dict[str, Callable[[Path], Path]] = {"pictures/orders.png": lambda p: over_orders_picture(found, p, title)}
+    every = list(found.values())
+    draw: Files = {"pictures/orders.png": lambda figure: over_orders_picture(found, figure, title)}
     if len(found) > 1:
         words = f"{settings.name}: the worst of all engine orders over the normal force"
-        draw = {"pictures/orders_worst.png": lambda p: worst_order_picture(list(found.values()), p, words)} | draw
-    every = list(found.values())
+        draw = {"pictures/orders_worst.png": lambda p: worst_order_picture(every, p, words)} | draw
     amplitude, stress = (np.concatenate([getattr(r, of) for r in every]) for of in ("amplitude", "stress"))
     said = _judged_by(_worst_sentences(every), settings, bases, "orders", amplitude, stress)
     return _answer(tables(found), draw, said, failed)

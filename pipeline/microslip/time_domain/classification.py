@@ -20,10 +20,10 @@ import scipy.special
 
 from ..data import Array
 from ..units import counted, percent
-from .stepper import Now, Stepper
+from .stepper import MotionState, Stepper
 
 if TYPE_CHECKING:
-    from .equations import Equations
+    from .equations import MotionEquations
     from .orbit import Orbit
 
 APART = 1e-7
@@ -85,7 +85,7 @@ class Chatter:
     step: float
 
 
-def exponent(stepper: Stepper, now: Now, samples: int, each: int, periods: int, seed: int = 0) -> Exponent:
+def exponent(stepper: Stepper, now: MotionState, samples: int, each: int, periods: int, seed: int = 0) -> Exponent:
     """The largest Lyapunov exponent along the motion that goes on from a state, over so many periods.
 
     Args:
@@ -95,8 +95,8 @@ def exponent(stepper: Stepper, now: Now, samples: int, each: int, periods: int, 
         nan where the motion or its neighbour ceases to be finite, or where memory cannot be separated (a message).
     """
     stepper = replace(stepper, order=2)  # whose steps are the same for neighbours
-    if told := whole(now.held.states):
-        return Exponent(math.nan, math.nan, 0, told)
+    if unseparable := whole(now.held.states):
+        return Exponent(math.nan, math.nan, 0, unseparable)
     e = stepper.equations
     rows, scale = np.full(samples, each * samples), sizes(e, len(now.y))
     weights = scale[:, : scale.shape[1] // 2]
@@ -116,7 +116,7 @@ def exponent(stepper: Stepper, now: Now, samples: int, each: int, periods: int, 
     return mean(growth[ALIGNED:], 2 * np.pi / e.Omega)
 
 
-def sizes(e: Equations, blocks: int) -> Array:
+def sizes(e: MotionEquations, blocks: int) -> Array:
     """(b, 2 p) by which displacements and velocities of the modes are weighed in a separation, 1/s and 1."""
     weights = pace(e.omega2, e.Omega).reshape(blocks, -1)
     return np.concatenate([weights, np.ones_like(weights)], axis=1)
@@ -147,7 +147,7 @@ def whole(states: Any) -> str:
     return "No Lyapunov exponent: a law of these contacts remembers whole numbers, which cannot be varied a little."
 
 
-def between(now: Now, other: Now, share: Any, array: Callable[[Any], Any] = np.asarray) -> Now:
+def between(now: MotionState, other: MotionState, share: Any, array: Callable[[Any], Any] = np.asarray) -> MotionState:
     """A motion apart by a share of what the other is, memory of contacts included. array: of numpy or of jax."""
 
     def one(a: Any, b: Any) -> Any:
@@ -215,8 +215,8 @@ def second_frequency(orbit: Orbit) -> float:
 
     near = rough + np.linspace(-1, 1, 81) / (2 * n)
     best = near[int(np.argmin([left(x) for x in near]))]
-    found = scipy.optimize.minimize_scalar(left, bounds=(best - 1 / (40 * n), best + 1 / (40 * n)), method="bounded")
-    return float(found.x) if 0 < found.x < 0.5 and found.fun < LATTICE else math.nan
+    nearest = scipy.optimize.minimize_scalar(left, bounds=(best - 1 / (40 * n), best + 1 / (40 * n)), method="bounded")
+    return float(nearest.x) if 0 < nearest.x < 0.5 and nearest.fun < LATTICE else math.nan
 
 
 def kind(orbit: Orbit) -> str:
@@ -310,12 +310,12 @@ def chatter(orbit: Orbit, contact: int) -> list[Chatter]:
     closes = closes[closes > opens[0]] if len(opens) else closes[:0]
     flights = closes - opens[np.searchsorted(opens, closes) - 1]
     leaves = np.append(opens, orbit.time[-1:])[np.searchsorted(opens, closes)]
-    found, first = list[Chatter](), 0
+    rests, first = list[Chatter](), 0
     for i, (at, stays) in enumerate(zip(closes, leaves - closes, strict=True)):
         if i and flights[i] >= flights[i - 1]:
             first = i
         before = (leaves - closes)[first:i]
         if i - first + 1 >= REBOUNDS and stays > 2 * before.max():
-            found.append(Chatter(float(at), i - first + 1, float(flights[i]), float(stays), orbit.period / orbit.steps))
+            rests.append(Chatter(float(at), i - first + 1, float(flights[i]), float(stays), orbit.period / orbit.steps))
             first = i + 1
-    return found
+    return rests

@@ -39,7 +39,7 @@ FEW = 4096
 """Numbers of a matrix up to which a product is faster as a sum that is compiled together with what surrounds it."""
 
 
-class Group(NamedTuple):
+class ContactGroup(NamedTuple):
     """Equal contacts, whose coordinates stand one after the other. law: of all of their points, on its ground. G: (c,
     n, 3, k) of each. offset: (c, k) where they stand at d = 0."""
 
@@ -108,39 +108,31 @@ def _unknown(law: Law, u: Any) -> Any:
     return jnp.isnan(law.overlap(u)).any()
 
 
-def untouched(groups: tuple[Group, ...]) -> Held:
+def untouched(groups: tuple[ContactGroup, ...]) -> Held:
     """Contacts that were never loaded, at u = 0."""
     d = jnp.zeros(sum(g.offset.size for g in groups))
-    states = tuple(g.law.init(_count(g)) for g in groups)
-    points = tuple(jnp.zeros((_count(g), 3)) for g in groups)
+    counts = [int(g.G.shape[0] * g.G.shape[1]) for g in groups]
+    states = tuple(g.law.init(n) for g, n in zip(groups, counts, strict=True))
+    points = tuple(jnp.zeros((n, 3)) for n in counts)
     none, zero = jnp.zeros(sum(len(g.G) for g in groups)), jnp.zeros(())
     return Held(d, d, states, points, points, none, none.astype(bool), zero, zero, zero, zero, zero)
 
 
-def _count(g: Group) -> int:
-    return int(g.G.shape[0] * g.G.shape[1])
-
-
-def parts(groups: tuple[Group, ...], d: Any) -> list[Any]:
+def parts(groups: tuple[ContactGroup, ...], d: Any) -> list[Any]:
     """(c, k) of each group."""
-    found, begin = [], 0
+    each, begin = [], 0
     for g in groups:
-        found.append(d[begin : begin + g.offset.size].reshape(g.offset.shape))
+        each.append(d[begin : begin + g.offset.size].reshape(g.offset.shape))
         begin += g.offset.size
-    return found
+    return each
 
 
-def moved(g: Group, d: Any) -> Any:
+def moved(g: ContactGroup, d: Any) -> Any:
     """(c n, 3) of the points, by coordinates (c, k)."""
     return (g.G * d[:, None, None, :]).sum(axis=-1).reshape(-1, 3)
 
 
-def _contracted(g: Group, points: Any) -> Any:
-    """(c k,) forces of the coordinates."""
-    return (g.G * points.reshape(*g.G.shape[:3], 1)).sum(axis=(1, 2)).reshape(-1)
-
-
-def force_at(groups: tuple[Group, ...], d: Any, v: Any, dt: Any, states: tuple[Any, ...]) -> tuple:
+def force_at(groups: tuple[ContactGroup, ...], d: Any, v: Any, dt: Any, states: tuple[Any, ...]) -> tuple:
     """Force (c,) at d with velocity v, states and points' forces of all groups."""
     after, points = [], []
     for g, state, at, rate in zip(groups, states, parts(groups, d), parts(groups, v), strict=True):
@@ -151,18 +143,20 @@ def force_at(groups: tuple[Group, ...], d: Any, v: Any, dt: Any, states: tuple[A
     return joined(groups, points), tuple(after), tuple(points)
 
 
-def joined(groups: tuple[Group, ...], points: Any) -> Any:
+def joined(groups: tuple[ContactGroup, ...], points: Any) -> Any:
     """(c,) forces of the coordinates, by those (c n, 3) of the points of all groups."""
-    return jnp.concatenate([jnp.zeros(0), *(_contracted(g, f) for g, f in zip(groups, points, strict=True))])
+    each = zip(groups, points, strict=True)
+    forces = [(g.G * f.reshape(*g.G.shape[:3], 1)).sum(axis=(1, 2)).reshape(-1) for g, f in each]
+    return jnp.concatenate([jnp.zeros(0), *forces])
 
 
-def slope_at(groups: tuple[Group, ...], d: Any, v: Any, dt: Any, states: tuple[Any, ...]) -> Any:
+def slope_at(groups: tuple[ContactGroup, ...], d: Any, v: Any, dt: Any, states: tuple[Any, ...]) -> Any:
     """(c, c) derivative of the force, point by point."""
     blocks = list[Any]()
     for g, state, at, rate in zip(groups, states, parts(groups, d), parts(groups, v), strict=True):
         u, w = moved(g, at + g.offset), moved(g, rate)
 
-        def along(direction: Any, g: Group = g, u: Any = u, w: Any = w, state: Any = state) -> Any:
+        def along(direction: Any, g: ContactGroup = g, u: Any = u, w: Any = w, state: Any = state) -> Any:
             tangent = jnp.broadcast_to(direction, u.shape)
             return jax.jvp(lambda x: g.law.step(x, w, dt, state)[0], (u,), (tangent,))[1]
 
@@ -171,7 +165,7 @@ def slope_at(groups: tuple[Group, ...], d: Any, v: Any, dt: Any, states: tuple[A
     return jax.scipy.linalg.block_diag(jnp.zeros((0, 0)), *blocks)
 
 
-def _placed(groups: tuple[Group, ...], bodies: Yielding, free: Any, v: Any, dt: Any, held: Held) -> tuple:
+def _placed(groups: tuple[ContactGroup, ...], bodies: Yielding, free: Any, v: Any, dt: Any, held: Held) -> tuple:
     """d (c,) of contacts that modes alone would have at `free`, where bodies yield at once; the residual, m; and what
     `force_at` says there. With the slope of sticking contacts first, with their own where that does not do."""
     enough = 1e-10 * jnp.abs(free).max() + 1e-17
@@ -194,13 +188,13 @@ def _placed(groups: tuple[Group, ...], bodies: Yielding, free: Any, v: Any, dt: 
         return i + 1, missing(d - jnp.linalg.solve(J, r))
 
     first = missing(free - times(bodies.R, held.force - bodies.F_0))
-    _, found = jax.lax.while_loop(partial(wanted, CHORDS), chord, (0, first))
-    _, (d, r, there) = jax.lax.while_loop(partial(wanted, ITERATIONS), newton, (0, found))
+    _, chorded = jax.lax.while_loop(partial(wanted, CHORDS), chord, (0, first))
+    _, (d, r, there) = jax.lax.while_loop(partial(wanted, ITERATIONS), newton, (0, chorded))
     return d, jnp.abs(r).max(), there
 
 
 def answer(
-    groups: tuple[Group, ...], bodies: Yielding | None, free: Any, v: Any, dt: Any, held: Held, accounts: bool
+    groups: tuple[ContactGroup, ...], bodies: Yielding | None, free: Any, v: Any, dt: Any, held: Held, accounts: bool
 ) -> Held:  # fmt: skip
     """What contacts hold after a step of dt to where modes alone have them, `free` (c,), with velocities v.
 
@@ -215,15 +209,21 @@ def answer(
     return after._replace(d=d, force=force, missed=missed)
 
 
-def placed(groups: tuple[Group, ...], d: Any) -> tuple[Any, ...]:
+def placed(groups: tuple[ContactGroup, ...], d: Any) -> tuple[Any, ...]:
     """(c n, 3) of the points of each group."""
     return tuple(moved(g, at + g.offset) for g, at in zip(groups, parts(groups, d), strict=True))
 
 
 def told(
-    groups: tuple[Group, ...], places: tuple[Any, ...], dt: Any, held: Held, accounts: bool, states: tuple[Any, ...],
-    points: tuple[Any, ...], by_law: bool = True,
-) -> Held:  # fmt: skip
+    groups: tuple[ContactGroup, ...],
+    places: tuple[Any, ...],
+    dt: Any,
+    held: Held,
+    accounts: bool,
+    states: tuple[Any, ...],
+    points: tuple[Any, ...],
+    by_law: bool = True,
+) -> Held:
     """What contacts hold, with events and energies, d and force as before; by_law: whether set-valued laws say what
     they lose."""
     approach, slips, lost, stored = [jnp.zeros(0)], [jnp.zeros(0, bool)], jnp.zeros(()), jnp.zeros(())
@@ -248,7 +248,7 @@ def told(
 
 
 def rigid_answer(
-    groups: tuple[Group, ...], meets: Meets, bodies: Yielding | None, free: Any, ahead: Any, dt: Any, held: Held,
+    groups: tuple[ContactGroup, ...], meets: Meets, bodies: Yielding | None, free: Any, ahead: Any, dt: Any, held: Held,
     others: tuple, accounts: bool,
 ) -> Held:  # fmt: skip
     """What contacts hold, some of them set-valued, see `inclusion`. A point sticks where the coefficient at rest can
@@ -287,7 +287,11 @@ def rigid_answer(
         f, w, missed, _ = jax.lax.scan(further, begin, length=2)[0]
     slipped = jnp.where(slid(w, ways)[:, None], w[:, 1:], 0.0)
     for i, force, way in zip(spots, jnp.split(f, ends), jnp.split(slipped, ends), strict=True):
-        points[i], states[i] = _held(groups[i], force, way, _point(groups, i, free), dt, held.states[i])
+        law = groups[i].law
+        if isinstance(law, Moving):
+            points[i], states[i] = law.slid(force, way, _point(groups, i, free), dt, held.states[i])
+        else:
+            points[i], states[i] = force, held.states[i] + way.T
     force = joined(groups, points)
     d = free if bodies is None else free - times(bodies.R, force)
     by_law = bodies is not None
@@ -300,7 +304,7 @@ def slid(w: Any, free: Any) -> Any:
     return norm(w[:, 1:].T) > SLIDES * jnp.maximum(jnp.abs(w), jnp.abs(free))[:, 1:].max()
 
 
-def _asked(groups: tuple[Group, ...], i: int, back: Any, free: Any, ahead: Any, dt: Any, held: Held) -> tuple:
+def _asked(groups: tuple[ContactGroup, ...], i: int, back: Any, free: Any, ahead: Any, dt: Any, held: Held) -> tuple:
     """Of the points of a group: w_0, `pressed` and `first` of `inclusion.solve`, and (n, 2) the slopes of the ground
     under them that turn their way, and their force. back: see `Meets`; None of bodies that
     yield."""
@@ -321,11 +325,74 @@ def _asked(groups: tuple[Group, ...], i: int, back: Any, free: Any, ahead: Any, 
     return goes.at[:, 0].set(along), pressed, first, *slopes
 
 
-def _point(groups: tuple[Group, ...], i: int, d: Any) -> Any:
+def _point(groups: tuple[ContactGroup, ...], i: int, d: Any) -> Any:
     """(n, 3) m of the points of a group."""
     return moved(groups[i], parts(groups, d)[i] + groups[i].offset)
 
 
-def _held(g: Group, force: Any, way: Any, u: Any, dt: Any, state: Any) -> tuple[Any, Any]:
-    """(n, 3) force and state of set-valued points after a step to u (n, 3) in which they slid by a way (n, 2)."""
-    return g.law.slid(force, way, u, dt, state) if isinstance(g.law, Moving) else (force, state + way.T)
+# friction that follows the velocity alone: solved for in every half kick, so that its slope sets no limit to the step;
+# the velocity after the kick is that before it, less what the friction at that velocity takes in it
+
+TURNS, NEWTON = 100, 8
+"""Turns of `slowed` at most, and steps of Newton's method in each."""
+
+
+class Braking(NamedTuple):
+    """slowing: (c, c) m/s per N that half a kick changes the contacts' velocities by. most: (points,) of it that each
+    point may count on, group by group."""
+
+    slowing: Any
+    most: tuple[Any, ...]
+
+
+def slowed(
+    groups: tuple[ContactGroup, ...], B: Braking, F_0: Any, d: Any, v: Any, dt: Any, held: Held
+) -> tuple[Any, Any]:  # fmt: skip
+    """(c,) velocities of contacts after half a kick, and what is missing, m/s.
+
+    v: before that kick. Newton's method from what the last force leaves; where that does not do, from turns in which
+    each point brakes by itself, as if all that yields were its own, from where the others leave it (forward and
+    backward steps: P. L. Lions, B. Mercier, SIAM J. Numer. Anal. 16, 1979).
+    """
+    enough = 1e-10 * jnp.abs(v).max() + 1e-18
+
+    def left(force: Any) -> Any:
+        return v - B.slowing @ (force - F_0)
+
+    def missing(at: Any) -> Any:
+        return at - left(force_at(groups, d, at, dt, held.states)[0])
+
+    def newton(carried: tuple) -> tuple:
+        i, at, r = carried
+        at = at - jnp.linalg.solve(jax.jacfwd(missing)(at), r)
+        return i + 1, at, missing(at)
+
+    def unsolved(carried: tuple) -> Any:
+        return (jnp.abs(carried[2]).max() > enough) & (carried[0] < NEWTON)
+
+    def refined(at: Any) -> tuple:
+        _, at, r = jax.lax.while_loop(unsolved, newton, (0, at, missing(at)))
+        return at, jnp.nan_to_num(jnp.abs(r).max(), nan=jnp.inf)
+
+    def turn(carried: tuple) -> tuple:
+        i, at, forces, _, _ = carried
+        alone = zip(groups, forces, held.states, B.most, parts(groups, d), parts(groups, at), strict=True)
+        after = tuple(_alone(g, f, state, y, place, rate, dt) for g, f, state, y, place, rate in alone)
+        at = left(joined(groups, after))
+        return i + 1, at, after, *refined(at)
+
+    at = left(held.force)
+    begin = (0, at, held.forces, *refined(at))
+    *_, velocity, missed = jax.lax.while_loop(lambda c: (c[4] > enough) & (c[0] < TURNS), turn, begin)
+    return velocity, missed
+
+
+def _alone(g: ContactGroup, force: Any, state: Any, most: Any, place: Any, rate: Any, dt: Any) -> Any:
+    """(c n, 3) forces of a group whose points brake by themselves from forces, at coordinates and velocities (c, k)."""
+    u, w = moved(g, place + g.offset), moved(g, rate)
+    by_law = g.law.step(u, w, dt, state)[0]
+    if not g.law.brakes:
+        return by_law
+    trial = w.at[:, 1:].add(most[:, None] * force[:, 1:])
+    braked = (trial - g.law.slowed(u, trial, dt, state, most))[:, 1:] / jnp.where(most > 0, most, 1.0)[:, None]
+    return jnp.concatenate([by_law[:, :1], braked], axis=1)

@@ -33,7 +33,7 @@ SEEN = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
-class Equations:
+class MotionEquations:
     """Real equations of motion in modal coordinates, M = 1, and rows of what is seen of them.
 
     Attributes:
@@ -77,12 +77,12 @@ class Equations:
 
     def turned(self, lengths: Array) -> Array:
         """(k, n, n) by which o turns in so many s: the exponentials of `turning`."""
-        found = np.tile(np.eye(len(self.turning)), (len(lengths), 1, 1))
+        turns = np.tile(np.eye(len(self.turning)), (len(lengths), 1, 1))
         if self.ramp is None:
             for i, h in enumerate(self.harmonics):
                 c, s = np.cos(h * self.Omega * lengths), np.sin(h * self.Omega * lengths)
-                found[:, 2 * i + 1 : 2 * i + 3, 2 * i + 1 : 2 * i + 3] = np.stack([[c, -s], [s, c]]).transpose(2, 0, 1)
-        return found
+                turns[:, 2 * i + 1 : 2 * i + 3, 2 * i + 1 : 2 * i + 3] = np.stack([[c, -s], [s, c]]).transpose(2, 0, 1)
+        return turns
 
     def oscillators(self, time: Array | float) -> Array:
         """(..., n) o at times (s), n = 1 + 2 H."""
@@ -117,7 +117,7 @@ class Equations:
         if self.ramp:
             return None
         m = len(self.omega2)
-        found = np.zeros((m, 1 + 2 * len(self.harmonics)))
+        motion = np.zeros((m, 1 + 2 * len(self.harmonics)))
         K = np.diag(self.omega2)
         for i, h in enumerate((0, *self.harmonics)):
             w = h * self.Omega
@@ -127,10 +127,10 @@ class Equations:
             if np.abs(S @ q - f).max(initial=0.0) > 1e-8 * np.abs(f).max(initial=0.0):
                 return None
             if h == 0:
-                found[:, 0] = q.real
+                motion[:, 0] = q.real
             else:
-                found[:, 2 * i - 1], found[:, 2 * i] = q.real, -q.imag
-        return found
+                motion[:, 2 * i - 1], motion[:, 2 * i] = q.real, -q.imag
+        return motion
 
     @cached_property
     def springs(self) -> Array:
@@ -148,8 +148,8 @@ class Equations:
     @cached_property
     def _own(self) -> Array:
         alike = {(id(c.patch), c.offset.tobytes()): c for c in self.contacts}
-        known = {key: _stiffest(c) for key, c in alike.items()}
-        return diagonal([known[id(c.patch), c.offset.tobytes()] for c in self.contacts])
+        stiffest = {key: _stiffest(c) for key, c in alike.items()}
+        return diagonal([stiffest[id(c.patch), c.offset.tobytes()] for c in self.contacts])
 
     @cached_property
     def fastest(self) -> float:
@@ -175,11 +175,11 @@ def _stiffest(contact: Contact) -> Array:
         return np.zeros(2 * contact.offset.shape)
     deep = np.zeros((9, len(contact.offset)))
     deep[:, 0] = DEEPEST / 4.0 ** np.arange(9)
-    found = [contact.stiffness, *stuck_stiffness(contact.patch, deep)]
-    return found[int(np.argmax([np.trace(k) for k in found]))]
+    stiffnesses = [contact.stiffness, *stuck_stiffness(contact.patch, deep)]
+    return stiffnesses[int(np.argmax([np.trace(k) for k in stiffnesses]))]
 
 
-def of(assembly: Assembly, Omega: float, second: float | None = None) -> Equations:
+def of(assembly: Assembly, Omega: float, second: float | None = None) -> MotionEquations:
     """The equations of an assembly driven at a frequency (rad/s); a sector that stands for a ring is unrolled.
 
     Loads of a second frequency (rad/s) count as a harmonic of the first one that is no whole number.
@@ -213,7 +213,7 @@ def of(assembly: Assembly, Omega: float, second: float | None = None) -> Equatio
     _can_press(assembly.contacts, D, _real(mean.residual, assembly))
     F_0 = np.concatenate([c.preload for c in assembly.contacts]) if assembly.contacts else np.zeros(0)
     B = _of_harmonics(parts, harmonics, lambda p: V.T @ p.load)
-    return Equations(
+    return MotionEquations(
         assembly, float(Omega), omega2, C, V, harmonics, B, D,
         _of_harmonics(parts, harmonics, lambda p: p.given), _real(mean.residual, assembly), F_0,
         _real(mean.output, assembly) @ V, _of_harmonics(parts, harmonics, lambda p: p.output_given),
@@ -238,10 +238,10 @@ def _can_press(contacts: Sequence[Contact], D: Array, R: Array) -> None:
     """Refuse rigid contacts along whose normal nothing moves: no force would ever press them, nor friction act."""
     ends = np.cumsum([len(c.offset) for c in contacts])
     for contact, end in zip(contacts, ends, strict=True):
-        law, own = contact.patch.law, slice(end - len(contact.offset), end)
+        law, rows = contact.patch.law, slice(end - len(contact.offset), end)
         normal = contact.patch.kinematics[:, 0]
-        moved = np.hstack([D[own], R[own]])
-        if isinstance(law, SetValued) and law.normal is None and not (normal @ moved).any():
+        moves = np.hstack([D[rows], R[rows]])
+        if isinstance(law, SetValued) and law.normal is None and not (normal @ moves).any():
             raise UserError(
                 f'contacts.{contact.name}: law "set-valued" is pressed by what moves along its normal, and here '
                 'nothing does, so that it would hold no friction; let the body move there (free = "xz", say), or take '
@@ -279,7 +279,7 @@ def _of_harmonics(parts: dict[int, Linear], harmonics: Sequence[int], of: Callab
     return np.stack(columns, axis=1)
 
 
-def of_ramp(assembly: Assembly, ramp: Ramp) -> Equations:
+def of_ramp(assembly: Assembly, ramp: Ramp) -> MotionEquations:
     """The equations of an assembly whose loads' frequency changes.
 
     Loads in rad2/s2 (centrifugal) follow the square of the rotation speed. Matrices stay as they are: those of the

@@ -18,13 +18,13 @@ import numpy as np
 
 from ..data import Array
 from .contacts import times
-from .equations import Equations
+from .equations import MotionEquations
 
 TERMS = 14
 """Of the exponential's series, whose argument has a norm of 1/8 at most: the next one is below 1e-23."""
 
 
-class Flow(NamedTuple):
+class BodyFlow(NamedTuple):
     """Flows over tau 2^k, k = 0, 1, ..., of b blocks of p modes each, s = 2 p + n.
 
     Attributes:
@@ -38,36 +38,36 @@ class Flow(NamedTuple):
     length: Any
 
 
-def blocks(equations: Equations) -> tuple[int, int]:
+def blocks(equations: MotionEquations) -> tuple[int, int]:
     """Number of blocks and modes in each."""
     m = len(equations.omega2)
     coupled = np.abs(equations.C - np.diag(np.diag(equations.C))).any()
     return (1, m) if coupled else (m, 1)
 
 
-def flow(equations: Equations, tau: float, doublings: int) -> Flow:
+def flow(equations: MotionEquations, tau: float, doublings: int) -> BodyFlow:
     """Flows over tau (s) and its doublings: of what they add, as what is added in the shortest of steps would be lost
     in the last digits of 1."""
     b, p = blocks(equations)
     grown, *works = _one_step(equations, tau, b, p)
-    length, one = tau * 2.0 ** np.arange(doublings + 1), np.eye(grown.shape[1])
-    found = [(grown, *works)]
+    length, identity = tau * 2.0 ** np.arange(doublings + 1), np.eye(grown.shape[1])
+    flows = [(grown, *works)]
     for _ in range(doublings):
-        full = one + grown
+        full = identity + grown
         with np.errstate(over="ignore", invalid="ignore"):  # of a motion that grows, which takes no leaps
             grown = 2 * grown + grown @ grown
             works = [kept + full.transpose(0, 2, 1) @ kept @ full for kept in works]
-        found.append((grown, *works))
-    moves, S, L = (np.array(x) for x in zip(*found, strict=True))
-    stack = np.concatenate([(one + moves)[:, :, : 2 * p], S, L], axis=2).transpose(0, 2, 3, 1)
-    return Flow(np.ascontiguousarray(stack), equations.turned(length), length)
+        flows.append((grown, *works))
+    moves, S, L = (np.array(x) for x in zip(*flows, strict=True))
+    stack = np.concatenate([(identity + moves)[:, :, : 2 * p], S, L], axis=2).transpose(0, 2, 3, 1)
+    return BodyFlow(np.ascontiguousarray(stack), equations.turned(length), length)
 
 
 def flown(A: Any, y: Any, o: Any) -> Any:
     """(r, b) rows A (r, s, b) of a flow times (q_b, v_b, o), of bodies at y (b, 2 p)."""
     if A.shape[2] == 1:
         return times(A[:, :, 0], jnp.concatenate([y[0], o]))[:, None]
-    return sum(A[:, i] * one for i, one in enumerate((*y.T, *o)))
+    return sum(A[:, i] * coordinate for i, coordinate in enumerate((*y.T, *o)))
 
 
 def worked(A: Any, y: Any, o: Any) -> tuple[Any, Any]:
@@ -77,7 +77,7 @@ def worked(A: Any, y: Any, o: Any) -> tuple[Any, Any]:
     return after[:n].T, (z * after[n:].reshape(2, *z.shape)).sum(axis=1)
 
 
-def _one_step(e: Equations, tau: float, b: int, p: int) -> tuple[Array, ...]:
+def _one_step(e: MotionEquations, tau: float, b: int, p: int) -> tuple[Array, ...]:
     """(b, s, s) what (q_b, v_b, o) grow by in one step, and both quadratic forms of it, of all blocks together."""
     s, q, v, o = 2 * p + e.turning.shape[0], slice(p), slice(p, 2 * p), slice(2 * p, None)
     at = np.arange(b * p).reshape(b, p)
@@ -93,13 +93,13 @@ def _one_step(e: Equations, tau: float, b: int, p: int) -> tuple[Array, ...]:
 def grown(A: Array) -> Array:
     """expm(A) - 1 of matrices (b, s, s), in which small A lose nothing: the series of a 2^k-th, doubled k times."""
     halvings = max(0, int(np.ceil(np.log2(max(np.abs(A).sum(axis=2).max(initial=0.0), 1e-300)))) + 3)
-    found = term = x = A / 2**halvings
+    growth = term = x = A / 2**halvings
     for k in range(2, TERMS):
         term = term @ x / k
-        found = found + term
+        growth = growth + term
     for _ in range(halvings):
-        found = 2 * found + found @ found
-    return found
+        growth = 2 * growth + growth @ growth
+    return growth
 
 
 def _integral(A: Array, Q: Array, tau: float) -> Array:
@@ -109,8 +109,8 @@ def _integral(A: Array, Q: Array, tau: float) -> Array:
     rows = np.concatenate([-A.transpose(0, 2, 1), Q], axis=2), np.concatenate([0 * A, A], axis=2)
     both = grown(np.concatenate(rows, axis=1) * (tau / 2**halvings))
     step = np.eye(n) + both[:, n:, n:]
-    found = step.transpose(0, 2, 1) @ both[:, :n, n:]
+    integral = step.transpose(0, 2, 1) @ both[:, :n, n:]
     for _ in range(halvings):
-        found = found + step.transpose(0, 2, 1) @ found @ step
+        integral = integral + step.transpose(0, 2, 1) @ integral @ step
         step = step @ step
-    return 0.5 * (found + found.transpose(0, 2, 1))
+    return 0.5 * (integral + integral.transpose(0, 2, 1))

@@ -20,10 +20,9 @@ from typing import Any, NamedTuple
 import jax
 import jax.numpy as jnp
 
-from .bodies import Bodies, Now, Options, exponent
-from .contacts import Group, Held, joined, times, told
+from .bodies import Bodies, MotionState, Options, by_modes, exponent, to_modes
+from .contacts import Held, joined, times, told
 from .flow import flown, worked
-from .spots import by_modes, to_modes
 
 HALVINGS = 10
 """Of a step, of which the shortest flow is half a step: where contacts change it is a 512th at least."""
@@ -42,7 +41,7 @@ SLOW = 0.03
 """Over the fastest frequency, s: laws that follow the motion more quickly would make steps too short."""
 
 
-class Answer(NamedTuple):
+class StageForces(NamedTuple):
     """push: (b, p) accelerations. Group by group forces: (c n, 3) N, rates: (k, n) of what is remembered, places and
     speeds: (c n, 3) m and m/s of the points."""
 
@@ -53,7 +52,7 @@ class Answer(NamedTuple):
     speeds: tuple[Any, ...]
 
 
-class Bent(NamedTuple):
+class Bending(NamedTuple):
     """bent: (b, p) second differences of the accelerations in the last step, m/s4, slope: how they change, m/s5; h: s,
     that step. curl: how they change otherwise, m/s6."""
 
@@ -63,37 +62,37 @@ class Bent(NamedTuple):
     curl: Any
 
 
-def begun(groups: tuple[Group, ...], B: Bodies, now: Now) -> Now:
+def begun(B: Bodies, now: MotionState) -> MotionState:
     """With what the contacts remember, and their forces by that."""
     x = tuple(
         g.law.memory(f, s).reshape(g.law.remembers, len(f)) if g.law.remembers else jnp.zeros((0, len(f)))
-        for g, f, s in zip(groups, now.held.forces, now.held.states, strict=True)
+        for g, f, s in zip(B.groups, now.held.forces, now.held.states, strict=True)
     )
-    first = _answer(groups, B, now.y, now.o, x, now.time)
+    first = _answer(B, now.y, now.o, x, now.time)
     held = now.held._replace(forces=first.forces)
-    straight = Bent(0 * first.push, 0 * first.push, jnp.zeros(()), jnp.zeros(()))
+    straight = Bending(0 * first.push, 0 * first.push, jnp.zeros(()), jnp.zeros(()))
     return now._replace(push=first.push, held=held, memory=(x, first.rates, straight), level=jnp.full(2, 1, int))
 
 
-def leapt(now: Now) -> Now:
+def leapt(now: MotionState) -> MotionState:
     """After a leap: contacts that were open all along remember nothing, and what comes is met as it was last time."""
     nothing = jax.tree_util.tree_map(jnp.zeros_like, now.memory)
     return now._replace(memory=nothing, level=jnp.broadcast_to(now.level[1], 2))
 
 
-def _answer(groups: tuple[Group, ...], B: Bodies, y: Any, o: Any, x: tuple[Any, ...], time: Any) -> Answer:
+def _answer(B: Bodies, y: Any, o: Any, x: tuple[Any, ...], time: Any) -> StageForces:
     """What contacts say where the bodies are, (b, 2 p)."""
     q, v = (part.reshape(-1) for part in jnp.split(y, 2, axis=1))
-    moves, push, found = times(B.rate, o), B.preload, []
-    for g, spots, own in zip(groups, B.spots, x, strict=True):
+    moves, push, answers = times(B.rate, o), B.preload, []
+    for g, spots, memory in zip(B.groups, B.spots, x, strict=True):
         u, w = by_modes(spots, q, o) + spots.rest, by_modes(spots, v, moves)
-        force, rate = g.law.rates(u.T, w.T, own, time, B.flow.length[0])
+        force, rate = g.law.rates(u.T, w.T, memory, time, B.flow.length[0])
         push -= to_modes(spots, force)
-        found.append((force, rate, u.T, w.T))
-    return Answer(push.reshape(B.omega2.shape), *zip(*found, strict=True))
+        answers.append((force, rate, u.T, w.T))
+    return StageForces(push.reshape(B.omega2.shape), *zip(*answers, strict=True))
 
 
-def step(options: Options, groups: tuple[Group, ...], B: Bodies, k: Any, now: Now) -> tuple[Any, Now]:
+def step(options: Options, B: Bodies, k: Any, now: MotionState) -> tuple[Any, MotionState]:
     """Whether 2^k steps were done, and where the motion is then; where they were not, what is to be tried."""
     p, h, half = B.omega2.shape[1], B.flow.length[k], B.flow.length[k - 1]
     x, rates, _ = now.memory
@@ -115,15 +114,15 @@ def step(options: Options, groups: tuple[Group, ...], B: Bodies, k: Any, now: No
         return tuple(a + share * sum(r) for a, *r in zip(x, *by, strict=True))
 
     free, first = on(now.y, now.o), pushed(now.push)
-    two = _answer(groups, B, free + half * first, o[0], grown(half, rates), now.time + half)
-    three = _answer(groups, B, kick(free, half * two.push), o[0], grown(half, two.rates), now.time + half)
+    two = _answer(B, free + half * first, o[0], grown(half, rates), now.time + half)
+    three = _answer(B, kick(free, half * two.push), o[0], grown(half, two.rates), now.time + half)
     end = on(free, o[0]) + h * pushed(three.push)
-    four = _answer(groups, B, end, o[1], grown(h, three.rates), now.time + h)
+    four = _answer(B, end, o[1], grown(h, three.rates), now.time + h)
     kicks = (h / 6 * now.push, h / 3 * (two.push + three.push), h / 6 * four.push)
     y, energy = _gone(stack, now.y, (now.o, o[0]), kicks)
     x = grown(h / 6, rates, two.rates, two.rates, three.rates, three.rates, four.rates)
-    last = _answer(groups, B, y, o[1], x, now.time + h)
-    held = _held(options, groups, h, now, last, x)
+    last = _answer(B, y, o[1], x, now.time + h)
+    held = _held(options, B, h, now, last, x)
     size = _norm(jnp.concatenate([y[:, p:], jnp.sqrt(jnp.abs(B.omega2)) * y[:, :p]])) + 1e-300
     bent, third, kink = _missed(h, now, two.push + three.push, four.push, last.push)
     third = third / size
@@ -143,14 +142,14 @@ def _norm(x: Any) -> Any:
     return jnp.sqrt(jnp.sum(x**2))
 
 
-def _missed(h: Any, now: Now, middle: Any, four: Any, five: Any) -> tuple[Bent, Any, Any]:
+def _missed(h: Any, now: MotionState, middle: Any, four: Any, five: Any) -> tuple[Bending, Any, Any]:
     """How N is bent in a step; what the step misses of velocities by third order, and by a kink."""
     before, between = now.memory[2], 0.5 * (h + now.memory[2].h)
     bent = (now.push - middle + five) / h**2
     as_before = [0.0, before.bent, before.bent + between * before.slope]
     odd = jnp.min(jnp.stack([_norm(bent - expected) for expected in as_before]))
     kink = h**3 / 3 * jnp.maximum(odd - 2 * before.curl * between**2, odd / SMOOTH)
-    return Bent(bent, (bent - before.bent) / between, h, odd / between**2), h / 6 * _norm(four - five), kink
+    return Bending(bent, (bent - before.bent) / between, h, odd / between**2), h / 6 * _norm(four - five), kink
 
 
 def _judged(options: Options, k: Any, level: Any, missed: Any, enough: Any) -> tuple[Any, Any]:
@@ -174,18 +173,18 @@ def _gone(stack: Any, y: Any, oscillators: tuple[Any, Any], kicks: tuple[Any, An
     return y, jnp.concatenate([works, work[None]]).sum(axis=1)
 
 
-def _held(options: Options, groups: tuple[Group, ...], h: Any, now: Now, last: Answer, x: tuple[Any, ...]) -> Held:
+def _held(options: Options, B: Bodies, h: Any, now: MotionState, last: StageForces, x: tuple[Any, ...]) -> Held:
     """What contacts hold: their state as their law's own step tells it, with the memory that was integrated; of their
     coordinates see `at_sample`."""
     states = list[Any]()
-    for g, u, w, state, own in zip(groups, last.places, last.speeds, now.held.states, x, strict=True):
+    for g, u, w, state, memory in zip(B.groups, last.places, last.speeds, now.held.states, x, strict=True):
         _, after = g.law.step(u, w, h, state)
-        states.append((g.law.recalled(after, own) if g.law.remembers else None) or after)
-    return told(groups, last.places, h, now.held, options.accounts, tuple(states), last.forces)
+        states.append((g.law.recalled(after, memory) if g.law.remembers else None) or after)
+    return told(B.groups, last.places, h, now.held, options.accounts, tuple(states), last.forces)
 
 
-def at_sample(groups: tuple[Group, ...], B: Bodies, now: Now) -> Held:
+def at_sample(B: Bodies, now: MotionState) -> Held:
     """With what contacts hold in their coordinates, which no step asks for."""
     q, _ = jnp.split(now.y, 2, axis=1)
     d = times(B.D, q.reshape(-1)) + times(B.D_o, now.o)
-    return now.held._replace(d=d, force=joined(groups, now.held.forces))
+    return now.held._replace(d=d, force=joined(B.groups, now.held.forces))

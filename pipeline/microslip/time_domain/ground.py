@@ -73,8 +73,8 @@ class Moving(Law):
         met, meeting = self._met(u, time), self._meeting(u, v, time)
         push = self._felt(self.law.step(met, meeting, dt, state.own)[0] * jnp.array([1.0, 0.0, 0.0]), u, time)
         trial = meeting - yielding[:, None] * push * jnp.array([0.0, 1.0, 1.0])
-        found = self.law.slowed(met, trial, dt, state.own, yielding)
-        return v.at[:, 1:].set(found[:, 1:] + (self.velocity * self.along).T)
+        velocity = self.law.slowed(met, trial, dt, state.own, yielding)
+        return v.at[:, 1:].set(velocity[:, 1:] + (self.velocity * self.along).T)
 
     def passed(
         self, before: Array, u: Array, then: Array, force: Array, dt: Array | float, state: OnGround

@@ -65,8 +65,8 @@ def meets(A: Any, back: Any = 0.0) -> Meets:
 def over_waves(M: Meets, slope: Any, lean: Any) -> Meets:
     """Of points over waves, whose way along the normal is w_N + slope . w_T, and whose force pushes by f_N lean; slope
     and lean (p, 2) are the same where what the ground takes it gives."""
-    own = jnp.broadcast_to(jnp.eye(3), (len(slope), 3, 3))
-    way, force = own.at[:, 0, 1:].set(slope), own.at[:, 0, 1:].set(lean)
+    identity = jnp.broadcast_to(jnp.eye(3), (len(slope), 3, 3))
+    way, force = identity.at[:, 0, 1:].set(slope), identity.at[:, 0, 1:].set(lean)
     A = M.A.reshape(len(slope), 3, len(slope), 3)
 
     def turned(left: Any, right: Any) -> Any:
@@ -77,14 +77,14 @@ def over_waves(M: Meets, slope: Any, lean: Any) -> Meets:
 
 def within(x: Any, pressed: Any, mu: Any) -> Any:
     """(p, 3) the projection of x: (p, 3); pressed: (p,) N of points that others press, nan of those that press."""
-    own = jnp.isnan(pressed)
-    normal = jnp.where(own, jnp.maximum(x[:, 0], 0.0), jnp.where(own, 0.0, pressed))
+    presses = jnp.isnan(pressed)
+    normal = jnp.where(presses, jnp.maximum(x[:, 0], 0.0), jnp.where(presses, 0.0, pressed))
     limit, size = mu * normal, norm(x[:, 1:].T)
     kept = jnp.where(size > limit, ratio(limit, size), 1.0)
     return jnp.concatenate([normal[:, None], kept[:, None] * x[:, 1:]], axis=1)
 
 
-class Asked(NamedTuple):
+class InclusionStep(NamedTuple):
     """What a step asks of points. M, mu, pressed: see `solve`. reach: (p, 3) m, w_0, and 0 of points that do not meet.
     meet: (p, 3), 1 of those that do."""
 
@@ -163,6 +163,6 @@ def solve(M: Meets, w_0: Any, mu: Any, pressed: Any, first: Any) -> tuple[Any, A
             the sliding way (p,). pressed: see `within`. first: (p, 3) N to begin with.
     """
     meets = jnp.isfinite(w_0[:, :1]) * jnp.ones(3)
-    asked = Asked(M, jnp.where(jnp.isfinite(w_0), w_0, 0.0), meets, mu, pressed)
+    asked = InclusionStep(M, jnp.where(jnp.isfinite(w_0), w_0, 0.0), meets, mu, pressed)
     f = asked.found(meets * first)
     return f, asked.motion(f), jnp.abs(ratio(asked.residual(f), M.r)).max(initial=0.0)

@@ -10,13 +10,12 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 
-from .bodies import Bodies, Now, Options, by_force, exponent
-from .braking import slowed
-from .contacts import Group, Held, answer, force_at, rigid_answer, times
+from .bodies import Bodies, MotionState, Options, by_force, exponent
+from .contacts import Held, answer, force_at, rigid_answer, slowed, times
 from .flow import flown, worked
 
 
-def step(options: Options, groups: tuple[Group, ...], B: Bodies, n: Any, now: Now) -> Now:
+def step(options: Options, B: Bodies, n: Any, now: MotionState) -> MotionState:
     """n steps, of which more than one only where no contact is met in them."""
     p = B.omega2.shape[1]
     dt = B.flow.length[0] * n
@@ -25,7 +24,7 @@ def step(options: Options, groups: tuple[Group, ...], B: Bodies, n: Any, now: No
     y, o, (given, taken) = _flown(options, B, n, now.y.at[:, p:].set(v), now.o)
     q, v_free = y[:, :p], y[:, p:]
     o, moves = _driven(options, B, now, o, dt)
-    held, push = answered(options, groups, B, q, v_free, touched + pushed, o, moves, dt, now.held)
+    held, push = answered(options, B, q, v_free, touched + pushed, o, moves, dt, now.held)
     work = jnp.zeros(())
     after = 0.5 * dt * push, 0.5 * dt * times(B.loads, o)
     for contacts, loads, mean in ((touched, pushed, 0.5 * (now.y[:, p:] + v)), (*after, v_free + 0.5 * sum(after))):
@@ -53,7 +52,7 @@ def _flown(options: Options, B: Bodies, n: Any, y: Any, o: Any) -> tuple[Any, An
     return (jax.lax.while_loop(lambda c: c[0] > 0, on, first) if options.leaps else on(first))[1:]
 
 
-def _driven(options: Options, B: Bodies, now: Now, o: Any, dt: Any) -> tuple[Any, Any]:
+def _driven(options: Options, B: Bodies, now: MotionState, o: Any, dt: Any) -> tuple[Any, Any]:
     """(n,) o after a step, and o' there, where o turns or, in a run-up, is driven."""
     if options.ramp is None:
         return o, times(B.rate, o)
@@ -63,9 +62,17 @@ def _driven(options: Options, B: Bodies, now: Now, o: Any, dt: Any) -> tuple[Any
 
 
 def answered(
-    options: Options, groups: tuple[Group, ...], B: Bodies, q: Any, v_free: Any, half: Any, o: Any, moves: Any, dt: Any,
-    held: Held, share: float = 1.0,
-) -> tuple[Held, Any]:  # fmt: skip
+    options: Options,
+    B: Bodies,
+    q: Any,
+    v_free: Any,
+    half: Any,
+    o: Any,
+    moves: Any,
+    dt: Any,
+    held: Held,
+    share: float = 1.0,
+) -> tuple[Held, Any]:
     """What contacts hold where the bodies are, and (b, p) their accelerations of the modes.
 
     Args:
@@ -78,28 +85,24 @@ def answered(
     unbraked = jnp.zeros(())
     if B.braking is not None and share == 1.0:
         before = times(B.D, v_free.reshape(-1)) + given
-        v, unbraked = slowed(groups, B.braking, B.F_0, free, before, dt, held)
+        v, unbraked = slowed(B.groups, B.braking, B.F_0, free, before, dt, held)
     if B.meets is None:
-        held = answer(groups, B.yielding, free, v, dt, held, options.accounts)
+        held = answer(B.groups, B.yielding, free, v, dt, held, options.accounts)
         return held._replace(missed=held.missed + dt * unbraked), by_force(B, held.force)
-    force, *others = force_at(groups, free, v, dt, held.states)
+    force, *others = force_at(B.groups, free, v, dt, held.states)
     ahead = free
     if B.yielding is None:
-        ahead = _ahead(B, q, v_free + share * dt * (by_force(B, force) + times(B.loads, o)), o)
+        v = v_free + share * dt * (by_force(B, force) + times(B.loads, o))
+        then = flown(B.flow.stack[0][: q.shape[1]], jnp.concatenate([q, v], axis=1), o)  # after another step
+        ahead = times(B.D, then.T.reshape(-1)) + times(B.D_o, times(B.flow.turn[0], o))
     else:
         free = free + times(B.yielding.R, B.F_0)
     points = B.meets if B.yielding is not None else B.meets._replace(A=share * B.meets.A, r=B.meets.r / share)
     owed = held.owed
-    held = rigid_answer(groups, points, B.yielding, free, ahead, dt, held, tuple(others), options.accounts)
+    held = rigid_answer(B.groups, points, B.yielding, free, ahead, dt, held, tuple(others), options.accounts)
     push = by_force(B, held.force)
     if B.yielding is None and options.accounts:
         whole, rigid = push + times(B.loads, o), 0.5 * dt * (held.force - force)
         now, then = (times(B.D, (v_free + part * dt * whole).reshape(-1)) + given for part in (0.25, share - 0.25))
         held = held._replace(lost=held.lost + owed + jnp.sum(rigid * now), owed=jnp.sum(rigid * then))
     return held, push
-
-
-def _ahead(B: Bodies, q: Any, v: Any, o: Any) -> Any:
-    """(c,) of the contact coordinates after another step."""
-    then = flown(B.flow.stack[0][: q.shape[1]], jnp.concatenate([q, v], axis=1), o)
-    return times(B.D, then.T.reshape(-1)) + times(B.D_o, times(B.flow.turn[0], o))

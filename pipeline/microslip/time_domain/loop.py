@@ -15,8 +15,8 @@ import jax.numpy as jnp
 
 from ..programs import inner, program
 from . import fourth, kicks
-from .bodies import Bodies, Hardest, Listed, Now, Options, Seen, exponent
-from .contacts import Group, Held, moved, parts, times, untouched
+from .bodies import Bodies, Hardest, Listed, MotionState, Options, Snapshot, exponent
+from .contacts import Held, moved, parts, times, untouched
 
 LEAST = 4
 """Shortest steps that are leapt over at once; nearer to a contact they are gone one by one."""
@@ -29,16 +29,16 @@ ROUNDING = 1e-6
 
 
 @partial(inner, static_argnums=0)
-def begun(options: Options, groups: tuple[Group, ...], B: Bodies, y: Any, o: Any, held: Held | None) -> Now:
+def begun(options: Options, B: Bodies, y: Any, o: Any, held: Held | None) -> MotionState:
     """At time 0, bodies at y (b, 2 p), the contacts there from what they held, or never touched before."""
     q, v = jnp.split(y, 2, axis=1)
     dt, moves = B.flow.length[0], times(B.rate, o)
-    before = held or untouched(groups)
-    held, push = kicks.answered(options, groups, B, q, v, 0 * v, o, moves, dt, before, 0.5)
-    zero, none = jnp.zeros(()), jnp.zeros((4, sum(len(g.G) for g in groups)))
+    before = held or untouched(B.groups)
+    held, push = kicks.answered(options, B, q, v, 0 * v, o, moves, dt, before, 0.5)
+    zero, none = jnp.zeros(()), jnp.zeros((4, sum(len(g.G) for g in B.groups)))
     energy = jnp.zeros(6).at[4].set(held.stored)
-    now = Now(y, o, zero, push, held, energy, held.missed, none.astype(bool), none, (), jnp.zeros(2, int), zero)
-    return typed(fourth.begun(groups, B, now) if options.halvings else now)
+    now = MotionState(y, o, zero, push, held, energy, held.missed, none.astype(bool), none, (), jnp.zeros(2, int), zero)
+    return typed(fourth.begun(B, now) if options.halvings else now)
 
 
 def typed(traced: Any) -> Any:
@@ -49,9 +49,15 @@ def typed(traced: Any) -> Any:
 
 @partial(program, static_argnums=(0, 1))
 def run(
-    options: Options, events: int, groups: tuple[Group, ...], B: Bodies, now: Now, each: Any, s: Any, rows: Any,
+    options: Options,
+    events: int,
+    B: Bodies,
+    now: MotionState,
+    each: Any,
+    s: Any,
+    rows: Any,
     steps: Any,
-) -> tuple[Now, Listed, Seen, Any, Hardest]:  # fmt: skip
+) -> tuple[MotionState, Listed, Snapshot, Any, Hardest]:
     """Rows of so many steps each, of which each (room,) is a sample, the first again after the last of s; as many as
     are asked for, or until numbers are infinite.
 
@@ -63,17 +69,17 @@ def run(
         were; the row in which steps missed most.
     """
     p = B.omega2.shape[1]
-    step = partial(one_step, options, groups, B)
+    step = partial(one_step, options, B)
 
     def on(carried: tuple) -> tuple:
         left, now, listed = carried
         left, now = jax.lax.while_loop(lambda c: (c[0] > 0) & ~c[1].met.any(), lambda c: step(*c), (left, now))
         return left, now._replace(met=jnp.zeros_like(now.met)), _noted(now, listed)
 
-    def look(now: Now) -> Seen:
+    def look(now: MotionState) -> Snapshot:
         q, v = now.y[:, :p], now.y[:, p:]
         bodies = 0.5 * jnp.sum(v**2 + B.omega2 * q**2)
-        return Seen(q.reshape(-1), v.reshape(-1), now.held.d, now.held.force, now.energy, bodies, now.time)
+        return Snapshot(q.reshape(-1), v.reshape(-1), now.held.d, now.held.force, now.energy, bodies, now.time)
 
     def row(carried: tuple) -> tuple:
         i, steps, _, now, listed, seen, hardest = carried
@@ -82,12 +88,12 @@ def run(
         steps = steps + count
         now = now._replace(o=oscillators(options, B, steps * B.flow.length[0]))
         if options.halvings:
-            now = now._replace(held=fourth.at_sample(groups, B, now))
-        found = look(now)
-        kept = jax.tree_util.tree_map(lambda all_of, one: all_of.at[i % s].set(one), seen, found)
+            now = now._replace(held=fourth.at_sample(B, now))
+        sample = look(now)
+        kept = jax.tree_util.tree_map(lambda all_of, one: all_of.at[i % s].set(one), seen, sample)
         rise = now.missed - before.missed
         hardest = Hardest(*(jnp.where(rise > hardest[0], *x) for x in zip((rise, before.time), hardest, strict=True)))
-        return i + 1, steps, jnp.isfinite(found.mechanical), now, listed, kept, hardest
+        return i + 1, steps, jnp.isfinite(sample.mechanical), now, listed, kept, hardest
 
     listed = Listed(jnp.zeros((), int), jnp.zeros((events, 3)))
     seen = jax.tree_util.tree_map(lambda one: jnp.zeros((len(each), *one.shape)), look(now))
@@ -104,26 +110,26 @@ def oscillators(options: Options, B: Bodies, time: Any) -> Any:
     return jnp.concatenate([jnp.ones(1), jnp.stack([jnp.cos(angle), jnp.sin(angle)], axis=1).reshape(-1)])
 
 
-def one_step(options: Options, groups: tuple[Group, ...], B: Bodies, left: Any, now: Now) -> tuple[Any, Now]:
+def one_step(options: Options, B: Bodies, left: Any, now: MotionState) -> tuple[Any, MotionState]:
     """A step, or a leap over as many as no contact is met in, of those that are left; and what is left then."""
-    free = _free(groups, B, now) if options.leaps else jnp.zeros((), int)
+    free = _free(B, now) if options.leaps else jnp.zeros((), int)
     far = jnp.clip(free, 1, left)
     if not options.halvings:
-        return left - far, _told(B, far, now, kicks.step(options, groups, B, far, now))
+        return left - far, _told(B, far, now, kicks.step(options, B, far, now))
     near = jnp.minimum(now.level[0], exponent(left))
 
-    def leap(now: Now) -> tuple[Any, Now]:
-        return far, _told(B, far, now, fourth.leapt(kicks.step(options, groups, B, far, now)))
+    def leap(now: MotionState) -> tuple[Any, MotionState]:
+        return far, _told(B, far, now, fourth.leapt(kicks.step(options, B, far, now)))
 
-    def step(now: Now) -> tuple[Any, Now]:
-        done, after = fourth.step(options, groups, B, near, now)
+    def step(now: MotionState) -> tuple[Any, MotionState]:
+        done, after = fourth.step(options, B, near, now)
         return jnp.where(done, 1 << near, 0), _told(B, 1 << near, now, after, done)
 
     done, after = jax.lax.cond(free >= LEAST, leap, step, now) if options.leaps else step(now)
     return left - done, after
 
 
-def _free(groups: tuple[Group, ...], B: Bodies, now: Now) -> Any:
+def _free(B: Bodies, now: MotionState) -> Any:
     """Steps in which no point of contact can close its gap: an even number, of `DIGITS` binary digits."""
     p = B.omega2.shape[1]
     z = now.y - times(B.steady, now.o)
@@ -131,9 +137,9 @@ def _free(groups: tuple[Group, ...], B: Bodies, now: Now) -> Any:
     fastest, bent = (swings * by_swing + steady for by_swing, steady in (B.reach, B.bends))
     w = times(B.D, now.y[:, p:].reshape(-1)) + times(B.D_o, times(B.rate, now.o))
     begin, free = 0, []
-    for g, u, rate in zip(groups, now.held.places, parts(groups, w), strict=True):
-        own = slice(begin, begin + len(u))
-        free.append(_unmet(g.law.overlap, u, moved(g, rate), fastest[own], bent[own]))
+    for g, u, rate in zip(B.groups, now.held.places, parts(B.groups, w), strict=True):
+        points = slice(begin, begin + len(u))
+        free.append(_unmet(g.law.overlap, u, moved(g, rate), fastest[points], bent[points]))
         begin += len(u)
     most = jnp.minimum(jnp.min(jnp.concatenate(free)) / B.flow.length[0], 2.0 ** (len(B.flow.length) - 1))
     last = jnp.maximum(exponent(jnp.maximum(most, 1.0)) - (DIGITS - 1), 1)
@@ -152,13 +158,13 @@ def _unmet(overlap: Any, u: Any, w: Any, fastest: Any, bent: Any) -> Any:
     return jnp.where((past <= 0) & (deep <= 0), jnp.maximum(ahead, sure), sure)
 
 
-def _told(B: Bodies, n: Any, now: Now, after: Now, done: Any = True) -> Now:
+def _told(B: Bodies, n: Any, now: MotionState, after: MotionState, done: Any = True) -> MotionState:
     """With the events of n short steps, if they were done."""
     met, at = _met(now, after.held, B.flow.length[0] * n)
     return typed(after._replace(met=met & done, at=at))
 
 
-def _met(before: Now, held: Held, dt: Any) -> tuple[Any, Any]:
+def _met(before: MotionState, held: Held, dt: Any) -> tuple[Any, Any]:
     """(4, contacts) events of a step and when: where the deepest point of a contact passes zero; where sliding begins
     and ends in it."""
     a, b = before.held.approach, held.approach
@@ -168,7 +174,7 @@ def _met(before: Now, held: Held, dt: Any) -> tuple[Any, Any]:
     return jnp.stack(met), before.time + dt * jnp.stack([share, share, half, half])
 
 
-def _noted(now: Now, listed: Listed) -> Listed:
+def _noted(now: MotionState, listed: Listed) -> Listed:
     kind, contact = jnp.meshgrid(jnp.arange(4.0), jnp.arange(1.0 * now.met.shape[1]), indexing="ij")
     place = listed.count + jnp.cumsum(now.met.reshape(-1)).reshape(now.met.shape) - 1
     rows = jnp.stack([now.at, contact, kind], axis=-1)

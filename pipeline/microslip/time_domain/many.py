@@ -20,10 +20,9 @@ from ..errors import UserError
 from ..interrupts import look
 from ..programs import program
 from . import classification, loop
-from .bodies import Bodies, Now, Options
+from .bodies import Bodies, MotionState, Options
 from .classification import Exponent
-from .contacts import Group
-from .equations import Equations
+from .equations import MotionEquations
 from .orbit import REPEATS, comes_back, refuse_behind, steps_of_a_sample
 from .stepper import Stepper
 
@@ -41,7 +40,7 @@ class Reached:
             they were asked for; nan where a motion ceases to be finite.
     """
 
-    equations: Equations
+    equations: MotionEquations
     steps: int
     q: Array
     v: Array
@@ -49,8 +48,8 @@ class Reached:
     exponents: tuple[Exponent, ...] = ()
 
     def __repr__(self) -> str:
-        found = [f"{int((self.attractor == i).sum())} {self._told(i)}" for i in np.unique(self.attractor)]
-        return f"<Reached: {len(self.q)} starts; {'; '.join(found)}>"
+        counts = [f"{int((self.attractor == i).sum())} {self._told(i)}" for i in np.unique(self.attractor)]
+        return f"<Reached: {len(self.q)} starts; {'; '.join(counts)}>"
 
     def _told(self, attractor: int) -> str:
         if attractor < 0:
@@ -97,20 +96,26 @@ class Reached:
     def attractor(self) -> Array:
         """(n,) number of the periodic motion that a start has reached, from 0 in the order of the starts: two are one
         if their points after a period coincide as closely as a motion with itself. Below zero: `OPEN`, `DIVERGED`."""
-        found, known = np.full(len(self.points), OPEN), list[Array]()
+        numbers, orbits = np.full(len(self.points), OPEN), list[Array]()
         for i, (z, p) in enumerate(zip(self.points, self.repeats, strict=True)):
             if not np.isfinite(z).all():
-                found[i] = DIVERGED
+                numbers[i] = DIVERGED
             elif p:
-                near = [np.abs(one - z[:, -1:]).max(axis=0).min() <= 2 * REPEATS * self.size for one in known]
-                found[i] = near.index(True) if any(near) else len(known)
+                near = [np.abs(orbit - z[:, -1:]).max(axis=0).min() <= 2 * REPEATS * self.size for orbit in orbits]
+                numbers[i] = near.index(True) if any(near) else len(orbits)
                 if not any(near):
-                    known.append(z[:, -p:])
-        return found
+                    orbits.append(z[:, -p:])
+        return numbers
 
 
 def run(
-    e: Equations, x: Array, x_dot: Array, settle: int, keep: int, steps: int | None = None, exponents: bool = False
+    e: MotionEquations,
+    x: Array,
+    x_dot: Array,
+    settle: int,
+    keep: int,
+    steps: int | None = None,
+    exponents: bool = False,
 ) -> Reached:
     """What starts (n, m0) of the assembly's coordinates lead to; contacts come there on a straight way from u = 0.
 
@@ -139,21 +144,23 @@ def run(
     shape = (len(x), stepper.bodies.omega2.shape[0], -1)
     y = np.concatenate([(x @ to_modes.T).reshape(shape), (x_dot @ to_modes.T).reshape(shape)], axis=2)
     counts = np.array([settle * each, each]) * 2**stepper.options.halvings
-    ends, closes, last = np.zeros((len(x), keep, *y.shape[1:])), np.zeros(len(x), int), list[Now]()
+    ends, closes, last = np.zeros((len(x), keep, *y.shape[1:])), np.zeros(len(x), int), list[MotionState]()
     for i, start in enumerate(y):
         look()
         o = e.oscillators(0.0)
-        ends[i], closes[i], now = _one(stepper.options, keep, stepper.groups, stepper.bodies, start, o, counts)
+        ends[i], closes[i], now = _one(stepper.options, keep, stepper.bodies, start, o, counts)
         last.append(now)
     q, v = (part.reshape(len(x), keep, -1) for part in np.split(ends, 2, axis=3))
     reached = Reached(e, each, q, v, closes)
     return replace(reached, exponents=_exponents(stepper, last, reached.size, each, periods)) if periods else reached
 
 
-def _exponents(stepper: Stepper, last: Sequence[Now], size: float, each: int, periods: int) -> tuple[Exponent, ...]:
+def _exponents(
+    stepper: Stepper, last: Sequence[MotionState], size: float, each: int, periods: int
+) -> tuple[Exponent, ...]:
     """Of the motions that go on from where they are, `last`."""
-    if told := classification.whole(last[0].held.states):
-        raise UserError(f"exponents: {told}")
+    if unseparable := classification.whole(last[0].held.states):
+        raise UserError(f"exponents: {unseparable}")
     e, stepper = stepper.equations, replace(stepper, order=2)
     scale = classification.sizes(e, last[0].y.shape[0])
     way = np.random.default_rng(0).standard_normal(scale.shape) / scale
@@ -162,23 +169,21 @@ def _exponents(stepper: Stepper, last: Sequence[Now], size: float, each: int, pe
     for now in last:
         look()
         count = classification.ALIGNED + periods
-        found = _grown(stepper.options, count, stepper.groups, stepper.bodies, now, each, scale, way)
-        growth = np.asarray(found)[classification.ALIGNED :]
-        known = np.isfinite(growth).all()
+        growths = _grown(stepper.options, count, stepper.bodies, now, each, scale, way)
+        growth = np.asarray(growths)[classification.ALIGNED :]
+        finite = np.isfinite(growth).all()
         none = Exponent(float("nan"), float("nan"), 0)
-        exponents.append(classification.mean(growth, 2 * np.pi / e.Omega) if known else none)
+        exponents.append(classification.mean(growth, 2 * np.pi / e.Omega) if finite else none)
     return tuple(exponents)
 
 
 @partial(program, static_argnums=(0, 1))
-def _one(
-    options: Options, keep: int, groups: tuple[Group, ...], B: Bodies, y: Any, o: Any, counts: Any
-) -> tuple[Any, Any, Now]:
+def _one(options: Options, keep: int, B: Bodies, y: Any, o: Any, counts: Any) -> tuple[Any, Any, MotionState]:
     """(keep, b, 2 p) after every period that is kept, how many impacts were in them, and where the motion is then."""
-    on = partial(_further, options, groups, B)
-    now, _ = on(loop.begun(options, groups, B, y, o, None), counts[0])
+    on = partial(_further, options, B)
+    now, _ = on(loop.begun(options, B, y, o, None), counts[0])
 
-    def period(now: Now, _: None) -> tuple[Now, tuple[Any, Any]]:
+    def period(now: MotionState, _: None) -> tuple[MotionState, tuple[Any, Any]]:
         now, closes = on(now, counts[1])
         return now, (now.y, closes)
 
@@ -186,12 +191,12 @@ def _one(
     return ends, jnp.sum(closes), now
 
 
-def _further(options: Options, groups: tuple[Group, ...], B: Bodies, now: Now, count: Any) -> tuple[Now, Any]:
+def _further(options: Options, B: Bodies, now: MotionState, count: Any) -> tuple[MotionState, Any]:
     """So many steps, and the impacts in them; o is there again what it was, so that rounding does not add up."""
 
     def step(carried: tuple) -> tuple:
         left, now, closes = carried
-        left, now = loop.one_step(options, groups, B, left, now)
+        left, now = loop.one_step(options, B, left, now)
         return left, now, closes + jnp.sum(now.met[0])
 
     _, after, closes = jax.lax.while_loop(lambda c: c[0] > 0, step, (count, now, jnp.zeros((), int)))
@@ -200,13 +205,19 @@ def _further(options: Options, groups: tuple[Group, ...], B: Bodies, now: Now, c
 
 @partial(program, static_argnums=(0, 1))
 def _grown(
-    options: Options, periods: int, groups: tuple[Group, ...], B: Bodies, last: Now, count: Any, scale: Any, way: Any
+    options: Options,
+    periods: int,
+    B: Bodies,
+    last: MotionState,
+    count: Any,
+    scale: Any,
+    way: Any,
 ) -> Any:
     """(periods,) logarithms by which a separation grows in each, brought back to its size after every one."""
     apart = jnp.linalg.norm(scale * way)
 
-    def period(carried: tuple[Now, Now], _: None) -> tuple[tuple[Now, Now], Any]:
-        now, other = (_further(options, groups, B, one, count)[0] for one in carried)
+    def period(carried: tuple[MotionState, MotionState], _: None) -> tuple[tuple[MotionState, MotionState], Any]:
+        now, other = (_further(options, B, one, count)[0] for one in carried)
         size = jnp.linalg.norm(scale * (other.y - now.y))
         other = loop.typed(classification.between(now, other, apart / size, jnp.asarray))
         return (now, other), jnp.log(size / apart)

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import json
 import math
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
+import h5py
 import jax
 import numpy as np
 import scipy.linalg
@@ -20,25 +22,27 @@ from ..data import Array
 from ..errors import NotConverged, UserError
 from ..files.hdf5 import put, sealed
 from ..interrupts import look
+from ..progress import Report
 from ..settings.mistakes import bounded, numbered
 from ..system.assembly import Contact
 from ..units import METRES, UNIT_OF_FREQUENCY, Quantity, counted, hertz
 from . import classification
-from . import samples as kept_samples
-from .bodies import Hardest, Now, Seen
+from .bodies import Hardest, MotionState, Snapshot
 from .classification import Exponent
-from .equations import Equations
+from .equations import MotionEquations
 from .ground import steps_of_waves
-from .samples import ROWS, InMemory, Kept
-from .starts import Periodic, Released
+from .samples import ENERGIES, ROWS, STRIP, Announced, KeptSamples, announced, of_period, read, units_with
+from .starts import PeriodicStart, Released
 from .starts import begun as on_its_way
 from .stepper import KINDS, Stepper, static_force
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-Report = Callable[[str], None]
 Start = Literal["static", "rest"] | Released
+
+FORMAT = "microslip-orbit"
+FORMAT_VERSION = "0.1"
 
 OF_CONTACT = 150
 """Steps in a period of the fastest motion with closed contacts, if nothing is asked for."""
@@ -80,44 +84,63 @@ REPEATS = 1e-3
 """Share of the size of a motion within which it counts as having come back."""
 
 
-@dataclass(frozen=True, eq=False)
-class Orbit:
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Ended:
+    """How a motion ended.
+
+    Attributes:
+        steps: of a period. error: estimate of the largest deviation of a read-out that all periods together leave,
+            those that are not kept too, if each of them was as hard for the steps as the hardest was; a share of the
+            largest read-out at the end, 1 at most; nan if it was not looked for. diverged: time (s) at which numbers
+            became infinite; inf: never. exponent: the largest Lyapunov exponent, looked for where the motion does not
+            come back; None: it was not.
+    """
+
+    steps: int
+    error: float = math.nan
+    diverged: float = math.inf
+    messages: tuple[str, ...] = ()
+    exponent: Exponent | None = None
+
+    @property
+    def told(self) -> dict[str, Any]:
+        """As a file has it."""
+        facts = {"steps_per_period": self.steps, "error": self.error, "diverged": self.diverged}
+        exponent = dict(zip(LYAPUNOV, self.exponent or (), strict=False))
+        return {**facts, "messages": list(self.messages), **exponent}
+
+
+def read_ended(told: Mapping[str, Any]) -> Ended:
+    """What `Ended.told` was."""
+    exponent = [told[name] for name in LYAPUNOV if name in told]
+    return Ended(
+        steps=int(told["steps_per_period"]),
+        error=float(told["error"]),
+        diverged=float(told["diverged"]),
+        messages=tuple(json.loads(told["messages"])),
+        exponent=Exponent(float(exponent[0]), float(exponent[1]), int(exponent[2])) if exponent else None,
+    )
+
+
+LYAPUNOV = "lyapunov_exponent", "lyapunov_uncertainty", "lyapunov_periods"
+
+
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
+class Orbit(Ended, Announced):
     """A motion in time, sampled.
 
     Attributes:
-        equations. labels: of the read-outs, ``monitor direction``. samples: of a period. steps: of a period.
-        time: (s,) s. y, v: (w, s) read-outs in the units of `of`, and their velocities. q, q_dot: (m, s) modal
-            coordinates of `Equations.shapes`. d, force: (c, s) of the contact coordinates, m and N.
-        energy: name -> (s,) J: ``mechanical`` of the bodies; since the start ``given`` by loads and preloads,
-            ``damped``, and ``contacts``, done on them; of that, and of what moving
-            ``ground`` gave them, ``stored`` and ``lost``, nan where a law does not tell.
-        events: (e, 3) time in s, number of the contact, kind (an index of `KINDS`). missed: how many are not listed.
-        error: estimate of the largest deviation of a read-out that all periods together leave, those that are not kept
-            too, if each of them was as hard for the steps as the hardest was; a share of the largest read-out at the
-            end, 1 at most; nan if it was not looked for. diverged: time (s) at which numbers became infinite;
-            inf: never.
-        exponent: the largest Lyapunov exponent, looked for where the motion does not come back; None: it was not.
-        shown: unit of frequencies in sentences.
+        arrays: name -> (rows, s) or (s,), as a file has them (`samples.UNITS`), and ``event``. missed: how many events
+            are not listed. model: see `equations`. shown: unit of frequencies in sentences.
+
+    ``time``: (s,) s. ``y``, ``v``: (w, s) read-outs in the units of `of`, and their velocities. ``q``, ``q_dot``:
+    (m, s) modal coordinates of `MotionEquations.shapes`. ``d``, ``force``: (c, s) of the contact coordinates, m and N.
+    ``events``: (e, 3) time in s, number of the contact, kind (an index of `KINDS`).
     """
 
-    equations: Equations
-    labels: tuple[str, ...]
-    samples: int
-    steps: int
-    time: Array
-    y: Array
-    v: Array
-    q: Array
-    q_dot: Array
-    d: Array
-    force: Array
-    energy: Mapping[str, Array]
-    events: Array
+    arrays: Mapping[str, Array]
     missed: int = 0
-    error: float = math.nan
-    diverged: float = math.inf
-    exponent: Exponent | None = None
-    messages: tuple[str, ...] = field(default=())
+    model: MotionEquations | None = None
     shown: str = field(default_factory=UNIT_OF_FREQUENCY.get)
 
     def __repr__(self) -> str:
@@ -126,25 +149,27 @@ class Orbit:
             f"<Orbit: {len(self.time) // self.samples} periods at {w / 2 / np.pi:.6g} Hz ({w:.6g} rad/s); {self.said}>"
         )
 
-    @property
-    def Omega(self) -> float:
-        """rad/s of the excitation."""
-        return self.equations.Omega
+    time = property(lambda self: self.array("time"))
+    y = property(lambda self: self.array("displacement"))
+    v = property(lambda self: self.array("velocity"))
+    q = property(lambda self: self.array("modal_displacement"))
+    q_dot = property(lambda self: self.array("modal_velocity"))
+    d = property(lambda self: self.array("contact_displacement"))
+    force = property(lambda self: self.array("contact_force"))
+    events = property(lambda self: self.array("event"))
 
     @property
-    def omega2(self) -> Array:
-        """(m,) (rad/s)^2 of the modal coordinates."""
-        return self.equations.omega2
+    def energy(self) -> Mapping[str, Array]:
+        """Name -> (s,) J: ``mechanical`` of the bodies; since the start ``given`` by loads and preloads, ``damped``,
+        and ``contacts``, done on them; of that, and of what moving ``ground`` gave them, ``stored`` and ``lost``, nan
+        where a law does not tell."""
+        return {name: self.array(f"energy_{name}") for name in ENERGIES}
 
     @property
-    def touching(self) -> tuple[kept_samples.Touch, ...]:
-        """Contacts, in the order in which events count them."""
-        return kept_samples.touches(self.equations)
-
-    @property
-    def units(self) -> tuple[str, ...]:
-        """Of the read-outs."""
-        return kept_samples.units_of(self.equations)
+    def equations(self) -> MotionEquations:
+        """Those that it was computed with."""
+        assert self.model is not None
+        return self.model
 
     def of(self, read_out: int = 0) -> Quantity:
         """What a read-out measures: a displacement, an angle, a strain."""
@@ -161,20 +186,13 @@ class Orbit:
         return 2 * np.pi / self.Omega
 
     def array(self, name: str, part: slice = slice(None)) -> Array:
-        """What a file has under a name (`samples.UNITS`), or a part of the samples of it."""
-        own = {
-            "time": self.time, "displacement": self.y, "velocity": self.v, "modal_displacement": self.q,
-            "modal_velocity": self.q_dot, "contact_displacement": self.d, "contact_force": self.force,
-        }  # fmt: skip
-        if name == "angular_frequency":
-            return self.equations.frequency(self.time[part])
-        found = own[name] if name in own else self.energy[name.removeprefix("energy_")]
-        return np.asarray(found[..., part])
+        """What a file has under a name, or a part of the samples of it."""
+        return np.asarray(self.arrays[name][..., part])
 
     def strips(self, *names: str) -> Iterator[list[Array]]:
         """Arrays, so many samples at a time."""
-        for begin in range(0, len(self.time), kept_samples.STRIP):
-            yield [self.array(name, slice(begin, begin + kept_samples.STRIP)) for name in names]
+        for begin in range(0, len(self.time), STRIP):
+            yield [self.array(name, slice(begin, begin + STRIP)) for name in names]
 
     @cached_property
     def repeats(self) -> int:
@@ -211,8 +229,8 @@ class Orbit:
             raise UserError(f"kind: '{kind}' is none of {', '.join(KINDS)}")
         if contact is not None:
             numbered("contact", contact, len(self.touching), "contact")
-        own = self.events[:, 2] == KINDS.index(kind)
-        return self.events[own if contact is None else own & (self.events[:, 1] == contact), 0]
+        chosen = self.events[:, 2] == KINDS.index(kind)
+        return self.events[chosen if contact is None else chosen & (self.events[:, 1] == contact), 0]
 
     def count(self, kind: str, contact: int | None = None) -> int:
         """Number of those events."""
@@ -270,32 +288,32 @@ class Orbit:
             if len(y) and (high := float(np.abs(y[0]).max())) > top:
                 top, at = high, float(w[np.abs(y[0]).argmax()]) / (2 * np.pi)
         way = "up" if last > first else "down"
-        said = f"run-{way} from {hertz(first / 2 / np.pi, self.shown)} to {hertz(last / 2 / np.pi, self.shown)}"
-        return f"{said}, largest at {hertz(at, self.shown)}" if self.labels else said
+        sentence = f"run-{way} from {hertz(first / 2 / np.pi, self.shown)} to {hertz(last / 2 / np.pi, self.shown)}"
+        return f"{sentence}, largest at {hertz(at, self.shown)}" if self.labels else sentence
 
     @property
     def drift(self) -> float:
         """Share of the energy that passed through the contacts by which what they store and lost differs from it."""
         gone, passed, first = 0.0, Range(), None
         ground = Range()
-        for contacts, moved, stored, lost in self._energies("contacts", "ground", "stored", "lost"):
-            left = contacts + moved - stored - lost
+        for contacts, by_ground, stored, lost in self._energies("contacts", "ground", "stored", "lost"):
+            left = contacts + by_ground - stored - lost
             first = left[0] if first is None else first
             gone = np.maximum(gone, np.abs(left - first).max())
             passed.see(contacts)
-            ground.see(moved)
+            ground.see(by_ground)
         most = max(passed.width, ground.width)
         return float(gone / most) if most else 0.0
 
     @property
     def balance(self) -> float:
         """Largest deviation of the bodies' energy from what they got, a share of what was given or is there at most."""
-        left, given, most = Range(), Range(), 0.0
+        left, gained, most = Range(), Range(), 0.0
         for mechanical, supplied, damped, contacts in self._energies("mechanical", "given", "damped", "contacts"):
             left.see(mechanical - supplied + damped + contacts)
-            given.see(supplied)
+            gained.see(supplied)
             most = max(most, float(np.abs(mechanical).max(initial=0.0)))
-        size = max(most, given.width)
+        size = max(most, gained.width)
         return left.width / size if size else 0.0
 
     def _energies(self, *names: str) -> Iterator[list[Array]]:
@@ -320,7 +338,7 @@ class Orbit:
 
         variables = {
             name: ((ROWS[name], "time") if name in ROWS else ("time",), self.array(name), {"units": unit})
-            for name, unit in kept_samples.units_with(self.units).items()
+            for name, unit in units_with(self.units).items()
             if name != "time"
         }
         when, where, kind = self.events.T
@@ -330,15 +348,12 @@ class Orbit:
             "event_kind": (("event",), np.array(KINDS)[kind.astype(int)], {}),
         }
         coords = {"time": ("time", self.time, {"units": "s"}), "read_out": list(self.labels)}
-        attrs = {"Omega": self.Omega, "samples_per_period": self.samples, "said": self.said, **self._told}
+        attrs = {"Omega": self.Omega, "samples_per_period": self.samples, "said": self.said, **self._facts}
         return xarray.Dataset(variables, coords=coords, attrs={**attrs, "messages": list(self.messages)})
 
     @property
-    def _told(self) -> dict[str, Any]:
-        return {
-            "steps_per_period": self.steps, "missed_events": self.missed, "error": self.error,
-            "diverged": self.diverged, "messages": list(self.messages), **told_of(self.exponent),
-        }  # fmt: skip
+    def _facts(self) -> dict[str, Any]:
+        return {"steps_per_period": self.steps, "missed_events": self.missed, **self.told}
 
     def save(self, path: Path | str) -> Path:
         """Write a file of this motion (``docs/time_domain.md``), complete or absent; `load` reads it.
@@ -347,16 +362,13 @@ class Orbit:
             UserError: no permission, no space; a file that is none of motions stands there.
         """
         with sealed(path) as file:
-            kept_samples.head(file)
+            head(file)
             group = file.create_group("motion_1")
-            kept_samples.describe(
-                group, f"{self.Omega:.6g} rad/s", self.Omega, self.omega2, self.labels, self.units, self.touching,
-                self.samples,
-            )  # fmt: skip
-            for name, unit in kept_samples.units_with(self.units).items():
+            replace(self, name=f"{self.Omega:.6g} rad/s").put(group)
+            for name, unit in units_with(self.units).items():
                 put(group, name, self.array(name), unit)
             put(group, "event", self.events)
-            kept_samples.tell(group, self._told)
+            tell(group, self._facts)
         return Path(path)
 
     def plot(self, axes: Axes | None = None, read_out: int = 0) -> Axes:
@@ -366,7 +378,7 @@ class Orbit:
             axes: of matplotlib, new ones with a legend if not given. read_out: its number.
         """
         numbered("read_out", read_out, len(self.labels), "read-out")
-        own = axes is None
+        alone = axes is None
         if axes is None:
             import matplotlib.pyplot as plt
 
@@ -376,7 +388,7 @@ class Orbit:
         axes.plot(by * y, rate * v, color="#0b4f9c", linewidth=0.7)
         axes.plot(by * y[last], rate * v[last], "o", color="#c8382c", markersize=4, label="after every period")
         axes.set(xlabel=f"{self.labels[read_out]} in {unit}", ylabel=f"velocity in {per_second}/s")
-        if own:
+        if alone:
             axes.legend(fontsize=8, loc="lower left", bbox_to_anchor=(0.0, 1.0), frameon=False)
         return axes
 
@@ -398,15 +410,16 @@ class Range:
         return 0.0 if self.low > self.high else float(self.high - self.low)
 
 
-@dataclass(frozen=True)
-class Ended:
-    """How a motion ended, see `Orbit`."""
+def head(file: h5py.File) -> None:
+    """Of a file of motions."""
+    file.attrs["format"], file.attrs["format_version"] = FORMAT, FORMAT_VERSION
+    file.attrs["units"] = "SI: m, kg, s, N, rad"
 
-    steps: int
-    error: float = math.nan
-    diverged: float = math.inf
-    messages: tuple[str, ...] = ()
-    exponent: Exponent | None = None
+
+def tell(group: h5py.Group, told: Mapping[str, Any]) -> None:
+    """What a motion says of itself beside its arrays."""
+    for key, value in told.items():
+        group.attrs[key] = json.dumps(value) if isinstance(value, list) else value
 
 
 def stroboscopic(
@@ -462,25 +475,9 @@ def _left(missed: Array, p: int) -> float:
     return last - less**2 / (falls - less) if falls > less > 0 else last
 
 
-def told_of(exponent: Exponent | None) -> dict[str, Any]:
-    """An exponent as a file has it; nothing where none was looked for."""
-    if exponent is None:
-        return {}
-    names = ("lyapunov_exponent", "lyapunov_uncertainty", "lyapunov_periods")
-    return dict(zip(names, exponent[:3], strict=True))
-
-
-def exponent_of(told: Mapping[str, Any]) -> Exponent | None:
-    """What `told_of` has told."""
-    if "lyapunov_exponent" not in told:
-        return None
-    value, around, periods = (told[f"lyapunov_{key}"] for key in ("exponent", "uncertainty", "periods"))
-    return Exponent(float(value), float(around), int(periods))
-
-
 def run(
-    equations: Equations, settle: int, keep: int, samples: int = 256, steps: int | None = None,
-    start: Start | Periodic = "static", report: Report = lambda _: None,
+    equations: MotionEquations, settle: int, keep: int, samples: int = 256, steps: int | None = None,
+    start: Start | PeriodicStart = "static", report: Report = lambda _: None,
 ) -> Orbit:  # fmt: skip
     """Motion in time from a start: see `microslip.integrate`.
 
@@ -490,28 +487,23 @@ def run(
     Raises:
         UserError: steps that are too few for the contacts' springs. NotConverged: no state of rest is found.
     """
-    kept = InMemory()
+    kept = KeptSamples()
     ended = march(equations, settle, keep, samples, steps, start, report, kept)
-    a = kept.arrays(equations)
-    return Orbit(
-        equations, kept_samples.labels_of(equations), samples, ended.steps, a["time"], a["displacement"], a["velocity"],
-        a["modal_displacement"], a["modal_velocity"], a["contact_displacement"], a["contact_force"],
-        {name: a[f"energy_{name}"] for name in kept_samples.ENERGIES}, a["event"], kept.missed, ended.error,
-        ended.diverged, ended.exponent, ended.messages,
-    )  # fmt: skip
+    facts = vars(announced(f"{equations.Omega:.6g} rad/s", equations, samples)) | vars(ended)
+    return Orbit(arrays=kept.arrays(equations), missed=kept.missed, model=equations, **facts)
 
 
 def march(
-    equations: Equations, settle: int, keep: int, samples: int, steps: int | None, start: Start | Periodic,
+    equations: MotionEquations, settle: int, keep: int, samples: int, steps: int | None, start: Start | PeriodicStart,
     report: Report,
-    kept: Kept,
+    kept: KeptSamples,
 ) -> Ended:  # fmt: skip
     """`run`, its samples kept elsewhere, and gone on with where that has been begun."""
     for name, value, least in (("settle", settle, 0), ("keep", keep, 1), ("samples", samples, 8)):
         bounded(name, value, ge=least)
     each = steps_of_a_sample(equations, samples, steps)
     stepper = Stepper(equations, 2 * np.pi / equations.Omega / (each * samples))
-    first = on_its_way(stepper, start) if isinstance(start, Periodic) else stepper.start(*begun(equations, start))
+    first = on_its_way(stepper, start) if isinstance(start, PeriodicStart) else stepper.start(*begun(equations, start))
     (now, hardest), done = kept.begun((first, Hardest(-1.0, 0.0)))
     many, reported = 1, time.monotonic()
     while done < settle + keep:
@@ -526,9 +518,9 @@ def march(
         done, kept.met = done + ahead, kept.met + count
         if not np.isfinite(seen.mechanical[-1]):
             when, why = _divergence(stepper, before, seen, kept if dense else None)
-            return Ended(each * samples, diverged=when, messages=(why,))
+            return Ended(steps=each * samples, diverged=when, messages=(why,))
         if dense:
-            kept.keep(kept_samples.of_period(equations, seen), listed, count - len(listed))
+            kept.keep(of_period(equations, seen), listed, count - len(listed))
         kept.mark((now, hardest), done)
         if time.monotonic() - reported >= PAUSE or done in (settle, settle + keep):
             met = counted(kept.met, "event")
@@ -539,12 +531,14 @@ def march(
     error, told = _error(stepper, first, now, hardest, samples, each, settle + keep)
     exponent = _exponent(stepper, now, kept, samples, each, settle + keep)
     more = (*_warnings(equations, kept, float(now.worst)), told, exponent.message if exponent else "")
-    beside = start.messages if isinstance(start, Periodic) else ()
+    beside = start.messages if isinstance(start, PeriodicStart) else ()
     messages = (*beside, *(text for text in more if text))
-    return Ended(each * samples, error, messages=messages, exponent=exponent)
+    return Ended(steps=each * samples, error=error, messages=messages, exponent=exponent)
 
 
-def _exponent(stepper: Stepper, now: Now, kept: Kept, samples: int, each: int, done: int) -> Exponent | None:
+def _exponent(
+    stepper: Stepper, now: MotionState, kept: KeptSamples, samples: int, each: int, done: int
+) -> Exponent | None:
     """The largest Lyapunov exponent of a motion that has not come back in what was kept; of so many periods at most as
     were done."""
     periods = classification.periods_of(done)
@@ -556,13 +550,13 @@ def _exponent(stepper: Stepper, now: Now, kept: Kept, samples: int, each: int, d
     return classification.exponent(stepper, now, samples, each, periods)
 
 
-def _divergence(stepper: Stepper, before: Now, seen: Seen, kept: Kept | None) -> tuple[float, str]:
+def _divergence(stepper: Stepper, before: MotionState, seen: Snapshot, kept: KeptSamples | None) -> tuple[float, str]:
     """When a motion became infinite, s, and why; what is finite of its last period is kept."""
     finite = np.isfinite(np.asarray(seen.mechanical))
     whole = int(np.argmin(finite))
-    sound = Seen._make(np.asarray(x)[:whole] for x in seen)
+    sound = Snapshot._make(np.asarray(x)[:whole] for x in seen)
     if kept is not None and whole:
-        kept.keep(kept_samples.of_period(stepper.equations, sound), np.zeros((0, 3)), 0)
+        kept.keep(of_period(stepper.equations, sound), np.zeros((0, 3)), 0)
     when = float(sound.time[-1]) if whole else float(before.time)
     energy = float(sound.mechanical[-1]) if whole else math.nan
     wrong = ~np.isfinite(np.asarray(seen.force)[whole])
@@ -572,26 +566,26 @@ def _divergence(stepper: Stepper, before: Now, seen: Seen, kept: Kept | None) ->
     return when, f"From {when:.6g} s on it is no number: {reached}; take more steps, or look for what drives it."
 
 
-def _warnings(equations: Equations, kept: Kept, worst: float) -> tuple[str, ...]:
+def _warnings(equations: MotionEquations, kept: KeptSamples, worst: float) -> tuple[str, ...]:
     """What a reader must know. worst: m, of the contacts that yield at once."""
-    said = []
+    warnings = []
     if any(H.any() for c in equations.assembly.components for H in c.loss.values()):
-        said.append(
+        warnings.append(
             f"Loss factors (structural damping) have no form in time: dampers that take as much at "
             f"{hertz(equations.Omega / (2 * np.pi))} stand for them, and take h times as much in the h-th harmonic, "
             "where a harmonic balance does not; with modal damping both mean the same."
         )
     if names := [c.name for c in equations.contacts if saws(c.patch.law)]:
-        said.append(
+        warnings.append(
             f"Static friction above the sliding one ({', '.join(names)}): a point without mass sticks again as soon as "
             "it has slipped, so sliding friction saws between both values, with teeth that hang on the step; "
             'write law = "set-valued" or "rate", or friction that falls with the speed.'
         )
     if worst > UNSOLVED * kept.widest:
-        said.append(f"Contacts were not solved for in every step, to {worst:.2g} m at worst; take more steps.")
+        warnings.append(f"Contacts were not solved for in every step, to {worst:.2g} m at worst; take more steps.")
     if kept.missed:
-        said.append(f"{counted(kept.missed, 'event')} more than are listed, and counted, happened.")
-    return tuple(said)
+        warnings.append(f"{counted(kept.missed, 'event')} more than are listed, and counted, happened.")
+    return tuple(warnings)
 
 
 @dataclass(frozen=True)
@@ -600,30 +594,30 @@ class Again:
 
     Attributes:
         ends: where both lead to. differ: the largest deviation of a read-out, infinite where one of them became so.
-            size: the largest read-out. missed: by its steps, see `Now`, and swing: the largest of the motion, both in
-            m kg^1/2 / s.
+            size: the largest read-out. missed: by its steps, see `MotionState`, and swing: the largest of the motion,
+            both in m kg^1/2 / s.
     """
 
-    ends: tuple[Now, Now]
+    ends: tuple[MotionState, MotionState]
     differ: float
     size: float
     missed: float
     swing: float
 
 
-def _again(stepper: Stepper, begin: Now, samples: int, each: int) -> Again:
+def _again(stepper: Stepper, begin: MotionState, samples: int, each: int) -> Again:
     e, steppers = stepper.equations, ((stepper, each), (stepper.halved(), 2 * each))
-    (one, seen, *_), (other, fine, *_) = (s.run(begin, np.full(samples, k)) for s, k in steppers)
-    missed, swing = float(one.missed) - float(begin.missed), math.sqrt(2 * seen.mechanical.max(initial=0.0))
+    (end, seen, *_), (fine_end, fine, *_) = (s.run(begin, np.full(samples, k)) for s, k in steppers)
+    missed, swing = float(end.missed) - float(begin.missed), math.sqrt(2 * seen.mechanical.max(initial=0.0))
     if not np.isfinite(seen.mechanical[-1] + fine.mechanical[-1]):
-        return Again((one, other), math.inf, 1.0, missed, swing)
-    y, exact, order = kept_samples.read(e, seen), kept_samples.read(e, fine), 4 if stepper.options.halvings else 2
+        return Again((end, fine_end), math.inf, 1.0, missed, swing)
+    y, exact, order = read(e, seen), read(e, fine), 4 if stepper.options.halvings else 2
     differ = float(np.abs(y - exact).max(initial=0.0)) * 2**order / (2**order - 1)
-    return Again((one, other), differ, float(np.abs(exact).max(initial=0.0)), missed, swing)
+    return Again((end, fine_end), differ, float(np.abs(exact).max(initial=0.0)), missed, swing)
 
 
 def _error(
-    stepper: Stepper, first: Now, now: Now, hardest: Hardest, samples: int, each: int, done: int
+    stepper: Stepper, first: MotionState, now: MotionState, hardest: Hardest, samples: int, each: int, done: int
 ) -> tuple[float, str]:  # fmt: skip
     """What all periods together leave in the read-outs, a share of the largest, and what a reader must know.
 
@@ -633,14 +627,18 @@ def _error(
     of those that were done, tells what all periods leave, each as much as the hardest.
     """
     last = _again(stepper, now, samples, each)
-    known = last if last.differ * last.missed > 0 else _again(stepper, first, samples, each)
-    if not math.isfinite(last.differ + known.differ):
+    missed = last if last.differ * last.missed > 0 else _again(stepper, first, samples, each)
+    if not math.isfinite(last.differ + missed.differ):
         return 1.0, ""
-    size, periods = last.size or known.size or 1.0, min(AFTER, done // 8, samples)
-    told = known.differ / known.missed if known.differ * known.missed > 0 else size / (last.swing or known.swing or 1.0)
-    worst = told * float(hardest.missed)
+    size, periods = last.size or missed.size or 1.0, min(AFTER, done // 8, samples)
+    leaves = (
+        missed.differ / missed.missed
+        if missed.differ * missed.missed > 0
+        else size / (last.swing or missed.swing or 1.0)
+    )
+    worst = leaves * float(hardest.missed)
     parts = _separations(stepper, *last.ends, samples, each, periods)
-    parts = parts if len(parts) else _separations(stepper, *known.ends, samples, each, periods)
+    parts = parts if len(parts) else _separations(stepper, *missed.ends, samples, each, periods)
     half = len(parts) // 2
     if not half or not np.isfinite(parts).all():
         return min(1.0, max(last.differ, worst) / size * done), ""
@@ -658,7 +656,7 @@ def _error(
     )
 
 
-def _separations(stepper: Stepper, a: Now, b: Now, samples: int, each: int, periods: int) -> Array:
+def _separations(stepper: Stepper, a: MotionState, b: MotionState, samples: int, each: int, periods: int) -> Array:
     """(periods,) how far two motions are apart after each, over what they are now; none where they are not apart."""
     stiff = np.sqrt(np.abs(stepper.equations.omega2)).reshape(len(a.y), -1)
     weights = np.concatenate([stiff, np.ones_like(stiff)], axis=1)
@@ -671,18 +669,14 @@ def _separations(stepper: Stepper, a: Now, b: Now, samples: int, each: int, peri
         return np.zeros(0)
     b = classification.between(a, b, APART * size / apart)
     begin, rows = APART * size, np.full(samples, samples * each)
-    one, other = (_phases(stepper, stepper.run(now, rows, periods)[1]) for now in (a, b))
-    if len(one) != len(other):  # one of them became infinite
+    runs, pace = [stepper.run(now, rows, periods)[1] for now in (a, b)], np.sqrt(np.abs(stepper.equations.omega2))
+    phases, neighbour = (np.concatenate([seen.q * pace, seen.q_dot], axis=1) for seen in runs)
+    if len(phases) != len(neighbour):  # one of them became infinite
         return np.zeros(0)
-    return np.linalg.norm(one - other, axis=1) / begin
+    return np.linalg.norm(phases - neighbour, axis=1) / begin
 
 
-def _phases(stepper: Stepper, seen: Seen) -> Array:
-    """(s, 2 m) modal displacements times their frequencies, and velocities."""
-    return np.concatenate([seen.q * np.sqrt(np.abs(stepper.equations.omega2)), seen.q_dot], axis=1)
-
-
-def steps_of_a_sample(e: Equations, samples: int, steps: int | None) -> int:
+def steps_of_a_sample(e: MotionEquations, samples: int, steps: int | None) -> int:
     """Steps from one sample to the next, a power of two where nothing is asked for.
 
     Raises:
@@ -701,31 +695,31 @@ def steps_of_a_sample(e: Equations, samples: int, steps: int | None) -> int:
     return max(1, math.ceil(steps / samples))
 
 
-def begun(e: Equations, start: Start) -> tuple[Array, Array]:
+def begun(e: MotionEquations, start: Start) -> tuple[Array, Array]:
     """(m,) modal displacements and velocities to start from.
 
     Raises:
         NotConverged: Newton's method finds no rest under the steady loads. UserError: no such
             start, or one behind a rigid stop.
     """
-    q, v = _begun(e, start)
+    if isinstance(start, Released):
+        q, v = start.q, start.v
+    elif start in ("static", "rest"):
+        q, v = _at_rest(e, start == "static"), np.zeros(len(e.omega2))
+    else:
+        raise UserError(f"start: '{start}' is none of static, rest, balance")
     refuse_behind(e, q)
     return q, v
 
 
-def _begun(e: Equations, start: Start) -> tuple[Array, Array]:
-    if isinstance(start, Released):
-        return start.q, start.v
-    zero, tight = np.zeros(len(e.omega2)), [c.offset[0] > 0 and not c.preload.any() for c in e.contacts]
-    if start == "rest":
-        if any(tight) and not e.R.any():
-            _refuse_penetration(e, _static(e))
-        return zero, zero
-    if start != "static":
-        raise UserError(f"start: '{start}' is none of static, rest, balance")
-    if not e.still[0].any() and not any(tight) and not any(map(_closed, e.contacts)):
-        return zero, zero  # preloads are in balance there
-    return _static(e), zero
+def _at_rest(e: MotionEquations, loaded: bool) -> Array:
+    """(m,) under the steady loads, or as preloaded."""
+    tight = any(c.offset[0] > 0 and not c.preload.any() for c in e.contacts)
+    if loaded and (e.still[0].any() or tight or any(map(_closed, e.contacts))):
+        return _static(e)
+    if not loaded and tight and not e.R.any():
+        _refuse_penetration(e, _static(e))
+    return np.zeros(len(e.omega2))  # preloads are in balance there
 
 
 def _closed(contact: Contact) -> bool:
@@ -736,13 +730,15 @@ def _closed(contact: Contact) -> bool:
     return bool((np.asarray(overlap) > 0).any())
 
 
-def refuse_behind(e: Equations, q: Array) -> None:
+def refuse_behind(e: MotionEquations, q: Array) -> None:
     """Raise `UserError` where bodies of modes alone begin at q (m,) behind what is rigid: nothing
     would bring them out. Waves of the ground are left out."""
-    for c, u in zip(e.contacts, _places(e, e.D @ q + e.D_o @ e.oscillators(0.0)), strict=True):
+    parts = np.split(e.D @ q + e.D_o @ e.oscillators(0.0), np.cumsum([c.patch.count for c in e.contacts])[:-1])
+    for c, d in zip(e.contacts, parts, strict=False):
         law = c.patch.law
         if e.R.any() or not isinstance(law, SetValued) or law.normal is not None or (c.ground and c.ground.waves):
             continue
+        u = c.patch.kinematics @ (d + c.offset)
         deep = float(np.max(u[:, 0] - np.asarray(law.gap), initial=0.0))
         if deep > BEHIND:
             raise UserError(
@@ -751,13 +747,7 @@ def refuse_behind(e: Equations, q: Array) -> None:
             )
 
 
-def _places(e: Equations, d: Array) -> list[Array]:
-    """(n, 3) m of the points of each contact, of its coordinates (c,)."""
-    parts = np.split(d, np.cumsum([c.patch.count for c in e.contacts])[:-1])
-    return [c.patch.kinematics @ (x + c.offset) for c, x in zip(e.contacts, parts, strict=False)]
-
-
-def _refuse_penetration(e: Equations, q: Array) -> None:
+def _refuse_penetration(e: MotionEquations, q: Array) -> None:
     """Contacts that are pressed deeper at q = 0 than under the steady loads would throw the bodies apart."""
     nearer, begins = e.D @ q + e.still[1], np.cumsum([0, *(c.patch.count for c in e.contacts)])
     for c, i in zip(e.contacts, begins, strict=False):
@@ -766,7 +756,7 @@ def _refuse_penetration(e: Equations, q: Array) -> None:
             raise UserError(f'start: "rest" begins with {c.name} {depth}; write start = "static"')
 
 
-def _static(e: Equations, most: int = 60) -> Array:
+def _static(e: MotionEquations, most: int = 60) -> Array:
     """(m,) where steady loads and contacts that came there on a straight way are in balance, by Newton's method."""
     q, force = np.zeros(len(e.omega2)), static_force(Stepper(e, 1.0, accounts=False))
     scale = np.abs(e.still[0]).max(initial=0.0) + np.abs(e.D.T @ e.F_0).max(initial=0.0)

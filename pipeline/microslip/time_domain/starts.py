@@ -19,9 +19,9 @@ from ..harmonic_balance.solver import Point, sweep
 from ..programs import inner
 from ..settings.mistakes import bounded, whole
 from ..units import counted, percent
-from .contacts import Group, Held, answer, untouched
-from .equations import Equations
-from .stepper import Now, Stepper
+from .contacts import ContactGroup, Held, answer, untouched
+from .equations import MotionEquations
+from .stepper import MotionState, Stepper
 
 CYCLES = 30
 """Cycles at most in which contacts come to remember a periodic motion."""
@@ -37,7 +37,7 @@ PERIODIC = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
-class Periodic:
+class PeriodicStart:
     """A periodic motion to start on.
 
     Attributes:
@@ -74,7 +74,7 @@ RELEASED = ("displacement", "velocity", "mode", "amplitude")
 """Keys of a start from which bodies are let go."""
 
 
-def released(e: Equations, start: Mapping[str, Any], key: str = "start") -> Released:
+def released(e: MotionEquations, start: Mapping[str, Any], key: str = "start") -> Released:
     """A start by its keys.
 
     Args:
@@ -101,7 +101,7 @@ def released(e: Equations, start: Mapping[str, Any], key: str = "start") -> Rele
     return Released(to_modes @ x, to_modes @ v)
 
 
-def _in_mode(e: Equations, mode: Any, amplitude: Any, key: str) -> Released:
+def _in_mode(e: MotionEquations, mode: Any, amplitude: Any, key: str) -> Released:
     bounded(f"{key}: mode", mode, ge=1, le=len(e.omega2))
     bounded(f"{key}: amplitude", amplitude)
     if mode != int(mode) or not len(e.output):
@@ -130,7 +130,7 @@ def _coordinates(given: Any, count: int, key: str) -> Array:
     return values
 
 
-def of_balance(e: Equations, problem: Problem, point: Point | None = None) -> Periodic:
+def of_balance(e: MotionEquations, problem: Problem, point: Point | None = None) -> PeriodicStart:
     """The solution of a harmonic balance of the same assembly at the frequency of the equations.
 
     Args:
@@ -146,21 +146,21 @@ def of_balance(e: Equations, problem: Problem, point: Point | None = None) -> Pe
     return replace(of_point(e, problem, point), beside=beside)
 
 
-def of_point(e: Equations, problem: Problem, point: Point) -> Periodic:
+def of_point(e: MotionEquations, problem: Problem, point: Point) -> PeriodicStart:
     """A solution of a harmonic balance of the same assembly, whatever it leaves out."""
-    found, contacts = operating(problem, point), e.contacts
-    bodies = [np.concatenate(parts) for parts in zip(*found.q.values(), strict=True)]
+    vibration, contacts = operating(problem, point), e.contacts
+    bodies = [np.concatenate(parts) for parts in zip(*vibration.q.values(), strict=True)]
     M = e.assembly.joined(1).M.real
-    q = np.array([e.shapes.T @ (M @ one) for one in bodies])
+    q = np.array([e.shapes.T @ (M @ body) for body in bodies])
     turns = 1j * e.Omega * np.arange(len(q))
-    relative = [found.relative[c.name].copy() for c in contacts]
-    for one, c in zip(relative, contacts, strict=True):
-        one[:, 0] -= c.offset
+    relative = [vibration.relative[c.name].copy() for c in contacts]
+    for body, c in zip(relative, contacts, strict=True):
+        body[:, 0] -= c.offset
     d = np.concatenate(relative) if relative else np.zeros((0, problem.coefficients))
-    return Periodic(q.sum(axis=0).real, (turns @ q).real, d)
+    return PeriodicStart(q.sum(axis=0).real, (turns @ q).real, d)
 
 
-def begun(stepper: Stepper, start: Periodic) -> Now:
+def begun(stepper: Stepper, start: PeriodicStart) -> MotionState:
     """On a periodic motion, the contacts led along it until what they remember is periodic too."""
     e, H = stepper.equations, start.d.shape[1] // 2
     angle = 2 * np.pi / SAMPLES * np.arange(1, SAMPLES + 1)[:, None] * np.arange(1, H + 1)
@@ -180,6 +180,6 @@ def begun(stepper: Stepper, start: Periodic) -> Now:
 
 
 @inner
-def _led(groups: tuple[Group, ...], held: Held, d: Any, v: Any, dt: Any) -> Held:
+def _led(groups: tuple[ContactGroup, ...], held: Held, d: Any, v: Any, dt: Any) -> Held:
     """What contacts hold after a path (s, c)."""
     return jax.lax.scan(lambda h, one: (answer(groups, None, *one, dt, h, False), None), held, (d, v))[0]

@@ -23,14 +23,12 @@ from ..errors import UserError
 from ..harmonic_balance.forces import repeated
 from ..programs import program
 from . import fourth, loop
-from .bodies import Bodies, Hardest, Now, Options, Seen
-from .braking import Braking
-from .contacts import Group, Held, Yielding, force_at, gapes, slope_at, untouched
-from .equations import Equations
-from .flow import Flow, blocks, flow
+from .bodies import Bodies, Hardest, MotionState, Options, Snapshot, Spots, spots
+from .contacts import Braking, ContactGroup, Held, Yielding, force_at, gapes, slope_at, untouched
+from .equations import MotionEquations
+from .flow import BodyFlow, blocks, flow
 from .ground import moving
 from .inclusion import Meets, meets
-from .spots import Spots, spots
 
 EVENTS = 8192
 """Events that one call of the loop keeps; of more, only their number is known."""
@@ -53,14 +51,14 @@ class Stepper:
             order: of its steps, 2 or 4; of 4 only where every law says how its force changes in time.
     """
 
-    equations: Equations
+    equations: MotionEquations
     tau: float
     accounts: bool = True
     order: int = 4
 
     @cached_property
-    def groups(self) -> tuple[Group, ...]:
-        contacts, found = self.equations.contacts, []
+    def groups(self) -> tuple[ContactGroup, ...]:
+        contacts, groups = self.equations.contacts, []
         for same in self.same:
             patch = contacts[same[0]].patch
             offset = np.array([contacts[i].offset for i in same])
@@ -68,16 +66,16 @@ class Stepper:
             if (ground := contacts[same[0]].ground) is not None:
                 law = moving(law, ground, np.tile(patch.points, (len(same), 1)))
             G = np.broadcast_to(patch.kinematics, (len(same), *patch.kinematics.shape))
-            found.append(Group(law, G, offset))
-        return _sent(tuple(found))
+            groups.append(ContactGroup(law, G, offset))
+        return _sent(tuple(groups))
 
     @cached_property
     def same(self) -> list[list[int]]:
         """Numbers of the contacts, those of one patch object on the same ground together."""
-        found: dict[tuple, list[int]] = {}
+        alike: dict[tuple, list[int]] = {}
         for i, c in enumerate(self.equations.contacts):
-            found.setdefault((id(c.patch), c.ground), []).append(i)
-        return list(found.values())
+            alike.setdefault((id(c.patch), c.ground), []).append(i)
+        return list(alike.values())
 
     @cached_property
     def rows(self) -> Array:
@@ -108,21 +106,22 @@ class Stepper:
         fine = replace(self, tau=self.tau / 2)
         for name in ("groups", "same", "rows", "numbers", "options", "_fixed"):
             fine.__dict__[name] = getattr(self, name)
-        fine.__dict__["_flow"] = Flow(*(x[:-1] for x in self._flows))
+        fine.__dict__["_flow"] = BodyFlow(*(x[:-1] for x in self._flows))
         return fine
 
     @cached_property
     def bodies(self) -> Bodies:
         enough = np.array(fourth.MISSED * (self.tau * self.equations.fastest) ** 4)
         fixed, meets = self._fixed, self._meets(self._flow)
-        return _sent(fixed._replace(flow=self._flow, meets=meets, braking=self._braking, enough=enough))
+        sent = _sent(fixed._replace(flow=self._flow, meets=meets, braking=self._braking, enough=enough))
+        return sent._replace(groups=self.groups)
 
     @cached_property
-    def _flow(self) -> Flow:
-        return Flow(*(x[1:] for x in self._flows))
+    def _flow(self) -> BodyFlow:
+        return BodyFlow(*(x[1:] for x in self._flows))
 
     @cached_property
-    def _flows(self) -> Flow:
+    def _flows(self) -> BodyFlow:
         """Those of half the step too, the shortest first."""
         e, shorter = self.equations, self.options.halvings + 1
         doublings = shorter
@@ -150,16 +149,18 @@ class Stepper:
         yielding = Yielding(R, e.yields[np.ix_(rows, rows)], F_0) if R.any() else None
         arrays = (F_0, D, D_o, e.turning, e.omega2.reshape(b, p), steady, reach, bends, loads, -D.T, np.zeros(()))
         harmonics = e.Omega * np.array(e.harmonics, dtype=float)
-        return Bodies._make((None, yielding, None, None, *arrays, harmonics, self._moved, D.T @ F_0))
+        return Bodies._make(((), None, yielding, None, None, *arrays, harmonics, self._moved, D.T @ F_0))
 
     @property
     def _moved(self) -> tuple[Spots, ...]:
         """Of steps of fourth order, group by group."""
         if not self.options.halvings:
             return ()
-        ends = np.cumsum([g.G.shape[0] * g.G.shape[1] for g in self.groups])[:-1]
         rest = np.concatenate([np.einsum("cnik,ck->cni", g.G, g.offset).reshape(-1, 3) for g in self.groups])
-        return tuple(spots(*parts) for parts in zip(*(np.split(x, ends) for x in (*self._points, rest)), strict=True))
+        return tuple(spots(*parts) for parts in zip(*map(self._by_group, (*self._points, rest)), strict=True))
+
+    def _by_group(self, of_points: Array) -> list[Array]:
+        return np.split(of_points, np.cumsum([g.G.shape[0] * g.G.shape[1] for g in self.groups])[:-1])
 
     @property
     def _braking(self) -> Braking | None:
@@ -167,16 +168,16 @@ class Stepper:
             return None
         D, moved = self.equations.D[self.rows], self._points[0][:, 1:].reshape(-1, len(self.equations.omega2))
         most = 0.5 * self.tau * np.abs(moved @ moved.T).sum(axis=1).reshape(-1, 2).max(axis=1, initial=0.0)
-        ends = np.cumsum([g.G.shape[0] * g.G.shape[1] for g in self.groups])[:-1]
-        return Braking(0.5 * self.tau * D @ D.T, tuple(np.split(most, ends)))
+        return Braking(0.5 * self.tau * D @ D.T, tuple(self._by_group(most)))
 
-    def _meets(self, flows: Flow) -> Meets | None:
+    def _meets(self, flows: BodyFlow) -> Meets | None:
         """Of set-valued points, see `inclusion`.
 
         Raises:
             UserError: they stand beside other laws on bodies that yield, or some yield and some do not.
         """
-        e, rigid = self.equations, np.array([r for G, r in self._spots for _ in G], dtype=bool)
+        e, points = self.equations, [np.full(g.G.shape[0] * g.G.shape[1], g.rigid) for g in self.groups]
+        rigid = np.concatenate([np.zeros(0, dtype=bool), *points])
         if not rigid.any():
             return None
         if not e.R.any():
@@ -195,7 +196,7 @@ class Stepper:
                 f"contacts {names}: restitution: is for bodies of modes alone; these yield beside them, and what "
                 "comes back is theirs: leave it out"
             )
-        rows = np.concatenate([G for G, _ in self._spots]).reshape(-1, len(e.D))
+        rows = self._rows.reshape(-1, len(e.D))
         yields, moves = rows @ e.R[np.ix_(self.rows, self.rows)] @ rows.T, np.abs(rows).any(axis=1)
         if np.diag(yields)[moves].min() <= 1e-9 * np.diag(yields).max():
             raise UserError(
@@ -205,41 +206,34 @@ class Stepper:
         return meets(yields)
 
     @cached_property
-    def _spots(self) -> list[tuple[Array, bool]]:
-        """Of each contact as the loop has them: (n, 3, c) of its points, and whether its law is set-valued."""
-        begin, found = 0, []
-        for g in self.groups:
-            for G in np.asarray(g.G):
-                rows = np.zeros((*G.shape[:2], len(self.rows)))
-                rows[:, :, begin : begin + G.shape[2]] = G
-                found.append((rows, g.rigid))
-                begin += G.shape[2]
-        return found
+    def _rows(self) -> Array:
+        """(points, 3, c): motion of all points by the contact coordinates, as the loop has them."""
+        each = [np.asarray(G).reshape(-1, G.shape[-1]) for g in self.groups for G in g.G]
+        rows = scipy.linalg.block_diag(np.zeros((0, 0)), *each)
+        return np.asarray(rows.reshape(len(rows) // 3, 3, len(self.rows)))
 
     @property
     def _points(self) -> tuple[Array, Array]:
         """(points, 3, m) and (points, 3, n): motion of all points by modes and by what the loads move beside them."""
-        e = self.equations
-        spots = np.concatenate([np.zeros((0, 3, len(e.D))), *(G for G, _ in self._spots)])
-        return spots @ e.D[self.rows], spots @ e.D_o[self.rows]
+        return self._rows @ self.equations.D[self.rows], self._rows @ self.equations.D_o[self.rows]
 
-    def start(self, q: Array, v: Array, held: Held | None = None) -> Now:
+    def start(self, q: Array, v: Array, held: Held | None = None) -> MotionState:
         """At time 0, at rest or moving, from modal coordinates (m,) and velocities; contacts come there on a straight
         way from what they held, from u = 0 if it is not given."""
         e = self.equations
         b, p = blocks(e)
         y = np.concatenate([np.reshape(q, (b, p)), np.reshape(v, (b, p))], axis=1)
-        return loop.begun(self.options, self.groups, self.bodies, y, e.oscillators(0.0), held)
+        return loop.begun(self.options, self.bodies, y, e.oscillators(0.0), held)
 
     def run(
-        self, now: Now, steps: Array, rows: int | None = None, events: int = EVENTS
-    ) -> tuple[Now, Seen, Array, int]:
+        self, now: MotionState, steps: Array, rows: int | None = None, events: int = EVENTS
+    ) -> tuple[MotionState, Snapshot, Array, int]:
         """`advanced`, without its hardest row."""
         return self.advanced(now, steps, rows, events)[:4]
 
     def advanced(
-        self, now: Now, steps: Array, rows: int | None = None, events: int = EVENTS
-    ) -> tuple[Now, Seen, Array, int, Hardest]:
+        self, now: MotionState, steps: Array, rows: int | None = None, events: int = EVENTS
+    ) -> tuple[MotionState, Snapshot, Array, int, Hardest]:
         """So many rows further, all samples if it is not said, the i-th after steps[i modulo s] of tau, (s,); compiled
         anew for another power of two above s alone. It ends early where numbers become infinite, in the last sample
         then.
@@ -254,14 +248,14 @@ class Stepper:
         each = np.zeros(max(FEWEST, 1 << (s - 1).bit_length()), int)
         each[:s] = fine * np.asarray(steps)
         now, listed, seen, i, hardest = loop.run(
-            self.options, events, self.groups, self.bodies, now, each, s, s if rows is None else rows, fine * done
+            self.options, events, self.bodies, now, each, s, s if rows is None else rows, fine * done
         )
         count, back = int(listed.count), np.argsort(self.rows)
-        told = np.array(np.asarray(listed.rows)[: min(count, events)])
-        told[:, 1] = self.numbers[told[:, 1].astype(int)] if len(told) else 0
+        events_listed = np.array(np.asarray(listed.rows)[: min(count, events)])
+        events_listed[:, 1] = self.numbers[events_listed[:, 1].astype(int)] if len(events_listed) else 0
         last = np.arange(max(int(i) - s, 0), int(i)) % s
-        seen = Seen._make(np.asarray(x)[last] for x in seen)
-        return now, seen._replace(d=seen.d[:, back], force=seen.force[:, back]), told, count, hardest
+        seen = Snapshot._make(np.asarray(x)[last] for x in seen)
+        return now, seen._replace(d=seen.d[:, back], force=seen.force[:, back]), events_listed, count, hardest
 
 
 @program

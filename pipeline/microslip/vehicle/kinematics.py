@@ -14,10 +14,12 @@ import numpy as np
 from ..data import Array
 from ..errors import UserError, at, in_its_file
 from ..files import store
+from ..progress import Report
 from ..results import Journal
 from ..rolling.wear import smoothed
 from ..rolling.wheelset import Pose, Side, Track, patches
-from .motion import Contacts
+from ..settings.mistakes import is_number
+from .motion import WheelContacts
 from .settings import KinematicsCase, track_of, worn_tracks
 from .wearing import (
     FIRST,
@@ -26,6 +28,7 @@ from .wearing import (
     Jump,
     LeavesTheRail,
     Tread,
+    WearState,
     columns_of,
     error_of,
     filtered,
@@ -87,9 +90,9 @@ def read_kinematics(path: Path) -> Kinematics:
             numbers += [_numbers(row, head)] if row else []
     if len(numbers) < 8:
         raise UserError(f"has {len(numbers)} rows of numbers; give eight at the least")
-    found = Kinematics(*np.array(numbers).T)
-    _sound(found)
-    return found
+    kinematics = Kinematics(*np.array(numbers).T)
+    _sound(kinematics)
+    return kinematics
 
 
 def _numbers(row: list[str], head: list[str]) -> list[float]:
@@ -99,16 +102,13 @@ def _numbers(row: list[str], head: list[str]) -> list[float]:
             f"has {len(row)} cells and the first line {len(head)}; write decimal points, and commas between "
             "the columns alone"
         )
-    found = []
+    numbers = []
     for column in (*NEEDED, *GIVEN):
-        cell = row[head.index(column)] if head.index(column) < len(row) else ""
-        try:
-            found.append(float(cell))
-        except ValueError:
-            found.append(np.nan)
-        if not np.isfinite(found[-1]):
-            raise UserError(f"{column}: '{cell.strip()}' is no finite number; leave out what is not known")
-    return found
+        cell = row[head.index(column)].strip()
+        if not (is_number(cell) and np.isfinite(float(cell))):
+            raise UserError(f"{column}: '{cell}' is no finite number; leave out what is not known")
+        numbers.append(float(cell))
+    return numbers
 
 
 def _sound(k: Kinematics) -> None:
@@ -134,7 +134,7 @@ def _sound(k: Kinematics) -> None:
         raise UserError("is of less than a turn of the wheel; give one at the least")
 
 
-class Places:
+class ContactPlaces:
     """Equal angles of the wheel in each whole turn of a file, from its angle 0 on, and the contacts there; arrays
     (places, turns of the file).
 
@@ -168,23 +168,23 @@ class Places:
         return p.a, p.b, p.on_wheel, p.angle, p.normal_force, p.approach
 
     @cached_property
-    def new(self) -> Contacts:
+    def new(self) -> WheelContacts:
         """Of new wheels: read straight between lateral places, grown with the force."""
         a, b, on_wheel, incline, static, _ = (np.interp(self.y, self.lateral, v) for v in self.shape)
         grown = (self.force / static) ** (1 / 3)
-        return Contacts(self.xi, self.eta, self.phi, a * grown, b * grown, self.force, on_wheel, self.speed,
+        return WheelContacts(self.xi, self.eta, self.phi, a * grown, b * grown, self.force, on_wheel, self.speed,
                         self.force * np.cos(incline))  # fmt: skip
 
     def _own(self, tracks: Iterable[Track]) -> Array:
         """(3, places, turns of the file) half axes and place on the wheel of every single patch, m; tracks: of each
         place."""
-        found = np.empty((3, *self.y.shape))
+        patches_worn = np.empty((3, *self.y.shape))
         for n, track in enumerate(tracks):
             for i, y in enumerate(self.y[n]):
                 a, b, on_wheel, _, static, _ = self._patch(track, y, self.new.vertical[n, i])
                 grown = (self.force[n, i] / static) ** (1 / 3)
-                found[:, n, i] = a * grown, b * grown, on_wheel
-        return found
+                patches_worn[:, n, i] = a * grown, b * grown, on_wheel
+        return patches_worn
 
     @cached_property
     def _own_new(self) -> Array:
@@ -195,33 +195,25 @@ class Places:
         """m, see `wearing.deepest`."""
         return 0.5 * float(self.shape[-1].min())
 
-    def worn(self, tracks: Callable[[Array], Track], depth: Array) -> Contacts:
+    def worn(self, tracks: Callable[[Array], Track], depth: Array) -> WheelContacts:
         """On a wheel of which (places, n) m are worn: by how much each patch, under its own force and on the profile
         across that its place has, differs from that of a new wheel."""
-        found, new, on = self._own(tracks(d) for d in depth), self._own_new, self.new
-        (a, b, _), shift = found / new, found[2] - new[2]
+        patches_worn, new, on = self._own(tracks(d) for d in depth), self._own_new, self.new
+        (a, b, _), shift = patches_worn / new, patches_worn[2] - new[2]
         return on._replace(a=a * on.a, b=b * on.b, on_wheel=on.on_wheel + shift)
 
 
 @dataclass(frozen=True, eq=False)
-class Passed:
-    """What the turns of a file do at one amount of wear.
+class Passed(WearState):
+    """What the turns of a file do at one amount of wear; depth: (1, places, strips), taken in their mean.
 
     Attributes:
-        turns: so far. depth: (1, places, strips) m worn. taken: m in one turn, in the mean over those of the file.
-            each: (turns of the file, places) m where a new wheel's contact runs, of each of them. friction: (1,) J in
+        each: (turns of the file, places) m where a new wheel's contact runs, of each of them. friction: (1,) J in
             one turn, in the mean.
     """
 
-    turns: float
-    depth: Array
-    taken: Array
     each: Array
     friction: Array
-
-    def point(self) -> dict[str, Any]:
-        """Names -> arrays, for a journal."""
-        return vars(self)
 
     @staticmethod
     def of(point: Mapping[str, Any]) -> Passed:
@@ -229,11 +221,11 @@ class Passed:
 
 
 @dataclass(frozen=True, eq=False)
-class Given:
+class GivenWheel:
     """A wheel whose running is given, which its wear changes by the profile alone. Attributes: places. tread. elastic:
     friction, shear, poisson. tracks: see `settings.worn_tracks`; None: as a new wheel."""
 
-    places: Places
+    places: ContactPlaces
     tread: Tread
     elastic: tuple[float, float, float]
     tracks: Callable[[Array], Track] | None
@@ -257,7 +249,7 @@ class Given:
             friction.append(float(self.tread.work(one, *self.elastic)[0]))
         return Passed(turns, depth, np.mean(taken, axis=0)[None], np.array(each), np.array([np.mean(friction)]))
 
-    def _contacts(self, depth: Array) -> Contacts:
+    def _contacts(self, depth: Array) -> WheelContacts:
         """Raises:
         LeavesTheRail: a groove that is deeper than half of the approach; where the wheel touches is not known.
         """
@@ -281,13 +273,13 @@ class Given:
         return now.friction
 
 
-def _turns(on: Contacts) -> list[Contacts]:
+def _turns(on: WheelContacts) -> list[WheelContacts]:
     """(places, 1) of each turn of a file."""
-    return [Contacts(*(c[:, n : n + 1] for c in on)) for n in range(on.xi.shape[1])]
+    return [WheelContacts(*(c[:, n : n + 1] for c in on)) for n in range(on.xi.shape[1])]
 
 
 @dataclass(frozen=True)
-class Recorded:
+class KinematicsAnswer:
     """Wear of a wheel by given kinematics, which it does not change.
 
     Attributes:
@@ -296,7 +288,7 @@ class Recorded:
     """
 
     case: KinematicsCase
-    wheel: Given
+    wheel: GivenWheel
     history: list[tuple[Passed, Jump]]
     ended: str
 
@@ -330,41 +322,43 @@ class Recorded:
         volume, work = sum(np.array([(j.volume[0], j.work[0]) for _, j in self.history]))
         orders = orders_of(depth[:, None], len(depth) // 8)[:, 0]
         n = int(orders.argmax())
-        told = [
+        sentences = [
             f"After {now.turns:.4g} turns, by {files} of the file, {1e6 * depth.mean():.4g} um "
             f"are worn where the contact runs, {1e9 * volume:.4g} mm3 in all: the coefficient times the work of "
             f"friction, {work / now.turns if now.turns else now.friction[0]:.4g} J a turn.",
         ]
         less = max(uncertain(self.history)[n, 0], np.nan_to_num(error).max())
         if orders[n] > less:
-            told.append(
+            sentences.append(
                 f"Over the circumference it differs by {1e6 * np.ptp(depth):.4g} um; order {n + 1} is largest, "
                 f"{1e6 * orders[n]:.3g} um."
             )
         else:
-            told.append(f"Over the circumference it differs by no more than its error, {1e6 * less:.2g} um.")
+            sentences.append(f"Over the circumference it differs by no more than its error, {1e6 * less:.2g} um.")
         if self.wheel.tracks is not None:
-            told.append(error_of(self.history))
+            sentences.append(error_of(self.history))
         if files == 1:
-            told.append("warning: the file holds one whole turn, so that no error can be told of the jump over many.")
+            sentences.append(
+                "warning: the file holds one whole turn, so that no error can be told of the jump over many."
+            )
         else:
-            told.append(f"Turns of the file differ: its standard error is at most {1e6 * error.max():.2g} um.")
-        return [*told, f"warning: it ends there: {self.ended}."] if self.ended else told
+            sentences.append(f"Turns of the file differ: its standard error is at most {1e6 * error.max():.2g} um.")
+        return [*sentences, f"warning: it ends there: {self.ended}."] if self.ended else sentences
 
 
 def recorded(
-    case: KinematicsCase, folder: Path, report: Callable[[str], None] = lambda _: None, journal: Journal | None = None
-) -> Recorded:
+    case: KinematicsCase, folder: Path, report: Report = lambda _: None, journal: Journal | None = None
+) -> KinematicsAnswer:
     """Wear of a case whose files stand in a folder.
 
     Args:
         journal: where finished jumps are kept, and known ones found.
 
     Raises:
-        UserError: see `read_kinematics` and `Places`.
+        UserError: see `read_kinematics` and `ContactPlaces`.
     """
     k, track, asked = read_kinematics(folder / case.kinematics.file), track_of(case, folder), case.kinematics
-    places, kept = Places(k, track, asked.side, asked.places), case.wear.profile == "kept"
+    places, kept = ContactPlaces(k, track, asked.side, asked.places), case.wear.profile == "kept"
     y = spread(places.new.on_wheel, float(places.new.b.max()))
     if not kept:  # a groove widens the contact
         more = int(np.ceil(places.new.b.max() / STRIP))
@@ -372,8 +366,8 @@ def recorded(
     way = 2 * np.pi * track.radius / asked.places
     t = Tread(y, way, case.wear.coefficient, case.model.model_dump(), (1,) if asked.side == "right" else (-1,))
     elastic = case.friction, track.elastic.shear, track.elastic.poisson
-    wheel = Given(places, t, elastic, None if kept else worn_tracks(track, y))
+    wheel = GivenWheel(places, t, elastic, None if kept else worn_tracks(track, y))
     first = asked.turns if kept else min(FIRST, asked.turns)
     report("wear by jumps over many turns")
     history, ended = worn(wheel, Passed.of, asked.turns, case.wear.tolerance, first, report, journal)
-    return Recorded(case, wheel, history, ended)
+    return KinematicsAnswer(case, wheel, history, ended)

@@ -8,6 +8,7 @@ the derivative of an energy, what drags it is conjugate to its slip: with them t
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -16,12 +17,69 @@ import jax.numpy as jnp
 import numpy as np
 
 from ..programs import program
-from .creep import Creep, linear
-from .touch import Touch, at, touched
+from ..rolling import strips
+from ..rolling.kalker import coefficients_at
+from ..rolling.table import CreepTable, cubic, placed
+from .touch import WheelTouch, at, touched
 
 Array = Any
 Q = 6
 STATES = 2 * Q + 1
+
+
+Creep = Callable[..., tuple[Array, Array, Array]]
+"""(xi, eta, phi, a, b, normal force, friction, G, nu), arrays (n,) -> F_x, F_y (N), M_z (N m) on the upper body."""
+
+
+def linear(
+    xi: Array, eta: Array, phi: Array, a: Array, b: Array, force: Array, friction: Array, shear: Array, poisson: Array
+) -> tuple[Array, Array, Array]:  # fmt: skip
+    """Kalker's, without slip: no friction is large enough."""
+    c11, c22, c23, c33 = coefficients_at(a / b, poisson) * shear
+    c = jnp.sqrt(a * b)
+    y = -(c**2) * c22 * eta - c**3 * c23 * phi
+    return -(c**2) * c11 * xi, y, c**3 * c23 * eta - c**4 * c33 * phi
+
+
+def of_strips(**how: Any) -> Creep:
+    """`strips.creep_forces`, of these keywords."""
+
+    def forces(*given: Array) -> tuple[Array, Array, Array]:
+        pose = strips.poses(*(jnp.broadcast_to(v, given[0].shape) for v in given), **how)
+        creep = strips.forces(pose, how.get("elements", (20, 20)), how.get("distribution", "constant"))
+        return creep.x, creep.y, creep.moment
+
+    return forces
+
+
+def of_table(table: CreepTable) -> Creep:
+    """What `CreepTable.forces` reads, in a compiled loop; poisson is that of the table, a/b beyond it is its end."""
+    axes, values = [jnp.asarray(axis) for axis in table.axes], jnp.asarray(table.values)
+    ridge = int(jnp.searchsorted(axes[0], 0.5))
+    least, most = float(table.ratio[0]), float(table.ratio[-1])
+
+    def forces(
+        xi: Array, eta: Array, phi: Array, a: Array, b: Array, force: Array, friction: Array, shear: Array, _: Array
+    ) -> tuple[Array, Array, Array]:  # fmt: skip
+        held, c, ratio = friction * force, jnp.sqrt(a * b), jnp.clip(a / b, least, most)
+        p = strips.poses(xi, eta, phi, a, b, held, jnp.ones_like(a), shear, table.poisson, **table.how)
+        at, signs = placed(p, ratio, jnp)
+        weights = [
+            cubic(axis, v, ridge if k == 0 else 0, jnp) for k, (axis, v) in enumerate(zip(axes, at, strict=True))
+        ]
+        x, y, moment = jnp.stack([_between(values, weights, i) for i in range(len(xi))], axis=1) * signs * held
+        return x, y, c * moment
+
+    return forces
+
+
+def _between(values: Array, weights: list[tuple[Array, Array]], i: int) -> Array:
+    """(3,) values at the place i."""
+    first = [jnp.int32(0), *(first[i].astype(jnp.int32) for first, _ in weights)]
+    near = jax.lax.dynamic_slice(values, first, [len(values), *(w.shape[1] for _, w in weights)])
+    for _, weight in reversed(weights):
+        near = near @ weight[i]
+    return near
 
 
 class Vehicle(NamedTuple):
@@ -41,7 +99,7 @@ class Vehicle(NamedTuple):
     load: float
     torque: float
     speed: float
-    over: Touch
+    over: WheelTouch
     reach: float
     each: float
     friction: float
@@ -49,7 +107,7 @@ class Vehicle(NamedTuple):
     poisson: float
 
 
-class Contacts(NamedTuple):
+class WheelContacts(NamedTuple):
     """Of both wheels, (..., 2), right first: states of rolling as `rolling.strips.creep_forces` takes them, and where.
 
     Attributes:
@@ -71,7 +129,7 @@ LEAST = 1e-6
 """Of the static load: below this a wheel counts as off its rail."""
 
 
-def _pressed(v: Vehicle, q: Array, out: Array) -> tuple[Array, Touch]:
+def _pressed(v: Vehicle, q: Array, out: Array) -> tuple[Array, WheelTouch]:
     """(2,) vertical approach of wheels that are out of round by (2,) m, and where they touch."""
     t = at(v.over, v.reach, q[0])
     down = q[1] - t.height + t.arm * (q[2] - t.roll) - q[4:6] + 0.5 * q[3] ** 2 * t.slope * t.arm
@@ -83,7 +141,7 @@ def _contact_energy(q: Array, v: Vehicle, out: Array) -> Array:
     return jnp.sum(t.spring * jnp.maximum(p, 0.0) ** 2.5) / 2.5
 
 
-def _slip(moved: Array, v: Vehicle, q: Array, out: Array, t: Touch) -> tuple[Array, Array, Array]:
+def _slip(moved: Array, v: Vehicle, q: Array, out: Array, t: WheelTouch) -> tuple[Array, Array, Array]:
     """(2,) velocities of the wheels on their rails, forward and to the left, m/s, and turn about their normals."""
     u, turning = moved[:Q], moved[Q]
     c = 1 / jnp.sqrt(1 + t.slope**2)
@@ -94,7 +152,7 @@ def _slip(moved: Array, v: Vehicle, q: Array, out: Array, t: Touch) -> tuple[Arr
     return v.speed - rim - u[3] * t.across, -(c * across + t.slope * c * down), spin
 
 
-def contacts(v: Vehicle, x: Array, out: Array) -> Contacts:
+def contacts(v: Vehicle, x: Array, out: Array) -> WheelContacts:
     """At one state (13,) of wheels that are out of round by (2,) m."""
     q, moved = x[:Q], x[Q:]
     p, t = _pressed(v, q, out)
@@ -103,7 +161,7 @@ def contacts(v: Vehicle, x: Array, out: Array) -> Contacts:
     grown = (normal / v.each) ** (1 / 3)
     mean = 0.5 * (v.speed + moved[Q] * (t.radius + out))
     xi, eta, phi = (s / mean for s in _slip(moved, v, q, out, t))
-    return Contacts(xi, eta, phi, t.a * grown, t.b * grown, normal, t.on_wheel, mean, vertical)
+    return WheelContacts(xi, eta, phi, t.a * grown, t.b * grown, normal, t.on_wheel, mean, vertical)
 
 
 def rates(v: Vehicle, creep: Creep, x: Array, out: Array, rise: Array) -> tuple[Array, Array]:
@@ -138,19 +196,19 @@ def energy(v: Vehicle, x: Array, out: Array) -> Array:
     return motion + 0.5 * q @ v.stiffness @ q - v.load * q[1] + _contact_energy(q, v, out)
 
 
-class Turn(NamedTuple):
-    """A turn of the wheels. Attributes: end: (13,). states: (n, 13) at n equal angles. on: `Contacts` there, (n, 2).
-    work: (4,) of `rates`, J. time: s."""
+class WheelTurn(NamedTuple):
+    """A turn of the wheels. Attributes: end: (13,). states: (n, 13) at n equal angles. on: `WheelContacts` there,
+    (n, 2). work: (4,) of `rates`, J. time: s."""
 
     end: Array
     states: Array
-    on: Contacts
+    on: WheelContacts
     work: Array
     time: Array
 
 
 @partial(program, static_argnames=("creep", "every"))
-def turned(v: Vehicle, creep: Creep, start: Array, out: Array, rise: Array, every: int) -> Turn:
+def turned(v: Vehicle, creep: Creep, start: Array, out: Array, rise: Array, every: int) -> WheelTurn:
     """One turn by the method of Runge and Kutta of fourth order.
 
     Args:
@@ -178,7 +236,7 @@ def turned(v: Vehicle, creep: Creep, start: Array, out: Array, rise: Array, ever
     end, passed = jax.lax.scan(step, jnp.concatenate([start, jnp.zeros(5)]), (three(out), three(rise)))
     states = passed[::every]
     on = jax.vmap(lambda x, o: contacts(v, x, o))(states, out[:: 2 * every])
-    return Turn(end[:STATES], states, on, end[STATES:-1], end[-1])
+    return WheelTurn(end[:STATES], states, on, end[STATES:-1], end[-1])
 
 
 @partial(program, static_argnames=("creep",))
@@ -187,7 +245,7 @@ def _linearised(v: Vehicle, creep: Creep, x: Array) -> tuple[Array, Array]:
     return rates(v, creep, x, none, none)[0], jax.jacfwd(lambda x: rates(v, creep, x, none, none)[0])(x)
 
 
-def sunk(t: Touch, each: float, stiffness: Array) -> tuple[float, float]:
+def sunk(t: WheelTouch, each: float, stiffness: Array) -> tuple[float, float]:
     """How deep, m, wheelset and rails stand under the load of each wheel, where `t` is that of no shift."""
     rail = each / float(stiffness[4, 4])
     return float(t.height[0]) + (each / float(t.spring[0])) ** (2 / 3) + rail, rail
@@ -216,8 +274,8 @@ def roots(v: Vehicle) -> tuple[Array, Array]:
 def hunting(v: Vehicle) -> complex:
     """The root that grows fastest of those whose motion is mostly lateral and yaw, 1/s."""
     values, shapes = roots(v)
-    moved = shapes[Q : 2 * Q]
-    of_each = np.abs(moved) ** 2 * np.diag(v.mass)[:, None]
+    velocities = shapes[Q : 2 * Q]
+    of_each = np.abs(velocities) ** 2 * np.diag(v.mass)[:, None]
     lateral = of_each[[0, 3]].sum(axis=0) > 0.5 * of_each.sum(axis=0)
     chosen = values[lateral & (values.imag >= 0)]
     return complex(chosen[chosen.real.argmax()])

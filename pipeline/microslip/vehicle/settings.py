@@ -14,14 +14,14 @@ from ..contact.kinds import FileName
 from ..contact.solids import Solid
 from ..data import Array
 from ..rolling.ellipse import combined
-from ..rolling.profiles import Profile
-from ..rolling.settings import Rail, Strips, TableOfCase, WearOfBody, Wheel
+from ..rolling.profiles import CrossSection
+from ..rolling.settings import Rail, StripKeys, TableOfCase, WearOfBody, Wheel
 from ..rolling.wheelset import Track
 from ..settings.numbers import Model, Name, NotNegative, Number, Positive, _tuple
 from ..settings.toml import read_settings
 from ..system.lumped import Body, Link, System
 from .motion import Vehicle, sunk
-from .touch import Touch, touched, touching
+from .touch import WheelTouch, touched, touching
 
 Three = Annotated[tuple[NotNegative, NotNegative, NotNegative], BeforeValidator(_tuple)]
 Inertia = Annotated[tuple[Positive, Positive, Positive], BeforeValidator(_tuple)]
@@ -123,7 +123,7 @@ class KinematicsCase(Model):
     rail: Rail
     kinematics: KinematicsOfCase
     wear: WearOfTurns
-    model: Strips = Strips()
+    model: StripKeys = StripKeys()
 
 
 class VehicleCase(Model):
@@ -140,7 +140,7 @@ class VehicleCase(Model):
     running: RunningOfCase
     unround: Annotated[tuple[Unround, ...], BeforeValidator(_tuple)] = ()
     wear: WearOfTurns
-    model: Strips = Strips()
+    model: StripKeys = StripKeys()
     table: TableOfCase = TableOfCase(points=(8, 10, 17, 17, 7), elements=(20, 20))
 
     @model_validator(mode="after")
@@ -164,14 +164,15 @@ class VehicleCase(Model):
         track = track_of(self, folder)
         elastic = track.elastic
         each = 0.5 * self.vehicle.load
-        found = touching(track, each, self.running.reach)
+        contacts = touching(track, each, self.running.reach)
         M, C, K = self.lumped().matrices()
         _, spin, _ = self.vehicle.inertia
-        held = K[1, 1] * sunk(touched(found.over, found.reach, 0.0), each, K)[0]  # of the suspension, as it has sunk
-        return Vehicle(M, C, K, spin, self.vehicle.load + held, self.running.torque, self.running.speed, found.over,
-                       found.reach, each, self.friction, elastic.shear, elastic.poisson)  # fmt: skip
+        # what the suspension takes, as it has sunk
+        held = K[1, 1] * sunk(touched(contacts.over, contacts.reach, 0.0), each, K)[0]
+        return Vehicle(M, C, K, spin, self.vehicle.load + held, self.running.torque, self.running.speed, contacts.over,
+                       contacts.reach, each, self.friction, elastic.shear, elastic.poisson)  # fmt: skip
 
-    def profiles(self, folder: Path, y: Array) -> Callable[[Array], Touch] | None:
+    def profiles(self, folder: Path, y: Array) -> Callable[[Array], WheelTouch] | None:
         """Depth (n,) m on strips about y (n,) m of both wheels' profile -> where they touch; see `made`."""
         if self.wear.profile == "kept":
             return None
@@ -218,7 +219,7 @@ def worn_tracks(track: Track, y: Array) -> Callable[[Array], Track]:
 
     def worn(depth: Array) -> Track:
         height = new - np.interp(fine, y, depth, left=0.0, right=0.0)
-        return replace(track, wheel=Profile(fine, height, track.wheel.name))
+        return replace(track, wheel=CrossSection(fine, height, track.wheel.name))
 
     return worn
 

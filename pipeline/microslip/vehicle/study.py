@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -10,17 +9,17 @@ import numpy as np
 
 from ..data import Array
 from ..errors import UserError
+from ..progress import Report
 from ..results import Journal
 from ..rolling.table import CreepTable, creep_table
-from .creep import Creep, linear, of_strips, of_table
-from .motion import Vehicle, critical_speed, hunting, roots, steady
+from .motion import Creep, Vehicle, critical_speed, hunting, linear, of_strips, of_table, roots, steady
 from .settings import VehicleCase
 from .wearing import (
     FIRST,
     Jump,
     LeavesTheRail,
-    Now,
-    Rolling,
+    Running,
+    RunningVehicle,
     columns_of,
     deepest,
     error_of,
@@ -49,15 +48,15 @@ FASTEST = 200.0
 
 
 @dataclass(frozen=True)
-class Studied:
+class VehicleAnswer:
     """Attributes: history: running and the jump to it, from new wheels on. ended: why it ends early, or nothing.
     speeds, grown: (n,) m/s and (n, orders) share per turn by which the waves of the wheel that is looked at grow.
     wheel: its index. critical: speed of hunting, m/s. table: of creep forces, if one was used."""
 
     case: VehicleCase
     vehicle: Vehicle
-    rolling: Rolling
-    history: list[tuple[Now, Jump]]
+    rolling: RunningVehicle
+    history: list[tuple[Running, Jump]]
     ended: str
     speeds: Array
     grown: Array
@@ -98,9 +97,9 @@ class Studied:
     def growing(self) -> dict[str, Array]:
         """Of the table over the distance."""
         columns = columns_of(self.history, self.way, WHEELS)
-        found = self.amplitudes()
+        amplitudes = self.amplitudes()
         for k, name in enumerate(WHEELS):
-            columns |= {f"{name}_order_{n + 1}_m": found[:, n, k] for n in range(self.orders)}
+            columns |= {f"{name}_order_{n + 1}_m": amplitudes[:, n, k] for n in range(self.orders)}
         return columns
 
     def over_speed(self) -> dict[str, Array]:
@@ -114,26 +113,28 @@ class Studied:
         """What a reader came for."""
         now, _ = self.history[-1]
         km = 1e-3 * now.turns * self.way
-        found, off, told = self.amplitudes(), uncertain(self.history), []
+        amplitudes, off, sentences = self.amplitudes(), uncertain(self.history), []
         for k, name in enumerate(WHEELS):
-            first, last, less = found[0, :, k], found[-1, :, k], off[: self.orders, k]
+            first, last, less = amplitudes[0, :, k], amplitudes[-1, :, k], off[: self.orders, k]
             if not first.max() > 1e-9:
                 continue
             n = int(first.argmax())
-            told.append(
+            sentences.append(
                 f"Order {n + 1} of the {name} wheel {_went(first[n], last[n], less[n])} in {km:.5g} km "
                 f"({now.turns:.4g} turns)."
             )
             m = int((last - first).argmax())
             if m != n and last[m] - first[m] > max(less[m], 1e-9):
-                told.append(f"Of the others order {m + 1} grows most, to {1e6 * last[m]:.3g} um.")
-        told += self._shifted()
-        told.append(error_of(self.history))
-        told += [self._hunts(), *self._deep()]
+                sentences.append(f"Of the others order {m + 1} grows most, to {1e6 * last[m]:.3g} um.")
+        sentences += self._shifted()
+        sentences.append(error_of(self.history))
+        sentences += [self._hunts(), *self._deep()]
         if self.table is not None:
-            told.append(f"Creep forces of the motion are read from a table, {100 * self.table.error[:, 0].max():.2g} % "
-                        "of mu F_N off in the mean; those of the wear are not.")  # fmt: skip
-        return [s for s in [*told, f"warning: it ends there: {self.ended}." if self.ended else ""] if s]
+            sentences.append(
+                f"Creep forces of the motion are read from a table, {100 * self.table.error[:, 0].max():.2g} % "
+                "of mu F_N off in the mean; those of the wear are not."
+            )
+        return [s for s in [*sentences, f"warning: it ends there: {self.ended}." if self.ended else ""] if s]
 
     def _shifted(self) -> list[str]:
         """How the waves of what is worn lie beside those of the wheel (Fig. 6.9-1)."""
@@ -162,26 +163,26 @@ class Studied:
         most, worn = deepest(self.vehicle), self.history[-1][0].depth
         renewed = self.rolling.profile is not None
         depth = float((groove(worn) if renewed else worn.mean(axis=1)).max())
-        told = f"The groove is {1e3 * depth:.2g} mm deep; "
+        sentence = f"The groove is {1e3 * depth:.2g} mm deep; "
         if depth <= most:
-            return [f"{told}the contact is one ellipse up to {1e3 * most:.2g} mm."]
+            return [f"{sentence}the contact is one ellipse up to {1e3 * most:.2g} mm."]
         return [
-            f"warning: {told.lower()}from {1e3 * most:.2g} mm on it splits the contact, and the profile across is "
+            f"warning: {sentence.lower()}from {1e3 * most:.2g} mm on it splits the contact, and the profile across is "
             "kept: what follows from there on is a guess."
         ]
 
     def _hunts(self) -> str:
         root = hunting(self.vehicle)
         state = "dies out" if root.real < 0 else "grows"
-        told = f"Lateral motion {state} by exp({root.real:.3g} t) at {self.vehicle.speed:g} m/s"
+        sentence = f"Lateral motion {state} by exp({root.real:.3g} t) at {self.vehicle.speed:g} m/s"
         if self.critical is None:
-            return f"{told}; no critical speed of hunting was found up to {FASTEST:g} m/s."
-        return f"{told}; the critical speed of hunting is {self.critical:.4g} m/s."
+            return f"{sentence}; no critical speed of hunting was found up to {FASTEST:g} m/s."
+        return f"{sentence}; the critical speed of hunting is {self.critical:.4g} m/s."
 
 
 def study(
-    case: VehicleCase, folder: Path, report: Callable[[str], None] = lambda _: None, journal: Journal | None = None
-) -> Studied:
+    case: VehicleCase, folder: Path, report: Report = lambda _: None, journal: Journal | None = None
+) -> VehicleAnswer:
     """Wear of a case whose files stand in a folder.
 
     Args:
@@ -199,11 +200,11 @@ def study(
         )
     creep, table = _creep(case, v, report)
     t = tread(v, case.running.places, case.wear.coefficient, case.model.model_dump())
-    r = Rolling.of(v, creep, t, case.shape(), case.profiles(folder, t.y))
+    r = RunningVehicle.of(v, creep, t, case.shape(), case.profiles(folder, t.y))
     report("wear by jumps over many turns")
     turns = case.running.turns
     try:
-        history, ended = worn(r, Now.of, turns, case.wear.tolerance, min(FIRST, turns), report, journal)
+        history, ended = worn(r, Running.of, turns, case.wear.tolerance, min(FIRST, turns), report, journal)
     except LeavesTheRail as stop:
         raise UserError(f"running, unround: already on new wheels {stop}; run slower or give less") from stop
     wheel = int(np.abs(r.shape).max(axis=0).argmax())
@@ -211,10 +212,10 @@ def study(
     speeds = [s for s, g in zip(case.running.speeds, grown, strict=True) if g is not None]
     table_of = np.array([g for g in grown if g is not None]).reshape(len(speeds), case.running.orders)
     critical = critical_speed(v, 1.0, FASTEST)
-    return Studied(case, v, r, history, ended, np.array(speeds), table_of, wheel, critical, table)
+    return VehicleAnswer(case, v, r, history, ended, np.array(speeds), table_of, wheel, critical, table)
 
 
-def _creep(case: VehicleCase, v: Vehicle, report: Callable[[str], None]) -> tuple[Creep, CreepTable | None]:
+def _creep(case: VehicleCase, v: Vehicle, report: Report) -> tuple[Creep, CreepTable | None]:
     if case.running.creep == "linear":
         return linear, None
     if case.running.creep == "strips":
@@ -230,22 +231,22 @@ SPEEDS = "speeds"
 
 
 def _all_grown(
-    case: VehicleCase, r: Rolling, wheel: int, report: Callable[[str], None], journal: Journal | None
+    case: VehicleCase, r: RunningVehicle, wheel: int, report: Report, journal: Journal | None
 ) -> list[Array | None]:
     """Of each speed (orders,) per turn; None where it does not run."""
-    known = {} if journal is None else journal.of(SPEEDS)
-    found = []
+    kept = {} if journal is None else journal.of(SPEEDS)
+    grown_at = []
     for speed in case.running.speeds:
-        if speed not in known:
+        if speed not in kept:
             grown = _grown(case, r, speed, wheel, report)
-            known[speed] = {} if grown is None else {"grown": grown}
+            kept[speed] = {} if grown is None else {"grown": grown}
             if journal is not None:
-                journal.keep(SPEEDS, speed, known[speed])
-        found.append(known[speed].get("grown"))
-    return found
+                journal.keep(SPEEDS, speed, kept[speed])
+        grown_at.append(kept[speed].get("grown"))
+    return grown_at
 
 
-def _grown(case: VehicleCase, r: Rolling, speed: float, wheel: int, report: Callable[[str], None]) -> Array | None:
+def _grown(case: VehicleCase, r: RunningVehicle, speed: float, wheel: int, report: Report) -> Array | None:
     """(orders,) per turn; None where it does not run."""
     report(f"growth at {speed:g} m/s")
     at = r.vehicle._replace(speed=speed)
@@ -253,7 +254,7 @@ def _grown(case: VehicleCase, r: Rolling, speed: float, wheel: int, report: Call
         report(f"warning: the wheelset hunts at {speed:g} m/s, which is left out")
         return None
     try:
-        r = Rolling.of(at, r.creep, r.tread, np.zeros_like(r.shape), r.profile)
+        r = RunningVehicle.of(at, r.creep, r.tread, np.zeros_like(r.shape), r.profile)
         return growth(r, np.arange(1, case.running.orders + 1), SMALL, wheel)
     except LeavesTheRail as stop:
         report(f"warning: at {speed:g} m/s {stop}; it is left out")

@@ -10,13 +10,13 @@ import numpy as np
 
 from ..errors import UserError
 from ..programs import program
-from ..rolling.wheelset import Patch, Pose, Side, Track, patches
+from ..rolling.wheelset import Pose, RollingPatch, Side, Track, patches
 
 Array = Any
 """Of numpy; of jax in what is traced."""
 
 
-class Touch(NamedTuple):
+class WheelTouch(NamedTuple):
     """Of both wheels, right first, arrays (2, ...) over the displacement or at one of it; axes of `rolling.wheelset`.
 
     Attributes:
@@ -41,13 +41,13 @@ class Touch(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Touching:
-    """Attributes: reach: largest displacement, m. load: vertical, on each wheel, N, of `Touch.a` and `Touch.b`. over:
-    a `Touch` of (2, n) arrays, on n equal steps from -reach to reach. jumps: largest move of a contact over the wheel
-    within a step, m."""
+    """Attributes: reach: largest displacement, m. load: vertical, on each wheel, N, of `WheelTouch.a` and `.b`.
+    over: a `WheelTouch` of (2, n) arrays, on n equal steps from -reach to reach. jumps: largest move of a contact over
+    the wheel within a step, m."""
 
     reach: float
     load: float
-    over: Touch
+    over: WheelTouch
 
     @property
     def jumps(self) -> float:
@@ -74,47 +74,47 @@ def touching(track: Track, load: float, reach: float, points: int = 33) -> Touch
     # what the right wheel has at y the left one has at -y, mirrored
     right = [_mirrored(one[1]) for one in half[:0:-1]] + [one[0] for one in half]
     left = [_mirrored(one) for one in right[::-1]]
-    return Touching(reach, load, Touch(*map(np.array, zip(*map(np.transpose, (right, left)), strict=True))))
+    return Touching(reach, load, WheelTouch(*map(np.array, zip(*map(np.transpose, (right, left)), strict=True))))
 
 
 def _mirrored(one: tuple[float, ...]) -> tuple[float, ...]:
-    t = Touch(*one)
+    t = WheelTouch(*one)
     return tuple(t._replace(roll=-t.roll, arm=-t.arm, slope=-t.slope, across=-t.across))
 
 
 def _standing(track: Track, load: float, y: float) -> list[tuple[float, ...]]:
-    """A `Touch` of numbers of each wheel, at one displacement."""
+    """A `WheelTouch` of numbers of each wheel, at one displacement."""
     roll = 0.0
     for _ in range(6):
-        found = [_one(track, load, y, roll, "right"), _one(track, load, y, roll, "left")]
-        (right, _), (left, _) = found
+        patches_of = [_one(track, load, y, roll, "right"), _one(track, load, y, roll, "left")]
+        (right, _), (left, _) = patches_of
         change = (right.axle[1] - left.axle[1]) / (right.place[1] - left.place[1])
         roll += change
         if abs(change) < 1e-9:
             break
-    return [_touch(track, p, roll, y) for p, _ in found]
+    return [_touch(track, p, roll, y) for p, _ in patches_of]
 
 
-def _one(track: Track, load: float, y: float, roll: float, side: Side) -> tuple[Patch, str]:
-    found = patches(track, Pose(y, 0.0, roll), side, load)
-    if len(found) > 1 and found[1].normal_force > 0.5 * found[0].normal_force:
+def _one(track: Track, load: float, y: float, roll: float, side: Side) -> tuple[RollingPatch, str]:
+    contacts = patches(track, Pose(y, 0.0, roll), side, load)
+    if len(contacts) > 1 and contacts[1].normal_force > 0.5 * contacts[0].normal_force:
         raise UserError(
             f"at {1e3 * y:.3g} mm the {side} wheel runs on two patches at once; a motion in time "
             "knows one, so take less",
             "running.reach",
         )
-    return found[0], side
+    return contacts[0], side
 
 
-def _touch(track: Track, p: Patch, roll: float, y: float) -> tuple[float, ...]:
+def _touch(track: Track, p: RollingPatch, roll: float, y: float) -> tuple[float, ...]:
     slope, c = float(np.tan(p.angle)), float(np.cos(p.angle))
     across, radius = float(p.place[1]) - y, track.radius + float(track.wheel.height(p.on_wheel))
     height = float(p.axle[1]) + track.radius - p.approach / c
     spring = p.normal_force * c / (p.approach / c) ** 1.5
-    return tuple(Touch(height, roll, across + radius * slope, slope, across, radius, p.on_wheel, p.a, p.b, spring))
+    return tuple(WheelTouch(height, roll, across + radius * slope, slope, across, radius, p.on_wheel, p.a, p.b, spring))
 
 
-def at(over: Touch, reach: float, y: Array) -> Touch:
+def at(over: WheelTouch, reach: float, y: Array) -> WheelTouch:
     """By cubics through four neighbours (Catmull-Rom), one continuous derivative: pure, (2,) of each."""
     n = over.a.shape[1]
     place = jnp.clip((y / reach + 1) * 0.5 * (n - 1), 1.0, n - 2.0)
@@ -123,7 +123,7 @@ def at(over: Touch, reach: float, y: Array) -> Touch:
     weights = jnp.stack([
         ((2 - t) * t - 1) * t, (3 * t - 5) * t * t + 2, ((4 - 3 * t) * t + 1) * t, (t - 1) * t * t
     ])  # fmt: skip
-    return Touch(*(0.5 * jnp.asarray(v)[:, i + jnp.arange(-1, 3)] @ weights for v in over))
+    return WheelTouch(*(0.5 * jnp.asarray(v)[:, i + jnp.arange(-1, 3)] @ weights for v in over))
 
 
 touched = program(at)

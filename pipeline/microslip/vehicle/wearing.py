@@ -14,11 +14,12 @@ import numpy as np
 from ..data import Array
 from ..errors import UserError
 from ..interrupts import look
+from ..progress import Report
 from ..results import Journal
 from ..rolling.strips import creep_forces, tractions
-from ..rolling.wear import deposited, smoothed
-from .motion import LEAST, Contacts, Q, Turn, Vehicle, resampled, steady, steps_of_a_turn, turned
-from .touch import Touch, touched
+from ..rolling.wear import deposited, smoothed, strip_work
+from .motion import LEAST, Q, Vehicle, WheelContacts, WheelTurn, resampled, steady, steps_of_a_turn, turned
+from .touch import WheelTouch, touched
 
 STRIP = 2.5e-4
 """m, width of a strip of the tread."""
@@ -36,23 +37,22 @@ class Tread:
     how: dict[str, Any]
     sides: tuple[int, ...] = (1, -1)
 
-    def taken(self, on: Contacts, friction: float, shear: float, poisson: float) -> Array:
+    def taken(self, on: WheelContacts, friction: float, shear: float, poisson: float) -> Array:
         """(wheels, places, n) m that passing each place once takes off (6.8-6); on: (places, wheels)."""
         t = tractions(*_flat(on), friction, shear, poisson, **self.how)
-        width = t.area[..., 0] / (t.x[..., 1] - t.x[..., 0])
-        depth = self.coefficient * (t.power * t.area).sum(axis=-1) / width
+        width, work = strip_work(t)
         middle = np.asarray(on.on_wheel).T.ravel()
         loaded = np.asarray(on.vertical).T.ravel() > 0
         outward = np.repeat(
             [-s for s in self.sides], on.xi.shape[0]
         )  # the strips' y runs to the left, the profile's to the field side
-        found = [
+        depths = [
             deposited(d[::s], w[::s], m, self.y) if touches else np.zeros_like(self.y)
-            for d, w, m, s, touches in zip(depth, width, middle, outward, loaded, strict=True)
+            for d, w, m, s, touches in zip(self.coefficient * work, width, middle, outward, loaded, strict=True)
         ]
-        return np.reshape(found, (len(self.sides), -1, len(self.y)))
+        return np.reshape(depths, (len(self.sides), -1, len(self.y)))
 
-    def work(self, on: Contacts, friction: float, shear: float, poisson: float) -> Array:
+    def work(self, on: WheelContacts, friction: float, shear: float, poisson: float) -> Array:
         """(wheels,) J of friction in a turn, from the forces."""
         power = creep_forces(*_flat(on), friction, shear, poisson, **self.how).power
         return np.asarray(
@@ -63,7 +63,7 @@ class Tread:
         """(wheels,) m3."""
         return np.asarray(depth.sum(axis=(1, 2)) * (self.y[1] - self.y[0]) * self.way)
 
-    def seen(self, depth: Array, on: Contacts) -> Array:
+    def seen(self, depth: Array, on: WheelContacts) -> Array:
         """(places, wheels) m by which the radius is less where the contact runs: the mean weighted by its pressure.
 
         To first order that is how much further off the bodies are; the pressure is that of a mean place, before wear.
@@ -78,7 +78,7 @@ def spread(middle: Array, half: float) -> Array:
     return np.arange(middle.min() - half - STRIP, middle.max() + half + 2 * STRIP, STRIP)
 
 
-def _flat(on: Contacts) -> tuple[Array, Array, Array, Array, Array, Array]:
+def _flat(on: WheelContacts) -> tuple[Array, Array, Array, Array, Array, Array]:
     """States of rolling, the places of one wheel after those of the other."""
     xi, eta, phi, a, b, force = (np.asarray(v).T.ravel() for v in on[:6])
     return xi, eta, phi, a, b, force
@@ -105,15 +105,25 @@ TURNS = 40
 
 
 @dataclass(frozen=True, eq=False)
-class Now:
-    """Running at one amount of wear. Attributes: turns: so far. depth: (2, places, n) m. radius: (places, 2) deviation
-    that the contacts see, m. one: a turn. taken: (2, places, n) m in it. start, map_: for the next one."""
+class WearState:
+    """What wears. Attributes: turns: so far. depth: (wheels, places, n) m. taken: in one turn, m."""
 
     turns: float
     depth: Array
-    radius: Array
-    one: Turn
     taken: Array
+
+    def point(self) -> dict[str, Any]:
+        """Names -> arrays, for a journal."""
+        return vars(self)
+
+
+@dataclass(frozen=True, eq=False)
+class Running(WearState):
+    """Running at one amount of wear. Attributes: radius: (places, 2) deviation that the contacts see, m. one: a turn.
+    start, map_: for the next one."""
+
+    radius: Array
+    one: WheelTurn
     start: Array
     map_: Array | None
 
@@ -124,15 +134,15 @@ class Now:
         return point | {k: v for k, v in vars(self).items() if k != "one" and v is not None}
 
     @staticmethod
-    def of(point: Mapping[str, Any]) -> Now:
+    def of(point: Mapping[str, Any]) -> Running:
         """What `point` took apart, to the last bit."""
         own = {k: v for k, v in point.items() if "/" not in k}
-        one = Turn(on=Contacts(**part(point, "on/")), **part(point, "one/"))
-        return Now(one=one, **{"map_": None, **own})
+        one = WheelTurn(on=WheelContacts(**part(point, "on/")), **part(point, "one/"))
+        return Running(one=one, **{"map_": None, **own})
 
 
 @dataclass(frozen=True, eq=False)
-class Rolling:
+class RunningVehicle:
     """A vehicle on wheels that are out of round.
 
     Attributes:
@@ -145,15 +155,15 @@ class Rolling:
     tread: Tread
     shape: Array
     steps: int
-    profile: Callable[[Array], Touch] | None = None
+    profile: Callable[[Array], WheelTouch] | None = None
 
     @staticmethod
     def of(
-        vehicle: Vehicle, creep: Any, tread: Tread, shape: Array, profile: Callable[[Array], Touch] | None = None
-    ) -> Rolling:
-        return Rolling(vehicle, creep, tread, shape, steps_of_a_turn(vehicle, len(shape)), profile)
+        vehicle: Vehicle, creep: Any, tread: Tread, shape: Array, profile: Callable[[Array], WheelTouch] | None = None
+    ) -> RunningVehicle:
+        return RunningVehicle(vehicle, creep, tread, shape, steps_of_a_turn(vehicle, len(shape)), profile)
 
-    def renewed(self, depth: Array) -> Rolling:
+    def renewed(self, depth: Array) -> RunningVehicle:
         """With the profile across that both wheels have in the mean over their circumference.
 
         Raises:
@@ -174,7 +184,7 @@ class Rolling:
         """(2, places, n) m of new wheels."""
         return np.zeros((2, len(self.shape), len(self.tread.y)))
 
-    def at(self, depth: Array, turns: float, near: Now | None = None) -> Now:
+    def at(self, depth: Array, turns: float, near: Running | None = None) -> Running:
         """Periodic motion on worn wheels.
 
         Raises:
@@ -189,23 +199,23 @@ class Rolling:
         radius = filtered(r.shape - r.tread.seen(depth - told, on), half, float(v.over.radius.mean()))
         one, x, map_ = r.periodic(x, radius, map_)
         taken = r.tread.taken(one.on, v.friction, v.shear, v.poisson)
-        return Now(turns, depth, radius, one, taken, x, map_)
+        return Running(turns, depth, taken, radius, one, x, map_)
 
-    def seen(self, depth: Array, now: Now) -> Array:
+    def seen(self, depth: Array, now: Running) -> Array:
         """(places, 2) m that a running sees of it."""
         return self.tread.seen(depth, now.one.on)
 
-    def work(self, now: Now) -> Array:
+    def work(self, now: Running) -> Array:
         """(2,) J of friction in a turn."""
         v = self.vehicle
         return self.tread.work(now.one.on, v.friction, v.shear, v.poisson)
 
-    def turn(self, x: Array, radius: Array) -> Turn:
+    def turn(self, x: Array, radius: Array) -> WheelTurn:
         """One turn from a state, on wheels of such radii (places, 2)."""
         out, rise = resampled(radius, 2 * self.steps)
         return turned(self.vehicle, self.creep, x, out, rise, self.steps // len(radius))
 
-    def periodic(self, x: Array, radius: Array, map_: Array | None) -> tuple[Turn, Array, Array | None]:
+    def periodic(self, x: Array, radius: Array, map_: Array | None) -> tuple[WheelTurn, Array, Array | None]:
         """The motion that comes back after a turn: that turn, its first state, and the derivative of the turn's end.
 
         Raises:
@@ -238,7 +248,7 @@ class Rolling:
 
 
 def groove(depth: Array) -> Array:
-    """(n,) m across, of depths (wheels, places, n), as `Rolling.renewed` has it."""
+    """(n,) m across, of depths (wheels, places, n), as `RunningVehicle.renewed` has it."""
     return smoothed(depth.mean(axis=(0, 1)), STRIP, SMOOTHING)
 
 
@@ -248,7 +258,7 @@ def deepest(v: Vehicle) -> float:
     return 0.5 * (v.each / float(np.asarray(touched(v.over, v.reach, 0.0).spring)[0])) ** (2 / 3)
 
 
-def _stays_on(one: Turn, v: Vehicle) -> None:
+def _stays_on(one: WheelTurn, v: Vehicle) -> None:
     off = np.asarray(one.on.vertical) <= LEAST * v.each
     for k, side in enumerate(("right", "left")):
         if off[:, k].any():
@@ -272,19 +282,7 @@ class Jump:
     waves: Array
 
 
-class State(Protocol):
-    """Of what wears. Attributes: turns: so far. depth: (wheels, places, n) m. taken: in one turn, m."""
-
-    @property
-    def turns(self) -> float: ...
-    @property
-    def depth(self) -> Array: ...
-    @property
-    def taken(self) -> Array: ...
-    def point(self) -> dict[str, Any]: ...
-
-
-S = TypeVar("S", bound=State)
+S = TypeVar("S", bound=WearState)
 
 
 class Wears(Protocol[S]):
@@ -331,7 +329,7 @@ def jumps(
         if error > tolerance and not fixed:
             size *= max(0.2, 0.9 * (tolerance / error) ** 0.5)
             continue
-        work = [size * 0.5 * r.work(one) for one in (now, then)]
+        work = [size * 0.5 * r.work(state) for state in (now, then)]
         now = r.at(now.depth + size * mean, now.turns + size, then)
         waves = orders_of(off, len(off) // 2)
         jump = Jump(now.turns, size, error, t.volume(size * mean), work[0] + work[1], waves)
@@ -353,7 +351,7 @@ JUMPS = "jumps"
 
 def worn(
     r: Wears[S], of: Callable[[Mapping[str, Any]], S], turns: float, tolerance: float, first: float,
-    report: Callable[[str], None], journal: Journal | None,
+    report: Report, journal: Journal | None,
 ) -> tuple[list[tuple[S, Jump]], str]:  # fmt: skip
     """All of `jumps`, each kept in a journal and found there, and why they end early, or nothing.
 
@@ -379,7 +377,7 @@ def worn(
     return history, ""
 
 
-def columns_of(history: Sequence[tuple[State, Jump]], way: float, wheels: Sequence[str]) -> dict[str, Array]:
+def columns_of(history: Sequence[tuple[WearState, Jump]], way: float, wheels: Sequence[str]) -> dict[str, Array]:
     """Of a table over the jumps: what each does, and the total so far; way: of a turn, m."""
     turns = np.array([now.turns for now, _ in history])
     columns = {"total_turns": turns, "total_distance_km": 1e-3 * turns * way}
@@ -393,12 +391,12 @@ def columns_of(history: Sequence[tuple[State, Jump]], way: float, wheels: Sequen
     return columns
 
 
-def uncertain(history: Sequence[tuple[State, Jump]]) -> Array:
+def uncertain(history: Sequence[tuple[WearState, Jump]]) -> Array:
     """(orders, wheels) by which amplitudes of what is worn may be off at the end, m: of all jumps together."""
     return np.asarray(sum(j.waves for _, j in history))
 
 
-def error_of(history: Sequence[tuple[State, Jump]]) -> str:
+def error_of(history: Sequence[tuple[WearState, Jump]]) -> str:
     """A sentence."""
     error = sum(j.error for _, j in history)
     return (
@@ -412,7 +410,7 @@ def part(point: Mapping[str, Any], name: str) -> dict[str, Any]:
     return {k.removeprefix(name): v for k, v in point.items() if k.startswith(name)}
 
 
-def point_of(now: State, jump: Jump) -> dict[str, Any]:
+def point_of(now: WearState, jump: Jump) -> dict[str, Any]:
     """Names -> arrays of a state and the jump to it, for a journal."""
     return {f"jump/{k}": v for k, v in vars(jump).items()} | now.point()
 
@@ -422,12 +420,12 @@ def of_point(point: Mapping[str, Any], of: Callable[[Mapping[str, Any]], S]) -> 
     return of({k: v for k, v in point.items() if not k.startswith("jump/")}), Jump(**part(point, "jump/"))
 
 
-def growth(r: Rolling, orders: Array, amplitude: float, wheel: int) -> Array:
+def growth(r: RunningVehicle, orders: Array, amplitude: float, wheel: int) -> Array:
     """(orders,) share by which the amplitude of each order of a wheel grows per turn, all together as small waves and
     the same with the opposite sign, so that what goes with their square drops out.
 
     Raises:
-        LeavesTheRail: see `Rolling.at`.
+        LeavesTheRail: see `RunningVehicle.at`.
     """
     angle = 2 * np.pi * np.arange(len(r.shape)) / len(r.shape)
     phases = np.pi * orders * (orders - 1) / max(len(orders), 1)  # no high crest where all meet

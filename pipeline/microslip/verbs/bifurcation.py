@@ -17,10 +17,9 @@ from pydantic import BeforeValidator, Field, model_validator
 from .. import sliding
 from ..analysis import Analysis, Answer, Files, Question
 from ..bifurcation import branches, mechanics
-from ..bifurcation.branches import SPECIAL, Branch
-from ..bifurcation.diagram import Asked, Diagram, diagram
+from ..bifurcation.branches import SPECIAL, DiagramBranch
+from ..bifurcation.diagram import Diagram, DiagramPlan, diagram
 from ..bifurcation.recorded import Branches, write_bifurcation
-from ..case import headline
 from ..errors import NotConverged, UserError, of_file
 from ..files.store import fingerprint, write_text
 from ..files.tables import rows_csv
@@ -106,9 +105,9 @@ def solve(q: Question) -> Answer:
     for asked, one in found:
         files |= _pictures(asked, one, q.built.settings.name)
     return Answer(
-        [*(words for a, one in found for words in told(a, one)), *headline.doubted(q.built, top)],
+        [words for a, one in found for words in told(a, one)],
         tables=[say(READ_AS, tone="note"), *(_points(a, one) for a, one in found)],
-        largest=None,
+        largest=top,
         whole=not any(b.lost for b in every),
         files=files,
     )
@@ -137,7 +136,7 @@ def _diagram(q: Question, asked: Keys) -> Diagram:
         place = f"{name}, {branch}.h5".replace(", ", "_").replace(" ", "_")
         return q.folder / "branches" / place
 
-    given = Asked(**{key: getattr(asked, key) for key in Asked.__dataclass_fields__})
+    given = DiagramPlan(**{key: getattr(asked, key) for key in DiagramPlan.__dataclass_fields__})
     try:
         begin = sliding.equilibrium(sliding.of(make(asked.start)))
     except NotConverged as error:
@@ -187,7 +186,7 @@ def _points(asked: Keys, found: Diagram) -> Piece:
     return table(head, [row for b in found.branches for row in _rows(b)])
 
 
-def _rows(branch: Branch) -> list[list[str]]:
+def _rows(branch: DiagramBranch) -> list[list[str]]:
     return [
         [
             branch.name,
@@ -201,7 +200,7 @@ def _rows(branch: Branch) -> list[list[str]]:
     ]
 
 
-def _multiplier(branch: Branch, i: int) -> str:
+def _multiplier(branch: DiagramBranch, i: int) -> str:
     value = complex(branch.multipliers[i, 0])
     if abs(value.imag) <= 1e-9 * abs(value):
         return number(value.real)
@@ -243,9 +242,9 @@ def beside(found: Diagram, p: float) -> str:
 
 
 ANALYSIS = Analysis(
-    name="bifurcation",
-    asks=Keys,
-    solve=solve,
+    "bifurcation",
+    Keys,
+    solve,
     lost="some branches could not be followed to their end",
     needed="keys, start and stop",
     swept=False,

@@ -3,7 +3,7 @@ optimal normal force."""
 
 from __future__ import annotations
 
-from functools import cache, partial
+from functools import partial
 from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
@@ -11,20 +11,21 @@ from pydantic import Field, model_validator
 
 from ..analysis import Analysis, Answer, Drawing, Question
 from ..case.assemble import Built
-from ..case.problem import forces_of, problem_of
-from ..continuation import NO_OPTIMUM, Peak
+from ..case.problem import forces_of
+from ..continuation import NO_OPTIMUM
 from ..data import Array
 from ..errors import UserError
 from ..harmonic_balance.peak import Optimum, Top, optimum, top_of
 from ..harmonic_balance.problem import Problem
 from ..harmonic_balance.readout import measured
-from ..harmonic_balance.refinement import filled_response
+from ..harmonic_balance.response import filled_response
 from ..pictures.plots import plain_numbers
 from ..results import Journal
 from ..results.dataset import Dataset, Variable
 from ..results.journal import once
 from ..settings.numbers import Model, Positive
 from ..units import Quantity
+from .optimum import kept_top, row_of, under_forces
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -57,15 +58,11 @@ class Keys(Model):
 def solve(q: Question) -> Answer:
     """A response under every normal force; whole if each has a resonance that is known."""
     built: Built = q.built
-    values, band = _forces(q), _band(built)
-    length = problem_of(built, float(np.sqrt(values[0] * values[-1]))).length
-
-    @cache
-    def make(force: float) -> Problem:
-        return problem_of(built, force, length=length)
+    values, band = _forces(q), built.settings.sweep.grid
+    make = under_forces(built, values[0], values[-1])
 
     def look(force: float, problem: Problem) -> Top:
-        return _top(once(q.kept, KEPT, force, partial(_responded, problem, band, q.report)))
+        return kept_top(once(q.kept, KEPT, force, partial(_responded, problem, band, q.report)))
 
     best = optimum(make, values, 2 * np.pi * band, report=q.report, look=look)
     of = measured(built.assembly)
@@ -99,29 +96,14 @@ def _forces(q: Question) -> list[float]:
     return [float(force) for force in np.geomspace(low, high, asked.forces)]
 
 
-def _band(built: Built) -> Array:
-    sweep = built.settings.sweep
-    return np.linspace(sweep.start, sweep.stop, sweep.points)
-
-
 def _responded(problem: Problem, band: Array, report: Any) -> dict[str, Any]:
     """A response and its highest resonance, as a journal keeps them."""
-    response = filled_response(problem, band, np.zeros(len(problem.assembly.contacts)), report)
-    top = top_of(problem, response)
+    response = filled_response(problem, band, report)
     return {
         "frequency": response.frequency,
         "amplitude": np.where(response.converged, np.abs(response.monitor), np.nan),
-        "x": top.peak.x, "Omega": top.peak.lam, "square": top.peak.value, "kink": int(top.peak.kink),
-        "status": top.peak.status, "tangent": top.peak.tangent, "end": top.end or np.nan, "unsolved": top.unsolved,
-    }  # fmt: skip
-
-
-def _top(kept: dict[str, Any]) -> Top:
-    """The highest resonance that a journal keeps."""
-    whole = ("x", "Omega", "square", "kink", "status", "tangent")
-    x, Omega, square, kink, status, tangent = (kept[name] for name in whole)
-    peak = Peak(x, float(Omega), float(square), bool(kink), status, tangent)
-    return Top(peak, None if np.isnan(kept["end"]) else float(kept["end"]), kept["unsolved"])
+        **row_of(top_of(problem, response)),
+    }
 
 
 def _ridge(best: Optimum, kept: Journal, of: Quantity) -> Dataset:
@@ -198,4 +180,4 @@ def draw(ridge: Dataset, points: Dataset, of: Quantity, figure: Figure) -> None:
     figure.colorbar(shades, label=f"amplitude in {unit} (0-peak); grey: no solution")
 
 
-ANALYSIS = Analysis(name="map", asks=Keys, solve=solve, lost="a resonance is not known under every normal force")
+ANALYSIS = Analysis("map", Keys, solve, lost="a resonance is not known under every normal force")

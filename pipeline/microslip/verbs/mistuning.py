@@ -14,7 +14,6 @@ from pydantic import BeforeValidator, Field, model_validator
 
 from ..analysis import Analysis, Answer, Files, Question
 from ..basis import read_basis
-from ..case import CaseSettings, headline
 from ..case.assemble import Built, build
 from ..case.contacts import swept
 from ..case.problem import book_models
@@ -138,20 +137,17 @@ def solve(q: Question) -> Answer:
     lone = first is not None and what.tuned.body(first).sectors == 1 and built.settings.stuck_ratios is None
     near = approximation(what, first) if first and lone and not what.stuck else None
     alone = near is not None and len(what.scatter) > 1
+    amplitude, stress = (
+        float(np.nanmax(found.column(of), initial=0.0)) for of in ("amplitude", "stress_Pa")
+    )
     return Answer(
-        [*said(found), *([FIRST_ALONE] if alone else []), *built.messages, *_doubted(found, built, asked)],
+        [*said(found), *([FIRST_ALONE] if alone else [])],
         tables=_pieces(found),
-        largest=None,
+        largest=max(amplitude, found.tuned.top.amplitude),
+        judged={"normal": _normal_force(built, asked), "stress": stress},
         whole=bool(found.solved.all()),
         files=_files(found, near) | (_pictures(found, worst, near, built.settings.name) if worst else {}),
     )
-
-
-def _doubted(found: Ensemble, built: Built, asked: Keys) -> list[str]:
-    """What looks like a number in a wrong unit: of the highest blade of all samples, or the tuned ring's."""
-    amplitude, stress = (float(np.nanmax(found.column(of), initial=0.0)) for of in ("amplitude", "stress_Pa"))
-    top = max(amplitude, found.tuned.top.amplitude)
-    return headline.doubted(built, top, _normal_force(built, asked), stress)
 
 
 FIRST_ALONE = "First order is of the first scatter of frequencies alone; the samples have all that scatters."
@@ -175,11 +171,9 @@ def asked_of(built: Built, asked: Keys) -> Asked:
     pressed = {name: tuple(c.name for c in sector.contacts if name in _ends(c)) for name in thrown}
     tuned = Tuned(sector, pressed)
     tuned.check(scatter)
-    sweep = settings.sweep
-    frequency = np.linspace(sweep.start, sweep.stop, sweep.points)
     balance = {"harmonics": settings.balanced, **settings.marching}
     models = partial(book_models, strips=settings.strips) if settings.mode == "book" else None
-    return Asked(tuned, scatter, frequency, asked.seed, balance, asked.stuck, models)
+    return Asked(tuned, scatter, settings.sweep.grid, asked.seed, balance, asked.stuck, models)
 
 
 def _ends(contact: Contact) -> set[str]:
@@ -404,28 +398,15 @@ def _highest(found: Ensemble) -> Piece:
     return table(["sample", "amplification", "frequency in Hz", "blade", "localisation"], rows)
 
 
-def _of_a_ring(asked: Keys, case: CaseSettings) -> str:
-    return "" if case.ring else "is that of a ring; add [ring] with blades and engine_order"
-
-
-def _named(asked: Keys) -> list[str | None]:
-    return [file for s in asked.scatter for file in (s.file, *s.others.values())]
-
-
 ANALYSIS = Analysis(
-    name="mistuning",
-    asks=Keys,
-    solve=solve,
+    "mistuning",
+    Keys,
+    solve,
     lost="some samples have no solution; samples.csv has no amplitude for them",
     needed="scatter = [{ of, deviation }]",
     verb="mistune",
-    options={
-        "samples": "at most, in the place of the case's number.",
-        "until": "ends when half of the 95 % quantile's interval is that share of it, as 2%.",
-        "rare": "further samples, chosen by a linear ring, for the 99.9 % quantile.",
-        "workers": "processes; as many as there are cores if not given. Samples are the same for any number.",
-    },
+    options=("samples", "until", "rare", "workers"),
     alone=True,
-    fits=_of_a_ring,
-    files=_named,
+    fits=lambda _, case: "" if case.ring else "is that of a ring; add [ring] with blades and engine_order",
+    files=lambda asked: [file for s in asked.scatter for file in (s.file, *s.others.values())],
 )

@@ -13,7 +13,6 @@ from pydantic import BeforeValidator, Field, model_validator
 from scipy.interpolate import CubicHermiteSpline
 
 from ..analysis import Analysis, Answer, Files, Question
-from ..case import headline
 from ..case.assemble import Built
 from ..case.contacts import swept
 from ..case.problem import problem_of
@@ -127,10 +126,13 @@ def solve(q: Question) -> Answer:
     found: Named = [(one.name, one) for one in ran]
     files: Files = {"orbit.csv": partial(write_columns, _columns(found), 8)}
     files["orbit.h5"] = lambda _: None  # is there
+    ends = [_ends(one) for _, one in found if len(one.time)]
+    notes = [words for one in found for words in (_sentence(*one), *_chatter(*one))]
     return Answer(
-        [*_notes(found), *_messages(found, built), *_doubted(found, built, q.asked)],
+        [*notes, *_messages(found, built)],
         tables=_shown(found),
-        largest=None,
+        largest=max((0.5 * (top - low) for top, low in ends), default=0.0),
+        judged={"normal": q.asked.normal_force, "in_time": True},
         whole=not any(np.isfinite(one.diverged) for _, one in found),
         files=files | _pictures(found, built.settings.name),
         moving=lambda folder: _moving(found, built, folder),
@@ -143,13 +145,13 @@ def _moving(found: Named, built: Built, folder: Path) -> list[Path]:
     return moving_bodies(found, built, folder)
 
 
-def _asked(asked: Keys, built: Built) -> list[recorded.Asked]:
+def _asked(asked: Keys, built: Built) -> list[recorded.Integration]:
     """The motions that a case asks for.
 
     Raises:
         UserError: nothing presses a contact that waits for it.
     """
-    motions = list[recorded.Asked]()
+    motions = list[recorded.Integration]()
     if asked.normal_force is None and (waiting := [c.interface for c in built.contacts if swept(c)]):
         raise UserError("nothing presses it; give orbit.normal_force, N", f"contacts.{waiting[0]}")
     assembly = built.pressed(asked.normal_force)
@@ -158,16 +160,16 @@ def _asked(asked: Keys, built: Built) -> list[recorded.Asked]:
     for f in asked.hertz:
         name = f"{2 * np.pi * f:.6g} rad/s" if asked.Omega else f"{f:.6g} Hz"
         driven = equations.of(assembly, 2 * np.pi * f)
-        start: orbit.Start | starts.Periodic
+        start: orbit.Start | starts.PeriodicStart
         if asked.start == "balance":
             start = starts.of_balance(driven, problem_of(built, asked.normal_force))
         else:
             start = _rest(driven, asked)
-        motions.append(recorded.Asked(name, driven, asked.settle, asked.keep, asked.samples, asked.steps, start))
+        motions.append(recorded.Integration(name, driven, asked.settle, asked.keep, asked.samples, asked.steps, start))
     return motions
 
 
-def _rest(e: equations.Equations, asked: Keys) -> orbit.Start:
+def _rest(e: equations.MotionEquations, asked: Keys) -> orbit.Start:
     """Where bodies stand, or are let go."""
     if asked.release is not None:
         with at("orbit"):
@@ -176,17 +178,12 @@ def _rest(e: equations.Equations, asked: Keys) -> orbit.Start:
     return asked.start
 
 
-def _run_up(assembly: Assembly, asked: Keys, how: RunUp) -> recorded.Asked:
+def _run_up(assembly: Assembly, asked: Keys, how: RunUp) -> recorded.Integration:
     ramp = Ramp(2 * np.pi * how.start, 2 * np.pi * how.stop, how.time, how.engine_order, how.euler)
     name = f"{how.start:.6g} to {how.stop:.6g} Hz in {how.time:.6g} s"
     driven = equations.of_ramp(assembly, ramp)
     start = _rest(driven, asked)
-    return recorded.Asked(name, driven, 0, ramp.periods, asked.samples, asked.steps, start)
-
-
-def _notes(found: Named) -> list[str]:
-    """What motions they are, in sentences."""
-    return [words for name, one in found for words in (_sentence(name, one), *_chatter(name, one))]
+    return recorded.Integration(name, driven, 0, ramp.periods, asked.samples, asked.steps, start)
 
 
 def _messages(found: Named, built: Built) -> list[str]:
@@ -198,14 +195,7 @@ def _messages(found: Named, built: Built) -> list[str]:
         for b in built.settings.components if one.equations.ramp else ():
             if b.pressed_at_rpm is not None:
                 own.append(f"{name}: the contacts of {b.name} stay pressed as at {b.pressed_at_rpm:g} rpm.")
-    return [*own, *built.messages]
-
-
-def _doubted(found: Named, built: Built, asked: Keys) -> list[str]:
-    """What looks like a number in a wrong unit."""
-    ends = [_ends(one) for _, one in found if len(one.time)]
-    swing = max((0.5 * (largest - smallest) for largest, smallest in ends), default=0.0)
-    return headline.doubted(built, swing, asked.normal_force, in_time=True)
+    return own
 
 
 def _sentence(name: str, one: Orbit) -> str:
@@ -323,9 +313,9 @@ def _band(asked: Mapping[str, Any]) -> dict[str, float]:
 
 
 ANALYSIS = Analysis(
-    name="orbit",
-    asks=Keys,
-    solve=solve,
+    "orbit",
+    Keys,
+    solve,
     lost="a motion diverged",
     needed="frequency (Hz), Omega (rad/s) or run_up",
     swept=False,

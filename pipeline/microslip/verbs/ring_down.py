@@ -175,8 +175,7 @@ def draw(decay: Dataset, motion: Dataset, of: Quantity, figure: Figure) -> None:
 
 def _rung(built: Built, force: float | None, problem: Problem, asked: Keys, report: Any) -> dict[str, Any]:
     """The nonlinear mode and the motion under a normal force, as a journal keeps them."""
-    over = built.settings.sweep
-    band = 2 * np.pi * np.linspace(over.start, over.stop, over.points)
+    band = 2 * np.pi * built.settings.sweep.grid
     stuck = nonlinear_modes.about_rest(problem)[0]
     number = nonlinear_modes.strongest(stuck, band[0], band[-1]) if asked.mode is None else asked.mode - 1
     point, amplitude = None, asked.amplitude
@@ -274,8 +273,8 @@ def measured_decay(time: Array, y: Array, Omega: float, down_to: float, first: f
 
 
 ANALYSIS = Analysis(
-    name="ring_down",
-    asks=Keys,
-    solve=solve,
+    "ring_down",
+    Keys,
+    solve,
     lost="a motion does not die away far enough, or a nonlinear mode ends early",
 )

@@ -22,16 +22,15 @@ from ..errors import NotConverged, UserError, of_file
 from ..files.tables import csv_files
 from ..linalg import quadratic
 from ..linalg.quadratic import Quadratic, Window
-from ..modal.unreduced import unreduced
+from ..modal.compute import unreduced
 from ..pictures.roots import cycles_picture, map_picture, plane_picture, relief_picture
 from ..report.page import fold, say, table
 from ..report.roots import root_table, table_lines
 from ..results.journal import once
-from ..roots.asked import window_of
+from ..roots.asked import window_of, write_roots
 from ..roots.cycles import Born, Cycle, Over, born, sentence_of_relief, sentences_of
 from ..roots.full import Compared, compared, full_matrices, growing
 from ..roots.map import Axis, Map, over_map
-from ..roots.recorded import write_roots
 from ..roots.spectrum import Spectrum, spectrum
 from ..roots.waves import waves
 from ..settings.numbers import Model, NotNegative, Number, _finite_vector, _tuple
@@ -348,9 +347,9 @@ def _axis(over: Over) -> str:
 
 
 ANALYSIS = Analysis(
-    name="stability",
-    asks=Keys,
-    solve=solve,
+    "stability",
+    Keys,
+    solve,
     lost="not all was found, roots in the window or limit cycles",
     needed="frequency = [0.0, HIGHEST] in Hz",
     swept=False,

@@ -12,7 +12,6 @@ from pydantic import Field, model_validator
 from ..analyses import two_tones
 from ..analysis import Analysis, Answer, Drawing, Question
 from ..data import Array
-from ..harmonic_balance.tones import Kept
 from ..pictures.plots import plain_axes
 from ..report.page import Piece, fold, number, say, table
 from ..results.tones import TwoTones
@@ -80,7 +79,7 @@ def solve(q: Question) -> Answer:
     first, second = asked.hertz
     motions = two_tones(
         q.built, first, second, free=asked.free, harmonics=asked.harmonics, samples=asked.samples, turns=asked.turns,
-        kept=Kept(q.kept), report=q.report,
+        kept=q.kept, report=q.report,
     )  # fmt: skip
     highest = int(np.argmax(np.where(motions.converged, np.abs(motions.of(1, 0)), -1.0)))
     reached = np.abs(motions.amplitude[motions.converged, 0, 1:]).sum(axis=-1).max(initial=0.0)
@@ -170,9 +169,9 @@ def draw_point(motions: TwoTones, i: int, figure: Figure) -> None:
 
 
 ANALYSIS = Analysis(
-    name="two_tones",
-    asks=Keys,
-    solve=solve,
+    "two_tones",
+    Keys,
+    solve,
     lost="some points did not converge",
     needed="start and second (Hz), or ratio",
     swept=False,

@@ -26,13 +26,12 @@ from ..contact.patch import pressing
 from ..contact.point import OnNormal
 from ..contact.portion import Portion
 from ..contact.wear import worn_law
-from ..continuation import peak as climbed
 from ..data import Array
 from ..errors import NotConverged, UserError
 from ..harmonic_balance.envelope import motion_of_read
 from ..harmonic_balance.peak import highest
 from ..harmonic_balance.problem import Problem, moves_by
-from ..harmonic_balance.readout import WithOutput, measured
+from ..harmonic_balance.readout import climbed, measured
 from ..harmonic_balance.response import judged, operating, traced
 from ..harmonic_balance.solver import CONVERGED, Point
 from ..harmonic_balance.solver import solve as solved
@@ -296,8 +295,7 @@ Vibrates = Callable[[Surface, Row | None], Row]
 
 def _course(w: Wearing, asked: Keys, kept: Kept, report: Callable[[str], None]) -> Course:
     """Jump after jump, each made of the one before and kept."""
-    over = w.settings.sweep
-    band = 2 * np.pi * np.linspace(over.start, over.stop, over.points)
+    band = 2 * np.pi * w.settings.sweep.grid
     vibrates = partial(_vibrating, w, asked.frequency, band, report)
     rows, lost = [kept(0.0, partial(_begun, w, asked, vibrates))], ""
     while not lost and rows[-1]["time"] < asked.hours * (1 - SHORTEST):
@@ -423,13 +421,11 @@ def _point(
         return solved(problem, 2 * np.pi * frequency, [] if near is None else [near["x"]])
     peak = None
     if near is not None:
-        large = max(problem.x_scale, float(np.abs(near["x"]).max()))
-        problem = replace(problem, x_scale=large)  # steps along the curve are shares of the motion
-        peak = climbed(WithOutput(problem), near["x"], near["Omega"])
+        peak = climbed(problem, near["x"], near["Omega"])
         if not peak.converged:
             beside = solved(problem, near["Omega"], [near["x"]])
             if beside.converged:
-                peak = climbed(WithOutput(problem), beside.x, beside.Omega)
+                peak = climbed(problem, beside.x, beside.Omega)
     if peak is None or not peak.converged:
         peak = highest(problem, band, report).peak
     return Point(peak.lam, peak.x, peak.status, 0.0, 0)
@@ -595,9 +591,9 @@ def draw_depth(depth: Dataset, figure: Figure) -> None:
 
 
 ANALYSIS = Analysis(
-    name="wear",
-    asks=Keys,
-    solve=solve,
+    "wear",
+    Keys,
+    solve,
     lost="a course of wear ends before its hours",
     needed="coefficient (m3/J) and hours",
 )

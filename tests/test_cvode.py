@@ -1,29 +1,25 @@
-"""The integrator that chooses its own steps: exact solutions, and the stepper against it."""
+"""The stepper against an integrator that chooses its own steps (`cvode`), and both against exact solutions."""
 
 from __future__ import annotations
 
-import sys
 from dataclasses import replace
 
+import cvode
 import numpy as np
 import pytest
 from closed_forms.impacts import dry_turns, restitution
-from refusals import refused
 from test_time_domain import BOOK, MASS, hitting, patch
 
 import microslip as ms
-from microslip.contact.examples import EXAMPLES
 from microslip.contact.friction import Coulomb
 from microslip.contact.heights import Polynomial
 from microslip.contact.law import Law, value
 from microslip.contact.normal import Penalty, Rough
 from microslip.contact.patch import Patch
-from microslip.contact.portion import portion
 from microslip.contact.regularised import MassContact
-from microslip.errors import UserError
 from microslip.system.assembly import Assembly
-from microslip.time_domain import equations, orbit, reference
-from microslip.time_domain.equations import Equations
+from microslip.time_domain import equations, orbit
+from microslip.time_domain.equations import MotionEquations
 from microslip.time_domain.stepper import Stepper
 
 pytest.importorskip("sksundae")
@@ -34,7 +30,7 @@ BOOK_44 = MassContact(
 )  # fmt: skip
 
 
-def rubbing(law: Law) -> Equations:
+def rubbing(law: Law) -> MotionEquations:
     """The mass of section 4.2, pressed, and rubbed in two directions until it slides and lifts off."""
     touching = Patch("stop", np.zeros((1, 2)), np.ones(1), law)
     return equations.of(hitting(touching, normal=0.5, push=1.5), 300.0)
@@ -60,12 +56,15 @@ SYSTEMS = {
 }
 
 
-@pytest.mark.parametrize("name", SYSTEMS)
+SLOW = ("rubs and is damped", "element with a mass")
+
+
+@pytest.mark.parametrize("name", [pytest.param(n, marks=pytest.mark.slow) if n in SLOW else n for n in SYSTEMS])
 def test_the_stepper_comes_to_what_the_reference_says(name: str) -> None:
     """With the order of its laws: with half the steps it is further away."""
     made, steps, most = SYSTEMS[name]
     e = made()
-    exact = reference.run(e, 0, 4, 64, "rest")
+    exact = cvode.run(e, 4, 64)
     size, found = np.abs(exact.y).max(), [orbit.run(e, 0, 4, 64, n, "rest") for n in (steps // 4, steps)]
     errors = [np.abs(one.y - exact.y).max() / size for one in found]
     assert errors[1] < most and errors[1] < 0.5 * errors[0]
@@ -80,13 +79,13 @@ def test_the_stepper_comes_to_what_the_reference_says(name: str) -> None:
 def test_bodies_alone_move_exactly() -> None:
     """x'' + x = cos t from rest is t sin(t) / 2, and a body that nothing holds goes as (1 - cos t)."""
     alone = ms.structure(np.eye(2), np.diag([1.0, 0.0]), force={0: 1.0, 1: 1.0}, output=[0, 1])
-    found = ms.integrate(alone, 1.0, unit="rad/s", settle=3, keep=6, method="reference", tolerance=1e-11)
+    found = cvode.run(equations.of(alone, 1.0), 6, 256, settle=3, tolerance=1e-11)
     t = found.time
     np.testing.assert_allclose(found.y, [0.5 * t * np.sin(t), 1 - np.cos(t)], atol=1e-6)
     assert found.balance < 1e-6 and t[0] == pytest.approx(2 * np.pi * (3 + 1 / 256))
 
 
-@pytest.mark.parametrize("ratio", [0.05, 0.3, 0.7])
+@pytest.mark.parametrize("ratio", [0.3, *(pytest.param(r, marks=pytest.mark.slow) for r in (0.05, 0.7))])
 def test_a_viscous_contact_throws_back_what_its_closed_form_says(ratio: float) -> None:
     """By the reference to its tolerance, by the stepper of first order: the damper begins with a jump."""
     k, speed = 3e5, 0.1
@@ -95,8 +94,8 @@ def test_a_viscous_contact_throws_back_what_its_closed_form_says(ratio: float) -
     e = replace(e, omega2=np.zeros(3), C=np.zeros((3, 3)))
     along = e.D[0] / (e.D[0] @ e.D[0])
     q, v, end = -1e-4 * along, speed * along, 1e-3 + 2 * np.pi / w
-    rates = reference.Rates(e)
-    found = reference.solve(rates, rates.start(q, v), np.array([end]), 1e-10).y[-1]
+    rates = cvode.Rates(e)
+    found = cvode.solve(rates, rates.start(q, v), np.array([end]), 1e-10).y[-1]
     assert e.D[0] @ found[3:6] == pytest.approx(-speed * restitution(ratio), rel=1e-6)
     errors = []
     for steps in (2**14, 2**16):
@@ -114,33 +113,10 @@ def test_dry_friction_takes_the_same_from_every_swing(stiffness: float, most: fl
     turns, end = dry_turns(1.0, 0.14), 8 * np.pi
     times = np.pi * np.arange(1, len(turns))
     along = 1.0 / e.shapes[0, 0]
-    rates = reference.Rates(e)
-    by_reference = reference.solve(rates, rates.start(np.array([along]), np.zeros(1)), times, 1e-9).y[1:, 0] / along
+    rates = cvode.Rates(e)
+    by_reference = cvode.solve(rates, rates.start(np.array([along]), np.zeros(1)), times, 1e-9).y[1:, 0] / along
     s = Stepper(e, np.pi / 2**15)
     by_steps = np.asarray(s.run(s.start(np.array([along]), np.zeros(1)), np.full(len(times), 2**15))[1].q)[:, 0] / along
     assert len(turns) == 8 and end > times[-1]
     for found in (by_reference, by_steps):
         np.testing.assert_allclose(found, turns[1:], atol=most)
-
-
-@pytest.mark.parametrize("law", ["Iwan", "Mindlin", "point, falling"])
-def test_a_law_known_by_its_steps_is_refused_by_name(law: str) -> None:
-    asked = portion(EXAMPLES[law].law, value(1.0))
-    with pytest.raises(
-        UserError, match=f"stop: its law, {type(EXAMPLES[law].law).__name__}, cannot .* use the stepper"
-    ):
-        reference.run(rubbing(asked), 0, 1)
-
-
-def test_what_the_reference_cannot_do_is_refused() -> None:
-    e = rubbing(RUBS)
-    refused("leave compliance out", reference.run, replace(e, R=1e-9 * np.eye(len(e.R))), 0, 1)
-    refused("tolerance", reference.run, e, 0, 1, tolerance=0.5)
-    refused("integrate: method", ms.integrate, SLIDER, 1.0, method="exact")
-    steady = replace(SLIDER, loads=(*SLIDER.loads, replace(SLIDER.loads[0], harmonic=0)))
-    refused('begin from "rest"', ms.integrate, steady, 1.0, method="reference")
-
-
-def test_without_its_package_the_reference_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "sksundae.cvode", None)
-    refused('pip install "microslip[reference]"', ms.integrate, SLIDER, 1.0, method="reference")

@@ -1,24 +1,82 @@
-"""Motions of two frequencies: Fourier series over two angles, and a closed line that nearly follows the motion there.
+"""Fourier series: E sums them up, P takes their coefficients out of samples, D differentiates.
 
-A motion u(t) = U(omega_1 t, omega_2 t) lives on a torus with the angles theta_1 and theta_2,
+The W coefficients of a signal are its mean, and the cosine and sine of every argument: of t', 2 t',
+... H t' where the signal has one frequency (W = 2 H + 1), of sums of two angles where it has two.
+
+A motion u(t) = U(omega_1 t, omega_2 t) of two frequencies lives on a torus with the angles theta_1
+and theta_2,
 
     U = mean + sum of a_k cos(k . theta) + b_k sin(k . theta),   0 < |k_1| + |k_2| <= H,
 
-of every pair k and -k only one. What a contact remembers runs along (omega_1, omega_2), a line that never closes. It is
-marched along one that does: q turns of theta_1 and p of theta_2, p/q near omega_2/omega_1. That is the only thing for
-which the ratio is taken as rational. The S samples of the line are a lattice on the torus: sums over them are the
-Fourier integrals up to pairs k whose difference has (q, p) . k a multiple of S, or zero.
+of every pair k and -k only one. What a contact remembers runs along (omega_1, omega_2), a line that
+never closes. It is marched along one that does: q turns of theta_1 and p of theta_2, p/q near
+omega_2/omega_1. That is the only thing for which the ratio is taken as rational. The S samples of
+the line are a lattice on the torus: sums over them are the Fourier integrals up to pairs k whose
+difference has (q, p) . k a multiple of S, or zero.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
+from typing import Any
 
 import numpy as np
 
-from ..data import Array, Indices
+from .data import Array, ComplexArray, Indices
+
+
+def summed(arguments: Array) -> Array:
+    """(..., W) E at arguments (..., P): 1, and cosine and sine of each."""
+    waves = np.stack([np.cos(arguments), np.sin(arguments)], axis=-1)
+    waves = waves.reshape(*arguments.shape[:-1], -1)
+    return np.concatenate([np.ones((*waves.shape[:-1], 1)), waves], axis=-1)
+
+
+def taken_out(values: Array) -> Array:
+    """(W, s) P of E (s, W) at evenly spaced samples."""
+    weights = np.full(values.shape[1], 2.0 / len(values))
+    weights[0] *= 0.5
+    return weights[:, None] * values.T
+
+
+@lru_cache(maxsize=8)
+def fourier(harmonics: int, samples: int) -> tuple[Any, Any]:
+    """(s, 2 H + 1) E at the samples of a cycle, and P.
+
+    Raises:
+        ValueError: fewer than 2 H + 1 samples cannot hold H harmonics.
+    """
+    if samples < 2 * harmonics + 1:
+        least = 2 * harmonics + 1
+        raise ValueError(f"{samples} samples cannot hold {harmonics} harmonics; take at least {least}")
+    t = 2 * np.pi * np.arange(samples) / samples
+    values = summed(np.outer(t, np.arange(1, harmonics + 1)))
+    return values, taken_out(values)
+
+
+def differentiated(factors: Array) -> Array:
+    """(W, W) D: the argument of every cosine and sine is multiplied by (P,) factors."""
+    out, a = np.zeros((2 * len(factors) + 1,) * 2), np.arange(1, 2 * len(factors), 2)
+    out[a, a + 1], out[a + 1, a] = factors, -np.asarray(factors)
+    return out
+
+
+def derivative(coefficients: int) -> Array:
+    """(W, W) D over t' of one frequency."""
+    return differentiated(np.arange(1.0, coefficients // 2 + 1))
+
+
+def amplitudes(v: Array) -> ComplexArray:
+    """(H + 1, ...) complex amplitudes, cos - i sin, of (W, ...) coefficients."""
+    out = np.empty((len(v) // 2 + 1, *v.shape[1:]), complex)
+    out[0], out[1:] = v[0], v[1::2] - 1j * v[2::2]
+    return out
+
+
+# two frequencies ---------------------------------------------------------------------------------
+
 
 ABOVE = 1e-9
 """Share of a frequency within which a combination of two is told from none at all."""
@@ -70,7 +128,7 @@ class Torus:
     def values(self) -> Array:
         """(S, W) of the series at the samples."""
         turned = np.arange(self.count) * (self.pairs @ np.array(self.turns))[:, None] % self.count
-        return with_mean(2 * np.pi * turned.T / self.count)
+        return summed(2 * np.pi * turned.T / self.count)
 
     @property
     def waves(self) -> tuple[Array, Array]:
@@ -80,35 +138,17 @@ class Torus:
     @cached_property
     def ahead(self) -> Array:
         """(S, W) derivative of the series over the time in closed lines, at the samples."""
-        return self.values @ self.differentiated(2 * np.pi * (self.pairs @ np.array(self.turns)))
+        return self.values @ differentiated(2 * np.pi * (self.pairs @ np.array(self.turns)))
 
     @cached_property
     def transform(self) -> Array:
         """(W, S) coefficients of samples."""
-        weights = np.full(self.coefficients, 2.0 / self.count)
-        weights[0] *= 0.5
-        return np.ascontiguousarray(weights[:, None] * self.values.T)
+        return np.ascontiguousarray(taken_out(self.values))
 
     def frequencies(self, first: float, second: float) -> Array:
         """(P,) k . omega of every pair; zero where two frequencies cancel."""
         found = self.pairs @ np.array([first, second])
         return np.where(np.abs(found) < ABOVE * max(first, second), 0.0, found)
-
-    def differentiated(self, factors: Array) -> Array:
-        """(W, W) coefficients of a derivative that multiplies the argument of every pair by (P,) factors."""
-        out, a = np.zeros((self.coefficients, self.coefficients)), np.arange(1, self.coefficients, 2)
-        out[a, a + 1], out[a + 1, a] = factors, -factors
-        return out
-
-    def at(self, angles: Array) -> Array:
-        """(..., W) of the series at angles (..., 2)."""
-        return with_mean(angles @ self.pairs.T)
-
-
-def with_mean(arguments: Array) -> Array:
-    """(..., 2 P + 1) of arguments (..., P): 1, and cosine and sine of each."""
-    waves = np.stack([np.cos(arguments), np.sin(arguments)], axis=-1).reshape(*arguments.shape[:-1], -1)
-    return np.concatenate([np.ones((*waves.shape[:-1], 1)), waves], axis=-1)
 
 
 def commensurate(first: float, second: float, order: int) -> tuple[int, int] | None:
