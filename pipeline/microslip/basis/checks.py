@@ -28,7 +28,15 @@ from ..linalg.gyroscopic import stability_sentence
 from ..modal.range_basis import frequencies, interpolant, largest_difference
 from ..reduced.coordinates import compliance_row, held, in_modes, own_stiffness
 from .integrals import cell_volumes, face_mean, modal_mass
-from .places import Places, face_of, misfit_error, normals_error, outline_error, set_error, turning_error
+from .places import (
+    Places,
+    face_of,
+    misfit_error,
+    normals_error,
+    outline_error,
+    set_error,
+    turning_error,
+)
 from .strains import allowed, stiffness_error, strain_error, stress_error
 
 TOLERANCES = {
@@ -58,7 +66,9 @@ def worst_of_each(findings: Iterable[Check]) -> list[Check]:
     """Each check once over all speeds and nodal diameters: one that failed, else the nearest to its limit."""
     kinds: dict[str, list[Check]] = {}
     for c in findings:
-        kinds.setdefault(re.sub(r"^(speed|range)(_\d+)?(/nd_\d+)?: ", r"\1: ", c.name), []).append(c)
+        kinds.setdefault(re.sub(r"^(speed|range)(_\d+)?(/nd_\d+)?: ", r"\1: ", c.name), []).append(
+            c
+        )
 
     def nearness(c: Check) -> tuple[bool, float]:
         return not c.passed, c.value / c.limit if c.limit and np.isfinite(c.limit) else 0.0
@@ -96,7 +106,10 @@ _Findings = Iterator[tuple[str, float, float, str]]
 
 
 def _judged(where: str, findings: _Findings) -> list[Check]:
-    return [Check(where + name, float(v), limit, bool(v <= limit), said) for name, v, limit, said in findings]
+    return [
+        Check(where + name, float(v), limit, bool(v <= limit), said)
+        for name, v, limit, said in findings
+    ]
 
 
 def _mesh_checks(basis: ModalBasis) -> _Findings:
@@ -108,14 +121,24 @@ def _mesh_checks(basis: ModalBasis) -> _Findings:
     tables = [*mesh.cells.values(), *(f for blocks in mesh.faces.values() for f in blocks.values())]
     highest = max((int(c.max()) for c in tables if c.size), default=-1)
     lowest = min((int(c.min()) for c in tables if c.size), default=0)
-    yield "mesh: cells refer to points", float(highest if lowest >= 0 else np.inf), mesh.n_points - 1, ""
+    yield (
+        "mesh: cells refer to points",
+        float(highest if lowest >= 0 else np.inf),
+        mesh.n_points - 1,
+        "",
+    )
     told: list[Any] = [*numbers(mesh), *numbers(basis)]
     told += [a for m in mesh.materials for a in (m.density, m.elasticity, m.expansion)]
     yield "body: every number is finite", _not_finite(told), 0.0, ""
     unknown = 0.0 if basis.source == "measured" or placeless else 1.0  # a test does not weigh
     mass = max(-basis.mass, 0.0) if basis.mass else unknown
     yield "body: mass is positive", mass, 0.0, f"{basis.mass:.6g} kg" if basis.mass else "not known"
-    yield "rotation axis has unit length", abs(float(np.linalg.norm(basis.rotation_axis)) - 1), 1e-9, ""
+    yield (
+        "rotation axis has unit length",
+        abs(float(np.linalg.norm(basis.rotation_axis)) - 1),
+        1e-9,
+        "",
+    )
 
 
 def _not_finite(arrays: Iterable[Any]) -> float:
@@ -169,7 +192,9 @@ def _group_checks(basis: ModalBasis, g: ModalGroup, mesh_is_sound: bool) -> _Fin
         if key in g.checks:
             yield f"solver: {key.replace('_', ' ')}", g.checks[key], TOLERANCES[key], ""
     if "certified" in g.checks:
-        message = "" if g.checks["certified"] else "modes.certify was false; the spectrum may have gaps"
+        message = (
+            "" if g.checks["certified"] else "modes.certify was false; the spectrum may have gaps"
+        )
         yield "solver: spectrum certified complete", 1.0 - g.checks["certified"], 0.0, message
 
 
@@ -208,13 +233,18 @@ def _misstated(r: SpeedRange) -> float:
 def _shapes_agree(basis: ModalBasis, g: ModalGroup) -> bool:
     m, own = g.n_modes, len(g.omega)
     sizes = {"node": basis.mesh.n_points, "mode": m, "own_mode": own}
-    fits = all(agrees(noun, sizes) for noun in nouns(g)) and (own == m if g.to_diagonal is None else own <= m)
+    fits = all(agrees(noun, sizes) for noun in nouns(g)) and (
+        own == m if g.to_diagonal is None else own <= m
+    )
     if (f := g.residual) is not None:
         k = len(f.labels)
         fits &= all(a.shape == (len(g.gauges[name].labels), k) for name, a in f.gauges.items())
         sets = [*f.strain.items(), *f.stress.items()]
         fits &= all(a.shape == (len(g.stresses[x].weights), 6, k) for x, a in sets)
-    forces, motions = g.kind.count("interface-force"), sum(c.startswith("interface:") for c in g.compliance.labels)
+    forces, motions = (
+        g.kind.count("interface-force"),
+        sum(c.startswith("interface:") for c in g.compliance.labels),
+    )
     return forces in (0, motions) and fits
 
 
@@ -234,14 +264,24 @@ def _transformation_checks(g: ModalGroup) -> _Findings:
     if not g.omega.any():  # rigid motions alone: what their stiffness cancels from
         top = max(_largest(np.abs(H) @ np.abs(g.K_r) @ np.abs(V)), 1.0)
     own = own_stiffness(g.K_r, g.omega, V, g.speed)
-    yield "to_diagonal: V^T M_r V is the identity", _largest(H @ g.M_r @ V - np.eye(len(g.omega))), 1e-9, ""
+    yield (
+        "to_diagonal: V^T M_r V is the identity",
+        _largest(H @ g.M_r @ V - np.eye(len(g.omega))),
+        1e-9,
+        "",
+    )
     yield "to_diagonal: V^T K_r V is diag(omega^2)", _largest(H @ g.K_r @ V - own) / top, 1e-9, ""
 
 
 def _matrix_checks(g: ModalGroup, coupled: bool = False) -> _Findings:
     """coupled: whether damping may couple the modes (a foreign damping matrix)."""
     scale = max(_largest(g.omega**2), 1.0)
-    yield "frequencies ascend", float(np.maximum(-np.diff(g.omega), 0).max(initial=0.0)), 1e-9 * _largest(g.omega), ""
+    yield (
+        "frequencies ascend",
+        float(np.maximum(-np.diff(g.omega), 0).max(initial=0.0)),
+        1e-9 * _largest(g.omega),
+        "",
+    )
     yield "G_r is skew", _largest(g.G_r + g.G_r.conj().T), 1e-9 * max(_largest(g.G_r), 1e-12), ""
     yield "rigid modes have omega = 0", _largest(g.omega[np.array(g.kind) == "rigid"]), 0.0, ""
     C = np.diag(2 * g.damping_ratio * g.omega)
@@ -260,8 +300,18 @@ def _run_up_checks(g: ModalGroup, r: RunUp) -> _Findings:
     yield "G_r is 2 Omega N", _largest(g.G_r - 2 * g.speed * r.N), 1e-9 * max(top, 1e-12), ""
     yield "run-up: N is skew", _largest(r.N + r.N.conj().T), 1e-9, ""
     yield "run-up: P is symmetric", _largest(r.P - r.P.conj().T), 1e-9, ""
-    yield "run-up: P is at most the mass", max(float(np.linalg.eigvalsh(r.P)[-1]) - 1, 0.0), 1e-9, ""
-    yield "run-up: N^T N is at most P", max(-float(np.linalg.eigvalsh(r.P - r.N.conj().T @ r.N)[0]), 0.0), 1e-9, ""
+    yield (
+        "run-up: P is at most the mass",
+        max(float(np.linalg.eigvalsh(r.P)[-1]) - 1, 0.0),
+        1e-9,
+        "",
+    )
+    yield (
+        "run-up: N^T N is at most P",
+        max(-float(np.linalg.eigvalsh(r.P - r.N.conj().T @ r.N)[0]), 0.0),
+        1e-9,
+        "",
+    )
 
 
 def _invariant_checks(basis: ModalBasis, g: ModalGroup, v: Invariants) -> _Findings:
@@ -301,10 +351,25 @@ def _moment_checks(basis: ModalBasis, g: ModalGroup, v: Invariants) -> _Findings
     gram = gram[:4] * (mass / np.float64(volume))
     size = np.sqrt(np.trace(gram[:3, :3].real) / mass) + _extent(basis.mesh)
     moving = np.sqrt(mass) * np.linalg.norm(w)
-    yield "invariants: first moment", _largest(v.first_moment - gram[:3, 3]) / (mass * size), 1e-9, ""
-    yield "invariants: second moment", _largest(v.second_moment - gram[:3, :3]) / (mass * size**2), 1e-9, ""
+    yield (
+        "invariants: first moment",
+        _largest(v.first_moment - gram[:3, 3]) / (mass * size),
+        1e-9,
+        "",
+    )
+    yield (
+        "invariants: second moment",
+        _largest(v.second_moment - gram[:3, :3]) / (mass * size**2),
+        1e-9,
+        "",
+    )
     yield "invariants: shape", _largest(v.shape @ w - gram[3, 4:]) / moving, 1e-9, ""
-    yield "invariants: position_shape", _largest(v.position_shape @ w - gram[:3, 4:]) / (moving * size), 1e-9, ""
+    yield (
+        "invariants: position_shape",
+        _largest(v.position_shape @ w - gram[:3, 4:]) / (moving * size),
+        1e-9,
+        "",
+    )
 
 
 def _inertia_load_checks(basis: ModalBasis, g: ModalGroup, run_up: RunUp) -> _Findings:
@@ -325,7 +390,12 @@ def _gyroscopic_checks(g: ModalGroup, y: GyroscopicModes) -> _Findings:
     s, x = y.growth + 1j * y.omega, y.shapes
     rest = s**2 * (g.M_r @ x) + s * (g.G_r @ x) + g.K_r @ x
     top = _largest(g.omega**2) + _largest(g.G_r) * _largest(g.omega) + _largest(s) ** 2
-    yield "gyroscopic: modes satisfy their equation", _largest(rest) / max(top, 1e-300), 1e-8, stability_sentence(y)
+    yield (
+        "gyroscopic: modes satisfy their equation",
+        _largest(rest) / max(top, 1e-300),
+        1e-8,
+        stability_sentence(y),
+    )
     yield "gyroscopic: every mode has a direction", float(len(y.direction) != len(y.omega)), 0.0, ""
 
 
@@ -339,13 +409,20 @@ def _shape_checks(basis: ModalBasis, g: ModalGroup, kept: ModalGroup) -> _Findin
     error = _largest(inner * basis.mass / weight - np.eye(g.n_modes))
     limit = 1e-8  # of motions of a boundary, which may be nearly alike
     if basis.reduction in ("eigenmodes", "macneal"):
-        limit = min(limit, max(1e-11, 100 * g.checks.get("orthogonality", 1.0)))  # what the solver claims, and rounding
+        limit = min(
+            limit, max(1e-11, 100 * g.checks.get("orthogonality", 1.0))
+        )  # what the solver claims, and rounding
     yield "shapes are mass-orthonormal on the mesh", error, limit, ""
     yield from _place_checks(basis)
     if (stiff := stiffness_error(basis, g)) is not None:
         yield "shapes are stiffness-orthogonal on the mesh", *stiff, ""
     if g.residual is not None and g.residual.phi.size:
-        yield "residual shapes are mass-orthogonal to the modes", _beside(basis, g, g.residual.phi), 1e-6, ""
+        yield (
+            "residual shapes are mass-orthogonal to the modes",
+            _beside(basis, g, g.residual.phi),
+            1e-6,
+            "",
+        )
     if basis.mesh.materials:
         yield "mass of the mesh's materials", abs(weight / basis.mass - 1), 1e-8, ""
     volume = cell_volumes(basis.mesh) if g.stresses else 0.0
@@ -376,10 +453,17 @@ def _place_checks(basis: ModalBasis) -> _Findings:
     inertia = np.trace(second) * np.eye(3) - second
     size = _extent(basis.mesh)
     yield "body: centre of mass is the mesh's", _largest(basis.centre - centre) / size, 1e-8, ""
-    yield "body: inertia is the mesh's", _largest(basis.inertia - inertia) / (basis.mass * size**2), 1e-8, ""
+    yield (
+        "body: inertia is the mesh's",
+        _largest(basis.inertia - inertia) / (basis.mass * size**2),
+        1e-8,
+        "",
+    )
 
 
-def _interface_checks(basis: ModalBasis, g: ModalGroup, name: str, item: Interface, mesh_is_sound: bool) -> _Findings:
+def _interface_checks(
+    basis: ModalBasis, g: ModalGroup, name: str, item: Interface, mesh_is_sound: bool
+) -> _Findings:
     R = item.rotation
     frame = float(np.abs(R @ R.T - np.eye(3)).max() + abs(np.linalg.det(R) - 1))
     yield f"interface {name}: frame is right-handed", frame, 1e-9, ""
@@ -390,7 +474,9 @@ def _interface_checks(basis: ModalBasis, g: ModalGroup, name: str, item: Interfa
     top = max(_largest(item.rows[:3]), 1e-300)
     if len(item.areas) and item.points.shape == (len(item.areas), 3):
         centre = item.areas @ item.points / item.areas.sum()
-        error = _largest(centre - item.origin) / (_largest(np.ptp(item.points, axis=0)) + _extent(basis.mesh))
+        error = _largest(centre - item.origin) / (
+            _largest(np.ptp(item.points, axis=0)) + _extent(basis.mesh)
+        )
         yield f"interface {name}: origin is the centre of the patch", error, 1e-9, ""
     if item.shapes.shape[0]:
         mean = R @ np.einsum("p,pim->im", item.areas, item.shapes) / item.areas.sum()
@@ -400,7 +486,12 @@ def _interface_checks(basis: ModalBasis, g: ModalGroup, name: str, item: Interfa
         return
     face = face_of(basis.mesh, item)
     yield f"interface {name}: normals are outward", normals_error(basis.mesh, item, face), 1e-9, ""
-    yield f"interface {name}: outline is that of its face", outline_error(basis.mesh, item, face), 1e-8, ""
+    yield (
+        f"interface {name}: outline is that of its face",
+        outline_error(basis.mesh, item, face),
+        1e-8,
+        "",
+    )
     if face and g.phi.shape[0]:
         mean = face_mean(basis.mesh.points, face, g.phi)[2]
         error = _largest(R @ mean - item.rows[:3]) / top
@@ -434,14 +525,36 @@ def _contact_checks(name: str, c: ContactState) -> _Findings:
     farther than a facet from the points, and whose second moment is that of a distribution."""
     total = float(c.areas @ c.pressure)
     top = max(c.normal_force, 1e-12)  # an open contact has none
-    deepest = 1e-4 * max(abs(c.interference), _largest(c.gap), 1e-9)  # m, of what the contact moves by
+    deepest = 1e-4 * max(
+        abs(c.interference), _largest(c.gap), 1e-9
+    )  # m, of what the contact moves by
     resultant = abs(float(np.linalg.norm(c.force)) - c.normal_force) / top
-    yield f"contact {name}: no pressure is negative", max(-float(c.pressure.min(initial=0.0)), 0.0), 0.0, ""
+    yield (
+        f"contact {name}: no pressure is negative",
+        max(-float(c.pressure.min(initial=0.0)), 0.0),
+        0.0,
+        "",
+    )
     yield f"contact {name}: normal force is the resultant", resultant, 1e-9, ""
-    yield f"contact {name}: pressure adds up to the force", max(c.normal_force - total, 0.0) / top, 1e-9, ""
+    yield (
+        f"contact {name}: pressure adds up to the force",
+        max(c.normal_force - total, 0.0) / top,
+        1e-9,
+        "",
+    )
     yield f"contact {name}: penetration", c.penetration, deepest, ""
-    yield f"contact {name}: share that is closed", max(-c.closed_share, c.closed_share - 1.0, 0.0), 1e-9, ""
-    yield f"contact {name}: centre is on the face", _beyond(c), float(np.sqrt(c.areas.max(initial=0.0))), ""
+    yield (
+        f"contact {name}: share that is closed",
+        max(-c.closed_share, c.closed_share - 1.0, 0.0),
+        1e-9,
+        "",
+    )
+    yield (
+        f"contact {name}: centre is on the face",
+        _beyond(c),
+        float(np.sqrt(c.areas.max(initial=0.0))),
+        "",
+    )
     if c.spread is not None:
         yield from _spread_checks(name, c.spread)
 
@@ -463,16 +576,31 @@ def _spread_checks(name: str, spread: Array) -> _Findings:
 def _compliance_checks(g: ModalGroup) -> _Findings:
     T = _all_rows(g)
     if T is None:
-        yield "compliance rows are stored", 1.0, 0.0, "a label names a row that the file does not hold"
+        yield (
+            "compliance rows are stored",
+            1.0,
+            0.0,
+            "a label names a row that the file does not hold",
+        )
     if T is None or not len(T):
         return
     modal = held(T, g.compliance.labels, g.kind, g.K_r, g.omega, g.to_diagonal)
     static = g.compliance.static
     d = np.sqrt(np.maximum(np.diag(static).real, 1e-300))
-    size = np.outer(*[np.maximum(d, SMALL * _largest(d))] * 2)  # metres and radians stand side by side
-    yield "modal compliance follows from the rows", _largest((modal - g.compliance.modal) / size), 1e-9, ""
+    size = np.outer(
+        *[np.maximum(d, SMALL * _largest(d))] * 2
+    )  # metres and radians stand side by side
+    yield (
+        "modal compliance follows from the rows",
+        _largest((modal - g.compliance.modal) / size),
+        1e-9,
+        "",
+    )
     yield "static compliance is symmetric", _largest((static - static.conj().T) / size), 1e-9, ""
-    for part, what in ((g.compliance.modal, "its modal part"), (g.compliance.plain, "that of the eigenmodes alone")):
+    for part, what in (
+        (g.compliance.modal, "its modal part"),
+        (g.compliance.plain, "that of the eigenmodes alone"),
+    ):
         scaled = (static - part) / np.outer(d, d)
         worst = float(np.linalg.eigvalsh(scaled).min()) if np.isfinite(scaled).all() else -np.inf
         yield f"static compliance is not below {what}", max(-worst, 0.0), 1e-6, ""

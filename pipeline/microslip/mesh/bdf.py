@@ -21,7 +21,10 @@ from .materials import isotropic_rows
 from .raw import PRESTRESSED, Damaged, DeckMaterial, Numbering, RawMesh, ignored, lost
 from .supports import Constraints, add_supports
 
-_BRICK20, _WEDGE15 = (*range(12), *range(16, 20), *range(12, 16)), (*range(9), *range(12, 15), *range(9, 12))
+_BRICK20, _WEDGE15 = (
+    (*range(12), *range(16, 20), *range(12, 16)),
+    (*range(9), *range(12, 15), *range(9, 12)),
+)
 """Places of VTK's nodes: mid-side nodes of the lower edges, the upright ones, the upper ones."""
 _SOLIDS: dict[str, dict[int, tuple[str, Sequence[int]]]] = {
     "CTETRA": {4: ("tetra", range(4)), 10: ("tetra10", range(10))},
@@ -84,7 +87,9 @@ class _Card(list[str]):
             raise Damaged(f"{self.name} holds '{text[:20]}' where a number belongs") from None
 
     def directions(self, place: int) -> str:
-        return "".join(name for name, digit in zip("xyzabc", "123456", strict=True) if digit in self.at(place))
+        return "".join(
+            name for name, digit in zip("xyzabc", "123456", strict=True) if digit in self.at(place)
+        )
 
 
 @dataclass
@@ -219,7 +224,10 @@ def _fields(line: str, number: int) -> list[str]:
             )
         return [*data, *[""] * (count + 1 - len(data)), *more]
     width, count = (16, 4) if "*" in line[:8] else (8, 8)
-    return [line[:8].strip(), *(line[8 + i * width : 8 + (i + 1) * width].strip() for i in range(count))]
+    return [
+        line[:8].strip(),
+        *(line[8 + i * width : 8 + (i + 1) * width].strip() for i in range(count)),
+    ]
 
 
 def _listed(card: _Card, first: int, numbering: Numbering | None = None) -> list[int]:
@@ -257,7 +265,9 @@ def _grid(cards: Mapping[str, list[_Card]]) -> RawMesh:
     for card in cards["GRID"]:
         ids.append(card.whole(1))
         if card.whole(2, 0) != 0:
-            raise Damaged(f"GRID {ids[-1]} uses the local coordinate system {card[2]}; write it in the basic one")
+            raise Damaged(
+                f"GRID {ids[-1]} uses the local coordinate system {card[2]}; write it in the basic one"
+            )
         points.append([card.real(place) or 0.0 for place in (3, 4, 5)])
     return RawMesh(np.array(points), np.array(ids, dtype=np.int64))
 
@@ -282,7 +292,9 @@ def _cell(name: str, number: int, card: _Card) -> tuple[str, list[int]]:
         nodes.pop()
     if len(nodes) not in forms or min(nodes) < 1:
         named = " or ".join(str(n) for n in sorted(forms))
-        raise Damaged(f"element {number} ({name}) has {sum(n > 0 for n in nodes)} nodes; {named} are read")
+        raise Damaged(
+            f"element {number} ({name}) has {sum(n > 0 for n in nodes)} nodes; {named} are read"
+        )
     kind, places = forms[len(nodes)]
     return kind, [nodes[i] for i in places]
 
@@ -291,11 +303,15 @@ def _material(bulk: _Bulk, property_: int) -> DeckMaterial:
     """What a property's cells are made of."""
     where, nothing = f"PSOLID {property_}", np.zeros(6)
     for layered in bulk.numbered(_PROPERTIES[:-1], property_):
-        refused = "a property that is not read; write PSOLID with a MAT1, or [material] in a body.toml"
+        refused = (
+            "a property that is not read; write PSOLID with a MAT1, or [material] in a body.toml"
+        )
         return DeckMaterial(f"{layered[0]} {property_}", None, None, nothing, refused=refused)
     solid = next(bulk.numbered(["PSOLID"], property_), None)
     if solid is None:
-        return DeckMaterial("", None, None, nothing, where=f"of property {property_}, which no PSOLID defines")
+        return DeckMaterial(
+            "", None, None, nothing, where=f"of property {property_}, which no PSOLID defines"
+        )
     number = solid.whole(2)
     card = next(bulk.numbered(["MAT1"], number), None)
     if card is None:
@@ -341,7 +357,9 @@ def _constrain(bulk: _Bulk) -> None:
 
 def _chosen(bulk: _Bulk, held: Constraints, kind: str = "SPC") -> set[int]:
     """Numbers of the sets of constraints that hold, those that they are made of included."""
-    control = re.split(r"^\s*BEGIN\s+BULK", bulk.text, maxsplit=1, flags=re.IGNORECASE | re.MULTILINE)
+    control = re.split(
+        r"^\s*BEGIN\s+BULK", bulk.text, maxsplit=1, flags=re.IGNORECASE | re.MULTILINE
+    )
     pattern = re.compile(rf"^\s*{kind}\s*=\s*(\d{{1,9}})\b", re.IGNORECASE | re.MULTILINE)
     named = pattern.findall(control[0]) if len(control) > 1 else []
     every = {c.whole(1) for name in (kind, f"{kind}1") for c in bulk.cards[name]}
@@ -362,7 +380,9 @@ def _chosen(bulk: _Bulk, held: Constraints, kind: str = "SPC") -> set[int]:
     unions = bulk.cards[f"{kind}ADD"]
     known = every | {c.whole(1) for c in unions}
     if unknown := sorted(chosen - known):
-        held.left_out.append(f"the set {kind} = {unknown[0]} of the case control is not defined, so it does not hold")
+        held.left_out.append(
+            f"the set {kind} = {unknown[0]} of the case control is not defined, so it does not hold"
+        )
     for card in unions:
         if card.whole(1) in chosen:
             chosen |= set(_listed(card, 2))
@@ -396,7 +416,9 @@ def _averages(bulk: _Bulk) -> Iterator[Link]:
     for card in bulk.cards["RBE3"]:
         where = bulk.where(card)
         if "UM" in card:
-            raise Damaged(f"{where} names its dependent displacements by UM, which is not read; leave it out")
+            raise Damaged(
+                f"{where} names its dependent displacements by UM, which is not read; leave it out"
+            )
         members: list[int] = []
         weights: list[float] = []
         place, end = 5, card.index("ALPHA") if "ALPHA" in card else len(card)
@@ -406,7 +428,9 @@ def _averages(bulk: _Bulk) -> Iterator[Link]:
                 continue
             weight = card.real(place) or 0.0
             if not set("123") <= set(card.at(place + 1)):
-                raise Damaged(f"{where} takes single directions of its points ({card.at(place + 1)}); 123 is read")
+                raise Damaged(
+                    f"{where} takes single directions of its points ({card.at(place + 1)}); 123 is read"
+                )
             place += 2
             while place < end and (not card[place] or card[place].isdecimal()):
                 if card[place]:

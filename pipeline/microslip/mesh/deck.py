@@ -136,7 +136,9 @@ class Deck:
             raise Damaged(f"{user} names the element set '{word}', which is not defined")
         return numbers
 
-    def _members(self, sets: dict[str, list[Indices]], word: str, space: str, cells: bool) -> Indices | None:
+    def _members(
+        self, sets: dict[str, list[Indices]], word: str, space: str, cells: bool
+    ) -> Indices | None:
         at, tail = self.place(word, space)
         number = tail if is_number(tail) or len(self.spaces) > 2 else tail.rpartition(".")[2]
         if is_number(number):

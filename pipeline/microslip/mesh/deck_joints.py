@@ -9,7 +9,16 @@ from .deck import Deck
 from .raw import Damaged, is_number, lost, real
 
 MODEL, CHOSEN, BOLT = "CYCLIC SYMMETRY MODEL", "SELECT CYCLIC SYMMETRY MODES", "PRE-TENSION SECTION"
-KEYWORDS = (MODEL, CHOSEN, BOLT, "CONTACT PAIR", "SURFACE INTERACTION", "FRICTION", "SURFACE BEHAVIOR", "CLOAD")
+KEYWORDS = (
+    MODEL,
+    CHOSEN,
+    BOLT,
+    "CONTACT PAIR",
+    "SURFACE INTERACTION",
+    "FRICTION",
+    "SURFACE BEHAVIOR",
+    "CLOAD",
+)
 
 
 def joints_of(deck: Deck) -> list[Joint]:
@@ -26,7 +35,9 @@ def joints_of(deck: Deck) -> list[Joint]:
             with of_file(card.place):
                 value = real(card.lines[0].split(",")[0], "*FRICTION")
                 if not 0 <= value < float("inf"):
-                    raise Damaged(f"*FRICTION has the coefficient {value:g}; write one of 0 or more")
+                    raise Damaged(
+                        f"*FRICTION has the coefficient {value:g}; write one of 0 or more"
+                    )
             friction[current] = value
     laws = {card.word("NAME") for card in deck.linking("SURFACE INTERACTION")}
     joints = []
@@ -36,9 +47,13 @@ def joints_of(deck: Deck) -> list[Joint]:
             with of_file(card.place):
                 names = [deck.surface(word, card.space) for word in fields(line)[:2]]
                 if len(names) < 2 or None in names:
-                    raise Damaged(f"*CONTACT PAIR names '{line[:60]}', which are not two surfaces of the file")
+                    raise Damaged(
+                        f"*CONTACT PAIR names '{line[:60]}', which are not two surfaces of the file"
+                    )
                 if law and law not in laws:
-                    raise Damaged(f"*CONTACT PAIR names the interaction '{law}', which is not defined")
+                    raise Damaged(
+                        f"*CONTACT PAIR names the interaction '{law}', which is not defined"
+                    )
             slave, master = map(str, names)
             joints.append(Joint(f"{card.where}: *CONTACT PAIR", slave, master, friction.get(law)))
     return joints
@@ -51,9 +66,13 @@ def unread(deck: Deck) -> list[str]:
         if card.keyword == "FRICTION" and (card.parameters or len(card.lines) > 1):
             said.append(f"{card.where}: of *FRICTION only the first coefficient is read")
         if card.keyword == "SURFACE BEHAVIOR":
-            said.append(f"{card.where}: *SURFACE BEHAVIOR is not read: a case guesses the stiffness by the area")
+            said.append(
+                f"{card.where}: *SURFACE BEHAVIOR is not read: a case guesses the stiffness by the area"
+            )
         if card.keyword == "CONTACT PAIR" and "TIED" in card.parameters:
-            said.append(f"{card.where}: *CONTACT PAIR, TIED is taken as a contact with friction; write *TIE for a tie")
+            said.append(
+                f"{card.where}: *CONTACT PAIR, TIED is taken as a contact with friction; write *TIE for a tie"
+            )
     return said
 
 
@@ -71,11 +90,16 @@ def preloads_of(deck: Deck) -> tuple[list[tuple[str, float]], list[str], list[st
         if nodes is None or len(nodes) != 1:
             raise Damaged(f"*{BOLT} names no single NODE of the file", file=card.place)
         bolts.add(int(nodes[0]))
-        where, forces = f"{card.where}: *{BOLT}", [force for node, force in loads if node == nodes[0]]
+        where, forces = (
+            f"{card.where}: *{BOLT}",
+            [force for node, force in loads if node == nodes[0]],
+        )
         if forces:
             preloads.append((where, forces[-1]))
         else:
-            unpressed.append(f"{where} has no *CLOAD on its node: its preload is not taken, write it yourself")
+            unpressed.append(
+                f"{where} has no *CLOAD on its node: its preload is not taken, write it yourself"
+            )
     return preloads, unpressed, ["CLOAD"] if any(node not in bolts for node, _ in loads) else []
 
 
@@ -102,23 +126,31 @@ def sector_of(deck: Deck) -> tuple[Sector | None, list[str]]:
     models = deck.linking(MODEL)
     ties = [card for card in deck.linking("TIE") if "CYCLIC SYMMETRY" in card.parameters]
     if len(models) != 1:
-        return None, [lost(card.where, f"*{card.keyword} of CYCLIC SYMMETRY") for card in [*models, *ties]]
+        return None, [
+            lost(card.where, f"*{card.keyword} of CYCLIC SYMMETRY") for card in [*models, *ties]
+        ]
     (model,) = models
     named, sectors = model.word("TIE"), model.text("N")
     chosen = [tie for tie in ties if named in ("", tie.word("NAME"))]
     with of_file(model.place):
         ends = [v for row in numbers(model.lines, f"*{MODEL}") for v in row]
         if not is_number(sectors) or len(ends) != 6 or len(chosen) != 1:
-            raise Damaged(f"*{MODEL} needs N, two points of its axis (six numbers) and the TIE of its faces")
+            raise Damaged(
+                f"*{MODEL} needs N, two points of its axis (six numbers) and the TIE of its faces"
+            )
     (tie,) = chosen
     with of_file(tie.place):
-        faces = [deck.surface(word, tie.space) for line in tie.lines for word in line.split(",")[:2]]
+        faces = [
+            deck.surface(word, tie.space) for line in tie.lines for word in line.split(",")[:2]
+        ]
         if len(faces) != 2 or None in faces:
             raise Damaged("*TIE, CYCLIC SYMMETRY names no two surfaces of the file")
     one, other = map(str, faces)
     axis = [b - a for a, b in zip(ends[:3], ends[3:], strict=True)]
     picked = next(iter(deck.linking(CHOSEN)), Card(""))
-    first, last = (int(word) if is_number(word) else None for word in map(picked.text, ("NMIN", "NMAX")))
+    first, last = (
+        int(word) if is_number(word) else None for word in map(picked.text, ("NMIN", "NMAX"))
+    )
     diameters = () if last is None else tuple(range(first or 0, min(last, int(sectors) // 2) + 1))
     where = f"{model.where}: *{MODEL}"
     return Sector(where, int(sectors), (one, other), tuple(axis), tuple(ends[:3]), diameters), []

@@ -55,7 +55,9 @@ class _Reading:
             raise Damaged(f"*{self.card.keyword} names no reference node; give REF NODE")
         nodes = self.nodes(word)
         if len(nodes) != 1:
-            raise Damaged(f"*{self.card.keyword} names '{word}' as one node, but it has {len(nodes)}")
+            raise Damaged(
+                f"*{self.card.keyword} names '{word}' as one node, but it has {len(nodes)}"
+            )
         return int(nodes[0])
 
     def surface(self, word: str) -> str:
@@ -92,28 +94,38 @@ def _tie(reading: _Reading) -> Iterator[Link]:
     for line in card.lines:
         words = [word.strip() for word in line.split(",")]
         if len(words) < 2 or not words[1]:
-            raise Damaged(f"*TIE needs the slave and the master surface in a line, not '{line[:60]}'")
+            raise Damaged(
+                f"*TIE needs the slave and the master surface in a line, not '{line[:60]}'"
+            )
         slave, master = map(reading.surface, words[:2])
         yield FaceTie(reading.where, slave, master, tolerance)
 
 
 def _equations(reading: _Reading) -> Iterator[Link]:
     if reading.deck.turned:
-        raise Damaged("*EQUATION beside a *TRANSFORM may act in local directions; write global ones without it")
-    words = [word.strip() for line in reading.card.lines for word in line.rstrip().rstrip(",").split(",")]
+        raise Damaged(
+            "*EQUATION beside a *TRANSFORM may act in local directions; write global ones without it"
+        )
+    words = [
+        word.strip() for line in reading.card.lines for word in line.rstrip().rstrip(",").split(",")
+    ]
     while words:
         if not is_number(words[0]) or int(words[0]) < 1:
             raise Damaged(f"*EQUATION begins with '{words[0][:40]}', which is no number of terms")
         count = int(words[0])
         terms, words = words[1 : 1 + 3 * count], words[1 + 3 * count :]
         if len(terms) < 3 * count:
-            raise Damaged(f"*EQUATION announces {count} terms of three words and has {len(terms)} words")
+            raise Damaged(
+                f"*EQUATION announces {count} terms of three words and has {len(terms)} words"
+            )
         ways = [_direction(word) for word in terms[1::3]]
         factors = np.array([real(word, "a factor of *EQUATION") for word in terms[2::3]])
         members = [reading.nodes(word) for word in terms[::3]]
         length = max(map(len, members))
         if any(len(m) not in (1, length) for m in members):
-            raise Damaged(f"*EQUATION names sets of {', '.join(str(len(m)) for m in members)} nodes, not equally many")
+            raise Damaged(
+                f"*EQUATION names sets of {', '.join(str(len(m)) for m in members)} nodes, not equally many"
+            )
         for nodes in np.column_stack([np.broadcast_to(m, length) for m in members]):
             yield Equation(reading.where, nodes, np.array(ways), factors)
 
@@ -134,10 +146,14 @@ def _mpc(reading: _Reading) -> Iterator[Link]:
             raise Damaged(f"*MPC {kind} names fewer than two nodes")
         members, other = reading.nodes(words[0]), reading.nodes(words[1])
         if len(other) not in (1, len(members)):
-            raise Damaged(f"*MPC {kind} names {len(members)} and {len(other)} nodes; give one to each, or one to all")
+            raise Damaged(
+                f"*MPC {kind} names {len(members)} and {len(other)} nodes; give one to each, or one to all"
+            )
         for a, b in zip(members, np.broadcast_to(other, len(members)), strict=True):
             along = reading.points[a] - reading.points[b]
-            yield from _pair(kind.upper(), f"{reading.card.where}: *MPC {kind.upper()}", int(a), int(b), along)
+            yield from _pair(
+                kind.upper(), f"{reading.card.where}: *MPC {kind.upper()}", int(a), int(b), along
+            )
 
 
 def _pair(kind: str, where: str, a: int, b: int, along: Array) -> Iterator[Link]:
@@ -166,7 +182,9 @@ def _old_coupling(reading: _Reading) -> Iterator[Link]:
 
 
 def _not_read(reading: _Reading) -> Iterator[Link]:
-    reading.left_out.append(lost(reading.card.where, "*DISTRIBUTING COUPLING (write *COUPLING with *DISTRIBUTING)"))
+    reading.left_out.append(
+        lost(reading.card.where, "*DISTRIBUTING COUPLING (write *COUPLING with *DISTRIBUTING)")
+    )
     return iter(())
 
 
@@ -183,20 +201,28 @@ def _ways(lines: list[list[str]]) -> str:
 
 def _refuse_turned(reading: _Reading, every: str) -> None:
     if reading.deck.turned and every not in ("xyz", "xyzabc", "abc"):
-        raise Damaged("a coupling in single directions beside a *TRANSFORM may mean local ones; write global ones")
+        raise Damaged(
+            "a coupling in single directions beside a *TRANSFORM may mean local ones; write global ones"
+        )
 
 
 def _coupling(reading: _Reading) -> Iterator[Link]:
     card, following = reading.card, reading.following
     if following is None or following.keyword not in ("KINEMATIC", "DISTRIBUTING"):
-        raise Damaged("*COUPLING is followed by neither *KINEMATIC nor *DISTRIBUTING; say which it is")
+        raise Damaged(
+            "*COUPLING is followed by neither *KINEMATIC nor *DISTRIBUTING; say which it is"
+        )
     if "INFLUENCE RADIUS" in card.parameters:
-        raise Damaged("*COUPLING with INFLUENCE RADIUS is not read; name a surface of the nodes that it takes in")
+        raise Damaged(
+            "*COUPLING with INFLUENCE RADIUS is not read; name a surface of the nodes that it takes in"
+        )
     reference = reading.node("REF NODE")
     members, weights = _weighed(reading, reading.surface(card.text("SURFACE")))
     every = _ways([[word.strip() for word in line.split(",")] for line in following.lines])
     if "ORIENTATION" in card.parameters and len(every) < 6:
-        raise Damaged("*COUPLING in single directions of an ORIENTATION is not read; write *EQUATIONs")
+        raise Damaged(
+            "*COUPLING in single directions of an ORIENTATION is not read; write *EQUATIONs"
+        )
     _refuse_turned(reading, every)
     if following.keyword == "KINEMATIC":
         yield RigidLink(reading.where, reference, members, every)
@@ -233,7 +259,9 @@ def _rigid_body(reading: _Reading) -> Iterator[Link]:
     every = np.unique(joined(members))
     reference = reading.node("REF NODE")
     pinned = set() if "PIN NSET" not in card.parameters else {*reading.nodes(card.text("PIN NSET"))}
-    tied = np.array([node for node in every if node != reference and node not in pinned], dtype=np.int64)
+    tied = np.array(
+        [node for node in every if node != reference and node not in pinned], dtype=np.int64
+    )
     if len(tied) or not pinned:
         yield RigidLink(reading.where, reference, tied, _WAYS)
     if pinned:
@@ -242,7 +270,9 @@ def _rigid_body(reading: _Reading) -> Iterator[Link]:
         turns = reading.node("ROT NODE")
         for way in range(3):
             pair, ways = np.array([turns, reference]), np.array([way, 3 + way])
-            yield Equation(f"{reading.where}, ROT NODE", pair, ways, np.array([1.0, -1.0]), first=False)
+            yield Equation(
+                f"{reading.where}, ROT NODE", pair, ways, np.array([1.0, -1.0]), first=False
+            )
 
 
 _MAKERS: dict[str, Callable[[_Reading], Iterator[Link]]] = {

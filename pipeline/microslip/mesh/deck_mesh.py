@@ -58,7 +58,9 @@ def _cartesian(points: Array, system: str) -> Array:
     if system == "C":
         return np.column_stack([r * np.cos(theta), r * np.sin(theta), last])
     phi = np.radians(last)  # from the z axis, see the keyword's description
-    return np.column_stack([r * np.sin(phi) * np.cos(theta), r * np.sin(phi) * np.sin(theta), r * np.cos(phi)])
+    return np.column_stack(
+        [r * np.sin(phi) * np.cos(theta), r * np.sin(phi) * np.sin(theta), r * np.cos(phi)]
+    )
 
 
 def _read_system(deck: Deck, card: Card) -> None:
@@ -80,7 +82,9 @@ def _read_elements(deck: Deck, card: Card) -> None:
     solid = match[1] in ("C3D", "DC3D", "AC3D")
     count = 6 if match[0] == "STRI65" else int(match[2])
     if solid and count not in _SOLIDS:
-        first = int(whole_numbers(card.lines[0].partition(",")[0], "*ELEMENT")[0]) if card.lines else 0
+        first = (
+            int(whole_numbers(card.lines[0].partition(",")[0], "*ELEMENT")[0]) if card.lines else 0
+        )
         raise Damaged(f"element {first} is of type {kind}, which cannot be assembled")
     if not solid and count not in CORNERS:
         return
@@ -89,7 +93,9 @@ def _read_elements(deck: Deck, card: Card) -> None:
         raise Damaged(f"*ELEMENT, TYPE={kind} holds another number of nodes than its cells need")
     table, own = table.reshape(-1, count + 1), deck.spaces[""]
     nodes = (table[:, 1:] if not (solid and count == 27) else table[:, 1:][:, _BRICK27]) + own.nodes
-    cells = Cells(_SOLIDS[count] if solid else "facet", table[:, 0] + own.cells, nodes, kind, card.place)
+    cells = Cells(
+        _SOLIDS[count] if solid else "facet", table[:, 0] + own.cells, nodes, kind, card.place
+    )
     (deck.solids if solid else deck.facets).append(cells)
     if "ELSET" in card.parameters:
         deck.add(deck.cell_sets, card.parameters["ELSET"]).append(cells.ids)
@@ -105,10 +111,16 @@ def _read_set(deck: Deck, card: Card) -> None:
     for line in card.lines:
         words = fields(line)
         if "GENERATE" in card.parameters:
-            known = joined(c.ids for c in (*deck.solids, *deck.facets)) if of_cells else joined(deck.node_id)
+            known = (
+                joined(c.ids for c in (*deck.solids, *deck.facets))
+                if of_cells
+                else joined(deck.node_id)
+            )
             members.append(_generated(words, known - more, what) + more)
             continue
-        members.append(whole_numbers(",".join(word for word in words if word.isdecimal()), what) + more)
+        members.append(
+            whole_numbers(",".join(word for word in words if word.isdecimal()), what) + more
+        )
         for word in words:
             if not word.isdecimal():
                 others = (deck.cells if of_cells else deck.nodes)(word, card.text("INSTANCE"))
@@ -130,9 +142,15 @@ def _read_surface(deck: Deck, card: Card) -> None:
     name, kind = card.text("NAME"), card.word("TYPE", "ELEMENT")
     if name:
         kind = card.word("COMBINE", kind)
-        rows = [words for line in card.lines if (words := [w.strip() for w in line.split(",")]) and any(words)]
+        rows = [
+            words
+            for line in card.lines
+            if (words := [w.strip() for w in line.split(",")]) and any(words)
+        ]
         for row in rows if kind == "ELEMENT" else ():
-            if not re.fullmatch("|S[1-6]|SPOS|SNEG|E[1-4]|END[12]|EDGE", (side := [*row, ""][1]).upper()):
+            if not re.fullmatch(
+                "|S[1-6]|SPOS|SNEG|E[1-4]|END[12]|EDGE", (side := [*row, ""][1]).upper()
+            ):
                 raise Damaged(f"*SURFACE, NAME={name} names the side '{side}', which no cell has")
         deck.surfaces.append(DeckSurface(name, kind, rows, card))
         deck.written.setdefault(name.upper(), name)
@@ -141,7 +159,14 @@ def _read_surface(deck: Deck, card: Card) -> None:
 _FACES: dict[str, tuple[tuple[int, ...], ...]] = {
     "tetra": ((0, 1, 2), (0, 3, 1), (1, 3, 2), (2, 3, 0)),
     "wedge": ((0, 1, 2), (3, 5, 4), (0, 3, 4, 1), (1, 4, 5, 2), (2, 5, 3, 0)),
-    "hexahedron": ((0, 1, 2, 3), (4, 7, 6, 5), (0, 4, 5, 1), (1, 5, 6, 2), (2, 6, 7, 3), (3, 7, 4, 0)),
+    "hexahedron": (
+        (0, 1, 2, 3),
+        (4, 7, 6, 5),
+        (0, 4, 5, 1),
+        (1, 5, 6, 2),
+        (2, 6, 7, 3),
+        (3, 7, 4, 0),
+    ),
 }
 
 
@@ -151,7 +176,9 @@ def add_surfaces(deck: Deck, raw: RawMesh, numbering: Numbering) -> None:
         with of_file(surface.card.place):
             if surface.kind == "NODE":
                 for word, *_ in surface.rows:
-                    nodes = deck.nodes_for(f"the surface '{surface.name}'", word, surface.card.space)
+                    nodes = deck.nodes_for(
+                        f"the surface '{surface.name}'", word, surface.card.space
+                    )
                     if len(nodes):
                         raw.add_set(surface.name, nodes, numbering)
             elif surface.kind == "ELEMENT":
@@ -171,10 +198,19 @@ def _combined(raw: RawMesh, deck: Deck, surface: DeckSurface) -> None:
     if surface.kind == "UNION":
         raw.facets[name] = [block for part in parts for block in part]
         return
-    others = {tuple(row) for part in parts[1:] for block in part for row in np.sort(block, axis=1).tolist()}
+    others = {
+        tuple(row)
+        for part in parts[1:]
+        for block in part
+        for row in np.sort(block, axis=1).tolist()
+    }
     for block in parts[0] if parts else ():
-        inside = np.array([tuple(row) in others for row in np.sort(block, axis=1).tolist()], dtype=bool)
-        raw.facets.setdefault(name, []).append(block[inside if surface.kind == "INTERSECTION" else ~inside])
+        inside = np.array(
+            [tuple(row) in others for row in np.sort(block, axis=1).tolist()], dtype=bool
+        )
+        raw.facets.setdefault(name, []).append(
+            block[inside if surface.kind == "INTERSECTION" else ~inside]
+        )
 
 
 def _element_surface(deck: Deck, raw: RawMesh, surface: DeckSurface) -> None:
@@ -183,9 +219,15 @@ def _element_surface(deck: Deck, raw: RawMesh, surface: DeckSurface) -> None:
     everything = joined(c.ids for c in (*deck.solids, *deck.facets))
     for word, *sides_named in surface.rows:
         face = sides_named[0].upper() if sides_named else ""
-        chosen = deck.cells_for(f"the surface '{name}'", word, surface.card.space) if word else everything
+        chosen = (
+            deck.cells_for(f"the surface '{name}'", word, surface.card.space)
+            if word
+            else everything
+        )
         if not np.isin(chosen, everything).any():
-            raw.remarks.append(f"{surface.card.where}: no cell that is read is '{word}' of the surface '{name}'")
+            raw.remarks.append(
+                f"{surface.card.where}: no cell that is read is '{word}' of the surface '{name}'"
+            )
         for cells in deck.solids:
             nodes = cells.nodes[np.isin(cells.ids, chosen)]
             sides = sides_of(cells.kind)
@@ -193,11 +235,15 @@ def _element_surface(deck: Deck, raw: RawMesh, surface: DeckSurface) -> None:
                 continue
             if re.fullmatch(r"S[1-6]", face):
                 if int(face[1]) > len(sides):
-                    raise Damaged(f"the surface '{name}' names the side {face} of cells {cells.written}")
+                    raise Damaged(
+                        f"the surface '{name}' names the side {face} of cells {cells.written}"
+                    )
                 facets.setdefault(name, []).append(nodes[:, list(sides[int(face[1]) - 1])])
             elif not face:
                 for corners in sorted({len(side) for side in sides}):
-                    every = np.concatenate([nodes[:, list(side)] for side in sides if len(side) == corners])
+                    every = np.concatenate(
+                        [nodes[:, list(side)] for side in sides if len(side) == corners]
+                    )
                     facets.setdefault(name, []).append(_free(every, raw, corners))
         for cells in deck.facets:
             if (inside := np.isin(cells.ids, chosen)).any() and face in ("", "SPOS", "SNEG"):

@@ -28,7 +28,7 @@ def mesh_problems(mesh: Mesh) -> tuple[list[str], list[str]]:
     Errors: coincident points, repeated points in a cell, inside-out cells (by their corners; curved cells are
     examined at the quadrature points when they are assembled). Warnings: a file without its end, what of it is not
     read, first-order cells, sets of facets that cannot serve as faces, parts that share no points
-    (`modes.unconstrained` refuses those that nothing holds).
+    (`modal.unconstrained` refuses those that nothing holds).
     """
     errors = [said for cell_type in mesh.cells if (said := _cell_problem(mesh, cell_type))]
     warnings = [

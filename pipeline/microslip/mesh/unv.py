@@ -35,7 +35,19 @@ _SHELLS: dict[int, tuple[str, tuple[int, ...]]] = {
 }
 _BEAMS = {11, 21, 22, 23, 24}
 """Beams and rods; the data set gives them a line more."""
-_OTHERS = {121, 122, 136, 137, 138, 139, 141, 142, 151, 152, 161}  # rigid bars, springs, dampers, masses
+_OTHERS = {
+    121,
+    122,
+    136,
+    137,
+    138,
+    139,
+    141,
+    142,
+    151,
+    152,
+    161,
+}  # rigid bars, springs, dampers, masses
 _GROUPS = {2417: 2, 2429: 2, 2430: 2, 2432: 2, 2435: 4, 2452: 4, 2467: 4, 2477: 4}
 """Data set of groups -> numbers of each member."""
 _NODE, _ELEMENT = 7, 8
@@ -112,7 +124,10 @@ def _data_sets(lines: list[str]) -> Iterator[tuple[int, list[str]]]:
             return
         if end > at + 1:
             head = lines[at + 1].split()
-            yield int(head[0]) if head and head[0].isdecimal() and len(head[0]) < 9 else 0, lines[at + 2 : end]
+            yield (
+                int(head[0]) if head and head[0].isdecimal() and len(head[0]) < 9 else 0,
+                lines[at + 2 : end],
+            )
         at = end + 1
 
 
@@ -120,7 +135,9 @@ def _whole(line: str, what: str) -> list[int]:
     try:
         values = [int(word) for word in line.split()]
     except ValueError:
-        raise Damaged(f"{what} holds the line '{line.strip()[:60]}', which is not of whole numbers") from None
+        raise Damaged(
+            f"{what} holds the line '{line.strip()[:60]}', which is not of whole numbers"
+        ) from None
     if any(abs(v) > 10**12 for v in values):
         raise Damaged(f"{what} holds a number beyond all bounds")
     return values
@@ -130,7 +147,9 @@ def _reals(line: str, what: str) -> list[float]:
     try:
         return [float(word) for word in line.upper().replace("D", "E").split()]
     except ValueError:
-        raise Damaged(f"{what} holds the line '{line.strip()[:60]}', which is not of numbers") from None
+        raise Damaged(
+            f"{what} holds the line '{line.strip()[:60]}', which is not of numbers"
+        ) from None
 
 
 def _nodes(sets: list[tuple[int, list[str]]]) -> RawMesh:
@@ -145,7 +164,9 @@ def _nodes(sets: list[tuple[int, list[str]]]) -> RawMesh:
         for head, place in zip(lines[::2], lines[1::2], strict=True):
             numbers, x = _whole(head, f"the data set {kind}"), _reals(place, f"the data set {kind}")
             if not numbers or len(x) != 3:
-                raise Damaged(f"the data set {kind} holds the lines '{head.strip()[:30]}' '{place.strip()[:60]}'")
+                raise Damaged(
+                    f"the data set {kind} holds the lines '{head.strip()[:30]}' '{place.strip()[:60]}'"
+                )
             ids.append(numbers[0])
             points.append(x)
     if not ids:
@@ -160,7 +181,9 @@ def _refuse_systems(lines: list[str]) -> None:
         kind = _whole(lines[at], "the data set 2420")
         axes = [_reals(line, "the data set 2420") for line in lines[at + 2 : at + 6]]
         if len(kind) > 1 and kind[1] != 0 or axes != wanted:
-            raise Damaged("it has local coordinate systems (data set 2420); export it in the global one")
+            raise Damaged(
+                "it has local coordinate systems (data set 2420); export it in the global one"
+            )
 
 
 _Shells = dict[int, tuple[str, Indices]]
@@ -171,16 +194,22 @@ def _elements(sets: list[tuple[int, list[str]]], raw: RawMesh, numbering: Number
     solids: dict[str, list[tuple[int, int, list[int]]]] = {}
     shells: dict[int, tuple[str, list[int]]] = {}
     seen: set[int] = set()
-    for number, descriptor, nodes in (e for kind, lines in sets if kind == 2412 for e in _records(lines)):
+    for number, descriptor, nodes in (
+        e for kind, lines in sets if kind == 2412 for e in _records(lines)
+    ):
         if number in seen:
             raise Damaged(f"element {number} is defined twice")
         seen.add(number)
         form = _SOLIDS.get(descriptor) or _SHELLS.get(descriptor)
         if form is None:
-            raise Damaged(f"element {number} is of the I-deas type {descriptor}, which cannot be assembled")
+            raise Damaged(
+                f"element {number} is of the I-deas type {descriptor}, which cannot be assembled"
+            )
         kind, places = form
         if len(nodes) != len(places):
-            raise Damaged(f"element {number} has {len(nodes)} nodes, its type {descriptor} ({kind}) {len(places)}")
+            raise Damaged(
+                f"element {number} has {len(nodes)} nodes, its type {descriptor} ({kind}) {len(places)}"
+            )
         placed = [nodes[i] for i in places]
         if descriptor in _SHELLS:
             shells[number] = kind, placed[: FACET_CORNERS[kind]]
@@ -188,7 +217,9 @@ def _elements(sets: list[tuple[int, list[str]]], raw: RawMesh, numbering: Number
             solids.setdefault(kind, []).append((number, 0, placed))
     raw.add_solids(solids, numbering, "the data set 2412 names")
     raw.regions = []
-    return {n: (t, numbering.positions(c, "the data set 2412 names")) for n, (t, c) in shells.items()}
+    return {
+        n: (t, numbering.positions(c, "the data set 2412 names")) for n, (t, c) in shells.items()
+    }
 
 
 def _taken(lines: Iterator[str], count: int, what: str) -> list[int]:
@@ -216,7 +247,9 @@ def _records(lines: list[str]) -> Iterator[tuple[int, int, list[int]]]:
             yield number, descriptor, nodes
 
 
-def _groups(sets: list[tuple[int, list[str]]], raw: RawMesh, numbering: Numbering, shells: _Shells) -> None:
+def _groups(
+    sets: list[tuple[int, list[str]]], raw: RawMesh, numbering: Numbering, shells: _Shells
+) -> None:
     """Groups of nodes become sets of points, groups of shells faces; solids in a group say nothing."""
     for kind, lines in ((k, l) for k, l in sets if k in _GROUPS):
         rest, what, width = iter(lines), f"the data set {kind}", _GROUPS[kind]

@@ -22,7 +22,9 @@ from .spectrum import leading_rows
 
 
 def body_ranges(
-    b: Prepared, settled: Mapping[float, StaticState], searched: Mapping[float, Mapping[int, Searched]]
+    b: Prepared,
+    settled: Mapping[float, StaticState],
+    searched: Mapping[float, Mapping[int, Searched]],
 ) -> dict[int, SpeedRange]:
     """Nodal diameter -> one basis for all speeds of `rotation.range_rpm`. Equilibria are shared.
 
@@ -77,7 +79,9 @@ class _Speeds:
 
         def settle(speed: float, weights: Guess) -> Settled:
             if speed not in self.states:
-                self.states[speed] = self.known[speed] if speed in self.known else self._settle(speed, weights)
+                self.states[speed] = (
+                    self.known[speed] if speed in self.known else self._settle(speed, weights)
+                )
                 self.pencils[speed] = self.b.pencils(self.states[speed].K)
             smooth = self.b.settings.rotation.prestress == "nonlinear" and not self.b.model.contacts
             slope = (lambda fresh: self._slope(speed, fresh)[k].K) if smooth else None
@@ -87,7 +91,10 @@ class _Speeds:
 
     def _slope(self, speed: float, fresh: bool) -> Mapping[int, eigen.Pencil]:
         if speed not in self.slope_pencils:
-            state, fresh = self.states[speed], fresh and speed not in self.known  # else other speeds came between
+            state, fresh = (
+                self.states[speed],
+                fresh and speed not in self.known,
+            )  # else other speeds came between
             self.slopes[speed], dK = stiffness_slope(self.b.model, state, self.b.solver, fresh)
             self.slope_pencils[speed] = self.b.pencils(dK)
         return self.slope_pencils[speed]
@@ -126,7 +133,9 @@ def _range(b: Prepared, k: int, common: Common) -> SpeedRange:
     assert r.range_rpm is not None
     return SpeedRange(
         samples=tuple(_samples(b, k, common, phi)),
-        solved=np.array([s.speed in common.solved or s.speed in common.refined for s in common.samples]),
+        solved=np.array(
+            [s.speed in common.solved or s.speed in common.refined for s in common.samples]
+        ),
         form=common.form,
         shift=common.shift,
         count=_kept(settings, common),
@@ -156,7 +165,9 @@ def _samples(b: Prepared, k: int, common: Common, phi: Array) -> list[ModalGroup
     T = np.asarray(B @ phi) if labels else np.zeros((0, phi.shape[1]))
     known: Solution = next(iter(common.solved.values())).solution
     out: list[ModalGroup] = []
-    for settled, K_r, left in zip(common.samples, common.K_r, _missing_compliance(common, T), strict=True):
+    for settled, K_r, left in zip(
+        common.samples, common.K_r, _missing_compliance(common, T), strict=True
+    ):
         values, Y = np.linalg.eigh(K_r)
         omega = np.sqrt(np.maximum(values, 0.0))
         static = T @ np.linalg.solve(K_r, T.conj().T) + left
@@ -167,7 +178,10 @@ def _samples(b: Prepared, k: int, common: Common, phi: Array) -> list[ModalGroup
             static=0.5 * (static + static.conj().T),
         )
         group = assemble_group(light, settled.state, s, k)
-        checks = {"orthogonality": common.orthogonality, "newton_steps": float(settled.state.iterations)}
+        checks = {
+            "orthogonality": common.orthogonality,
+            "newton_steps": float(settled.state.iterations),
+        }
         if solved:
             checks["certified"] = float(s.found.certified)
         compliance = replace(group.compliance, eigenmodes=None)
@@ -180,7 +194,9 @@ def _missing_compliance(common: Common, T: Array) -> Array:
     """(s, r, r) static compliance that the common coordinates leave out: known where solved, a polynomial between."""
     at = {s.speed: K for s, K in zip(common.samples, common.K_r, strict=True)}
     speeds = sorted(common.solved)
-    known = [common.solved[s].solution.static - T @ np.linalg.solve(at[s], T.conj().T) for s in speeds]
+    known = [
+        common.solved[s].solution.static - T @ np.linalg.solve(at[s], T.conj().T) for s in speeds
+    ]
     weights = [lagrange(np.array(speeds), s.speed, common.shift) for s in common.samples]
     return np.tensordot(np.array(weights), np.array(known), 1)
 

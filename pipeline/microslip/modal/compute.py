@@ -62,24 +62,32 @@ def modal_basis(
 
 def _at_speeds(
     b: Prepared,
-) -> tuple[dict[tuple[int, int], ModalGroup], dict[float, StaticState], dict[float, Mapping[int, Searched]]]:
+) -> tuple[
+    dict[tuple[int, int], ModalGroup], dict[float, StaticState], dict[float, Mapping[int, Searched]]
+]:
     """(number of the speed, nodal diameter) -> group; speed in rad/s -> static state, and modes at ends of a range."""
     rotation, speeds, waves = b.settings.rotation, b.settings.rotation.speeds_rpm, len(b.harmonics)
     groups: dict[tuple[int, int], ModalGroup] = {}
     settled: dict[float, StaticState] = {}
     ends: dict[float, Mapping[int, Searched]] = {}
     state: StaticState | None = None
-    report = Whole(b.report, len(speeds) * waves, "speeds" if waves == 1 else "nodal diameters at all speeds")
+    report = Whole(
+        b.report, len(speeds) * waves, "speeds" if waves == 1 else "nodal diameters at all speeds"
+    )
     b = replace(b, report=report)
     for number, rpm in enumerate(speeds):
         speed = from_rpm(rpm)
         if len(speeds) > 1 or speed:
             report(f"speed {number + 1} of {len(speeds)}: {rpm:g} rpm")
         if b.pressed:
-            state = pressed_state(b.model, b.motions, b.centre, rotation.prestress, b.settings.modes.solver, report)
+            state = pressed_state(
+                b.model, b.motions, b.centre, rotation.prestress, b.settings.modes.solver, report
+            )
         else:
             within = balanced(b.model, b.floats(0), b.solver)
-            state = equilibrium(b.model, speed, rotation.prestress, within, _guess(state, speed), report)
+            state = equilibrium(
+                b.model, speed, rotation.prestress, within, _guess(state, speed), report
+            )
         settled[speed] = state
         end = rpm in (rotation.range_rpm or ())  # whose basis begins with its modes and a few more
         searched = searched_state(b.with_spares() if end else b, state)
@@ -117,9 +125,13 @@ def closure_curve(
     """
     known = [c.name for c in settings.closures]
     if name not in known:
-        raise UserError(f"closures: there is no closure '{name}'; the body has {', '.join(known) or 'none'}")
+        raise UserError(
+            f"closures: there is no closure '{name}'; the body has {', '.join(known) or 'none'}"
+        )
     if settings.free:
-        raise UserError("free: a free body has nothing to be pressed against; hold it for the curve of a closure")
+        raise UserError(
+            "free: a free body has nothing to be pressed against; hold it for the curve of a closure"
+        )
     with prepared(mesh, settings, temperature, report) as b:
         return contact_curve(b.model, name, approaches, b.solver, speed, report)
 
@@ -153,7 +165,12 @@ def unreduced(mesh: Mesh, settings: BodySettings) -> Unreduced:
     """
     damping = settings.damping
     with prepared(mesh, settings) as b:
-        if damping.ratio or damping.table or b.sector is not None or any(settings.rotation.speeds_rpm):
+        if (
+            damping.ratio
+            or damping.table
+            or b.sector is not None
+            or any(settings.rotation.speeds_rpm)
+        ):
             raise UserError(
                 f"{settings.name}: the unreduced matrices of a body have no damping by modes, no sector and no speed; "
                 "write alpha and beta in [damping]"

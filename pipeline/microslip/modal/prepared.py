@@ -19,7 +19,14 @@ from ..linalg.eigen import DirectSolver, Pencil, new_solver
 from ..settings.body import BodySettings
 from . import rigid
 from .body_rows import BodyRows, body_rows, with_centrifugal
-from .boundary import check_held, fixed_dofs, known_materials, materials_of, refuse_overlap, with_dead_loads
+from .boundary import (
+    check_held,
+    fixed_dofs,
+    known_materials,
+    materials_of,
+    refuse_overlap,
+    with_dead_loads,
+)
 from .closures import bolt_forces, contact_pairs
 from .equilibrium import BodyModel, Unknowns, make_model
 from .floating import refuse_floating, refuse_unbalanced
@@ -92,7 +99,10 @@ class Prepared:
 
 @contextmanager
 def prepared(
-    mesh: Mesh, settings: BodySettings, temperature: Array | None = None, report: Report = lambda _: None
+    mesh: Mesh,
+    settings: BodySettings,
+    temperature: Array | None = None,
+    report: Report = lambda _: None,
 ) -> Iterator[Prepared]:
     """Model, rows, rigid motions and solver of a body, with every refusal that needs no solution.
 
@@ -109,19 +119,25 @@ def prepared(
             b.sector.condensed.close()
 
 
-def _prepared(mesh: Mesh, settings: BodySettings, temperature: Array | None, report: Report) -> Prepared:
+def _prepared(
+    mesh: Mesh, settings: BodySettings, temperature: Array | None, report: Report
+) -> Prepared:
     axis, point = np.array(settings.rotation.axis), np.array(settings.rotation.point)
     if settings.cyclic:  # before what relies on the number of sectors
         cut_faces(mesh, settings, axis, point)
     pairs = contact_pairs(mesh, settings, known_materials(mesh, settings))
     degree = REDUCED if settings.mesh.integration == "reduced" else None
     if degree and not set(mesh.cells) <= set(REDUCED):
-        raise UserError('mesh.integration: "reduced" is of bricks of 20 nodes alone; write "full" or mesh with bricks')
+        raise UserError(
+            'mesh.integration: "reduced" is of bricks of 20 nodes alone; write "full" or mesh with bricks'
+        )
     d = discretise(mesh, degree, coupled=[coupled_points(p) for p in pairs])
     held = fixed_dofs(mesh, settings)
     fixed = held[held < 3 * mesh.n_points]
     if len(fixed) == 3 * mesh.n_points:
-        raise UserError("supports: hold every point of the body, so that nothing vibrates; hold fewer of its faces")
+        raise UserError(
+            "supports: hold every point of the body, so that nothing vibrates; hold fewer of its faces"
+        )
     sector = make_sector(d, settings, held, axis, point) if settings.cyclic else None
     free = tied_upper(d.pattern, held, mesh.ties) if sector is None else sector.static
     rows = body_rows(mesh, settings)
@@ -145,7 +161,9 @@ def _prepared(mesh: Mesh, settings: BodySettings, temperature: Array | None, rep
     if settings.free:
         refuse_floating(settings, turning)
     if turning and sector is None:  # all sectors together are balanced
-        refuse_unbalanced(replace(model, point=np.array(settings.rotation.point)), motions, centre, inertia)
+        refuse_unbalanced(
+            replace(model, point=np.array(settings.rotation.point)), motions, centre, inertia
+        )
     solver = new_solver(settings.modes.solver)
     return Prepared(
         model, settings, rows, motions, coefficients, mass, centre, inertia, sector, solver, report
@@ -159,11 +177,18 @@ def _floating(model: BodyModel, sector: Sector | None, centre: Array) -> Array:
         assert not isinstance(model.free, CyclicUpper)
         return rigid.left_by(model.free, points, centre, model.fixed)
     cut, apart = sector.unknowns.cut, sector.unknowns.apart
-    motions = rigid.free_motions_of_ring(points, model.point, model.fixed, cut.rotation, cut.sectors)
-    if not isinstance(apart, Tied) or (left := rigid.allowed(apart, motions)).shape[1] == motions.shape[1]:
+    motions = rigid.free_motions_of_ring(
+        points, model.point, model.fixed, cut.rotation, cut.sectors
+    )
+    if (
+        not isinstance(apart, Tied)
+        or (left := rigid.allowed(apart, motions)).shape[1] == motions.shape[1]
+    ):
         return motions
     if left.shape[1]:
-        raise UserError("supports: a reference node of a cyclic sector can be held wholly or not at all; hold a face")
+        raise UserError(
+            "supports: a reference node of a cyclic sector can be held wholly or not at all; hold a face"
+        )
     return left
 
 
@@ -173,8 +198,12 @@ def inertia_of(d: Discretisation, density: float | Sequence[float]) -> tuple[flo
     Args:
         density: kg/m3, one or one per block.
     """
-    points = np.concatenate([np.einsum("qk,eki->eqi", b.N, d.mesh.points[b.cells]).reshape(-1, 3) for b in d.blocks])
-    dm = np.concatenate([rho * b.dx.reshape(-1) for rho, b in zip(per_block(d, density), d.blocks, strict=True)])
+    points = np.concatenate(
+        [np.einsum("qk,eki->eqi", b.N, d.mesh.points[b.cells]).reshape(-1, 3) for b in d.blocks]
+    )
+    dm = np.concatenate(
+        [rho * b.dx.reshape(-1) for rho, b in zip(per_block(d, density), d.blocks, strict=True)]
+    )
     m = dm.sum()
     centre = dm @ points / m
     r = points - centre

@@ -102,16 +102,26 @@ def searched_state(b: Prepared, state: StaticState) -> dict[int, Searched]:
         if where and isinstance(b.report, Whole):
             b.report.done += 1
     if b.settings.modes.certify:
-        b.report(f"certifying the {'spectrum' if b.sector is None else 'spectra'} by the inertia count")
+        b.report(
+            f"certifying the {'spectrum' if b.sector is None else 'spectra'} by the inertia count"
+        )
         found = certified(found)
     return dict(zip(pencils, found, strict=True))
 
 
 def _searched(
-    b: Prepared, state: StaticState, k: int, pencil: eigen.Pencil, R: Array, where: str, floating: Floating | None
+    b: Prepared,
+    state: StaticState,
+    k: int,
+    pencil: eigen.Pencil,
+    R: Array,
+    where: str,
+    floating: Floating | None,
 ) -> Searched:
     """Modes and static answers of one pencil. where: ``nodal diameter 3``, for messages."""
-    shift = rigid_shift(b.model) if b.settings.free else 0.0  # a free sector floats while its cut faces are apart
+    shift = (
+        rigid_shift(b.model) if b.settings.free else 0.0
+    )  # a free sector floats while its cut faces are apart
     wanted = b.settings.modes.count
     if wanted > pencil.n - 2:
         raise UserError(
@@ -186,7 +196,9 @@ def reduced_solution(b: Prepared, s: Searched) -> Solution:
     return reduced_on(canonical.by_place(points), len(points), b.settings, s, b.rows)
 
 
-def reduced_on(place: Indices, n: int, settings: BodySettings, s: Searched, rows: BodyRows) -> Solution:
+def reduced_on(
+    place: Indices, n: int, settings: BodySettings, s: Searched, rows: BodyRows
+) -> Solution:
     """The same of a body of n points, whose degrees of freedom take precedence in the order `place`."""
     zero = s.R.shape[1]
     static = np.asarray(s.B @ s.answers)
@@ -206,10 +218,23 @@ def reduced_on(place: Indices, n: int, settings: BodySettings, s: Searched, rows
     plain = held_compliance(np.asarray(s.B @ problem.vectors), METHODS["eigenmodes"](problem))
     T = np.asarray(s.B @ reduced.vectors)
     held = held_compliance(T, reduced, s.labels)
-    quality = stuck.indicators(settings.reduction, reduced, T, s.labels, static, held, s.stuck, problem.values, zero)
+    quality = stuck.indicators(
+        settings.reduction, reduced, T, s.labels, static, held, s.stuck, problem.values, zero
+    )
     if s.floating is not None:
         reduced = with_rotation(reduced, s.floating, s.pencil)
-    return Solution(s.found, keep, reduced, s.answers, static, plain, s.unknowns, s.labels, quality, problem.labels)
+    return Solution(
+        s.found,
+        keep,
+        reduced,
+        s.answers,
+        static,
+        plain,
+        s.unknowns,
+        s.labels,
+        quality,
+        problem.labels,
+    )
 
 
 def _turned(s: Searched, rows: Array) -> Array:
@@ -268,7 +293,9 @@ def _band(values: Array, settings: BodySettings) -> int:
     """How many modes are kept; of a free body its rigid motions alone, if the band ends below the first elastic one."""
     if settings.modes.max_frequency is None:
         return len(values)
-    keep = int(np.searchsorted(values, (2 * np.pi * settings.modes.max_frequency) ** 2, side="right"))
+    keep = int(
+        np.searchsorted(values, (2 * np.pi * settings.modes.max_frequency) ** 2, side="right")
+    )
     if not keep:
         raise UserError(
             f"modes.max_frequency: no mode lies below {settings.modes.max_frequency:g} Hz "

@@ -1,6 +1,6 @@
 """The body at any speed of a range, from the samples of its modal file: `group_at`, `basis_at`. Pure numpy and scipy.
 
-How the samples are made and interpolated is told in `modes.common`; the reduction that the body file asks for is
+How the samples are made and interpolated is told in `modal.range_basis`; the reduction that the body file asks for is
 carried out anew at the speed, within the common coordinates.
 """
 
