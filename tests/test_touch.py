@@ -81,6 +81,7 @@ def test_a_text_in_a_picture_is_found_again_and_its_pixels_stay(tmp_path: Path) 
 def test_the_outside_of_a_box_is_closed_and_has_its_edges() -> None:
     """Triangles of a closed surface meet in pairs; sharp are the sides on the twelve edges alone, and modes are those
     of the file to what 16 bits hold."""
+    pytest.importorskip("plotly")
     basis = basis_in_modes(ms.read_basis(ms.sample()))
     used, triangles, outline = outside(basis.mesh)
     sides = np.sort(np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]), axis=1)
@@ -150,6 +151,7 @@ addEventListener("load", () => setTimeout(async () => {
 
 @pytest.mark.slow
 def test_a_browser_turns_a_body_and_changes_its_mode(tmp_path: Path) -> None:
+    pytest.importorskip("plotly")
     basis = basis_in_modes(ms.read_basis(ms.sample()))
     text = page("vane", [turning_modes(basis)])
     (tmp_path / "page.html").write_text(text, encoding="utf-8")
