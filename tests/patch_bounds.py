@@ -14,11 +14,11 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
-from microslip.data import Array, Indices, Mesh
+from microslip.data import INTERFACE_ROWS, Array, Indices, Mesh
 from microslip.errors import UserError
 from microslip.fem.discretise import Discretisation, discretise, free_upper
 from microslip.linalg import eigen
-from microslip.modal.body_rows import INTERFACE_LABELS, BodyRows, body_rows
+from microslip.modal.body_rows import BodyRows, body_rows
 from microslip.modal.boundary import fixed_dofs, materials_of
 from microslip.modal.equilibrium import make_model
 from microslip.modal.spectrum import make_pencil
@@ -67,7 +67,7 @@ def patch_bounds(mesh: Mesh, settings: BodySettings) -> PatchBounds:
     rest, inner = _pencil(d, settings, np.union1d(fixed, (3 * every[:, None] + np.arange(3)).ravel()))
     reaction_inside = reaction[np.searchsorted(free, rest)]
     stiffness = X.T @ reaction - reaction_inside.T @ _static(inner, reaction_inside)  # Schur complement onto the stamps
-    labels = tuple(f"{i.name} {row}" for i in settings.interfaces for row in INTERFACE_LABELS)
+    labels = tuple(f"{i.name} {row}" for i in settings.interfaces for row in INTERFACE_ROWS)
     rigid = np.linalg.inv(0.5 * (stiffness + stiffness.T))
     return PatchBounds(labels, 0.5 * (uniform + uniform.T), 0.5 * (rigid + rigid.T))
 
