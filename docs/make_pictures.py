@@ -460,7 +460,7 @@ def closed() -> None:
 
     pressed = ('closures.shroud.modes="closed"', "rotation.speeds_rpm=[4500]")
     basis = replace(made("shroud-closed", "shroud", *LIGHT, *pressed), name="shroud, contacts closed")
-    diagrams.stuck_plot(basis, BUILD / "closed_nodal_diameters.png")
+    plots.save(partial(diagrams.stuck_plot, basis), BUILD / "closed_nodal_diameters.png")
     save(from_file(BUILD / "closed_nodal_diameters.png"), "closed_nodal_diameters")
 
 
@@ -1244,9 +1244,10 @@ def stability() -> None:
 
     brake = ROOT / "geometry" / "disc-brake"
     drawn_to = BUILD / "stability.png"
-    save(Image.open(plane_picture(ms.stability(brake, certify=False), drawn_to)), "stability_roots")
+    roots = ms.stability(brake, certify=False)
+    save(Image.open(plots.save(partial(plane_picture, roots), drawn_to)), "stability_roots")
     over = ms.stability(brake, over="speed", values=np.linspace(2 * np.pi, 10 * np.pi, 100))
-    save(Image.open(over_picture(over, drawn_to)), "stability_speeds")
+    save(Image.open(plots.save(partial(over_picture, over), drawn_to)), "stability_speeds")
     rpm, counts = over.values * 30 / np.pi, over.unstable
     runs = np.split(np.arange(len(counts)), np.flatnonzero(np.diff(counts)) + 1)
     rows = [[f"{rpm[r[0]]:.1f} to {rpm[r[-1]]:.1f} rpm", str(counts[r[0]])] for r in runs]
