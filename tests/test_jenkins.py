@@ -56,14 +56,14 @@ def test_one_harmonic_is_the_closed_form(slider: int) -> None:
     )
     assert closed.converged.all() and (np.abs(closed.contact[:, slider]) > 2 * held / k).any()
     errors = []
-    for samples in (24, 96):  # as cases of tests have
+    for samples in (64, 256):
         contact = preloaded_contact("rub", four(held, slider), ContactFace("block", "rub"), None, normal=2.0)
         loads, outputs = (Load("block", "push"),), (Output("block", "tip", "u_y" if slider == 1 else "u_x"),)
         problem = balance.of(Assembly((Component("block", {0: group}),), (contact,), loads, outputs), 1, samples)
         found = harmonic_response(problem, f)
         assert found.converged.all()
         errors.append(np.abs(found.monitor - closed.monitor).max() / np.abs(closed.monitor).max())
-    assert errors[1] < 2e-3 and errors[0] > 8 * errors[1]
+    assert errors[1] < 3e-4 and errors[0] > 8 * errors[1]
 
 
 def test_a_cycle_takes_what_the_law_counts_and_gives_nothing_back() -> None:

@@ -334,7 +334,7 @@ CHANGES: dict[str, Callable[[dict[str, Any]], Any]] = {
     "stop": larger("sweep", "stop"),
     "points": put("sweep", "points", 4),
     "harmonics": put("harmonics", 2),
-    "samples": put("samples", 24),
+    "samples": put("samples", 32),
     "periodicity": put("periodicity", 1e-3),
     "mode": put("mode", "book"),
     "amplitude": larger("excitations", 0, "amplitude"),

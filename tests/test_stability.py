@@ -438,7 +438,7 @@ RING = 2 * np.pi * 60.0
 @pytest.fixture(scope="module")
 def ring():
     """Four blades that rub on each other, driven by an engine order near a resonance, all alike."""
-    problem = balance.of(sector(4, 1).unrolled(), harmonics=9, samples=256, length=1e-6)
+    problem = balance.of(sector(4, 1, points=(4, 3)).unrolled(), harmonics=9, samples=256, length=1e-6)
     found = newton(problem.at(RING), problem.at(RING).reference)
     assert found.converged
     return problem, found.x, orbit(problem, found.x, RING)

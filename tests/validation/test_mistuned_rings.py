@@ -45,4 +45,4 @@ def _balanced(ring: object, harmonics: int) -> np.ndarray:
     p = balance.of(ring, harmonics, 1024, form="sides")  # type: ignore[arg-type]
     point = solve(p, 2 * np.pi * FREQUENCY, [])
     assert point.converged, point.status
-    return amplitudes(p, point)
+    return amplitudes(p.at(point.Omega), point.x)
