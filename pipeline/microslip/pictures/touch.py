@@ -53,7 +53,7 @@ def curves_of(figure: Figure) -> dict[str, Any] | None:
     layout: dict[str, Any] = {
         "margin": {"l": 20, "r": 20, "t": 20, "b": 20}, "hovermode": "closest", "plot_bgcolor": "white",
         "font": {"size": 12}, "annotations": [], "showlegend": False,
-        "legend": {"orientation": "h", "x": 0, "y": -0.08, "yanchor": "top", "yref": "paper"},
+        "legend": {"orientation": "h", "x": 0, "y": -0.13, "yanchor": "top", "yref": "paper"},
     }  # fmt: skip
     bounds = np.array([axes.get_position().extents for axes in panels])
     (left, low), (right, high) = bounds[:, :2].min(axis=0), bounds[:, 2:].max(axis=0)
