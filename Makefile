@@ -60,7 +60,7 @@ $(BODIES:%=%-mesh): %-mesh: $(READY)
 $(BODIES:%=%-modes): %-modes: $(READY)
 	@$(RUN) modes geometry/$*
 
-test: $(READY) ## the quick tests: nine minutes the first time on two cores, then six
+test: $(READY) ## the quick tests: nine minutes the first time on two cores, then seven
 	@$(PYTEST)
 
 test-slow: $(READY) ## only the slow ones and the peers (CalculiX, if it is installed)
