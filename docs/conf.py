@@ -29,7 +29,7 @@ add_module_names = False
 autodoc_typehints = "none"
 autodoc_member_order = "bysource"
 suppress_warnings = ["myst.xref_missing", "myst.header", "image.not_readable"]
-"""Links to files of the repository, which are no pages: `linked` below mends those, and the test finds dead ones."""
+"""Links to files of the repository, which are no pages; tests/test_site.py finds dead ones."""
 
 HERE = Path(__file__).parent
 MADE = HERE / "generated"

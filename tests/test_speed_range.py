@@ -585,3 +585,19 @@ def test_every_nodal_diameter_of_a_sector_has_its_range(tmp_path) -> None:
         np.testing.assert_allclose(rows, exact, atol=2e-3 * np.abs(exact).max())
         np.testing.assert_allclose(got.G_r, at.G_r[:4, :4], atol=2e-3 * np.abs(at.G_r).max())
         np.testing.assert_allclose(got.u_static, at.u_static, atol=1e-3 * np.abs(at.u_static).max())
+
+
+def test_a_range_may_end_at_a_speed_that_is_asked_for_besides() -> None:
+    """Slopes of the stiffness belong to their own speed: as few samples as without it, and frequencies to 1e-4."""
+    mesh = rings.bladed_sector("tetra10", 6)
+
+    def ended(*rpm: float) -> ModalBasis:
+        rotation = {"speeds_rpm": [0.0, *rpm], "range_rpm": [0.0, 20000.0]}
+        held = {"supports": [{"face": "bore"}], "cyclic": {"sectors": 6, "nodal_diameters": [0, 1]}}
+        return modal_basis(mesh, body(**held, modes={"count": 3}, rotation=rotation))
+
+    alone, besides = ended(), ended(20000.0)
+    for k in (0, 1):
+        one, other = alone.ranges[k], besides.ranges[k]
+        assert len(other.speeds) == len(one.speeds) and other.total_error.max() <= 1e-4
+        assert group_at(besides, 7000.0, k).omega == pytest.approx(group_at(alone, 7000.0, k).omega, rel=1e-4)

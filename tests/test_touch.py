@@ -101,7 +101,6 @@ addEventListener("load", () => setTimeout(() => {
   const place = document.querySelector(".touch");
   Plotly.Fx.hover(place, [{ curveNumber: 2, pointNumber: 3 }]);
   document.body.dataset.hover = place.querySelector(".hoverlayer").textContent;
-  document.body.dataset.zoomed = place._fullLayout.xaxis.range.join(" ");
 }, 1500));
 </script>"""
 

@@ -23,6 +23,7 @@ from .harmonic_balance.nonlinear_modes import Backbone
 from .harmonic_balance.problem import Problem
 from .harmonic_balance.solved import Motions
 from .harmonic_balance.solver import Point, sweep
+from .progress import Report
 from .settings.arguments import Count, Frequencies, Index, Rows, Text, Vector, checked
 from .settings.mistakes import bounded, numbered, too_few
 from .settings.numbers import Number, Positive
@@ -41,7 +42,6 @@ if TYPE_CHECKING:
     from .time_domain.many import Reached
     from .time_domain.orbit import Orbit
 
-Report = Callable[[str], None]
 
 
 def _to_be_analysed(system: Any) -> Any:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -18,6 +18,7 @@ from .case.contacts import swept
 from .case.settings import UNPRESSED, case_model, unasked_sweep
 from .data import ModalBasis
 from .errors import UserError
+from .progress import Report
 from .settings.arguments import Index, Text, Vector, checked
 from .settings.mistakes import unfit, validate
 from .settings.numbers import NotNegative, Number, Positive
@@ -30,7 +31,6 @@ if TYPE_CHECKING:
     from .roots.diagram import Diagram
     from .roots.spectrum import Spectrum
 
-Report = Callable[[str], None]
 
 
 def _from_to(value: Any) -> Any:

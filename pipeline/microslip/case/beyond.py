@@ -8,7 +8,7 @@ is left at all. Motions in time do.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -21,6 +21,7 @@ from ..harmonic_balance.problem import Problem
 from ..harmonic_balance.response import HarmonicResponse
 from ..harmonic_balance.stability import Settings as Multipliers
 from ..harmonic_balance.stability import Stability, orbit, stability
+from ..progress import Report
 from ..results import Journal
 from ..time_domain.swept import DOWN, REST, SAME, UP, SettledMotion, Sweeps, on_two_motions
 from ..units import Quantity, percent
@@ -30,8 +31,6 @@ from .problem import problem_of
 from .questions import CurveOfCase
 from .settings import CaseSettings
 from .surveys import Bases
-
-Report = Callable[[str], None]
 
 
 @dataclass(frozen=True)

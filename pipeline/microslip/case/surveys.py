@@ -22,13 +22,13 @@ from ..harmonic_balance.identification import (
     nodal_diagram,
 )
 from ..harmonic_balance.problem import Problem
+from ..progress import Report
 from ..results.names import apart
 from ..system.assembly import Assembly
 from .assemble import Built, build
 from .problem import models_of, normal_forces, problem_of
 from .settings import BodyOfCase, CaseSettings
 
-Report = Callable[[str], None]
 Bases = Mapping[str, ModalBasis]
 
 

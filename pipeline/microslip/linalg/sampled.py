@@ -12,10 +12,9 @@ import numpy as np
 
 from ..data import Array, ComplexArray
 from ..errors import NotConverged
+from ..progress import Report
 from .parametric import Family
 from .quadratic import Factors, Quadratic, Window, every_value, search
-
-Report = Callable[[str], None]
 
 MOST_SAMPLES = 24
 SKETCH = 64

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,11 +13,10 @@ from ..fem.contact import ContactPair, Grip, Plane, gap_at, make_pair, node_valu
 from ..fem.discretise import face_blocks, quadrature
 from ..fem.loads import traction
 from ..linalg.eigen import DirectSolver
+from ..progress import Report
 from ..settings.body import GROUND, BodySettings, Closure
 from .boundary import require_face
 from .equilibrium import BodyModel, StaticState, equilibrium
-
-Report = Callable[[str], None]
 
 
 def contact_pairs(mesh: Mesh, settings: BodySettings, materials: Sequence[Material]) -> tuple[ContactPair, ...]:

@@ -37,10 +37,9 @@ from ..fem.operators import (
 from ..fem.tied import Tied
 from ..interrupts import look
 from ..linalg.eigen import DirectSolver, Unstable, symmetric_product
+from ..progress import Report
 from ..units import rpm_text
 from .closing import Closing
-
-Report = Callable[[str], None]
 
 
 class Expandable(Protocol):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,6 +16,7 @@ from ..errors import UserError
 from ..frames import skew
 from ..linalg import canonical, eigen
 from ..linalg.parametric import state
+from ..progress import Report
 from ..reduction import Reduced
 from ..settings.body import BodySettings
 from ..units import from_rpm
@@ -24,8 +25,6 @@ from .body_rows import BodyRows, body_rows
 from .boundary import AXES, check_held, require_face
 from .group import checks_of, modal_damping, of_solution
 from .solution import Searched, Solution, answered, certified, reduced_on
-
-Report = Callable[[str], None]
 
 NOT_RIGID = 1e-6
 """Force that a rigid motion may meet, over that of its parts, of a stiffness written with seven digits or more."""

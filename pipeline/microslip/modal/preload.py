@@ -10,7 +10,6 @@ rotation.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -23,10 +22,9 @@ from ..fem.cyclic import CyclicUpper
 from ..fem.tied import Tied, tied_upper
 from ..linalg import eigen
 from ..linalg.bordered import Bordered
+from ..progress import Report
 from . import rigid
 from .equilibrium import BodyModel, StaticState, equilibrium
-
-Report = Callable[[str], None]
 
 
 def pressed_state(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
@@ -16,6 +16,7 @@ from ..fem.discretise import REDUCED, Discretisation, discretise, whole
 from ..fem.operators import per_block, spin_projector
 from ..fem.tied import Tied, tied_upper
 from ..linalg.eigen import DirectSolver, Pencil, new_solver
+from ..progress import Report
 from ..settings.body import BodySettings
 from . import rigid
 from .body_rows import BodyRows, body_rows, with_centrifugal
@@ -34,8 +35,6 @@ from .range_basis import SPARE
 from .sector import Sector, cut_faces, make_sector, sector_pencils
 from .spectrum import make_pencil
 from .unconstrained import refuse_unlinked_parts
-
-Report = Callable[[str], None]
 
 
 @dataclass(frozen=True)

@@ -34,6 +34,7 @@ import numpy as np
 from ..data import Array, SpeedRange
 from ..errors import NotConverged
 from ..linalg import eigen
+from ..progress import Report
 from ..units import rpm_text
 
 SPAN = 1e-12
@@ -56,7 +57,6 @@ FAR = 10.0
 
 FORMS = ("stiffness", "root")
 
-Report = Callable[[str], None]
 Guess = Mapping[float, tuple[float, float]]
 """Speed -> weights of the displacements there and of their slopes over Omega^2."""
 

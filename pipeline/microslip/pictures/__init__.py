@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 
 from ..data import ModalBasis, ModalGroup
 from ..modal.campbell import track_basis
+from ..progress import Report
 from ..reduced.coordinates import basis_in_modes
 from ..ring.expansion import multiplicity
 from ..ring.resonances import eigenmodes
@@ -29,7 +30,6 @@ if TYPE_CHECKING:
     from .lettering import Picture
     from .views import Studio
 
-Report = Callable[[str], None]
 
 PACKAGES = ("libglu1-mesa", "libgl1", "libxcursor1", "libxft2", "libxinerama1", "libgomp1", "libegl1")
 """What a bare Debian or Ubuntu lacks for gmsh and VTK."""

@@ -47,7 +47,9 @@ def curves_of(figure: Figure) -> dict[str, Any] | None:
     """Traces and layout of a figure that was drawn, see plotly's `newPlot`; None where it holds what is no curve."""
     panels = [axes for axes in figure.axes if axes.get_visible() and axes.get_label() != "<colorbar>"]
     bars = sum(axes.get_label() == "<colorbar>" for axes in figure.axes)
-    if not panels or bars > 1 or any(_other(axes) for axes in panels):
+    drawn: list[Any] = [line.get_xdata() for axes in panels for line in axes.lines]
+    drawn += [some.get_array() for axes in panels for some in axes.collections]
+    if not 0 < sum(map(np.size, drawn)) < MOST or bars > 1 or any(_other(axes) for axes in panels):
         return None
     traces: list[Trace] = []
     layout: dict[str, Any] = {
@@ -65,8 +67,7 @@ def curves_of(figure: Figure) -> dict[str, Any] | None:
     title = figure.get_suptitle() or panels[0].get_title() * (len(panels) == 1)
     layout |= {"title": {"text": _text(title), "font": {"size": 14}}} if title else {}
     layout |= {"margin": layout["margin"] | {"t": 50}} if title else {}
-    size = sum(len(trace.get("y", ())) for trace in traces) + sum(np.size(trace.get("z", ())) for trace in traces)
-    return {"data": traces, "layout": layout, "shape": round(width / height, 3)} if 0 < size < MOST else None
+    return {"data": traces, "layout": layout, "shape": round(width / height, 3)}
 
 
 def _other(axes: Axes) -> bool:
@@ -114,16 +115,14 @@ def _panel(
     legend = axes.get_legend() or next(iter(axes.figure.legends), None)
     if legend is not None and (words := legend.get_title().get_text()):
         layout["legend"]["title"] = {"text": f"{_text(words)}<br>", "font": {"size": 10}, "side": "top"}
-    many = len(axes.figure.axes) > 1 and bool(axes.get_title())
-    for words, x, y, where in [(axes.get_title(), 0.5, 1.0, "domain")] * many + _words(axes):
-        layout["annotations"].append({
-            "text": _text(words), "x": x, "y": y, "showarrow": False, "font": {"size": 10},
-            "xref": f"{here['xaxis']} {where}".strip(), "yref": f"{here['yaxis']} {where}".strip(),
-            "yanchor": "bottom",
-        })  # fmt: skip
+    at = {"xref": here["xaxis"], "yref": here["yaxis"], "showarrow": False, "font": {"size": 10}, "yanchor": "bottom"}
+    layout["annotations"] += [at | {"text": _text(words), "x": x, "y": y} for words, x, y in _words(axes)]
+    if len(axes.figure.axes) > 1 and (title := axes.get_title()):
+        above = {"xref": f"{here['xaxis']} domain", "yref": f"{here['yaxis']} domain", "x": 0.5, "y": 1.0}
+        layout["annotations"].append(at | above | {"text": _text(title)})
 
 
-def _words(axes: Axes) -> list[tuple[str, float, float, str]]:
+def _words(axes: Axes) -> list[tuple[str, float, float]]:
     """Texts at places of the data; of a logarithmic axis in powers of ten, as plotly has them."""
     out = []
     for text in axes.texts:
@@ -131,7 +130,7 @@ def _words(axes: Axes) -> list[tuple[str, float, float, str]]:
         if text.get_transform() == axes.transData or hasattr(text, "xy"):
             logged = [np.log10(v) if scale == "log" and v > 0 else v
                       for v, scale in ((x, axes.get_xscale()), (y, axes.get_yscale()))]  # fmt: skip
-            out.append((text.get_text(), float(logged[0]), float(logged[1]), ""))
+            out.append((text.get_text(), float(logged[0]), float(logged[1])))
     return out
 
 
@@ -167,9 +166,8 @@ def _line(axes: Axes, line: Line2D, label: str, pointed: bool) -> list[Trace]:
             "mode": "markers", "marker": {"color": colour, "size": 5, "opacity": 0.35}, "text": rows, "name": head,
             "hovertemplate": f"<b>{head}</b><br>%{{text}}<extra></extra>", "showlegend": False,
         }]  # fmt: skip
-    dashes, marker = DASHES.get(str(line.get_linestyle())), SYMBOLS.get(str(line.get_marker()))
-    if isinstance(line.get_linestyle(), tuple) or str(line.get_linestyle()) not in (*DASHES, "None", "none"):
-        dashes = "dash"
+    style, marker = str(line.get_linestyle()), SYMBOLS.get(str(line.get_marker()))
+    dashes = None if style in ("None", "none") else DASHES.get(style, "dash")
     if dashes is None and marker is None:
         return []
     mode = "+".join(word for word, there in (("lines", dashes), ("markers", marker)) if there)
@@ -200,7 +198,7 @@ def _collection(some: Any) -> list[Trace]:
         return [{
             "type": "heatmap", "x": _numbers(x), "y": _numbers(y), "z": [_numbers(row) for row in shown],
             "text": [[f"{v:.4g}" for v in row] for row in z], "zmin": float(low), "zmax": float(high),
-            "colorscale": [[float(s), to_hex(some.cmap(float(s)))] for s in np.linspace(0, 1, 17)],
+            "colorscale": _shades(some.cmap),
             "hovertemplate": "%{x:.5g}, %{y:.5g}: %{text}<extra></extra>", "showscale": bar is not None,
             "colorbar": {"title": {"text": _text(bar.ax.get_ylabel() or bar.ax.get_xlabel()), "side": "right"}}
             | (ticks if logged else {}) if bar is not None else {},
@@ -210,8 +208,7 @@ def _collection(some: Any) -> list[Trace]:
         colour: Any = to_hex(some.get_facecolor()[0]) if len(some.get_facecolor()) else "#888"
         marker = {"color": colour, "size": float(np.sqrt(np.mean(some.get_sizes())))}
         if values is not None:
-            scale = [[float(s), to_hex(some.cmap(float(s)))] for s in np.linspace(0, 1, 17)]
-            marker |= {"color": _numbers(np.asarray(values, dtype=float)), "colorscale": scale}
+            marker |= {"color": _numbers(np.asarray(values, dtype=float)), "colorscale": _shades(some.cmap)}
         return [{"type": "scatter", "mode": "markers", "x": _numbers(x), "y": _numbers(y), "marker": marker,
                  "showlegend": False}]  # fmt: skip
     colours = some.get_colors()
@@ -220,6 +217,13 @@ def _collection(some: Any) -> list[Trace]:
          "line": {"color": to_hex(colours[i % len(colours)]), "width": 1}, "showlegend": False}
         for i, at in enumerate(some.get_segments())
     ]  # fmt: skip
+
+
+def _shades(colours: Any) -> list[tuple[float, str]]:
+    """A colour map as plotly has it."""
+    from matplotlib.colors import to_hex
+
+    return [(share, to_hex(colours(share))) for share in np.linspace(0, 1, 17).tolist()]
 
 
 def _edges(mesh: Any) -> tuple[Array, Array] | None:

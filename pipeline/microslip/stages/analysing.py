@@ -71,10 +71,10 @@ def analyse(
         >>> answer = ms.analyse("map", "sample", low=20.0, high=60.0, forces=3)  # doctest: +SKIP
         >>> answer.data[""]["frequency"]  # Hz, of the highest resonance under each normal force  # doctest: +SKIP
     """
-    verbs = {analysis.verb_of(name).name: name for name in analysis.places()}
-    table = verbs.get(name, name)
-    if table not in verbs.values():
-        raise UserError(f"there is no analysis '{name}'; there are {', '.join(sorted(verbs))}", "name")
+    tables = {analysis.verb_of(table).name: table for table in analysis.places()}
+    table = tables.get(name, name)
+    if table not in tables.values():
+        raise UserError(f"there is no analysis '{name}'; there are {', '.join(sorted(tables))}", "name")
     more = [f"{table}.{key}={json.dumps(value)}" for key, value in keys.items()]
     own = case_job(case_file(Path(case)), basis, [*assignments, *more], report=report)
     with tempfile.TemporaryDirectory() as made_up:

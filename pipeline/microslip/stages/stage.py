@@ -17,9 +17,9 @@ from typing import Any
 
 from ..errors import UserError
 from ..files import store
+from ..progress import Report
 from ..settings.toml import load_toml
 
-Report = Callable[[str], None]
 PACKAGE = Path(__file__).parents[1]
 
 
