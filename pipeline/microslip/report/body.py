@@ -24,7 +24,6 @@ from ..units import METRES, rpm_text, to_rpm
 from . import ring
 from .page import Album, Piece, fold, number, page, say, table
 from .response import answer, response_pieces, warnings
-from .turning import turning_modes
 from .words import (
     certificate,
     contact_sentence,
@@ -230,7 +229,7 @@ def _modes(basis: ModalBasis, album: Album) -> list[Piece]:
         of = f" of nodal diameter {group.harmonic}" if basis.sectors > 1 else ""
         shown = Piece("row", album.begun("mode_", "_" + at.replace(" ", "")))
         single.append(fold(f"Each mode{of} at {at}", shown))
-    return [turning_modes(basis), *rings, *moving, *album.begun("modes_", tone="wide"), *single]
+    return [*album.begun("modes_", tone="wide"), *rings, *moving, *single]
 
 
 def _interfaces(basis: ModalBasis, album: Album) -> list[Piece]:

@@ -12,7 +12,7 @@ from io import BytesIO
 from pathlib import Path
 from typing import Any
 
-from ..files.png import CURVES, text_in
+from ..files.png import BODY, CURVES, text_in
 
 
 @dataclass(frozen=True)
@@ -22,7 +22,8 @@ class Piece:
     Attributes:
         inside: sentences, rows of cells, pieces, a text, or the data of a picture. title: of a fold, the caption of a
             picture. head: of a table. tone: of sentences ("lead", "note", "warn", "bad") or of a picture ("wide").
-        name: of a picture; `fixed.html` has captions. curves: of a picture, JSON for plotly; see `pictures.touch`.
+        name: of a picture; `fixed.html` has captions. curves, body: of a picture, JSON; see
+            `pictures.touch` and `pictures.turning`.
     """
 
     kind: str
@@ -32,6 +33,7 @@ class Piece:
     tone: str = ""
     name: str = ""
     curves: str = ""
+    body: str = ""
 
     def __bool__(self) -> bool:
         return any(self.inside)
@@ -78,12 +80,13 @@ class Album:
 
     def take(self, name: str, caption: str = "", tone: str = "") -> Piece:
         """A picture, with nothing inside if there is none of this name."""
-        path, data, curves = self.left.pop(name, None), "", ""
+        path, data, curves, body = self.left.pop(name, None), "", "", ""
         if path is not None and path.is_file():
             picture = path.read_bytes()
             data = f"data:image/webp;base64,{base64.b64encode(_webp(picture)).decode()}"
-            curves = text_in(picture, CURVES).replace("<", "\\u003c") if _plotly() else ""
-        return Piece("figure", data, caption, tone=tone, name=name, curves=curves)
+            curves, body = (text_in(picture, key).replace("<", "\\u003c") for key in (CURVES, BODY))
+        kept = {"curves": curves, "body": body} if _plotly() else {}
+        return Piece("figure", data, caption, tone=tone, name=name, **kept)
 
     def begun(self, prefix: str, suffix: str = "", tone: str = "") -> list[Piece]:
         """All pictures whose names begin and end so."""
@@ -110,11 +113,6 @@ def page(title: str, pieces: Iterable[Piece], sections: Mapping[str, Sequence[Pi
     if 'class="curves"' not in text and 'class="body"' not in text:
         return text
     return text.replace("</body>", _templates().get_template("curves.html").render(program=_plotly()) + "</body>")
-
-
-def draws_curves() -> bool:
-    """Whether a page can have what is touched: the package plotly is installed."""
-    return bool(_plotly())
 
 
 @cache
