@@ -16,7 +16,7 @@ from ..mesh import boundary_facets
 from ..modal.stress import von_mises
 from ..units import rpm_text
 
-MOST_SHAPES, MOST_VERTICES = 16, 12_000
+MOST_SHAPES, MOST_VERTICES = 16, 9_000
 """Shapes of a body, and vertices above which its outside is made coarser, so that a page stays quick."""
 
 DRAWN = 0.08

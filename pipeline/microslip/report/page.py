@@ -88,6 +88,10 @@ class Album:
         kept = {"curves": curves, "body": body} if _plotly() else {}
         return Piece("figure", data, caption, tone=tone, name=name, **kept)
 
+    def drop(self, *prefixes: str) -> None:
+        """Pictures whose names begin so are not shown."""
+        self.left = {n: path for n, path in self.left.items() if not n.startswith(prefixes)}
+
     def begun(self, prefix: str, suffix: str = "", tone: str = "") -> list[Piece]:
         """All pictures whose names begin and end so."""
         return [self.take(n, tone=tone) for n in list(self.left) if n.startswith(prefix) and n.endswith(suffix)]
