@@ -10,7 +10,7 @@ a tetrahedron (both).
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -55,8 +55,8 @@ _FORMS: dict[int, dict[str, Sequence[int]]] = {
 class _Archive:
     """What the commands have said. elements: (number, material, type, system, nodes). places: of equations, by name.
     kind: of the elements that follow (TYPE). outside: kind -> where, and how many elements, beside EBLOCK,,SOLID.
-    full: types with KEYOPT(2) = 1. selected: the component that CMSEL chose last. parameters: whole
-    numbers of *SET. unused: loads that are not taken. ranged: numbers that ranges of D go over.
+    options: type -> number of a KEYOPT -> its value. selected: the component that CMSEL chose last. parameters: numbers
+    of *SET, by their names in capitals. unused: loads that are not taken. ranged: numbers that ranges of D go over.
     """
 
     node_id: list[int] = field(default_factory=list)
@@ -78,9 +78,9 @@ class _Archive:
     places: dict[str, str] = field(default_factory=dict)
     kind: int = 1
     outside: dict[int, tuple[str, int]] = field(default_factory=dict)
-    full: set[int] = field(default_factory=set)
+    options: dict[int, dict[int, str]] = field(default_factory=dict)
     selected: str = ""
-    parameters: dict[str, int] = field(default_factory=dict)
+    parameters: dict[str, str] = field(default_factory=dict)
     stressed: bool = False
     ranged: set[int] = field(default_factory=set)
     unused: list[str] = field(default_factory=list)
@@ -94,28 +94,55 @@ def read_cdb(path: Path) -> RawMesh:
         Damaged: content that is inconsistent, or elements whose meaning would be lost, by their number.
     """
     lines = path.read_text(encoding="latin-1").splitlines()
-    archive, at = _Archive(), 0
+    archive, at = _Archive(), _beginning(lines)
     while at < len(lines):
-        words = [word.strip() for word in lines[at].split("!")[0].split(",")]
-        command = words[0].upper()
         archive.where = f"{path.name}, line {at + 1}"
+        block = 0
         with of_file(f"{path}, line {at + 1}"):
-            if command in _BLOCKS:
-                at = _BLOCKS[command](archive, words, lines, at + 1)
-                continue
-            if command in _COMMANDS:
-                _COMMANDS[command](archive, [*words, *_BLANKS])
-        if command in _NOT_READ:
-            archive.lost.append(lost(archive.where, command))
-        elif re.fullmatch(_LOADS, command):
-            archive.unused.append(command)
-        at += 1
+            for words in _commands(archive, lines[at]):
+                command = words[0].upper()
+                if command in _BLOCKS:
+                    block = _BLOCKS[command](archive, words, lines, at + 1)
+                elif command in _COMMANDS:
+                    _COMMANDS[command](archive, [*words, *_BLANKS])
+                if command in _NOT_READ:
+                    archive.lost.append(lost(archive.where, command))
+                elif re.fullmatch(_LOADS, command):
+                    archive.unused.append(command)
+        at = block or at + 1
     raw = _assembled(archive)
     raw.lost = [*archive.lost, *_other_elements(archive, path.name)]
     raw.remarks += [*_integration(archive), *ignored(archive.unused, _LOADS, archive.stressed)]
     if not any(line.strip().upper().startswith("FINI") for line in lines[-20:]):
         raw.unended = "no FINISH"  # a warning: archives that were shortened by hand have none
     return raw
+
+
+def _beginning(lines: list[str]) -> int:
+    """The line where the archive begins: behind the drawing (IGES) that CDWRITE may put before it."""
+    marks = (n for n, line in enumerate(lines) if line.upper().startswith(":CDWRITE"))
+    return next(marks, 0)
+
+
+_TEXTS = ("/COM", "/TITLE", "/STITLE", "C***", "*DIM", "/WB", "/INPUT")
+"""Beginnings of lines that are texts, in which no command stands."""
+
+
+def _commands(archive: _Archive, line: str) -> Iterator[list[str]]:
+    """The words of the commands of a line, parameters replaced by their values."""
+    line = line.split("!")[0].strip()
+    if line.upper().startswith(_TEXTS):
+        return
+    for part in line.split("$"):
+        words = [word.strip() for word in part.split(",")]
+        name, sign, value = words[0].partition("=")
+        if sign:
+            words = ["*SET", name.strip(), value.strip()]
+        if words[0].upper() == "*SET":
+            yield words
+        elif words[0]:
+            known = archive.parameters
+            yield [words[0], *(known.get(word.upper(), word) for word in words[1:])]
 
 
 # blocks --------------------------------------------------------------------------------------------------------------
@@ -155,15 +182,26 @@ def _read_nodes(archive: _Archive, words: list[str], lines: list[str], at: int) 
     coordinates, angles = coordinates[:3], coordinates[3:]
     if not whole or len(coordinates) < 3:
         raise Damaged("NBLOCK has a format without a number and three coordinates")
+    before, announced = len(archive.node_id), _announced(words)
     for number, line in enumerate(lines[at + 1 :], at + 1):
-        if line.strip().upper().startswith("N,") or line.strip() == "-1":
+        if line.strip() == "-1":
             return number + 1
+        if re.match(r"\s*[^\d\s]", line):  # N,UNBL,LOC,-1, or the next command
+            if len(archive.node_id) - before < announced:
+                text = f"{len(archive.node_id) - before} nodes of {announced}"
+                raise Damaged(f"NBLOCK holds {text} that it announces")
+            return number
         archive.node_id.append(_whole(line[: whole[0][1]], "NBLOCK"))
         if any(real(t, "NBLOCK") for a, b, _ in angles if (t := line[a:b].strip())):
             archive.held.turned.add(archive.node_id[-1])
         given = [line[a:b] for a, b, _ in coordinates]
         archive.points.append([real(t, "NBLOCK") if t.strip() else 0.0 for t in given])
     raise Damaged("NBLOCK has no end, the file is truncated")
+
+
+def _announced(words: list[str]) -> int:
+    """How many nodes a block says that it has: NBLOCK, fields, SOLID, largest number, count."""
+    return int(words[4]) if len(words) > 4 and words[4].isdecimal() else 0
 
 
 def _read_elements(archive: _Archive, words: list[str], lines: list[str], at: int) -> int:
@@ -241,8 +279,7 @@ def _read_types(archive: _Archive, words: list[str], lines: list[str], at: int) 
             return number + 1
         kind = _whole(row[0], "ETBLOCK")
         archive.kinds[kind] = _whole(row[1], "ETBLOCK")
-        if row[3] == "1":
-            archive.full.add(kind)
+        archive.options[kind] = {n: w for n, w in enumerate(row[2:]) if w}
     raise Damaged("ETBLOCK has no end, the file is truncated")
 
 
@@ -262,22 +299,29 @@ _BLOCKS = {
 
 
 def _read_type(archive: _Archive, words: list[str]) -> None:
-    kind = archive.parameters.get(words[1].upper(), words[1])
-    if str(kind).isdecimal() and words[2]:
-        number = re.search(r"\d+$", words[2])
-        archive.kinds[_whole(str(kind), "ET")] = int(number[0]) if number else 0
+    if words[1].isdecimal() and words[2]:
+        number, kind = re.search(r"\d+$", words[2]), _whole(words[1], "ET")
+        archive.kinds[kind] = int(number[0]) if number else 0
+        archive.options[kind] = {n: w for n, w in enumerate(words[3:9], 1) if w}
 
 
 def _read_option(archive: _Archive, words: list[str]) -> None:
     """KEYOPT, type, number, value."""
-    if words[2:4] == ["2", "1"] and words[1].isdecimal():
-        archive.full.add(_whole(words[1], "KEYOPT"))
+    if words[1].isdecimal() and words[2].isdecimal():
+        options = archive.options.setdefault(_whole(words[1], "KEYOPT"), {})
+        options[_whole(words[2], "KEYOPT")] = words[3]
 
 
 def _read_parameter(archive: _Archive, words: list[str]) -> None:
-    """*SET, name, value."""
-    if is_number(words[2]):
-        archive.parameters[words[1].upper()] = int(words[2])
+    """*SET, name, value: a number, or a parameter that is."""
+    name, value = words[1].upper(), archive.parameters.get(words[2].upper(), words[2])
+    archive.parameters.pop(name, None)
+    if re.fullmatch(_NUMBER, value):
+        whole = float(value).is_integer() and "e" not in value.lower()
+        archive.parameters[name] = str(int(float(value))) if whole else value
+
+
+_NUMBER = r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d{1,3})?"
 
 
 def _read_selection(archive: _Archive, words: list[str]) -> None:
@@ -307,8 +351,8 @@ def _stressed(archive: _Archive, words: list[str]) -> None:
 
 
 def _behind_release(words: list[str]) -> list[str]:
-    """What stands behind the command and "R5.0, count"."""
-    return words[3:] if words[1].upper().startswith("R") else words[1:]
+    """What stands behind the command and "R5.0, count" or "UNBL, count"."""
+    return words[3:] if words[1].upper().startswith(("R5", "UNBL")) else words[1:]
 
 
 def _read_temperatures(archive: _Archive, words: list[str]) -> None:
@@ -325,7 +369,7 @@ def _read_temperatures(archive: _Archive, words: list[str]) -> None:
 def _read_data(archive: _Archive, words: list[str]) -> None:
     """MPDATA[, R5.0, count], label, material, first place, values."""
     rest = _behind_release(words)
-    if not any(rest[3:]):
+    if not any(rest[3:]) or not re.fullmatch(_CONSTANTS, rest[0], re.IGNORECASE):
         return
     material, label = _whole(rest[1], "MPDATA"), rest[0].upper()
     start = _whole(rest[2] or "1", "MPDATA")
@@ -337,7 +381,7 @@ def _read_data(archive: _Archive, words: list[str]) -> None:
 
 def _read_constant(archive: _Archive, words: list[str]) -> None:
     """MP, label, material, value[, slopes over temperature]."""
-    if words[3]:
+    if words[3] and re.fullmatch(_CONSTANTS, words[1], re.IGNORECASE):
         if any(real(w, "MP") for w in words[4:] if w):
             raise Damaged(f"MP,{words[1]},{words[2]} is a polynomial of temperature; write a table (MPTEMP, MPDATA)")
         material = _whole(words[2] or "1", "MP")
@@ -441,12 +485,16 @@ def _read_rigid(archive: _Archive, words: list[str]) -> None:
     archive.rigid.append((_whole(master, "CERIG"), slave, ways, f"{archive.where}: CERIG,{master},{slave}"))
 
 
+_CONSTANTS = "E[XYZ]|(NU|PR|G)(XY|YZ|XZ)|DENS|(ALP|CTE)[XYZ]"
+"""Constants of a material that modes and static states need."""
+
+
 _COMMANDS = {
     "CE": _read_equation, "CERIG": _read_rigid, "CP": _read_coupled,
     "D": _read_displacement, "E": _leave_out, "EN": _leave_out, "TYPE": _read_current,
     "ET": _read_type, "MPTEMP": _read_temperatures, "MPDATA": _read_data, "MP": _read_constant, "TREF": _read_reference,
     "TUNIF": _read_uniform, "BFUNIF": _read_uniform, "BF": _read_body_force, "BFBLOCK": _refuse_temperatures,
-    "KEYOPT": _read_option, "KEYO": _read_option, "*SET": _read_parameter, "CMSEL": _read_selection,
+    "KEYOPT": _read_option, "KEYOP": _read_option, "KEYO": _read_option, "*SET": _read_parameter, "CMSEL": _read_selection,
     "NSEL": _read_selection, "ALLSEL": _read_selection, "ALLS": _read_selection,
     "ESEL": _read_selection, "PSTRES": _stressed, "ANTYPE": _stressed, "ANTY": _stressed,
 }  # fmt: skip
@@ -537,7 +585,9 @@ def _other_elements(archive: _Archive, name: str) -> list[str]:
 def _integration(archive: _Archive) -> list[str]:
     """What is said of bricks of 20 nodes that Ansys integrates at fewer points than are taken."""
     count = sum(
-        archive.kinds.get(kind) == 186 and kind not in archive.full and len(set(nodes)) == 20
+        archive.kinds.get(kind) == 186
+        and archive.options.get(kind, {}).get(2) != "1"
+        and len(set(nodes)) == 20
         for _, _, kind, _, nodes in archive.elements
     )
     text = (
