@@ -313,7 +313,7 @@ CMBLOCK,ROOT_2,NODE,1
          5
 cmsel,s,Z0
 d,all,all
-nsel,all
+nsle,s
 d,all,ux,0
 d,12,ux,%_loadx%
 D,5,UZ,0,,900,2

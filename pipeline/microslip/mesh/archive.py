@@ -51,8 +51,9 @@ class Archive:
         kinds: number of a type -> Ansys's element. options: number of a type -> number of a KEYOPT
             -> its value.
         places: of equations, by name. rigid: master, slaves, directions, place. spread: RBE3, likewise with weights.
-        current: of elements that follow: TYPE, REAL, MAT, ESYS, and CSYS. selected: the component that CMSEL chose
-        last. parameters: numbers of *SET, by their names in capitals. unused: loads that are not taken.
+        current: of elements that follow: TYPE, REAL, MAT, ESYS, and CSYS. selected: numbers of the nodes that are
+            chosen, None: all. chosen: the component that they are. unread: a selection that is not read.
+        parameters: numbers of *SET, by their names in capitals. unused: loads that are not taken.
         ranged: numbers that ranges of D go over. systems: coordinate systems. turns: nodes -> coordinate system
         (NROTAT), or angles (NBLOCK, NMODIF). rings: CYCLIC. diameters: of CYCOPT.
     """
@@ -81,7 +82,9 @@ class Archive:
     where: str = ""
     places: dict[str, str] = field(default_factory=dict)
     current: dict[str, int] = field(default_factory=lambda: {"TYPE": 1, "MAT": 1, "REAL": 1})
-    selected: str = ""
+    selected: set[int] | None = None
+    chosen: str = ""
+    unread: str = ""
     parameters: dict[str, str] = field(default_factory=dict)
     stressed: bool = False
     ranged: set[int] = field(default_factory=set)
@@ -103,7 +106,9 @@ class Archive:
         if is_number(word):
             return [int(word)]
         if word.upper() == "ALL":
-            return self.component(self.selected) if self.selected else None
+            if self.unread:
+                return None
+            return self.node_id if self.selected is None else sorted(self.selected)
         return self.component(word)
 
 

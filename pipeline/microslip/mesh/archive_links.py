@@ -7,7 +7,7 @@ pilot node makes that node lead the surface (or follow it in the mean), other pa
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from ..data import Array, AverageLink, Equation, FaceTie, Indices, Joint, Link, 
 from .archive import Archive, Element, Ring, whole
 from .raw import Damaged, Numbering, RawMesh, is_number, lost, real
 from .supports import add_supports, in_axes
-from .systems import System, axes_by_angles
+from .systems import System
 
 LABELS = {"UX": "x", "UY": "y", "UZ": "z", "ROTX": "a", "ROTY": "b", "ROTZ": "c"}
 """Degree of freedom -> direction."""
@@ -30,7 +30,8 @@ def _displacement(archive: Archive, words: list[str]) -> None:
     if not ways:
         return
     named = {name.upper(): name for name in archive.components}
-    component = named.get(archive.selected if where.upper() == "ALL" else where.upper())
+    every = where.upper() == "ALL"
+    component = named.get(archive.chosen.upper() if every else where.upper())
     if value.startswith("%"):
         archive.held.left_out.append(
             f"D,{where},{label} takes its displacement from the table {value}"
@@ -41,12 +42,17 @@ def _displacement(archive: Archive, words: list[str]) -> None:
         archive.held.hold(component, ways)
     elif is_number(where):
         first, end = int(where), whole(last, "D") if last else int(where)
-        every = range(first, min(end, first + 10**8) + 1, max(whole(step or "1", "D"), 1))
-        archive.ranged.update(every[1:])
-        for node in every:
+        numbers = range(first, min(end, first + 10**8) + 1, max(whole(step or "1", "D"), 1))
+        archive.ranged.update(numbers[1:])
+        for node in numbers:
+            archive.held.hold(node, ways)
+    elif every and not archive.unread:
+        for node in archive.nodes(where) or []:
             archive.held.hold(node, ways)
     else:
-        archive.held.left_out.append(f"D,{where},{label} names no node by its number")
+        unread = f"is for the selection {archive.unread}, which is not read"
+        why = unread if every else "names no node by its number"
+        archive.held.left_out.append(f"D,{where},{label} {why}")
 
 
 def read_displacements(archive: Archive, words: list[str], lines: list[str], at: int) -> int:
@@ -125,7 +131,7 @@ def _rigid(archive: Archive, words: list[str]) -> None:
     """CERIG, master, slave node or component, directions."""
     master, slave, label = words[1:4]
     ways = _RIGID.get(label.upper(), LABELS.get(label.upper(), "?"))
-    if ways == "?" or slave.upper() == "" or (slave.upper() == "ALL" and not archive.selected):
+    if ways == "?" or slave == "":
         raise Damaged(
             f"CERIG,{master},{slave},{label} is not read; name one node or component, and ALL, UXYZ or UX"
         )
@@ -148,112 +154,6 @@ def _spread(archive: Archive, words: list[str]) -> None:
         raise Damaged(f"{text}; name a component of nodes, without weights, and ALL, UXYZ or UX")
     place = f"{archive.where}: RBE3,{node},{members}"
     archive.spread.append((whole(node, "RBE3"), nodes, [1.0] * len(nodes), ways, place))
-
-
-# coordinate systems -----------------------------------------------------------------------------
-
-
-def _numbers(words: list[str], what: str) -> Array:
-    """Three numbers, empty places 0."""
-    return np.array([real(word, what) if word else 0.0 for word in [*words, "", "", ""][:3]])
-
-
-def _system(archive: Archive, words: list[str]) -> None:
-    """LOCAL, number, kind, origin, angles, ratios; or LOCAL,R5.0,LOC or ANG or PRM, number, kind, values."""
-    if words[1].upper().startswith(("R5", "UNBL")):
-        part, number, kind = (
-            words[2].upper(),
-            whole(words[3], "LOCAL"),
-            whole(words[4] or "0", "LOCAL"),
-        )
-        before = archive.systems.get(number, System(kind))
-        values = _numbers(words[5:8], "LOCAL")
-        if part == "LOC":
-            archive.systems[number] = System(kind, values, before.axes)
-        elif part == "ANG":
-            archive.systems[number] = System(kind, before.origin, axes_by_angles(values))
-        elif part == "PRM" and (values[:2] != 1).any() and words[5]:
-            archive.systems[number] = System(-1)
-        return
-    number, kind = whole(words[1], "LOCAL"), whole(words[2] or "0", "LOCAL")
-    ratios = [word for word in words[9:11] if word and real(word, "LOCAL") != 1]
-    axes = axes_by_angles(_numbers(words[6:9], "LOCAL"))
-    archive.systems[number] = System(-1 if ratios else kind, _numbers(words[3:6], "LOCAL"), axes)
-    archive.current["CSYS"] = number
-
-
-def _by_nodes(archive: Archive, words: list[str]) -> None:
-    """CS, number, kind, nodes at the origin, on the x axis, in the x-y plane."""
-    number, kind, *nodes = (whole(word or "0", "CS") for word in words[1:6])
-    place = {
-        n: np.array(p) for n, p in zip(archive.node_id, archive.points, strict=True) if n in nodes
-    }
-    if len(place) < 3 or words[6] or words[7]:
-        raise Damaged(
-            f"CS,{number} names fewer than three nodes that are there before it, or ratios; write LOCAL"
-        )
-    origin, on, beside = (place[n] for n in nodes)
-    x = on - origin
-    z = np.cross(x, beside - origin)
-    if not np.linalg.norm(z) > 0:
-        raise Damaged(f"CS,{number} names three nodes on a line; name one beside it")
-    axes = np.array([x, np.cross(z, x), z])
-    axes /= np.linalg.norm(axes, axis=1)[:, None]
-    archive.systems[number] = System(kind, origin, axes)
-    archive.current["CSYS"] = number
-
-
-def _relative(archive: Archive, words: list[str]) -> None:
-    """CLOCAL, number, kind, origin and angles in the active system."""
-    active = _known(archive, archive.current.get("CSYS", 0), "CLOCAL")
-    if active.kind:
-        raise Damaged("CLOCAL in a cylindrical or spherical system is not read; write LOCAL")
-    number, kind = whole(words[1], "CLOCAL"), whole(words[2] or "0", "CLOCAL")
-    origin = active.origin + _numbers(words[3:6], "CLOCAL") @ active.axes
-    axes = axes_by_angles(_numbers(words[6:9], "CLOCAL")) @ active.axes
-    archive.systems[number] = System(kind, origin, axes)
-    archive.current["CSYS"] = number
-
-
-def _known(archive: Archive, number: int, command: str) -> System:
-    system = archive.systems.get(number)
-    if system is None or system.kind not in (0, 1, 2):
-        why = "is not defined" if system is None else "is a torus or an ellipse, which is not read"
-        raise Damaged(
-            f"{command} takes the coordinate system {number}, which {why}; write it by LOCAL before"
-        )
-    return system
-
-
-def _activate(archive: Archive, words: list[str]) -> None:
-    """CSYS, number."""
-    archive.current["CSYS"] = (
-        whole(words[1] or "0", "CSYS") if words[1].lstrip("-").isdecimal() else -1
-    )
-
-
-def _turn(archive: Archive, words: list[str]) -> None:
-    """NROTAT, node or component or ALL[, last[, step]]: nodes turned into the active system."""
-    nodes: Iterable[int] | None = archive.nodes(words[1])
-    if nodes is None and words[1].upper() == "ALL" and not archive.selected:
-        nodes = archive.node_id
-    if nodes is None:
-        archive.held.all_turned = True
-        archive.lost.append(
-            f"{archive.where}: NROTAT,{words[1]} turns nodes of a selection that is not read"
-        )
-        return
-    if words[2] and is_number(words[1]):
-        step = max(whole(words[3] or "1", "NROTAT"), 1)
-        nodes = range(int(words[1]), whole(words[2], "NROTAT") + 1, step)
-    system = _known(archive, archive.current.get("CSYS", 0), "NROTAT")
-    archive.turns.update(dict.fromkeys(nodes, system))
-
-
-def _modify(archive: Archive, words: list[str]) -> None:
-    """NMODIF, node, , , , angles of the node."""
-    if any(words[5:8]) and is_number(words[1]):
-        archive.turns[int(words[1])] = System(axes=axes_by_angles(_numbers(words[5:8], "NMODIF")))
 
 
 # assembly ---------------------------------------------------------------------------------------
@@ -540,12 +440,6 @@ COMMANDS = {
     "CE": _equation,
     "CERIG": _rigid,
     "RBE3": _spread,
-    "LOCAL": _system,
-    "CS": _by_nodes,
-    "CLOCAL": _relative,
-    "CSYS": _activate,
-    "NROTAT": _turn,
-    "NMODIF": _modify,
     "CYCLIC": _ring,
     "CYCOPT": _cyclic_option,
     "MSOPT": _stages,

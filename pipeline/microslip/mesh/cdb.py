@@ -19,8 +19,9 @@ from ..data import Array, Equation
 from ..elasticity import turned, turned_strain
 from ..errors import of_file
 from ..topology import CELL_TYPES
+from . import archive_links, archive_nodes
 from .archive import Archive, Element, changed, whole
-from .archive_links import BLOCKS, COMMANDS, CONTACTS, TARGETS, constrain, ring_of
+from .archive_links import CONTACTS, TARGETS, constrain, ring_of
 from .materials import isotropic_rows, orthotropic_row
 from .raw import (
     PRESTRESSED,
@@ -269,7 +270,7 @@ _BLANKS = [""] * 8
 
 
 _BLOCKS = {
-    **BLOCKS,
+    **archive_links.BLOCKS,
     "NBLOCK": _read_nodes,
     "EBLOCK": _read_elements,
     "CMBLOCK": _read_component,
@@ -304,12 +305,6 @@ def _read_parameter(archive: Archive, words: list[str]) -> None:
 
 
 _NUMBER = r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d{1,3})?"
-
-
-def _read_selection(archive: Archive, words: list[str]) -> None:
-    """CMSEL,S,component; every other selection, or all, is none that is known."""
-    chosen = words[0].upper() == "CMSEL" and words[1].upper() in ("S", "")
-    archive.selected = words[2].upper() if chosen else ""
 
 
 def _read_current(archive: Archive, words: list[str]) -> None:
@@ -461,15 +456,26 @@ def _read_table_data(archive: Archive, words: list[str]) -> None:
 
 
 _COMMANDS = {
-    "E": _read_element, "EN": _read_element, "TYPE": _read_current, "REAL": _read_current, "MAT": _read_current,
-    "ET": _read_type, "MPTEMP": _read_temperatures, "MPDATA": _read_data, "MP": _read_constant, "TREF": _read_reference,
-    "TUNIF": _read_uniform, "BFUNIF": _read_uniform, "BF": _read_body_force, "BFBLOCK": _refuse_temperatures,
-    "KEYOPT": _read_option, "KEYOP": _read_option, "KEYO": _read_option, "*SET": _read_parameter,
-    "CMSEL": _read_selection, "NSEL": _read_selection, "ALLSEL": _read_selection, "ALLS": _read_selection,
-    "ESEL": _read_selection, "NSLE": _read_selection, "PSTRES": _stressed, "ANTYPE": _stressed, "ANTY": _stressed,
-    "EMODIF": _modify, "EMOD": _modify, "TB": _read_table, "TBDATA": _read_table_data, "TBDAT": _read_table_data,
-    "TBTEMP": _read_table_place, "TBTEM": _read_table_place, "TBFIELD": _read_table_place, **COMMANDS,
-}  # fmt: skip
+    **dict.fromkeys(("E", "EN"), _read_element),
+    **dict.fromkeys(("TYPE", "REAL", "MAT"), _read_current),
+    **dict.fromkeys(("KEYOPT", "KEYOP", "KEYO"), _read_option),
+    **dict.fromkeys(("EMODIF", "EMOD"), _modify),
+    **dict.fromkeys(("TUNIF", "BFUNIF"), _read_uniform),
+    **dict.fromkeys(("TBDATA", "TBDAT"), _read_table_data),
+    **dict.fromkeys(("TBTEMP", "TBTEM", "TBFIELD"), _read_table_place),
+    **dict.fromkeys(("PSTRES", "ANTYPE", "ANTY"), _stressed),
+    "ET": _read_type,
+    "MPTEMP": _read_temperatures,
+    "MPDATA": _read_data,
+    "MP": _read_constant,
+    "TREF": _read_reference,
+    "BF": _read_body_force,
+    "BFBLOCK": _refuse_temperatures,
+    "*SET": _read_parameter,
+    "TB": _read_table,
+    **archive_nodes.COMMANDS,
+    **archive_links.COMMANDS,
+}
 
 
 _NOT_READ = {
