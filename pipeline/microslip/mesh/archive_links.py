@@ -273,7 +273,8 @@ def ring_of(archive: Archive, raw: RawMesh) -> Sector | None:
     """
     names = {ring.name.upper() for ring in archive.rings}
     if len(names) > 1:
-        text = f"CYCLIC is given for {' and '.join(sorted(names))}: a multistage model is not read"
+        ring = archive.rings[-1]
+        text = f"{ring.where} is given for {' and '.join(sorted(names))}: a multistage model is not read"
         raise Damaged(f"{text}; write an archive of each stage and import these")
     if not archive.rings:
         return None
