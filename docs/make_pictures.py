@@ -20,7 +20,7 @@ from typing import Any
 import damper_study
 import numpy as np
 import scipy.linalg
-from pages import FILES, HERE, file_reference, fill, modal_reference, play, public_reference, table
+from pages import FILES, HERE, figure_states, file_reference, fill, modal_reference, play, public_reference, table, wall
 
 from microslip.basis import read_basis
 from microslip.case import CaseSettings, load_case, run_case
@@ -1112,6 +1112,8 @@ def reference() -> None:
     for name, (page, _) in FILES.items():
         fill(page, name, file_reference(name))
     fill("python.md", "public", public_reference())
+    fill("the_book.md", "wall", wall())
+    fill("the_book.md", "figures", figure_states())
 
 
 def python() -> None:
