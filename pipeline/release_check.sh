@@ -1,0 +1,41 @@
+#!/bin/sh
+# Wheel and sdist, checked: metadata, then each installed in clean environments with no extra, with [solve] and with
+# [all], which read the sample's modal file and solve it. make release-check; products in dist/.
+set -eu
+cd "$(dirname "$0")/.."
+python=${PYTHON:-python3}
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+
+needs_index() { # a step that downloads
+    "$@" >"$work/log" 2>&1 && return
+    tail -5 "$work/log"
+    echo "release-check: '$*' failed. It takes packages from the index that pip is set to: is the network there? Nothing was published." >&2
+    exit 1
+}
+
+echo "== build"
+rm -rf dist
+needs_index "$python" -m venv "$work/build"
+needs_index "$work/build/bin/pip" install build twine
+needs_index "$work/build/bin/python" -m build --outdir dist .
+echo "== twine check"
+"$work/build/bin/twine" check --strict dist/*
+
+wheel=$(ls "$PWD"/dist/*.whl)
+sdist=$(ls "$PWD"/dist/*.tar.gz)
+sample='import microslip; print(microslip.sample())'
+try() { # name, what is installed, what is typed there
+    echo "== $1"
+    needs_index "$python" -m venv "$work/$1"
+    needs_index "$work/$1/bin/pip" install "$2"
+    mkdir "$work/$1/try"
+    (cd "$work/$1/try" && PATH="$work/$1/bin:$PATH" sh -eu -c "$3")
+    rm -rf "${work:?}/$1"
+}
+few="--set sweep.points=12 --set sweep.patience=0 --set sweep.normal_forces=[20.0]"
+try base "$wheel" "microslip check \$(python -c '$sample') | tail -1"
+try sdist "$sdist" "microslip check \$(python -c '$sample') | tail -1"
+try solve "${wheel}[solve]" "microslip respond sample $few | tail -1"
+try all "${wheel}[all]" "microslip init blade && microslip modes blade --set mesh.size=24 --set modes.count=4 && microslip respond sample $few | tail -1"
+echo "release-check: $(basename "$wheel") and $(basename "$sdist") are good"
