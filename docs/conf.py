@@ -9,9 +9,9 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-import pages  # noqa: E402
+import pages
 
-import microslip  # noqa: E402
+import microslip
 
 project = "microslip"
 author = copyright = "The microslip developers"

@@ -24,18 +24,23 @@ echo "== twine check"
 
 wheel=$(ls "$PWD"/dist/*.whl)
 sdist=$(ls "$PWD"/dist/*.tar.gz)
-sample='import microslip; print(microslip.sample())'
+sample='import microslip, pathlib; print(pathlib.Path(microslip.__file__).parent / "samples" / "basis.h5")'
 try() { # name, what is installed, what is typed there
     echo "== $1"
     needs_index "$python" -m venv "$work/$1"
     needs_index "$work/$1/bin/pip" install "$2"
     mkdir "$work/$1/try"
-    (cd "$work/$1/try" && PATH="$work/$1/bin:$PATH" sh -eu -c "$3")
+    (cd "$work/$1/try" && PATH="$work/$1/bin:$PATH" sh -eu -c "$3") >"$work/said" 2>&1 || {
+        tail -20 "$work/said"
+        echo "release-check: '$3' failed in an environment with $1" >&2
+        exit 1
+    }
+    tail -1 "$work/said"
     rm -rf "${work:?}/$1"
 }
 few="--set sweep.points=12 --set sweep.patience=0 --set sweep.normal_forces=[20.0]"
-try base "$wheel" "microslip check \$(python -c '$sample') | tail -1"
-try sdist "$sdist" "microslip check \$(python -c '$sample') | tail -1"
-try solve "${wheel}[solve]" "microslip respond sample $few | tail -1"
-try all "${wheel}[all]" "microslip init blade && microslip modes blade --set mesh.size=24 --set modes.count=4 && microslip respond sample $few | tail -1"
+try base "$wheel" "file=\$(python -c '$sample'); microslip check \"\$file\""
+try sdist "$sdist" "file=\$(python -c '$sample'); microslip check \"\$file\""
+try solve "${wheel}[solve]" "microslip respond sample $few"
+try all "${wheel}[all]" "microslip init blade && microslip modes blade --set mesh.size=24 --set modes.count=4 && microslip respond sample $few"
 echo "release-check: $(basename "$wheel") and $(basename "$sdist") are good"
