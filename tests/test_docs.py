@@ -32,7 +32,7 @@ from microslip.stages.modal import modes_stage  # noqa: E402
 OF_ALL = [ROOT / name for name in ("README.md", "CONTRIBUTING.md", "CHANGELOG.md")]
 PAGES = sorted([*DOCS.glob("*.md"), *DOCS.glob("tutorials/*.md"), *OF_ALL])
 PACKAGE = ROOT / "pipeline" / "microslip"
-LONG = {"your_own_model.md", "CONTRIBUTING.md"}
+LONG = {"your_own_model.md"}
 """Pages that are not yet short."""
 
 
