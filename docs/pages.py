@@ -9,7 +9,6 @@ Marks in a page:
 
 from __future__ import annotations
 
-import inspect
 import os
 import re
 import subprocess
@@ -132,13 +131,10 @@ def typed(line: str, folder: Path) -> str:
 
 
 def public_reference() -> str:
-    """Table of the public names: what they are called with and the first sentence of their docstrings."""
-    rows = []
-    for name in microslip.__all__:
-        what = getattr(microslip, name)
-        said = (inspect.getdoc(what) or "").split("\n\n")[0].replace("\n", " ")
-        rows.append([f"`ms.{name}`", said])
-    return table(["name", "what it is"], rows)
+    """Table of the public names, by the module that they are from."""
+    from_modules = microslip.PUBLIC.items()
+    rows = [[f"`{module}`", ", ".join(f"`{name}`" for name in names.split())] for module, names in from_modules]
+    return table(["from", "`ms.` names"], rows)
 
 
 FILES: dict[str, tuple[str, Any]] = {
