@@ -148,7 +148,9 @@ def test_bonded_contact_is_a_tie(capsys):
     Path("c.cdb").write_text(ended(text, *lines[:4], *lines[5:], "MP,MU,3,0.15", *held))
     assert main(["import", "c.cdb"]) == 0
     said = capsys.readouterr().out
-    assert "contact of the real constants 3, frictional" in said
+    assert "contact of the real constants 3, frictional" in said and "77 mm2, friction 0.15" in said
+    case = tomllib.loads(Path("c/case.toml").read_text())
+    assert [b["name"] for b in case["bodies"]] == ["part-1", "part-2"]
 
 
 @pytest.mark.parametrize("mean", [False, True])

@@ -37,13 +37,14 @@ from .stage import Report
 def import_deck(
     file: Path, folder: Path | None, unit: str | None, report: Report = lambda _: None
 ) -> Imported:
-    """Import a file; a deck whose *CONTACT PAIRs separate bodies becomes an assembly.
+    """Import a file; a deck whose contact pairs separate bodies becomes an assembly.
 
     Raises:
         UserError: unreadable files, files that are there already.
     """
-    deck = [f.read_bytes() for f in files_of(file) if f.is_file()] if suffix_of(file) == ".inp" else []
-    if not any(map(PAIR.search, deck)):
+    pattern = PAIRS.get(suffix_of(file))
+    deck = [f.read_bytes() for f in files_of(file) if f.is_file()] if pattern else []
+    if pattern is None or not any(map(pattern.search, deck)):
         return import_file(file, folder, unit, report=report)
     unit = length_unit(unit, file)
     mesh = read_mesh(file, unit)
@@ -128,7 +129,11 @@ def _free(mesh: Mesh, metres: float) -> Array:
     return mesh.points[free if len(free) else surface] / metres
 
 
-PAIR = re.compile(rb"^\s*\*\s*CONTACT\s+PAIR", re.IGNORECASE | re.MULTILINE)
+PAIRS = {
+    ".inp": re.compile(rb"^\s*\*\s*CONTACT\s+PAIR", re.IGNORECASE | re.MULTILINE),
+    ".cdb": re.compile(rb"^\s*ET\s*,.*17[1-57]\s*($|!|,)|^ETBLOCK", re.IGNORECASE | re.MULTILINE),
+}
+"""Suffix -> what stands in decks that may have faces in contact."""
 
 
 Ends = tuple[int, int]
