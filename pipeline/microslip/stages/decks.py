@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ..basis import read_basis
 from ..data import Array, Indices, Joint, Mesh
 from ..errors import UserError
 from ..files.store import ordinary
@@ -18,7 +19,17 @@ from ..mesh.cards import files_of
 from ..mesh.chosen import bodies, of_instances, with_parts
 from ..mesh.raw import joined
 from ..mesh.touching import touch_of, touching_facets
-from .importing import CAD, Imported, body_name, import_file, length_unit, refuse_taken
+from .importing import (
+    CAD,
+    Imported,
+    body_name,
+    import_file,
+    length_unit,
+    refuse_taken,
+    with_page,
+)
+from .job import open_job
+from .modal import modes_stage
 from .parts import (
     Part,
     Patch,
@@ -32,6 +43,7 @@ from .parts import (
     with_names,
 )
 from .stage import Report
+from .summary import frequency_lines
 
 
 def import_deck(
@@ -52,13 +64,28 @@ def import_deck(
     joints, told = _between_bodies(mesh, groups)
     if not joints:
         made = import_file(file, folder, unit, report=report)
-        return Imported(made.path, (*made.told[:-1], *told, made.told[-1]))
+        made = replace(made, told=(*made.told[:-1], *told, made.told[-1]))
+        return with_page(made) if told and made.mesh is not None else made
     meshes = [of_instances(mesh, group) for group in groups]
     patches = list(_patches(joints, meshes, UNITS[unit]))
     pairs = zip(patches, joints, strict=True)
     said = [*told, *(_sentence(groups, patch, joint, unit) for patch, (joint, _) in pairs)]
     force, texts = _pressed(mesh)
     return _assembly(file, folder, unit, groups, meshes, patches, [*said, *texts], force)
+
+
+def with_modes(made: Imported, report: Report = lambda _: None) -> Imported:
+    """Solve for the modes of an imported body at once: a line of frequencies, told and on its page.
+
+    Raises:
+        UserError, NotConverged: see `modes_stage`; the body.toml stays.
+    """
+    if made.path.name != "body.toml":
+        return made  # several bodies, or modes that are there already
+    path, _ = modes_stage(open_job(made.path), report=report)
+    lines = frequency_lines(read_basis(path))
+    made = replace(made, told=(*made.told[:-1], *lines, made.told[-1]))
+    return made if made.mesh is None else with_page(made, lines)
 
 
 def import_apart(
