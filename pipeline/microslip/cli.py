@@ -537,7 +537,9 @@ def _say_seal(file: Path, quiet: bool) -> None:
 
 
 @app.command(name="import")
-def import_(file: Path, /, *more: Path, unit: str | None = None, apart: Apart = False) -> None:
+def import_(
+    file: Path, /, *more: Path, unit: str | None = None, apart: Apart = False, modes: bool = False
+) -> None:
     """Make a body.toml around a CAD file, a mesh or matrices, or a modal file from measured modes.
 
     Several CAD files, or several meshes, of parts that touch become an assembly: a body.toml each, with the faces where
@@ -549,8 +551,9 @@ def import_(file: Path, /, *more: Path, unit: str | None = None, apart: Apart = 
         more: the other parts of an assembly, and the folder of the new files, last; one of their names if not given.
             A part may be a folder with a body.toml that is there already.
         unit: of lengths; if not given what the file tells (/UNITS of Ansys, data set 164), else mm.
+        modes: compute them at once; the first frequencies stand on the page.
     """
-    from .stages.decks import import_apart, import_deck
+    from .stages.decks import import_apart, import_deck, with_modes
     from .stages.importing import CAD
     from .stages.parts import import_parts
 
@@ -565,6 +568,9 @@ def import_(file: Path, /, *more: Path, unit: str | None = None, apart: Apart = 
             made = import_deck(file, folder, unit, report)
         else:
             made = import_parts(parts, folder, unit, report)
+    if modes:
+        with progress(f"modes of {made.path.parent}") as report:
+            made = with_modes(made, report)
     for line in made.told:
         print(line)
 
