@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ..data import Equation, FaceTie, Indices
+from ..data import Array, Equation, FaceTie, Guide, Indices, Link
 from .raw import Numbering, RawMesh
 
 
@@ -17,12 +17,15 @@ class Constraints:
 
     Attributes:
         sets: set name -> directions out of x, y, z. nodes: node number -> directions.
-        turned: numbers of nodes whose directions are those of a local system. all_turned: some may be, unknown which.
+        axes: node number -> (3, 3) rows x, y, z of its directions, where these are not the body's.
+        turned: numbers of nodes whose directions are those of a local system that is not read. all_turned: some may be,
+            unknown which.
         left_out: what is not read, in words.
     """
 
     sets: dict[str, set[str]] = field(default_factory=dict)
     nodes: dict[int, set[str]] = field(default_factory=dict)
+    axes: dict[int, Array] = field(default_factory=dict)
     turned: set[int] = field(default_factory=set)
     all_turned: bool = False
     left_out: list[str] = field(default_factory=list)
@@ -51,6 +54,7 @@ def add_supports(raw: RawMesh, held: Constraints, numbering: Numbering) -> None:
     for node, found in held.nodes.items():
         at = raw.node_id[turning] == node
         held.nodes[node] = found if at.any() else found - set("abc")
+    raw.links += _guided(held, numbering)
     left_out = dict.fromkeys(held.left_out)
     for name, found in held.sets.items():
         directions = _in_order(found)
@@ -82,6 +86,37 @@ def add_supports(raw: RawMesh, held: Constraints, numbering: Numbering) -> None:
     raw.not_held = told if len(told) <= 5 else [*told[:4], f"and {len(told) - 4} more like these"]
 
 
+_ALIKE = 1e-9
+"""What the components of an axis may differ by from those of an axis of the body."""
+
+
+def _guided(held: Constraints, numbering: Numbering) -> list[Link]:
+    """Supports in skewed directions, which are taken out of `held.nodes`; along the body's axes
+    they stay there as directions of the body."""
+    skewed: dict[bool, list[tuple[int, Array]]] = {False: [], True: []}
+    for node in held.axes.keys() & held.nodes.keys() & set(numbering.sorted.tolist()):
+        plain = set[str]()
+        for ways in ("xyz", "abc"):
+            chosen = held.nodes[node] & set(ways)
+            axes = held.axes[node][[ways.index(c) for c in chosen]]
+            along = np.abs(axes) > 1 - _ALIKE
+            used = along.any(axis=0) if len(chosen) < 3 else np.ones(3, dtype=bool)
+            plain |= {c for c, hit in zip(ways, used, strict=True) if hit}
+            if len(chosen) < 3:
+                skewed[ways == "abc"] += [(node, e) for e in axes[~along.any(axis=1)]]
+        held.nodes[node] = plain
+    return [
+        Guide(
+            "supports in local systems",
+            numbering.positions([node for node, _ in pairs], "a constraint names"),
+            np.array([e for _, e in pairs]),
+            turning,
+        )
+        for turning, pairs in skewed.items()
+        if pairs
+    ]
+
+
 def _in_order(directions: Iterable[str]) -> str:
     """Displacements x, y, z, then rotations a, b, c."""
     return "".join(sorted(directions, key="xyzabc".index))
@@ -92,7 +127,7 @@ def _turning(raw: RawMesh) -> Indices:
     named = [
         link.nodes if isinstance(link, Equation) else [link.reference]
         for link in raw.links
-        if not isinstance(link, FaceTie)
+        if not isinstance(link, FaceTie | Guide)
     ]
     used = np.unique(np.concatenate([np.zeros(0, dtype=np.int64), *(nodes.ravel() for _, nodes in raw.blocks)]))
     return np.setdiff1d(np.concatenate([np.zeros(0, dtype=np.int64), *map(np.asarray, named)]), used)
