@@ -68,6 +68,20 @@ def test_a_map_keeps_its_cells_and_what_is_no_curve_stays_a_picture() -> None:
     assert curves_of(drawn) is None
 
 
+def test_every_panel_keeps_its_bar_beside_it() -> None:
+    """As the maps of contacts have them; points in shades keep theirs too."""
+    drawn = empty_figure()
+    for axes, low in zip(drawn.subplots(2, 1), (0.0, 5.0), strict=True):
+        shades = axes.scatter([0.0, 1.0], [0.0, 1.0], c=[low, low + 1.0])
+        drawn.colorbar(shades, label="in MPa")
+    traces = curves_of(drawn)["data"]
+    for trace, low, middle in zip(traces, (0.0, 5.0), (0.77, 0.23), strict=True):
+        marker = trace["marker"]
+        assert (marker["cmin"], marker["cmax"], marker["color"]) == (low, low + 1.0, [low, low + 1.0])
+        assert marker["colorbar"]["title"]["text"] == "in MPa" and marker["colorbar"]["x"] > 1.0
+        assert marker["colorbar"]["y"] == pytest.approx(middle, abs=0.05)
+
+
 def test_a_text_in_a_picture_is_found_again_and_its_pixels_stay(tmp_path: Path) -> None:
     from PIL import Image
 

@@ -52,7 +52,7 @@ class _Rows:
         self.of += [link] * r
         self.count += r
 
-    def dof(self, nodes: Indices, way: Indices | int) -> Indices:
+    def dof(self, nodes: Indices | int, way: Indices | int) -> Indices:
         """Columns of a direction (0 to 5) of points and reference nodes."""
         nodes = np.asarray(nodes)
         return np.where(nodes < self.n, 3 * nodes + way, 3 * self.n + 6 * (nodes - self.n) + way)
@@ -142,7 +142,7 @@ def _along(
 
     An equation gives the member's own displacement where e is an axis of the body, else any.
     """
-    first, ways = (3 if moment is None else 0), np.flatnonzero(np.abs(e) > 1e-15)
+    first, ways = (3 if moment is None else 0), [int(w) for w in np.flatnonzero(np.abs(e) > 1e-15)]
     of = np.full(len(members), reference)
     own = np.column_stack([rows.dof(members, first + w) for w in ways])
     columns, factors = [own, *(rows.dof(of, first + w)[:, None] for w in ways)], [e[ways], -e[ways]]
@@ -187,8 +187,10 @@ def _average(mesh: Mesh, link: AverageLink, rows: _Rows, number: int) -> str:
         first, e = way - way % 3, axes[way % 3]
         moved = rows.dof(np.full(3, link.reference), first + np.arange(3))
         factors = np.concatenate([-e, np.einsum("k,kmi->mi", e, fit[first : first + 3]).ravel()])
-        given = rows.dof(link.reference, way) if link.axes is None else -1
-        rows.add(number, np.concatenate([moved, own])[None], factors[None], np.array([given]))
+        given = rows.dof(np.array([link.reference]), way)
+        if link.axes is not None:
+            given = np.full(1, -1)
+        rows.add(number, np.concatenate([moved, own])[None], factors[None], given)
     return f"{link.where}: node {_number(mesh, link.reference)} follows {len(members)} nodes in the mean"
 
 

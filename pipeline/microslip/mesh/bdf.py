@@ -19,10 +19,10 @@ import numpy as np
 
 from ..data import Array, AverageLink, Equation, Indices, Link, RigidLink
 from ..elasticity import turned_strain
+from .bulk_systems import Chained, LocalSystem, through
 from .materials import isotropic_rows
 from .raw import PRESTRESSED, Damaged, DeckMaterial, Numbering, RawMesh, ignored, lost
-from .supports import Constraints, add_supports
-from .systems import Chained, LocalSystem, through
+from .supports import Constraints, add_supports, in_axes
 
 _BRICK20, _WEDGE15 = (
     (*range(12), *range(16, 20), *range(12, 16)),
@@ -521,24 +521,13 @@ def _equations(bulk: _Bulk) -> Iterator[Link]:
         if not all(0 <= way < 6 for way in ways):
             raise Damaged(f"{bulk.where(card)} names a component that no grid point has (1 to 6)")
         factors = np.array([card.real(p + 2) or 0.0 for p in places])
-        yield _in_body_axes(
-            Equation(bulk.where(card), nodes, np.array(ways), factors),
-            [bulk.held.axes.get(number) for number in numbers],
-        )
-
-
-def _in_body_axes(link: Equation, axes: Sequence[Array | None]) -> Equation:
-    """An equation whose terms are along directions (3, 3) of their nodes."""
-    if all(frame is None for frame in axes):
-        return link
-    nodes, ways, factors = list[int](), list[int](), list[float]()
-    for node, way, factor, frame in zip(link.nodes, link.directions, link.factors, axes, strict=True):
-        along = np.eye(3)[way % 3] if frame is None else frame[way % 3]
-        for part in np.flatnonzero(np.abs(along) > 1e-15):
-            nodes.append(int(node))
-            ways.append(int(way - way % 3 + part))
-            factors.append(float(factor * along[part]))
-    return Equation(link.where, np.array(nodes), np.array(ways), np.array(factors), first=False)
+        if bulk.held.axes.keys().isdisjoint(numbers):
+            yield Equation(bulk.where(card), nodes, np.array(ways), factors)
+            continue
+        pairs = zip(numbers, ways, strict=True)
+        along = np.array([bulk.held.axes.get(node, np.eye(3))[way % 3] for node, way in pairs])
+        first = np.array(ways) // 3 * 3
+        yield in_axes(bulk.where(card), nodes, first, along * factors[:, None])
 
 
 def _shells(bulk: _Bulk) -> None:

@@ -25,7 +25,8 @@ def renumbered(raw: RawMesh, points: Array, number: Indices, metres: float) -> L
     if not raw.links:
         return None
     found = _References(raw, number)
-    items = [item for link in raw.links for item in found.of(link, metres)]
+    order = sorted(raw.links, key=lambda link: isinstance(link, Guide))  # which need to know the others
+    items = [item for link in order for item in found.of(link, metres)]
     found.refuse_chains()
     at = np.array(list(found.known), dtype=np.int64)
     sets = {name: np.flatnonzero(np.isin(at, s) & (number[at] < 0)) for name, s in raw.point_sets.items()}

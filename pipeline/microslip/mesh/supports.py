@@ -44,7 +44,8 @@ class Constraints:
 def add_supports(raw: RawMesh, held: Constraints, numbering: Numbering) -> None:
     """Give `raw` the supports: named sets as they are; nodes held alike as the set that has just them, or a new one.
 
-    Rotations (a, b, c) are those of reference nodes; others have none.
+    Rotations (a, b, c) are those of reference nodes; others have none. Single directions of a local system become
+    linear equations, which hold wherever the mesh is used.
     """
     turning = _turning(raw)
     held = replace(held, sets=dict(held.sets), nodes=dict(held.nodes))
@@ -54,7 +55,7 @@ def add_supports(raw: RawMesh, held: Constraints, numbering: Numbering) -> None:
     for node, found in held.nodes.items():
         at = raw.node_id[turning] == node
         held.nodes[node] = found if at.any() else found - set("abc")
-    raw.links += _guided(held, numbering)
+    raw.links += _guided(raw, held, numbering) if held.axes else []
     left_out = dict.fromkeys(held.left_out)
     for name, found in held.sets.items():
         directions = _in_order(found)
@@ -90,9 +91,15 @@ _ALIKE = 1e-9
 """What the components of an axis may differ by from those of an axis of the body."""
 
 
-def _guided(held: Constraints, numbering: Numbering) -> list[Link]:
-    """Supports in skewed directions, which are taken out of `held.nodes`; along the body's axes
+def _guided(raw: RawMesh, held: Constraints, numbering: Numbering) -> list[Link]:
+    """Supports in skewed directions, which are taken out of what is held; along the body's axes
     they stay there as directions of the body."""
+    for name in [name for name, ways in held.sets.items() if len(ways & set("xyz")) in (1, 2)]:
+        members = raw.node_id[raw.point_sets.get(name, np.zeros(0, dtype=np.int64))].tolist()
+        if not held.axes.keys().isdisjoint(members):
+            directions = held.sets.pop(name)
+            for node in members:
+                held.nodes[node] = held.nodes.get(node, set()) | directions
     skewed: dict[bool, list[tuple[int, Array]]] = {False: [], True: []}
     for node in held.axes.keys() & held.nodes.keys() & set(numbering.sorted.tolist()):
         plain = set[str]()
@@ -100,8 +107,8 @@ def _guided(held: Constraints, numbering: Numbering) -> list[Link]:
             chosen = held.nodes[node] & set(ways)
             axes = held.axes[node][[ways.index(c) for c in chosen]]
             along = np.abs(axes) > 1 - _ALIKE
-            used = along.any(axis=0) if len(chosen) < 3 else np.ones(3, dtype=bool)
-            plain |= {c for c, hit in zip(ways, used, strict=True) if hit}
+            used = along.any(axis=0) | (len(chosen) == 3)
+            plain |= {ways[i] for i in np.flatnonzero(used)}
             if len(chosen) < 3:
                 skewed[ways == "abc"] += [(node, e) for e in axes[~along.any(axis=1)]]
         held.nodes[node] = plain
@@ -115,6 +122,16 @@ def _guided(held: Constraints, numbering: Numbering) -> list[Link]:
         for turning, pairs in skewed.items()
         if pairs
     ]
+
+
+def in_axes(where: str, nodes: Indices, first: Indices, factors: Array) -> Equation:
+    """The equation of terms along directions of their own.
+
+    Args:
+        nodes: (t,) of the terms. first: (t,) 0 for a displacement, 3 for a rotation. factors: (t, 3) along x, y, z.
+    """
+    term, way = np.nonzero(np.abs(factors) > 1e-12 * np.abs(factors).max())
+    return Equation(where, nodes[term], first[term] + way, factors[term, way], first=False)
 
 
 def _in_order(directions: Iterable[str]) -> str:

@@ -1,110 +1,56 @@
-"""Local coordinate systems of decks: rectangular, cylindrical, spherical, each within another one."""
+"""Local coordinate systems of Ansys: rectangular, cylindrical and spherical, by three angles."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from ..data import Array
-from .raw import Damaged
 
-_PARALLEL = 1e-8
-"""Sine of the angle between two axes below which they are parallel: files have eight digits."""
 
-_ON_AXIS = 1e-12
+def axes_by_angles(angles: Array) -> Array:
+    """(3, 3) rows = axes of a system by its angles THXY, THYZ, THZX in degrees.
+
+    It is turned about its z axis first, then about its new x axis, then about its new y axis
+    (Mechanical APDL, command LOCAL).
+    """
+    (c, a, b), (t, s, r) = np.cos(np.radians(angles)), np.sin(np.radians(angles))
+    about_z = np.array([[c, -t, 0], [t, c, 0], [0, 0, 1]])
+    about_x = np.array([[1, 0, 0], [0, a, -s], [0, s, a]])
+    about_y = np.array([[b, 0, r], [0, 1, 0], [-r, 0, b]])
+    return (about_z @ about_x @ about_y).T
 
 
 @dataclass(frozen=True)
-class LocalSystem:
-    """Coordinates x, y, z (``R``), r, theta, z (``C``) or r, theta from z, phi about z (``S``).
+class System:
+    """A coordinate system. kind: 0 rectangular, 1 cylindrical, 2 spherical. `axes`: rows, in global
+    axes."""
 
-    Angles are in degrees. `BASIC` is the system in which all others lie.
+    kind: int = 0
+    origin: Array = field(default_factory=lambda: np.zeros(3))
+    axes: Array = field(default_factory=lambda: np.eye(3))
 
-    Attributes:
-        kind: R, C or S. origin: (3,) in the basic system. axes: (3, 3) rows x, y, z in it.
-    """
-
-    kind: str
-    origin: Array
-    axes: Array
-
-    def points(self, coordinates: Array) -> Array:
-        """(n, 3) points in the basic system, of coordinates (n, 3) in this one."""
-        a, b, c = np.asarray(coordinates, dtype=float).T
-        if self.kind == "C":
-            b = np.radians(b)
-            a, b = a * np.cos(b), a * np.sin(b)
-        elif self.kind == "S":
-            b, c = np.radians(b), np.radians(c)
-            a, b, c = a * np.sin(b) * np.cos(c), a * np.sin(b) * np.sin(c), a * np.cos(b)
-        return self.origin + np.column_stack([a, b, c]) @ self.axes
-
-    def directions(self, points: Array) -> Array:
-        """(n, 3, 3) unit vectors (rows) of this system's three directions at points (n, 3).
-
-        On the z axis of a cylindrical or spherical system, where these have no direction, they are
-        x, y, z, as Nastran takes them there.
-        """
-        local = (np.asarray(points, dtype=float) - self.origin) @ self.axes.T
-        frames = np.tile(np.eye(3), (len(local), 1, 1))
-        radius, size = np.hypot(local[:, 0], local[:, 1]), np.linalg.norm(local, axis=1)
-        off = radius > _ON_AXIS * np.maximum(size, np.linalg.norm(self.origin))
-        if self.kind != "R":
-            c, s = (local[off, :2] / radius[off, None]).T
-            zero = np.zeros_like(c)
-            around = np.column_stack([-s, c, zero])
-            if self.kind == "C":
-                frames[off, 0], frames[off, 1] = np.column_stack([c, s, zero]), around
-            else:
-                sine, cosine = radius[off] / size[off], local[off, 2] / size[off]
-                frames[off, 0] = np.column_stack([sine * c, sine * s, cosine])
-                frames[off, 1] = np.column_stack([cosine * c, cosine * s, -sine])
-                frames[off, 2] = around
-        return frames @ self.axes
+    def at(self, point: Array) -> Array:
+        """(3, 3) rows = directions x, y, z (r, theta, z of a cylindrical, r, theta, phi of a spherical
+        one) at a point (3,), in global axes."""
+        if self.kind == 0:
+            return self.axes
+        x, y, z = self.axes @ (point - self.origin)
+        theta = np.arctan2(y, x) if x or y else 0.0
+        c, s = np.cos(theta), np.sin(theta)
+        local = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
+        if self.kind == 2:
+            phi = np.arctan2(z, np.hypot(x, y))
+            a, b = np.cos(phi), np.sin(phi)
+            local = np.array([[a, 0, b], [0, 1, 0], [-b, 0, a]]) @ local
+        return local @ self.axes
 
 
-BASIC = LocalSystem("R", np.zeros(3), np.eye(3))
-
-
-def through(kind: str, origin: Array, on_z: Array, in_xz: Array) -> LocalSystem:
-    """The system with a point on its z axis and one in its x-z plane, each (3,) in the basic one.
-
-    Raises:
-        Damaged: the three points lie on a line.
-    """
-    z, towards = on_z - origin, in_xz - origin
-    y = np.cross(z, towards)
-    size = np.linalg.norm(z) * np.linalg.norm(towards)
-    if not np.linalg.norm(y) > _PARALLEL * size:
-        raise Damaged("has three points on a line, which give no axes; move one off it")
-    z, y = z / np.linalg.norm(z), y / np.linalg.norm(y)
-    return LocalSystem(kind, origin, np.array([np.cross(y, z), y, z]))
-
-
-class Chained:
-    """Systems by their numbers, each made when it is first asked for.
-
-    Args:
-        make: the system of a number, which asks here for those that it lies in.
-    """
-
-    def __init__(self, make: Callable[[int], LocalSystem]) -> None:
-        self.make = make
-        self.made: dict[int, LocalSystem] = {0: BASIC}
-        self.within: list[int] = []
-
-    def __getitem__(self, number: int) -> LocalSystem:
-        """Raises `Damaged` if a system lies in itself."""
-        if number not in self.made:
-            if number in self.within or len(self.within) > 200:
-                chain = " in ".join(map(str, [*self.within[-4:], number]))
-                raise Damaged(
-                    f"coordinate systems lie in each other in a circle ({chain}); define one of "
-                    "them in the basic system"
-                )
-            self.within.append(number)
-            self.made[number] = self.make(number)
-            self.within.pop()
-        return self.made[number]
+BASIC = {
+    0: System(),
+    1: System(1),
+    2: System(2),
+    5: System(1, axes=np.array([[1.0, 0, 0], [0, 0, -1.0], [0, 1.0, 0]])),
+}
+"""Systems that are there from the start: 5 is cylindrical about y."""
