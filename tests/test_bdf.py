@@ -116,9 +116,18 @@ def test_cards_that_count_and_are_not_read_are_told_with_their_line(tmp_path, ca
     assert told in mesh_problems(read)[1]
 
 
-def test_a_material_that_is_not_read_refuses_the_import(tmp_path, capsys):
-    constrained(tmp_path, ["PSOLID,1,2", "MAT9,2,1.+11"])
-    refused_command(["import", str(tmp_path / "a.bdf"), str(tmp_path / "out")], capsys, "'MAT9 2'")
+@pytest.mark.parametrize(
+    ("card", "words"),
+    [
+        ("MAT9,2,1.+11", "MAT9 2 has a matrix that is not positive definite"),
+        ("MAT8,2,1.+11,1.+10,.3,1.+9", "'MAT8 2'"),
+    ],
+)
+def test_a_material_that_is_not_read_refuses_the_import(tmp_path, capsys, card, words):
+    constrained(tmp_path, ["PSOLID,1,2"])
+    text = (tmp_path / "a.bdf").read_text().replace("ENDDATA", f"{card}\nENDDATA")
+    (tmp_path / "a.bdf").write_text(text)
+    refused_command(["import", str(tmp_path / "a.bdf"), str(tmp_path / "out")], capsys, words)
     assert not (tmp_path / "out").exists()
 
 

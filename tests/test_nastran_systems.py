@@ -14,9 +14,11 @@ from test_bdf import CARD, ORDER
 from microslip.basis import read_basis
 from microslip.cli import main
 from microslip.data import Mesh
+from microslip.elasticity import isotropic, turned, turned_strain
 from microslip.mesh import read_mesh
+from microslip.mesh.materials import NONE, Substitute, orthotropic_row
 
-STEEL = ["MAT1,1,2.05+11,,0.29,7830.", "PSOLID,1,1"]
+STEEL = ("MAT1,1,2.05+11,,0.29,7830.", "PSOLID,1,1")
 
 
 @pytest.fixture(autouse=True)
@@ -24,7 +26,14 @@ def there(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
 
 
-def bulk(mesh: Mesh, *cards: str, cp: str = "", cd: str = "", control: Sequence[str] = ("SPC=7",)) -> str:
+def bulk(
+    mesh: Mesh,
+    *cards: str,
+    cp: str = "",
+    cd: str = "",
+    control: Sequence[str] = ("SPC=7",),
+    material: Sequence[str] = STEEL,
+) -> str:
     """Free fields with all digits. cp, cd: systems of the coordinates and displacements."""
     lines = ["SOL 103", "CEND", *control, "BEGIN BULK"]
     for number, x in zip(mesh.node_id, mesh.points, strict=True):
@@ -34,7 +43,7 @@ def bulk(mesh: Mesh, *cards: str, cp: str = "", cd: str = "", control: Sequence[
             words = [number, 1, *(int(mesh.node_id[cell[i]]) for i in ORDER[kind])]
             rows = [",".join(map(str, words[i : i + 8])) for i in range(0, len(words), 8)]
             lines.append(f"{CARD[kind[:3]]}," + ",+\n+,".join(rows))
-    return "\n".join([*lines, *STEEL, *cards, "ENDDATA"]) + "\n"
+    return "\n".join([*lines, *material, *cards, "ENDDATA"]) + "\n"
 
 
 def block(to: Callable | None = None) -> Mesh:
@@ -202,3 +211,70 @@ def transformed() -> str:
 def test_systems_that_are_none_are_refused_with_their_line(cards, words, capsys):
     Path("a.bdf").write_text(bulk(block(), *cards, cp="3"))
     refused_command(["import", "a.bdf", "b"], capsys, words, "a.bdf, line ")
+
+
+def read(*material: str, instead: Substitute = NONE, **more) -> Mesh:
+    Path("a.bdf").write_text(bulk(block(), material=material, **more))
+    return read_mesh("a.bdf", "m", "m-kg-s", instead=instead)
+
+
+E, NU, G = 2.05e11, 0.29, 2.05e11 / 2.58
+LAME = 2 * G * NU / (1 - 2 * NU)
+
+
+@pytest.mark.parametrize(
+    "card",
+    [
+        f"MAT1,1,{E},,0.29,7830.",
+        f"MAT1,1,{E},{G},,7830.",
+        f"MAT1,1,,{G},0.29,7830.",
+        f"MAT9,1,{LAME + 2 * G},{LAME},{LAME},,,,{LAME + 2 * G},+\n+,{LAME},,,,{LAME + 2 * G},,,,+\n"
+        f"+,{G},,,{G},,{G},7830.",
+        f"MAT11,1,{E},{E},{E},0.29,0.29,0.29,{G},+\n+,{G},{G},7830.",
+    ],
+)
+def test_every_form_of_an_isotropic_material_is_the_same(card):
+    (material,) = read(card, "PSOLID,1,1").materials
+    np.testing.assert_allclose(material.elasticity, isotropic(E, NU), rtol=1e-9, atol=1e-3)
+    assert material.density == 7830
+
+
+ORTHO = "MAT11,1,1.4+11,1.+10,2.+10,.3,.25,.4,5.+9,+\n+,6.+9,4.+9,1600.,1.-6,2.-5,3.-5"
+NINE = np.array([1.4e11, 1e10, 2e10, 0.3, 0.25, 0.4, 5e9, 6e9, 4e9])
+
+
+def test_a_material_has_the_directions_of_its_property():
+    """CORDM: Hooke's matrix and the expansions of MAT11, and of MAT9, turned into body axes."""
+    (material,) = read(ORTHO, "PSOLID,1,1,3", *CHAIN).materials
+    axes = np.array([[C, S, 0.0], [-S, C, 0.0], [0.0, 0.0, 1.0]])
+    plain = orthotropic_row("", NINE)
+    np.testing.assert_allclose(material.elasticity, turned(plain, axes), rtol=1e-9, atol=1e-3)
+    np.testing.assert_allclose(material.expansion, turned_strain([1e-6, 2e-5, 3e-5], axes), rtol=1e-9)
+    words = [f"{v:.17g}" for v in plain[np.triu_indices(6)]] + ["1600.", "1.-6", "2.-5", "3.-5"]
+    nine = "MAT9,1," + ",+\n+,".join(",".join((["1", *words])[i : i + 8]) for i in (0, 8, 16, 24))
+    nine = nine.replace("MAT9,1,1,", "MAT9,1,")
+    (same,) = read(nine, "PSOLID,1,1,3", *CHAIN).materials
+    np.testing.assert_allclose(same.elasticity, material.elasticity, rtol=1e-9, atol=1e-3)
+    np.testing.assert_allclose(same.expansion, material.expansion, rtol=1e-9)
+
+
+@pytest.mark.parametrize("property_", ["PSOLID,1,1,-1", "PSOLID,1,1,5", "PCOMPS,1"])
+def test_directions_that_turn_from_cell_to_cell_are_refused_until_others_are_asked_for(property_, capsys):
+    Path("a.bdf").write_text(bulk(block(), *CHAIN, material=(ORTHO, property_)))
+    refused_command(["import", "a.bdf", "b", "--unit", "m"], capsys, "a.bdf", "--young")
+    assert main(["import", "a.bdf", "b", "--unit", "m", "--young", "7e10", "--density", "1600"]) == 0
+    assert main(["modes", "b", "-q", "--set", "modes.solver=superlu"]) == 0
+
+
+def test_fluid_cells_beside_a_structure_are_left_out_and_counted(capsys):
+    mesh = block()
+    text = bulk(mesh, "MAT10,2,2.2+9,1000.", "PSOLID,2,2,,,,,PFLUID")
+    Path("a.bdf").write_text(text.replace("CHEXA,3,1,", "CHEXA,3,2,"))
+    assert main(["import", "a.bdf", "b", "--unit", "m"]) == 0
+    assert "its 1 cells are a fluid and are left out" in capsys.readouterr().out
+    assert sum(map(len, read_mesh("a.bdf", "m").cells.values())) == 2
+
+
+def test_a_weight_is_turned_into_a_mass():
+    (material,) = read("MAT1,1,3.+7,,.3,.283", "PSOLID,1,1", "PARAM,WTMASS,0.5").materials
+    assert material.density == pytest.approx(0.1415)

@@ -12,15 +12,15 @@ import contextlib
 import re
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from ..data import Array, AverageLink, Equation, Indices, Link, RigidLink
-from ..elasticity import turned_strain
+from ..elasticity import strain_tensor, turned, turned_strain
 from .bulk_systems import Chained, LocalSystem, through
-from .materials import isotropic_rows
+from .materials import isotropic_rows, orthotropic_row
 from .raw import PRESTRESSED, Damaged, DeckMaterial, Numbering, RawMesh, ignored, lost
 from .supports import Constraints, add_supports, in_axes
 
@@ -105,7 +105,8 @@ class _Bulk:
     cards: defaultdict[str, list[_Card]]
     raw: RawMesh
     numbering: Numbering
-    held: Constraints = field(default_factory=Constraints)
+    held: Constraints
+    systems: Chained
 
     def where(self, card: _Card) -> str:
         return f"{self.file}, {card.where}"
@@ -132,8 +133,8 @@ def read_bdf(path: Path) -> RawMesh:
     for card in _cards(text):
         cards[card[0]].append(card)
     others = {name: c for name, c in cards.items() if name not in _READ}
-    raw, held = _grid(cards, path.name)
-    bulk = _Bulk(path.name, text, cards, raw, Numbering(raw.node_id), held)
+    raw, held, systems = _grid(cards, path.name)
+    bulk = _Bulk(path.name, text, cards, raw, Numbering(raw.node_id), held, systems)
     properties = _elements(bulk)
     if any(cards[name] for name in (*_PROPERTIES, "MAT1", *_MATERIALS)):
         raw.materials = [_material(bulk, p) for p in properties]
@@ -144,7 +145,7 @@ def read_bdf(path: Path) -> RawMesh:
         for card in cards[name]:
             raw.add_set(f"{label} {card[1]}", _listed(card, first, bulk.numbering), bulk.numbering)
     _constrain(bulk)
-    raw.lost = [
+    raw.lost += [
         lost(f"{path.name}, line {c[0].line}", f"{name} ({len(c)} card{'s' * (len(c) > 1)})")
         for name, c in others.items()
         if _COUNTS.fullmatch(name)
@@ -262,7 +263,7 @@ def _listed(card: _Card, first: int, numbering: Numbering | None = None) -> list
 # content -------------------------------------------------------------------------------------------------------------
 
 
-def _grid(cards: Mapping[str, list[_Card]], file: str) -> tuple[RawMesh, Constraints]:
+def _grid(cards: Mapping[str, list[_Card]], file: str) -> tuple[RawMesh, Constraints, Chained]:
     """The grid points in the basic system, and what they hold themselves (PS) in the directions of
     their systems (CD)."""
     if not cards["GRID"]:
@@ -287,7 +288,7 @@ def _grid(cards: Mapping[str, list[_Card]], file: str) -> tuple[RawMesh, Constra
             else:
                 frames = system.directions(table[places])
                 held.axes |= dict(zip(ids[places].tolist(), frames, strict=True))
-    return RawMesh(table, ids), held
+    return RawMesh(table, ids), held, systems
 
 
 @contextlib.contextmanager
@@ -344,13 +345,19 @@ def _systems(cards: Mapping[str, list[_Card]], file: str) -> Chained:
 def _elements(bulk: _Bulk) -> list[int]:
     """Add the solids; the properties that they name, in the order of their regions."""
     blocks: dict[str, list[tuple[int, int, list[int]]]] = {}
-    properties: dict[int, int] = {}
+    properties, fluids = dict[int, int](), _fluids(bulk)
     for name in _SOLIDS:
         for card in bulk.cards[name]:
-            number, region = card.whole(1), properties.setdefault(card.whole(2), len(properties))
+            if card.whole(2, card.whole(1)) in fluids:
+                continue
+            number, region = card.whole(1), properties.setdefault(
+                card.whole(2, card.whole(1)), len(properties)
+            )
             kind, nodes = _cell(name, number, card)
             blocks.setdefault(kind, []).append((number, region, nodes))
     bulk.raw.add_solids(blocks, bulk.numbering, "an element names")
+    if fluids and not blocks:
+        raise Damaged("all of its solid cells are a fluid (MAT10); give those of the structure")
     return list(properties)
 
 
@@ -368,6 +375,26 @@ def _cell(name: str, number: int, card: _Card) -> tuple[str, list[int]]:
     return kind, [nodes[i] for i in places]
 
 
+def _fluids(bulk: _Bulk) -> set[int]:
+    """Properties of fluid cells, which are told: MAT10, or PFLUID of a PSOLID."""
+    acoustic = {card.whole(1) for card in bulk.cards["MAT10"]}
+    solid = {card.whole(1) for name in ("MAT1", "MAT9", "MAT11") for card in bulk.cards[name]}
+    fluids = {
+        card.whole(1)
+        for card in bulk.cards["PSOLID"]
+        if card.at(7) == "PFLUID" or card.whole(2, 0) in acoustic - solid
+    }
+    for number in fluids:
+        count = sum(card.whole(2) == number for name in _SOLIDS for card in bulk.cards[name])
+        if count:
+            where = bulk.where(next(bulk.numbered(["PSOLID"], number)))
+            bulk.raw.lost.append(
+                f"{where}: its {count} cells are a fluid and are left out: in contact with it "
+                "the structure has lower frequencies"
+            )
+    return fluids
+
+
 def _material(bulk: _Bulk, property_: int) -> DeckMaterial:
     """What a property's cells are made of."""
     where, nothing = f"PSOLID {property_}", np.zeros(6)
@@ -378,30 +405,81 @@ def _material(bulk: _Bulk, property_: int) -> DeckMaterial:
         return DeckMaterial(f"{layered[0]} {property_}", None, None, nothing, refused=refused)
     solid = next(bulk.numbered(["PSOLID"], property_), None)
     if solid is None:
-        return DeckMaterial(
-            "", None, None, nothing, where=f"of property {property_}, which no PSOLID defines"
-        )
-    number = solid.whole(2)
-    card = next(bulk.numbered(["MAT1"], number), None)
-    if card is None:
-        for other in (c for m in _MATERIALS for c in bulk.cards[m] if c.at(1) == str(number)):
-            refused = "a form that is not read; write it as MAT1, or give density and stiffness in a body.toml"
-            return DeckMaterial(other.name, None, None, nothing, where=where, refused=refused)
-        return DeckMaterial(f"MAT1 {number} (missing)", None, None, nothing, where=where)
-    E, G, nu, density = map(card.real, (2, 3, 4, 5))
-    if E is None and G is not None and nu is not None:
-        E = 2 * G * (1 + nu)
-    if nu is None and E is not None and G:
-        nu = E / (2 * G) - 1
+        return DeckMaterial("", None, None, nothing, where=f"property {property_}, which no PSOLID defines")
+    number = solid.whole(2, 0)
     factor = next((c.real(2) for c in bulk.cards["PARAM"] if c.at(1) == "WTMASS"), None)
-    if density is not None and factor is not None:  # which turns a weight into a mass
-        density *= factor
-    name = f"MAT1 {number}"
-    if E is None or nu is None:
-        return DeckMaterial(name, None, density, nothing, where=where)
-    C, _ = isotropic_rows(name, np.array([[E, nu, 0.0]]))
-    expansion = turned_strain(np.full(3, card.real(6) or 0.0), None)
-    return DeckMaterial(name, C, density, expansion, where=where)
+
+    def mass(card: _Card, place: int) -> float | None:
+        """Density: PARAM,WTMASS turns a weight into a mass."""
+        rho = card.real(place)
+        return rho if rho is None or factor is None else rho * factor
+
+    for card in bulk.numbered(["MAT1"], number):
+        E, G, nu = map(card.real, (2, 3, 4))
+        density, name, line = mass(card, 5), card.name, bulk.where(card)
+        if not E and G and nu is not None:
+            E = 2 * G * (1 + nu)
+        if nu is None and E and G:
+            nu = E / (2 * G) - 1
+        if not E or nu is None:
+            return DeckMaterial(
+                name, None, density, nothing, None, where, line=line, young=E, poisson=nu, shear=G
+            )
+        C, _ = isotropic_rows(name, np.array([[E, nu, 0.0]]))
+        expansion = turned_strain(np.full(3, card.real(6) or 0.0), None)
+        return DeckMaterial(name, C, density, expansion, where=where, line=line)
+    for card in bulk.numbered(["MAT9", "MAT11"], number):
+        nine, line = card[0] == "MAT9", bulk.where(card)
+        density = mass(card, 23 if nine else 11)
+        axes, refused = _material_axes(bulk, solid)
+        if refused:
+            return DeckMaterial(card.name, None, density, nothing, None, where, refused, line)
+        if nine:
+            C, expansion = _anisotropic(card)
+            C, expansion = turned(C, axes), _turned_expansion(expansion, axes)
+        else:
+            constants = np.array([card.real(place) or 0.0 for place in range(2, 11)])
+            C = turned(orthotropic_row(card.name, constants), axes)
+            along = np.array([card.real(place) or 0.0 for place in (12, 13, 14)])
+            expansion = turned_strain(along, axes)
+        return DeckMaterial(card.name, C, density, expansion, where=where, line=line)
+    for other in (c for m in _MATERIALS for c in bulk.cards[m] if c.at(1) == str(number)):
+        refused = "a form that is not read; write it as MAT1, MAT9 or MAT11, or give it in a body.toml"
+        return DeckMaterial(other.name, None, None, nothing, None, where, refused, bulk.where(other))
+    return DeckMaterial(f"MAT1 {number} (missing)", None, None, nothing, where=where)
+
+
+def _material_axes(bulk: _Bulk, solid: _Card) -> tuple[Array, str]:
+    """(3, 3) rows: the material's axes by CORDM of a PSOLID, or why they are not read."""
+    number = int(solid.at(3) or 0) if re.fullmatch(r"-?\d*", solid.at(3)) else -1
+    remedy = "write a rectangular CORDM, or give density and stiffness in a body.toml"
+    if number < 0:
+        return np.eye(3), f"directions of each cell (CORDM {solid.at(3)}), which are not read; {remedy}"
+    with _named(bulk.where(solid)):
+        system = bulk.systems[number]
+    if system.kind != "R":
+        return np.eye(3), f"directions that turn along the body (CORDM {number}), which are not read; {remedy}"
+    return system.axes, ""
+
+
+def _anisotropic(card: _Card) -> tuple[Array, Array]:
+    """Hooke matrix and expansions (6,) of a MAT9 in its axes, order xx, yy, zz, xy, yz, zx.
+
+    Raises:
+        Damaged: a matrix that is not positive definite.
+    """
+    C = np.zeros((6, 6))
+    C[np.triu_indices(6)] = [card.real(place) or 0.0 for place in range(2, 23)]
+    C = C + np.triu(C, 1).T
+    if not np.linalg.eigvalsh(C).min() > 0:
+        raise Damaged(f"{card.where} has a matrix that is not positive definite")
+    return C, np.array([card.real(place) or 0.0 for place in range(24, 30)])
+
+
+def _turned_expansion(strain: Array, axes: Array) -> Array:
+    """(6,) strain with engineering shear, xx, yy, zz, xy, yz, zx, in body axes."""
+    tensor = axes.T @ strain_tensor(strain) @ axes
+    return np.concatenate([np.diag(tensor), 2 * tensor[[0, 1, 0], [1, 2, 2]]])
 
 
 def _constrain(bulk: _Bulk) -> None:
