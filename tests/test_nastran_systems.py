@@ -278,3 +278,22 @@ def test_fluid_cells_beside_a_structure_are_left_out_and_counted(capsys):
 def test_a_weight_is_turned_into_a_mass():
     (material,) = read("MAT1,1,3.+7,,.3,.283", "PSOLID,1,1", "PARAM,WTMASS,0.5").materials
     assert material.density == pytest.approx(0.1415)
+
+
+def test_a_mean_motion_by_single_directions_turns_with_its_body(capsys):
+    """RBE3 by two directions of some points and one of others, the deck turned with its CD; points
+    that tell too little are refused."""
+    mesh = block()
+    tip = mesh.node_id[ends(mesh)["tip"]].tolist()
+    root = ",".join(map(str, mesh.node_id[ends(mesh)["root"]].tolist()))
+    few = f"RBE3,61,,900,123,1.0,12,{tip[4]},{tip[5]}"
+    cards = [f"SPC1,7,123,{root}", "SPC1,7,13,900"]
+    whole = f"{few},+\n+,0.5,3,{tip[6]},{tip[7]},{tip[2]},1.0,1,{tip[0]}"
+    grid, free = "GRID,900,{0},0.065,0.005,0.01,{0}", hertz(bulk(mesh, cards[0]), "free")
+    plain = hertz(bulk(mesh, *cards, whole, grid.format("")), "plain")
+    skew = card("CORD2R", 3, 0, (0, 0, 0), (1, 2, 2), (2, 1, -2))
+    turned = hertz(bulk(mesh, skew, *cards, whole, grid.format("3"), cp="3", cd="3"), "turned")
+    np.testing.assert_allclose(turned, plain, rtol=1e-9)
+    assert (plain[:2] > 1.05 * free[:2]).all()
+    Path("a.bdf").write_text(bulk(mesh, *cards, few, grid.format("")))
+    refused_command(["import", "a.bdf", "b"], capsys, "RBE3 61", "do not tell all of its motion")

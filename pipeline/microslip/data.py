@@ -123,9 +123,9 @@ class AverageLink:
     """A reference node that follows nodes in the mean: the rigid motion that fits theirs best, by weights.
 
     Attributes:
-        reference: node. members: nodes, or the face that has them. weights: (m,) of the members; None: their tributary
-            areas of the face. directions: which of the reference node's x, y, z and rotations a, b, c follow.
-            axes: (3, 3) rows x, y, z of these, None: those of the body.
+        reference: node. members: nodes, or the face that has them. weights: (m,) of the members, (m, 3, 3) if in single
+            directions; None: their tributary areas of the face. directions: which of the reference node's x, y, z and
+            rotations a, b, c follow. axes: (3, 3) rows x, y, z of these, None: those of the body.
     """
 
     where: str

@@ -169,7 +169,7 @@ def _average(mesh: Mesh, link: AverageLink, rows: _Rows, number: int) -> str:
     fields = rigid_fields(_position(mesh, members), origin[0])
     size = max(float(np.abs(_position(mesh, members) - origin).max()), 1e-300)
     scaled = fields / np.array([1, 1, 1, size, size, size])
-    gram = np.einsum("m,mic,mid->cd", weights, scaled, scaled)
+    gram = np.einsum("mij,mic,mjd->cd", weights, scaled, scaled)
     values, V = np.linalg.eigh(gram)
     ways = ["xyzabc".index(c) for c in link.directions]
     if values[0] < 1e-12 * values[-1] and set(ways) & {3, 4, 5}:
@@ -180,7 +180,13 @@ def _average(mesh: Mesh, link: AverageLink, rows: _Rows, number: int) -> str:
     inverse = (V[:, values > 1e-12 * values[-1]] / values[values > 1e-12 * values[-1]]) @ V.T[
         values > 1e-12 * values[-1]
     ]
-    fit = np.einsum("cd,m,mid->cmi", inverse, weights, scaled) / np.array([1, 1, 1, size, size, size])[:, None, None]
+    known = inverse @ gram  # projects on the rigid motions that the members tell
+    single = link.weights is not None and link.weights.ndim == 3
+    if single and np.abs(known - np.eye(6))[ways].max() > 1e-6:
+        raise UserError(
+            f"{link.where} follows its nodes in directions that do not tell all of its motion; add some to it"
+        )
+    fit = np.einsum("cd,mij,mjd->cmi", inverse, weights, scaled) / np.array([1, 1, 1, size, size, size])[:, None, None]
     own = rows.dof(np.repeat(members, 3), np.tile(np.arange(3), len(members)))
     axes = np.eye(3) if link.axes is None else link.axes
     for way in ways:
@@ -195,14 +201,20 @@ def _average(mesh: Mesh, link: AverageLink, rows: _Rows, number: int) -> str:
 
 
 def _weights(mesh: Mesh, link: AverageLink, members: Indices) -> Array:
-    """(m,) weights as given, or the tributary areas int N_i dA of a face's nodes, m2.
+    """(m, 3, 3) weights as given, or the tributary areas int N_i dA of a face's nodes, m2.
 
     Raises:
         UserError: areas of what is no face, weights that add up to nothing.
     """
     if link.weights is not None and not isinstance(link.members, str):
         kept = link.members != link.reference
-        weights = np.broadcast_to(link.weights, len(kept))[kept].astype(float)
+        weights = np.asarray(link.weights, dtype=float)
+        if weights.ndim == 3:
+            weights = weights[kept]
+            if not np.trace(weights.sum(axis=0)) > 0:
+                raise UserError(f"{link.where} has weights whose sum is not above 0; correct them")
+            return weights
+        weights = np.broadcast_to(weights, len(kept))[kept]
     elif isinstance(link.members, str) and link.members in mesh.faces:
         area = np.zeros(mesh.n_points)
         for block in face_blocks(mesh, link.members):
@@ -212,7 +224,7 @@ def _weights(mesh: Mesh, link: AverageLink, members: Indices) -> Array:
         raise UserError(f"{link.where} weighs nodes by areas of '{link.members}', which is no face of the mesh")
     if not weights.sum() > 0:
         raise UserError(f"{link.where} has weights whose sum is not above 0; correct them")
-    return weights
+    return weights[:, None, None] * np.eye(3)
 
 
 def _number(mesh: Mesh, node: int) -> int:

@@ -560,29 +560,30 @@ def _averages(bulk: _Bulk) -> Iterator[Link]:
                 f"{where} names its dependent displacements by UM, which is not read; leave it out"
             )
         members: list[int] = []
-        weights: list[float] = []
+        weights: list[Array] = []
         place, end = 5, card.index("ALPHA") if "ALPHA" in card else len(card)
         while place < end:
             if not card.at(place):
                 place += 1
                 continue
             weight = card.real(place) or 0.0
-            if not set("123") <= set(card.at(place + 1)):
-                raise Damaged(
-                    f"{where} takes single directions of its points ({card.at(place + 1)}); 123 is read"
-                )
+            digits = [int(c) - 1 for c in card.at(place + 1) if c in "123"]
             place += 2
             while place < end and (not card[place] or card[place].isdecimal()):
                 if card[place]:
                     members.append(int(card[place]))
-                    weights.append(weight)
+                    axes = bulk.held.axes.get(members[-1], np.eye(3))[digits]
+                    weights.append(weight * axes.T @ axes)
                 place += 1
         if not members:
             raise Damaged(f"{where} follows no nodes; add them")
         ways = card.directions(4)
-        axes = bulk.held.axes.get(card.whole(3)) if ways not in _EVERY else None
+        own_axes = bulk.held.axes.get(card.whole(3)) if ways not in _EVERY else None
         reference, positions = bulk.positions(card, [card.whole(3)]), bulk.positions(card, members)
-        yield AverageLink(where, int(reference[0]), positions, np.array(weights), ways, axes)
+        W = np.array(weights)
+        even = (W == W[:, :1, :1] * np.eye(3)).all()
+        factors = W[:, 0, 0] if even else W
+        yield AverageLink(where, int(reference[0]), positions, factors, ways, own_axes)
 
 
 def _equations(bulk: _Bulk) -> Iterator[Link]:
