@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -17,6 +18,7 @@ from microslip.data import Mesh
 from microslip.elasticity import isotropic, turned, turned_strain
 from microslip.mesh import read_mesh
 from microslip.mesh.materials import NONE, Substitute, orthotropic_row
+from microslip.topology import CELL_TYPES
 
 STEEL = ("MAT1,1,2.05+11,,0.29,7830.", "PSOLID,1,1")
 
@@ -297,3 +299,22 @@ def test_a_mean_motion_by_single_directions_turns_with_its_body(capsys):
     assert (plain[:2] > 1.05 * free[:2]).all()
     Path("a.bdf").write_text(bulk(mesh, *cards, few, grid.format("")))
     refused_command(["import", "a.bdf", "b"], capsys, "RBE3 61", "do not tell all of its motion")
+
+
+@pytest.mark.parametrize("kind", ["hexahedron20", "tetra10", "wedge15"])
+def test_a_cell_that_leaves_out_mid_side_nodes_has_straight_edges(kind):
+    """All but one left out by one cell, which is no edge of others: the body of the first-order cell,
+    with the equation written by hand in the whole one."""
+    mesh = meshes.brick(kind, (1, 1, 1), (0.06, 0.011, 0.007))
+    cell = mesh.cells[kind][0]
+    text = bulk(mesh, "SPC1,7,123,1,2,3,4")
+    edge, gone = CELL_TYPES[kind].edges[0], mesh.node_id[cell[CELL_TYPES[kind].corners]]
+    a, b = (mesh.node_id[cell[i]] for i in edge[:2])
+    ways = [f"MPC,5,{gone},{w},1.0,{a},{w},-0.5,+\n+,,{b},{w},-0.5" for w in (1, 2, 3)]
+    control = ("SPC=7", "MPC=5")
+    by_hand = hertz(bulk(mesh, "SPC1,7,123,1,2,3,4", *ways, control=control), "hand")
+    head, body = text.split("BEGIN BULK")
+    grid, cells = body[: body.index(f"{CARD[kind[:3]]},")], body[body.index(f"{CARD[kind[:3]]},") :]
+    cells = re.sub(rf"(?<=,){gone}(?=[,\n])", "", cells)
+    left = hertz(f"{head}BEGIN BULK{grid}{cells}", "left")
+    np.testing.assert_allclose(left, by_hand, rtol=1e-9)

@@ -19,6 +19,7 @@ import numpy as np
 
 from ..data import Array, AverageLink, Equation, Indices, Link, RigidLink
 from ..elasticity import strain_tensor, turned, turned_strain
+from ..topology import CELL_TYPES
 from .bulk_systems import Chained, LocalSystem, through
 from .materials import isotropic_rows, orthotropic_row
 from .raw import PRESTRESSED, Damaged, DeckMaterial, Numbering, RawMesh, ignored, lost
@@ -161,7 +162,7 @@ def read_bdf(path: Path) -> RawMesh:
     raw.lost += stress
     unused = (n for n in others if not (_COUNTS.fullmatch(n) or _SILENT.fullmatch(n)))
     raw.remarks += ignored(unused, _LOADS, bool(stress))
-    raw.links = [*_rigid(bulk), *_averages(bulk), *_equations(bulk)]
+    raw.links += [*_rigid(bulk), *_averages(bulk), *_equations(bulk)]
     add_supports(raw, bulk.held, bulk.numbering)
     if not re.search(r"^\s*ENDDATA\b", text, re.IGNORECASE | re.MULTILINE):
         raw.unended = "no ENDDATA"  # a warning: decks are also kept as parts that others include
@@ -355,6 +356,7 @@ def _elements(bulk: _Bulk) -> list[int]:
             )
             kind, nodes = _cell(name, number, card)
             blocks.setdefault(kind, []).append((number, region, nodes))
+    _add_left_out(bulk, blocks)
     bulk.raw.add_solids(blocks, bulk.numbering, "an element names")
     if fluids and not blocks:
         raise Damaged("all of its solid cells are a fluid (MAT10); give those of the structure")
@@ -362,17 +364,46 @@ def _elements(bulk: _Bulk) -> list[int]:
 
 
 def _cell(name: str, number: int, card: _Card) -> tuple[str, list[int]]:
+    """Type and nodes of a cell, 0 where a mid-side node is left out."""
     forms = _SOLIDS[name]
     nodes = [card.whole(place, 0) for place in range(3, len(card))]
     while nodes and nodes[-1] == 0:
         nodes.pop()
-    if len(nodes) not in forms or min(nodes) < 1:
-        named = " or ".join(str(n) for n in sorted(forms))
+    corners, most = sorted(forms)
+    if len(nodes) not in range(corners, most + 1) or min(nodes[:corners]) < 1 or min(nodes) < 0:
         raise Damaged(
-            f"element {number} ({name}) has {sum(n > 0 for n in nodes)} nodes; {named} are read"
+            f"element {number} ({name}) has {sum(n > 0 for n in nodes)} nodes; {corners} or {most} are read"
         )
-    kind, places = forms[len(nodes)]
+    kind, places = forms[corners if len(nodes) == corners else most]
+    nodes += [0] * (max(places) + 1 - len(nodes))
     return kind, [nodes[i] for i in places]
+
+
+def _add_left_out(bulk: _Bulk, blocks: dict[str, list[tuple[int, int, list[int]]]]) -> None:
+    """Put a node in the middle of every edge without one in cells that have others: it moves as the
+    mean of the edge's ends, so the edge is a straight first-order one, as Nastran takes it."""
+    raw, made = bulk.raw, dict[tuple[int, int], int]()
+    first = int(raw.node_id.max()) + 1
+    for kind, cells in blocks.items():
+        edges, corners = CELL_TYPES[kind].edges, CELL_TYPES[kind].corners
+        for _, _, nodes in cells:
+            for i in (i for i, node in enumerate(nodes) if not node):
+                a, b = (nodes[end] for end in edges[i - corners][:2])
+                nodes[i] = made.setdefault((min(a, b), max(a, b)), first + len(made))
+    if not made:
+        return
+    at = bulk.numbering.positions(list(made), "an element names")
+    new = len(raw.points) + np.arange(len(at))
+    where, mean = f"{bulk.file}: mid-side nodes that are left out", np.array([1.0, -0.5, -0.5])
+    raw.links += [
+        Equation(where, np.array([node, *ends]), np.full(3, way), mean)
+        for node, ends in zip(new, at, strict=True)
+        for way in range(3)
+    ]
+    raw.points = np.concatenate([raw.points, raw.points[at].mean(axis=1)])
+    raw.node_id = np.concatenate([raw.node_id, first + np.arange(len(at))])
+    bulk.numbering = Numbering(raw.node_id)
+    raw.remarks.append(f"{len(at)} mid-side nodes are left out by cells: their edges are of first order")
 
 
 def _fluids(bulk: _Bulk) -> set[int]:
