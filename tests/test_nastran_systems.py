@@ -318,3 +318,13 @@ def test_a_cell_that_leaves_out_mid_side_nodes_has_straight_edges(kind):
     cells = re.sub(rf"(?<=,){gone}(?=[,\n])", "", cells)
     left = hertz(f"{head}BEGIN BULK{grid}{cells}", "left")
     np.testing.assert_allclose(left, by_hand, rtol=1e-9)
+
+
+def test_a_rotation_alone_is_held_at_a_reference_node():
+    """RBE2 from a point that may not turn about x: torsion of the end is held, of the free one not."""
+    mesh = block()
+    root, tip = (",".join(map(str, mesh.node_id[at].tolist())) for at in ends(mesh).values())
+    cards = [f"SPC1,7,123,{root}", "GRID,900,,0.06,0.0055,0.0035", f"RBE2,60,900,123,{tip}"]
+    free, held = (hertz(bulk(mesh, *cards, *more), name) for more, name in (((), "free"), (["SPC1,7,4,900"], "held")))
+    bending = [i for i, f in enumerate(free[:6]) if np.abs(held / f - 1).min() < 1e-6]
+    assert len(bending) < 6 and len(bending) >= 4

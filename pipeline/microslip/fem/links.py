@@ -158,8 +158,8 @@ def _guide(mesh: Mesh, link: Guide, rows: _Rows, number: int) -> str:
     first = 3 if link.turning else 0
     columns = np.column_stack([rows.dof(link.nodes, first + way) for way in range(3)])
     rows.add(number, columns, link.axes, np.full(len(columns), -1))
-    what = "rotations" if link.turning else "displacements"
-    return f"{link.where}: {len(columns)} {what} in skewed directions are zero"
+    what = "rotations" if link.turning else "displacements in skewed directions"
+    return f"{link.where}: {len(columns)} {what} are zero"
 
 
 def _average(mesh: Mesh, link: AverageLink, rows: _Rows, number: int) -> str:

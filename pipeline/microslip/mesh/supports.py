@@ -55,7 +55,7 @@ def add_supports(raw: RawMesh, held: Constraints, numbering: Numbering) -> None:
     for node, found in held.nodes.items():
         at = raw.node_id[turning] == node
         held.nodes[node] = found if at.any() else found - set("abc")
-    raw.links += _guided(raw, held, numbering) if held.axes else []
+    raw.links += _guided(raw, held, numbering)
     left_out = dict.fromkeys(held.left_out)
     for name, found in held.sets.items():
         directions = _in_order(found)
@@ -92,7 +92,7 @@ _ALIKE = 1e-9
 
 
 def _guided(raw: RawMesh, held: Constraints, numbering: Numbering) -> list[Link]:
-    """Supports in skewed directions, which are taken out of what is held; along the body's axes
+    """Supports in skewed directions, and of rotations alone, which are taken out of what is held; along the body's axes
     they stay there as directions of the body."""
     for name in [name for name, ways in held.sets.items() if len(ways & set("xyz")) in (1, 2)]:
         members = raw.node_id[raw.point_sets.get(name, np.zeros(0, dtype=np.int64))].tolist()
@@ -112,9 +112,13 @@ def _guided(raw: RawMesh, held: Constraints, numbering: Numbering) -> list[Link]
             if len(chosen) < 3:
                 skewed[ways == "abc"] += [(node, e) for e in axes[~along.any(axis=1)]]
         held.nodes[node] = plain
+    for node, left in held.nodes.items():  # rotations alone, which no line of body.toml holds
+        if left and not left & set("xyz") and np.isin(node, numbering.sorted):
+            skewed[True] += [(node, np.eye(3)["abc".index(c)]) for c in sorted(left)]
+            held.nodes[node] = set()
     return [
         Guide(
-            "supports in local systems",
+            "supports by equations",
             numbering.positions([node for node, _ in pairs], "a constraint names"),
             np.array([e for _, e in pairs]),
             turning,
