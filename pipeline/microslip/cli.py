@@ -538,8 +538,9 @@ def _say_seal(file: Path, quiet: bool) -> None:
 
 @app.command(name="import")
 def import_(
-    file: Path, /, *more: Path, unit: str | None = None, apart: Apart = False, modes: bool = False
-) -> None:
+    file: Path, /, *more: Path, unit: str | None = None, apart: Apart = False, density: float | None = None,
+    young: float | None = None, poisson: float | None = None, modes: bool = False,
+) -> None:  # fmt: skip
     """Make a body.toml around a CAD file, a mesh or matrices, or a modal file from measured modes.
 
     Several CAD files, or several meshes, of parts that touch become an assembly: a body.toml each, with the faces where
@@ -551,23 +552,27 @@ def import_(
         more: the other parts of an assembly, and the folder of the new files, last; one of their names if not given.
             A part may be a folder with a body.toml that is there already.
         unit: of lengths; if not given what the file tells (/UNITS of Ansys, data set 164), else mm.
+        density: kg/m3, whatever the unit of the file, of materials that have none there; steel's 7850 if not given.
+        young: Pa, likewise, of materials without elastic constants, and of kinds that are not read; 2.1e11.
+        poisson: likewise; 0.3.
         modes: compute them at once; the first frequencies stand on the page.
     """
     from .stages.decks import import_apart, import_deck, with_modes
-    from .stages.importing import CAD
+    from .stages.importing import CAD, substitute
     from .stages.parts import import_parts
 
     parts = [file, *(p for p in more if p.is_file() or (p / "body.toml").is_file() or p is not more[-1])]
     folder = more[-1] if len(parts) <= len(more) else None
+    instead = substitute(density, young, poisson)
     if apart and len(parts) > 1:
         raise UserError(f"import --apart: sets the solids of one file apart, and {len(parts)} parts are given")
     with progress(f"import {file}", quiet=file.suffix.lower() not in CAD) as report:
         if apart:
-            made = import_apart(file, folder, unit, report)
+            made = import_apart(file, folder, unit, report, instead)
         elif len(parts) == 1:
-            made = import_deck(file, folder, unit, report)
+            made = import_deck(file, folder, unit, report, instead)
         else:
-            made = import_parts(parts, folder, unit, report)
+            made = import_parts(parts, folder, unit, report, instead)
     if modes:
         with progress(f"modes of {made.path.parent}") as report:
             made = with_modes(made, report)
