@@ -72,6 +72,7 @@ class Deck:
     points: list[Array] = field(default_factory=list)
     solids: list[Cells] = field(default_factory=list)
     facets: list[Cells] = field(default_factory=list)
+    lumped: list[Cells] = field(default_factory=list)
     written: dict[str, str] = field(default_factory=dict)
     node_sets: dict[str, list[Indices]] = field(default_factory=dict)
     cell_sets: dict[str, list[Indices]] = field(default_factory=dict)

@@ -11,6 +11,8 @@ from ..data import Array, Indices
 from ..errors import of_file
 from .cards import Card, fields, numbers, whole_numbers
 from .deck import Cells, Deck, DeckSurface, Readers
+from .deck_lumps import NODES as LUMPED
+from .deck_lumps import read_cells
 from .instances import local_system
 from .raw import Damaged, Numbering, RawMesh, joined
 
@@ -76,6 +78,9 @@ def _read_elements(deck: Deck, card: Card) -> None:
     kind = card.word("TYPE")
     match = cell_type(kind)
     deck.kinds.append(kind)
+    if kind in LUMPED and card.lines:
+        read_cells(deck, card, kind, numbers(card.lines, f"*ELEMENT, TYPE={kind}"))
+        return
     if match is None:
         deck.add(deck.cell_sets, card.text("ELSET"))
         return  # beams, springs, masses and the like

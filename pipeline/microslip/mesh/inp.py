@@ -22,6 +22,9 @@ from .deck_joints import KEYWORDS as JOINTS
 from .deck_joints import joints_of, preloads_of, sector_of, unread
 from .deck_links import KEYWORDS as LINKS
 from .deck_links import links_of
+from .deck_lumps import KEYWORDS as LUMPING
+from .deck_lumps import NODES as LUMPED
+from .deck_lumps import lumps_of
 from .deck_materials import assign_materials
 from .deck_mesh import CORNERS, add_surfaces, cell_type
 from .instances import numbered, outline, place, placement, places
@@ -33,7 +36,7 @@ _REFUSED = {
     "ELGEN": "generates cells by *ELGEN", "ELCOPY": "copies cells by *ELCOPY",
 }  # fmt: skip
 
-_LINKING = (*LINKS, *JOINTS)
+_LINKING = (*LINKS, *JOINTS, *LUMPING)
 READERS = deck_mesh.READERS | deck_materials.READERS | deck_conditions.READERS
 
 
@@ -163,7 +166,7 @@ def _read_card(deck: Deck, card: Card) -> None:
         return
     READERS[card.keyword](deck, card)
     kind = card.word("TYPE")
-    if card.keyword == "ELEMENT" and card.lines and not cell_type(kind) and kind != "DCOUP3D":
+    if card.keyword == "ELEMENT" and card.lines and not cell_type(kind) and kind not in (*LUMPED, "DCOUP3D"):
         deck.lost.append(lost(card.where, f"*ELEMENT, TYPE={kind}"))
 
 
@@ -175,7 +178,7 @@ _SILENT = {
 """Keywords that say nothing of the body."""
 
 _COUNTS = re.compile(
-    "MASS|ROTARY INERTIA|NONSTRUCTURAL MASS|SPRING|DASHPOT|GAP|JOINT|CONNECTOR [A-Z]+|EMBEDDED ELEMENT|"
+    "NONSTRUCTURAL MASS|GAP|JOINT|CONNECTOR [A-Z]+|EMBEDDED ELEMENT|"
     "SHELL TO SOLID COUPLING|FASTENER|MATRIX (INPUT|ASSEMBLE)|SUBSTRUCTURE [A-Z]+|USER ELEMENT|UEL PROPERTY|"
     "CONTACT|COHESIVE BEHAVIOR|HYPERELASTIC|HYPERFOAM|MODEL CHANGE|FOUNDATION|"
     "(BEAM|BEAM GENERAL|SHELL|SHELL GENERAL|MEMBRANE|FRAME|COHESIVE|GASKET|CONNECTOR) SECTION"
@@ -212,6 +215,7 @@ def _assembled(deck: Deck) -> RawMesh:
         if len(members):
             raw.add_set(deck.written[key], members, numbering)
     raw.links, left_out = links_of(deck, numbering, points)
+    raw.lumps = list(lumps_of(deck, numbering, points))
     raw.sector, uncut = sector_of(deck)
     raw.preloads, unpressed, unused = preloads_of(deck)
     raw.lost = [*deck.lost, *left_out, *uncut, *unpressed]
@@ -233,9 +237,9 @@ def _assembled(deck: Deck) -> RawMesh:
 
 def _unknown_cells(deck: Deck) -> list[str]:
     """What is said of element sets that name cells which are not there; nothing beside kinds that are not read."""
-    if not all(map(cell_type, deck.kinds)):
+    if not all(kind in LUMPED or cell_type(kind) for kind in deck.kinds):
         return []
-    known = joined(cells.ids for cells in (*deck.solids, *deck.facets))
+    known = joined(cells.ids for cells in (*deck.solids, *deck.facets, *deck.lumped))
     gone = {key: np.setdiff1d(joined(parts), known) for key, parts in deck.cell_sets.items()}
     return [undefined(deck.written[key], "element", ids) for key, ids in gone.items() if len(ids)]
 

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ..data import Array, Indices, Joint, Link, Sector
+from ..data import Array, Indices, Joint, Link, LumpedElement, PointMass, Sector
 from ..errors import UserError
 from ..topology import FACET_CORNERS
 
@@ -70,7 +70,7 @@ class RawMesh:
         lost: what carries mass, stiffness or a constraint and is not read, in words.
         remarks: what was read as something else or not used, in words. instances: name -> positions. joints: pairs of
             faces in contact. sector: of a cyclic ring. preloads: of bolts: where it stands, force
-            in the file's unit.
+            in the file's unit. lumps: masses, springs and dashpots, by positions in `points`.
     """
 
     points: Array
@@ -92,6 +92,7 @@ class RawMesh:
     joints: list[Joint] = field(default_factory=list)
     sector: Sector | None = None
     preloads: list[tuple[str, float]] = field(default_factory=list)
+    lumps: list[PointMass | LumpedElement] = field(default_factory=list)
 
     def add_points(self, name: str, positions: Indices) -> None:
         """Add to a point set."""

@@ -189,15 +189,18 @@ def _hold(mesh: Mesh) -> bool:
     """Whether the file's supports leave no rigid motion."""
     from ..fem.discretise import discretise
     from ..fem.tied import tied_upper
-    from ..modal.rigid import free_motions, left_by
+    from ..modal.equilibrium import lumped_springs
+    from ..modal.rigid import free_motions, left_by, unresisted
 
     none, fixed = np.zeros(0, dtype=np.int64), _fixed(mesh)
+    centre, pattern = mesh.points.mean(axis=0), discretise(mesh).pattern
+    springs = lumped_springs(mesh, pattern)
     if mesh.ties is None:
-        return free_motions(mesh.points, mesh.points.mean(axis=0), fixed).shape[1] == 0
+        return unresisted(free_motions(mesh.points, centre, fixed), springs, pattern).shape[1] == 0
     first, sets = 3 * mesh.n_points, mesh.ties.sets
     moves = [first + 6 * sets.get(n, none) + "xyzabc".index(c) for n, ways in mesh.supports.items() for c in ways]
-    free = tied_upper(discretise(mesh).pattern, np.concatenate([fixed, *moves]), mesh.ties)
-    return left_by(free, mesh.points, mesh.points.mean(axis=0), fixed).shape[1] == 0
+    free = tied_upper(pattern, np.concatenate([fixed, *moves]), mesh.ties)
+    return unresisted(left_by(free, mesh.points, centre, fixed), springs, pattern).shape[1] == 0
 
 
 def _tied(file: Path, mesh: Mesh) -> tuple[Mesh, list[str]]:
@@ -364,7 +367,8 @@ def _mesh(file: Path, folder: Path, unit: str, instances: Sequence[str] = ()) ->
     told += [*ties, *((*joints, *_pressed(mesh)) if not instances else ())]
     held, said = _supports(mesh)
     told += said
-    lines = [] if "[[supports]]" in held else ["free = true               # nothing is held yet"]
+    grounded = mesh.lumps is not None and _hold(mesh)
+    lines = [] if "[[supports]]" in held or grounded else ["free = true               # nothing is held yet"]
     lines += ["", "[geometry]", f"mesh = {_beside(file, folder)}"]
     lines += [f"instances = {json.dumps(list(instances))}"] if instances else []
     lines += ["", "[material]"]
