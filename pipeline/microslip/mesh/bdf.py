@@ -17,6 +17,8 @@ import numpy as np
 
 from ..data import AverageLink, Equation, Indices, Link, RigidLink
 from ..elasticity import turned_strain
+from .bdf_lumps import READ as LUMPED
+from .bdf_lumps import bars_of, lumps_of
 from .materials import isotropic_rows
 from .raw import PRESTRESSED, Damaged, DeckMaterial, Numbering, RawMesh, ignored, lost
 from .supports import Constraints, add_supports
@@ -38,7 +40,7 @@ _MATERIALS = ("MAT2", "MAT3", "MAT8", "MAT9", "MAT10", "MAT11")
 _PROPERTIES = ("PCOMPS", "PLSOLID", "PCOMPLS", "PSOLID")
 _READ = {
     "GRID", "PSOLID", "MAT1", "PARAM", "SET1", "SPC", "SPC1", "SPCADD", "RBE2", "RBE3", "MPC", "MPCADD", *_SOLIDS,
-    *_SHELLS, *_MATERIALS, *_PROPERTIES,
+    *_SHELLS, *_MATERIALS, *_PROPERTIES, *LUMPED,
 }  # fmt: skip
 _SILENT = re.compile(
     r"EIG\w*|CORD\w+|MATT\d+|ENDDATA|LOAD|DLOAD|TABL\w*|FREQ\d?|TSTEP|NLPARM|DTI|SET3|MDLPRM"
@@ -156,7 +158,8 @@ def read_bdf(path: Path) -> RawMesh:
     raw.lost += stress
     unused = (n for n in others if not (_COUNTS.fullmatch(n) or _SILENT.fullmatch(n)))
     raw.remarks += ignored(unused, _LOADS, bool(stress))
-    raw.links = [*_rigid(bulk), *_averages(bulk), *_equations(bulk)]
+    raw.links = [*_rigid(bulk), *bars_of(bulk), *_averages(bulk), *_equations(bulk)]
+    raw.lumps = lumps_of(bulk)
     add_supports(raw, bulk.held, bulk.numbering)
     if not re.search(r"^\s*ENDDATA\b", text, re.IGNORECASE | re.MULTILINE):
         raw.unended = "no ENDDATA"  # a warning: decks are also kept as parts that others include

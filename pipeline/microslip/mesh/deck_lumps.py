@@ -126,7 +126,8 @@ def _element(reading: _Reading, nodes: Array) -> LumpedElement:
     if reading.kind.endswith("A"):
         along = reading.points[nodes[1]] - reading.points[nodes[0]]
         if not along.any():
-            raise Damaged(f"a {reading.kind} joins two nodes at one place, so it has no direction; use {reading.kind[:-1]}2")
+            kind = reading.kind
+            raise Damaged(f"a {kind} joins two nodes at one place, so it has no direction; use {kind[:-1]}2")
         axes = [along / np.linalg.norm(along)] * 2
         turns = [0, 0]
     else:

@@ -128,8 +128,10 @@ class _Spread:
                 self._load(self._follower(node, item.where, item.offset + side * axis), moment / (2 * away**2))
         rest = m - second.sum() / away**2 if most else m
         if abs(rest) > 1e-12 * m:
-            centre = self._follower(node, item.where, item.offset) if item.offset.any() else self.point(node, item.where)
-            self._load(centre, rest)
+            away = item.offset.any()
+            self._load(
+                self._follower(node, item.where, item.offset) if away else self.point(node, item.where), rest
+            )
 
     def connect(self, item: LumpedElement) -> None:
         """Add a spring or dashpot."""
@@ -137,11 +139,11 @@ class _Spread:
         kept = np.array([row is not None for row in rows])
         given = [row for row in rows if row is not None]
         points = sorted({point for row in given for point, _ in row})
-        B = np.zeros((len(given), len(points), 3))
+        rows_of = np.zeros((len(given), len(points), 3))
         for k, row in enumerate(given):
             for point, vector in row:
-                B[k, points.index(point)] += vector
-        B = B.reshape(len(given), -1)
+                rows_of[k, points.index(point)] += vector
+        B = rows_of.reshape(len(given), 3 * len(points))
         both = [B.T @ A[np.ix_(kept, kept)] @ B for A in (item.stiffness, item.damping)]
         for i, a in enumerate(points):
             for j, b in enumerate(points[i:], i):

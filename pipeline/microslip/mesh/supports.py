@@ -94,6 +94,6 @@ def _turning(raw: RawMesh) -> Indices:
         for link in raw.links
         if not isinstance(link, FaceTie)
     ]
-    named += [item.node if isinstance(item, PointMass) else item.nodes for item in raw.lumps]
+    named += [[item.node] if isinstance(item, PointMass) else item.nodes for item in raw.lumps]
     used = np.unique(np.concatenate([np.zeros(0, dtype=np.int64), *(nodes.ravel() for _, nodes in raw.blocks)]))
-    return np.setdiff1d(joined(map(np.atleast_1d, named)), used)
+    return np.setdiff1d(joined(map(np.asarray, named)), used)
