@@ -1,27 +1,30 @@
 """Reader of Nastran bulk data: grid points, solid elements, materials, sets of points, shells as faces.
 
-Written against the Quick Reference Guide: GRID, CTETRA, CHEXA, CPENTA, CPYRAM, PSOLID, MAT1, PARAM WTMASS, SET1, SPC,
-SPC1, SPCADD, the constraints RBE2, RBE3, MPC, MPCADD and the shells CTRIA3, CTRIA6, CQUAD4, CQUAD8; fields of eight or
-sixteen columns or between commas.
+Written against the Quick Reference Guide: GRID, GRDSET, CORD1R, CORD1C, CORD1S, CORD2R, CORD2C, CORD2S,
+CTETRA, CHEXA, CPENTA, CPYRAM, PSOLID, MAT1, PARAM WTMASS, SET1, SPC, SPC1, SPCADD, the constraints
+RBE2, RBE3, MPC, MPCADD and the shells CTRIA3, CTRIA6, CQUAD4, CQUAD8; fields of eight or sixteen
+columns or between commas.
 """
 
 from __future__ import annotations
 
+import contextlib
 import re
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 
-from ..data import AverageLink, Equation, Indices, Link, RigidLink
+from ..data import Array, AverageLink, Equation, Indices, Link, RigidLink
 from ..elasticity import turned_strain
 from .bdf_lumps import READ as LUMPED
 from .bdf_lumps import bars_of, lumps_of
+from .bulk_systems import Chained, LocalSystem, through
 from .materials import isotropic_rows
 from .raw import PRESTRESSED, Damaged, DeckMaterial, Numbering, RawMesh, ignored, lost
-from .supports import Constraints, add_supports
+from .supports import Constraints, add_supports, in_axes
 
 _BRICK20, _WEDGE15 = (
     (*range(12), *range(16, 20), *range(12, 16)),
@@ -38,9 +41,10 @@ _SOLIDS["CPYRA"] = _SOLIDS["CPYRAM"]
 _SHELLS = {"CTRIA3": 3, "CTRIAR": 3, "CTRIA6": 3, "CQUAD4": 4, "CQUADR": 4, "CQUAD8": 4}
 _MATERIALS = ("MAT2", "MAT3", "MAT8", "MAT9", "MAT10", "MAT11")
 _PROPERTIES = ("PCOMPS", "PLSOLID", "PCOMPLS", "PSOLID")
+_SYSTEMS = ("CORD1R", "CORD1C", "CORD1S", "CORD2R", "CORD2C", "CORD2S")
 _READ = {
-    "GRID", "PSOLID", "MAT1", "PARAM", "SET1", "SPC", "SPC1", "SPCADD", "RBE2", "RBE3", "MPC", "MPCADD", *_SOLIDS,
-    *_SHELLS, *_MATERIALS, *_PROPERTIES, *LUMPED,
+    "GRID", "GRDSET", *_SYSTEMS, "PSOLID", "MAT1", "PARAM", "SET1", "SPC", "SPC1", "SPCADD", "RBE2", "RBE3", "MPC",
+    "MPCADD", *_SOLIDS, *_SHELLS, *_MATERIALS, *_PROPERTIES, *LUMPED,
 }  # fmt: skip
 _SILENT = re.compile(
     r"EIG\w*|CORD\w+|MATT\d+|ENDDATA|LOAD|DLOAD|TABL\w*|FREQ\d?|TSTEP|NLPARM|DTI|SET3|MDLPRM"
@@ -48,7 +52,7 @@ _SILENT = re.compile(
 """Cards that say nothing of the body, or only together with others that are named."""
 _LOADS = r"FORCE\d?|MOMENT\d?|PLOAD\w*|GRAV|RFORCE\d?|ACCEL\d?|TEMP\w*|SLOAD|DAREA|DEFORM"
 _COUNTS = re.compile(
-    r"C(?!ORD|END)[A-Z]+\d?|R(?!FORCE|LOAD|AND|ING)[A-Z]+\d?|SUPORT1?|GENEL|DMIG|NSM[A-Z]*\d?|GRDSET|"
+    r"C(?!ORD|END)[A-Z]+\d?|R(?!FORCE|LOAD|AND|ING)[A-Z]+\d?|SUPORT1?|GENEL|DMIG|NSM[A-Z]*\d?|"
     r"MFLUID|BCTSET|BGSET|BCTABL[E1]|BCBODY1?|PSHELL|PCOMPG?|BCONTACT|BOLT|SPCOFF1?|SPCR|SPLINE\d|ASET1?|AEQUAD4"
 )
 """Cards that add mass, stiffness or constraints; those beside `_READ` are not read."""
@@ -105,6 +109,11 @@ class _Bulk:
     numbering: Numbering
     held: Constraints = field(default_factory=Constraints)
 
+    def frame(self, card: _Card, number: int, node: int) -> Array:
+        """(3, 3) rows are the directions of a coordinate system at the node at a position."""
+        with _named(self.where(card)):
+            return _systems(self.cards, self.file)[number].directions(self.raw.points[[node]])[0]
+
     def where(self, card: _Card) -> str:
         return f"{self.file}, {card.where}"
 
@@ -130,8 +139,8 @@ def read_bdf(path: Path) -> RawMesh:
     for card in _cards(text):
         cards[card[0]].append(card)
     others = {name: c for name, c in cards.items() if name not in _READ}
-    raw = _grid(cards)
-    bulk = _Bulk(path.name, text, cards, raw, Numbering(raw.node_id))
+    raw, held = _grid(cards, path.name)
+    bulk = _Bulk(path.name, text, cards, raw, Numbering(raw.node_id), held)
     properties = _elements(bulk)
     if any(cards[name] for name in (*_PROPERTIES, "MAT1", *_MATERIALS)):
         raw.materials = [_material(bulk, p) for p in properties]
@@ -261,18 +270,83 @@ def _listed(card: _Card, first: int, numbering: Numbering | None = None) -> list
 # content -------------------------------------------------------------------------------------------------------------
 
 
-def _grid(cards: Mapping[str, list[_Card]]) -> RawMesh:
-    if "GRID" not in cards:
+def _grid(cards: Mapping[str, list[_Card]], file: str) -> tuple[RawMesh, Constraints]:
+    """The grid points in the basic system, and what they hold themselves (PS) in the directions of
+    their systems (CD)."""
+    if not cards["GRID"]:
         raise Damaged("it holds no GRID card")
-    ids, points = [], []
-    for card in cards["GRID"]:
-        ids.append(card.whole(1))
-        if card.whole(2, 0) != 0:
-            raise Damaged(
-                f"GRID {ids[-1]} uses the local coordinate system {card[2]}; write it in the basic one"
-            )
-        points.append([card.real(place) or 0.0 for place in (3, 4, 5)])
-    return RawMesh(np.array(points), np.array(ids, dtype=np.int64))
+    usual = next(iter(cards["GRDSET"]), _Card())
+    systems, table = _systems(cards, file), np.empty((len(cards["GRID"]), 3))
+    ids, held = np.array([card.whole(1) for card in cards["GRID"]], dtype=np.int64), Constraints()
+    within, turned = dict[int, list[int]](), dict[int, list[int]]()
+    for place, card in enumerate(cards["GRID"]):
+        table[place] = [card.real(column) or 0.0 for column in (3, 4, 5)]
+        for column, groups in ((2, within), (6, turned)):
+            number = card.whole(column, usual.whole(column, 0))
+            if number > 0:  # -1 is a grid point of a fluid
+                groups.setdefault(number, []).append(place)
+        held.hold(int(ids[place]), (card if card.at(7) else usual).directions(7))
+    for groups, into in ((within, True), (turned, False)):
+        for number, places in groups.items():
+            with _named(f"{file}, {cards['GRID'][places[0]].where}"):
+                system = systems[number]
+            if into:
+                table[places] = system.points(table[places])
+            else:
+                frames = system.directions(table[places])
+                held.axes |= dict(zip(ids[places].tolist(), frames, strict=True))
+    return RawMesh(table, ids), held
+
+
+@contextlib.contextmanager
+def _named(where: str) -> Iterator[None]:
+    """Puts the place of a card before what is wrong with it."""
+    try:
+        yield
+    except Damaged as error:
+        text = str(error.args[0])
+        raise Damaged(text if ", line " in text else f"{where} {text}") from None
+
+
+def _systems(cards: Mapping[str, list[_Card]], file: str) -> Chained:
+    """The systems of CORD1R, C, S (through three grid points) and CORD2R, C, S."""
+    known = dict[int, tuple[_Card, int]]()
+    for name in _SYSTEMS:
+        for card in cards[name]:
+            for place in (1, 5) if name[4] == "1" else (1,):
+                if place == 5 and not card.at(place):
+                    continue
+                number = card.whole(place)
+                if number in known and known[number][0][1:] != card[1:]:
+                    with _named(f"{file}, {card.where}"):
+                        raise Damaged(f"defines system {number}, which is there already")
+                known[number] = card, place
+    grids = dict[int, _Card]()
+
+    def at(number: int) -> Array:
+        """(3,) of a grid point."""
+        if not grids:
+            grids.update((card.whole(1), card) for card in cards["GRID"])
+        if number not in grids:
+            raise Damaged(f"names grid point {number}, which is not there")
+        card, usual = grids[number], next(iter(cards["GRDSET"]), _Card())
+        within = chained[max(card.whole(2, usual.whole(2, 0)), 0)]
+        return within.points(np.array([[card.real(column) or 0.0 for column in (3, 4, 5)]]))[0]
+
+    def made(number: int) -> LocalSystem:
+        if number not in known:
+            raise Damaged(f"uses the coordinate system {number}, which no CORD card defines; add it")
+        card, place = known[number]
+        with _named(f"{file}, {card.where}"):
+            if card[0][4] == "1":
+                points = np.array([at(card.whole(place + i)) for i in (1, 2, 3)])
+            else:
+                rows = [[card.real(3 + 3 * i + k) or 0.0 for k in range(3)] for i in range(3)]
+                points = chained[card.whole(2, 0)].points(np.array(rows))
+            return through(card[0][5], *points)
+
+    chained = Chained(made)
+    return chained
 
 
 def _elements(bulk: _Bulk) -> list[int]:
@@ -341,9 +415,6 @@ def _material(bulk: _Bulk, property_: int) -> DeckMaterial:
 def _constrain(bulk: _Bulk) -> None:
     """Zero displacements: GRID's own, and those of the sets that the case control chooses, or the only one."""
     held, cards = bulk.held, bulk.cards
-    held.turned = {c.whole(1) for c in cards["GRID"] if c.whole(6, 0) != 0}
-    for card in cards["GRID"]:
-        held.hold(card.whole(1), card.directions(7))
     chosen = _chosen(bulk, held)
     for card in cards["SPC1"]:
         if card.whole(1) in chosen:
@@ -392,15 +463,6 @@ def _chosen(bulk: _Bulk, held: Constraints, kind: str = "SPC") -> set[int]:
     return chosen
 
 
-def _refuse_turned(bulk: _Bulk, card: _Card, nodes: Iterable[int]) -> None:
-    """Raises `Damaged` if the directions of a node are those of a local system (CD)."""
-    if turned := next((node for node in nodes if node in bulk.held.turned), None):
-        raise Damaged(
-            f"{bulk.where(card)} takes single directions of GRID {turned} in a local system (CD); "
-            "write it in the basic one"
-        )
-
-
 def _rigid(bulk: _Bulk) -> Iterator[Link]:
     """RBE2: points that follow one as a rigid body does, in some of its directions."""
     for card in bulk.cards["RBE2"]:
@@ -409,9 +471,14 @@ def _rigid(bulk: _Bulk) -> Iterator[Link]:
         if not members:
             raise Damaged(f"{bulk.where(card)} couples no nodes to its node {card.at(2)}; add them")
         reference, ways = bulk.positions(card, [card.whole(2)]), card.directions(3)
-        if ways not in _EVERY:
-            _refuse_turned(bulk, card, [card.whole(2), *members])
-        yield RigidLink(bulk.where(card), int(reference[0]), bulk.positions(card, members), ways)
+        link = RigidLink(bulk.where(card), int(reference[0]), bulk.positions(card, members), ways)
+        turned = bulk.held.axes.keys() & set(members) if ways not in _EVERY else set()
+        if len(turned) < len(members):
+            plain = [number for number in members if number not in turned]
+            yield replace(link, members=bulk.positions(card, plain))
+        for number in sorted(turned):
+            alone = bulk.positions(card, [number])
+            yield replace(link, members=alone, axes=bulk.held.axes[number])
 
 
 def _averages(bulk: _Bulk) -> Iterator[Link]:
@@ -443,10 +510,9 @@ def _averages(bulk: _Bulk) -> Iterator[Link]:
         if not members:
             raise Damaged(f"{where} follows no nodes; add them")
         ways = card.directions(4)
-        if ways not in _EVERY:
-            _refuse_turned(bulk, card, [card.whole(3)])
+        axes = bulk.held.axes.get(card.whole(3)) if ways not in _EVERY else None
         reference, positions = bulk.positions(card, [card.whole(3)]), bulk.positions(card, members)
-        yield AverageLink(where, int(reference[0]), positions, np.array(weights), ways)
+        yield AverageLink(where, int(reference[0]), positions, np.array(weights), ways, axes)
 
 
 def _equations(bulk: _Bulk) -> Iterator[Link]:
@@ -462,9 +528,14 @@ def _equations(bulk: _Bulk) -> Iterator[Link]:
         nodes, ways = bulk.positions(card, numbers), [card.whole(p + 1, 0) - 1 for p in places]
         if not all(0 <= way < 6 for way in ways):
             raise Damaged(f"{bulk.where(card)} names a component that no grid point has (1 to 6)")
-        _refuse_turned(bulk, card, numbers)
         factors = np.array([card.real(p + 2) or 0.0 for p in places])
-        yield Equation(bulk.where(card), nodes, np.array(ways), factors)
+        if bulk.held.axes.keys().isdisjoint(numbers):
+            yield Equation(bulk.where(card), nodes, np.array(ways), factors)
+            continue
+        pairs = zip(numbers, ways, strict=True)
+        along = np.array([bulk.held.axes.get(node, np.eye(3))[way % 3] for node, way in pairs])
+        first = np.array(ways) // 3 * 3
+        yield in_axes(bulk.where(card), nodes, first, along * factors[:, None])
 
 
 def _shells(bulk: _Bulk) -> None:

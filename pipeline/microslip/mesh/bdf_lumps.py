@@ -41,7 +41,8 @@ def _masses(bulk: _Bulk, scale: float) -> Iterator[PointMass]:
         elif system and not (x.any() or _round(J)):
             pass  # alike in every system
         elif system:
-            x, J = _turned(bulk, card, system, x, J)
+            Q = bulk.frame(card, system, node)
+            x, J = Q.T @ x, Q.T @ J @ Q
         _refuse_impossible(bulk, card, m, J)
         yield PointMass(bulk.where(card), node, scale * m, x, scale * J)
     for card in bulk.cards["CONM1"]:
@@ -67,10 +68,6 @@ def _round(J: Array) -> bool:
     return bool(np.abs(J - np.trace(J) / 3 * np.eye(3)).max() > 0)
 
 
-def _turned(bulk: _Bulk, card: _Card, system: int, x: Array, J: Array) -> tuple[Array, Array]:
-    raise Damaged(f"{bulk.where(card)} is written in the coordinate system {system}; write it in the basic one (0)")
-
-
 def _refuse_impossible(bulk: _Bulk, card: _Card, m: float, J: Array) -> None:
     if m < 0 or np.linalg.eigvalsh(J)[0] < -1e-9 * np.abs(J).max():
         raise Damaged(f"{bulk.where(card)} has a mass or inertia below 0; correct it")
@@ -86,11 +83,14 @@ def _scalars(bulk: _Bulk) -> Iterator[LumpedElement]:
             if any(not 1 <= way <= 6 for _, way in ends) or not ends:
                 bulk.raw.lost.append(lost(bulk.where(card), f"{card.name} on scalar points"))
                 continue
-            _in_basic(bulk, card, [node for node, _ in ends])
-            row = np.array([1.0, -1.0])[: len(ends)]
-            A = (value or 0.0) * np.outer(row, row)
-            zero, nodes = np.zeros_like(A), bulk.positions(card, [node for node, _ in ends])
-            ways = np.array([way - 1 for _, way in ends])
+            basic, signs = np.eye(3), (1.0, -1.0)
+            axes = [sign * bulk.held.axes.get(n, basic)[(w - 1) % 3] for (n, w), sign in zip(ends, signs, strict=False)]
+            row = np.concatenate(axes)
+            used = row != 0
+            A = (value or 0.0) * np.outer(row[used], row[used])
+            zero = np.zeros_like(A)
+            nodes = np.repeat(bulk.positions(card, [node for node, _ in ends]), 3)[used]
+            ways = np.concatenate([3 * ((way - 1) // 3) + np.arange(3) for _, way in ends])[used]
             both = (A, zero) if name[1] == "E" else (zero, A)
             yield LumpedElement(bulk.where(card), nodes, ways, *both)
 
@@ -106,7 +106,7 @@ def _property(bulk: _Bulk, card: _Card, kind: str) -> float:
 
 
 def _in_basic(bulk: _Bulk, card: _Card, nodes: list[int]) -> None:
-    if turned := next((node for node in nodes if node in bulk.held.turned), None):
+    if turned := next((node for node in nodes if node in bulk.held.axes), None):
         raise Damaged(
             f"{bulk.where(card)} takes single directions of GRID {turned} in a local system (CD); write it in the "
             "basic one"
@@ -156,7 +156,7 @@ def _bush_axes(bulk: _Bulk, card: _Card, x: Array, K: Array, B: Array) -> Array:
     if system == 0:
         return np.eye(3)
     if system > 0:
-        return _turned(bulk, card, system, np.zeros(3), np.eye(3))[1]
+        return bulk.frame(card, system, int(bulk.positions(card, [card.whole(3)])[0]))
     along = x[-1] - x[0]
     if not along.any():
         if all(np.ptp(v[part]) == 0 for v in (K, B) for part in (slice(0, 3), slice(3, 6))):

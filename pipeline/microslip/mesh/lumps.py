@@ -17,7 +17,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..data import Array, Equation, FaceTie, Indices, LumpedElement, Lumps, PointMass, RigidLink
+from ..data import Array, Equation, FaceTie, Guide, Indices, LumpedElement, Lumps, PointMass, RigidLink
 from ..units import SYSTEMS
 from .raw import RawMesh, joined
 
@@ -98,7 +98,7 @@ class _Spread:
         self.size = float(np.ptp(raw.points[used], axis=0).max()) if len(used) else 1.0
         tied: set[int] = set()
         for link in raw.links:
-            if isinstance(link, Equation):
+            if isinstance(link, Equation | Guide):
                 tied.update(link.nodes.tolist())
             elif not isinstance(link, FaceTie):
                 self.leading.add(int(link.reference))

@@ -150,22 +150,23 @@ def _sets(mesh: Mesh, held: bool = False) -> list[str]:
     return lines
 
 
-def _supports(mesh: Mesh) -> tuple[list[str], list[str]]:
-    """The file's own supports, as comments where they do not hold the body, and what to say of them."""
+def _supports(mesh: Mesh, holding: bool) -> tuple[list[str], list[str]]:
+    """The file's own supports, and what to say of them. holding: they leave no rigid motion."""
     told = [f"warning: not taken as a support: {text}" for text in mesh.not_held]
     if not mesh.supports:
         return [], told
-    lines, mark = ["", "# Held by the file itself:"], "" if _hold(mesh) else "#"
+    lines = ["", "# Held by the file itself:"]
     for name, directions in mesh.supports.items():
-        lines += [f"{mark}[[supports]]", f"{mark}face = {json.dumps(name)}"]
+        lines += ["[[supports]]", f"face = {json.dumps(name)}"]
         moves = "".join(c for c in directions if c in "xyz")
         turns = "".join("xyz"["abc".index(c)] for c in directions if c in "abc")
-        lines += [f'{mark}directions = "{moves}"'] if moves != "xyz" else []
-        lines += [f"{mark}rotations = {'true' if turns == 'xyz' else json.dumps(turns)}"] if turns else []
+        lines += [f'directions = "{moves}"'] if moves != "xyz" else []
+        lines += [f"rotations = {'true' if turns == 'xyz' else json.dumps(turns)}"] if turns else []
     named = ", ".join(f"{name} in {directions}" for name, directions in mesh.supports.items())
-    if mark:
-        lines[1] = "# Held by the file itself, but not against every rigid motion (then remove free = true at the top):"
-        return lines, [*told, f"warning: supports of the file: {named}; they do not hold the body: written as comments"]
+    if not holding:
+        lines[1] = "# Held by the file itself, but not against every rigid motion:"
+        named += "; they leave rigid motions, so the body floats (free = true)"
+        return lines, [*told, f"warning: supports of the file: {named}"]
     return lines, [*told, f"supports of the file: {named}"]
 
 
@@ -176,12 +177,12 @@ def _fixed(mesh: Mesh) -> Indices:
     return joined(3 * s + "xyz".index(c) for s, ways in held for c in ways if c in "xyz")
 
 
-def _count(mesh: Mesh, held: bool) -> int:
+def _count(mesh: Mesh) -> int:
     """How many modes are asked for: those of the sector at a nodal diameter have one cut face."""
     face = "" if mesh.sector is None else mesh.sector.faces[0]
     cut = 3 * len(mesh.set_points(face)) if face in {*mesh.faces, *mesh.point_sets} else 0
     ties = 0 if mesh.ties is None else mesh.ties.rows.shape[0]
-    fixed = len(np.unique(_fixed(mesh))) if held else 0
+    fixed = len(np.unique(_fixed(mesh)))
     return max(min(USUAL, 3 * mesh.n_points - fixed - cut - ties - 2), 1)
 
 
@@ -365,10 +366,10 @@ def _mesh(file: Path, folder: Path, unit: str, instances: Sequence[str] = ()) ->
     told += again
     told += [f"note: {text}" for text in mesh.remarks]
     told += [*ties, *((*joints, *_pressed(mesh)) if not instances else ())]
-    held, said = _supports(mesh)
+    holding = _hold(mesh)
+    held, said = _supports(mesh, holding)
     told += said
-    grounded = mesh.lumps is not None and _hold(mesh)
-    lines = [] if "[[supports]]" in held or grounded else ["free = true               # nothing is held yet"]
+    lines = [] if holding else ["free = true               # nothing holds it wholly yet"]
     lines += ["", "[geometry]", f"mesh = {_beside(file, folder)}"]
     lines += [f"instances = {json.dumps(list(instances))}"] if instances else []
     lines += ["", "[material]"]
@@ -383,7 +384,7 @@ def _mesh(file: Path, folder: Path, unit: str, instances: Sequence[str] = ()) ->
     hot, said = _temperatures(mesh)
     ring, words = _cyclic(mesh, UNITS[unit])
     told += [*said, *words]
-    count = _count(mesh, "[[supports]]" in held)
+    count = _count(mesh)
     if count < USUAL:
         told.append(f"modes: {count} asked for, the body has few degrees of freedom")
     lines = [*_noted([text for text in told if text not in again]), *lines]
