@@ -74,6 +74,9 @@ Everywhere = Annotated[
     bool, Parameter(show_default=False, help="stresses over the whole sweep, not at its resonances alone")
 ]
 Apart = Annotated[bool, Parameter(show_default=False, help="every solid of the CAD file is a part of its own")]
+SolidsOnly = Annotated[
+    bool, Parameter(show_default=False, help="beams, shells and the like that hang on the solids are left out")
+]
 Ring = Annotated[bool, Parameter(show_default=False, help="vtu: the ring of a cyclic body, a file a nodal diameter")]
 
 Over = Annotated[
@@ -526,7 +529,9 @@ def _say_seal(file: Path, quiet: bool) -> None:
 
 
 @app.command(name="import")
-def import_(file: Path, /, *more: Path, unit: str | None = None, apart: Apart = False) -> None:
+def import_(
+    file: Path, /, *more: Path, unit: str | None = None, apart: Apart = False, solids_only: SolidsOnly = False
+) -> None:
     """Make a body.toml around a CAD file, a mesh or matrices, or a modal file from measured modes.
 
     Several CAD files, or several meshes, of parts that touch become an assembly: a body.toml each, with the faces where
@@ -551,7 +556,7 @@ def import_(file: Path, /, *more: Path, unit: str | None = None, apart: Apart = 
         if apart:
             made = import_apart(file, folder, unit, report)
         elif len(parts) == 1:
-            made = import_deck(file, folder, unit, report)
+            made = import_deck(file, folder, unit, report, solids_only)
         else:
             made = import_parts(parts, folder, unit, report)
     for line in made.told:

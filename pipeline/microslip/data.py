@@ -308,6 +308,8 @@ class Mesh:
         joints: faces that the file lets touch. sector: of a cyclic ring, if the file is one.
             preloads: of its bolts: where it stands, force in the file's unit.
         links: constraints of the file, and ties: the equations that `fem.links.linked` makes of them, or None.
+        retained: point sets whose displacements a reduction of the file keeps.
+        hanging: elements left out that share nodes with the solids or their constraints, in words, or nothing.
         lumps: point masses, springs and dashpots, or None; their points need not be of cells.
     """
 
@@ -333,6 +335,8 @@ class Mesh:
     links: Links | None = None
     ties: Ties | None = None
     lumps: Lumps | None = None
+    hanging: str = ""
+    retained: tuple[str, ...] = ()
 
     @property
     def n_points(self) -> int:

@@ -73,6 +73,8 @@ class Deck:
     solids: list[Cells] = field(default_factory=list)
     facets: list[Cells] = field(default_factory=list)
     lumped: list[Cells] = field(default_factory=list)
+    structures: list[tuple[str, str, list[list[int]]]] = field(default_factory=list)
+    retained: list[tuple[str, str]] = field(default_factory=list)
     written: dict[str, str] = field(default_factory=dict)
     node_sets: dict[str, list[Indices]] = field(default_factory=dict)
     cell_sets: dict[str, list[Indices]] = field(default_factory=dict)

@@ -28,7 +28,7 @@ from .deck_lumps import lumps_of
 from .deck_materials import assign_materials
 from .deck_mesh import CORNERS, add_surfaces, cell_type
 from .instances import numbered, outline, place, placement, places
-from .raw import PRESTRESSED, Damaged, Numbering, RawMesh, ignored, joined, locks, lost, undefined
+from .raw import PRESTRESSED, Damaged, Numbering, RawMesh, Structure, ignored, joined, locks, lost, undefined
 from .supports import add_supports
 
 _REFUSED = {
@@ -155,13 +155,13 @@ def _read_card(deck: Deck, card: Card) -> None:
 _SILENT = {
     "HEADING", "PREPRINT", "RESTART", "OUTPUT", "NODE OUTPUT", "ELEMENT OUTPUT", "CONTACT OUTPUT", "NODE FILE",
     "EL FILE", "NODE PRINT", "EL PRINT", "CONTACT PRINT", "PART", "END PART", "ASSEMBLY", "END ASSEMBLY", "END STEP",
-    "INSTANCE", "END INSTANCE", "STATIC", "FREQUENCY", "INCLUDE", "MONITOR", "SECTION PRINT", "CONTACT FILE",
+    "INSTANCE", "END INSTANCE", "STATIC", "SUBSTRUCTURE GENERATE", "FREQUENCY", "INCLUDE", "MONITOR", "SECTION PRINT", "CONTACT FILE",
 }  # fmt: skip
 """Keywords that say nothing of the body."""
 
 _COUNTS = re.compile(
     "NONSTRUCTURAL MASS|GAP|JOINT|CONNECTOR [A-Z]+|EMBEDDED ELEMENT|"
-    "SHELL TO SOLID COUPLING|FASTENER|MATRIX (INPUT|ASSEMBLE)|SUBSTRUCTURE [A-Z]+|USER ELEMENT|UEL PROPERTY|"
+    "SHELL TO SOLID COUPLING|FASTENER|MATRIX (INPUT|ASSEMBLE)|SUBSTRUCTURE (PROPERTY|PATH|DIRECTORY)|USER ELEMENT|UEL PROPERTY|"
     "CONTACT|COHESIVE BEHAVIOR|HYPERELASTIC|HYPERFOAM|MODEL CHANGE|FOUNDATION|"
     "(BEAM|BEAM GENERAL|SHELL|SHELL GENERAL|MEMBRANE|FRAME|COHESIVE|GASKET|CONNECTOR) SECTION"
 )
@@ -198,6 +198,8 @@ def _assembled(deck: Deck) -> RawMesh:
             raw.add_set(deck.written[key], members, numbering)
     raw.links, left_out = links_of(deck, numbering, points)
     raw.lumps = list(lumps_of(deck, numbering, points))
+    raw.structures = _structures(deck, numbering)
+    raw.retained = _retained(deck, raw, numbering)
     raw.sector, uncut = sector_of(deck)
     raw.preloads, unpressed, unused = preloads_of(deck)
     raw.lost = [*deck.lost, *left_out, *uncut, *unpressed]
@@ -215,6 +217,34 @@ def _assembled(deck: Deck) -> RawMesh:
                 raw.facets.setdefault(deck.written[key], []).append(cells.nodes[inside])
     add_surfaces(deck, raw, numbering)
     return raw
+
+
+def _structures(deck: Deck, numbering: Numbering) -> list[Structure]:
+    """Beams, shells, connectors and the like by their types."""
+    shells = [
+        (c.where.rpartition("/")[2], c.written, c.nodes.tolist())
+        for c in deck.facets
+        if re.match(r"(S|STRI|M3D)\d", c.written)
+    ]
+    kinds: dict[str, Structure] = {}
+    for where, kind, rows in (*deck.structures, *shells):
+        there = [[n for n in nodes if n in numbering.sorted] for nodes in rows]
+        elements = [numbering.positions(nodes, "").tolist() for nodes in there if nodes]
+        if elements and kind != "DCOUP3D":
+            kinds.setdefault(kind, Structure(where, kind, [])).elements.extend(elements)
+    return list(kinds.values())
+
+
+def _retained(deck: Deck, raw: RawMesh, numbering: Numbering) -> list[str]:
+    """Sets of nodes whose displacements a substructure keeps."""
+    names = []
+    for word, at in deck.retained:
+        with of_file(at):
+            key, nodes = deck.key(deck.node_sets, word), deck.nodes_for("*RETAINED NODAL DOFS", word)
+        if key is None:
+            raw.add_set(f"retained {word}", nodes, numbering)
+        names.append(f"retained {word}" if key is None else deck.written[key])
+    return list(dict.fromkeys(names))
 
 
 def _unknown_cells(deck: Deck) -> list[str]:

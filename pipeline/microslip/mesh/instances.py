@@ -186,6 +186,9 @@ def place(whole: Deck, part: Deck, name: str, at: Placement, space: Space) -> No
     whole.surfaces += [
         replace(s, name=space.prefix + s.name, card=replace(s.card, space=key)) for s in part.surfaces
     ]
+    whole.structures += [
+        (where, kind, [[n + space.nodes for n in nodes] for nodes in rows]) for where, kind, rows in part.structures
+    ]
     whole.ignored += part.ignored
     whole.kinds += part.kinds
     whole.lost += [text for text in part.lost if text not in whole.lost]

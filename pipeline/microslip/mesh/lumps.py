@@ -229,6 +229,29 @@ def _along_axes(vectors: Array) -> Array:
     return np.vstack([axes, np.where(np.abs(others) < 1e-12, 0.0, others)])
 
 
+def hanging(raw: RawMesh) -> str:
+    """Which elements left out share nodes with the solids or with constraints, in words; nothing if none does.
+
+    Shells whose nodes are all of solids lie on them and name their faces.
+    """
+    solid = {*joined(nodes.ravel() for _, nodes in raw.blocks).tolist()}
+    near = set(solid)
+    for link in raw.links:
+        if isinstance(link, Equation | Guide):
+            near.update(link.nodes.tolist())
+        elif not isinstance(link, FaceTie):
+            near.update([link.reference, *([] if isinstance(link.members, str) else link.members.tolist())])
+    near.update(node for item in raw.lumps for node in _nodes(item))
+    counts, where = list[str](), ""
+    for s in raw.structures:
+        flat = len(s.elements[0]) > 2
+        beside = [nodes for nodes in s.elements if not (flat and solid.issuperset(nodes))]
+        if not near.isdisjoint(node for nodes in beside for node in nodes):
+            counts.append(f"{len(beside)} {s.kind}")
+            where = where or s.where
+    return f"{where}: {', '.join(counts)} share nodes with the solids or their constraints" if counts else ""
+
+
 def _nodes(item: PointMass | LumpedElement) -> list[int]:
     return [item.node] if isinstance(item, PointMass) else item.nodes.tolist()
 

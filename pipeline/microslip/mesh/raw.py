@@ -51,6 +51,19 @@ class DeckMaterial:
     line: str = ""
 
 
+@dataclass(frozen=True)
+class Structure:
+    """Elements of one type that are left out because they are no solids: beams, shells, trusses.
+
+    Attributes:
+        where: the first of them. kind: as the file calls it. elements: positions of the nodes of each.
+    """
+
+    where: str
+    kind: str
+    elements: list[list[int]]
+
+
 @dataclass
 class RawMesh:
     """A file's content.
@@ -70,7 +83,8 @@ class RawMesh:
         lost: what carries mass, stiffness or a constraint and is not read, in words.
         remarks: what was read as something else or not used, in words. instances: name -> positions. joints: pairs of
             faces in contact. sector: of a cyclic ring. preloads: of bolts: where it stands, force
-            in the file's unit. lumps: masses, springs and dashpots, by positions in `points`.
+            in the file's unit. lumps: masses, springs and dashpots, by positions in `points`. structures:
+            elements that are left out. retained: point sets whose displacements the file keeps.
     """
 
     points: Array
@@ -93,6 +107,8 @@ class RawMesh:
     sector: Sector | None = None
     preloads: list[tuple[str, float]] = field(default_factory=list)
     lumps: list[PointMass | LumpedElement] = field(default_factory=list)
+    structures: list[Structure] = field(default_factory=list)
+    retained: list[str] = field(default_factory=list)
 
     def add_points(self, name: str, positions: Indices) -> None:
         """Add to a point set."""

@@ -27,7 +27,7 @@ from .bdf import read_bdf
 from .cdb import read_cdb
 from .inp import read_inp
 from .linking import renumbered
-from .lumps import on_mesh, points_of, spread
+from .lumps import hanging, on_mesh, points_of, spread
 from .materials import in_si
 from .med import read_med
 from .msh import is_msh41, read_msh41
@@ -170,13 +170,15 @@ def _mesh_of(raw: RawMesh, metres: float, system: str | None) -> Mesh:
             cells.setdefault(kind, []).append(connectivity)
     if not cells:
         raise UserError("holds no volume cells (only surfaces or lines?); mesh the volume first")
+    attached = hanging(raw)
     lumps = spread(raw, system)
     points = raw.points * metres
     if points.shape[1:] != (3,) or not np.isfinite(points).all():
         raise UserError("coordinates must be three finite numbers a point; the file is damaged or not 3-D")
     if np.abs(points).max() > _FARTHEST:
         raise UserError(f"a point lies {np.abs(points).max():.3g} m from the origin; the file is damaged")
-    return _assemble_mesh(raw, points, {t: np.concatenate(c) for t, c in cells.items()}, metres, lumps)
+    mesh = _assemble_mesh(raw, points, {t: np.concatenate(c) for t, c in cells.items()}, metres, lumps)
+    return replace(mesh, hanging=attached, retained=tuple(n for n in raw.retained if n in mesh.point_sets))
 
 
 _MIRRORED = {

@@ -18,7 +18,7 @@ from ..mesh.cards import files_of
 from ..mesh.chosen import bodies, of_instances, with_parts
 from ..mesh.raw import joined
 from ..mesh.touching import touch_of, touching_facets
-from .importing import CAD, Imported, body_name, import_file, length_unit, refuse_taken
+from .importing import CAD, Imported, body_name, import_file, length_unit, refuse_hanging, refuse_taken
 from .parts import (
     Part,
     Patch,
@@ -35,7 +35,7 @@ from .stage import Report
 
 
 def import_deck(
-    file: Path, folder: Path | None, unit: str | None, report: Report = lambda _: None
+    file: Path, folder: Path | None, unit: str | None, report: Report = lambda _: None, solids_only: bool = False
 ) -> Imported:
     """Import a file; a deck whose *CONTACT PAIRs separate bodies becomes an assembly.
 
@@ -44,9 +44,11 @@ def import_deck(
     """
     deck = [f.read_bytes() for f in files_of(file) if f.is_file()] if suffix_of(file) == ".inp" else []
     if not any(map(PAIR.search, deck)):
-        return import_file(file, folder, unit, report=report)
+        return import_file(file, folder, unit, report=report, solids_only=solids_only)
     unit = length_unit(unit, file)
     mesh = read_mesh(file, unit)
+    if not solids_only:
+        refuse_hanging(file, mesh)
     groups = bodies(mesh)
     joints, told = _between_bodies(mesh, groups)
     if not joints:

@@ -54,6 +54,7 @@ def import_file(
     instances: Sequence[str] = (),
     report: Report = lambda _: None,
     name: str = "",
+    solids_only: bool = True,
 ) -> Imported:
     """Write a body.toml around a CAD file, a mesh or matrices; nothing is copied, the file is named where it lies.
 
@@ -61,7 +62,8 @@ def import_file(
         file: a CAD file, a mesh with or without materials, or the stiffness matrix of a pair. folder: of the new
             body.toml; by default one of the file's name here. unit: of its lengths; None: that which
             the file tells, else mm. instances: those of a deck that are the body, all if none.
-        name: of the body; the folder's if not given.
+        name: of the body; the folder's if not given. solids_only: whether beams and shells that are joined to the
+            solids may be left out.
 
     Raises:
         UserError: unreadable, or there is a body.toml already.
@@ -78,7 +80,7 @@ def import_file(
     target = (folder or Path(name)) / "body.toml"
     refuse_taken(target)
     kind = suffix_of(file)
-    made = _matrices if kind in MATRICES else partial(_mesh, instances=instances)
+    made = _matrices if kind in MATRICES else partial(_mesh, instances=instances, solids_only=solids_only)
     if kind in CAD:
         made = partial(_cad, report=report)
     report(f"reading {file}")
@@ -347,7 +349,19 @@ def _end(count: int = USUAL) -> list[str]:
     return ["", "[modes]", f"count = {count}", "", "[damping]", "ratio = 0.001"]
 
 
-def _mesh(file: Path, folder: Path, unit: str, instances: Sequence[str] = ()) -> tuple[list[str], list[str]]:
+def refuse_hanging(file: Path, mesh: Mesh) -> None:
+    """Raise `UserError` if elements that are left out hold or load the solids."""
+    if mesh.hanging:
+        raise refused(
+            file,
+            f"{mesh.hanging}, and beams, shells and the like are not read: without them other frequencies come. Model "
+            "them by solids, or write --solids-only if the solids are meant to stand alone",
+        )
+
+
+def _mesh(
+    file: Path, folder: Path, unit: str, instances: Sequence[str] = (), solids_only: bool = True
+) -> tuple[list[str], list[str]]:
     system = usual_system(unit)
     told = []
     try:
@@ -360,8 +374,11 @@ def _mesh(file: Path, folder: Path, unit: str, instances: Sequence[str] = ()) ->
     joints = [f"{j.where}: '{j.slave}' on '{j.master}': make them interfaces and a contact" for j in mesh.joints]
     mesh = of_instances(mesh, instances) if instances else mesh
     mesh, ties = _tied(file, mesh)
+    if not solids_only:
+        refuse_hanging(file, mesh)
     kinds = ", ".join(f"{len(c)} {t}" for t, c in mesh.cells.items())
-    told.insert(0, f"{file}: {mesh.n_points} points, {kinds}")
+    alone = f"; the solids alone: {mesh.hanging.partition(': ')[2]} and are left out" if mesh.hanging else ""
+    told.insert(0, f"{file}: {mesh.n_points} points, {kinds}{alone}")
     again = [f"warning: {text}" for texts in mesh_problems(mesh) for text in texts]
     told += again
     told += [f"note: {text}" for text in mesh.remarks]
@@ -388,7 +405,22 @@ def _mesh(file: Path, folder: Path, unit: str, instances: Sequence[str] = ()) ->
     if count < USUAL:
         told.append(f"modes: {count} asked for, the body has few degrees of freedom")
     lines = [*_noted([text for text in told if text not in again]), *lines]
-    return [*lines, *hot, *ring, *held, *_sets(mesh, bool(held)), *_end(count)], told
+    kept, words = _retained(mesh)
+    told += words
+    return [*lines, *hot, *ring, *held, *kept, *_sets(mesh, bool(held)), *_end(count)], told
+
+
+def _retained(mesh: Mesh) -> tuple[list[str], list[str]]:
+    """Lines of [[interfaces]] where the file keeps displacements, comments where these are no face, and what to say."""
+    lines, told = [], []
+    for name in mesh.retained:
+        mark = "" if name in mesh.faces else "#"
+        title = body_name(name, "retained")
+        lines += ["", f"{mark}[[interfaces]]           # the file retains its displacements"]
+        lines += [f"{mark}name = {json.dumps(title)}", f"{mark}face = {json.dumps(name)}"]
+        none = "; it is no whole face of the surface, so it is written as a comment: give the face by box" * bool(mark)
+        told.append(f"retained displacements of '{name}': an interface, not a support{none}")
+    return lines, told
 
 
 def _noted(told: Sequence[str]) -> list[str]:
