@@ -208,21 +208,23 @@ class _Spread:
 
     def _unresisted(self, node: int) -> Iterable[Equation]:
         """A loose node stands still where it meets no stiffness, as it could not be solved for there."""
-        ways = 6 if node in self.turning else 3
-        K = self.resisted.get(node, np.zeros((6, 6)))[:ways, :ways]
-        for part in (slice(0, 3), slice(3, 6))[: ways // 3]:
-            values, V = np.linalg.eigh(K[part, part])
+        ways = "xyzabc" if node in self.turning else "xyz"
+        K = self.resisted.get(node, np.zeros((6, 6)))
+        known = [d for name, d in self.raw.supports.items() if node in self.raw.point_sets.get(name, ())]
+        for first in range(0, len(ways), 3):
+            left = [first + k for k in range(3) if not any(ways[first + k] in d for d in known)]
+            values, V = np.linalg.eigh(K[np.ix_(left, left)])
             free = V[:, values <= _WITHOUT * max(values.max(initial=0.0), 1e-300)].T
             for vector in _along_axes(free):
                 at = np.flatnonzero(vector)
                 where = f"node {self.raw.node_id[node]}, which no stiffness holds"
-                yield Equation(where, np.full(len(at), node), at + part.start, vector[at], first=False)
+                yield Equation(where, np.full(len(at), node), np.array(left)[at], vector[at], first=False)
 
 
 def _along_axes(vectors: Array) -> Array:
-    """The same span of (r, 3) orthonormal vectors, by unit vectors of the axes where these lie in it."""
+    """The same span of (r, k) orthonormal vectors, by unit vectors of the axes where these lie in it."""
     projector = vectors.T @ vectors
-    axes = np.eye(3)[np.diag(projector) > 1 - 1e-9]
+    axes = np.eye(len(projector))[np.diag(projector) > 1 - 1e-9]
     left = projector - axes.T @ axes
     values, V = np.linalg.eigh(left)
     others = V[:, values > 0.5].T
