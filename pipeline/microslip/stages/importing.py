@@ -407,7 +407,7 @@ def _mesh(
     lines = [*_noted([text for text in told if text not in again]), *lines]
     kept, words = _retained(mesh)
     told += words
-    return [*lines, *hot, *ring, *held, *kept, *_sets(mesh, bool(held)), *_end(count)], told
+    return [*lines, *hot, *ring, *held, *kept, *_sets(mesh, bool(held) or holding), *_end(count)], told
 
 
 def _retained(mesh: Mesh) -> tuple[list[str], list[str]]:
