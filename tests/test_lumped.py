@@ -12,6 +12,7 @@ import pytest
 import scipy.linalg
 from refusals import refused_command
 from test_bdf import bulk
+from test_cdb import archive
 
 from microslip.basis import read_basis
 from microslip.cli import main
@@ -226,3 +227,18 @@ def test_inertia_on_a_node_of_solids_alone_is_told(capsys):
     Path("a.bdf").write_text(nastran(f"CONM2,501,{C},,1.-6,3.,0.,0."))
     assert main(["import", "a.bdf", "body"]) == 0
     assert "rotation" in capsys.readouterr().out
+
+
+def test_masses_and_springs_of_an_archive_are_the_same_ones():
+    """MASS21 with KEYOPT(3) = 2, COMBIN14 along its line and along displacements; one end held is the ground."""
+    text = archive(
+        MESH, ("x0",), ("MP,EX,1,205000.", "MP,PRXY,1,0.29", "MP,DENS,1,7.83e-9", "D,X0,ALL", "D,901,UX,0,,,,UZ",
+        "D,902,UX,0,,,,UY", "D,903,ALL", "ET,21,21", "KEYOPT,21,3,2", "R,21,2e-6", "R,22,1e-6", "TYPE,21", "REAL,21",
+        f"E,{C}", "E,901", "REAL,22", "E,902", "ET,14,14", "R,14,1500.", "TYPE,14", "REAL,14", f"E,{C},901",
+        "ET,15,14", "KEYOPT,15,2,2", "R,15,3000.", "TYPE,15", "REAL,15", f"E,{D},903", "ET,16,14", "KEYOPT,16,2,3",
+        "R,16,700.", "TYPE,16", "REAL,16", f"E,{D},902"),
+    )  # fmt: skip
+    places = {901: (60.0, 30.0, 7.0), 902: (70.0, 11.0, 7.0), 903: (60.0, -5.0, 0.0)}
+    rows = [f"{n:9d}{0:9d}{0:9d}" + "".join(f"{v:21.13E}" for v in x) for n, x in places.items()]
+    found = hertz(text.replace("N,R5.3", "\n".join([*rows, "N,R5.3"])), "a.cdb")
+    np.testing.assert_allclose(found, HANGING, rtol=1e-6)
