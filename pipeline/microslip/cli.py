@@ -79,6 +79,9 @@ Everywhere = Annotated[
     bool, Parameter(show_default=False, help="stresses over the whole sweep, not at its resonances alone")
 ]
 Apart = Annotated[bool, Parameter(show_default=False, help="every solid of the CAD file is a part of its own")]
+SolidsOnly = Annotated[
+    bool, Parameter(show_default=False, help="beams, shells and the like that hang on the solids are left out")
+]
 Ring = Annotated[bool, Parameter(show_default=False, help="vtu: the ring of a cyclic body, a file a nodal diameter")]
 
 Over = Annotated[
@@ -539,7 +542,7 @@ def _say_seal(file: Path, quiet: bool) -> None:
 @app.command(name="import")
 def import_(
     file: Path, /, *more: Path, unit: str | None = None, apart: Apart = False, density: float | None = None,
-    young: float | None = None, poisson: float | None = None, modes: bool = False,
+    young: float | None = None, poisson: float | None = None, modes: bool = False, solids_only: SolidsOnly = False,
 ) -> None:  # fmt: skip
     """Make a body.toml around a CAD file, a mesh or matrices, or a modal file from measured modes.
 
@@ -570,7 +573,7 @@ def import_(
         if apart:
             made = import_apart(file, folder, unit, report, instead)
         elif len(parts) == 1:
-            made = import_deck(file, folder, unit, report, instead)
+            made = import_deck(file, folder, unit, report, instead, solids_only)
         else:
             made = import_parts(parts, folder, unit, report, instead)
     if modes:

@@ -184,6 +184,57 @@ class Links:
 
 
 @dataclass(frozen=True)
+class PointMass:
+    """A rigid body on a node. `where`: its place in the file.
+
+    Attributes:
+        node: that carries it. mass. offset: (3,) of its centre from the node. inertia: (3, 3) tensor
+            about the centre; all in the units of the file.
+    """
+
+    where: str
+    node: int
+    mass: float
+    offset: Array = field(default_factory=lambda: np.zeros(3))
+    inertia: Array = field(default_factory=lambda: np.zeros((3, 3)))
+
+
+@dataclass(frozen=True)
+class LumpedElement:
+    """A spring or dashpot: a small symmetric matrix over displacements and rotations of nodes.
+
+    Attributes:
+        nodes, directions: (t,) of its rows; directions 3 to 5 are rotations. stiffness, damping:
+            (t, t), in the units of the file.
+    """
+
+    where: str
+    nodes: Indices
+    directions: Indices
+    stiffness: Array
+    damping: Array
+
+
+@dataclass(frozen=True)
+class Lumps:
+    """Point masses, springs and dashpots of a mesh, all of them as translations of its points.
+
+    Inertia and rotational springs of a node stand on points that follow it rigidly.
+
+    Attributes:
+        points: (j,) with masses (j,), kg; those beside a principal axis of an impossible inertia
+            may be negative. pairs: (m, 2) points a <= b. stiffness, damping: (m, 3, 3) what they
+            add to the block of a and b, N/m and N s/m.
+    """
+
+    points: Indices
+    masses: Array
+    pairs: Indices
+    stiffness: Array
+    damping: Array
+
+
+@dataclass(frozen=True)
 class Ties:
     """Linear equations C (u, q) = 0 between the displacements u of points and the motions q of reference nodes.
 
@@ -257,6 +308,9 @@ class Mesh:
         joints: faces that the file lets touch. sector: of a cyclic ring, if the file is one.
             preloads: of its bolts: where it stands, force in the file's unit.
         links: constraints of the file, and ties: the equations that `fem.links.linked` makes of them, or None.
+        retained: point sets whose displacements a reduction of the file keeps.
+        hanging: elements left out that share nodes with the solids or their constraints, in words, or nothing.
+        lumps: point masses, springs and dashpots, or None; their points need not be of cells.
     """
 
     points: Annotated[Array, Stored("node axis", "m", "reference positions", at="xyz")]
@@ -280,6 +334,9 @@ class Mesh:
     preloads: tuple[tuple[str, float], ...] = ()
     links: Links | None = None
     ties: Ties | None = None
+    lumps: Lumps | None = None
+    hanging: str = ""
+    retained: tuple[str, ...] = ()
 
     @property
     def n_points(self) -> int:

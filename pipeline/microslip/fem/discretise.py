@@ -13,6 +13,7 @@ import scipy.sparse as sp
 from .. import elements
 from ..data import Array, Indices, Mesh
 from ..errors import UserError
+from ..mesh.lumps import points_of
 from ..topology import CELL_TYPES
 
 _ELEMENTS = {
@@ -126,6 +127,10 @@ class Pattern:
     @property
     def size(self) -> int:
         return len(self.row)
+
+    def places(self, a: Indices, b: Indices) -> Indices:
+        """Where pairs of points a <= b stand."""
+        return np.searchsorted(self.row * self.n + self.col, np.asarray(a) * self.n + np.asarray(b))
 
     def full(self, values: Array) -> sp.csr_matrix:
         """The whole symmetric matrix, (n, n) for scalar `values` (p,), (3n, 3n) for (p, 3, 3)."""
@@ -247,6 +252,8 @@ def discretise(mesh: Mesh, degree: Mapping[str, int] | None = None, coupled: Seq
         for t, whole in mesh.cells.items()
         for region, cells in _by_region(whole, mesh.regions.get(t))
     )
+    if mesh.lumps is not None:
+        coupled = [*coupled, mesh.lumps.pairs, np.repeat(points_of(mesh.lumps)[:, None], 2, axis=1)]
     pattern, positions = _pattern(mesh.n_points, [b.cells for b in blocks], coupled)
     return Discretisation(mesh, blocks, pattern, positions)
 

@@ -46,6 +46,7 @@ class Archive:
     """What the commands have said.
 
     Attributes:
+        reals: values of each set of real constants; open_reals: the last set of R.
         path: name of the file. changes: of EMODIF, by element. table: of TB that is read: material,
             label. refused: material -> what of its elasticity is not read.
         kinds: number of a type -> Ansys's element. options: number of a type -> number of a KEYOPT
@@ -65,6 +66,8 @@ class Archive:
     options: dict[int, dict[int, str]] = field(default_factory=dict)
     elements: list[Element] = field(default_factory=list)
     changes: dict[int, dict[str, int]] = field(default_factory=dict)
+    reals: dict[int, list[float]] = field(default_factory=dict)
+    open_reals: int = 1
     components: dict[str, list[int]] = field(default_factory=dict)
     temperatures: dict[int, float] = field(default_factory=dict)
     constants: dict[int, dict[str, dict[int, float]]] = field(default_factory=dict)

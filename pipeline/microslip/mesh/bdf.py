@@ -20,9 +20,11 @@ import numpy as np
 from ..data import Array, AverageLink, Equation, Indices, Link, RigidLink
 from ..elasticity import strain_tensor, turned, turned_strain
 from ..topology import CELL_TYPES
+from .bdf_lumps import READ as LUMPED
+from .bdf_lumps import bars_of, lumps_of
 from .bulk_systems import Chained, LocalSystem, through
 from .materials import isotropic_rows, orthotropic_row
-from .raw import PRESTRESSED, Damaged, DeckMaterial, Numbering, RawMesh, ignored, lost
+from .raw import PRESTRESSED, Damaged, DeckMaterial, Numbering, RawMesh, Structure, ignored, lost
 from .supports import Constraints, add_supports, in_axes
 
 _BRICK20, _WEDGE15 = (
@@ -43,7 +45,7 @@ _PROPERTIES = ("PCOMPS", "PLSOLID", "PCOMPLS", "PSOLID")
 _SYSTEMS = ("CORD1R", "CORD1C", "CORD1S", "CORD2R", "CORD2C", "CORD2S")
 _READ = {
     "GRID", "GRDSET", *_SYSTEMS, "PSOLID", "MAT1", "PARAM", "SET1", "SPC", "SPC1", "SPCADD", "RBE2", "RBE3", "MPC",
-    "MPCADD", *_SOLIDS, *_SHELLS, *_MATERIALS, *_PROPERTIES,
+    "MPCADD", "ASET", "ASET1", *_SOLIDS, *_SHELLS, *_MATERIALS, *_PROPERTIES, *LUMPED,
 }  # fmt: skip
 _SILENT = re.compile(
     r"EIG\w*|CORD\w+|MATT\d+|ENDDATA|LOAD|DLOAD|TABL\w*|FREQ\d?|TSTEP|NLPARM|DTI|SET3|MDLPRM"
@@ -52,7 +54,7 @@ _SILENT = re.compile(
 _LOADS = r"FORCE\d?|MOMENT\d?|PLOAD\w*|GRAV|RFORCE\d?|ACCEL\d?|TEMP\w*|SLOAD|DAREA|DEFORM"
 _COUNTS = re.compile(
     r"C(?!ORD|END)[A-Z]+\d?|R(?!FORCE|LOAD|AND|ING)[A-Z]+\d?|SUPORT1?|GENEL|DMIG|NSM[A-Z]*\d?|"
-    r"MFLUID|BCTSET|BGSET|BCTABL[E1]|BCBODY1?|PSHELL|PCOMPG?|BCONTACT|BOLT|SPCOFF1?|SPCR|SPLINE\d|ASET1?|AEQUAD4"
+    r"MFLUID|BCTSET|BGSET|BCTABL[E1]|BCBODY1?|PSHELL|PCOMPG?|BCONTACT|BOLT|SPCOFF1?|SPCR|SPLINE\d|AEQUAD4"
 )
 """Cards that add mass, stiffness or constraints; those beside `_READ` are not read."""
 
@@ -109,6 +111,11 @@ class _Bulk:
     held: Constraints
     systems: Chained
 
+    def frame(self, card: _Card, number: int, node: int) -> Array:
+        """(3, 3) rows are the directions of a coordinate system at the node at a position."""
+        with _named(self.where(card)):
+            return self.systems[number].directions(self.raw.points[[node]])[0]
+
     def where(self, card: _Card) -> str:
         return f"{self.file}, {card.where}"
 
@@ -162,7 +169,10 @@ def read_bdf(path: Path) -> RawMesh:
     raw.lost += stress
     unused = (n for n in others if not (_COUNTS.fullmatch(n) or _SILENT.fullmatch(n)))
     raw.remarks += ignored(unused, _LOADS, bool(stress))
-    raw.links += [*_rigid(bulk), *_averages(bulk), *_equations(bulk)]
+    raw.links += [*_rigid(bulk), *bars_of(bulk), *_averages(bulk), *_equations(bulk)]
+    raw.lumps = lumps_of(bulk)
+    raw.structures = list(_structures(bulk))
+    _retain(bulk)
     add_supports(raw, bulk.held, bulk.numbering)
     if not re.search(r"^\s*ENDDATA\b", text, re.IGNORECASE | re.MULTILINE):
         raw.unended = "no ENDDATA"  # a warning: decks are also kept as parts that others include
@@ -638,6 +648,33 @@ def _equations(bulk: _Bulk) -> Iterator[Link]:
         along = np.array([bulk.held.axes.get(node, np.eye(3))[way % 3] for node, way in pairs])
         first = np.array(ways) // 3 * 3
         yield in_axes(bulk.where(card), nodes, first, along * factors[:, None])
+
+
+def _retain(bulk: _Bulk) -> None:
+    """ASET, ASET1: displacements that a reduction keeps; they are held by nothing."""
+    nodes = [card.whole(p) for card in bulk.cards["ASET"] for p in range(1, len(card), 2) if card.at(p)]
+    nodes += [n for card in bulk.cards["ASET1"] for n in _listed(card, 2, bulk.numbering)]
+    if nodes:
+        bulk.raw.add_set("ASET", nodes, bulk.numbering)
+        bulk.raw.retained.append("ASET")
+
+
+def _structures(bulk: _Bulk) -> Iterator[Structure]:
+    """Beams, rods and shells, which are not read."""
+    for name, (first, count) in _OTHERS.items():
+        if cards := bulk.cards[name]:
+            nodes = [[card.whole(p, 0) for p in range(first, first + count)] for card in cards]
+            nodes = [[n for n in each if n in bulk.numbering.sorted] for each in nodes]
+            elements = [bulk.numbering.positions(each, "").tolist() for each in nodes if each]
+            if elements:
+                yield Structure(f"{bulk.file}, line {cards[0].line}", name, elements)
+
+
+_OTHERS = {
+    **dict.fromkeys(("CBAR", "CBEAM", "CBEND", "CROD", "CTUBE", "CGAP", "CVISC", "CBEAM3"), (3, 2)), "CONROD": (2, 2),
+    **{name: (3, corners) for name, corners in _SHELLS.items()}, "CSHEAR": (3, 4),
+}  # fmt: skip
+"""Card of an element that is no solid -> place of its first node, and how many it has at its corners."""
 
 
 def _shells(bulk: _Bulk) -> None:

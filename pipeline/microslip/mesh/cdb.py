@@ -19,7 +19,7 @@ from ..data import Array, Equation
 from ..elasticity import turned, turned_strain
 from ..errors import of_file
 from ..topology import CELL_TYPES
-from . import archive_links, archive_nodes
+from . import archive_links, archive_lumps, archive_nodes
 from .archive import Archive, Element, changed, whole
 from .archive_links import CONTACTS, TARGETS, constrain, ring_of
 from .materials import isotropic_rows, orthotropic_row
@@ -273,6 +273,7 @@ _BLOCKS = {
     **archive_links.BLOCKS,
     "NBLOCK": _read_nodes,
     "EBLOCK": _read_elements,
+    "RLBLOCK": archive_lumps.read_block,
     "CMBLOCK": _read_component,
     "ETBLOCK": _read_types,
 }
@@ -458,6 +459,7 @@ def _read_table_data(archive: Archive, words: list[str]) -> None:
 _COMMANDS = {
     **dict.fromkeys(("E", "EN"), _read_element),
     **dict.fromkeys(("TYPE", "REAL", "MAT"), _read_current),
+    "R": archive_lumps.read_reals, "RMORE": archive_lumps.read_reals,
     **dict.fromkeys(("KEYOPT", "KEYOP", "KEYO"), _read_option),
     **dict.fromkeys(("EMODIF", "EMOD"), _modify),
     **dict.fromkeys(("TUNIF", "BFUNIF"), _read_uniform),
@@ -516,6 +518,7 @@ def _assembled(archive: Archive) -> RawMesh:
             raw.add_set(name, members, numbering)
     raw.links += middle.links(numbering)
     raw.sector = ring_of(archive, raw)
+    raw.lumps = list(archive_lumps.lumps_of(archive, numbering))
     constrain(archive, raw, numbering)
     raw.materials = [_material(archive, *key) for key in regions] if archive.constants else []
     if not raw.materials:
@@ -593,7 +596,7 @@ def _other_elements(archive: Archive, name: str) -> list[str]:
     told: dict[int, tuple[str, int]] = {}
     for element in archive.elements:
         ansys = archive.kinds.get(element.kind, 0)
-        if ansys in _SOLIDS or ansys in _HARMLESS | CONTACTS | TARGETS:
+        if ansys in _SOLIDS or ansys in _HARMLESS | CONTACTS | TARGETS | {*archive_lumps.KINDS}:
             continue
         where, count = told.get(ansys, (element.where or f"{name}, element {element.number}", 0))
         told[ansys] = where, count + 1

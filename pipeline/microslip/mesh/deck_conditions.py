@@ -98,7 +98,12 @@ def constraints(deck: Deck) -> Constraints:
     return held
 
 
+def _read_retained(deck: Deck, card: Card) -> None:
+    deck.retained += [(fields(line)[0], card.place) for line in card.lines if fields(line)]
+
+
 READERS: Readers = {
+    "RETAINED NODAL DOFS": _read_retained,
     "BOUNDARY": _read_boundary,
     "STEP": _read_step,
     "TRANSFORM": _read_transform,

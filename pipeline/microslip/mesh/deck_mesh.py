@@ -11,8 +11,10 @@ from ..data import Array, Indices
 from ..errors import of_file
 from .cards import Card, fields, numbers, whole_numbers
 from .deck import Cells, Deck, DeckSurface, Readers
+from .deck_lumps import NODES as LUMPED
+from .deck_lumps import read_cells
 from .instances import local_system
-from .raw import Damaged, Numbering, RawMesh, joined
+from .raw import Damaged, Numbering, RawMesh, is_number, joined
 
 _SOLIDS = {
     4: "tetra", 10: "tetra10", 8: "hexahedron", 20: "hexahedron20", 27: "hexahedron27", 6: "wedge", 15: "wedge15",
@@ -76,8 +78,13 @@ def _read_elements(deck: Deck, card: Card) -> None:
     kind = card.word("TYPE")
     match = cell_type(kind)
     deck.kinds.append(kind)
+    if kind in LUMPED and card.lines:
+        read_cells(deck, card, kind, numbers(card.lines, f"*ELEMENT, TYPE={kind}"))
+        return
     if match is None:
         deck.add(deck.cell_sets, card.text("ELSET"))
+        if card.lines:
+            deck.structures.append((card.where, kind, _nodes_of_rows(card.lines, deck.spaces[""].nodes)))
         return  # beams, springs, masses and the like
     solid = match[1] in ("C3D", "DC3D", "AC3D")
     count = 6 if match[0] == "STRI65" else int(match[2])
@@ -99,6 +106,13 @@ def _read_elements(deck: Deck, card: Card) -> None:
     (deck.solids if solid else deck.facets).append(cells)
     if "ELSET" in card.parameters:
         deck.add(deck.cell_sets, card.parameters["ELSET"]).append(cells.ids)
+
+
+def _nodes_of_rows(lines: list[str], more: int) -> list[list[int]]:
+    """Numbers of the nodes of elements of a type that is not read, one element a line or, behind a comma, several."""
+    text = re.sub(r",\s*\n", ",", "\n".join(lines))
+    rows = [[int(w) for w in fields(line) if is_number(w)] for line in text.splitlines()]
+    return [[node + more for node in row[1:]] for row in rows if len(row) > 1]
 
 
 def _read_set(deck: Deck, card: Card) -> None:

@@ -12,6 +12,7 @@ from scipy.spatial import cKDTree
 
 from ..data import Array, FaceTie, Indices, Mesh
 from ..topology import CELL_TYPES, FACET_CORNERS
+from .raw import joined
 
 _FIRST_ORDER = {"tetra", "hexahedron", "wedge", "pyramid"}
 # corner -> its three neighbours, right-handed; of the cells with more corners than a tetrahedron
@@ -47,6 +48,7 @@ def mesh_problems(mesh: Mesh) -> tuple[list[str], list[str]]:
     size = np.ptp(mesh.points, axis=0).max()
     pairs = cKDTree(mesh.points).query_pairs(1e-9 * size, output_type="ndarray")
     pairs = pairs[~np.isin(pairs, _hanging(mesh)).any(axis=1)]
+    pairs = pairs[np.isin(pairs, joined(c.ravel() for c in mesh.cells.values())).all(axis=1)]
     pairs = pairs[~_meant(mesh, pairs)]
     parts = part_numbers(mesh, tied=True)
     if not errors and (overlapping := _overlapping(mesh)):
@@ -148,7 +150,30 @@ def part_numbers(mesh: Mesh, tied: bool = False) -> Indices:
         cols = np.concatenate([cols, nodes])
     graph = sp.coo_matrix((np.ones(len(rows)), (rows, cols)), shape=(size, size))
     numbers = connected_components(graph, directed=False)[1][: mesh.n_points]
+    solid = np.unique(np.concatenate([c.ravel() for c in mesh.cells.values()]))
+    if mesh.lumps is not None and len(solid) < mesh.n_points:
+        numbers = _with_lumps(mesh, numbers, solid)
     return np.unique(numbers, return_inverse=True)[1].astype(np.int64)
+
+
+def _with_lumps(mesh: Mesh, numbers: Indices, solid: Indices) -> Indices:
+    """Points without cells belong to a part that springs and links join them to, else to the first."""
+    assert mesh.lumps is not None
+    rows, cols = mesh.lumps.pairs.T
+    size = mesh.n_points
+    if mesh.ties is not None:
+        link = mesh.ties.rows.tocoo()
+        dof, n = link.col.astype(np.int64), 3 * size
+        rows = np.concatenate([rows, np.where(dof < n, dof // 3, size + (dof - n) // 6)])
+        size += len(mesh.ties.references) + link.shape[0]
+        cols = np.concatenate([cols, size - link.shape[0] + link.row])
+    graph = sp.coo_matrix((np.ones(len(rows)), (rows, cols)), shape=(size, size))
+    group = connected_components(graph, directed=False)[1][: mesh.n_points]
+    first = dict(zip(group[solid][::-1].tolist(), numbers[solid][::-1].tolist(), strict=True))
+    numbers = numbers.copy()
+    for point in np.setdiff1d(np.arange(mesh.n_points), solid):
+        numbers[point] = first.get(int(group[point]), numbers[solid[0]])
+    return numbers
 
 
 def _hanging(mesh: Mesh) -> Indices:

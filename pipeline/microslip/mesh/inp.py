@@ -22,10 +22,13 @@ from .deck_joints import KEYWORDS as JOINTS
 from .deck_joints import joints_of, preloads_of, sector_of, unread
 from .deck_links import KEYWORDS as LINKS
 from .deck_links import links_of
+from .deck_lumps import KEYWORDS as LUMPING
+from .deck_lumps import NODES as LUMPED
+from .deck_lumps import lumps_of
 from .deck_materials import assign_materials
 from .deck_mesh import CORNERS, add_surfaces, cell_type
 from .instances import numbered, outline, place, placement, places
-from .raw import PRESTRESSED, Damaged, Numbering, RawMesh, ignored, joined, locks, lost, undefined
+from .raw import PRESTRESSED, Damaged, Numbering, RawMesh, Structure, ignored, joined, locks, lost, undefined
 from .supports import add_supports
 
 _REFUSED = {
@@ -33,7 +36,7 @@ _REFUSED = {
     "ELGEN": "generates cells by *ELGEN", "ELCOPY": "copies cells by *ELCOPY",
 }  # fmt: skip
 
-_LINKING = (*LINKS, *JOINTS)
+_LINKING = (*LINKS, *JOINTS, *LUMPING)
 READERS = deck_mesh.READERS | deck_materials.READERS | deck_conditions.READERS
 
 
@@ -145,7 +148,7 @@ def _read_card(deck: Deck, card: Card) -> None:
         return
     READERS[card.keyword](deck, card)
     kind = card.word("TYPE")
-    if card.keyword == "ELEMENT" and card.lines and not cell_type(kind) and kind != "DCOUP3D":
+    if card.keyword == "ELEMENT" and card.lines and not cell_type(kind) and kind not in (*LUMPED, "DCOUP3D"):
         deck.lost.append(lost(card.where, f"*ELEMENT, TYPE={kind}"))
 
 
@@ -153,12 +156,14 @@ _SILENT = {
     "HEADING", "PREPRINT", "RESTART", "OUTPUT", "NODE OUTPUT", "ELEMENT OUTPUT", "CONTACT OUTPUT", "NODE FILE",
     "EL FILE", "NODE PRINT", "EL PRINT", "CONTACT PRINT", "PART", "END PART", "ASSEMBLY", "END ASSEMBLY", "END STEP",
     "INSTANCE", "END INSTANCE", "STATIC", "FREQUENCY", "INCLUDE", "MONITOR", "SECTION PRINT", "CONTACT FILE",
+    "SUBSTRUCTURE GENERATE",
 }  # fmt: skip
 """Keywords that say nothing of the body."""
 
 _COUNTS = re.compile(
-    "MASS|ROTARY INERTIA|NONSTRUCTURAL MASS|SPRING|DASHPOT|GAP|JOINT|CONNECTOR [A-Z]+|EMBEDDED ELEMENT|"
-    "SHELL TO SOLID COUPLING|FASTENER|MATRIX (INPUT|ASSEMBLE)|SUBSTRUCTURE [A-Z]+|USER ELEMENT|UEL PROPERTY|"
+    "NONSTRUCTURAL MASS|GAP|JOINT|CONNECTOR [A-Z]+|EMBEDDED ELEMENT|"
+    "SHELL TO SOLID COUPLING|FASTENER|MATRIX (INPUT|ASSEMBLE)|SUBSTRUCTURE (PROPERTY|PATH|DIRECTORY)|"
+    "USER ELEMENT|UEL PROPERTY|"
     "CONTACT|COHESIVE BEHAVIOR|HYPERELASTIC|HYPERFOAM|MODEL CHANGE|FOUNDATION|"
     "(BEAM|BEAM GENERAL|SHELL|SHELL GENERAL|MEMBRANE|FRAME|COHESIVE|GASKET|CONNECTOR) SECTION"
 )
@@ -194,6 +199,9 @@ def _assembled(deck: Deck) -> RawMesh:
         if len(members):
             raw.add_set(deck.written[key], members, numbering)
     raw.links, left_out = links_of(deck, numbering, points)
+    raw.lumps = list(lumps_of(deck, numbering, points))
+    raw.structures = _structures(deck, numbering)
+    raw.retained = _retained(deck, raw, numbering)
     raw.sector, uncut = sector_of(deck)
     raw.preloads, unpressed, unused = preloads_of(deck)
     raw.lost = [*deck.lost, *left_out, *uncut, *unpressed]
@@ -213,11 +221,39 @@ def _assembled(deck: Deck) -> RawMesh:
     return raw
 
 
+def _structures(deck: Deck, numbering: Numbering) -> list[Structure]:
+    """Beams, shells, connectors and the like by their types."""
+    shells = [
+        (c.where.rpartition("/")[2], c.written, c.nodes.tolist())
+        for c in deck.facets
+        if re.match(r"(S|STRI|M3D)\d", c.written)
+    ]
+    kinds: dict[str, Structure] = {}
+    for where, kind, rows in (*deck.structures, *shells):
+        there = [[n for n in nodes if n in numbering.sorted] for nodes in rows]
+        elements = [numbering.positions(nodes, "").tolist() for nodes in there if nodes]
+        if elements and kind != "DCOUP3D":
+            kinds.setdefault(kind, Structure(where, kind, [])).elements.extend(elements)
+    return list(kinds.values())
+
+
+def _retained(deck: Deck, raw: RawMesh, numbering: Numbering) -> list[str]:
+    """Sets of nodes whose displacements a substructure keeps."""
+    names = []
+    for word, at in deck.retained:
+        with of_file(at):
+            key, nodes = deck.key(deck.node_sets, word), deck.nodes_for("*RETAINED NODAL DOFS", word)
+        if key is None:
+            raw.add_set(f"retained {word}", nodes, numbering)
+        names.append(f"retained {word}" if key is None else deck.written[key])
+    return list(dict.fromkeys(names))
+
+
 def _unknown_cells(deck: Deck) -> list[str]:
     """What is said of element sets that name cells which are not there; nothing beside kinds that are not read."""
-    if not all(map(cell_type, deck.kinds)):
+    if not all(kind in LUMPED or cell_type(kind) for kind in deck.kinds):
         return []
-    known = joined(cells.ids for cells in (*deck.solids, *deck.facets))
+    known = joined(cells.ids for cells in (*deck.solids, *deck.facets, *deck.lumped))
     gone = {key: np.setdiff1d(joined(parts), known) for key, parts in deck.cell_sets.items()}
     return [undefined(deck.written[key], "element", ids) for key, ids in gone.items() if len(ids)]
 

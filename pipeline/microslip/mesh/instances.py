@@ -142,7 +142,7 @@ def local_system(rows: list[list[float]]) -> Array | None:
 def places(parts: list[tuple[str, Deck]]) -> list[Space]:
     """Of every instance, and last of the assembly's own nodes; a single one keeps its numbers and names."""
     nodes = _power(ids for _, part in parts for ids in part.node_id)
-    cells = _power(c.ids for _, part in parts for c in (*part.solids, *part.facets))
+    cells = _power(c.ids for _, part in parts for c in (*part.solids, *part.facets, *part.lumped))
     named = [f"{name}." if len(parts) > 1 else "" for name, _ in parts]
     return [Space(k * nodes, k * cells, prefix) for k, prefix in enumerate([*named, ""])]
 
@@ -166,7 +166,11 @@ def place(whole: Deck, part: Deck, name: str, at: Placement, space: Space) -> No
     whole.node_id += [ids + space.nodes for ids in part.node_id]
     whole.node_where += part.node_where
     whole.points += [points @ at.turn.T + at.shift for points in part.points]
-    for into, cells in ((whole.solids, part.solids), (whole.facets, part.facets)):
+    for into, cells in (
+        (whole.solids, part.solids),
+        (whole.facets, part.facets),
+        (whole.lumped, part.lumped),
+    ):
         into += [Cells(c.kind, c.ids + space.cells, c.nodes + space.nodes, c.written, c.where) for c in cells]
     for own, sets, more in (
         (part.node_sets, whole.node_sets, space.nodes),
@@ -181,6 +185,9 @@ def place(whole: Deck, part: Deck, name: str, at: Placement, space: Space) -> No
     whole.links += [replace(card, space=key) for card in part.links]
     whole.surfaces += [
         replace(s, name=space.prefix + s.name, card=replace(s.card, space=key)) for s in part.surfaces
+    ]
+    whole.structures += [
+        (where, kind, [[n + space.nodes for n in nodes] for nodes in rows]) for where, kind, rows in part.structures
     ]
     whole.ignored += part.ignored
     whole.kinds += part.kinds

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ..data import Array, Indices, Joint, Link, Sector
+from ..data import Array, Indices, Joint, Link, LumpedElement, PointMass, Sector
 from ..errors import UserError
 from ..topology import FACET_CORNERS
 
@@ -55,6 +55,19 @@ class DeckMaterial:
     shear: float | None = None
 
 
+@dataclass(frozen=True)
+class Structure:
+    """Elements of one type that are left out because they are no solids: beams, shells, trusses.
+
+    Attributes:
+        where: the first of them. kind: as the file calls it. elements: positions of the nodes of each.
+    """
+
+    where: str
+    kind: str
+    elements: list[list[int]]
+
+
 @dataclass
 class RawMesh:
     """A file's content.
@@ -74,7 +87,8 @@ class RawMesh:
         lost: what carries mass, stiffness or a constraint and is not read, in words.
         remarks: what was read as something else or not used, in words. instances: name -> positions. joints: pairs of
             faces in contact. sector: of a cyclic ring. preloads: of bolts: where it stands, force
-            in the file's unit.
+            in the file's unit. lumps: masses, springs and dashpots, by positions in `points`. structures:
+            elements that are left out. retained: point sets whose displacements the file keeps.
     """
 
     points: Array
@@ -96,6 +110,9 @@ class RawMesh:
     joints: list[Joint] = field(default_factory=list)
     sector: Sector | None = None
     preloads: list[tuple[str, float]] = field(default_factory=list)
+    lumps: list[PointMass | LumpedElement] = field(default_factory=list)
+    structures: list[Structure] = field(default_factory=list)
+    retained: list[str] = field(default_factory=list)
 
     def add_points(self, name: str, positions: Indices) -> None:
         """Add to a point set."""

@@ -17,15 +17,17 @@ from typing import Any
 
 import numpy as np
 
-from ..data import Array, Indices, Mesh
+from ..data import Array, Indices, Lumps, Mesh
 from ..errors import UserError, in_its_file
 from ..files.hostile import tried
 from ..files.store import ordinary
 from ..topology import CELL_TYPES, FACET_CORNERS
+from ..units import usual_system
 from .bdf import read_bdf
 from .cdb import read_cdb
 from .inp import read_inp
 from .linking import renumbered
+from .lumps import hanging, on_mesh, points_of, spread
 from .materials import NONE, Substitute, in_si
 from .med import read_med
 from .msh import is_msh41, read_msh41
@@ -73,7 +75,7 @@ def read_mesh(
         made = [in_si(m, system, zero, instead) for m in raw.materials] if system else []
         materials, lacking = tuple(m for m, _ in made), [text for _, text in made if text]
         raw.lost = [*lacking, *raw.lost]
-        mesh = _mesh_of(raw, UNITS[unit])
+        mesh = _mesh_of(raw, UNITS[unit], system or usual_system(unit))
         return replace(mesh, materials=materials, regions=mesh.regions if materials else {})
     except Damaged as error:
         raise _refused(path, error) from error
@@ -158,7 +160,7 @@ def _read_raw(path: Path) -> RawMesh:
     raise UserError(f"meshes are not read from a file '{suffix}'; use one of {known}")
 
 
-def _mesh_of(raw: RawMesh, metres: float) -> Mesh:
+def _mesh_of(raw: RawMesh, metres: float, system: str | None) -> Mesh:
     foreign = sorted({kind for kind, cells in raw.blocks if kind not in CELL_TYPES and len(cells)})
     if foreign:
         way = f"convert the mesh to one of {', '.join(CELL_TYPES)}"
@@ -173,12 +175,15 @@ def _mesh_of(raw: RawMesh, metres: float) -> Mesh:
             cells.setdefault(kind, []).append(connectivity)
     if not cells:
         raise UserError("holds no volume cells (only surfaces or lines?); mesh the volume first")
+    attached = hanging(raw)
+    lumps = spread(raw, system)
     points = raw.points * metres
     if points.shape[1:] != (3,) or not np.isfinite(points).all():
         raise UserError("coordinates must be three finite numbers a point; the file is damaged or not 3-D")
     if np.abs(points).max() > _FARTHEST:
         raise UserError(f"a point lies {np.abs(points).max():.3g} m from the origin; the file is damaged")
-    return _assemble_mesh(raw, points, {t: np.concatenate(c) for t, c in cells.items()}, metres)
+    mesh = _assemble_mesh(raw, points, {t: np.concatenate(c) for t, c in cells.items()}, metres, lumps)
+    return replace(mesh, hanging=attached, retained=tuple(n for n in raw.retained if n in mesh.point_sets))
 
 
 _MIRRORED = {
@@ -317,8 +322,10 @@ def _cell_sets(raw: Any) -> dict[str, list]:
 # surface and faces ------------------------------------------------------------------------------------------------
 
 
-def _assemble_mesh(raw: RawMesh, points: Array, cells: dict[str, Indices], metres: float) -> Mesh:
-    used = np.unique(np.concatenate([c.ravel() for c in cells.values()]))
+def _assemble_mesh(
+    raw: RawMesh, points: Array, cells: dict[str, Indices], metres: float, lumps: Lumps | None
+) -> Mesh:
+    used = np.unique(np.concatenate([points_of(lumps), *(c.ravel() for c in cells.values())]))
     renumber = np.full(len(points), -1, dtype=np.int64)
     renumber[used] = np.arange(len(used))
     mesh = Mesh(
@@ -354,6 +361,7 @@ def _assemble_mesh(raw: RawMesh, points: Array, cells: dict[str, Indices], metre
         links=links, lost=tuple(raw.lost), remarks=tuple(raw.remarks), joints=tuple(raw.joints),
         sector=raw.sector, preloads=tuple(raw.preloads),
         instances={n: kept for n, s in raw.instances.items() if len(kept := _kept(renumber[s]))},
+        lumps=None if lumps is None else on_mesh(lumps, renumber),
     )  # fmt: skip
 
 

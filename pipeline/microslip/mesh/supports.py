@@ -7,8 +7,8 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ..data import Array, Equation, FaceTie, Guide, Indices, Link
-from .raw import Numbering, RawMesh
+from ..data import Array, Equation, FaceTie, Guide, Indices, Link, PointMass
+from .raw import Numbering, RawMesh, joined
 
 
 @dataclass
@@ -150,5 +150,6 @@ def _turning(raw: RawMesh) -> Indices:
         for link in raw.links
         if not isinstance(link, FaceTie | Guide)
     ]
+    named += [[item.node] if isinstance(item, PointMass) else item.nodes for item in raw.lumps]
     used = np.unique(np.concatenate([np.zeros(0, dtype=np.int64), *(nodes.ravel() for _, nodes in raw.blocks)]))
-    return np.setdiff1d(np.concatenate([np.zeros(0, dtype=np.int64), *map(np.asarray, named)]), used)
+    return np.setdiff1d(joined(map(np.asarray, named)), used)

@@ -51,7 +51,8 @@ def modal_basis(
             groups = {key: with_stiffening(g, b.model, operators) for key, g in groups.items()}
         ranges = {} if settings.rotation.range_rpm is None else body_ranges(b, settled, ends)
     basis = ModalBasis(
-        settings.name, mesh, groups, b.mass, b.centre, b.inertia, b.model.axis, b.model.point, settings.damping.source,
+        settings.name, mesh, groups, b.mass, b.centre, b.inertia, b.model.axis, b.model.point,
+        settings.damping.source if b.model.dashpots is None else "matrix",
         bool(b.motions.shape[1]), settings.reduction, dict(provenance or {}),
         ranges=ranges,
     )  # fmt: skip
@@ -181,5 +182,7 @@ def unreduced(mesh: Mesh, settings: BodySettings) -> Unreduced:
         upper = free.matrix(b.model.K0)
     K = (upper + sp.triu(upper, 1).T).tocsr()
     C = ((damping.alpha or 0.0) * M + (damping.beta or 0.0) * K).tocsr()
+    if b.model.dashpots is not None:
+        C = C + free.congruent(b.model.d.pattern.full(b.model.dashpots))
     rows = {name: free.rows(p.B.tocsr()) for name, p in b.rows.patches.items()}
     return Unreduced(M, C, K, rows, mesh, b.mass, free.congruent)

@@ -14,12 +14,12 @@ from typing import Protocol
 import numpy as np
 import scipy.sparse as sp
 
-from ..data import Array, Indices, Material
+from ..data import Array, Indices, Material, Mesh
 from ..elasticity import VOIGT_AXES, pushed, strain_tensor
 from ..errors import NotConverged, UserError
 from ..fem.contact import ContactPair, Grip
 from ..fem.cyclic import CyclicUpper
-from ..fem.discretise import Discretisation, FreeUpper, whole
+from ..fem.discretise import Discretisation, FreeUpper, Pattern, whole
 from ..fem.operators import (
     displacement_gradient,
     engineering,
@@ -73,6 +73,7 @@ class BodyModel:
         dead_load: (n, 3) forces that act at every speed, N. axis, point: of rotation.
         spin_softening: whether -Omega^2 M P is part of K. contacts: faces that may touch in the static state.
         hooke: per block (6, 6) or (e, q, 6, 6) that takes the place of the materials' (see `heated`), or None.
+        springs, dashpots: (p, 3, 3) of the mesh's lumped elements, N/m and N s/m, or None.
     """
 
     d: Discretisation
@@ -90,6 +91,8 @@ class BodyModel:
     spin_softening: bool = True
     contacts: tuple[ContactPair, ...] = ()
     hooke: list[Array] | None = None
+    springs: Array | None = None
+    dashpots: Array | None = None
 
     def elasticity(self, block: int) -> Array:
         """(6, 6) or (e, q, 6, 6) Hooke matrix of a block's points, Pa, without `factor`."""
@@ -152,6 +155,36 @@ def make_model(
         d, tuple(own), factor, strain, M, d.pattern.full(M), K, free, fixed,
         dead_load, axis / np.linalg.norm(axis), point, spin_softening,
     )  # fmt: skip
+
+
+def with_lumps(model: BodyModel) -> BodyModel:
+    """The model with the point masses, springs and dashpots of its mesh."""
+    if (lumps := model.d.mesh.lumps) is None:
+        return model
+    pattern, M = model.d.pattern, model.M.copy()
+    np.add.at(M, pattern.places(lumps.points, lumps.points), lumps.masses)
+    springs, dashpots = lumped_springs(model.d.mesh, pattern), np.zeros((pattern.size, 3, 3))
+    np.add.at(dashpots, pattern.places(*lumps.pairs.T), lumps.damping)
+    return replace(
+        model, M=M, M_full=pattern.full(M), K0=model.K0 + springs, springs=springs,
+        dashpots=dashpots if dashpots.any() else None,
+    )  # fmt: skip
+
+
+def lumped_springs(mesh: Mesh, pattern: Pattern) -> Array:
+    """(p, 3, 3) stiffness of the lumped elements of a mesh over a pattern, N/m."""
+    K = np.zeros((pattern.size, 3, 3))
+    if mesh.lumps is not None:
+        np.add.at(K, pattern.places(*mesh.lumps.pairs.T), mesh.lumps.stiffness)
+    return K
+
+
+def resisting_force(model: BodyModel, stress: list[Array], H: list[Array] | None, u: Array) -> Array:
+    """(n, 3) forces with which stress and springs resist displacements u (n, 3), N."""
+    force = internal_force(model.d, stress, H)
+    if model.springs is not None:
+        force = force + (model.d.pattern.full(model.springs) @ u.reshape(-1)).reshape(u.shape)
+    return force
 
 
 def stress_of(model: BodyModel, strain: list[Array]) -> list[Array]:
@@ -290,7 +323,8 @@ def _tangent_slope(model: BodyModel, state: StaticState, du: Array) -> Array:
 
 def _tangent(model: BodyModel, H: list[Array], stress: list[Array]) -> Array:
     parts = enumerate(zip(model.factors, H, stress, strict=True))
-    return tangent(model.d, [tangent_tensor(model.elasticity(i), *part) for i, part in parts])
+    K = tangent(model.d, [tangent_tensor(model.elasticity(i), *part) for i, part in parts])
+    return K if model.springs is None else K + model.springs
 
 
 def _newton(
@@ -354,7 +388,7 @@ def _newton_at(
             K = closing.stiffened(K + soft if model.spin_softening else K, model.d.pattern, True, whole)
             return StaticState(u, H, stress, K, "nonlinear", len(steps), closing.grips, omega)
         outer = closing.with_forces(level * model.dead_load + centrifugal_force(model, omega, u))
-        residual = free.restrict((outer - internal_force(model.d, stress, H)).reshape(-1))
+        residual = free.restrict((outer - resisting_force(model, stress, H, u)).reshape(-1))
         if model.contacts or not _factors_serve(steps):
             K = _tangent(model, H, stress)
             solver.factorise(free.matrix(closing.stiffened(K + soft, model.d.pattern)))

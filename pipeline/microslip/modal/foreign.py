@@ -23,7 +23,7 @@ from ..units import from_rpm
 from . import rigid
 from .body_rows import BodyRows, body_rows
 from .boundary import AXES, check_held, require_face
-from .group import checks_of, modal_damping, of_solution
+from .group import checks_of, modal_damping, of_solution, ratios_of
 from .solution import Searched, Solution, answered, certified, reduced_on
 
 NOT_RIGID = 1e-6
@@ -431,6 +431,4 @@ def _damping(body: Matrices, settings: BodySettings, reduced: Reduced, free: Ind
         raise UserError("damping: geometry.matrices.damping brings the damping already; remove one of the two")
     C = reduced.vectors.T @ (body.damping[free][:, free] @ reduced.vectors)
     C = 0.5 * (C + C.T)
-    V = np.eye(len(C)) if reduced.to_diagonal is None else reduced.to_diagonal
-    own = np.einsum("ij,ik,kj->j", V, C, V)
-    return C, np.divide(own, 2 * reduced.omega, out=np.zeros_like(own), where=reduced.omega > 0)
+    return C, ratios_of(C, reduced)

@@ -29,6 +29,11 @@ def assemble_group(b: Prepared, state: StaticState, s: Solution, harmonic: int) 
     phi = s.unknowns.expand(reduced.vectors, n)
     shapes = phi.reshape(n, 3, -1)
     ratios = settings.damping.ratios(reduced.omega)
+    C = modal_damping(reduced, 2 * ratios * reduced.omega)
+    if model.dashpots is not None:
+        C_d = phi.conj().T @ (model.d.pattern.full(model.dashpots) @ phi)
+        C = C + 0.5 * (C_d + C_d.conj().T)
+        ratios = ratios_of(C, reduced)
     Mphi = (model.M_full @ phi.reshape(n, -1)).reshape(shapes.shape)
     run_up = without_massless(run_up_terms(model, state, shapes, Mphi, harmonic), reduced)
     if (settings.output.gauss or settings.output.nodal_stress) and settings.output.stress_at(harmonic):
@@ -37,7 +42,7 @@ def assemble_group(b: Prepared, state: StaticState, s: Solution, harmonic: int) 
         **of_solution(rows, s, phi, n, state.u.reshape(-1)),
         speed=speed,
         damping_ratio=ratios,
-        C_r=modal_damping(reduced, 2 * ratios * reduced.omega),
+        C_r=C,
         G_r=2 * speed * run_up.N,
         run_up=run_up,
         gyroscopic=_gyroscopic(settings, speed, reduced, run_up, s.found, s.kept),
@@ -146,6 +151,13 @@ def modal_damping(reduced: Reduced, diagonal: Array) -> Array:
     return (back * diagonal) @ back.conj().T
 
 
+def ratios_of(C: Array, reduced: Reduced) -> Array:
+    """(c,) damping ratios of the reduced body's own modes, whatever else C (c, c) couples."""
+    V = np.eye(len(C)) if reduced.to_diagonal is None else reduced.to_diagonal
+    own = np.einsum("ij,ik,kj->j", V.conj(), C, V).real
+    return np.divide(own, 2 * reduced.omega, out=np.zeros_like(own), where=reduced.omega > 0)
+
+
 def checks_of(s: Solution) -> dict[str, float]:
     """What the search says of itself."""
     found = s.found
@@ -162,4 +174,5 @@ def checks_of(s: Solution) -> dict[str, float]:
 def _checks(model: BodyModel, state: StaticState) -> dict[str, float]:
     total = float(model.M_full.sum())
     volume = float(sum(m.density * b.dx.sum() for m, b in zip(model.materials, model.d.blocks, strict=True)))
+    volume += 0.0 if model.d.mesh.lumps is None else float(model.d.mesh.lumps.masses.sum())
     return {"mass_error": abs(total - volume) / volume, "newton_steps": float(state.iterations)}

@@ -29,7 +29,7 @@ from .boundary import (
     with_dead_loads,
 )
 from .closures import bolt_forces, contact_pairs
-from .equilibrium import BodyModel, Unknowns, make_model
+from .equilibrium import BodyModel, Unknowns, make_model, with_lumps
 from .floating import refuse_floating, refuse_unbalanced
 from .range_basis import SPARE
 from .sector import Sector, cut_faces, make_sector, sector_pencils
@@ -149,10 +149,11 @@ def _prepared(
         d, materials, free, fixed, axis, point, temperature, settings.temperature.reference,
         np.zeros((mesh.n_points, 3)), settings.rotation.spin_softening,
     )  # fmt: skip
+    model = with_lumps(model)
     rows = with_centrifugal(rows, model)
     model = with_dead_loads(model, mesh, settings)
     model = replace(model, contacts=pairs, dead_load=model.dead_load + bolt_forces(mesh, settings))
-    motions = _floating(model, sector, centre)
+    motions = rigid.unresisted(_floating(model, sector, centre), model.springs, d.pattern)
     check_held(mesh, settings, centre, motions)
     refuse_unlinked_parts(model, settings)
     refuse_overlap(mesh, settings)
@@ -203,6 +204,9 @@ def inertia_of(d: Discretisation, density: float | Sequence[float]) -> tuple[flo
     dm = np.concatenate(
         [rho * b.dx.reshape(-1) for rho, b in zip(per_block(d, density), d.blocks, strict=True)]
     )
+    if d.mesh.lumps is not None:
+        points = np.concatenate([points, d.mesh.points[d.mesh.lumps.points]])
+        dm = np.concatenate([dm, d.mesh.lumps.masses])
     m = dm.sum()
     centre = dm @ points / m
     r = points - centre

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.linalg import qr
 
 from ..data import Array, Indices
-from ..fem.discretise import FreeUpper
+from ..fem.discretise import FreeUpper, Pattern
 from ..fem.tied import Tied
 from ..frames import rigid_fields as rigid_fields
 
@@ -40,6 +40,17 @@ def allowed(free: Tied, motions: Array) -> Array:
 
 _BARRED = 1e-6
 """Share of a motion beyond which ties resist it: positions in a file have some seven digits."""
+
+
+def unresisted(motions: Array, springs: Array | None, pattern: Pattern) -> Array:
+    """(3n, q) those motions out of (3n, r) that springs (p, 3, 3) of lumped elements let pass without force."""
+    if springs is None or not springs.any() or not motions.shape[1]:
+        return motions
+    moved = motions / np.maximum(np.abs(motions).max(axis=0), 1e-300)
+    K = pattern.full(springs)
+    force = np.linalg.qr(K @ moved, mode="r")
+    _, s, vt = np.linalg.svd(force, full_matrices=True)
+    return moved @ vt[int((s > _BARRED * np.linalg.norm(np.abs(K) @ np.abs(moved))).sum()) :].T
 
 
 def null_space(rows: Array) -> Array:

@@ -112,7 +112,7 @@ def nodal_set(
     smoothers = [smoother(b, n) for b in model.d.blocks]
     volumes = np.sum([w for _, w in smoothers], axis=0)
     cut = model.free.unknowns.cut if isinstance(model.free, CyclicUpper) else None
-    weights = volumes.copy()
+    weights = np.where(volumes > 0, volumes, 1.0)  # of points without cells
     if cut is not None:
         weights[cut.left] = weights[cut.right] = volumes[cut.left] + volumes[cut.right]
     S = sp.hstack([matrix for matrix, _ in smoothers]).tocsr()

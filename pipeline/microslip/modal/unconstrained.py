@@ -103,7 +103,8 @@ def _part_motions(model: BodyModel, part: Indices) -> Array:
         whole[own] = left.reshape(len(own), 3, -1)
         columns.append(whole.reshape(3 * len(points), -1))
     motions = np.hstack(columns)
-    return rigid.allowed(model.free, motions) if isinstance(model.free, Tied) else motions
+    motions = rigid.allowed(model.free, motions) if isinstance(model.free, Tied) else motions
+    return rigid.unresisted(motions, model.springs, model.d.pattern)
 
 
 def _renumbered(fixed: Indices, own: Indices) -> Indices:

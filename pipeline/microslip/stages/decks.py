@@ -26,6 +26,7 @@ from .importing import (
     body_name,
     import_file,
     length_unit,
+    refuse_hanging,
     refuse_taken,
     with_page,
 )
@@ -48,8 +49,12 @@ from .summary import frequency_lines
 
 
 def import_deck(
-    file: Path, folder: Path | None, unit: str | None, report: Report = lambda _: None,
+    file: Path,
+    folder: Path | None,
+    unit: str | None,
+    report: Report = lambda _: None,
     instead: Substitute = NONE,
+    solids_only: bool = False,
 ) -> Imported:
     """Import a file; a deck whose contact pairs separate bodies becomes an assembly.
 
@@ -59,9 +64,11 @@ def import_deck(
     pattern = PAIRS.get(suffix_of(file))
     deck = [f.read_bytes() for f in files_of(file) if f.is_file()] if pattern else []
     if pattern is None or not any(map(pattern.search, deck)):
-        return import_file(file, folder, unit, report=report, instead=instead)
+        return import_file(file, folder, unit, report=report, instead=instead, solids_only=solids_only)
     unit = length_unit(unit, file)
     mesh = read_mesh(file, unit)
+    if not solids_only:
+        refuse_hanging(file, mesh)
     groups = bodies(mesh)
     joints, told = _between_bodies(mesh, groups)
     if not joints:

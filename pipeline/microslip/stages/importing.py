@@ -62,6 +62,7 @@ def import_file(
     report: Report = lambda _: None,
     name: str = "",
     instead: Substitute = NONE,
+    solids_only: bool = True,
 ) -> Imported:
     """Write a body.toml around a CAD file, a mesh or matrices; nothing is copied, the file is named where it lies.
 
@@ -70,7 +71,7 @@ def import_file(
             body.toml; by default one of the file's name here. unit: of its lengths; None: that which
             the file tells, else mm. instances: those of a deck that are the body, all if none.
         name: of the body; the folder's if not given. instead: of numbers that the file's materials lack, steel's where
-            it has none.
+            it has none. solids_only: whether beams and shells that are joined to the solids may be left out.
 
     Raises:
         UserError: unreadable, or there is a body.toml already.
@@ -87,7 +88,8 @@ def import_file(
     target = (folder or Path(name)) / "body.toml"
     refuse_taken(target)
     kind = suffix_of(file)
-    made = _matrices if kind in MATRICES else partial(_mesh, instances=instances, instead=instead)
+    of_mesh = partial(_mesh, instances=instances, instead=instead, solids_only=solids_only)
+    made = _matrices if kind in MATRICES else of_mesh
     if kind in CAD:
         made = partial(_cad, report=report)
     report(f"reading {file}")
@@ -239,15 +241,18 @@ def _hold(mesh: Mesh) -> bool:
     """Whether the file's supports leave no rigid motion."""
     from ..fem.discretise import discretise
     from ..fem.tied import tied_upper
-    from ..modal.rigid import free_motions, left_by
+    from ..modal.equilibrium import lumped_springs
+    from ..modal.rigid import free_motions, left_by, unresisted
 
     none, fixed = np.zeros(0, dtype=np.int64), _fixed(mesh)
+    centre, pattern = mesh.points.mean(axis=0), discretise(mesh).pattern
+    springs = lumped_springs(mesh, pattern)
     if mesh.ties is None:
-        return free_motions(mesh.points, mesh.points.mean(axis=0), fixed).shape[1] == 0
+        return unresisted(free_motions(mesh.points, centre, fixed), springs, pattern).shape[1] == 0
     first, sets = 3 * mesh.n_points, mesh.ties.sets
     moves = [first + 6 * sets.get(n, none) + "xyzabc".index(c) for n, ways in mesh.supports.items() for c in ways]
-    free = tied_upper(discretise(mesh).pattern, np.concatenate([fixed, *moves]), mesh.ties)
-    return left_by(free, mesh.points, mesh.points.mean(axis=0), fixed).shape[1] == 0
+    free = tied_upper(pattern, np.concatenate([fixed, *moves]), mesh.ties)
+    return unresisted(left_by(free, mesh.points, centre, fixed), springs, pattern).shape[1] == 0
 
 
 def _tied(file: Path, mesh: Mesh) -> tuple[Mesh, list[str]]:
@@ -396,8 +401,23 @@ def _end(count: int = USUAL) -> list[str]:
 STEEL = Substitute(7850.0, 2.1e11, 0.3)
 
 
+def refuse_hanging(file: Path, mesh: Mesh) -> None:
+    """Raise `UserError` if elements that are left out hold or load the solids."""
+    if mesh.hanging:
+        raise refused(
+            file,
+            f"{mesh.hanging}, and beams, shells and the like are not read: without them other frequencies come. Model "
+            "them by solids, or write --solids-only if the solids are meant to stand alone",
+        )
+
+
 def _mesh(
-    file: Path, folder: Path, unit: str, instances: Sequence[str] = (), instead: Substitute = NONE
+    file: Path,
+    folder: Path,
+    unit: str,
+    instances: Sequence[str] = (),
+    instead: Substitute = NONE,
+    solids_only: bool = True,
 ) -> tuple[list[str], list[str], Mesh]:
     system, asked = usual_system(unit), instead
     numbers = {key: getattr(asked, key) or getattr(STEEL, key) for key in ("density", "young", "poisson")}
@@ -413,10 +433,13 @@ def _mesh(
     joints = [f"{j.where}: '{j.slave}' on '{j.master}': make them interfaces and a contact" for j in mesh.joints]
     mesh = of_instances(mesh, instances) if instances else mesh
     mesh, ties = _tied(file, mesh)
+    if not solids_only:
+        refuse_hanging(file, mesh)
     kinds = ", ".join(f"{len(c)} {t}" for t, c in mesh.cells.items())
+    alone = f"; the solids alone: {mesh.hanging.partition(': ')[2]} and are left out" if mesh.hanging else ""
     again = [f"warning: {text}" for texts in mesh_problems(mesh) for text in texts]
     lacking = [text for text in again if text.endswith(STANDS)]
-    told = [*lacking, *told, f"{file}: {mesh.n_points} points, {kinds}"]
+    told = [*lacking, *told, f"{file}: {mesh.n_points} points, {kinds}{alone}"]
     told += [text for text in again if text not in lacking]
     told += [f"note: {text}" for text in mesh.remarks]
     told += [*ties, *((*joints, *_pressed(mesh)) if not instances else ())]
@@ -446,12 +469,28 @@ def _mesh(
     if count < USUAL:
         told.append(f"modes: {count} asked for, the body has few degrees of freedom")
     lines = [*_noted([text for text in told if text not in again]), *lines]
-    return [*lines, *hot, *ring, *held, *_sets(mesh, bool(held)), *_end(count)], told, mesh
+    kept, words = _retained(mesh)
+    told += words
+    sets = _sets(mesh, bool(held) or holding)
+    return [*lines, *hot, *ring, *held, *kept, *sets, *_end(count)], told, mesh
 
 
 def _keys(numbers: Mapping[str, float]) -> list[str]:
     """Lines of [material]."""
     return [f"{key} = {f'{value:.9g}'.replace('e+', 'e')}" for key, value in numbers.items()]
+
+
+def _retained(mesh: Mesh) -> tuple[list[str], list[str]]:
+    """Lines of [[interfaces]] where the file keeps displacements, comments where these are no face, and what to say."""
+    lines, told = [], []
+    for name in mesh.retained:
+        mark = "" if name in mesh.faces else "#"
+        title = body_name(name, "retained")
+        lines += ["", f"{mark}[[interfaces]]           # the file retains its displacements"]
+        lines += [f"{mark}name = {json.dumps(title)}", f"{mark}face = {json.dumps(name)}"]
+        none = "; it is no whole face of the surface, so it is written as a comment: give the face by box" * bool(mark)
+        told.append(f"retained displacements of '{name}': an interface, not a support{none}")
+    return lines, told
 
 
 def _noted(told: Sequence[str]) -> list[str]:
