@@ -7,7 +7,7 @@ import numpy as np
 from ..errors import of_file
 from .cards import Card, fields
 from .deck import Deck, Readers
-from .raw import Damaged, Numbering, RawMesh, joined, lost
+from .raw import Damaged, Numbering, RawMesh, joined, lost, real
 from .supports import Constraints
 
 _HELD = {
@@ -17,38 +17,39 @@ _HELD = {
 
 
 def _read_boundary(deck: Deck, card: Card) -> None:
-    """Displacements that are zero. OP=NEW takes the place of all there was before the step."""
-    if card.word("OP") == "NEW" and deck.renewed != deck.step:
-        deck.held, deck.not_held, deck.renewed = [], [], deck.step
+    """Displacements that are held. OP=NEW takes the place of all there was before the step."""
+    if card.word("OP") == "NEW" and deck.renewed != deck.steps.number:
+        deck.held, deck.not_held, deck.renewed = [], [], deck.steps.number
     other = {"SUBMODEL", "USER", "FIXED", "BASE NAME"} & set(card.parameters)
     if other or card.word("TYPE", "DISPLACEMENT") != "DISPLACEMENT":
         deck.not_held.append(f"a *BOUNDARY of the kind {', '.join(other) or card.parameters['TYPE']}")
         return
+    moved = Card(card.keyword, card.parameters, [], card.where, card.place, card.space)
     for line in card.lines:
         words = [word.strip() for word in line.split(",")] + 3 * [""]
         try:
-            directions = _HELD.get(words[1].upper()) or _zeros(words)
+            directions = _HELD.get(words[1].upper()) or _directions(words)
+            if words[3] and real(words[3], "*BOUNDARY"):
+                moved.lines.append(line)
             deck.held.append((words[0].strip('"'), directions, card.place))
         except ValueError:
             deck.not_held.append(f"the line '{line[:60]}' of *BOUNDARY")
+    steps = deck.steps
+    if not steps.perturbed and (moved.lines or card.word("OP") == "NEW"):
+        steps.acting.append((steps.number, steps.factor(card), moved))
 
 
-def _zeros(words: list[str]) -> str:
+def _directions(words: list[str]) -> str:
     """Directions of a data line: set, first, last direction, value.
 
     Raises:
-        ValueError: not such a line, a last direction below the first, or a displacement that is
-            prescribed.
+        ValueError: not such a line, or a last direction below the first.
     """
     first = int(words[1])
     last = int(words[2]) if words[2] else first
-    if first < 1 or last < first or (first <= 3 and words[3] and float(words[3]) != 0):
+    if first < 1 or last < first:
         raise ValueError
     return "xyzabc"[first - 1 : last]
-
-
-def _read_step(deck: Deck, card: Card) -> None:
-    deck.step += 1
 
 
 def _read_transform(deck: Deck, card: Card) -> None:
@@ -58,10 +59,11 @@ def _read_transform(deck: Deck, card: Card) -> None:
 def _read_temperature(deck: Deck, card: Card, column: int = 1) -> None:
     if "FILE" in card.parameters or "BSTEP" in card.parameters:
         raise Damaged("*TEMPERATURE reads from a results file; write the temperatures out")
+    factor = deck.steps.factor(card)
     for line in card.lines:
         words = fields(line)
         try:
-            deck.temperatures.append((column, words[0], float(words[1])))
+            deck.temperatures.append((column, words[0], factor * float(words[1])))
         except (IndexError, ValueError):
             raise Damaged(f"*TEMPERATURE holds the line '{line[:60]}', no node (or set) and temperature") from None
 
@@ -100,7 +102,6 @@ def constraints(deck: Deck) -> Constraints:
 
 READERS: Readers = {
     "BOUNDARY": _read_boundary,
-    "STEP": _read_step,
     "TRANSFORM": _read_transform,
     "INITIAL CONDITIONS": _read_initial,
     "TEMPERATURE": _read_temperature,

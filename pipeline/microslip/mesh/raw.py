@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ..data import Array, Indices, Joint, Link, Sector
+from ..data import Array, Indices, Joint, Link, Sector, StaticStep
 from ..errors import UserError
 from ..topology import FACET_CORNERS
 
@@ -70,7 +70,8 @@ class RawMesh:
         lost: what carries mass, stiffness or a constraint and is not read, in words.
         remarks: what was read as something else or not used, in words. instances: name -> positions. joints: pairs of
             faces in contact. sector: of a cyclic ring. preloads: of bolts: where it stands, force
-            in the file's unit.
+            in the file's unit. state: the static step that the file's modes are about: a reader fills it with
+            loads by positions in `points`, corners of facets and numbers of cells, in the file's units.
     """
 
     points: Array
@@ -92,6 +93,7 @@ class RawMesh:
     joints: list[Joint] = field(default_factory=list)
     sector: Sector | None = None
     preloads: list[tuple[str, float]] = field(default_factory=list)
+    state: StaticStep | None = None
 
     def add_points(self, name: str, positions: Indices) -> None:
         """Add to a point set."""

@@ -26,6 +26,7 @@ from .bdf import read_bdf
 from .cdb import read_cdb
 from .inp import read_inp
 from .linking import renumbered
+from .loading import state_of
 from .materials import in_si
 from .med import read_med
 from .msh import is_msh41, read_msh41
@@ -68,7 +69,7 @@ def read_mesh(path: Path | str, unit: str, system: str | None = None, zero: floa
         if (said := unit_of(path)) not in ("", unit):
             raw.lost.append(f"the file tells its lengths in {said}, here they are taken in {unit}: which is right?")
         materials = tuple(in_si(m, system, zero) for m in raw.materials) if system else ()
-        mesh = _mesh_of(raw, UNITS[unit])
+        mesh = _mesh_of(raw, UNITS[unit], system)
         return replace(mesh, materials=materials, regions=mesh.regions if materials else {})
     except Damaged as error:
         raise _refused(path, error) from error
@@ -150,7 +151,7 @@ def _read_raw(path: Path) -> RawMesh:
     raise UserError(f"meshes are not read from a file '{suffix}'; use one of {known}")
 
 
-def _mesh_of(raw: RawMesh, metres: float) -> Mesh:
+def _mesh_of(raw: RawMesh, metres: float, system: str | None) -> Mesh:
     foreign = sorted({kind for kind, cells in raw.blocks if kind not in CELL_TYPES and len(cells)})
     if foreign:
         way = f"convert the mesh to one of {', '.join(CELL_TYPES)}"
@@ -170,7 +171,8 @@ def _mesh_of(raw: RawMesh, metres: float) -> Mesh:
         raise UserError("coordinates must be three finite numbers a point; the file is damaged or not 3-D")
     if np.abs(points).max() > _FARTHEST:
         raise UserError(f"a point lies {np.abs(points).max():.3g} m from the origin; the file is damaged")
-    return _assemble_mesh(raw, points, {t: np.concatenate(c) for t, c in cells.items()}, metres)
+    whole = {t: np.concatenate(c) for t, c in cells.items()}
+    return _assemble_mesh(raw, points, whole, metres, system)
 
 
 _MIRRORED = {
@@ -309,7 +311,9 @@ def _cell_sets(raw: Any) -> dict[str, list]:
 # surface and faces ------------------------------------------------------------------------------------------------
 
 
-def _assemble_mesh(raw: RawMesh, points: Array, cells: dict[str, Indices], metres: float) -> Mesh:
+def _assemble_mesh(
+    raw: RawMesh, points: Array, cells: dict[str, Indices], metres: float, system: str | None
+) -> Mesh:
     used = np.unique(np.concatenate([c.ravel() for c in cells.values()]))
     renumber = np.full(len(points), -1, dtype=np.int64)
     renumber[used] = np.arange(len(used))
@@ -339,11 +343,12 @@ def _assemble_mesh(raw: RawMesh, points: Array, cells: dict[str, Indices], metre
         if face := faces_from_points(boundary, chosen, len(mesh.points)):
             faces[name] = face
     links = renumbered(raw, points, renumber, metres)
+    state = state_of(raw, replace(mesh, links=links), renumber, boundary, metres, system)
     known = {*mesh.point_sets, *(links.sets if links else ())}
     supports = {n: directions for n, directions in raw.supports.items() if n in known}
     return replace(
         mesh, faces=faces, inner=inner, supports=supports, not_held=tuple(raw.not_held), unended=raw.unended,
-        links=links, lost=tuple(raw.lost), remarks=tuple(raw.remarks), joints=tuple(raw.joints),
+        links=links, state=state, lost=tuple(raw.lost), remarks=tuple(raw.remarks), joints=tuple(raw.joints),
         sector=raw.sector, preloads=tuple(raw.preloads),
         instances={n: kept for n, s in raw.instances.items() if len(kept := _kept(renumber[s]))},
     )  # fmt: skip

@@ -26,7 +26,7 @@ from .boundary import (
     known_materials,
     materials_of,
     refuse_overlap,
-    with_dead_loads,
+    with_loads,
 )
 from .closures import bolt_forces, contact_pairs
 from .equilibrium import BodyModel, Unknowns, make_model
@@ -150,7 +150,7 @@ def _prepared(
         np.zeros((mesh.n_points, 3)), settings.rotation.spin_softening,
     )  # fmt: skip
     rows = with_centrifugal(rows, model)
-    model = with_dead_loads(model, mesh, settings)
+    model = with_loads(model, mesh, settings, held)
     model = replace(model, contacts=pairs, dead_load=model.dead_load + bolt_forces(mesh, settings))
     motions = _floating(model, sector, centre)
     check_held(mesh, settings, centre, motions)
