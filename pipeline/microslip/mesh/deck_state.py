@@ -27,7 +27,8 @@ def until_modes(cards: list[Card]) -> tuple[list[Card], list[str]]:
         return cards, []
     end = next((i for i in range(first, len(cards)) if cards[i].keyword == "END STEP"), len(cards))
     more = sum(card.keyword in _MODES for card in cards[end:])
-    told = f"{cards[first].where}: *{cards[first].keyword} is the first of {more + 1} steps of modes; it is the one taken"
+    step = f"{cards[first].where}: *{cards[first].keyword}"
+    told = f"{step} is the first of {more + 1} steps of modes; it is the one taken"
     return cards[: end + 1], [told] * bool(more)
 
 
@@ -129,6 +130,9 @@ def state_of_deck(deck: Deck, raw: RawMesh, numbering: Numbering, of_parts: bool
     raw.state = StaticStep(f"{step.where}: *STEP", nonlinear, tuple(loads.all()))
 
 
+_NOT_READ = {"USER", "LOAD CASE", "SUBMODEL", "SECTOR", "OMEGA0", "ORIENTATION", "FILE"}
+
+
 @dataclass
 class _Acting:
     """Loads in force. nodal, facets, fields: where they act -> step, value and place; a later step takes the place of
@@ -149,7 +153,7 @@ class _Acting:
         """
         if card.word("OP") == "NEW":
             self._forget(number, card.keyword)
-        other = {"USER", "LOAD CASE", "SUBMODEL", "SECTOR", "OMEGA0", "REGION TYPE", "ORIENTATION"} & set(card.parameters)
+        other = _NOT_READ & set(card.parameters)
         if other and not (other == {"LOAD CASE"} and card.word("LOAD CASE") == "1"):
             self.raw.lost.append(lost(card.where, f"*{card.keyword} with {', '.join(sorted(other))}"))
             return
@@ -165,9 +169,10 @@ class _Acting:
             self.facets = {k: v for k, v in self.facets.items() if v[0] == number}
         kept = {"CLOAD": "force", "BOUNDARY": "displacement"}.get(keyword, "")
         self.nodal = {k: v for k, v in self.nodal.items() if k[0] != kept or v[0] == number}
-        self.fields = {
-            k: v for k, v in self.fields.items() if v[0] == number or k[0].startswith("surface ") != (keyword == "DSLOAD")
-        } if keyword in ("DLOAD", "DSLOAD") else self.fields  # fmt: skip
+        if keyword in ("DLOAD", "DSLOAD"):
+            other = keyword == "DLOAD"
+            items = self.fields.items()
+            self.fields = {k: v for k, v in items if v[0] == number or k[0].startswith("surface ") == other}
 
     def _nodal(self, number: int, factor: float, card: Card, words: list[str]) -> None:
         kind = "force" if card.keyword == "CLOAD" else "displacement"

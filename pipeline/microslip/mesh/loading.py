@@ -25,7 +25,8 @@ def state_of(
     if (step := raw.state) is None:
         return None
     if system is None:
-        raw.lost.append(f"{step.where}: its loads are in units that are not known; write material.units, or use m or mm")
+        text = "its loads are in units that are not known; write material.units, or use m or mm"
+        raw.lost.append(f"{step.where}: {text}")
         return None
     loads: list[NodalLoad | FacetLoad | BodyLoad | SpinLoad] = []
     for load in step.loads:
@@ -57,8 +58,8 @@ def _nodal(
     if not kept.all():
         first, what = raw.node_id[load.nodes[~kept][0]], "force" if load.kind == "force" else "displacement"
         raw.lost.append(
-            f"{load.where}: a {what} acts on node {first}, which neither a solid cell nor a constraint uses: it is left "
-            "out, so frequencies may differ"
+            f"{load.where}: a {what} acts on node {first}, which neither a solid cell nor a constraint "
+            "uses: it is left out, so frequencies may differ"
         )
     turns = load.directions[kept] >= 3
     unit = np.where(turns, 1.0, metres)

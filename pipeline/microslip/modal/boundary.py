@@ -227,12 +227,13 @@ def _with_state(model: BodyModel, mesh: Mesh, held: Indices) -> tuple[BodyModel,
         elif isinstance(load, FacetLoad) and load.direction is None:
             following.append(FollowingPressure(load.kind, load.facets, load.values))
         elif isinstance(load, FacetLoad):
-            force += corner_traction(facet_block(mesh, load.kind, load.facets), load.kind, n, load.values, load.direction)
+            block = facet_block(mesh, load.kind, load.facets)
+            force += corner_traction(block, load.kind, n, load.values, np.asarray(load.direction))
         elif isinstance(load, BodyLoad) and load.cells is None:
             force += body_force(model.M_full, load.acceleration)
         elif isinstance(load, BodyLoad):
-            density = [m.density for m in model.materials]
-            force += cells_force(whole(model.d), density, load.cells, load.acceleration)
+            density, chosen = [m.density for m in model.materials], np.asarray(load.cells, dtype=bool)
+            force += cells_force(whole(model.d), density, chosen, load.acceleration)
     if moments.any():
         upper = model.free.unknowns.apart if isinstance(model.free, CyclicUpper) else model.free
         assert isinstance(upper, Tied)
