@@ -23,9 +23,9 @@ def there(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
 
 
-def deck(cell: str, *steps: str, before=(), modes=MODES) -> str:
-    """60 x 11 x 7 mm of 4 x 1 x 1 cells, clamped at x = 0."""
-    mesh = meshes.brick(cell, (4, 1, 1), (0.06, 0.011, 0.007))
+def deck(cell: str, *steps: str, before=(), modes=MODES, cells=(4, 1, 1)) -> str:
+    """60 x 11 x 7 mm, clamped at x = 0."""
+    mesh = meshes.brick(cell, cells, (0.06, 0.011, 0.007))
     lines = decks.mesh_lines(mesh, sets=("x0", "x1"))
     section = decks.section(material="ST")
     return "\n".join([*lines, *STEEL, section, *before, "*BOUNDARY", "x0, 1, 3", *steps, *modes]) + "\n"
@@ -78,6 +78,30 @@ def test_the_modes_are_about_the_static_step_of_the_deck(capsys, cell, law, load
     said = imported(capsys, deck(cell, *static(*loads, law=law), before=COLD if loads is HEATED else ()))
     assert "the modes are about its static state" in said
     np.testing.assert_allclose(hertz(), wanted, rtol=1e-6)
+
+
+TURN = "*TRANSFORM, NSET=x1, TYPE={}"
+OBLIQUE, ROUND = (TURN.format("R"), "1., 1., 0., -1., 1., 0."), (TURN.format("C"), "50., -3., -2., 50., -3., 20.")
+
+
+@pytest.mark.parametrize(
+    ("before", "steps", "wanted"),
+    [
+        ([*OBLIQUE, "*BOUNDARY", "x1, 1, 1"], [], [1980.193, 10249.32, 11836.22, 19697.16]),
+        ([*ROUND, "*BOUNDARY", "x1, 2, 2"], [], [2116.287, 10935.74, 11966.22, 21172.99]),
+        (ROUND, static("*CLOAD", "x1, 1, 300.", "x1, 2, 50."), [1670.647, 2550.149, 9962.503, 12169.82]),
+        ([*OBLIQUE, "*EQUATION", "2", "49, 1, 1., 53, 1, -0.5"], [], [1679.052, 4844.436, 10177.93, 13273.2]),
+    ],
+)
+def test_supports_loads_and_equations_along_local_directions(capsys, before, steps, wanted):
+    imported(capsys, deck(BRICK, *steps, before=before))
+    np.testing.assert_allclose(hertz(), wanted, rtol=1e-6)
+
+
+def test_bricks_of_eight_points_have_their_masses_by_these_too(capsys):
+    """CalculiX with C3D20R."""
+    imported(capsys, deck(BRICK, cells=(4, 2, 2)).replace("TYPE=C3D20,", "TYPE=C3D20R,"))
+    np.testing.assert_allclose(hertz(), [1613.077, 2490.138, 9585.706, 11340.66], rtol=1e-6)
 
 
 HALF = ["*AMPLITUDE, NAME=A", "0., 0., 1., 0.5"]

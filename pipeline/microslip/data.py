@@ -310,7 +310,8 @@ class Mesh:
         joints: faces that the file lets touch. sector: of a cyclic ring, if the file is one.
             preloads: of its bolts: where it stands, force in the file's unit.
         links: constraints of the file, and ties: the equations that `fem.links.linked` makes of them, or None.
-        state: the static step that the file's modes are about, or None.
+        state: the static step that the file's modes are about, or None. integration: rule of its bricks of 20 nodes,
+            as `mesh.integration` of a body file.
     """
 
     points: Annotated[Array, Stored("node axis", "m", "reference positions", at="xyz")]
@@ -335,6 +336,7 @@ class Mesh:
     links: Links | None = None
     ties: Ties | None = None
     state: StaticStep | None = None
+    integration: str = "full"
 
     @property
     def n_points(self) -> int:

@@ -106,6 +106,7 @@ class Deck:
         spaces: instance in capitals -> its place; "" is the assembly's own (or the whole of a flat file).
         links: constraints, contacts and loads; sections: of solids; both resolved at the end.
         kinds: types of cells. lost: what counts and is not read, in words.
+        transforms: cards of local directions of nodes; axes: node number -> (3, 3) these as rows, once all is read.
         system: (4, 3) axes and origin in which nodes are written, or None. ignored: keywords that are not used.
     """
 
@@ -127,7 +128,8 @@ class Deck:
     not_held: list[str] = field(default_factory=list)
     steps: Steps = field(default_factory=Steps)
     renewed: int = -1
-    turned: bool = False
+    transforms: list[Card] = field(default_factory=list)
+    axes: dict[int, Array] = field(default_factory=dict)
     spaces: dict[str, Space] = field(default_factory=lambda: {"": Space()})
     links: list[Card] = field(default_factory=list)
     system: Array | None = None

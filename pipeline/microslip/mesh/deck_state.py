@@ -265,7 +265,13 @@ class _Acting:
         loads: list[NodalLoad | FacetLoad | BodyLoad | SpinLoad] = []
         nodal: dict[tuple[str, str], list[tuple[int, int, float]]] = {}
         for (kind, node, way), (_, amount, where) in self.nodal.items():
-            if amount:
+            axes = self.deck.axes.get(node) if way < 3 else None
+            if amount and axes is not None and kind == "displacement":
+                self.raw.lost.append(f"{where}: *BOUNDARY moves node {node} along a local direction, which is not read")
+            elif amount and axes is not None:
+                terms = [(node, j, amount * axes[way][j]) for j in range(3)]
+                nodal.setdefault((kind, f"{where}: *CLOAD"), []).extend(terms)
+            elif amount:
                 word = "CLOAD" if kind == "force" else "BOUNDARY"
                 nodal.setdefault((kind, f"{where}: *{word}"), []).append((node, way, amount))
         for (kind, where), terms in nodal.items():

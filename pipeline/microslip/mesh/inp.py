@@ -17,7 +17,7 @@ from ..errors import of_file
 from . import deck_conditions, deck_materials, deck_mesh, deck_state
 from .cards import Card, data_of, numbers, read_cards
 from .deck import Deck
-from .deck_conditions import assign_temperatures, constraints
+from .deck_conditions import assign_temperatures, constraints, local_axes, local_supports
 from .deck_joints import KEYWORDS as JOINTS
 from .deck_joints import joints_of, preloads_of, sector_of, unread
 from .deck_links import KEYWORDS as LINKS
@@ -58,7 +58,7 @@ def read_inp(path: Path) -> RawMesh:
     raw = _assembled(whole, bool(found.instances))
     raw.remarks += [
         *numbered([card.parameters["NAME"] for card, _ in parts], spaces),
-        *_replaced(raw, whole),
+        *_replaced(raw, whole, bool(found.instances)),
         *later,
     ]
     if raw.state is None:
@@ -83,12 +83,20 @@ _AS = {
 """Solids that are taken as their plain sisters, and what that changes."""
 
 
-def _replaced(raw: RawMesh, deck: Deck) -> list[str]:
-    """Which cells are taken as others, and how far first-order ones lock in bending."""
+def _replaced(raw: RawMesh, deck: Deck, of_parts: bool) -> list[str]:
+    """Which cells are taken as others, and how far first-order ones lock in bending.
+
+    Where all bricks of 20 nodes are integrated by eight points they are so here, stiffness and mass, if the deck is of
+    CalculiX (it has no parts).
+    """
     count: dict[str, int] = {}
     for cells in deck.solids:
         count[cells.written] = count.get(cells.written, 0) + len(cells.ids)
     told = []
+    bricks20 = {cells.written for cells in deck.solids if cells.kind == "hexahedron20"}
+    if bricks20 == {"C3D20R"} and not of_parts:
+        raw.integration = "reduced-mass"
+        count = {written: number for written, number in count.items() if written != "C3D20R"}
     for written, number in count.items():
         plain = re.match(r"C3D\d+", written)
         if written in _AS and plain:
@@ -198,7 +206,9 @@ def _assembled(deck: Deck, of_parts: bool) -> RawMesh:
         members = np.unique(joined(parts))
         if len(members):
             raw.add_set(deck.written[key], members, numbering)
+    deck.axes = local_axes(deck, numbering, points)
     raw.links, left_out = links_of(deck, numbering, points)
+    raw.links += local_supports(deck, numbering)
     raw.sector, uncut = sector_of(deck)
     raw.preloads, unpressed = preloads_of(deck)
     raw.lost = [*deck.lost, *left_out, *uncut, *unpressed]

@@ -71,7 +71,8 @@ class RawMesh:
         remarks: what was read as something else or not used, in words. instances: name -> positions. joints: pairs of
             faces in contact. sector: of a cyclic ring. preloads: of bolts: where it stands, force
             in the file's unit. state: the static step that the file's modes are about: a reader fills it with
-            loads by positions in `points`, corners of facets and numbers of cells, in the file's units.
+            loads by positions in `points`, corners of facets and numbers of cells, in the file's units. integration:
+            as `mesh.integration` of a body file.
     """
 
     points: Array
@@ -94,6 +95,7 @@ class RawMesh:
     sector: Sector | None = None
     preloads: list[tuple[str, float]] = field(default_factory=list)
     state: StaticStep | None = None
+    integration: str = "full"
 
     def add_points(self, name: str, positions: Indices) -> None:
         """Add to a point set."""

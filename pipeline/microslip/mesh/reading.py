@@ -348,7 +348,8 @@ def _assemble_mesh(
     supports = {n: directions for n, directions in raw.supports.items() if n in known}
     return replace(
         mesh, faces=faces, inner=inner, supports=supports, not_held=tuple(raw.not_held), unended=raw.unended,
-        links=links, state=state, lost=tuple(raw.lost), remarks=tuple(raw.remarks), joints=tuple(raw.joints),
+        links=links, state=state, integration=raw.integration,
+        lost=tuple(raw.lost), remarks=tuple(raw.remarks), joints=tuple(raw.joints),
         sector=raw.sector, preloads=tuple(raw.preloads),
         instances={n: kept for n, s in raw.instances.items() if len(kept := _kept(renumber[s]))},
     )  # fmt: skip

@@ -368,6 +368,8 @@ def _mesh(file: Path, folder: Path, unit: str, instances: Sequence[str] = ()) ->
     lines = [] if "[[supports]]" in held else ["free = true               # nothing is held yet"]
     lines += ["", "[geometry]", f"mesh = {_beside(file, folder)}"]
     lines += [f"instances = {json.dumps(list(instances))}"] if instances else []
+    rule = f'integration = "{mesh.integration}"  # bricks of 20 nodes by eight points, as the file says'
+    lines += ["", "[mesh]", rule] if mesh.integration != "full" else []
     lines += ["", "[material]"]
     if mesh.materials:
         lines.append('from = "mesh"')
