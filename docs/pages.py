@@ -159,7 +159,13 @@ def file_reference(name: str) -> str:
     page, model = FILES[name]
     depth = "##" if page == f"{name}.md" else "###"
     length = "length_unit" if "length_unit" in model.model_fields else "m"
-    return "\n\n".join(f"{depth} {_section(*s[1:], length)}" for s in sections(model))
+    before = [m for n, (p, m) in FILES.items() if p == page and list(FILES).index(n) < list(FILES).index(name)]
+    known = {(title, part) for other in before for _, title, _, part in sections(other) if title}
+    parts = [s[1:] for s in sections(model)]
+    again = [title for title, _, part in parts if (title, part) in known]
+    own = [f"{depth} {_section(*s, length)}" for s in parts if s[0] not in again]
+    said = f"\n\n{', '.join(f'`{title}`' for title in again)}: as above." if again else ""
+    return "\n\n".join(own) + said
 
 
 def silent(model: Any) -> list[str]:

@@ -161,9 +161,9 @@ def test_materials_of_tables_and_minor_ratios(tmp_path):
 @pytest.mark.parametrize(
     ("change", "text"),
     [
-        (("ET,1,185", "ET,1,226"), "element 1 is of the Ansys type 226"),
+        (("ET,1,185", "ET,1,70"), "element 1 is of the Ansys type 70, which conducts heat"),
         (("ET,1,185", "ET,3,185"), "element 1 is of type 1, which no ET command defines"),
-        (("N,R5.3,LOC,       -1,\n", ""), "NBLOCK"),
+        ((f"{12:10d}\n(3i9", f"{13:10d}\n(3i9"), "NBLOCK holds 12 nodes of 13"),
         ((f"{-1:10d}\nCMBLOCK", "CMBLOCK"), "EBLOCK"),
         (("EBLOCK,19,SOLID", "EBLOCK,19,COMPACT"), "COMPACT form"),
         ((f"{-1:10d}\nCMBLOCK", "      \nCMBLOCK"), "EBLOCK"),
@@ -249,7 +249,7 @@ def test_elements_outside_the_block_of_solids_are_told(tmp_path, more):
     text = archive(BAR).replace("ET,2,154", "ET,2,154\nET,3,MASS21").replace("FINISH", f"{more}FINISH")
     read = read_mesh(written(tmp_path, text), "mm")
     said = [told.split(" is not read")[0].partition(": ")[2] for told in read.lost]
-    assert said == ["EMODIF", "the Ansys type 21 (2 elements)"]
+    assert said == ["the Ansys type 21, point masses (2 elements)"]
 
 
 def test_coupled_nodes_are_equations(tmp_path):
@@ -264,13 +264,18 @@ def test_coupled_nodes_are_equations(tmp_path):
         read_mesh(tmp_path / "part.cdb", "mm")
 
 
-@pytest.mark.parametrize("command", ["CE,1,0,9,UY,1,10,UY,-1", "CP,1,UY,9,10", "CERIG,9,10,UX"])
-def test_turned_nodes_in_constraints_are_refused(tmp_path, command):
+def test_equations_take_the_directions_of_turned_nodes(tmp_path):
+    """A node turned by 90 degrees about z: its y is -x. Single directions of CERIG there are refused."""
     lines = archive(BAR).splitlines()
     at = next(i for i, line in enumerate(lines) if line.startswith(f"{9:9d}"))
     lines[at] += f"{90.0:21.13E}"
-    written(tmp_path, "\n".join(lines).replace("FINISH", f"{command}\nFINISH"))
-    with pytest.raises(UserError, match=r"part.cdb, line \d+: .*directions of node 9, which are turned in NBLOCK"):
+    for command in ("CE,1,0,9,UY,1,10,UY,-1", "CP,1,UY,9,10"):
+        written(tmp_path, "\n".join(lines).replace("FINISH", f"{command}\nFINISH"))
+        (link,) = read_mesh(tmp_path / "part.cdb", "mm").links.items
+        assert link.nodes.tolist() == [8, 9] and link.directions.tolist() == [0, 1]
+        np.testing.assert_allclose(link.factors, [-1, -1])
+    written(tmp_path, "\n".join(lines).replace("FINISH", "CERIG,9,10,UX\nFINISH"))
+    with pytest.raises(UserError, match=r"line \d+: .*directions of node 9, which is turned"):
         read_mesh(tmp_path / "part.cdb", "mm")
 
 
@@ -285,7 +290,7 @@ def test_elements_with_mass_that_are_not_read_are_told(tmp_path):
     written(tmp_path, "\n".join(lines).replace("FINISH", "CEINTF,0.25\nFINISH"))
     read = read_mesh(tmp_path / "part.cdb", "mm")
     assert [text.split(" is not read")[0].partition(", ")[2] for text in read.lost] == [
-        f"line {len(lines)}: CEINTF", "element 98: the Ansys type 21 (1 element)",
+        f"line {len(lines)}: CEINTF", "element 98: the Ansys type 21, point masses (1 element)",
     ]  # fmt: skip
 
 
@@ -308,7 +313,7 @@ CMBLOCK,ROOT_2,NODE,1
          5
 cmsel,s,Z0
 d,all,all
-nsel,all
+nsle,s
 d,all,ux,0
 d,12,ux,%_loadx%
 D,5,UZ,0,,900,2

@@ -96,7 +96,7 @@ def test_over_the_frequency(case: Path, capsys: pytest.CaptureFixture[str]) -> N
     assert "% of the way" in said.err or said.err.count("\n") < 5
     assert found["open"].max() > 0.1 and Path("build/lifting/pictures/over_frequency.png").stat().st_size > 10_000
     page = Path("build/lifting/over_frequency.html").read_text()
-    assert "data:image/png" in page and f"<summary>{len(found['leg'])} rows" in page
+    assert "data:image/webp" in page and f"<summary>{len(found['leg'])} rows" in page
     held = read_response("build/lifting/over_frequency.h5").series[0]
     np.testing.assert_allclose(np.abs(held.monitor("middle")[:, 0, 1]), found["amplitude_m"], rtol=1e-10)
     assert not any(name.startswith("curve/") for name in held.arrays)

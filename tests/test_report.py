@@ -136,7 +136,7 @@ def test_every_text_is_escaped(tmp_path: Path) -> None:
     response = {NASTY: NASTY, "list": [NASTY], "rows": [{NASTY: NASTY}]}
     page = report_html(nasty, {NASTY: picture}, [NASTY], response)
     tags = parsed(page)
-    assert "<script>alert" not in page and page.count("<script") == 3  # the modes, the program, what it draws
+    assert "<script>alert" not in page and "<script" not in page
     assert "".join(tags.words).count('<script>alert("x")</script>&amp;\'"') > 12
 
 

@@ -572,7 +572,7 @@ def test_a_case_makes_its_curve_pictures_and_page(
     )
     said = capsys.readouterr().out
     assert re.search(r"largest creep force is 1 mu F_N", said)
-    assert "data:image/png" in (folder / "rolling.html").read_text()
+    assert "data:image/webp" in (folder / "rolling.html").read_text()
     meshio = pytest.importorskip("meshio")
     shown = min(rows, key=lambda row: abs(float(row["longitudinal_creepage"]) - 0.0015))
     cells = {name: of[0] for name, of in meshio.read(folder / "tractions.vtu").cell_data.items()}

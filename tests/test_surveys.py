@@ -111,7 +111,7 @@ def test_respond_over_orders(ring: Path, capsys) -> None:
     assert found["engine_order"].tolist() == [1, 2]
     assert Path("build/ring/pictures/orders.png").is_file()
     page = Path("build/ring/orders.html").read_text()
-    assert "<h1>ring: engine orders</h1>" in page and "data:image/png" in page and page.count("<tr>") == 5
+    assert "<h1>ring: engine orders</h1>" in page and "data:image/webp" in page and page.count("<tr>") == 5
 
 
 STRESS = 7e12

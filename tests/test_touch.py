@@ -15,11 +15,12 @@ from matplotlib.colors import LogNorm
 
 import microslip as ms
 from microslip.files.png import CURVES, text_in, with_text
+from microslip.pictures.lettering import save_png
 from microslip.pictures.plots import empty_figure, panels, save_figure
 from microslip.pictures.touch import curves_of, tell_points
+from microslip.pictures.turning import MOST_VERTICES, Outside, Turned, outside, turned, turning_modes
 from microslip.reduced.coordinates import basis_in_modes
-from microslip.report.page import answer_page, page
-from microslip.report.turning import outside, turning_modes
+from microslip.report.page import answer_page
 
 
 def figure() -> tuple:
@@ -67,6 +68,20 @@ def test_a_map_keeps_its_cells_and_what_is_no_curve_stays_a_picture() -> None:
     assert curves_of(drawn) is None
 
 
+def test_every_panel_keeps_its_bar_beside_it() -> None:
+    """As the maps of contacts have them; points in shades keep theirs too."""
+    drawn = empty_figure()
+    for axes, low in zip(drawn.subplots(2, 1), (0.0, 5.0), strict=True):
+        shades = axes.scatter([0.0, 1.0], [0.0, 1.0], c=[low, low + 1.0])
+        drawn.colorbar(shades, label="in MPa")
+    traces = curves_of(drawn)["data"]
+    for trace, low, middle in zip(traces, (0.0, 5.0), (0.77, 0.23), strict=True):
+        marker = trace["marker"]
+        assert (marker["cmin"], marker["cmax"], marker["color"]) == (low, low + 1.0, [low, low + 1.0])
+        assert marker["colorbar"]["title"]["text"] == "in MPa" and marker["colorbar"]["x"] > 1.0
+        assert marker["colorbar"]["y"] == pytest.approx(middle, abs=0.05)
+
+
 def test_a_text_in_a_picture_is_found_again_and_its_pixels_stay(tmp_path: Path) -> None:
     from PIL import Image
 
@@ -83,17 +98,45 @@ def test_the_outside_of_a_box_is_closed_and_has_its_edges() -> None:
     of the file to what 16 bits hold."""
     pytest.importorskip("plotly")
     basis = basis_in_modes(ms.read_basis(ms.sample()))
-    used, triangles, outline = outside(basis.mesh)
+    skin = outside(basis.mesh)
+    used, triangles, outline = skin.source, skin.triangles, skin.edges
     sides = np.sort(np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]), axis=1)
     assert (np.unique(sides, axis=0, return_counts=True)[1] == 2).all()
     assert len(outline) == 4 * 5 + 2 * (2 * 2 + 2 * 1)  # 1 x 2 x 5 elements
-    body = json.loads(str(turning_modes(basis).inside))
     group = basis.groups[min(basis.groups)]
-    shape = np.frombuffer(base64.b64decode(body["modes"][2]["parts"][0]), "<i2").reshape(-1, 3) / 32767
-    own = group.phi[used, :, 2].real
-    largest = np.linalg.norm(group.phi[:, :, 2], axis=1).max()
-    np.testing.assert_allclose(shape, own / largest, atol=2e-5)
-    assert body["modes"][2]["name"] == f"mode 3: {group.frequency[2]:.5g} Hz"
+    third = json.loads(turning_modes(basis, group))["shapes"][2]
+    expected = group.phi[used, :, 2].real
+    expected = expected / np.linalg.norm(expected, axis=1).max()
+    np.testing.assert_allclose(third["most"] * numbers(third["parts"][0][0]), expected, atol=2e-5)
+    assert third["name"] == f"mode 3: {group.frequency[2]:.5g} Hz"
+
+
+def numbers(packed: str) -> np.ndarray:
+    return np.frombuffer(base64.b64decode(packed), "<i2").reshape(-1, 3) / 32767
+
+
+def test_harmonics_and_values_of_a_body_are_those_given_and_a_large_one_is_coarser() -> None:
+    """Two harmonics of a plate of 150 x 150 points; in the coarser one every vertex is one of them."""
+    n = 150
+    grid = np.stack(np.meshgrid(np.arange(n), np.arange(n), indexing="ij"), axis=-1).reshape(-1, 2)
+    points = np.column_stack([grid / n, 0.02 * np.sin(grid[:, 0] / 9.0)])
+    corner = (np.arange(n - 1)[:, None] * n + np.arange(n - 1)).ravel()
+    triangles = np.concatenate(
+        [np.column_stack([corner, corner + n, corner + 1]), np.column_stack([corner + 1, corner + n, corner + n + 1])]
+    )
+    skin = Outside(np.arange(n * n), triangles, np.zeros((0, 2), dtype=int))
+    moving = np.stack([points * (1 + 2j), 0.5j * points])
+    body = json.loads(turned(points, skin, [Turned("both", moving, points[:, 0], "MPa", True)], "<plate>"))
+    (shape,), at = body["shapes"], body["scale"] * numbers(body["points"]) + points.mean(axis=0)
+    assert len(at) <= 1.01 * MOST_VERTICES and body["title"] == "&lt;plate&gt;"
+    gap = np.abs(at[:, None, :2] - points[:: n // 2, :2]).max(axis=2).min(axis=0)
+    assert gap.max() < 0.05  # the plate is still whole
+    size = np.linalg.norm(moving[0], axis=1).max()
+    (real, imag), (_, second) = shape["parts"]
+    for part, factor in ((real, 1.0), (imag, 2.0), (second, 0.5)):
+        np.testing.assert_allclose(shape["most"] * size * numbers(part), factor * at, atol=2e-4)
+    assert shape["high"] == pytest.approx(points[:, 0].max())
+    assert shape["grown"] == pytest.approx(body["drawn"] * body["extent"] / size)
 
 
 HOVER = """<script>
@@ -128,7 +171,7 @@ def test_a_browser_draws_the_curves_and_a_hover_reads_the_number(tmp_path: Path)
     save_figure(figure()[0], tmp_path / "response.png")
     text = answer_page("response", ["The highest is 0.2 µm."], [tmp_path / "response.png"])
     assert len(text) < 6e6 and not re.search(r'(src|href)="(?!data:|#)', text)
-    assert base64.b64encode(b"\x89PNG")[:4].decode() in text  # without scripts the picture stands there
+    assert "data:image/webp;base64," in text  # without scripts the picture stands there
     (tmp_path / "page.html").write_text(text, encoding="utf-8")
     out = browsed(tmp_path / "page.html", HOVER, tmp_path)
     hover = re.search(r'data-hover="([^"]*)"', out)
@@ -152,7 +195,11 @@ addEventListener("load", () => setTimeout(async () => {
 def test_a_browser_turns_a_body_and_changes_its_mode(tmp_path: Path) -> None:
     pytest.importorskip("plotly")
     basis = basis_in_modes(ms.read_basis(ms.sample()))
-    text = page("vane", [turning_modes(basis)])
+    from PIL import Image
+
+    body = turning_modes(basis, basis.groups[min(basis.groups)])
+    save_png(Image.new("RGB", (9, 9)), tmp_path / "modes.png", body)
+    text = answer_page("vane", [], [tmp_path / "modes.png"])
     (tmp_path / "page.html").write_text(text, encoding="utf-8")
     out = browsed(tmp_path / "page.html", TURN, tmp_path)
     assert 'data-modes="6"' in out and "<canvas" in out

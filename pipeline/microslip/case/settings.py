@@ -347,7 +347,7 @@ class CaseSettings(OfFile):
     last one for all that follow"""
     harmonics: Literal["auto"] | Annotated[int, Field(ge=1, le=200)] = 3
     """H, besides the mean; `auto`: [as many as the error asks
-    for](harmonic_balance.md#what-is-followed-instead-of-swept)"""
+    for](harmonic_balance.md#how-many-harmonics-how-many-samples)"""
     harmonics_error: Annotated[Positive, Field(le=0.5)] | None = None
     """of `auto`: estimated error of the resonances that is allowed, a share of the amplitude;
     0.01 if not given"""

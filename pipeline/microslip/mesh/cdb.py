@@ -10,15 +10,18 @@ a tetrahedron (both).
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
 
-from ..data import Array, Equation, Link, RigidLink
-from ..elasticity import turned_strain
+from ..data import Array, Equation
+from ..elasticity import turned, turned_strain
 from ..errors import of_file
+from ..topology import CELL_TYPES
+from . import archive_links, archive_nodes
+from .archive import Archive, Element, changed, whole
+from .archive_links import CONTACTS, TARGETS, constrain, ring_of
 from .materials import isotropic_rows, orthotropic_row
 from .raw import (
     PRESTRESSED,
@@ -28,17 +31,26 @@ from .raw import (
     RawMesh,
     ignored,
     is_number,
+    locks,
     lost,
     real,
 )
-from .supports import Constraints, add_supports
+from .systems import BASIC, System, axes_by_angles
 
-_SOLIDS = {185: 8, 45: 8, 186: 20, 95: 20, 187: 10, 92: 10, 285: 4}
+_SOLIDS = {
+    185: 8, 45: 8, 64: 8, 65: 8, 73: 8, 190: 8, 186: 20, 95: 20, 226: 20, 187: 10, 92: 10, 227: 10, 285: 4,
+}  # fmt: skip
 """Element type -> number of nodes. Others that are known to hold no stiffness of a solid are left out."""
+_COUPLED = {226, 227}
+"""Coupled fields; the displacements are among them where KEYOPT(1) is odd."""
+_BY_MESH200 = {"8": 285, "9": 187, "10": 185, "11": 186}
+"""KEYOPT(1) of cells that only a mesh is made from -> the solid of the same nodes."""
 _OTHERS = {14, 21, 156, 184, 188, 189, 200, 208, 209, 214, 281, 290}
-_OTHERS |= {*range(151, 155), *range(169, 176), *range(177, 182)}
+_OTHERS |= {*range(151, 155), *range(169, 180), 181}
 _HARMLESS = {*range(151, 157), 200}
 """Those of `_OTHERS` without mass and stiffness: surface effects, cells to mesh from."""
+_FLAT = {25, 42, 82, 83, 182, 183, 192, 193, 212, 213, 222, 223}
+_THERMAL = {55, 70, 77, 87, 90, 278, 279, 291, 292, 293}
 # corners I J K L M N O P are 0-7; mid-sides Q R S T U V W X Y Z A B are 8-19
 _FORMS: dict[int, dict[str, Sequence[int]]] = {
     8: {"hexahedron": range(8), "wedge": (0, 1, 2, 4, 5, 6), "pyramid": range(5), "tetra": (0, 1, 2, 4)},
@@ -51,42 +63,6 @@ _FORMS: dict[int, dict[str, Sequence[int]]] = {
 }  # fmt: skip
 
 
-@dataclass
-class _Archive:
-    """What the commands have said. elements: (number, material, type, system, nodes). places: of equations, by name.
-    kind: of the elements that follow (TYPE). outside: kind -> where, and how many elements, beside EBLOCK,,SOLID.
-    full: types with KEYOPT(2) = 1. selected: the component that CMSEL chose last. parameters: whole
-    numbers of *SET. unused: loads that are not taken. ranged: numbers that ranges of D go over.
-    """
-
-    node_id: list[int] = field(default_factory=list)
-    points: list[list[float]] = field(default_factory=list)
-    kinds: dict[int, int] = field(default_factory=dict)
-    elements: list[tuple[int, int, int, int, list[int]]] = field(default_factory=list)
-    components: dict[str, list[int]] = field(default_factory=dict)
-    temperatures: dict[int, float] = field(default_factory=dict)
-    constants: dict[int, dict[str, dict[int, float]]] = field(default_factory=dict)
-    tables: dict[int, dict[str, dict[int, float]]] = field(default_factory=dict)
-    reference: float | None = None
-    uniform: float | None = None
-    nodal: dict[int, float] = field(default_factory=dict)
-    held: Constraints = field(default_factory=Constraints)
-    equations: dict[str, list[tuple[int, str, float]]] = field(default_factory=dict)
-    rigid: list[tuple[int, str, str, str]] = field(default_factory=list)
-    open: str = ""
-    where: str = ""
-    places: dict[str, str] = field(default_factory=dict)
-    kind: int = 1
-    outside: dict[int, tuple[str, int]] = field(default_factory=dict)
-    full: set[int] = field(default_factory=set)
-    selected: str = ""
-    parameters: dict[str, int] = field(default_factory=dict)
-    stressed: bool = False
-    ranged: set[int] = field(default_factory=set)
-    unused: list[str] = field(default_factory=list)
-    lost: list[str] = field(default_factory=list)
-
-
 def read_cdb(path: Path) -> RawMesh:
     """Read an archive.
 
@@ -94,28 +70,56 @@ def read_cdb(path: Path) -> RawMesh:
         Damaged: content that is inconsistent, or elements whose meaning would be lost, by their number.
     """
     lines = path.read_text(encoding="latin-1").splitlines()
-    archive, at = _Archive(), 0
+    archive, at = Archive(path.name), _beginning(lines)
     while at < len(lines):
-        words = [word.strip() for word in lines[at].split("!")[0].split(",")]
-        command = words[0].upper()
         archive.where = f"{path.name}, line {at + 1}"
+        block = 0
         with of_file(f"{path}, line {at + 1}"):
-            if command in _BLOCKS:
-                at = _BLOCKS[command](archive, words, lines, at + 1)
-                continue
-            if command in _COMMANDS:
-                _COMMANDS[command](archive, [*words, *_BLANKS])
-        if command in _NOT_READ:
-            archive.lost.append(lost(archive.where, command))
-        elif re.fullmatch(_LOADS, command):
-            archive.unused.append(command)
-        at += 1
+            for words in _commands(archive, lines[at]):
+                command = words[0].upper()
+                if command in _BLOCKS:
+                    block = _BLOCKS[command](archive, words, lines, at + 1)
+                elif command in _COMMANDS:
+                    _COMMANDS[command](archive, [*words, *_BLANKS])
+                if command in _NOT_READ:
+                    archive.lost.append(lost(archive.where, command))
+                elif re.fullmatch(_LOADS, command):
+                    archive.unused.append(command)
+        at = block or at + 1
     raw = _assembled(archive)
-    raw.lost = [*archive.lost, *_other_elements(archive, path.name)]
-    raw.remarks += [*_integration(archive), *ignored(archive.unused, _LOADS, archive.stressed)]
+    raw.lost = [*archive.lost, *_other_elements(archive, path.name), *_layers(archive)]
+    raw.remarks += [*archive.remarks, *_integration(archive, raw)]
+    raw.remarks += ignored(archive.unused, _LOADS, archive.stressed)
     if not any(line.strip().upper().startswith("FINI") for line in lines[-20:]):
         raw.unended = "no FINISH"  # a warning: archives that were shortened by hand have none
     return raw
+
+
+def _beginning(lines: list[str]) -> int:
+    """The line where the archive begins: behind the drawing (IGES) that CDWRITE may put before it."""
+    marks = (n for n, line in enumerate(lines) if line.upper().startswith(":CDWRITE"))
+    return next(marks, 0)
+
+
+_TEXTS = ("/COM", "/TITLE", "/STITLE", "C***", "*DIM", "/WB", "/INPUT")
+"""Beginnings of lines that are texts, in which no command stands."""
+
+
+def _commands(archive: Archive, line: str) -> Iterator[list[str]]:
+    """The words of the commands of a line, parameters replaced by their values."""
+    line = line.split("!")[0].strip()
+    if line.upper().startswith(_TEXTS):
+        return
+    for part in line.split("$"):
+        words = [word.strip() for word in part.split(",")]
+        name, sign, value = words[0].partition("=")
+        if sign:
+            words = ["*SET", name.strip(), value.strip()]
+        if words[0].upper() == "*SET":
+            yield words
+        elif words[0]:
+            known = archive.parameters
+            yield [words[0], *(known.get(word.upper(), word) for word in words[1:])]
 
 
 # blocks --------------------------------------------------------------------------------------------------------------
@@ -138,40 +142,42 @@ def _widths(lines: list[str], at: int, what: str) -> list[tuple[int, int, str]]:
     return fields
 
 
-def _whole(text: str, what: str) -> int:
-    try:
-        value = int(text)
-    except ValueError:
-        raise Damaged(f"{what} holds '{text.strip()[:30]}' where a whole number belongs") from None
-    if abs(value) > 10**12:
-        raise Damaged(f"{what} holds the number {value}")
-    return value
-
-
-def _read_nodes(archive: _Archive, words: list[str], lines: list[str], at: int) -> int:
+def _read_nodes(archive: Archive, words: list[str], lines: list[str], at: int) -> int:
     fields = _widths(lines, at, "NBLOCK")
-    whole = [f for f in fields if f[2] == "i"]
+    integers = [f for f in fields if f[2] == "i"]
     coordinates = [f for f in fields if f[2] == "e"]
     coordinates, angles = coordinates[:3], coordinates[3:]
-    if not whole or len(coordinates) < 3:
+    if not integers or len(coordinates) < 3:
         raise Damaged("NBLOCK has a format without a number and three coordinates")
+    before, announced = len(archive.node_id), _announced(words)
     for number, line in enumerate(lines[at + 1 :], at + 1):
-        if line.strip().upper().startswith("N,") or line.strip() == "-1":
+        if line.strip() == "-1":
             return number + 1
-        archive.node_id.append(_whole(line[: whole[0][1]], "NBLOCK"))
-        if any(real(t, "NBLOCK") for a, b, _ in angles if (t := line[a:b].strip())):
-            archive.held.turned.add(archive.node_id[-1])
+        if re.match(r"\s*[^\d\s]", line):  # N,UNBL,LOC,-1, or the next command
+            if len(archive.node_id) - before < announced:
+                text = f"{len(archive.node_id) - before} nodes of {announced}"
+                raise Damaged(f"NBLOCK holds {text} that it announces")
+            return number
+        archive.node_id.append(whole(line[: integers[0][1]], "NBLOCK"))
+        own = [real(t, "NBLOCK") for a, b, _ in angles if (t := line[a:b].strip())]
+        if any(own):
+            archive.turns[archive.node_id[-1]] = System(axes=axes_by_angles(np.array([*own, 0, 0][:3])))
         given = [line[a:b] for a, b, _ in coordinates]
         archive.points.append([real(t, "NBLOCK") if t.strip() else 0.0 for t in given])
     raise Damaged("NBLOCK has no end, the file is truncated")
 
 
-def _read_elements(archive: _Archive, words: list[str], lines: list[str], at: int) -> int:
+def _announced(words: list[str]) -> int:
+    """How many nodes a block says that it has: NBLOCK, fields, SOLID, largest number, count."""
+    return int(words[4]) if len(words) > 4 and words[4].isdecimal() else 0
+
+
+def _read_elements(archive: Archive, words: list[str], lines: list[str], at: int) -> int:
     if "COMPACT" in (word.upper() for word in words):
         raise Damaged("EBLOCK is in the COMPACT form; write the archive with EBLOCK,19,SOLID (CDWRITE)")
     fields = _widths(lines, at, "EBLOCK")
     solid = len(words) > 2 and words[2].upper() == "SOLID"
-    announced = _whole(words[4], "EBLOCK") if solid and len(words) > 4 and words[4] else 0
+    announced = whole(words[4], "EBLOCK") if solid and len(words) > 4 and words[4] else 0
     before = len(archive.elements)
     at += 1
     while at < len(lines):
@@ -184,8 +190,7 @@ def _read_elements(archive: _Archive, words: list[str], lines: list[str], at: in
             raise Damaged("EBLOCK has an empty line instead of -1 at its end, the file is truncated")
         at += 1
         if not solid:
-            known = len(first) > 1 and first[1] in archive.kinds
-            _leave_out(archive, words, first[1] if known else archive.kind)
+            at = _read_short(archive, first, lines, at, fields)
             continue
         if len(first) < 12:
             raise Damaged(f"EBLOCK holds the line '{lines[at - 1].strip()[:60]}', which is too short")
@@ -196,19 +201,34 @@ def _read_elements(archive: _Archive, words: list[str], lines: list[str], at: in
             if not more or more[0] == -1:
                 raise Damaged(f"element {first[10]} has {len(nodes)} nodes instead of {count}")
             nodes += more
-        archive.elements.append((first[10], first[0], first[1], first[4], nodes[:count]))
+        archive.elements.append(Element(first[10], first[0], first[1], first[2], first[4], nodes[:count]))
     raise Damaged("EBLOCK has no end, the file is truncated")
 
 
+def _read_short(
+    archive: Archive, first: list[int], lines: list[str], at: int, fields: list[tuple[int, int, str]]
+) -> int:
+    """An element of a block without SOLID: number, type, real constants, material, system, nodes."""
+    number, *four = [*first[:5], *[0] * (5 - len(first[:5]))]
+    kind, nodes = four[0] if four[0] in archive.kinds else archive.current["TYPE"], first[5:]
+    count = _SOLIDS.get(archive.kinds.get(kind, 0), 0)
+    while len(nodes) < min(count, 20) and len(nodes) >= 8 and at < len(lines):
+        if not (more := _row(lines[at], fields)) or more[0] == -1:
+            break
+        nodes, at = nodes + more, at + 1
+    archive.elements.append(Element(number, four[2], kind, four[1], four[3], nodes, archive.where))
+    return at
+
+
 def _row(line: str, fields: list[tuple[int, int, str]]) -> list[int]:
-    return [_whole(line[a:b], "EBLOCK") for a, b, _ in fields if line[a:b].strip()]
+    return [whole(line[a:b], "EBLOCK") for a, b, _ in fields if line[a:b].strip()]
 
 
-def _read_component(archive: _Archive, words: list[str], lines: list[str], at: int) -> int:
+def _read_component(archive: Archive, words: list[str], lines: list[str], at: int) -> int:
     """Numbers; a negative one ends a range that began with the number before it."""
     if len(words) < 4:
         raise Damaged("a CMBLOCK has no name or number of members")
-    fields, count = _widths(lines, at, "CMBLOCK"), _whole(words[3], "CMBLOCK")
+    fields, count = _widths(lines, at, "CMBLOCK"), whole(words[3], "CMBLOCK")
     listed: list[int] = []
     at += 1
     while len(listed) < count:
@@ -230,7 +250,7 @@ def _ranges(listed: list[int], name: str) -> list[int]:
     return members
 
 
-def _read_types(archive: _Archive, words: list[str], lines: list[str], at: int) -> int:
+def _read_types(archive: Archive, words: list[str], lines: list[str], at: int) -> int:
     """Number, element and 18 KEYOPTs of each type; -1 ends them."""
     fields = _widths(lines, at, "ETBLOCK")
     if len(fields) < 4:
@@ -239,10 +259,9 @@ def _read_types(archive: _Archive, words: list[str], lines: list[str], at: int) 
         row = [line[a:b].strip() for a, b, _ in fields]
         if row[0] == "-1":
             return number + 1
-        kind = _whole(row[0], "ETBLOCK")
-        archive.kinds[kind] = _whole(row[1], "ETBLOCK")
-        if row[3] == "1":
-            archive.full.add(kind)
+        kind = whole(row[0], "ETBLOCK")
+        archive.kinds[kind] = whole(row[1], "ETBLOCK")
+        archive.options[kind] = {n: w for n, w in enumerate(row[2:], 1) if w}
     raise Damaged("ETBLOCK has no end, the file is truncated")
 
 
@@ -251,6 +270,7 @@ _BLANKS = [""] * 8
 
 
 _BLOCKS = {
+    **archive_links.BLOCKS,
     "NBLOCK": _read_nodes,
     "EBLOCK": _read_elements,
     "CMBLOCK": _read_component,
@@ -261,44 +281,51 @@ _BLOCKS = {
 # commands ------------------------------------------------------------------------------------------------------------
 
 
-def _read_type(archive: _Archive, words: list[str]) -> None:
-    kind = archive.parameters.get(words[1].upper(), words[1])
-    if str(kind).isdecimal() and words[2]:
-        number = re.search(r"\d+$", words[2])
-        archive.kinds[_whole(str(kind), "ET")] = int(number[0]) if number else 0
+def _read_type(archive: Archive, words: list[str]) -> None:
+    if words[1].isdecimal() and words[2]:
+        number, kind = re.search(r"\d+$", words[2]), whole(words[1], "ET")
+        archive.kinds[kind] = int(number[0]) if number else 0
+        archive.options[kind] = {n: w for n, w in enumerate(words[3:9], 1) if w}
 
 
-def _read_option(archive: _Archive, words: list[str]) -> None:
+def _read_option(archive: Archive, words: list[str]) -> None:
     """KEYOPT, type, number, value."""
-    if words[2:4] == ["2", "1"] and words[1].isdecimal():
-        archive.full.add(_whole(words[1], "KEYOPT"))
+    if words[1].isdecimal() and words[2].isdecimal():
+        options = archive.options.setdefault(whole(words[1], "KEYOPT"), {})
+        options[whole(words[2], "KEYOPT")] = words[3]
 
 
-def _read_parameter(archive: _Archive, words: list[str]) -> None:
-    """*SET, name, value."""
-    if is_number(words[2]):
-        archive.parameters[words[1].upper()] = int(words[2])
+def _read_parameter(archive: Archive, words: list[str]) -> None:
+    """*SET, name, value: a number, or a parameter that is."""
+    name, value = words[1].upper(), archive.parameters.get(words[2].upper(), words[2])
+    archive.parameters.pop(name, None)
+    if re.fullmatch(_NUMBER, value):
+        whole = float(value).is_integer() and "e" not in value.lower()
+        archive.parameters[name] = str(int(float(value))) if whole else value
 
 
-def _read_selection(archive: _Archive, words: list[str]) -> None:
-    """CMSEL,S,component; every other selection, or all, is none that is known."""
-    chosen = words[0].upper() == "CMSEL" and words[1].upper() in ("S", "")
-    archive.selected = words[2].upper() if chosen else ""
+_NUMBER = r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d{1,3})?"
 
 
-def _read_current(archive: _Archive, words: list[str]) -> None:
+def _read_current(archive: Archive, words: list[str]) -> None:
     if words[1].isdecimal():
-        archive.kind = _whole(words[1], "TYPE")
+        archive.current[words[0].upper()[:4].rstrip()] = whole(words[1], words[0].upper())
 
 
-def _leave_out(archive: _Archive, words: list[str], kind: int | None = None) -> None:
-    """An element, of the current type if none is given, outside EBLOCK,,SOLID: E, EN, short blocks."""
-    kind = archive.kind if kind is None else kind
-    where, count = archive.outside.get(kind, (archive.where, 0))
-    archive.outside[kind] = where, count + 1
+def _read_element(archive: Archive, words: list[str]) -> None:
+    """E, nodes; EN, number, nodes: of the current type, material and real constants."""
+    apart = words[0].upper() == "EN"
+    if "ATTR" in (word.upper() for word in words):
+        return  # the end of a block of elements
+    numbers = [whole(word, words[0].upper()) for word in words[1:] if word]
+    now = archive.current
+    nodes = numbers[apart:]
+    archive.elements.append(
+        Element(numbers[0] if apart and numbers else 0, now["MAT"], now["TYPE"], now["REAL"], 0, nodes, archive.where)
+    )
 
 
-def _stressed(archive: _Archive, words: list[str]) -> None:
+def _stressed(archive: Archive, words: list[str]) -> None:
     """PSTRES,ON, and a restart of a loaded state (ANTYPE,,RESTART,,,PERTURB)."""
     on = words[0].upper() == "PSTRES" and words[1].upper() in ("ON", "1")
     if on or "PERTURB" in (word.upper() for word in words):
@@ -307,154 +334,153 @@ def _stressed(archive: _Archive, words: list[str]) -> None:
 
 
 def _behind_release(words: list[str]) -> list[str]:
-    """What stands behind the command and "R5.0, count"."""
-    return words[3:] if words[1].upper().startswith("R") else words[1:]
+    """What stands behind the command and "R5.0, count" or "UNBL, count"."""
+    return words[3:] if words[1].upper().startswith(("R5", "UNBL")) else words[1:]
 
 
-def _read_temperatures(archive: _Archive, words: list[str]) -> None:
+def _read_temperatures(archive: Archive, words: list[str]) -> None:
     """MPTEMP[, R5.0, count], first place, values; alone it clears the table."""
     rest = _behind_release(words)
     if not any(rest):
         archive.temperatures = {}
         return
-    start = _whole(rest[0], "MPTEMP")
+    start = whole(rest[0], "MPTEMP")
     for i, text in enumerate(t for t in rest[1:] if t):
         archive.temperatures[start + i] = real(text, "MPTEMP")
 
 
-def _read_data(archive: _Archive, words: list[str]) -> None:
+def _read_data(archive: Archive, words: list[str]) -> None:
     """MPDATA[, R5.0, count], label, material, first place, values."""
     rest = _behind_release(words)
-    if not any(rest[3:]):
+    if not any(rest[3:]) or not re.fullmatch(_CONSTANTS, rest[0], re.IGNORECASE):
         return
-    material, label = _whole(rest[1], "MPDATA"), rest[0].upper()
-    start = _whole(rest[2] or "1", "MPDATA")
+    material, label = whole(rest[1], "MPDATA"), rest[0].upper()
+    start = whole(rest[2] or "1", "MPDATA")
     values = archive.constants.setdefault(material, {}).setdefault(label, {})
     table = archive.tables.setdefault(material, {}).setdefault(label, {})
     for place, text in enumerate((t for t in rest[3:] if t), start):
         values[place], table[place] = real(text, "MPDATA"), archive.temperatures.get(place, 0.0)
 
 
-def _read_constant(archive: _Archive, words: list[str]) -> None:
+def _read_constant(archive: Archive, words: list[str]) -> None:
     """MP, label, material, value[, slopes over temperature]."""
-    if words[3]:
+    if words[3] and re.fullmatch(_CONSTANTS, words[1], re.IGNORECASE):
         if any(real(w, "MP") for w in words[4:] if w):
             raise Damaged(f"MP,{words[1]},{words[2]} is a polynomial of temperature; write a table (MPTEMP, MPDATA)")
-        material = _whole(words[2] or "1", "MP")
+        material = whole(words[2] or "1", "MP")
         archive.constants.setdefault(material, {})[words[1].upper()] = {1: real(words[3], "MP")}
         archive.tables.setdefault(material, {})[words[1].upper()] = {1: 0.0}
 
 
-def _read_reference(archive: _Archive, words: list[str]) -> None:
+def _read_reference(archive: Archive, words: list[str]) -> None:
     if words[1]:
         archive.reference = real(words[1], "TREF")
 
 
-def _read_uniform(archive: _Archive, words: list[str]) -> None:
+def _read_uniform(archive: Archive, words: list[str]) -> None:
     if words[0].upper() == "TUNIF" and words[1]:
         archive.uniform = real(words[1], "TUNIF")
     elif words[1].upper() == "TEMP" and words[2] not in ("", "_TINY"):  # how Ansys says none
         archive.uniform = real(words[2], "BFUNIF")
 
 
-def _read_body_force(archive: _Archive, words: list[str]) -> None:
+def _read_body_force(archive: Archive, words: list[str]) -> None:
     if words[2].upper() == "TEMP" and words[1].lstrip("-").isdecimal() and words[3]:
-        archive.nodal[_whole(words[1], "BF")] = real(words[3], "BF")
+        archive.nodal[whole(words[1], "BF")] = real(words[3], "BF")
 
 
-def _refuse_temperatures(archive: _Archive, words: list[str]) -> None:
+def _refuse_temperatures(archive: Archive, words: list[str]) -> None:
     if words[2].upper().startswith("TEMP"):
         raise Damaged("BFBLOCK with temperatures is not read; write them as BF commands (CDWRITE, UNBLOCKED)")
 
 
-def _read_displacement(archive: _Archive, words: list[str]) -> None:
-    """D, node or component, UX or UY or UZ or ALL, value, its imaginary part, last node, step, further labels."""
-    where, label, value, _, last, step, *more = words[1:]
-    directions = "".join("xyzabc" if w.upper() == "ALL" else _LABELS.get(w.upper(), "") for w in (label, *more))
-    if not directions:
+_CONSTANTS = "E[XYZ]|(NU|PR|G)(XY|YZ|XZ)|DENS|(ALP|CTE)[XYZ]|MU"
+"""Constants of a material that modes, static states and contacts need."""
+
+
+def _modify(archive: Archive, words: list[str]) -> None:
+    """EMODIF, element, MAT or TYPE or REAL or ESYS, number."""
+    what = {"MAT": "material", "TYPE": "kind", "REAL": "real", "ESYS": "system"}.get(words[2].upper())
+    if what is None or not is_number(words[1]) or not is_number(words[3]):
+        archive.lost.append(lost(archive.where, f"EMODIF,{words[1]},{words[2]}"))
         return
-    named = {name.upper(): name for name in archive.components}
-    component = named.get(archive.selected if where.upper() == "ALL" else where.upper())
-    if value.startswith("%"):
-        archive.held.left_out.append(f"D,{where},{label} takes its displacement from the table {value}")
-    elif value and real(value, "D") != 0:
-        archive.held.left_out.append(f"D,{where},{label} prescribes a displacement")
-    elif component is not None:
-        archive.held.hold(component, directions)
-    elif is_number(where):
-        first, end = int(where), _whole(last, "D") if last else int(where)
-        every = range(first, min(end, first + 10**8) + 1, max(_whole(step or "1", "D"), 1))
-        archive.ranged.update(every[1:])
-        for node in every:
-            archive.held.hold(node, directions)
-    else:
-        archive.held.left_out.append(f"D,{where},{label} names no node by its number")
+    archive.changes.setdefault(int(words[1]), {})[what] = int(words[3])
 
 
-_LABELS = {"UX": "x", "UY": "y", "UZ": "z", "ROTX": "a", "ROTY": "b", "ROTZ": "c"}
+_LINEAR = {"ELASTIC": ("EX", "NUXY"), "ELAS": ("EX", "NUXY"), "DENS": ("DENS",), "CTE": ("ALPX",)}
+"""TB table -> the constants that its values are."""
+_BENDING = {"ANEL", "HYPE", "HYPER", "MOON", "BB", "OGDEN", "AHYPER", "GASKET", "FABRIC", "POROUS", "PIEZ"}
+"""Tables that stand for the elasticity itself; others (plasticity, creep, damage) are beside it."""
 
 
-def _read_equation(archive: _Archive, words: list[str]) -> None:
-    """CE, number, constant, then node, label, factor in threes; or CE,R5.0,DEFI, length, number, constant and rows
-    CE,R5.0,NODE of terms, as archives have it."""
-    if words[1].upper().startswith("R5"):
-        if words[2].upper() == "DEFI":
-            archive.open = words[4]
-            number, constant, terms = words[4], words[5], []
-        else:
-            number, constant, terms = archive.open, "", words[3:]
-    else:
-        number, constant, *terms = words[1:]
-    if constant and real(constant, "CE") != 0:
-        raise Damaged(f"the constraint equation CE {number} has the constant {constant}; only 0 is read")
-    archive.places.setdefault(f"CE {number}", f"{archive.where}: CE {number}")
-    found = archive.equations.setdefault(f"CE {number}", [])
-    for place in range(0, len(terms) - 2, 3):
-        node, label, factor = terms[place : place + 3]
-        if node:
-            if label.upper() not in _LABELS:
-                raise Damaged(f"the constraint equation CE {number} takes in {label or 'nothing'} of node {node}")
-            found.append((_whole(node, "CE"), _LABELS[label.upper()], real(factor, "CE")))
+def _read_table(archive: Archive, words: list[str]) -> None:
+    """TB, table, material, temperatures, points, option."""
+    label, number, option = words[1].upper(), whole(words[2] or "1", "TB"), words[5].upper()
+    archive.table, archive.places["TB"] = None, ""
+    if label in _LINEAR and option in ("", "ISOT"):
+        archive.table = number, label
+    elif label in _LINEAR or label in _BENDING:
+        archive.refused[number] = f"TB,{label}{',' * bool(option)}{option} ({archive.where}), which is not read"
+    elif label not in ("FRIC", "SDAMP", "DENS", "THERM", "JOIN", "FCLI"):
+        archive.remarks.append(
+            f"{archive.where}: TB,{label} of the material {number} is not used: vibration is about its elastic state"
+        )
 
 
-def _read_coupled(archive: _Archive, words: list[str]) -> None:
-    """CP, number, label, nodes: displacements that are equal."""
-    number, label, *nodes = words[1:]
-    nodes, ways = [n for n in nodes if n], "xyz" if label.upper() == "ALL" else _LABELS.get(label.upper(), "")
-    if len(nodes) < 2 or not ways or not all(map(is_number, nodes)):
-        raise Damaged(f"CP {number} couples other things than {label or 'UX'} of two nodes or more in its line; use CE")
-    for node in nodes[1:]:
-        for way in ways:
-            terms = [(_whole(nodes[0], "CP"), way, 1.0), (_whole(node, "CP"), way, -1.0)]
-            name = f"CP {number}, {label} of node {node}, {way}"
-            archive.places[name], archive.equations[name] = f"{archive.where}: CP {number}", terms
+def _read_table_place(archive: Archive, words: list[str]) -> None:
+    """TBTEMP, temperature; TBFIELD, TEMP, temperature."""
+    field = words[0].upper() == "TBFIELD"
+    if field and words[1].upper() != "TEMP":
+        if archive.table:
+            number, label = archive.table
+            archive.refused[number] = f"TB,{label} over the field '{words[1]}' ({archive.where}), which is not read"
+        archive.table = None
+        return
+    archive.places["TB"] = words[1 + field]
 
 
-def _read_rigid(archive: _Archive, words: list[str]) -> None:
-    """CERIG, master, slave node or component, directions."""
-    master, slave, label = words[1:4]
-    ways = {"": "xyzabc", "ALL": "xyzabc", "UXYZ": "xyz", "RXYZ": "abc"}.get(
-        label.upper(), _LABELS.get(label.upper(), "?")
-    )
-    if ways == "?" or slave.upper() in ("ALL", ""):
-        raise Damaged(f"CERIG,{master},{slave},{label} is not read; name one node or component, and ALL, UXYZ or UX")
-    archive.rigid.append((_whole(master, "CERIG"), slave, ways, f"{archive.where}: CERIG,{master},{slave}"))
+def _read_table_data(archive: Archive, words: list[str]) -> None:
+    """TBDATA, place of the first value, values."""
+    if archive.table is None:
+        return
+    number, table = archive.table
+    first, text = whole(words[1] or "1", "TBDATA"), archive.places.get("TB", "")
+    for place, value in enumerate(words[2:8], first):
+        if value and place <= len(_LINEAR[table]):
+            label = _LINEAR[table][place - 1]
+            values = archive.constants.setdefault(number, {}).setdefault(label, {})
+            row = len(values) + 1
+            values[row] = real(value, "TBDATA")
+            over = archive.tables.setdefault(number, {}).setdefault(label, {})
+            over[row] = real(text, "TBTEMP") if text else 0.0
 
 
 _COMMANDS = {
-    "CE": _read_equation, "CERIG": _read_rigid, "CP": _read_coupled,
-    "D": _read_displacement, "E": _leave_out, "EN": _leave_out, "TYPE": _read_current,
-    "ET": _read_type, "MPTEMP": _read_temperatures, "MPDATA": _read_data, "MP": _read_constant, "TREF": _read_reference,
-    "TUNIF": _read_uniform, "BFUNIF": _read_uniform, "BF": _read_body_force, "BFBLOCK": _refuse_temperatures,
-    "KEYOPT": _read_option, "KEYO": _read_option, "*SET": _read_parameter, "CMSEL": _read_selection,
-    "NSEL": _read_selection, "ALLSEL": _read_selection, "ALLS": _read_selection,
-    "ESEL": _read_selection, "PSTRES": _stressed, "ANTYPE": _stressed, "ANTY": _stressed,
-}  # fmt: skip
+    **dict.fromkeys(("E", "EN"), _read_element),
+    **dict.fromkeys(("TYPE", "REAL", "MAT"), _read_current),
+    **dict.fromkeys(("KEYOPT", "KEYOP", "KEYO"), _read_option),
+    **dict.fromkeys(("EMODIF", "EMOD"), _modify),
+    **dict.fromkeys(("TUNIF", "BFUNIF"), _read_uniform),
+    **dict.fromkeys(("TBDATA", "TBDAT"), _read_table_data),
+    **dict.fromkeys(("TBTEMP", "TBTEM", "TBFIELD"), _read_table_place),
+    **dict.fromkeys(("PSTRES", "ANTYPE", "ANTY"), _stressed),
+    "ET": _read_type,
+    "MPTEMP": _read_temperatures,
+    "MPDATA": _read_data,
+    "MP": _read_constant,
+    "TREF": _read_reference,
+    "BF": _read_body_force,
+    "BFBLOCK": _refuse_temperatures,
+    "*SET": _read_parameter,
+    "TB": _read_table,
+    **archive_nodes.COMMANDS,
+    **archive_links.COMMANDS,
+}
 
 
 _NOT_READ = {
-    "RBE3", "CEINTF", "CPINTF", "CPNGEN", "CPLGEN", "CPCYC", "CECYC", "CESGEN", "CPSGEN", "MATWRITE", "EGEN", "ENGEN",
-    "EMODIF", "MPCHG", "INISTATE", "CYCLIC",
+    "CEINTF", "CPINTF", "CPNGEN", "CPLGEN", "CPCYC", "CECYC", "CESGEN", "CPSGEN", "MATWRITE", "EGEN", "ENGEN",
+    "MPCHG", "INISTATE",
 }  # fmt: skip
 """Commands that constrain, or add or change elements, and are not read."""
 _LOADS = "F|FBLOCK|SF|SFE|SFEBLOCK|ACEL|OMEGA|DOMEGA|CMOMEGA|CMACEL|CGOMGA|BFE|SLOAD|PSLOAD"
@@ -463,112 +489,199 @@ _LOADS = "F|FBLOCK|SF|SFE|SFEBLOCK|ACEL|OMEGA|DOMEGA|CMOMEGA|CMACEL|CGOMGA|BFE|S
 # assembly ------------------------------------------------------------------------------------------------------------
 
 
-def _assembled(archive: _Archive) -> RawMesh:
+def _assembled(archive: Archive) -> RawMesh:
     if not archive.node_id:
         raise Damaged("there is no NBLOCK")
-    node_id = np.array(archive.node_id, dtype=np.int64)
-    numbering = Numbering(node_id)
-    raw = RawMesh(np.array(archive.points), node_id)
+    archive.elements = [changed(e, archive.changes.get(e.number, {})) for e in archive.elements]
+    _take_mesh200(archive)
+    middle = _Middle(archive)
     regions: dict[tuple[int, int], int] = {}
     blocks: dict[str, list[tuple[int, int, list[int]]]] = {}
-    for number, material, kind, system, nodes in archive.elements:
-        named = _form(archive, number, kind, nodes)
+    for element in archive.elements:
+        named = _form(archive, element)
         if named is not None:
-            region = regions.setdefault((material, system), len(regions))
-            blocks.setdefault(named[0], []).append((number, region, named[1]))
+            region = regions.setdefault((element.material, element.system), len(regions))
+            cell = element.number, region, middle.filled(element.number, *named)
+            blocks.setdefault(named[0], []).append(cell)
+    if not blocks:
+        told = [text.split(" is not read")[0] for text in _other_elements(archive, archive.path)]
+        text = f"holds no solid elements ({'; '.join(told) or 'nothing but nodes'})"
+        raise Damaged(f"{text}; mesh the volume with SOLID186 or 187")
+    node_id = np.array([*archive.node_id, *middle.new], dtype=np.int64)
+    numbering = Numbering(node_id)
+    raw = RawMesh(np.array([*archive.points, *middle.places(numbering)]), node_id)
     raw.add_solids(blocks, numbering, "EBLOCK names")
     for name, members in archive.components.items():
         if members:
             raw.add_set(name, members, numbering)
-    raw.links = _links(archive, numbering)
-    for gap in archive.ranged.difference(archive.node_id):
-        archive.held.nodes.pop(gap, None)
-    add_supports(raw, archive.held, numbering)
+    raw.links += middle.links(numbering)
+    raw.sector = ring_of(archive, raw)
+    constrain(archive, raw, numbering)
     raw.materials = [_material(archive, *key) for key in regions] if archive.constants else []
     if not raw.materials:
         raw.regions = []
+        archive.lost += [f"{archive.path}: the material {n} has {text}" for n, text in archive.refused.items()]
     _assign_temperatures(archive, raw, numbering)
     return raw
 
 
-def _links(archive: _Archive, numbering: Numbering) -> list[Link]:
-    """Constraint equations, and nodes that follow one rigidly."""
-    found: list[Link] = []
-    for name, terms in archive.equations.items():
-        where = archive.places[name]
-        if not terms:
-            raise Damaged(f"the constraint equation {where} has no terms")
-        numbers, directions, factors = map(list, zip(*terms, strict=True))
-        nodes = numbering.positions(numbers, f"{where} names")
-        _refuse_turned(archive, where, numbers)
-        found.append(Equation(where, nodes, np.array(["xyzabc".index(d) for d in directions]), np.array(factors)))
-    for master, slave, moves, where in archive.rigid:
-        members = [int(slave)] if is_number(slave) else archive.components.get(slave, [])
-        if not members:
-            raise Damaged(f"{where} couples no nodes: '{slave}' is no node and no component of nodes")
-        reference = numbering.positions([master], f"{where} names")
-        positions = numbering.positions(members, f"{where} names")
-        if moves not in ("xyz", "abc", "xyzabc"):
-            _refuse_turned(archive, where, [master, *members])
-        if moves:
-            found.append(RigidLink(where, int(reference[0]), positions, moves))
+class _Middle:
+    """Mid-side nodes that elements drop: put in the middle of their edges, where the ends move them.
+
+    A dropped node makes the edge straight and the displacement along it linear, which is that of a
+    node with u = (u_1 + u_2) / 2. `new`: number of such a node -> the two ends.
+    """
+
+    def __init__(self, archive: Archive) -> None:
+        self.archive, self.new, self.at = archive, dict[int, tuple[int, int]](), dict[tuple[int, int], int]()
+
+    def filled(self, element: int, kind: str, nodes: list[int]) -> list[int]:
+        """The nodes of a cell with those that it drops."""
+        if 0 not in nodes:
+            return nodes
+        cell, nodes = CELL_TYPES[kind], list(nodes)
+        if 0 in nodes[: cell.corners]:
+            raise Damaged(f"element {element} drops a corner; write it with all its nodes")
+        for place, (a, b) in enumerate(cell.edges, cell.corners):
+            if not nodes[place]:
+                ends = min(nodes[a], nodes[b]), max(nodes[a], nodes[b])
+                fresh = max(self.archive.node_id) + len(self.new) + 1 if ends not in self.at else 0
+                nodes[place] = self.at.setdefault(ends, fresh)
+                self.new.setdefault(nodes[place], ends)
+        return nodes
+
+    def places(self, numbering: Numbering) -> Array:
+        """(k, 3) coordinates of the new nodes."""
+        known = Numbering(np.array(self.archive.node_id, dtype=np.int64))
+        ends = known.positions(np.array([*self.new.values()], dtype=np.int64).reshape(-1, 2), "EBLOCK names")
+        return np.array(self.archive.points)[ends].mean(axis=1)
+
+    def links(self, numbering: Numbering) -> Iterator[Equation]:
+        """What moves the new nodes."""
+        if self.new:
+            text = f"{len(self.new)} mid-side nodes that elements drop stand in the middle of their edges"
+            self.archive.remarks.append(f"{text} and move as these do, in straight lines, as in Ansys")
+        for number, ends in self.new.items():
+            at = numbering.positions([number, *ends], "EBLOCK names")
+            for way in range(3):
+                factors = np.array([1.0, -0.5, -0.5])
+                yield Equation("mid-side nodes that elements drop", at, np.full(3, way), factors)
+
+
+def _take_mesh200(archive: Archive) -> None:
+    """Cells that only a mesh is made from are the body where the archive has no other solids."""
+    kinds = archive.kinds
+    if any(kinds.get(e.kind) in _SOLIDS for e in archive.elements):
+        return
+    for number, kind in list(kinds.items()):
+        new = _BY_MESH200.get(archive.options.get(number, {}).get(1, "")) if kind == 200 else None
+        if new and any(e.kind == number for e in archive.elements):
+            kinds[number], archive.options[number] = new, {2: "1"}
+            text = f"the cells MESH200 of the type {number} are taken as SOLID{new}"
+            archive.remarks.append(f"{text}: no others are there")
+
+
+_MEANS = {
+    14: "springs", 21: "point masses", 178: "contact between nodes", 179: "bolts' pretension", 181: "shells",
+    184: "joints and rigid links", 188: "beams", 189: "beams", 208: "shells", 209: "shells", 214: "bearings",
+    281: "shells", 290: "pipes",
+}  # fmt: skip
+
+
+def _other_elements(archive: Archive, name: str) -> list[str]:
+    """What is said of elements that are no solids but have mass or stiffness."""
+    told: dict[int, tuple[str, int]] = {}
+    for element in archive.elements:
+        ansys = archive.kinds.get(element.kind, 0)
+        if ansys in _SOLIDS or ansys in _HARMLESS | CONTACTS | TARGETS:
+            continue
+        where, count = told.get(ansys, (element.where or f"{name}, element {element.number}", 0))
+        told[ansys] = where, count + 1
+    found = []
+    for kind, (where, count) in told.items():
+        means = f", {_MEANS[kind]}" if kind in _MEANS else ""
+        found.append(lost(where, f"the Ansys type {kind}{means} ({count} element{'s' * (count > 1)})"))
     return found
 
 
-def _refuse_turned(archive: _Archive, where: str, nodes: list[int]) -> None:
-    """Raises `Damaged` if the directions of a node are turned (angles of NBLOCK)."""
-    if found := next((node for node in nodes if node in archive.held.turned), None):
-        raise Damaged(f"{where} takes directions of node {found}, which are turned in NBLOCK; turn them back (NROTAT)")
+def _integration(archive: Archive, raw: RawMesh) -> list[str]:
+    """What is said of elements that Ansys forms in another way than they are taken."""
+    count: dict[str, int] = {}
+    for element in archive.elements:
+        kind, options = archive.kinds.get(element.kind), archive.options.get(element.kind, {})
+        brick = len(set(element.nodes)) in (8, 20)
+        if kind == 186 and options.get(2) != "1" and brick:
+            what = "SOLID186 are taken with full integration, which their KEYOPT(2) = 1 asks for; "
+            what += "without it they are a little softer on coarse meshes"
+        elif kind == 185 and brick:
+            how = {"1": "reduced integration", "2": "enhanced strain", "3": "enhanced strain"}
+            what = f"SOLID185 are taken with full integration in place of {how.get(options.get(2, ''), 'B-bar')}"
+        elif kind == 45 and options.get(1) != "1" and brick:
+            what = "SOLID45 are taken without extra displacement shapes"
+        elif kind in _COUPLED:
+            what = f"SOLID{kind} are taken by their displacements alone"
+        else:
+            continue
+        count[what] = count.get(what, 0) + 1
+    return [*(f"{number} elements {what}" for what, number in count.items()), *locks(raw)]
 
 
-def _other_elements(archive: _Archive, name: str) -> list[str]:
-    """What is said of elements that are no solids but have mass or stiffness."""
-    first: dict[int, tuple[int, int]] = {}
-    for number, _, kind, _, _ in archive.elements:
-        ansys = archive.kinds.get(kind, 0)
-        if ansys in _OTHERS - _HARMLESS:
-            first[ansys] = (first.get(ansys, (number, 0))[0], first.get(ansys, (number, 0))[1] + 1)
-    found = [(kind, f"{name}, element {number}", count) for kind, (number, count) in first.items()]
-    beside = [(archive.kinds.get(kind, 0), where, count) for kind, (where, count) in archive.outside.items()]
-    found += [one for one in beside if one[0] not in _HARMLESS]
-    return [lost(where, f"the Ansys type {kind} ({count} element{'s' * (count > 1)})") for kind, where, count in found]
-
-
-def _integration(archive: _Archive) -> list[str]:
-    """What is said of bricks of 20 nodes that Ansys integrates at fewer points than are taken."""
-    count = sum(
-        archive.kinds.get(kind) == 186 and kind not in archive.full and len(set(nodes)) == 20
-        for _, _, kind, _, nodes in archive.elements
+def _layers(archive: Archive) -> list[str]:
+    """What is said of layered solids and of solids that stand for shells."""
+    layered = sum(
+        archive.kinds.get(e.kind) in (185, 186) and archive.options.get(e.kind, {}).get(3) == "1"
+        for e in archive.elements
     )
-    text = (
-        "elements SOLID186 are taken with full integration, which their KEYOPT(2) = 1 asks for; "
-        "without it they are a little softer on coarse meshes"
-    )
-    return [f"{count} {text}"] if count else []
+    thin = sum(archive.kinds.get(e.kind) == 190 for e in archive.elements)
+    told = []
+    if layered:
+        text = "are taken as of one material, that of the element: their sections (SECDATA) are not read, so"
+        told.append(f"{layered} layered solids (KEYOPT(3) = 1) {text} frequencies will differ")
+    if thin:
+        text = "elements SOLSH190 are taken as plain bricks, far too stiff where one layer of them bends"
+        told.append(f"{thin} {text}; mesh them with SOLID186")
+    return told
 
 
-def _form(archive: _Archive, number: int, kind: int, nodes: list[int]) -> tuple[str, list[int]] | None:
-    """Cell type and its nodes of an element; None if it is no solid."""
+def _form(archive: Archive, element: Element) -> tuple[str, list[int]] | None:
+    """Cell type and its nodes of an element, 0 where it drops one; None if it is no solid."""
+    number, kind, nodes = element.number, element.kind, element.nodes
     if kind not in archive.kinds:
+        if element.where:
+            return None  # told with the others
         raise Damaged(f"element {number} is of type {kind}, which no ET command defines")
-    count = _SOLIDS.get(archive.kinds[kind])
+    ansys = archive.kinds[kind]
+    count = _SOLIDS.get(ansys)
     if count is None:
-        if archive.kinds[kind] in _OTHERS:
+        if ansys in _OTHERS or element.where:
             return None
-        raise Damaged(
-            f"element {number} is of the Ansys type {archive.kinds[kind]}, which cannot be assembled (SOLID185, 186, "
-            "187, 285 can)"
-        )
+        raise Damaged(f"element {number} is of the Ansys type {ansys}, {_why_not(ansys)}")
+    if ansys in _COUPLED and archive.options.get(kind, {}).get(1, "0")[-1:] not in tuple("13579"):
+        raise Damaged(f"element {number} is of the Ansys type {ansys} without displacements; {_INSTEAD}")
     if (count, len(nodes)) in ((20, 8), (10, 4)):  # every mid-side node is dropped: Ansys takes straight functions
         count = len(nodes)
-    if len(nodes) != count or (count not in (8, 20) and len(set(nodes)) < count) or min(nodes) < 1:
-        what = "drops mid-side nodes" if 0 in nodes else f"has {len(set(nodes))} different nodes instead of {count}"
-        raise Damaged(f"element {number} {what}; write it with all its nodes")
+    nodes = nodes + [0] * (count - len(nodes)) if count in (10, 20) and len(nodes) > count // 2 else nodes
+    if len(nodes) != count or (count not in (8, 20) and len({*nodes} - {0}) < count - nodes.count(0)) or min(nodes) < 0:
+        raise Damaged(f"element {number} has {len(set(nodes))} different nodes instead of {count}; write all of them")
     form = _degenerate(number, nodes) if count in (8, 20) else ""
+    if count == 20 and not any(nodes[8:]):
+        count = 8
     for name, chosen in _FORMS[count].items():
         if name.startswith(form):
             return name, [nodes[i] for i in chosen]
     raise Damaged(f"element {number} has a form that is not read")
+
+
+_INSTEAD = "change ET to the structural solid of the same nodes (185, 186, 187) and give EX, NUXY, DENS"
+
+
+def _why_not(ansys: int) -> str:
+    """What is said of a type that cannot be assembled."""
+    if ansys in _FLAT:
+        return "a plane or axisymmetric one, which is no solid; mesh the volume (SOLID186, 187)"
+    if ansys in _THERMAL:
+        return f"which conducts heat and has no stiffness; {_INSTEAD}"
+    return "which cannot be assembled (SOLID185, 186, 187, 285 can); change ET to one of these of the same nodes"
 
 
 def _degenerate(number: int, nodes: list[int]) -> str:
@@ -582,46 +695,66 @@ def _degenerate(number: int, nodes: list[int]) -> str:
     return form
 
 
-def _material(archive: _Archive, number: int, system: int) -> DeckMaterial:
+def _material(archive: Archive, number: int, system: int) -> DeckMaterial:
     c, t = archive.constants.get(number, {}), archive.tables.get(number, {})
-    name = f"material {number}"
+    name, density = f"material {number}", _first(c, "DENS")
+    if number in archive.refused and "EX" not in c:
+        text = f"{archive.refused[number]}; write MP,EX, NUXY and DENS (or nine constants of an orthotropic one)"
+        return DeckMaterial(name, None, density, np.zeros(6), refused=text)
     if "EX" not in c:
-        return DeckMaterial(name, None, _first(c, "DENS"), np.zeros(6))
-    expansion = np.array([_first(c, f"{'ALP' if 'ALPX' in c else 'CTE'}{a}") or 0.0 for a in "XYZ"])
+        return DeckMaterial(name, None, density, np.zeros(6))
+    along = np.array([_first(c, f"{'ALP' if 'ALPX' in c else 'CTE'}{a}") or 0.0 for a in "XYZ"])
     if ("ALPX" in c and "ALPY" not in c) or ("CTEX" in c and "CTEY" not in c):
-        expansion[1:] = expansion[0]
-    table = None
-    if "EY" in c and c["EY"] != c["EX"]:
-        if system:
-            text = f"directions of the element coordinate system {system}, which is not read; give it in body.toml"
-            return DeckMaterial(name, None, _first(c, "DENS"), np.zeros(6), refused=text)
-        C: Array = orthotropic_row(name, _orthotropic(name, c))
+        along[1:] = along[0]
+    table, axes = None, None
+    if len({*c.get("DENS", {}).values()}) > 1:
+        archive.remarks.append(f"the density of the {name} depends on temperature: that of its first row is taken")
+    if _orthotropic(c):
+        local = archive.systems.get(system, BASIC[0])
+        if local.kind != 0:
+            text = f"directions of the element coordinate system {system}, which is no rectangular one"
+            text += "; give it in body.toml"
+            return DeckMaterial(name, None, density, np.zeros(6), refused=text)
+        if max(len(c[label]) for label in c if label[0] in "EG") > 1:
+            archive.remarks.append(f"the orthotropic {name} depends on temperature: its first row is taken")
+        axes = local.axes
+        C: Array = turned(orthotropic_row(name, _nine(name, c)), axes)
     else:
         nu = c.get("PRXY") or c.get("NUXY") or {1: 0.3}  # 0.3 is what Ansys assumes
         ratio = nu[min(nu)]
         rows = [[E, nu.get(place, ratio), t.get("EX", {}).get(place, 0.0)] for place, E in sorted(c["EX"].items())]
         C, table = isotropic_rows(name, np.array(rows))
-    return DeckMaterial(name, C, _first(c, "DENS"), turned_strain(expansion, None), table)
+    return DeckMaterial(name, C, density, turned_strain(along, axes), table)
+
+
+def _orthotropic(c: dict[str, dict[int, float]]) -> bool:
+    """Whether the constants of a material are others than those that EX and NUXY alone make."""
+    E = _first(c, "EX") or 0.0
+    nu = _first(c, "PRXY") if "PRXY" in c else _first(c, "NUXY") if "NUXY" in c else 0.3
+    plain = {"E": E, "G": E / (2 * (1 + (nu or 0.0)))}
+    return any(abs((_first(c, key) or 0.0) / plain[key[0]] - 1) > 1e-4 for key in c if key[0] in plain)
 
 
 def _first(c: dict[str, dict[int, float]], label: str) -> float | None:
     return c[label][min(c[label])] if label in c else None
 
 
-def _orthotropic(name: str, c: dict[str, dict[int, float]]) -> Array:
+def _nine(name: str, c: dict[str, dict[int, float]]) -> Array:
     """E1 E2 E3 nu12 nu13 nu23 G12 G13 G23; the minor ratios NU.. become the major ones PR.. ."""
-    E = {a: _first(c, f"E{a}") for a in "XYZ"}
+    E = {a: _first(c, f"E{a}") or _first(c, "EX") for a in "XYZ"}
     G = [_first(c, f"G{ab}") for ab in ("XY", "XZ", "YZ")]
     if None in E.values() or None in G:
         raise Damaged(f"the {name} is orthotropic and lacks some of EX, EY, EZ, GXY, GYZ, GXZ")
-    nu = []
+    nu: list[float] = []
     for a, b in ("XY", "XZ", "YZ"):
         major, minor = _first(c, f"PR{a}{b}"), _first(c, f"NU{a}{b}")
+        if major is None and minor is None:
+            major = nu[0] if nu else 0.3  # what Ansys assumes
         nu.append(major if major is not None else (minor or 0.0) * (E[a] or 0.0) / (E[b] or 1.0))
     return np.array([E["X"], E["Y"], E["Z"], *nu, *G], dtype=float)
 
 
-def _assign_temperatures(archive: _Archive, raw: RawMesh, numbering: Numbering) -> None:
+def _assign_temperatures(archive: Archive, raw: RawMesh, numbering: Numbering) -> None:
     if not archive.nodal and archive.uniform is None and archive.reference is None:
         return
     raw.temperature = np.full((len(raw.points), 2), np.nan)

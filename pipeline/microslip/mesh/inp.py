@@ -26,7 +26,7 @@ from .deck_materials import assign_materials
 from .deck_mesh import CORNERS, add_surfaces, cell_type
 from .deck_state import state_of_deck, until_modes
 from .instances import numbered, outline, place, placement, places
-from .raw import Damaged, Numbering, RawMesh, ignored, joined, lost, undefined
+from .raw import Damaged, Numbering, RawMesh, ignored, joined, locks, lost, undefined
 from .supports import add_supports
 
 _REFUSED = {
@@ -101,25 +101,7 @@ def _replaced(raw: RawMesh, deck: Deck, of_parts: bool) -> list[str]:
         plain = re.match(r"C3D\d+", written)
         if written in _AS and plain:
             told.append(f"{number} cells {written} are taken as {plain[0]}: {_AS[written]}")
-    bricks = [nodes for kind, nodes in raw.blocks if kind == "hexahedron"]
-    if bricks:
-        told.append(
-            f"first-order bricks lock: where one layer of them bends, stiffness is {locking(raw, bricks):.2g} times "
-            "too large, with m layers the excess falls as 1/m2; export second-order cells (C3D20)"
-        )
-    return told
-
-
-def locking(raw: RawMesh, bricks: list[Indices]) -> float:
-    """How many times too stiff one layer of fully integrated bricks is in bending, of the median brick.
-
-    (1 / (1 - nu) + a^2 / 2) / (1 + nu), a the length over the height (R. D. Cook and others, Concepts and Applications
-    of Finite Element Analysis, parasitic shear), here with nu = 0 and its longest over its shortest side.
-    """
-    x = raw.points[np.concatenate(bricks)]
-    sides = np.stack([np.linalg.norm(x[:, j] - x[:, 0], axis=1) for j in (1, 3, 4)])
-    with np.errstate(all="ignore"):  # flat cells are told elsewhere
-        return float(1 + 0.5 * np.median(sides.max(axis=0) / sides.min(axis=0)) ** 2)
+    return [*told, *locks(raw)]
 
 
 def _part(parts: dict[str, list[Card]], instance: Card, own: list[Card]) -> Deck:

@@ -88,9 +88,12 @@ def _refused(path: Path, error: Damaged) -> UserError:
 
 
 _READERS: dict[str, Callable[[Path], RawMesh]] = {
-    ".inp": read_inp, ".cdb": read_cdb, ".anf": read_cdb, ".med": read_med, ".unv": read_unv, ".bdf": read_bdf,
-    ".nas": read_bdf, ".fem": read_bdf, ".dat": read_bdf, ".uff": read_unv, ".uf": read_unv,
-}  # fmt: skip
+    **dict.fromkeys((".cdb", ".anf", ".mac", ".ans"), read_cdb),
+    **dict.fromkeys((".bdf", ".nas", ".fem", ".dat"), read_bdf),
+    **dict.fromkeys((".unv", ".uff", ".uf"), read_unv),
+    ".inp": read_inp,
+    ".med": read_med,
+}
 _BY_MESHIO = (".msh", ".vtu", ".vtk")
 
 
@@ -130,7 +133,7 @@ def unit_of(path: Path) -> str:
     if not path.is_file():
         return ""
     kind = suffix_of(path)
-    if kind in (".cdb", ".anf"):
+    if _READERS.get(kind) is read_cdb:
         text = ordinary(path).read_text(encoding="latin-1")
         said = re.search(r"^\s*/UNITS\s*,\s*(\w+)", text, re.IGNORECASE | re.MULTILINE)
         return _TELLS.get(said[1].upper(), "") if said else ""

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ..data import Equation, FaceTie, Indices
+from ..data import Array, Equation, FaceTie, Indices
 from .raw import Numbering, RawMesh
 
 
@@ -17,7 +17,8 @@ class Constraints:
 
     Attributes:
         sets: set name -> directions out of x, y, z. nodes: node number -> directions.
-        turned: numbers of nodes whose directions are those of a local system. all_turned: some may be, unknown which.
+        turned: numbers of nodes whose directions are those of a local system, which is not known. all_turned: some may
+            be, unknown which. axes: number of a node -> (3, 3) rows, its own directions.
         left_out: what is not read, in words.
     """
 
@@ -25,6 +26,7 @@ class Constraints:
     nodes: dict[int, set[str]] = field(default_factory=dict)
     turned: set[int] = field(default_factory=set)
     all_turned: bool = False
+    axes: dict[int, Array] = field(default_factory=dict)
     left_out: list[str] = field(default_factory=list)
 
     def hold(self, where: str | int, directions: Iterable[str]) -> None:
@@ -41,8 +43,11 @@ class Constraints:
 def add_supports(raw: RawMesh, held: Constraints, numbering: Numbering) -> None:
     """Give `raw` the supports: named sets as they are; nodes held alike as the set that has just them, or a new one.
 
-    Rotations (a, b, c) are those of reference nodes; others have none.
+    Rotations (a, b, c) are those of reference nodes; others have none. Single directions of a local system become
+    linear equations, which hold wherever the mesh is used.
     """
+    if held.axes:
+        held = _beside_axes(raw, held, numbering)
     turning = _turning(raw)
     held = replace(held, sets=dict(held.sets), nodes=dict(held.nodes))
     for name, found in held.sets.items():
@@ -80,6 +85,47 @@ def add_supports(raw: RawMesh, held: Constraints, numbering: Numbering) -> None:
         raw.supports[name] = directions
     told = list(left_out)
     raw.not_held = told if len(told) <= 5 else [*told[:4], f"and {len(told) - 4} more like these"]
+
+
+def _beside_axes(raw: RawMesh, held: Constraints, numbering: Numbering) -> Constraints:
+    """What is held in global directions or wholly; what is held in others becomes equations of `raw`."""
+    nodes = {node: set(ways) for node, ways in held.nodes.items()}
+    sets = dict(held.sets)
+    for name, ways in held.sets.items():
+        members = raw.node_id[raw.point_sets.get(name, np.zeros(0, dtype=np.int64))].tolist()
+        if len(ways & set("xyz")) in (1, 2) and not held.axes.keys().isdisjoint(members):
+            del sets[name]
+            for node in members:
+                nodes.setdefault(node, set()).update(ways)
+    count = 0
+    for node, ways in nodes.items():
+        if node not in held.axes or not np.isin(node, numbering.sorted):
+            continue
+        for first, names in ((0, "xyz"), (3, "abc")):
+            local = [way for way in names if way in ways]
+            if len(local) in (0, 3):
+                continue
+            ways.difference_update(names)
+            at, count = numbering.positions([node], ""), count + 1
+            for way in local:
+                direction = held.axes[node][names.index(way)]
+                raw.links.append(in_axes(LOCAL, at, np.array([first]), direction[None]))
+    if count:
+        raw.remarks.append(f"{count} nodes are held in directions of their own, by equations of the mesh")
+    return replace(held, sets=sets, nodes=nodes)
+
+
+LOCAL = "supports in local directions"
+
+
+def in_axes(where: str, nodes: Indices, first: Indices, factors: Array) -> Equation:
+    """The equation of terms along directions of their own.
+
+    Args:
+        nodes: (t,) of the terms. first: (t,) 0 for a displacement, 3 for a rotation. factors: (t, 3) along x, y, z.
+    """
+    term, way = np.nonzero(np.abs(factors) > 1e-12 * np.abs(factors).max())
+    return Equation(where, nodes[term], first[term] + way, factors[term, way], first=False)
 
 
 def _in_order(directions: Iterable[str]) -> str:

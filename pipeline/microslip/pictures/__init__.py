@@ -23,6 +23,7 @@ from ..units import to_rpm
 from . import plots
 from .lettering import save_gif, save_png
 from .scene import quiet_vtk
+from .turning import stress_modes, turning_modes
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -150,9 +151,9 @@ def _scenes(basis: ModalBasis, folder: Path, report: Report) -> dict[str, Path]:
 
     drawn: dict[str, Path] = {}
 
-    def keep(name: str, image: Picture | None) -> None:
+    def keep(name: str, image: Picture | None, body: str = "") -> None:
         if image is not None:
-            drawn[name] = save_png(image, folder / f"{name}.png")
+            drawn[name] = save_png(image, folder / f"{name}.png", body)
 
     studio = views.open_studio(basis)
     try:
@@ -172,14 +173,17 @@ def _scenes(basis: ModalBasis, folder: Path, report: Report) -> dict[str, Path]:
             for group in shown:
                 report(f"pictures of {min(group.n_modes, MOST_MODES)} modes{views.at_speed(group)}")
                 images = list(views.mode_pictures(studio, group, MOST_MODES, camera))
-                keep(f"modes_{_rpm(group)}", views.contact_sheet(studio, group, images))
+                body = turning_modes(studio.basis, group)
+                keep(f"modes_{_rpm(group)}", views.contact_sheet(studio, group, images), body)
                 for j, image in enumerate(images):
                     mode = views.mode_caption(studio, image, group, j)  # 256 colours: a third of the size
                     keep(f"mode_{j + 1:02d}_{_rpm(group)}", mode.quantize(256, dither=Image.Dither.NONE))
             report("animations")
             drawn |= _animations(studio, shown[0], folder)
             report("pictures of stresses")
-            keep("stress_modes", views.stress_sheet(stressed, _ends(stressed.basis)[0], STRESSED, camera))
+            group = _ends(stressed.basis)[0]
+            body = stress_modes(stressed.basis, group, STRESSED)
+            keep("stress_modes", views.stress_sheet(stressed, group, STRESSED, camera), body)
     finally:
         studio.stage.close()
     return drawn
@@ -232,7 +236,8 @@ def _ring(basis: ModalBasis, studio: Studio, folder: Path, report: Report) -> di
     report("pictures of the ring")
     camera = ring_views.ring_camera(ring, 0.3 * ring_views.AREA)
     image = ring_views.ring_sheet(ring, chosen, RING_COLUMNS, camera)
-    sheet = save_png(image, folder / f"ring_modes_{_rpm(chosen[0])}.png")
+    body = ring_views.turning_ring(basis, chosen, RING_COLUMNS)
+    sheet = save_png(image, folder / f"ring_modes_{_rpm(chosen[0])}.png", body)
     drawn, camera = {sheet.stem: sheet}, ring_views.ring_camera(ring)
     for g in [g for g in chosen if multiplicity(g.harmonic, basis.sectors) == 2][:WAVES]:
         report(f"animation of nodal diameter {g.harmonic}")

@@ -9,12 +9,14 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Sequence
+from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..data import Array
+from ..files.png import BODY, with_text
 from ..files.store import complete_or_absent
 
 if TYPE_CHECKING:
@@ -180,10 +182,13 @@ def scaled(image: Picture, factor: float) -> Picture:
     return image.resize(size, Image.Resampling.LANCZOS)
 
 
-def save_png(image: Picture, path: Path) -> Path:
-    """Complete or absent."""
+def save_png(image: Picture, path: Path, body: str = "") -> Path:
+    """Complete or absent. body: what turns on a page in its place, see `turning.turned`."""
+    packed = BytesIO()
+    image.save(packed, format="PNG", compress_level=6)
+    png = packed.getvalue()
     with complete_or_absent(path) as temporary:
-        image.save(temporary, format="PNG", compress_level=6)
+        temporary.write_bytes(with_text(png, BODY, body) if body else png)
     return path
 
 

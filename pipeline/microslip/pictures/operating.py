@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..data import Array
+from ..data import Array, ModalBasis
 from ..operating.cycle import at_time, farthest_at
 from ..operating.fatigue import Endurance, MaterialLimits, allowed_amplitude, vibration_margin
 from ..operating.motion import Motion, displacement
@@ -29,6 +29,7 @@ from .plots import (
     said_beside,
     swept,
 )
+from .turning import Outside, Turned, outside, turned
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -297,6 +298,28 @@ def stress_picture(
         f"{METRES.sized(full_scale, 3)}; grey lines: at rest.{ring}{zones}"
     )
     return captioned(side_by_side(tiles), title, note, 20)
+
+
+def turning_stress(
+    basis: ModalBasis, motion: Motion, cycle: CycleStress, title: str, limits: MaterialLimits | None
+) -> str:
+    """The body over the cycle, coloured by its stress, as it turns on a page; see `stress_picture`."""
+    skin = outside(basis.mesh)
+    moving = displacement(motion.at(0), skin.source)[0][1:]
+    shapes = [
+        Turned("stress amplitude", moving, _capped(1e-6 * cycle.amplitude, skin), "MPa, von Mises", True),
+        Turned("largest stress", None, _capped(1e-6 * cycle.largest, skin), "MPa, von Mises", True),
+    ]
+    if limits is not None:
+        used = 100.0 / np.maximum(vibration_margin(limits, cycle.amplitude, cycle.mean), 1e-3)
+        shapes.append(Turned("share of the endured amplitude", None, _capped(used, skin), "%", True))
+    return turned(basis.mesh.points[skin.source], skin, shapes, title)
+
+
+def _capped(values: Array, skin: Outside) -> Array:
+    """At the vertices, without the highest 0.2 %, which a corner has."""
+    seen = values[skin.source]
+    return np.minimum(seen, np.quantile(seen, 0.998))
 
 
 def _seen(studio: Studio, node: int) -> bool:

@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..data import Array, Indices, ModalBasis, ModalGroup
+from ..data import Array, ComplexArray, Indices, ModalBasis, ModalGroup
 from ..ring.expansion import expand, multiplicity, sector_rotation
 from ..ring.resonances import eigenmodes
 from ..units import METRES
 from .lettering import captioned, colour_bar, nice, sheet, stacked
 from .scene import Camera, Stage, Surface, axes_towards, face_triangles, fit, surface
+from .turning import MOST_SHAPES, Turned, outside, together, turned
 from .views import AREA, _map, at_speed, hertz, mode_scale
 
 if TYPE_CHECKING:
@@ -59,22 +60,22 @@ class RingStudio:
 
 def open_ring(basis: ModalBasis, stage: Stage) -> RingStudio:
     """Extract the surface of one sector and choose the view: mostly along the axis, a little from above."""
-    outside, triangles = _outside(basis, basis.sectors)
+    skin, triangles = _outside(basis, basis.sectors)
     arm = basis.mesh.points - basis.rotation_point
     axes, extent = _view(basis.rotation_axis), _diameter(arm, basis.rotation_axis)
-    return RingStudio(basis, stage, outside, triangles, axes, extent)
+    return RingStudio(basis, stage, skin, triangles, axes, extent)
 
 
 def _outside(basis: ModalBasis, sectors: int) -> tuple[Surface, Indices]:
     """The surface of a body that is drawn so many times, and its triangles without those of cyclic faces."""
-    outside = surface(basis.mesh)
-    if sectors * len(outside.triangles) > MOST_TRIANGLES:
-        outside = surface(basis.mesh, coarse=True)
-    inside = np.zeros(len(outside.triangles), dtype=bool)
+    skin = surface(basis.mesh)
+    if sectors * len(skin.triangles) > MOST_TRIANGLES:
+        skin = surface(basis.mesh, coarse=True)
+    inside = np.zeros(len(skin.triangles), dtype=bool)
     for name in basis.cyclic_faces if basis.sectors > 1 else ():
         if name in basis.mesh.faces:
-            inside |= face_triangles(outside, basis.mesh, name)
-    return outside, outside.triangles[~inside]
+            inside |= face_triangles(skin, basis.mesh, name)
+    return skin, skin.triangles[~inside]
 
 
 def _view(axis: Array) -> Array:
@@ -136,6 +137,21 @@ def _skin(ring: RingStudio) -> tuple[object, Indices]:
     return data, triangles
 
 
+def turning_ring(basis: ModalBasis, groups: Sequence[ModalGroup], modes: int) -> str:
+    """The first modes of nodal diameters on all sectors, as they turn on a page: travelling where there are two."""
+    skin = outside(basis.mesh, basis.cyclic_faces)
+    turns = [sector_rotation(basis, j) for j in range(basis.sectors)]
+    still = (basis.mesh.points[skin.source] - basis.rotation_point) @ np.transpose(turns, (0, 2, 1))
+    shapes = []
+    for group in groups:
+        for j in range(min(modes, eigenmodes(group).n_modes, -(-MOST_SHAPES // len(groups)))):
+            one = replace(group, phi=group.phi[:, :, j : j + 1])
+            wave = [expand(one, basis, sector)[skin.source, :, 0] for sector in range(basis.sectors)]
+            name = f"nodal diameter {group.harmonic}, mode {j + 1}: {hertz(group.frequency[j])}"
+            shapes.append(Turned(name, np.concatenate(wave)[None]))
+    return turned(still.reshape(-1, 3), together([skin] * basis.sectors), shapes, f"{basis.name}: modes of the ring")
+
+
 def ring_sheet(
     ring: RingStudio, groups: Sequence[ModalGroup], modes: int, camera: Camera, across: int | None = None
 ) -> Picture:
@@ -179,20 +195,36 @@ def ring_wave(ring: RingStudio, group: ModalGroup, mode: int, camera: Camera, st
 @dataclass(frozen=True)
 class Round:
     """A body in every sector of a ring. Attributes: basis. still: (N, n, 3) its mesh at rest, m, in common axes.
-    moved: (N, n, 3) displacement, m, in them."""
+    moving: (N, H, n, 3) harmonics of its displacement, m, in them, from the first one on."""
 
     basis: ModalBasis
     still: Array
-    moved: Array
+    moving: ComplexArray
 
 
-def operating_ring(bodies: Sequence[Round], axis: Array, point: Array, title: str, note: str) -> Picture:
+def turning_round(bodies: Sequence[Round], title: str) -> str:
+    """All bodies of a ring over the cycle, as they turn on a page."""
+    skins, still, moving = [], [], []
+    for body in bodies:
+        faces = body.basis.cyclic_faces if body.basis.sectors > 1 else ()
+        skin = outside(body.basis.mesh, faces)
+        skins += [skin] * len(body.still)
+        still.append(body.still[:, skin.source].reshape(-1, 3))
+        each = np.moveaxis(body.moving[:, :, skin.source], 0, 1)
+        moving.append(each.reshape(each.shape[0], -1, 3))
+    shape = Turned("displacement", np.concatenate(moving, axis=1), sized=True)
+    return turned(np.concatenate(still), together(skins), [shape], title)
+
+
+def operating_ring(
+    bodies: Sequence[Round], angle: float, axis: Array, point: Array, title: str, note: str
+) -> Picture:
     """All bodies of a ring at an instant, deformed, coloured by the displacement along one direction.
 
     Args:
-        axis, point: (3,) of the rotation. note: what is shown, without a full stop.
+        angle: rad, of the cycle. axis, point: (3,) of the rotation. note: what is shown, without a full stop.
     """
-    skins = [_round_skin(b) for b in bodies]
+    skins = [_round_skin(b, angle) for b in bodies]
     still, moved = (np.concatenate([s[i] for s in skins]) for i in (0, 1))
     begins = np.cumsum([0, *(len(s[0]) for s in skins)])
     triangles = np.concatenate([s[2] + start for s, start in zip(skins, begins, strict=False)])
@@ -217,9 +249,11 @@ def operating_ring(bodies: Sequence[Round], axis: Array, point: Array, title: st
     return captioned(stacked([image, bar], 4), title, told, 20)
 
 
-def _round_skin(body: Round) -> tuple[Array, Array, Indices]:
+def _round_skin(body: Round, angle: float) -> tuple[Array, Array, Indices]:
     """Vertices (N v, 3) at rest, their displacement (N v, 3), and the triangles of a body all round."""
-    outside, triangles = _outside(body.basis, len(body.still))
-    still, moved = (x[:, outside.source].reshape(-1, 3) for x in (body.still, body.moved))
-    shift = len(outside.source) * np.arange(len(body.still))[:, None, None]
+    skin, triangles = _outside(body.basis, len(body.still))
+    turn = np.exp(1j * angle * np.arange(1, body.moving.shape[1] + 1))[:, None, None]
+    moved = (body.moving * turn).sum(axis=1).real
+    still, moved = (x[:, skin.source].reshape(-1, 3) for x in (body.still, moved))
+    shift = len(skin.source) * np.arange(len(body.still))[:, None, None]
     return still, moved, (triangles[None] + shift).reshape(-1, 3)

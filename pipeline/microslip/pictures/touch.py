@@ -46,10 +46,9 @@ def tell_points(axes: Axes, x: Array, y: Array, columns: Mapping[str, Array], co
 def curves_of(figure: Figure) -> dict[str, Any] | None:
     """Traces and layout of a figure that was drawn, see plotly's `newPlot`; None where it holds what is no curve."""
     panels = [axes for axes in figure.axes if axes.get_visible() and axes.get_label() != "<colorbar>"]
-    bars = sum(axes.get_label() == "<colorbar>" for axes in figure.axes)
     drawn: list[Any] = [line.get_xdata() for axes in panels for line in axes.lines]
     drawn += [some.get_array() for axes in panels for some in axes.collections]
-    if not 0 < sum(map(np.size, drawn)) < MOST or bars > 1 or any(_other(axes) for axes in panels):
+    if not 0 < sum(map(np.size, drawn)) < MOST or any(_other(axes) for axes in panels):
         return None
     traces: list[Trace] = []
     layout: dict[str, Any] = {
@@ -59,14 +58,17 @@ def curves_of(figure: Figure) -> dict[str, Any] | None:
     }  # fmt: skip
     bounds = np.array([axes.get_position().extents for axes in panels])
     (left, low), (right, high) = bounds[:, :2].min(axis=0), bounds[:, 2:].max(axis=0)
-    shares = (bounds - [left, low, left, low]) / [right - left, high - low, right - left, high - low]
+    frame = np.array([left, low]), np.array([right - left, high - low])
+    shares = ((bounds.reshape(-1, 2, 2) - frame[0]) / frame[1]).reshape(-1, 4)
     for number, axes in enumerate(panels, 1):
         before = [i for i, other in enumerate(panels[: number - 1], 1) if _together(axes, other)]
-        _panel(axes, number, before[0] if before else 0, shares[number - 1].tolist(), traces, layout)
+        _panel(axes, number, before[0] if before else 0, shares[number - 1].tolist(), frame, traces, layout)
     width, height = figure.get_size_inches()
     title = figure.get_suptitle() or panels[0].get_title() * (len(panels) == 1)
     layout |= {"title": {"text": _text(title), "font": {"size": 14}}} if title else {}
-    layout |= {"margin": layout["margin"] | {"t": 50}} if title else {}
+    lines = max((a.get_title().count("\n") + 1 for a in panels if len(panels) > 1 and a.get_title()), default=0)
+    bars = any(axes.get_label() == "<colorbar>" for axes in figure.axes)
+    layout["margin"] |= {"t": 15 * lines + (50 if title else 20), "r": 70 if bars else 20}
     return {"data": traces, "layout": layout, "shape": round(width / height, 3)}
 
 
@@ -87,13 +89,19 @@ def _together(axes: Axes, other: Axes) -> bool:
 
 
 def _panel(
-    axes: Axes, number: int, over: int, place: list[float], traces: list[Trace], layout: dict[str, Any]
-) -> None:  # fmt: skip
+    axes: Axes,
+    number: int,
+    over: int,
+    place: list[float],
+    frame: tuple[Array, Array],
+    traces: list[Trace],
+    layout: dict[str, Any],
+) -> None:
     """Add what an axes holds.
 
     Args:
         over: number of the axes whose place it shares; 0: none. place: its left, lower, right and upper end, as shares
-            of the figure.
+            of the figure. frame: lower left corner and size of all axes, shares of the picture.
     """
     here = {"xaxis": f"x{over or number}", "yaxis": f"y{number}"}
     pointed = any(line.get_gid() for line in axes.lines)
@@ -101,7 +109,7 @@ def _panel(
     for line in axes.lines:
         traces += [{**trace, **here} for trace in _line(axes, line, named.get(line, ""), pointed)]
     for some in axes.collections:
-        traces += [{**trace, **here} for trace in _collection(some)]
+        traces += [{**trace, **here} for trace in _collection(some, frame)]
     if not over:
         layout[f"xaxis{number}"] = _axis(axes.get_xlabel(), axes.get_xscale(), axes.get_xlim()) | {
             "domain": place[::2], "anchor": f"y{number}",
@@ -181,7 +189,23 @@ def _line(axes: Axes, line: Line2D, label: str, pointed: bool) -> list[Trace]:
     return [trace | ({"hoverinfo": "skip"} if pointed and dashes else {})]
 
 
-def _collection(some: Any) -> list[Trace]:
+def _bar(some: Any, frame: tuple[Array, Array]) -> Trace:
+    """The colour bar of a map or of points, where the picture has it."""
+    if (bar := some.colorbar) is None:
+        return {}
+    (x, low), (_, high) = (bar.ax.get_position().get_points() - frame[0]) / frame[1]
+    words = bar.ax.get_ylabel() or bar.ax.get_xlabel() or bar.ax.get_title()
+    return {
+        "title": {"text": _text(words), "side": "right"},
+        "x": float(x),
+        "xanchor": "left",
+        "y": float(low + high) / 2,
+        "len": float(high - low),
+        "thickness": 12,
+    }
+
+
+def _collection(some: Any, frame: tuple[Array, Array]) -> list[Trace]:
     """Points, lines, or a map over a grid."""
     from matplotlib.collections import PathCollection, QuadMesh
     from matplotlib.colors import LogNorm, to_hex
@@ -191,7 +215,7 @@ def _collection(some: Any) -> list[Trace]:
         x, y = _edges(some) or (np.zeros(0), np.zeros(0))
         z: Array = np.ma.filled(np.ma.asarray(values, dtype=float), np.nan).reshape(len(y) - 1, len(x) - 1)
         logged = isinstance(some.norm, LogNorm)
-        bar = some.colorbar
+        bar = _bar(some, frame)
         shown = np.log10(np.where(z > 0, z, np.nan)) if logged else z
         low, high = (np.log10(v) if logged else v for v in some.get_clim())
         ticks = {"tickvals": (at := np.linspace(low, high, 5)).tolist(), "ticktext": [f"{10**v:.3g}" for v in at]}
@@ -199,9 +223,8 @@ def _collection(some: Any) -> list[Trace]:
             "type": "heatmap", "x": _numbers(x), "y": _numbers(y), "z": [_numbers(row) for row in shown],
             "text": [[f"{v:.4g}" for v in row] for row in z], "zmin": float(low), "zmax": float(high),
             "colorscale": _shades(some.cmap),
-            "hovertemplate": "%{x:.5g}, %{y:.5g}: %{text}<extra></extra>", "showscale": bar is not None,
-            "colorbar": {"title": {"text": _text(bar.ax.get_ylabel() or bar.ax.get_xlabel()), "side": "right"}}
-            | (ticks if logged else {}) if bar is not None else {},
+            "hovertemplate": "%{x:.5g}, %{y:.5g}: %{text}<extra></extra>", "showscale": bool(bar),
+            "colorbar": bar | (ticks if logged else {}),
         }]  # fmt: skip
     if isinstance(some, PathCollection):
         x, y = np.asarray(some.get_offsets(), dtype=float).T
@@ -209,6 +232,9 @@ def _collection(some: Any) -> list[Trace]:
         marker = {"color": colour, "size": float(np.sqrt(np.mean(some.get_sizes())))}
         if values is not None:
             marker |= {"color": _numbers(np.asarray(values, dtype=float)), "colorscale": _shades(some.cmap)}
+            bar = _bar(some, frame)
+            low, high = map(float, some.get_clim())
+            marker |= {"cmin": low, "cmax": high, "showscale": bool(bar), "colorbar": bar}
         return [{"type": "scatter", "mode": "markers", "x": _numbers(x), "y": _numbers(y), "marker": marker,
                  "showlegend": False}]  # fmt: skip
     colours = some.get_colors()

@@ -24,7 +24,6 @@ from ..units import METRES, rpm_text, to_rpm
 from . import ring
 from .page import Album, Piece, fold, number, page, say, table
 from .response import answer, response_pieces, warnings
-from .turning import turning_modes
 from .words import (
     certificate,
     contact_sentence,
@@ -222,7 +221,10 @@ def _campbell(basis: ModalBasis, album: Album) -> list[Piece]:
 
 
 def _modes(basis: ModalBasis, album: Album) -> list[Piece]:
-    rings = album.begun("ring_modes_", tone="wide")
+    sheets = [*album.begun("modes_", tone="wide"), *album.begun("ring_modes_", tone="wide")]
+    if any(sheet.body for sheet in sheets):  # a mode can be chosen there, and moves
+        album.drop("ring_wave_", "animation_", "mode_")
+        return sheets
     moving = [Piece("row", album.begun(prefix)) for prefix in ("ring_wave_", "animation_")]
     single = []
     for group in _groups(basis):
@@ -230,7 +232,7 @@ def _modes(basis: ModalBasis, album: Album) -> list[Piece]:
         of = f" of nodal diameter {group.harmonic}" if basis.sectors > 1 else ""
         shown = Piece("row", album.begun("mode_", "_" + at.replace(" ", "")))
         single.append(fold(f"Each mode{of} at {at}", shown))
-    return [turning_modes(basis), *rings, *moving, *album.begun("modes_", tone="wide"), *single]
+    return [*sheets, *moving, *single]
 
 
 def _interfaces(basis: ModalBasis, album: Album) -> list[Piece]:

@@ -8,10 +8,11 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
-from ..files.png import CURVES, text_in
+from ..files.png import BODY, CURVES, text_in
 
 
 @dataclass(frozen=True)
@@ -21,7 +22,8 @@ class Piece:
     Attributes:
         inside: sentences, rows of cells, pieces, a text, or the data of a picture. title: of a fold, the caption of a
             picture. head: of a table. tone: of sentences ("lead", "note", "warn", "bad") or of a picture ("wide").
-        name: of a picture; `fixed.html` has captions. curves: of a picture, JSON for plotly; see `pictures.touch`.
+        name: of a picture; `fixed.html` has captions. curves, body: of a picture, JSON; see
+            `pictures.touch` and `pictures.turning`.
     """
 
     kind: str
@@ -31,6 +33,7 @@ class Piece:
     tone: str = ""
     name: str = ""
     curves: str = ""
+    body: str = ""
 
     def __bool__(self) -> bool:
         return any(self.inside)
@@ -77,17 +80,34 @@ class Album:
 
     def take(self, name: str, caption: str = "", tone: str = "") -> Piece:
         """A picture, with nothing inside if there is none of this name."""
-        path, data, curves = self.left.pop(name, None), "", ""
+        path, data, curves, body = self.left.pop(name, None), "", "", ""
         if path is not None and path.is_file():
-            kind = "gif" if path.suffix.lower() == ".gif" else "png"
             picture = path.read_bytes()
-            data = f"data:image/{kind};base64,{base64.b64encode(picture).decode()}"
-            curves = text_in(picture, CURVES).replace("<", "\\u003c") if _plotly() else ""
-        return Piece("figure", data, caption, tone=tone, name=name, curves=curves)
+            data = f"data:image/webp;base64,{base64.b64encode(_webp(picture)).decode()}"
+            curves, body = (text_in(picture, key).replace("<", "\\u003c") for key in (CURVES, BODY))
+        kept = {"curves": curves, "body": body} if _plotly() else {}
+        return Piece("figure", data, caption, tone=tone, name=name, **kept)
+
+    def drop(self, *prefixes: str) -> None:
+        """Pictures whose names begin so are not shown."""
+        self.left = {n: path for n, path in self.left.items() if not n.startswith(prefixes)}
 
     def begun(self, prefix: str, suffix: str = "", tone: str = "") -> list[Piece]:
         """All pictures whose names begin and end so."""
         return [self.take(n, tone=tone) for n in list(self.left) if n.startswith(prefix) and n.endswith(suffix)]
+
+
+def _webp(picture: bytes) -> bytes:
+    """A PNG or GIF in a third of its bytes: pages are sent by mail."""
+    from PIL import Image, ImageSequence
+
+    packed = BytesIO()
+    with Image.open(BytesIO(picture)) as opened:
+        first, *others = [frame.convert("RGB") for frame in ImageSequence.Iterator(opened)]
+        moves = {"save_all": True, "append_images": others, "loop": 0} if others else {}
+        step = opened.info.get("duration", 0)
+    first.save(packed, "WEBP", quality=80 if others else 90, duration=step, **moves)
+    return packed.getvalue()
 
 
 def page(title: str, pieces: Iterable[Piece], sections: Mapping[str, Sequence[Piece]] | None = None) -> str:
@@ -97,11 +117,6 @@ def page(title: str, pieces: Iterable[Piece], sections: Mapping[str, Sequence[Pi
     if 'class="curves"' not in text and 'class="body"' not in text:
         return text
     return text.replace("</body>", _templates().get_template("curves.html").render(program=_plotly()) + "</body>")
-
-
-def draws_curves() -> bool:
-    """Whether a page can have what is touched: the package plotly is installed."""
-    return bool(_plotly())
 
 
 @cache

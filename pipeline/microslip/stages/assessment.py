@@ -372,7 +372,8 @@ def _at_worst(
         finally:
             studio.stage.close()
         if image is not None:
-            drawn["stress at resonance"] = save_png(image, folder / "stress_at_resonance.png")
+            body = operating.turning_stress(basis, motion, cycle, title, found.limits)
+            drawn["stress at resonance"] = save_png(image, folder / "stress_at_resonance.png", body)
     return drawn
 
 

@@ -13,7 +13,7 @@ from ..case.assemble import Built
 from ..case.loaded import place_of
 from ..data import Array
 from ..frames import rotation
-from ..operating.cycle import at_time, farthest_at
+from ..operating.cycle import farthest_at
 from ..operating.motion import Motion, motion_of
 from ..operating.shape import on_sector
 from ..results import Series
@@ -78,7 +78,7 @@ def draw_ring(built: Built, series: Series, row: Mapping[str, Any], path: Path) 
         The picture; None where no body has elements and shapes.
     """
     from ..pictures.lettering import save_png
-    from ..pictures.ring_views import Round, operating_ring
+    from ..pictures.ring_views import Round, operating_ring, turning_round
     from ..pictures.scene import quiet_vtk
 
     point = int(np.abs(series.frequency - row["frequency_Hz"]).argmin())
@@ -94,17 +94,12 @@ def draw_ring(built: Built, series: Series, row: Mapping[str, Any], path: Path) 
     for name, moving in found.items():
         basis, place = built.bodies[name].basis, place_of(built.bodies[name])
         still = basis.mesh.points @ place.turn.T + place.shift - first.rotation_point
-        moved = [at_time(_swinging(moving(j)), angle, axis=0) for j in sectors]
-        bodies.append(Round(basis, np.array([still @ R.T + first.rotation_point for R in turns]), np.array(moved)))
+        round_ = np.array([still @ R.T + first.rotation_point for R in turns])
+        bodies.append(Round(basis, round_, np.array([moving(j)[1:] for j in sectors])))
     quiet_vtk()
     title = f"{built.settings.name}: the ring at {row['frequency_Hz']:.5g} Hz under {row['normal_force_N']:.6g} N"
-    image = operating_ring(bodies, first.rotation_axis, first.rotation_point, title, _said(built, angle))
-    return save_png(image, path)
-
-
-def _swinging(harmonics: Array) -> Array:
-    """About the mean."""
-    return np.concatenate([np.zeros_like(harmonics[:1]), harmonics[1:]])
+    image = operating_ring(bodies, angle, first.rotation_axis, first.rotation_point, title, _said(built, angle))
+    return save_png(image, path, turning_round(bodies, title))
 
 
 def _said(built: Built, angle: float) -> str:

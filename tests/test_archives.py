@@ -1,0 +1,255 @@
+"""Ansys archives beyond the plain mesh: turned nodes, contact, remote points, cyclic edges, dropped
+mid-side nodes; each beside the same body written plainly, or beside CalculiX."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+
+import decks
+import meshes
+import numpy as np
+import pytest
+import touching
+from refusals import refused_command
+from test_cdb import archive
+from test_public_decks import sector
+
+from microslip.basis import read_basis
+from microslip.cli import main
+from microslip.data import Mesh
+from microslip.mesh.deck_mesh import sides_of
+from microslip.mesh.systems import axes_by_angles
+
+
+@pytest.fixture(autouse=True)
+def there(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+
+
+def hertz(capsys, text: str, name: str = "a.cdb", k: int = 0, **more: str) -> np.ndarray:
+    """Frequencies of an imported deck; what import said is left in `hertz.said`."""
+    body = f"{Path(name).stem}-{abs(hash(text))}"
+    Path(f"{body}{Path(name).suffix}").write_text(text)
+    assert main(["import", f"{body}{Path(name).suffix}"]) == 0
+    hertz.said = capsys.readouterr().out
+    sets = [w for key, value in more.items() for w in ("--set", f"{key.replace('_', '.')}={value}")]
+    assert main(["modes", body, "-q", "--set", "modes.solver=superlu", *sets]) == 0
+    return read_basis(Path("build") / body / "basis.h5").groups[0, k].frequency
+
+
+def block(cells=(2, 1, 2), size=(0.06, 0.011, 0.007), kind="hexahedron20") -> Mesh:
+    return meshes.brick(kind, cells, size)
+
+
+def ended(text: str, *lines: str) -> str:
+    return text.replace("FINISH", "\n".join([*lines, "FINISH"]))
+
+
+def numbers(mesh: Mesh, face: str) -> list[int]:
+    return [int(n) for n in mesh.node_id[mesh.face_points(face)]]
+
+
+SLIDING = ["CMSEL,S,X0", "D,ALL,UX", "CMSEL,S,Y0", "D,ALL,UY", "CMSEL,S,Z0", "D,ALL,UZ,,,,,UX"]
+
+
+def test_supports_of_turned_nodes_are_those_of_the_body_before_it_was_turned(capsys):
+    """Faces that slide, in a system turned by three angles: by NROTAT, and by angles of NBLOCK."""
+    angles = (25.0, -40.0, 65.0)
+    straight = hertz(capsys, ended(archive(block(), ("x0", "y0", "z0")), *SLIDING))
+    R = axes_by_angles(np.array(angles)).T
+    mesh = block()
+    moved = Mesh(mesh.points @ R.T, mesh.cells, mesh.faces, {}, mesh.node_id)
+    text = archive(moved, ("x0", "y0", "z0"))
+    system = ["LOCAL,12,0,0,0,0,25,-40,65", "CMSEL,S,X0", "CMSEL,A,Y0", "ALLSEL", "NROTAT,ALL"]
+    turned = hertz(capsys, ended(text, *system, "CSYS,0", *SLIDING))
+    np.testing.assert_allclose(turned, straight, rtol=1e-9)
+    assert "nodes are held in directions of their own" in hertz.said
+    lines = text.splitlines()
+    at = lines.index("(3i9,6e21.13e3)") + 1
+    for i in range(at, at + mesh.n_points):
+        lines[i] += "".join(f"{a:21.13E}" for a in angles)
+    by_node = hertz(capsys, ended("\n".join(lines) + "\n", *SLIDING))
+    np.testing.assert_allclose(by_node, straight, rtol=1e-9)
+
+
+def test_systems_are_written_in_two_ways_and_nodes_chosen_by_place(capsys):
+    """A slice of a ring whose flat sides are held along theta: LOCAL in one line and in three, NSEL
+    in the cylindrical system and components; CalculiX with a *TRANSFORM of the same nodes."""
+    text = archive(sector(), ("y0", "y1"))
+    plain = ["LOCAL,11,1,0,0,0,0,0,90"]
+    blocked = ["LOCAL,R5.0,LOC,11,1,0,0,0", "LOCAL,R5.0,ANG,11,1,0,0,90", "CSYS,11"]
+    named = [w for n in ("Y0", "Y1") for w in (f"CMSEL,S,{n}", "NROTAT,ALL", "D,ALL,UY")]
+    placed = [
+        *("NSEL,S,LOC,Y,165", "NSEL,A,LOC,Y,-165.01,-164.99", "CM,SIDES,NODE"),
+        *("NROTAT,ALL", "CSYS,0", "ALLSEL", "D,SIDES,UY"),
+    ]
+    found = [
+        hertz(capsys, ended(text, *lines)) for lines in ([*plain, *named], [*blocked, *placed])
+    ]
+    np.testing.assert_allclose(found[0], found[1], rtol=1e-9)
+    np.testing.assert_allclose(found[0][1:5], THETA, rtol=3e-6)
+
+
+THETA = [303688.9, 951442.2, 1385611, 2577317]
+"""Hz, CalculiX 2.20: the deck of `sector` with *TRANSFORM, TYPE=C about x on both sides, 2 held there."""
+
+
+def pairs(mesh: Mesh, contact: str, target: str | int, options=(), first: int = 9000) -> list[str]:
+    """Contact and target elements of two faces, or of a face and a pilot node, as Workbench writes them."""
+    lines = ["*SET,tid,4", "*SET,cid,3", "ET,cid,174", "ET,tid,170", *options]
+
+    def elements(kind: int, face: str) -> list[str]:
+        cells = [c for block in mesh.faces[face].values() for c in block]
+        rows = [
+            [first + 100 * kind + i, kind, 3, 3, 0, *mesh.node_id[c]] for i, c in enumerate(cells)
+        ]
+        rows = ["".join(f"{w:9d}" for w in row) for row in rows]
+        return [f"EBLOCK,10,,,{len(rows)}", "(15i9)", *rows, "       -1"]
+
+    lines += elements(3, contact)
+    if isinstance(target, int):
+        return [
+            *lines,
+            "type,tid $ mat,cid $ real,cid",
+            "tshape,pilo",
+            f"en,9999,{target}",
+            "tshape",
+        ]
+    return [*lines, *elements(4, target)]
+
+
+def two() -> Mesh:
+    a = block((2, 2, 1), (0.03, 0.011, 0.007))
+    b = block((3, 1, 1), (0.03, 0.011, 0.007))
+    return touching.together(a=a, b=Mesh(b.points + [0.03, 0, 0], b.cells, b.faces, {}, b.node_id))
+
+
+STEEL = [*("*MATERIAL, NAME=ST", "*ELASTIC", "210000., 0.3", "*DENSITY", "7.85e-9")]
+
+
+def deck(mesh: Mesh, *more: str, sets=()) -> str:
+    lines = [*decks.mesh_lines(mesh, sets=sets), *STEEL, decks.section(material="ST"), *more]
+    return "\n".join(lines) + "\n"
+
+
+def test_bonded_contact_is_a_tie(capsys):
+    """KEYOPT(12) = 5: as *TIE of the same faces; without it the parts stay apart and it is a joint."""
+    mesh, held = two(), ["CMSEL,S,A_X0", "D,ALL,ALL"]
+    text = archive(mesh, ("a_x0",))
+    lines = pairs(mesh, "a_x1", "b_x0", ["keyo,cid,12,5"])
+    bonded = hertz(capsys, ended(text, *lines, *held))
+    assert "is bonded: tied" in hertz.said and "tied to 'target 3'" in hertz.said
+    tie = [f"*SURFACE, NAME=S{i}, TYPE=NODE\n{n}" for i, n in enumerate(("a_x1", "b_x0"))]
+    tie = deck(
+        mesh, *tie, "*TIE, NAME=T", "S0, S1", "*BOUNDARY", "a_x0,1,3", sets=("a_x0", "a_x1", "b_x0")
+    )
+    np.testing.assert_allclose(bonded, hertz(capsys, tie, "a.inp"), rtol=1e-9)
+    Path("c.cdb").write_text(ended(text, *lines[:4], *lines[5:], "MP,MU,3,0.15", *held))
+    assert main(["import", "c.cdb"]) == 0
+    said = capsys.readouterr().out
+    assert "contact of the real constants 3, frictional" in said
+
+
+@pytest.mark.parametrize("mean", [False, True])
+def test_a_remote_point_is_a_coupling(capsys, mean):
+    """A pilot node that leads a face (KEYOPT(4) = 2), or follows it (1), held but for a rotation."""
+    mesh = block()
+    text = archive(mesh, ("x0",)).replace(
+        "N,R5.3", f"{5000:9d}{0:9d}{0:9d}{80.0:21.13E}{5.0:21.13E}{3.0:21.13E}\nN,R5.3"
+    )
+    text = text.replace(f"{mesh.n_points:10d}\n(3i9", f"{mesh.n_points + 1:10d}\n(3i9")
+    lines = pairs(
+        mesh, "x1", 5000, ["keyo,cid,12,5", f"keyo,cid,4,{1 if mean else 2}", "keyo,tid,4,111111"]
+    )
+    held = ["CMSEL,S,X0", "D,ALL,ALL", "D,5000,UX,,,,,UY,UZ", "D,5000,ROTX,,,,,ROTZ"]
+    found = hertz(capsys, ended(text, *lines, *held))
+    kind = "*DISTRIBUTING" if mean else "*KINEMATIC"
+    more = [
+        "*NODE",
+        "5000, 80., 5., 3.",
+        "*SURFACE, NAME=S",
+        "EALL",
+        "*COUPLING, REF NODE=5000, SURFACE=S",
+    ]
+    if mean:
+        cells = mesh.cells["hexahedron20"]
+        inner = np.isin(cells, mesh.face_points("x1")).sum(axis=1) == 8
+        more[3:4] = [f"{i + 1}, S{side_of(mesh, cell)}" for i, cell in enumerate(cells) if inner[i]]
+    else:
+        more[2:4] = ["*SURFACE, NAME=S, TYPE=NODE", "x1"]
+    held = ["*BOUNDARY", "x0,1,3", "5000,1,4", "5000,6,6"]
+    text = deck(mesh, *more, kind, *held, sets=("x0", "x1"))
+    np.testing.assert_allclose(found, hertz(capsys, text, "a.inp"), rtol=1e-9)
+
+
+def side_of(mesh: Mesh, cell: np.ndarray) -> int:
+    on = set(mesh.face_points("x1").tolist())
+    return 1 + next(
+        i for i, s in enumerate(sides_of("hexahedron20")) if on.issuperset(cell[list(s)].tolist())
+    )
+
+
+EDGES = ["CMBLOCK,CYCLIC_M01{},NODE,{}", "(8i10)"]
+
+
+def ring(text: str, mesh: Mesh, low="y1", high="y0", command="CYCLIC,12,30,11") -> str:
+    lines = ["LOCAL,11,1,0,0,0,0,0,90", "CSYS,0"]
+    for letter, face in (("L", low), ("H", high)):
+        members = numbers(mesh, face)
+        lines += [EDGES[0].format(letter, len(members)), EDGES[1]]
+        lines += [
+            "".join(f"{n:10d}" for n in members[i : i + 8]) for i in range(0, len(members), 8)
+        ]
+    return ended(text, *lines, command, "/SOLU", "ANTYPE,MODAL", "CYCOPT,HINDEX,0,4,2")
+
+
+@pytest.mark.parametrize("command", ["CYCLIC,12,30,11", "CYCLIC,,,11"])
+def test_cyclic_edges_are_a_sector(capsys, command):
+    """Numbers of CalculiX, as in test_public_decks; of CYCLIC without a number by the angle."""
+    material = ("MP,EX,1,205000", "MP,NUXY,1,0.29", "MP,DENS,1,7.83E-9")
+    mesh = sector()
+    text = ring(archive(mesh, (), material), mesh, command=command)
+    found = hertz(capsys, text, k=2)
+    np.testing.assert_allclose(found[:3], [140782, 401182, 888852], rtol=3e-6)
+    (body,) = Path(".").glob("a-*/body.toml")
+    keys = tomllib.loads(body.read_text())
+    assert keys["cyclic"] == {
+        "sectors": 12, "left": "CYCLIC_M01L", "right": "CYCLIC_M01H", "nodal_diameters": [0, 2, 4],
+    }  # fmt: skip
+    assert "one of 12 cyclic sectors" in hertz.said
+
+
+def test_what_is_no_single_ring_is_refused(capsys):
+    mesh = sector()
+    text = archive(mesh)
+    for command, words in (
+        ("CYCLIC,13,,11", "12 sectors, not 13"),
+        ("CYCLIC,12,30,11,'A'\nCYCLIC,12,30,11,'B'", "multistage"),
+        ("CYCLIC,12,30,11\nMSOPT,NEW,S1", "multistage"),
+    ):
+        Path("a.cdb").write_text(ring(text, mesh, command=command))
+        refused_command(["import", "a.cdb"], capsys, words, "a.cdb, line")
+        assert not Path("a").exists()
+
+
+def test_dropped_mid_side_nodes_make_straight_edges(capsys):
+    """A brick without the mid-side nodes of one edge, and of a face: as *EQUATIONs in CalculiX."""
+    mesh = block((2, 1, 1))
+    corners = mesh.cells["hexahedron20"][0]
+    dropped = [int(mesh.node_id[corners[8 + i]]) for i in (4, 8)]
+    text = archive(mesh, ("x1",))
+    lines, at = text.splitlines(), text.splitlines().index("(19i10)") + 1
+    for i in range(at, at + 4):
+        words = [int(lines[i][k : k + 10]) for k in range(0, len(lines[i]), 10)]
+        head = 11 if (i - at) % 2 == 0 else 0
+        lines[i] = "".join(
+            f"{0 if n in dropped and j >= head else n:10d}" for j, n in enumerate(words)
+        )
+    found = hertz(capsys, ended("\n".join(lines) + "\n", "CMSEL,S,X1", "D,ALL,ALL"))
+    np.testing.assert_allclose(found[:4], STRAIGHT, rtol=3e-6)
+    assert "mid-side nodes that elements drop" in hertz.said
+
+
+STRAIGHT = [1779.041, 2687.528, 12347.96, 15423.66]
+"""Hz, CalculiX 2.20: the same mesh, each dropped node by *EQUATION the mean of its ends."""
