@@ -207,7 +207,6 @@ def test_random_constraints_are_those_of_dense_algebra(data):
         (["*EQUATION", "2", "{A}, 1, 1., {B}, 1, -1.", "2", "{A}, 1, 1., {C}, 1, -1."], "gives already"),
         (["*EQUATION", "2", "{A}, 1, 1., {B}, 1, -1.", "2", "{B}, 1, 1., {A}, 1, 2."], "leads in a circle"),
         (["*EQUATION", "3", "{A}, 1, 1., {B}, 1, -1."], "announces 3 terms"),
-        (["*TRANSFORM, NSET=z1", "0,1,0,1,0,0", "*EQUATION", "2", "{A}, 1, 1., {B}, 1, -1."], "beside a *TRANSFORM"),
         (["*MPC", "BEAM, {A}, {B}", "BEAM, {B}, {C}"], "moves node {B}, which leads others"),
         (["*SURFACE, NAME=U, COMBINE=UNION", "S-z1, S-z9"], "names the surface 'S-z9', which is not defined"),
         (["*MPC", "BEAMM, {A}, {B}"], "kind 'BEAMM' is not read"),

@@ -285,6 +285,78 @@ class Sector:
     diameters: tuple[int, ...] = ()
 
 
+@dataclass(frozen=True)
+class NodalLoad:
+    """Forces on nodes, or displacements that are prescribed there. `where`: its place in the file, of every load.
+
+    Attributes:
+        kind: ``force`` (N, along rotations N m) or ``displacement`` (m, rad). nodes, directions, values: (t,) of its
+            terms; nodes and directions as those of an `Equation`, along the axes of the body.
+    """
+
+    where: str
+    kind: str
+    nodes: Indices
+    directions: Indices
+    values: Array
+
+
+@dataclass(frozen=True)
+class FacetLoad:
+    """A pressure that follows the surface, or a traction that keeps its direction.
+
+    Attributes:
+        facets: (f, c) corners as a file has them, (f, k) points of facets of the type `kind` in a mesh. values: (f,)
+            or (f, c) at the corners, Pa; a pressure is positive into the body. direction: (3,) unit vector of a
+            traction, None for a pressure.
+    """
+
+    where: str
+    facets: Indices
+    values: Array
+    direction: Array | None = None
+    kind: str = ""
+
+
+@dataclass(frozen=True)
+class BodyLoad:
+    """A uniform acceleration field such as gravity: each mass m is pulled by m times it.
+
+    Attributes:
+        acceleration: (3,) m/s2. cells: (c,) the file's numbers of those that it acts on, in a mesh whether it acts on
+            each, type by type; None: all.
+    """
+
+    where: str
+    acceleration: Array
+    cells: Indices | None = None
+
+
+@dataclass(frozen=True)
+class SpinLoad:
+    """Centrifugal forces. speed: rad/s; axis: (3,) of any length; point: (3,) m of it; cells as of a `BodyLoad`."""
+
+    where: str
+    speed: float
+    axis: Array
+    point: Array
+    cells: Indices | None = None
+
+
+@dataclass(frozen=True)
+class StaticStep:
+    """What acts on a body in the static step that a file's modes are about; temperatures stand in `Mesh.temperature`.
+
+    Attributes:
+        where: place of the step. nonlinear: whether its displacements are finite (NLGEOM), else one linear solution.
+        loads: all that act at its end, in a mesh in SI.
+    """
+
+    where: str
+    nonlinear: bool
+    loads: tuple[NodalLoad | FacetLoad | BodyLoad | SpinLoad, ...] = ()
+
+
 @dataclass(frozen=True, eq=False)
 class Mesh:
     """A volume mesh with named faces.
@@ -311,6 +383,8 @@ class Mesh:
         retained: point sets whose displacements a reduction of the file keeps.
         hanging: elements left out that share nodes with the solids or their constraints, in words, or nothing.
         lumps: point masses, springs and dashpots, or None; their points need not be of cells.
+        state: the static step that the file's modes are about, or None. integration: rule of its bricks of 20 nodes,
+            as `mesh.integration` of a body file.
     """
 
     points: Annotated[Array, Stored("node axis", "m", "reference positions", at="xyz")]
@@ -337,6 +411,8 @@ class Mesh:
     lumps: Lumps | None = None
     hanging: str = ""
     retained: tuple[str, ...] = ()
+    state: StaticStep | None = None
+    integration: str = "full"
 
     @property
     def n_points(self) -> int:

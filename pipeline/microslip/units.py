@@ -9,6 +9,8 @@ from contextvars import ContextVar
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
+import numpy as np
+
 from .data import Array
 
 Speed = TypeVar("Speed", float, Array)
@@ -37,6 +39,11 @@ def density(system: str) -> float:
     """kg/m3 of the system's unit of density."""
     length, mass, _ = SYSTEMS[system]
     return mass / length**3
+
+
+def in_si(value: Any, system: str, length: int = 0, mass: int = 0, time: int = 0) -> Any:
+    """A number of a system, or an array, in SI: the powers of its units of length, mass and time."""
+    return value * np.prod(np.power(SYSTEMS[system], (length, mass, time)))
 
 
 def to_rpm(speed: Speed) -> Speed:

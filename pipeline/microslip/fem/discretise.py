@@ -223,13 +223,15 @@ def free_upper(pattern: Pattern, fixed: Indices) -> FreeUpper:
 class Discretisation:
     """A mesh made ready for assembly: its blocks, the pattern, and where each cell's pairs go in it.
 
-    `positions[i]` is (e, k, k): index into the pattern, or `pattern.size` for pairs below the diagonal.
+    `positions[i]` is (e, k, k): index into the pattern, or `pattern.size` for pairs below the diagonal. one_rule:
+    masses are integrated as stiffness is.
     """
 
     mesh: Mesh
     blocks: tuple[Block, ...]
     pattern: Pattern
     positions: tuple[Indices, ...]
+    one_rule: bool = False
 
     @property
     def volume(self) -> float:
@@ -263,8 +265,8 @@ REDUCED = {"hexahedron20": 3}
 
 
 def whole(d: Discretisation) -> Discretisation:
-    """The same with the default rule of each cell type, as masses need it."""
-    if all(len(b.at) == len(quadrature(b.cell_type)[0]) for b in d.blocks):
+    """The same with the default rule of each cell type, as masses need it, unless they have that of the stiffness."""
+    if d.one_rule or all(len(b.at) == len(quadrature(b.cell_type)[0]) for b in d.blocks):
         return d
     return replace(d, blocks=tuple(_block(d.mesh, b.cell_type, None, b.region, b.cells) for b in d.blocks))
 

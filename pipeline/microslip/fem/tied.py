@@ -33,7 +33,8 @@ class Tied:
         apart: of the displacements that are not held, ties left out. T: (f, m) of these. own: (m,) the degree of
             freedom (3 * point + component) that an unknown is, -1 of motions of reference nodes. indptr, indices: CSR
             of the upper triangle. collect: (entries, 9 p) sums the entries of a flattened (p, 3, 3) operator.
-        fixed: what is held, of the points and behind them of reference nodes.
+        fixed: what is held, of the points and behind them of reference nodes. motions: (6 k, m) what unknowns make of
+            the reference nodes.
     """
 
     apart: FreeUpper
@@ -43,6 +44,7 @@ class Tied:
     indices: Indices
     collect: sp.csr_matrix
     fixed: Indices
+    motions: sp.csr_matrix
 
     @property
     def size(self) -> int:
@@ -69,6 +71,13 @@ class Tied:
     def expand(self, unknowns: Array, n: int) -> Array:
         """(3n,) or (3n, r) displacements of n points from the unknowns (m,) or (m, r)."""
         return self.apart.expand(self.T @ unknowns, n)
+
+    def carried(self, forces: Array, n: int) -> Array:
+        """(3n,) forces on the points that do on every motion the work of forces and moments (6 k,) on reference nodes.
+        """
+        on_points = np.zeros(3 * n)
+        on_points[self.apart.free] = self.T @ spla.spsolve((self.T.T @ self.T).tocsc(), self.motions.T @ forces)
+        return on_points
 
     def unknowns_of(self, displacements: Array) -> Array:
         """(m, r) unknowns of displacements (3n, r) that supports and ties allow: `expand` turned round."""
@@ -99,7 +108,7 @@ def tied_upper(pattern: Pattern, fixed: Indices, ties: Ties | None) -> FreeUpper
     apart = free_upper(pattern, np.flatnonzero(np.diff(whole.indptr)[: 3 * pattern.n] == 0))
     T = whole[apart.free]
     indptr, indices, collect = congruence(apart, T, pattern.size)
-    return Tied(apart, T, own, indptr, indices, collect, fixed)
+    return Tied(apart, T, own, indptr, indices, collect, fixed, whole[3 * pattern.n :])
 
 
 def congruence(apart: FreeUpper | Tied, T: sp.csr_matrix, size: int) -> tuple[Indices, Indices, sp.csr_matrix]:

@@ -61,6 +61,7 @@ def of_instances(mesh: Mesh, names: Sequence[str]) -> Mesh:
         cell_id={t: r[kept[t]] for t, r in mesh.cell_id.items() if kept[t].any()},
         temperature=None if mesh.temperature is None else mesh.temperature[inside],
         instances={name: number[mesh.instances[name]] for name in names},
+        state=mesh.state if inside.all() else None,
     )  # fmt: skip
     return _with_links(mesh, part, inside, number)
 

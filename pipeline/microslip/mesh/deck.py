@@ -57,6 +57,48 @@ class Space:
 
 
 @dataclass
+class Steps:
+    """The steps of a deck as they are met.
+
+    Attributes:
+        number: of the step. card: its keyword line. nonlinear: whether displacements are finite in it. total: time at
+            its end. period: its time. amplitudes: name -> time, value rows, and whether in total time.
+        acting: cards of loads with step, and factor at its end. static: the last static step, as its keyword line and
+            whether it was nonlinear. other: keyword of another one whose state is not read. modes: the keyword line
+            whose modes are meant.
+    """
+
+    number: int = 0
+    card: Card = field(default_factory=lambda: Card(""))
+    nonlinear: bool = False
+    total: float = 0.0
+    period: float = 1.0
+    amplitudes: dict[str, tuple[Array, bool]] = field(default_factory=dict)
+    acting: list[tuple[int, float, Card]] = field(default_factory=list)
+    static: tuple[Card, bool] | None = None
+    other: Card | None = None
+    modes: Card | None = None
+
+    @property
+    def perturbed(self) -> bool:
+        """Whether the step is one of small motions about the state before it."""
+        return "PERTURBATION" in self.card.parameters
+
+    def factor(self, card: Card) -> float:
+        """What an amplitude makes of a load at the end of the step.
+
+        Raises:
+            Damaged: an amplitude that is not defined.
+        """
+        if not (name := card.word("AMPLITUDE")) or not self.number:
+            return 1.0
+        if name not in self.amplitudes:
+            raise Damaged(f"*{card.keyword} names the amplitude '{name}', which is not defined")
+        table, in_total = self.amplitudes[name]
+        return float(np.interp(self.total if in_total else self.period, *table.T))
+
+
+@dataclass
 class Deck:
     """What the keywords have said so far. Names of sets are free of case: their keys are in capitals.
 
@@ -64,6 +106,7 @@ class Deck:
         spaces: instance in capitals -> its place; "" is the assembly's own (or the whole of a flat file).
         links: constraints, contacts and loads; sections: of solids; both resolved at the end.
         kinds: types of cells. lost: what counts and is not read, in words.
+        transforms: cards of local directions of nodes; axes: node number -> (3, 3) these as rows, once all is read.
         system: (4, 3) axes and origin in which nodes are written, or None. ignored: keywords that are not used.
     """
 
@@ -86,9 +129,10 @@ class Deck:
     temperatures: list[tuple[int, str, float]] = field(default_factory=list)
     held: list[tuple[str, str, str]] = field(default_factory=list)
     not_held: list[str] = field(default_factory=list)
-    step: int = 0
+    steps: Steps = field(default_factory=Steps)
     renewed: int = -1
-    turned: bool = False
+    transforms: list[Card] = field(default_factory=list)
+    axes: dict[int, Array] = field(default_factory=dict)
     spaces: dict[str, Space] = field(default_factory=lambda: {"": Space()})
     links: list[Card] = field(default_factory=list)
     system: Array | None = None

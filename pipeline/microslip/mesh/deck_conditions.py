@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 
+from ..data import Array, Equation, Link
 from ..errors import of_file
-from .cards import Card, fields
+from .cards import Card, fields, numbers
 from .deck import Deck, Readers
-from .raw import Damaged, Numbering, RawMesh, joined, lost
+from .raw import Damaged, Numbering, RawMesh, joined, lost, real
 from .supports import Constraints
 
 _HELD = {
@@ -17,51 +20,98 @@ _HELD = {
 
 
 def _read_boundary(deck: Deck, card: Card) -> None:
-    """Displacements that are zero. OP=NEW takes the place of all there was before the step."""
-    if card.word("OP") == "NEW" and deck.renewed != deck.step:
-        deck.held, deck.not_held, deck.renewed = [], [], deck.step
+    """Displacements that are held. OP=NEW takes the place of all there was before the step."""
+    if card.word("OP") == "NEW" and deck.renewed != deck.steps.number:
+        deck.held, deck.not_held, deck.renewed = [], [], deck.steps.number
     other = {"SUBMODEL", "USER", "FIXED", "BASE NAME"} & set(card.parameters)
     if other or card.word("TYPE", "DISPLACEMENT") != "DISPLACEMENT":
         deck.not_held.append(f"a *BOUNDARY of the kind {', '.join(other) or card.parameters['TYPE']}")
         return
+    moved = Card(card.keyword, card.parameters, [], card.where, card.place, card.space)
     for line in card.lines:
         words = [word.strip() for word in line.split(",")] + 3 * [""]
         try:
-            directions = _HELD.get(words[1].upper()) or _zeros(words)
+            directions = _HELD.get(words[1].upper()) or _directions(words)
+            if words[3] and real(words[3], "*BOUNDARY"):
+                moved.lines.append(line)
             deck.held.append((words[0].strip('"'), directions, card.place))
         except ValueError:
             deck.not_held.append(f"the line '{line[:60]}' of *BOUNDARY")
+    steps = deck.steps
+    if not steps.perturbed and (moved.lines or card.word("OP") == "NEW"):
+        steps.acting.append((steps.number, steps.factor(card), moved))
 
 
-def _zeros(words: list[str]) -> str:
+def _directions(words: list[str]) -> str:
     """Directions of a data line: set, first, last direction, value.
 
     Raises:
-        ValueError: not such a line, a last direction below the first, or a displacement that is
-            prescribed.
+        ValueError: not such a line, or a last direction below the first.
     """
     first = int(words[1])
     last = int(words[2]) if words[2] else first
-    if first < 1 or last < first or (first <= 3 and words[3] and float(words[3]) != 0):
+    if first < 1 or last < first:
         raise ValueError
     return "xyzabc"[first - 1 : last]
 
 
-def _read_step(deck: Deck, card: Card) -> None:
-    deck.step += 1
-
-
 def _read_transform(deck: Deck, card: Card) -> None:
-    deck.turned = True
+    deck.transforms.append(card)
+
+
+def local_axes(deck: Deck, numbering: Numbering, points: Array) -> dict[int, Array]:
+    """Node number -> (3, 3) its local directions as rows, of *TRANSFORM: rectangular by two points, or cylindrical
+    (radial, tangential, along the axis) about an axis through two points.
+
+    Raises:
+        Damaged: with the line, points that give no directions.
+    """
+    axes: dict[int, Array] = {}
+    for card in deck.transforms:
+        with of_file(card.place):
+            ends = [v for row in numbers(card.lines, "*TRANSFORM") for v in row]
+            kind, nodes = card.word("TYPE", "R"), deck.nodes_for("*TRANSFORM", card.text("NSET"), card.space)
+            if kind not in ("R", "C") or len(ends) != 6:
+                raise Damaged("*TRANSFORM is read with TYPE=R or C and the six coordinates of two points")
+            a, b = np.array(ends[:3]), np.array(ends[3:])
+            x = points[numbering.positions(nodes, "*TRANSFORM names")]
+            if kind == "C":
+                third = np.broadcast_to(b - a, x.shape)
+                first = x - a
+                second = np.cross(third, first)
+                first = np.cross(second, third)
+            else:
+                first, third = (np.broadcast_to(v, x.shape) for v in (a, np.cross(a, b)))
+                second = np.cross(third, first)
+            frame = np.stack([first, second, third], axis=1)
+            size = np.linalg.norm(frame, axis=2, keepdims=True)
+            if not (size > 1e-12 * max(np.abs(frame).max(initial=0.0), 1e-300)).all():
+                raise Damaged("*TRANSFORM has two points, or a node on its axis, that give no three directions")
+            axes.update(zip(nodes.tolist(), frame / size, strict=True))
+    return axes
+
+
+def local_supports(deck: Deck, numbering: Numbering) -> list[Link]:
+    """Supports along local directions, each as an equation: the displacement along it is zero."""
+    links: list[Link] = []
+    for word, directions, place in deck.held:
+        ways = ["xyz".index(c) for c in directions if c in "xyz"]
+        turned = [node for node in deck.nodes_for("*BOUNDARY", word).tolist() if node in deck.axes]
+        for node in turned if len(ways) < 3 else ():
+            at = np.repeat(numbering.positions(np.array([node]), "*BOUNDARY names"), 3)
+            where = f"{Path(place).name}: *BOUNDARY, local"
+            links += [Equation(where, at, np.arange(3), deck.axes[node][way], first=False) for way in ways]
+    return links
 
 
 def _read_temperature(deck: Deck, card: Card, column: int = 1) -> None:
     if "FILE" in card.parameters or "BSTEP" in card.parameters:
         raise Damaged("*TEMPERATURE reads from a results file; write the temperatures out")
+    factor = deck.steps.factor(card)
     for line in card.lines:
         words = fields(line)
         try:
-            deck.temperatures.append((column, words[0], float(words[1])))
+            deck.temperatures.append((column, words[0], factor * float(words[1])))
         except (IndexError, ValueError):
             raise Damaged(f"*TEMPERATURE holds the line '{line[:60]}', no node (or set) and temperature") from None
 
@@ -87,14 +137,19 @@ def assign_temperatures(deck: Deck, raw: RawMesh, numbering: Numbering) -> None:
 
 def constraints(deck: Deck) -> Constraints:
     """What *BOUNDARY holds, its sets by the names they were written with."""
-    held = Constraints(all_turned=deck.turned, left_out=list(deck.not_held))
+    held = Constraints(left_out=list(deck.not_held))
     known = set(joined(deck.node_id).tolist())
     for word, directions, place in deck.held:
         with of_file(place):
             key, nodes = deck.key(deck.node_sets, word), deck.nodes_for("*BOUNDARY", word)
             if key is None and not known.issuperset(nodes.tolist()):
                 raise Damaged(f"*BOUNDARY names the node {word}, which is not defined")
-        held.hold(int(nodes[0]) if key is None else deck.written[key], directions)
+        single = set(directions) & set("xyz") not in (set(), set("xyz"))
+        turned = single and not deck.axes.keys().isdisjoint(nodes.tolist())
+        for node in nodes.tolist() if turned else ():
+            held.hold(node, set(directions) - set("xyz") if node in deck.axes else directions)
+        if not turned:
+            held.hold(int(nodes[0]) if key is None else deck.written[key], directions)
     return held
 
 
@@ -105,7 +160,6 @@ def _read_retained(deck: Deck, card: Card) -> None:
 READERS: Readers = {
     "RETAINED NODAL DOFS": _read_retained,
     "BOUNDARY": _read_boundary,
-    "STEP": _read_step,
     "TRANSFORM": _read_transform,
     "INITIAL CONDITIONS": _read_initial,
     "TEMPERATURE": _read_temperature,

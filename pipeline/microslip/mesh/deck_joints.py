@@ -76,20 +76,19 @@ def unread(deck: Deck) -> list[str]:
     return said
 
 
-def preloads_of(deck: Deck) -> tuple[list[tuple[str, float]], list[str], list[str]]:
-    """Of every *PRE-TENSION SECTION the force of *CLOAD on its node, along its first direction; what is said of
-    sections without one; and the keyword of loads that are no preloads of bolts.
+def preloads_of(deck: Deck) -> tuple[list[tuple[str, float]], list[str]]:
+    """Of every *PRE-TENSION SECTION the force of *CLOAD on its node, along its first direction; and what is said of
+    sections without one.
 
     Raises:
         Damaged: with the line, a section without a node.
     """
-    loads, bolts = _loads(deck), set[int]()
+    loads = _loads(deck)
     preloads, unpressed = [], []
     for card in deck.linking(BOLT):
         nodes = deck.nodes(card.parameters.get("NODE", "-"), card.space)
         if nodes is None or len(nodes) != 1:
             raise Damaged(f"*{BOLT} names no single NODE of the file", file=card.place)
-        bolts.add(int(nodes[0]))
         where, forces = (
             f"{card.where}: *{BOLT}",
             [force for node, force in loads if node == nodes[0]],
@@ -100,7 +99,7 @@ def preloads_of(deck: Deck) -> tuple[list[tuple[str, float]], list[str], list[st
             unpressed.append(
                 f"{where} has no *CLOAD on its node: its preload is not taken, write it yourself"
             )
-    return preloads, unpressed, ["CLOAD"] if any(node not in bolts for node, _ in loads) else []
+    return preloads, unpressed
 
 
 def _loads(deck: Deck) -> list[tuple[int, float]]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
@@ -30,6 +31,13 @@ class _Reading:
     card: Card = field(default_factory=lambda: Card(""))
     following: Card | None = None
     left_out: list[str] = field(default_factory=list)
+
+    @cached_property
+    def numbers(self) -> Indices:
+        """(n,) numbers of all nodes by position."""
+        found = np.empty(len(self.points), dtype=np.int64)
+        found[self.numbering.order] = self.numbering.sorted
+        return found
 
     @property
     def where(self) -> str:
@@ -102,10 +110,6 @@ def _tie(reading: _Reading) -> Iterator[Link]:
 
 
 def _equations(reading: _Reading) -> Iterator[Link]:
-    if reading.deck.turned:
-        raise Damaged(
-            "*EQUATION beside a *TRANSFORM may act in local directions; write global ones without it"
-        )
     words = [
         word.strip() for line in reading.card.lines for word in line.rstrip().rstrip(",").split(",")
     ]
@@ -127,7 +131,22 @@ def _equations(reading: _Reading) -> Iterator[Link]:
                 f"*EQUATION names sets of {', '.join(str(len(m)) for m in members)} nodes, not equally many"
             )
         for nodes in np.column_stack([np.broadcast_to(m, length) for m in members]):
-            yield Equation(reading.where, nodes, np.array(ways), factors)
+            yield _in_body_axes(reading, nodes, np.array(ways), factors)
+
+
+def _in_body_axes(reading: _Reading, nodes: Indices, ways: Indices, factors: Array) -> Equation:
+    """An equation whose terms at turned nodes are those of their local directions."""
+    axes = [reading.deck.axes.get(int(reading.numbers[node])) for node in nodes]
+    if all(a is None or way > 2 for a, way in zip(axes, ways, strict=True)):
+        return Equation(reading.where, nodes, ways, factors)
+    terms: list[tuple[int, int, float]] = []
+    for a, node, way, factor in zip(axes, nodes.tolist(), ways.tolist(), factors.tolist(), strict=True):
+        if a is None or way > 2:
+            terms.append((node, way, factor))
+        else:
+            terms += [(node, j, factor * a[way][j]) for j in range(3)]
+    at, along, by = map(np.array, zip(*terms, strict=True))
+    return Equation(reading.where, at, along, by, first=False)
 
 
 def _direction(word: str) -> int:
@@ -200,7 +219,7 @@ def _ways(lines: list[list[str]]) -> str:
 
 
 def _refuse_turned(reading: _Reading, every: str) -> None:
-    if reading.deck.turned and every not in ("xyz", "xyzabc", "abc"):
+    if reading.deck.axes and every not in ("xyz", "xyzabc", "abc"):
         raise Damaged(
             "a coupling in single directions beside a *TRANSFORM may mean local ones; write global ones"
         )

@@ -97,7 +97,7 @@ def _read_elements(deck: Deck, card: Card) -> None:
         return
     table = whole_numbers(",".join(card.lines), f"*ELEMENT, TYPE={kind}")
     if len(table) % (count + 1):
-        raise Damaged(f"*ELEMENT, TYPE={kind} holds another number of nodes than its cells need")
+        table = _without_rest(card.lines, count, kind)
     table, own = table.reshape(-1, count + 1), deck.spaces[""]
     nodes = (table[:, 1:] if not (solid and count == 27) else table[:, 1:][:, _BRICK27]) + own.nodes
     cells = Cells(
@@ -113,6 +113,22 @@ def _nodes_of_rows(lines: list[str], more: int) -> list[list[int]]:
     text = re.sub(r",\s*\n", ",", "\n".join(lines))
     rows = [[int(w) for w in fields(line) if is_number(w)] for line in text.splitlines()]
     return [[node + more for node in row[1:]] for row in rows if len(row) > 1]
+
+
+def _without_rest(lines: list[str], count: int, kind: str) -> Indices:
+    """Numbers and nodes of cells that begin on a line each: what stands behind their nodes there is not read.
+
+    Raises:
+        Damaged: a cell with too few nodes.
+    """
+    cells: list[int] = []
+    for line in lines:
+        numbers_there = whole_numbers(line, f"*ELEMENT, TYPE={kind}").tolist()
+        lacking = -len(cells) % (count + 1) or count + 1
+        cells += numbers_there[:lacking]
+    if len(cells) % (count + 1):
+        raise Damaged(f"*ELEMENT, TYPE={kind} holds another number of nodes than its cells need")
+    return np.array(cells, dtype=np.int64)
 
 
 def _read_set(deck: Deck, card: Card) -> None:

@@ -14,10 +14,10 @@ import numpy as np
 
 from ..data import Array, Indices
 from ..errors import of_file
-from . import deck_conditions, deck_materials, deck_mesh
+from . import deck_conditions, deck_materials, deck_mesh, deck_state
 from .cards import Card, data_of, numbers, read_cards
 from .deck import Deck
-from .deck_conditions import assign_temperatures, constraints
+from .deck_conditions import assign_temperatures, constraints, local_axes, local_supports
 from .deck_joints import KEYWORDS as JOINTS
 from .deck_joints import joints_of, preloads_of, sector_of, unread
 from .deck_links import KEYWORDS as LINKS
@@ -27,8 +27,9 @@ from .deck_lumps import NODES as LUMPED
 from .deck_lumps import lumps_of
 from .deck_materials import assign_materials
 from .deck_mesh import CORNERS, add_surfaces, cell_type
+from .deck_state import state_of_deck, until_modes
 from .instances import numbered, outline, place, placement, places
-from .raw import PRESTRESSED, Damaged, Numbering, RawMesh, Structure, ignored, joined, locks, lost, undefined
+from .raw import Damaged, Numbering, RawMesh, Structure, ignored, joined, locks, lost, undefined
 from .supports import add_supports
 
 _REFUSED = {
@@ -37,7 +38,7 @@ _REFUSED = {
 }  # fmt: skip
 
 _LINKING = (*LINKS, *JOINTS, *LUMPING)
-READERS = deck_mesh.READERS | deck_materials.READERS | deck_conditions.READERS
+READERS = deck_mesh.READERS | deck_materials.READERS | deck_conditions.READERS | deck_state.READERS
 
 
 def read_inp(path: Path) -> RawMesh:
@@ -55,37 +56,23 @@ def read_inp(path: Path) -> RawMesh:
             at = placement(numbers(card.lines, "*INSTANCE"))
         place(whole, part, card.parameters["NAME"], at, space)
     whole.spaces[""] = spaces[-1]
-    _read(whole, found.rest)
-    raw = _assembled(whole)
+    cards, later = until_modes(found.rest)
+    _read(whole, cards)
+    raw = _assembled(whole, bool(found.instances))
     raw.remarks += [
         *numbered([card.parameters["NAME"] for card, _ in parts], spaces),
-        *_replaced(raw, whole),
+        *_replaced(raw, whole, bool(found.instances)),
+        *later,
     ]
-    stress = _prestressed(found.rest)
-    raw.lost += stress
-    raw.remarks += ignored([f"*{word}" for word in whole.ignored], _LOADS, bool(stress))
+    if raw.state is None:
+        whole.ignored += [card.keyword for *_, card in whole.steps.acting if card.keyword != "BOUNDARY"]
+    raw.remarks += ignored([f"*{word}" for word in whole.ignored], _LOADS, raw.state is not None)
     if not path.read_bytes().endswith(b"\n"):
         raw.unended = "a last line without an end"
     return raw
 
 
 _LOADS = r"\*(C|D|DS)(LOAD|FLUX)|\*(D|S)?FILM|\*D?RADIATE|\*INERTIA RELIEF|\*MASS FLOW RATE"
-
-
-def _prestressed(cards: list[Card]) -> list[str]:
-    """What is said of modes of a loaded body: those after a static step with NLGEOM, or in a step
-    of PERTURBATION."""
-    step, stressed, large = Card(""), False, False
-    for card in cards:
-        if card.keyword == "STEP":
-            step = card
-            large = large or "NLGEOM" in step.parameters and step.parameters["NLGEOM"].upper() != "NO"
-        elif card.keyword == "STATIC":
-            stressed = True
-        elif card.keyword in ("FREQUENCY", "COMPLEX FREQUENCY") and stressed:
-            if large or "PERTURBATION" in step.parameters:
-                return [f"{card.where}: *{card.keyword}: {PRESTRESSED}"]
-    return []
 
 
 _AS = {
@@ -99,12 +86,20 @@ _AS = {
 """Solids that are taken as their plain sisters, and what that changes."""
 
 
-def _replaced(raw: RawMesh, deck: Deck) -> list[str]:
-    """Which cells are taken as others, and how far first-order ones lock in bending."""
+def _replaced(raw: RawMesh, deck: Deck, of_parts: bool) -> list[str]:
+    """Which cells are taken as others, and how far first-order ones lock in bending.
+
+    Where all bricks of 20 nodes are integrated by eight points they are so here, stiffness and mass, if the deck is of
+    CalculiX (it has no parts).
+    """
     count: dict[str, int] = {}
     for cells in deck.solids:
         count[cells.written] = count.get(cells.written, 0) + len(cells.ids)
     told = []
+    bricks20 = {cells.written for cells in deck.solids if cells.kind == "hexahedron20"}
+    if bricks20 == {"C3D20R"} and not of_parts:
+        raw.integration = "reduced-mass"
+        count = {written: number for written, number in count.items() if written != "C3D20R"}
     for written, number in count.items():
         plain = re.match(r"C3D\d+", written)
         if written in _AS and plain:
@@ -155,8 +150,7 @@ def _read_card(deck: Deck, card: Card) -> None:
 _SILENT = {
     "HEADING", "PREPRINT", "RESTART", "OUTPUT", "NODE OUTPUT", "ELEMENT OUTPUT", "CONTACT OUTPUT", "NODE FILE",
     "EL FILE", "NODE PRINT", "EL PRINT", "CONTACT PRINT", "PART", "END PART", "ASSEMBLY", "END ASSEMBLY", "END STEP",
-    "INSTANCE", "END INSTANCE", "STATIC", "FREQUENCY", "INCLUDE", "MONITOR", "SECTION PRINT", "CONTACT FILE",
-    "SUBSTRUCTURE GENERATE",
+    "INSTANCE", "END INSTANCE", "INCLUDE", "MONITOR", "SECTION PRINT", "CONTACT FILE", "SUBSTRUCTURE GENERATE",
 }  # fmt: skip
 """Keywords that say nothing of the body."""
 
@@ -173,7 +167,7 @@ _COUNTS = re.compile(
 # from numbers to positions ---------------------------------------------------------------------------------------
 
 
-def _assembled(deck: Deck) -> RawMesh:
+def _assembled(deck: Deck, of_parts: bool) -> RawMesh:
     if not deck.node_id:
         raise Damaged("there is no *NODE")
     node_id, points = _unique_nodes(deck)
@@ -198,14 +192,15 @@ def _assembled(deck: Deck) -> RawMesh:
         members = np.unique(joined(parts))
         if len(members):
             raw.add_set(deck.written[key], members, numbering)
+    deck.axes = local_axes(deck, numbering, points)
     raw.links, left_out = links_of(deck, numbering, points)
+    raw.links += local_supports(deck, numbering)
     raw.lumps = list(lumps_of(deck, numbering, points))
     raw.structures = _structures(deck, numbering)
     raw.retained = _retained(deck, raw, numbering)
     raw.sector, uncut = sector_of(deck)
-    raw.preloads, unpressed, unused = preloads_of(deck)
+    raw.preloads, unpressed = preloads_of(deck)
     raw.lost = [*deck.lost, *left_out, *uncut, *unpressed]
-    deck.ignored += unused
     raw.remarks += unread(deck)
     raw.joints = joints_of(deck)
     raw.instances = {name: numbering.positions(np.unique(ids), "") for name, ids in deck.instances.items()}
@@ -218,6 +213,7 @@ def _assembled(deck: Deck) -> RawMesh:
             if (inside := np.isin(cells.ids, chosen)).any():
                 raw.facets.setdefault(deck.written[key], []).append(cells.nodes[inside])
     add_surfaces(deck, raw, numbering)
+    state_of_deck(deck, raw, numbering, of_parts)
     return raw
 
 

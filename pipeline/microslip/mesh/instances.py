@@ -195,4 +195,8 @@ def place(whole: Deck, part: Deck, name: str, at: Placement, space: Space) -> No
     whole.held += [(f"{name}.{word}", directions, where) for word, directions, where in part.held]
     whole.temperatures += [(column, f"{name}.{word}", value) for column, word, value in part.temperatures]
     whole.not_held += part.not_held
-    whole.turned |= part.turned
+    moved = at.shift.any() or not np.array_equal(at.turn, np.eye(3))
+    if part.transforms and moved:
+        text = "*TRANSFORM stands in a part that its instance moves; write it behind the instance, in the assembly"
+        raise Damaged(text, file=part.transforms[0].place)
+    whole.transforms += [replace(card, space=key) for card in part.transforms]

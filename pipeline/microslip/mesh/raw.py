@@ -10,7 +10,16 @@ from typing import Any
 
 import numpy as np
 
-from ..data import Array, Indices, Joint, Link, LumpedElement, PointMass, Sector
+from ..data import (
+    Array,
+    Indices,
+    Joint,
+    Link,
+    LumpedElement,
+    PointMass,
+    Sector,
+    StaticStep,
+)
 from ..errors import UserError
 from ..topology import FACET_CORNERS
 
@@ -89,6 +98,9 @@ class RawMesh:
             faces in contact. sector: of a cyclic ring. preloads: of bolts: where it stands, force
             in the file's unit. lumps: masses, springs and dashpots, by positions in `points`. structures:
             elements that are left out. retained: point sets whose displacements the file keeps.
+        state: the static step that the file's modes are about: a reader fills it with loads by positions in `points`,
+            corners of facets and numbers of cells, in the file's units. integration: as `mesh.integration` of a body
+            file.
     """
 
     points: Array
@@ -113,6 +125,8 @@ class RawMesh:
     lumps: list[PointMass | LumpedElement] = field(default_factory=list)
     structures: list[Structure] = field(default_factory=list)
     retained: list[str] = field(default_factory=list)
+    state: StaticStep | None = None
+    integration: str = "full"
 
     def add_points(self, name: str, positions: Indices) -> None:
         """Add to a point set."""

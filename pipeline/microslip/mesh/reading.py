@@ -27,6 +27,7 @@ from .bdf import read_bdf
 from .cdb import read_cdb
 from .inp import read_inp
 from .linking import renumbered
+from .loading import state_of
 from .lumps import hanging, on_mesh, points_of, spread
 from .materials import NONE, Substitute, in_si
 from .med import read_med
@@ -182,7 +183,8 @@ def _mesh_of(raw: RawMesh, metres: float, system: str | None) -> Mesh:
         raise UserError("coordinates must be three finite numbers a point; the file is damaged or not 3-D")
     if np.abs(points).max() > _FARTHEST:
         raise UserError(f"a point lies {np.abs(points).max():.3g} m from the origin; the file is damaged")
-    mesh = _assemble_mesh(raw, points, {t: np.concatenate(c) for t, c in cells.items()}, metres, lumps)
+    whole = {t: np.concatenate(c) for t, c in cells.items()}
+    mesh = _assemble_mesh(raw, points, whole, metres, system, lumps)
     return replace(mesh, hanging=attached, retained=tuple(n for n in raw.retained if n in mesh.point_sets))
 
 
@@ -323,7 +325,12 @@ def _cell_sets(raw: Any) -> dict[str, list]:
 
 
 def _assemble_mesh(
-    raw: RawMesh, points: Array, cells: dict[str, Indices], metres: float, lumps: Lumps | None
+    raw: RawMesh,
+    points: Array,
+    cells: dict[str, Indices],
+    metres: float,
+    system: str | None,
+    lumps: Lumps | None,
 ) -> Mesh:
     used = np.unique(np.concatenate([points_of(lumps), *(c.ravel() for c in cells.values())]))
     renumber = np.full(len(points), -1, dtype=np.int64)
@@ -354,11 +361,13 @@ def _assemble_mesh(
         if face := faces_from_points(boundary, chosen, len(mesh.points)):
             faces[name] = face
     links = renumbered(raw, points, renumber, metres)
+    state = state_of(raw, replace(mesh, links=links), renumber, boundary, metres, system)
     known = {*mesh.point_sets, *(links.sets if links else ())}
     supports = {n: directions for n, directions in raw.supports.items() if n in known}
     return replace(
         mesh, faces=faces, inner=inner, supports=supports, not_held=tuple(raw.not_held), unended=raw.unended,
-        links=links, lost=tuple(raw.lost), remarks=tuple(raw.remarks), joints=tuple(raw.joints),
+        links=links, state=state, integration=raw.integration,
+        lost=tuple(raw.lost), remarks=tuple(raw.remarks), joints=tuple(raw.joints),
         sector=raw.sector, preloads=tuple(raw.preloads),
         instances={n: kept for n, s in raw.instances.items() if len(kept := _kept(renumber[s]))},
         lumps=None if lumps is None else on_mesh(lumps, renumber),

@@ -5,12 +5,16 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from scipy.sparse.linalg import lsqr
 
-from ..data import Array, Indices, Material, Mesh
+from ..data import Array, BodyLoad, FacetLoad, Indices, Material, Mesh, NodalLoad
 from ..errors import UserError
-from ..fem.discretise import Discretisation, face_blocks
-from ..fem.loads import body_force, pressure, traction
+from ..fem.cyclic import CyclicUpper
+from ..fem.discretise import Discretisation, face_blocks, facet_block, whole
+from ..fem.loads import FollowingPressure, body_force, cells_force, corner_traction, pressure, traction
+from ..fem.tied import Tied
 from ..settings.body import BodySettings, MaterialSettings
+from ..topology import FACET_CORNERS
 from . import rigid
 from .equilibrium import BodyModel
 from .rows import Locator
@@ -163,11 +167,26 @@ def refuse_overlap(mesh: Mesh, settings: BodySettings) -> None:
             )
 
 
-def with_dead_loads(model: BodyModel, mesh: Mesh, settings: BodySettings) -> BodyModel:
+def with_loads(model: BodyModel, mesh: Mesh, settings: BodySettings, held: Indices) -> BodyModel:
+    """The model with what acts on it at every speed. held: degrees of freedom, see `fixed_dofs`.
+
+    Raises:
+        UserError: faces that are not there, displacements prescribed where nothing holds the body.
+    """
     force = np.zeros((mesh.n_points, 3))
     locator = Locator(mesh) if any(load.point for load in settings.loads) else None
     for number, load in enumerate(settings.loads):
-        if load.kind == "gravity":
+        if load.kind == "mesh":
+            model, more = _with_state(model, mesh, held)
+            force += more
+        elif load.kind == "pressure" and load.follows:
+            require_face(mesh, load.face or "", f"loads.{number}.face")
+            alike = [
+                FollowingPressure(t, f, np.full((len(f), FACET_CORNERS[t]), load.value or 0.0))
+                for t, f in mesh.faces[load.face or ""].items()
+            ]
+            model = replace(model, following=(*model.following, *alike))
+        elif load.kind == "gravity":
             force += body_force(model.M_full, np.array(load.vector))
         elif load.kind == "pressure":
             require_face(mesh, load.face or "", f"loads.{number}.face")
@@ -182,3 +201,61 @@ def with_dead_loads(model: BodyModel, mesh: Mesh, settings: BodySettings) -> Bod
             place = locator.find(np.array(load.point), f"loads.{number}.point")
             force[place.nodes] += place.N[:, None] * np.array(load.vector)
     return replace(model, dead_load=force)
+
+
+def _with_state(model: BodyModel, mesh: Mesh, held: Indices) -> tuple[BodyModel, Array]:
+    """The model with pressures and displacements of the mesh file's static step, and (n, 3) N of what keeps its
+    direction; `SpinLoad`s stand in [rotation].
+
+    Raises:
+        UserError: the file has no static step, or a displacement is prescribed where nothing holds the body.
+    """
+    if mesh.state is None:
+        raise UserError("loads: the mesh file has no static step whose loads are read; remove kind = \"mesh\"")
+    n, force, given = mesh.n_points, np.zeros((mesh.n_points, 3)), dict[int, float]()
+    moments = np.zeros(6 * (0 if mesh.ties is None else len(mesh.ties.references)))
+    following = []
+    for load in mesh.state.loads:
+        if isinstance(load, NodalLoad):
+            on_points = load.nodes < n
+            dofs = np.where(on_points, 3 * load.nodes, 3 * n + 6 * (load.nodes - n)) + load.directions
+            if load.kind == "displacement":
+                given.update(zip(dofs.tolist(), load.values.tolist(), strict=True))
+                continue
+            np.add.at(force.reshape(-1), dofs[on_points], load.values[on_points])
+            np.add.at(moments, dofs[~on_points] - 3 * n, load.values[~on_points])
+        elif isinstance(load, FacetLoad) and load.direction is None:
+            following.append(FollowingPressure(load.kind, load.facets, load.values))
+        elif isinstance(load, FacetLoad):
+            block = facet_block(mesh, load.kind, load.facets)
+            force += corner_traction(block, load.kind, n, load.values, np.asarray(load.direction))
+        elif isinstance(load, BodyLoad) and load.cells is None:
+            force += body_force(model.M_full, load.acceleration)
+        elif isinstance(load, BodyLoad):
+            density, chosen = [m.density for m in model.materials], np.asarray(load.cells, dtype=bool)
+            force += cells_force(whole(model.d), density, chosen, load.acceleration)
+    if moments.any():
+        upper = model.free.unknowns.apart if isinstance(model.free, CyclicUpper) else model.free
+        assert isinstance(upper, Tied)
+        force += upper.carried(moments, n).reshape(n, 3)
+    displaced = _displaced(mesh, given, held) if any(given.values()) else None
+    return replace(model, following=(*model.following, *following), displaced=displaced), force
+
+
+def _displaced(mesh: Mesh, given: dict[int, float], held: Indices) -> Array:
+    """(n, 3) m of prescribed displacements (degree of freedom -> m or rad), continued as the ties want it."""
+    dofs, values = np.array(list(given)), np.array(list(given.values()))
+    if not np.isin(dofs, held).all():
+        node = int(dofs[~np.isin(dofs, held)][0]) // 3
+        which = f"node {mesh.node_id[node]}" if node < mesh.n_points else "a reference node"
+        raise UserError(
+            f"supports: the mesh file prescribes a displacement of {which}, which nothing holds; hold it in its "
+            "direction, or take the loads of kind \"mesh\" out"
+        )
+    first = np.zeros(3 * mesh.n_points + (0 if mesh.ties is None else 6 * len(mesh.ties.references)))
+    first[dofs] = values
+    if mesh.ties is not None and mesh.ties.rows.shape[0]:
+        C, left = mesh.ties.rows.tocsc(), np.setdiff1d(np.arange(len(first)), held)
+        answer = lsqr(C[:, left], -(C @ first), atol=1e-15, btol=1e-15, iter_lim=10 * len(left))
+        first[left] = answer[0]
+    return first[: 3 * mesh.n_points].reshape(-1, 3)

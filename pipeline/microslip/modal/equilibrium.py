@@ -20,6 +20,7 @@ from ..errors import NotConverged, UserError
 from ..fem.contact import ContactPair, Grip
 from ..fem.cyclic import CyclicUpper
 from ..fem.discretise import Discretisation, FreeUpper, Pattern, whole
+from ..fem.loads import FollowingPressure
 from ..fem.operators import (
     displacement_gradient,
     engineering,
@@ -74,6 +75,8 @@ class BodyModel:
         spin_softening: whether -Omega^2 M P is part of K. contacts: faces that may touch in the static state.
         hooke: per block (6, 6) or (e, q, 6, 6) that takes the place of the materials' (see `heated`), or None.
         springs, dashpots: (p, 3, 3) of the mesh's lumped elements, N/m and N s/m, or None.
+        following: pressures that follow the surface. displaced: (n, 3) m, displacements that are prescribed, continued
+            as the ties want it and 0 elsewhere, or None.
     """
 
     d: Discretisation
@@ -93,6 +96,8 @@ class BodyModel:
     hooke: list[Array] | None = None
     springs: Array | None = None
     dashpots: Array | None = None
+    following: tuple[FollowingPressure, ...] = ()
+    displaced: Array | None = None
 
     def elasticity(self, block: int) -> Array:
         """(6, 6) or (e, q, 6, 6) Hooke matrix of a block's points, Pa, without `factor`."""
@@ -106,7 +111,16 @@ class BodyModel:
     @property
     def loaded(self) -> bool:
         """True if something acts on the body at rest."""
-        return self.thermal_strain is not None or bool(np.any(self.dead_load)) or bool(self.contacts)
+        given = self.thermal_strain is not None or self.displaced is not None
+        return given or bool(np.any(self.dead_load)) or bool(self.contacts or self.following)
+
+    def following_force(self, x: Array) -> Array | float:
+        """(n, 3) N of the pressures that follow the surface, at positions x."""
+        return sum((p.force(x) for p in self.following), start=0.0)
+
+    def following_stiffness(self, x: Array) -> Array | float:
+        """(p, 3, 3) N/m of these."""
+        return sum((p.stiffness(x, self.d.pattern) for p in self.following), start=0.0)
 
 
 @dataclass(frozen=True)
@@ -266,15 +280,32 @@ def equilibrium(
 def _linear(model: BodyModel, speed: float, solver: DirectSolver, soft: Array | float) -> StaticState:
     """One linear solution; then K_u (displaced geometry) + K_sigma + softening, as CalculiX's PERTURBATION step."""
     n = model.d.mesh.n_points
-    force = model.dead_load + centrifugal_force(model, speed, np.zeros((n, 3)))
-    if model.thermal_strain is not None:
-        relaxed = stress_of(model, [np.zeros_like(e) for e in model.thermal_strain])
-        force = force - internal_force(model.d, relaxed, None)
+    x, first = model.d.mesh.points, np.zeros((n, 3)) if model.displaced is None else model.displaced
+    force = model.dead_load + centrifugal_force(model, speed, np.zeros((n, 3))) + model.following_force(x)
+    if model.thermal_strain is not None or model.displaced is not None:
+        force = force - resisting_force(model, _small(model, first)[1], None, first)
     solver.factorise(model.free.matrix(model.K0))
-    u = model.free.expand(solver.solve(model.free.restrict(force.reshape(-1))), n).reshape(n, 3)
+    u = first + model.free.expand(solver.solve(model.free.restrict(force.reshape(-1))), n).reshape(n, 3)
+    H, stress = _small(model, u)
+    K = _tangent(model, H, stress) + soft + model.following_stiffness(x + u)
+    return StaticState(u, H, stress, K, "linear", speed=speed)
+
+
+def _small(model: BodyModel, u: Array) -> tuple[list[Array], list[Array]]:
+    """Displacement gradients, and the stress of small strains, per block."""
     H = [displacement_gradient(b, u) for b in model.d.blocks]
-    stress = stress_of(model, [green_strain(h, nonlinear=False) for h in H])
-    return StaticState(u, H, stress, _tangent(model, H, stress) + soft, "linear", speed=speed)
+    return H, stress_of(model, [green_strain(h, nonlinear=False) for h in H])
+
+
+def _continued(model: BodyModel, solver: DirectSolver) -> Array:
+    """(n, 3) m: prescribed displacements as the stress-free body follows them, linearly."""
+    n, cold = model.d.mesh.n_points, replace(model, thermal_strain=None)
+    if model.displaced is None:
+        return np.zeros((n, 3))
+    force = resisting_force(cold, _small(cold, model.displaced)[1], None, model.displaced)
+    solver.factorise(model.free.matrix(model.K0))
+    answer = model.free.expand(solver.solve(model.free.restrict(force.reshape(-1))), n)
+    return model.displaced - answer.reshape(n, 3)
 
 
 def stiffness_slope(
@@ -338,10 +369,12 @@ def _newton(
             report("static state: starting again from rest")
     good: StaticState | None = None
     level, step, total = 0.0, 1.0, 0
+    given = _continued(model, solver)
     while level < 1.0:
         target = min(level + step, 1.0)
         try:
-            state = _newton_at(model, speed, target, solver, good)
+            begun = None if good is None else replace(good, u=good.u + (target - level) * given)
+            state = _newton_at(model, speed, target, solver, begun, target * given)
         except NotConverged as error:
             step *= 0.5
             if step < 1 / 64:
@@ -356,8 +389,9 @@ def _newton(
 
 
 def _newton_at(
-    model: BodyModel, speed: float, level: float, solver: DirectSolver, start: StaticState | None
-) -> StaticState:
+    model: BodyModel, speed: float, level: float, solver: DirectSolver, start: StaticState | None,
+    given: Array | float = 0.0,
+) -> StaticState:  # fmt: skip
     """Newton at a share `level` of all loads, until steps are below 1e-9 of u, or small and no longer falling.
 
     Small steps that fall tenfold are taken with the factors at hand, but for contacts. A millionth of the body stands
@@ -373,7 +407,7 @@ def _newton_at(
     steps: list[float] = []
     points = model.d.mesh.points
     size = float(np.ptp(points, axis=0).max())
-    u = np.zeros((n, 3)) if start is None else start.u
+    u = np.zeros((n, 3)) + given if start is None else start.u
     closing = Closing(model.contacts, points + u, level, () if start is None else start.contacts)
     for _ in range(60 if model.contacts else 25):
         look()
@@ -384,13 +418,14 @@ def _newton_at(
             if any((np.linalg.det(np.eye(3) + h) <= 0).any() for h in H):
                 break  # in balance, but turned inside out
             whole = not isinstance(free, CyclicUpper)  # of a sector neighbours count by nodal diameter (`sector`)
-            K = _tangent(model, H, stress)
+            K = _tangent(model, H, stress) + level * model.following_stiffness(points + u)
             K = closing.stiffened(K + soft if model.spin_softening else K, model.d.pattern, True, whole)
             return StaticState(u, H, stress, K, "nonlinear", len(steps), closing.grips, omega)
-        outer = closing.with_forces(level * model.dead_load + centrifugal_force(model, omega, u))
+        pushed = level * (model.dead_load + model.following_force(points + u))
+        outer = closing.with_forces(pushed + centrifugal_force(model, omega, u))
         residual = free.restrict((outer - resisting_force(model, stress, H, u)).reshape(-1))
         if model.contacts or not _factors_serve(steps):
-            K = _tangent(model, H, stress)
+            K = _tangent(model, H, stress) + level * model.following_stiffness(points + u)
             solver.factorise(free.matrix(closing.stiffened(K + soft, model.d.pattern)))
             if (negative := solver.negative()) and len(steps) > 3:
                 raise Unstable(negative)  # perhaps only on the way: smaller load steps will tell
@@ -429,7 +464,7 @@ def what_loads(model: BodyModel, speed: float) -> str:
     """The key of body.toml behind the stresses of a state: of the first that is given, the speed before all others."""
     if speed:
         return "rotation.speeds_rpm"
-    if np.any(model.dead_load):
+    if np.any(model.dead_load) or model.following or model.displaced is not None:
         return "loads"
     return "temperature" if model.thermal_strain is not None else "closures"
 

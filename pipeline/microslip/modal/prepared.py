@@ -26,7 +26,7 @@ from .boundary import (
     known_materials,
     materials_of,
     refuse_overlap,
-    with_dead_loads,
+    with_loads,
 )
 from .closures import bolt_forces, contact_pairs
 from .equilibrium import BodyModel, Unknowns, make_model, with_lumps
@@ -125,12 +125,12 @@ def _prepared(
     if settings.cyclic:  # before what relies on the number of sectors
         cut_faces(mesh, settings, axis, point)
     pairs = contact_pairs(mesh, settings, known_materials(mesh, settings))
-    degree = REDUCED if settings.mesh.integration == "reduced" else None
-    if degree and not set(mesh.cells) <= set(REDUCED):
-        raise UserError(
-            'mesh.integration: "reduced" is of bricks of 20 nodes alone; write "full" or mesh with bricks'
-        )
+    rule = settings.mesh.integration
+    degree = REDUCED if rule != "full" else None
+    if degree and not set(mesh.cells) & set(REDUCED):
+        raise UserError(f'mesh.integration: "{rule}" is of bricks of 20 nodes; write "full" or mesh with bricks')
     d = discretise(mesh, degree, coupled=[coupled_points(p) for p in pairs])
+    d = replace(d, one_rule=rule == "reduced-mass")
     held = fixed_dofs(mesh, settings)
     fixed = held[held < 3 * mesh.n_points]
     if len(fixed) == 3 * mesh.n_points:
@@ -151,7 +151,7 @@ def _prepared(
     )  # fmt: skip
     model = with_lumps(model)
     rows = with_centrifugal(rows, model)
-    model = with_dead_loads(model, mesh, settings)
+    model = with_loads(model, mesh, settings, held)
     model = replace(model, contacts=pairs, dead_load=model.dead_load + bolt_forces(mesh, settings))
     motions = rigid.unresisted(_floating(model, sector, centre), model.springs, d.pattern)
     check_held(mesh, settings, centre, motions)

@@ -211,9 +211,9 @@ class Meshing(Model):
     """size of the elements; chosen from the body where it is not given"""
     order: Annotated[Literal[1, 2], BeforeValidator(_whole)] = 2
     """order of the elements; 1 is far too stiff in bending"""
-    integration: Literal["full", "reduced"] = "full"
+    integration: Literal["full", "reduced", "reduced-mass"] = "full"
     """of the stiffness; `"reduced"` takes 8 points in bricks of 20 nodes, which do not lock near
-    a Poisson's ratio of 0.5"""
+    a Poisson's ratio of 0.5; `"reduced-mass"` takes them for the mass too, as CalculiX does in C3D20R"""
     local: dict[str, Positive] = Field(default_factory=dict)
     """[length_unit] table: name of a face = size there"""
 
@@ -440,10 +440,12 @@ class Rotation(Model):
 
 
 class Load(Model):
-    """A static load that acts at every speed: gravity (m/s2), pressure on a face (Pa), force on a face or point (N)."""
+    """A static load that acts at every speed: gravity (m/s2), pressure on a face (Pa), force on a
+    face or point (N), or all that the static step of the mesh file holds but its rotation."""
 
-    kind: Literal["gravity", "pressure", "force"]
-    """a static load that acts at every speed"""
+    kind: Literal["gravity", "pressure", "force", "mesh"]
+    """a static load that acts at every speed; mesh: forces, pressures, accelerations and prescribed
+    displacements of the file's static step, pressures following the surface"""
     face: FaceName | None = None
     """of a pressure or a force"""
     point: Point | None = None
@@ -452,11 +454,15 @@ class Load(Model):
     """[Pa] of a pressure, positive into the body"""
     vector: Vector | None = None
     """[m/s2 or N] of gravity or a force"""
+    follows: bool = False
+    """whether a pressure follows the surface as it moves and turns, in the modes too"""
 
     @model_validator(mode="after")
     def _complete(self) -> Load:
         if self.kind == "pressure" and (self.face is None or self.value is None):
             raise ValueError("a pressure needs face and value (Pa, positive pushes into the body)")
+        if self.follows and self.kind != "pressure":
+            raise ValueError("follows belongs to a pressure; leave it out")
         if self.kind == "gravity" and self.vector is None:
             raise ValueError("gravity needs vector (m/s2)")
         if self.kind == "force" and (self.vector is None or (self.face is None) == (self.point is None)):
@@ -768,6 +774,8 @@ class BodySettings(Model):
         elif isinstance(self.material, ForeignMaterial):
             if self.material.source == "matrices" or self.geometry.mesh is None:
                 raise ValueError('material.from: "mesh" needs geometry.mesh; write density, young and poisson instead')
+        if any(load.kind == "mesh" for load in self.loads) and self.geometry.mesh is None:
+            raise ValueError('loads: "mesh" are those of a mesh file; give geometry.mesh')
         if self.closures and self.rotation.prestress != "nonlinear":
             raise ValueError('closures: contact is found by Newton only; set rotation.prestress = "nonlinear"')
         for key in ("stress_nodal_diameters", "shape_nodal_diameters"):

@@ -9,6 +9,7 @@ import re
 import shlex
 import subprocess
 import tempfile
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -17,14 +18,14 @@ from pathlib import Path
 import numpy as np
 
 from ..basis import write_basis
-from ..data import Array, Indices, Material, Mesh
+from ..data import Array, BodyLoad, FacetLoad, Indices, Material, Mesh, NodalLoad, SpinLoad
 from ..errors import UserError
 from ..files.store import ordinary, write_text
 from ..mesh import UNITS, mesh_problems, read_mesh, suffix_of, unit_of
 from ..mesh.chosen import of_instances
 from ..mesh.materials import NONE, STANDS, Substitute
 from ..mesh.raw import Unread, joined, refused
-from ..units import SYSTEMS, usual_system
+from ..units import SYSTEMS, to_rpm, usual_system
 from .meshing import run_apart
 from .stage import Report
 
@@ -449,6 +450,8 @@ def _mesh(
     lines = [] if holding else ["free = true               # nothing holds it wholly yet"]
     lines += ["", "[geometry]", f"mesh = {_beside(file, folder)}"]
     lines += [f"instances = {json.dumps(list(instances))}"] if instances else []
+    rule = f'integration = "{mesh.integration}"  # bricks of 20 nodes by eight points, as the file says'
+    lines += ["", "[mesh]", rule] if mesh.integration != "full" else []
     lines += ["", "[material]"]
     if mesh.materials:
         lines.append('from = "mesh"')
@@ -469,10 +472,13 @@ def _mesh(
     if count < USUAL:
         told.append(f"modes: {count} asked for, the body has few degrees of freedom")
     lines = [*_noted([text for text in told if text not in again]), *lines]
+    turning, loads, words = _state(mesh, UNITS[unit], bool(ring), holding)
+    told += words
+    ring = [*ring[:4], *turning, *ring[4:]] if ring or turning else []
     kept, words = _retained(mesh)
     told += words
     sets = _sets(mesh, bool(held) or holding)
-    return [*lines, *hot, *ring, *held, *kept, *sets, *_end(count)], told, mesh
+    return [*lines, *hot, *ring, *loads, *held, *kept, *sets, *_end(count)], told, mesh
 
 
 def _keys(numbers: Mapping[str, float]) -> list[str]:
@@ -511,7 +517,7 @@ def _temperatures(mesh: Mesh) -> tuple[list[str], list[str]]:
     whole = not np.isnan(free).any() and np.ptp(free) <= 1e-9 * max(np.abs(free).max(), 1.0)
     strained = bool((np.abs(actual - free) > 0).any()) and any(m.expansion.any() for m in mesh.materials)
     lines = ["[temperature]", 'from = "mesh"', 'scale = "C"             # or "K"']
-    if hanging and whole and not strained:
+    if whole and (mesh.state is not None or (hanging and not strained)):
         return ["", *lines], [f"temperatures of the file are in force: {text}" for text in said]
     told = "temperatures: used only once [temperature] of body.toml is uncommented"
     if hanging:
@@ -569,6 +575,43 @@ def _cyclic(mesh: Mesh, metres: float) -> tuple[list[str], list[str]]:
     ]
     lines += [f"nodal_diameters = {list(sector.diameters)}"] if sector.diameters else []
     return lines, [f"{sector.where}: one of {sector.sectors} cyclic sectors, '{right}' ahead of '{left}'"]
+
+
+_LOADED = {FacetLoad: "loaded facet", BodyLoad: "acceleration field", SpinLoad: "rotation"}
+
+
+def _state(mesh: Mesh, metres: float, ring: bool, held: bool) -> tuple[list[str], list[str], list[str]]:
+    """Lines of [rotation] (behind those of a ring) and [[loads]] of the file's static step, and what to say of it."""
+    if (state := mesh.state) is None:
+        return [], [], []
+    if not held:
+        return [], [], [f"warning: {state.where}: its loads are left out, for nothing holds the body against them"]
+    count = Counter[str]()
+    for load in state.loads:
+        kind = load.kind if isinstance(load, NodalLoad) else _LOADED[type(load)]
+        count[kind] += len(load.values) if isinstance(load, NodalLoad | FacetLoad) else 1
+    acting = [f"{number} {kind}{'s' * (number > 1)}" for kind, number in count.items()]
+    acting += ["temperatures"] * (mesh.temperature is not None)
+    law = "finite displacements" if state.nonlinear else "one linear solution"
+    said = [f"{state.where}: the modes are about its static state: {', '.join(acting) or 'nothing acts'}; {law}"]
+    turning = [] if ring else ["", "[rotation]"]
+    turning.append(f'prestress = "{"nonlinear" if state.nonlinear else "linear"}"')
+    spins = [load for load in state.loads if isinstance(load, SpinLoad) and load.speed]
+    if len(spins) > 1 or any(spin.cells is not None for spin in spins):
+        said.append(
+            f"warning: {spins[0].where}: is left out, frequencies will differ: [rotation] turns the whole body about "
+            "one axis; write one that does"
+        )
+    elif spins:
+        (spin,) = spins
+        axis, speed = spin.axis / np.linalg.norm(spin.axis) + 0.0, to_rpm(spin.speed)
+        said.append(f"{spin.where}: {speed:.6g} rpm")
+        if not ring:
+            numbers = [", ".join(f"{v:.15g}" for v in row) for row in (axis, spin.point / metres + 0.0)]
+            turning += [f"axis = [{numbers[0]}]", f"point = [{numbers[1]}]"]
+        turning.append(f"speeds_rpm = [{speed!r}]")
+    rest = len(state.loads) > sum(isinstance(load, SpinLoad) for load in state.loads)
+    return turning, ["", "[[loads]]", 'kind = "mesh"             # those of its static step'] if rest else [], said
 
 
 def _pressed(mesh: Mesh) -> list[str]:

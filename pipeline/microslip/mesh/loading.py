@@ -1,0 +1,103 @@
+"""The static step of a file: from positions, corners and numbers of the file to its mesh, in SI."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from ..data import Array, BodyLoad, FacetLoad, Indices, Mesh, NodalLoad, SpinLoad, StaticStep
+from ..topology import FACET_CORNERS
+from ..units import in_si
+from .raw import RawMesh, joined
+
+
+def state_of(
+    raw: RawMesh, mesh: Mesh, number: Indices, boundary: Mapping[str, Indices], metres: float, system: str | None
+) -> StaticStep | None:  # fmt: skip
+    """The static step on the mesh; what of it finds no place there is added to `raw.lost`.
+
+    Args:
+        mesh: with its links. number: (n,) points of the file's nodes, -1 of those that no cell uses. boundary: facets
+            of the surface. metres: of the unit of coordinates. system: of units, None if unknown.
+    """
+    if (step := raw.state) is None:
+        return None
+    if system is None:
+        text = "its loads are in units that are not known; write material.units, or use m or mm"
+        raw.lost.append(f"{step.where}: {text}")
+        return None
+    loads: list[NodalLoad | FacetLoad | BodyLoad | SpinLoad] = []
+    for load in step.loads:
+        if isinstance(load, NodalLoad):
+            loads += _nodal(raw, mesh, load, number, metres, system)
+        elif isinstance(load, FacetLoad):
+            loads += _facets(raw, replace(load, facets=number[load.facets]), boundary, system)
+        elif isinstance(load, BodyLoad):
+            acceleration = in_si(np.asarray(load.acceleration, dtype=float), system, length=1, time=-2)
+            loads.append(replace(load, acceleration=acceleration, cells=_cells(mesh, load.cells)))
+        else:
+            speed, point = in_si(load.speed, system, time=-1), metres * np.asarray(load.point, dtype=float)
+            cells = _cells(mesh, load.cells)
+            loads.append(replace(load, speed=float(speed), point=point, cells=cells))
+    return replace(step, loads=tuple(loads))
+
+
+def _nodal(
+    raw: RawMesh, mesh: Mesh, load: NodalLoad, number: Indices, metres: float, system: str
+) -> list[NodalLoad]:  # fmt: skip
+    """The load on points, rotations on reference nodes, in SI."""
+    nodes = number[load.nodes]
+    references = {} if mesh.links is None else {int(n): j for j, n in enumerate(mesh.links.reference_id)}
+    away = np.flatnonzero((nodes < 0) | (load.directions >= 3))
+    for i in away:
+        j = references.get(int(raw.node_id[load.nodes[i]]), -1)
+        nodes[i] = -1 if j < 0 else mesh.n_points + j
+    kept = nodes >= 0
+    if not kept.all():
+        first, what = raw.node_id[load.nodes[~kept][0]], "force" if load.kind == "force" else "displacement"
+        raw.lost.append(
+            f"{load.where}: a {what} acts on node {first}, which neither a solid cell nor a constraint "
+            "uses: it is left out, so frequencies may differ"
+        )
+    turns = load.directions[kept] >= 3
+    unit = np.where(turns, 1.0, metres)
+    if load.kind == "force":
+        unit = in_si(1.0, system, length=1, mass=1, time=-2) * np.where(turns, metres, 1.0)
+    return [replace(load, nodes=nodes[kept], directions=load.directions[kept], values=load.values[kept] * unit)]
+
+
+def _facets(raw: RawMesh, load: FacetLoad, boundary: Mapping[str, Indices], system: str) -> list[FacetLoad]:
+    """Loads on whole facets of the surface, type by type; corner values follow their corners."""
+    count, loads, left = load.facets.shape[1], [], np.ones(len(load.facets), dtype=bool)
+    order = np.argsort(load.facets, axis=1)
+    wanted = np.take_along_axis(load.facets, order, axis=1)
+    values = np.broadcast_to(np.reshape(load.values, (len(wanted), -1)), wanted.shape)
+    values = np.take_along_axis(values, order, axis=1) * in_si(1.0, system, length=-1, mass=1, time=-2)
+    for kind, facets in boundary.items():
+        if FACET_CORNERS[kind] != count:
+            continue
+        order = np.argsort(facets[:, :count], axis=1)
+        place = {tuple(row): i for i, row in enumerate(np.take_along_axis(facets[:, :count], order, axis=1).tolist())}
+        at = np.array([place.get(tuple(row), -1) for row in wanted.tolist()], dtype=np.int64)
+        there = at >= 0
+        if there.any():
+            own = np.empty((int(there.sum()), count))
+            np.put_along_axis(own, order[at[there]], values[there], axis=1)
+            loads.append(replace(load, facets=facets[at[there]], values=own, kind=kind))
+        left &= ~there
+    if left.any():
+        raw.lost.append(
+            f"{load.where}: {left.sum()} of {len(left)} loaded facets are not on the surface of the body: left out, so "
+            "frequencies may differ"
+        )
+    return loads
+
+
+def _cells(mesh: Mesh, numbers: Indices | None) -> Array | None:
+    """Whether each cell is chosen, type by type; None if all are."""
+    if numbers is None:
+        return None
+    chosen = np.isin(joined(mesh.cell_id[kind] for kind in mesh.cells), numbers)
+    return None if chosen.all() else chosen
