@@ -76,7 +76,8 @@ def test_links_lead_somewhere(page: Path) -> None:
 
 def test_every_picture_is_shown_and_small() -> None:
     """No picture without a page; less than 300 kB each and 3.2 MB together."""
-    shown = {m for page in PAGES for m in re.findall(r"pictures/([\w-]+\.png)", page.read_text(encoding="utf-8"))}
+    pages_ = [*PAGES, *(DOCS / "tutorials").glob("*.md")]
+    shown = {m for page in pages_ for m in re.findall(r"pictures/([\w-]+\.png)", page.read_text(encoding="utf-8"))}
     files = list((DOCS / "pictures").glob("*"))
     assert {f.name for f in files} == shown
     assert max(f.stat().st_size for f in files) < 300_000 and sum(f.stat().st_size for f in files) < 3_200_000
