@@ -17,7 +17,7 @@ unexport DISPLAY PYTHONPATH PYTHONHOME PYTHONDONTWRITEBYTECODE # without byte co
 # The environment knows the folder it was made for: a checkout that was moved or copied is set up again.
 MOVED := $(shell [ "$$(cat $(READY) 2>/dev/null)" = "$$(pwd -P)" ] || echo moved)
 
-.PHONY: disc-brake spin-pit moved help setup all cases $(CASES) $(BODIES) $(BODIES:%=%-mesh) $(BODIES:%=%-modes) test test-slow test-all peers lint docs bench clean distclean site
+.PHONY: disc-brake spin-pit moved help setup all cases $(CASES) $(BODIES) $(BODIES:%=%-mesh) $(BODIES:%=%-modes) test test-slow test-all peers lint docs bench clean distclean site release-check
 
 help: ## list the verbs
 	@grep -hE '^[a-z%-]+:.*## ' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 14
@@ -79,6 +79,9 @@ lint: $(READY) ## ruff and mypy
 site: $(READY) ## the documentation as a site that can be searched -> build/site/index.html
 	@$(PYTHON) -m sphinx -b html -q docs build/site
 	@echo build/site/index.html
+
+release-check: $(READY) ## wheel and sdist, installed in clean environments and tried (downloads; minutes)
+	@PYTHON=$(abspath $(PYTHON)) sh pipeline/release_check.sh
 
 docs: $(READY) ## the studies and pictures of docs/ (minutes)
 	@$(PYTHON) docs/make_pictures.py

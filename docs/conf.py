@@ -7,6 +7,10 @@ import subprocess
 import sys
 from pathlib import Path
 
+sys.path.insert(0, str(Path(__file__).parent))
+
+import pages
+
 import microslip
 
 project = "microslip"
@@ -15,7 +19,7 @@ release = microslip.__version__
 extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "sphinx.ext.mathjax", "sphinx_design"]
 myst_enable_extensions = ["colon_fence"]
 myst_heading_anchors = 4
-exclude_patterns = ["pictures"]
+exclude_patterns = ["pictures", "generated/gallery.md"]
 html_theme = "pydata_sphinx_theme"
 html_title = "microslip"
 html_show_sourcelink = False
@@ -62,7 +66,7 @@ def _help(*verb: str) -> str:
 
 def setup(app: object) -> None:
     MADE.mkdir(exist_ok=True)
-    for name, text in (("names.md", _names()), ("verbs.md", _verbs())):
+    for name, text in (("names.md", _names()), ("verbs.md", _verbs()), ("gallery.md", pages.gallery())):
         file = MADE / name
         if not file.is_file() or file.read_text(encoding="utf-8") != text:
             file.write_text(text, encoding="utf-8")

@@ -23,6 +23,7 @@ import scipy.linalg
 from pages import (
     FILES,
     HERE,
+    figure_states,
     file_reference,
     fill,
     keywords,
@@ -30,6 +31,7 @@ from pages import (
     play,
     public_reference,
     table,
+    wall,
 )
 
 from microslip.basis import read_basis
@@ -1112,6 +1114,8 @@ def reference() -> None:
     for name, (page, _) in FILES.items():
         fill(page, name, file_reference(name))
     fill("python.md", "public", public_reference())
+    fill("the_book.md", "wall", wall())
+    fill("the_book.md", "figures", figure_states())
 
 
 def python() -> None:
@@ -1267,6 +1271,22 @@ def squeal() -> None:
         moving.seek(i * moving.n_frames // 6)
         frames.append(moving.convert("RGB"))
     save(lettering.side_by_side(frames), "squeal_wave", colours=40)
+    small_gif(moving, "squeal")
+
+
+def small_gif(moving: Any, name: str, width: int = 420, colours: int = LINES // 2) -> None:
+    """Every other frame of an animation, small enough for the front page."""
+    from PIL import Image
+
+    frames = []
+    for i in range(0, moving.n_frames, 2):
+        moving.seek(i)
+        frame = moving.convert("RGB")
+        frames.append(frame.resize((width, frame.height * width // frame.width), Image.Resampling.LANCZOS))
+    palette = frames[0].quantize(colours)
+    flat = [frame.quantize(palette=palette, dither=Image.Dither.NONE) for frame in frames]
+    how = {"append_images": flat[1:], "duration": 120, "loop": 0, "optimize": True}
+    flat[0].save(PICTURES / f"{name}.gif", save_all=True, **how)
 
 
 # the cyclic page ---------------------------------------------------------------------------------------------------

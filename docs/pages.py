@@ -9,7 +9,6 @@ Marks in a page:
 
 from __future__ import annotations
 
-import inspect
 import os
 import re
 import subprocess
@@ -148,13 +147,10 @@ def keywords() -> str:
 
 
 def public_reference() -> str:
-    """Table of the public names: what they are called with and the first sentence of their docstrings."""
-    rows = []
-    for name in microslip.__all__:
-        what = getattr(microslip, name)
-        said = (inspect.getdoc(what) or "").split("\n\n")[0].replace("\n", " ")
-        rows.append([f"`ms.{name}`", said])
-    return table(["name", "what it is"], rows)
+    """Table of the public names, by the module that they are from."""
+    from_modules = microslip.PUBLIC.items()
+    rows = [[f"`{module}`", ", ".join(f"`{name}`" for name in names.split())] for module, names in from_modules]
+    return table(["from", "`ms.` names"], rows)
 
 
 FILES: dict[str, tuple[str, Any]] = {
@@ -327,3 +323,81 @@ def _type(schema: dict[str, Any]) -> str:
         return "table"
     bounds = {sign[0]: f"{sign} {schema[key]:g}" for key, sign in SIGNS.items() if key in schema}
     return " ".join([WORDS.get(str(kind), "any"), ", ".join(bounds.values())]).strip()
+
+
+# the book ----------------------------------------------------------------------------------------------------------
+
+WALL = {
+    "book_figures": "3.2-1", "contact_element": "3.7-7", "contact_stick_slip": "3.7-3", "microslip": "3.8-2",
+    "wear": "3.9-2", "phase_portraits": "4.2-1", "sliding_portraits": "4.3-1", "bifurcation": "4.4-1",
+    "book_mode": "5.2-5", "blade_response": "5.3-5", "rig_forces": "5.3-7", "spin_pit": "5.4-4",
+    "ring_modes": "5.5-1", "ring_orders": "5.5-2", "ring_forces": "5.5-3", "damping_element": "5.5-6",
+    "damping_wire": "5.5-8", "multicoupling": "5.5-9", "mistuning_mistuned": "5.6-3", "bolted_pipes": "5.7-2",
+    "book_rolling": "6.5-1", "rolling_creep": "6.6-1", "half_space": "6.7-3", "unround_wheels": "6.9-1",
+    "tyre": "6.10-4",
+}  # fmt: skip
+"""Picture -> one of the figures of the book that it shows."""
+
+
+def figures_of_the_book() -> list[tuple[str, str, str]]:
+    """Printed numbers, what is shown, and what became of it, of the rows of book.md that have figures."""
+    rows = []
+    for line in (HERE / "book.md").read_text(encoding="utf-8").splitlines():
+        cells = [cell.strip() for cell in line.strip("|").split("|")]
+        if line.startswith("| ") and len(cells) == 5 and "Fig" in cells[0]:
+            rows.append((re.sub(r"^.*?(Figs?\. )", r"\1", cells[0]), cells[1], cells[4]))
+    return rows
+
+
+def state_of(figure: str) -> tuple[str, str]:
+    """The printed numbers of the row that a figure stands in, and its state in one word."""
+    for printed, _, state in figures_of_the_book():
+        found = re.findall(r"(\d\.\d+)-(\d+)", printed)
+        for (section, low), (_, high) in zip(found, [*found[1:], found[-1]], strict=True):
+            whole = range(int(low), int(high) + 1) if f"{section}-{low} to" in printed else [int(low)]
+            if figure in {f"{section}-{i}" for i in whole}:
+                return printed, _mark(state)
+    raise LookupError(figure)
+
+
+def _mark(state: str) -> str:
+    words = ("not reproducible", "different", "reproduced")
+    word = next(word for word in words if state.removeprefix("parameters ").startswith(word))
+    if word == "reproduced":
+        word += " in part" * ("different" in state) or " in shape" * ("in shape" in state or "in words" in state)
+    return word
+
+
+def wall() -> str:
+    """Pictures, three in a row, each with its figure and what became of it, and linked to its page."""
+    cells = []
+    for picture, figure in WALL.items():
+        page = next(p.name for p in sorted(HERE.glob("*.md")) if p.stem not in ("the_book", "index")
+                    and f"pictures/{picture}.png" in p.read_text(encoding="utf-8"))  # fmt: skip
+        printed, state = state_of(figure)
+        cells.append(f"[![{printed}](pictures/{picture}.png)]({page}) {printed}: **{state}**")
+    rows = [cells[i : i + 3] + [""] * (3 - len(cells[i : i + 3])) for i in range(0, len(cells), 3)]
+    return table(["", "", ""], rows)
+
+
+def figure_states() -> str:
+    """Table of every row with figures: printed, shown, reproduced, different or not reproducible, and how near."""
+    rows = []
+    for printed, shown, state in figures_of_the_book():
+        rows.append([printed, shown, f"**{_mark(state)}**"])
+    return table(["figure", "shown", "state"], rows)
+
+
+def gallery() -> str:
+    """Every picture of these pages as a card that leads to its page; Markdown of sphinx-design."""
+    cards, seen = [], set()
+    first = ("blade", "cyclic", "squeal", "results", "rolling", "mistuning", "bifurcation", "geometry", "dampers")
+    order = {name: i for i, name in enumerate(first)}
+    for page in sorted(HERE.glob("*.md"), key=lambda p: (order.get(p.stem, len(first)), p.stem)):
+        text = page.read_text(encoding="utf-8")
+        for said, picture in re.findall(r"!\[([^\]]*)\]\(pictures/([\w-]+\.png)\)", text):
+            if picture not in seen and page.stem not in ("index", "the_book"):
+                seen.add(picture)
+                card = f":::{{grid-item-card}}\n:img-top: pictures/{picture}\n:link: {page.stem}\n:link-type: doc\n"
+                cards.append(f"{card}:class-item: small\n\n{said}\n:::")
+    return "::::{grid} 2 3 4 4\n:gutter: 2\n\n" + "\n\n".join(cards) + "\n::::\n"

@@ -107,13 +107,15 @@ class RigidLink:
 
     Attributes:
         reference: node. members: nodes, or the face that has them. directions: out of x, y, z, and of a, b, c
-            for members that are reference nodes and turn with it.
+            for members that are reference nodes and turn with it. axes: (3, 3) rows x, y, z of the directions,
+            None: those of the body.
     """
 
     where: str
     reference: int
     members: Indices | str
     directions: str = "xyz"
+    axes: Array | None = None
 
 
 @dataclass(frozen=True)
@@ -121,8 +123,9 @@ class AverageLink:
     """A reference node that follows nodes in the mean: the rigid motion that fits theirs best, by weights.
 
     Attributes:
-        reference: node. members: nodes, or the face that has them. weights: (m,) of the members; None: their tributary
-            areas of the face. directions: which of the reference node's x, y, z and rotations a, b, c follow.
+        reference: node. members: nodes, or the face that has them. weights: (m,) of the members, (m, 3, 3) if in single
+            directions; None: their tributary areas of the face. directions: which of the reference node's x, y, z and
+            rotations a, b, c follow. axes: (3, 3) rows x, y, z of these, None: those of the body.
     """
 
     where: str
@@ -130,6 +133,7 @@ class AverageLink:
     members: Indices | str
     weights: Array | None
     directions: str = "xyzabc"
+    axes: Array | None = None
 
 
 @dataclass(frozen=True)
@@ -146,7 +150,22 @@ class FaceTie:
     tolerance: float | None = None
 
 
-Link = Equation | RigidLink | AverageLink | FaceTie
+@dataclass(frozen=True)
+class Guide:
+    """Supports in skewed directions: of each node the displacement along an axis is zero.
+
+    Attributes:
+        nodes: (m,), a node as often as it has such axes. axes: (m, 3) unit vectors. turning: rotations of
+            reference nodes about these axes are zero instead.
+    """
+
+    where: str
+    nodes: Indices
+    axes: Array
+    turning: bool = False
+
+
+Link = Equation | RigidLink | AverageLink | FaceTie | Guide
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.spatial import cKDTree
 
-from ..data import Array, AverageLink, Equation, FaceTie, Indices, Links, Mesh, RigidLink, Ties
+from ..data import Array, AverageLink, Equation, FaceTie, Guide, Indices, Links, Mesh, RigidLink, Ties
 from ..errors import UserError
 from ..frames import rigid_fields
 from ..topology import FACET_CORNERS
@@ -52,7 +52,7 @@ class _Rows:
         self.of += [link] * r
         self.count += r
 
-    def dof(self, nodes: Indices, way: Indices | int) -> Indices:
+    def dof(self, nodes: Indices | int, way: Indices | int) -> Indices:
         """Columns of a direction (0 to 5) of points and reference nodes."""
         nodes = np.asarray(nodes)
         return np.where(nodes < self.n, 3 * nodes + way, 3 * self.n + 6 * (nodes - self.n) + way)
@@ -81,6 +81,7 @@ def _ties(mesh: Mesh, links: Links, rows: _Rows) -> Ties:
     width = 3 * mesh.n_points + 6 * len(links.references)
     place = (np.concatenate(rows.row), np.concatenate(rows.column))
     matrix = sp.csr_matrix((np.concatenate(rows.factor), place), shape=(rows.count, width))
+    matrix.eliminate_zeros()
     return Ties(
         matrix, np.concatenate(rows.dependent), np.array(rows.of), tuple(link.where for link in links.items),
         tuple(_OTHERWISE.get(type(link), "refuse") for link in links.items), links.references,
@@ -124,17 +125,41 @@ def _equation(mesh: Mesh, link: Equation, rows: _Rows, number: int) -> str:
 def _rigid(mesh: Mesh, link: RigidLink, rows: _Rows, number: int) -> str:
     members = _members(mesh, link)
     r = _position(mesh, members) - _position(mesh, np.array([link.reference]))
+    axes = np.eye(3) if link.axes is None else link.axes
     for way in ["xyz".index(c) for c in link.directions if c in "xyz"]:
-        own = rows.dof(members, way)
-        a, b = (way + 1) % 3, (way + 2) % 3  # (theta x r)_way = theta_a r_b - theta_b r_a
-        base = [np.full(len(members), rows.dof(np.array(link.reference), c)) for c in (way, 3 + a, 3 + b)]
-        factors = np.column_stack([np.ones(len(members)), -np.ones(len(members)), -r[:, b], r[:, a]])
-        rows.add(number, np.column_stack([own, *base]), factors, own)
+        moment = np.cross(r, axes[way])  # e (theta x r) = theta (r x e)
+        _along(rows, number, members, link.reference, axes[way], moment)
     turning = members[members >= mesh.n_points]
-    for way in ["xyzabc".index(c) for c in link.directions if c in "abc"]:
-        given, leading = rows.dof(turning, way), np.full(len(turning), rows.dof(np.array(link.reference), way))
-        rows.add(number, np.column_stack([given, leading]), np.tile([1.0, -1.0], (len(turning), 1)), given)
+    for way in ["abc".index(c) for c in link.directions if c in "abc"]:
+        _along(rows, number, turning, link.reference, axes[way], None)
     return f"{link.where}: {len(members)} nodes follow node {_number(mesh, link.reference)}"
+
+
+def _along(
+    rows: _Rows, number: int, members: Indices, reference: int, e: Array, moment: Array | None
+) -> None:
+    """e u_m = e u_r + moment theta_r of members; without moments (m, 3) the same of their rotations.
+
+    An equation gives the member's own displacement where e is an axis of the body, else any.
+    """
+    first, ways = (3 if moment is None else 0), [int(w) for w in np.flatnonzero(np.abs(e) > 1e-15)]
+    of = np.full(len(members), reference)
+    own = np.column_stack([rows.dof(members, first + w) for w in ways])
+    columns, factors = [own, *(rows.dof(of, first + w)[:, None] for w in ways)], [e[ways], -e[ways]]
+    table = np.tile(np.concatenate(factors), (len(members), 1))
+    if moment is not None:
+        columns += [rows.dof(of, 3 + w)[:, None] for w in range(3)]
+        table = np.hstack([table, -moment])
+    plain = len(ways) == 1
+    rows.add(number, np.hstack(columns), table, own[:, 0] if plain else np.full(len(members), -1))
+
+
+def _guide(mesh: Mesh, link: Guide, rows: _Rows, number: int) -> str:
+    first = 3 if link.turning else 0
+    columns = np.column_stack([rows.dof(link.nodes, first + way) for way in range(3)])
+    rows.add(number, columns, link.axes, np.full(len(columns), -1))
+    what = "rotations" if link.turning else "displacements in skewed directions"
+    return f"{link.where}: {len(columns)} {what} are zero"
 
 
 def _average(mesh: Mesh, link: AverageLink, rows: _Rows, number: int) -> str:
@@ -144,7 +169,7 @@ def _average(mesh: Mesh, link: AverageLink, rows: _Rows, number: int) -> str:
     fields = rigid_fields(_position(mesh, members), origin[0])
     size = max(float(np.abs(_position(mesh, members) - origin).max()), 1e-300)
     scaled = fields / np.array([1, 1, 1, size, size, size])
-    gram = np.einsum("m,mic,mid->cd", weights, scaled, scaled)
+    gram = np.einsum("mij,mic,mjd->cd", weights, scaled, scaled)
     values, V = np.linalg.eigh(gram)
     ways = ["xyzabc".index(c) for c in link.directions]
     if values[0] < 1e-12 * values[-1] and set(ways) & {3, 4, 5}:
@@ -155,24 +180,41 @@ def _average(mesh: Mesh, link: AverageLink, rows: _Rows, number: int) -> str:
     inverse = (V[:, values > 1e-12 * values[-1]] / values[values > 1e-12 * values[-1]]) @ V.T[
         values > 1e-12 * values[-1]
     ]
-    fit = np.einsum("cd,m,mid->cmi", inverse, weights, scaled) / np.array([1, 1, 1, size, size, size])[:, None, None]
+    known = inverse @ gram  # projects on the rigid motions that the members tell
+    single = link.weights is not None and link.weights.ndim == 3
+    if single and np.abs(known - np.eye(6))[ways].max() > 1e-6:
+        raise UserError(
+            f"{link.where} follows its nodes in directions that do not tell all of its motion; add some to it"
+        )
+    fit = np.einsum("cd,mij,mjd->cmi", inverse, weights, scaled) / np.array([1, 1, 1, size, size, size])[:, None, None]
     own = rows.dof(np.repeat(members, 3), np.tile(np.arange(3), len(members)))
+    axes = np.eye(3) if link.axes is None else link.axes
     for way in ways:
-        moved = rows.dof(np.array([link.reference]), way)
-        columns, factors = np.concatenate([moved, own])[None], np.concatenate([[-1.0], fit[way].ravel()])[None]
-        rows.add(number, columns, factors, moved)
+        first, e = way - way % 3, axes[way % 3]
+        moved = rows.dof(np.full(3, link.reference), first + np.arange(3))
+        factors = np.concatenate([-e, np.einsum("k,kmi->mi", e, fit[first : first + 3]).ravel()])
+        given = rows.dof(np.array([link.reference]), way)
+        if link.axes is not None:
+            given = np.full(1, -1)
+        rows.add(number, np.concatenate([moved, own])[None], factors[None], given)
     return f"{link.where}: node {_number(mesh, link.reference)} follows {len(members)} nodes in the mean"
 
 
 def _weights(mesh: Mesh, link: AverageLink, members: Indices) -> Array:
-    """(m,) weights as given, or the tributary areas int N_i dA of a face's nodes, m2.
+    """(m, 3, 3) weights as given, or the tributary areas int N_i dA of a face's nodes, m2.
 
     Raises:
         UserError: areas of what is no face, weights that add up to nothing.
     """
     if link.weights is not None and not isinstance(link.members, str):
         kept = link.members != link.reference
-        weights = np.broadcast_to(link.weights, len(kept))[kept].astype(float)
+        weights = np.asarray(link.weights, dtype=float)
+        if weights.ndim == 3:
+            weights = weights[kept]
+            if not np.trace(weights.sum(axis=0)) > 0:
+                raise UserError(f"{link.where} has weights whose sum is not above 0; correct them")
+            return weights
+        weights = np.broadcast_to(weights, len(kept))[kept]
     elif isinstance(link.members, str) and link.members in mesh.faces:
         area = np.zeros(mesh.n_points)
         for block in face_blocks(mesh, link.members):
@@ -182,7 +224,7 @@ def _weights(mesh: Mesh, link: AverageLink, members: Indices) -> Array:
         raise UserError(f"{link.where} weighs nodes by areas of '{link.members}', which is no face of the mesh")
     if not weights.sum() > 0:
         raise UserError(f"{link.where} has weights whose sum is not above 0; correct them")
-    return weights
+    return weights[:, None, None] * np.eye(3)
 
 
 def _number(mesh: Mesh, node: int) -> int:
@@ -191,7 +233,7 @@ def _number(mesh: Mesh, node: int) -> int:
 
 
 _MAKERS: dict[type, Callable[[Mesh, Any, _Rows, int], str]] = {
-    Equation: _equation, RigidLink: _rigid, AverageLink: _average,
+    Equation: _equation, RigidLink: _rigid, AverageLink: _average, Guide: _guide,
 }  # fmt: skip
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 
-from ..data import Equation, FaceTie, Indices, Link, Mesh
+from ..data import Equation, FaceTie, Guide, Indices, Link, Mesh
 from ..errors import UserError
 from .gates import part_numbers
 from .raw import joined
@@ -78,6 +78,11 @@ def _with_links(mesh: Mesh, part: Mesh, inside: Indices, number: Indices) -> Mes
             own.append(_moved(link, mesh.n_points, part.n_points, number))
     used = {n - part.n_points for link in own for n in _references(link) if n >= part.n_points}
     sets = {name: s for name, s in mesh.links.sets.items() if np.isin(s, list(used)).all()}
+    places = np.concatenate([inside, np.isin(np.arange(len(mesh.links.references)), list(used))])
+    for guide in (link for link in mesh.links.items if isinstance(link, Guide)):
+        if (there := places[guide.nodes]).any():
+            cut = replace(guide, nodes=guide.nodes[there], axes=guide.axes[there])
+            own.append(_moved(cut, mesh.n_points, part.n_points, number))
     links = replace(mesh.links, items=tuple(own), sets=sets) if own else None
     known = {*part.point_sets, *(links.sets if links else ())}
     return replace(part, links=links, supports={n: d for n, d in mesh.supports.items() if n in known})
@@ -85,7 +90,7 @@ def _with_links(mesh: Mesh, part: Mesh, inside: Indices, number: Indices) -> Mes
 
 def _references(link: Link) -> list[int]:
     """Nodes of a link that may be reference nodes."""
-    if isinstance(link, FaceTie):
+    if isinstance(link, FaceTie | Guide):
         return []
     return link.nodes.tolist() if isinstance(link, Equation) else [link.reference]
 
@@ -99,7 +104,7 @@ def _moved(link: Link, before: int, after: int, number: Indices) -> Link:
 
     if isinstance(link, FaceTie):
         return link
-    if isinstance(link, Equation):
+    if isinstance(link, Equation | Guide):
         return replace(link, nodes=new(link.nodes))
     members = link.members if isinstance(link.members, str) else new(link.members)
     return replace(link, reference=int(new(np.array(link.reference))), members=members)
@@ -122,7 +127,9 @@ def nodes_of(mesh: Mesh) -> list[Indices]:
 
 
 def _named(mesh: Mesh, link: Link) -> Indices:
-    """Points and reference nodes that a link names."""
+    """Points and reference nodes that a link names, but supports, which join nothing."""
+    if isinstance(link, Guide):
+        return np.zeros(0, dtype=np.int64)
     if isinstance(link, Equation):
         return link.nodes
     members = [link.slave, link.master] if isinstance(link, FaceTie) else [link.members]

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ..data import Array, AverageLink, Equation, FaceTie, Indices, Link, Links, RigidLink
+from ..data import Array, AverageLink, Equation, FaceTie, Guide, Indices, Link, Links, RigidLink
 from .raw import Damaged, RawMesh
 
 
@@ -25,7 +25,8 @@ def renumbered(raw: RawMesh, points: Array, number: Indices, metres: float) -> L
     if not raw.links:
         return None
     found = _References(raw, number)
-    items = [item for link in raw.links for item in found.of(link, metres)]
+    order = sorted(raw.links, key=lambda link: isinstance(link, Guide))  # which need to know the others
+    items = [item for link in order for item in found.of(link, metres)]
     found.refuse_chains()
     at = np.array(list(found.known), dtype=np.int64)
     sets = {name: np.flatnonzero(np.isin(at, s) & (number[at] < 0)) for name, s in raw.point_sets.items()}
@@ -47,6 +48,12 @@ class _References:
         if isinstance(link, Equation):
             pairs = zip(link.nodes, link.directions, strict=True)
             return [replace(link, nodes=np.array([self._node(int(p), int(d), link.where) for p, d in pairs]))]
+        if isinstance(link, Guide):
+            places = enumerate(map(int, link.nodes))
+            there = [i for i, p in places if self.number[p] >= 0 or p in self.known]
+            way = 3 if link.turning else 0
+            nodes = [self._node(int(link.nodes[i]), way, link.where) for i in there]
+            return [replace(link, nodes=np.array(nodes), axes=link.axes[there])] if there else []
         new = link.reference not in self.known
         reference = self._reference(link.reference)
         made = replace(link, reference=reference, members=self._members(link))

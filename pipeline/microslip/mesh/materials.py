@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from ..data import Array, Material
@@ -46,32 +48,91 @@ def orthotropic_row(name: str, c: Array) -> Array:
         raise Damaged(f"the material '{name}': {error}") from None
 
 
-def in_si(found: DeckMaterial, system: str, zero: float = 0.0) -> Material:
-    """A material of a file in SI.
+@dataclass(frozen=True)
+class Substitute:
+    """Numbers in SI that stand where a material of a file lacks them; None: none does.
+
+    Attributes:
+        density: kg/m3. young: Pa. poisson: Poisson's ratio. whole: whether young stands for a material of a kind that
+            is not read, too.
+    """
+
+    density: float | None = None
+    young: float | None = None
+    poisson: float | None = None
+    whole: bool = True
+
+
+NONE = Substitute()
+
+STANDS = (
+    "what stands in brackets is taken; [material] of body.toml, or import's --density, --young, "
+    "--poisson, give another"
+)
+"""End of what is said of a number that a material lacks."""
+
+
+def in_si(
+    found: DeckMaterial, system: str, zero: float = 0.0, instead: Substitute = NONE
+) -> tuple[Material, str]:
+    """A material of a file in SI, and what is said of numbers that it lacks; empty if there are none.
 
     Args:
-        system: of units, a key of `units.SYSTEMS`. zero: K of the file's temperature 0.
+        system: of units, a key of `units.SYSTEMS`. zero: K of the file's temperature 0. instead: of what it lacks.
 
     Raises:
         Damaged: impossible or none. Unread: it is of another kind, or lacks constants or density.
     """
     at, line = f" of the cells '{found.where}'" if found.where else "", found.line or None
-    if not found.name:
-        raise Damaged(f"the cells '{found.where}' have no material" if found.where else "cells have no material")
-    if found.refused:
-        raise Unread(f"the material '{found.name}'{at} has {found.refused}")
-    if found.elasticity is None:
-        text = "has no elastic constants that are read (iso- or orthotropic)"
-        raise Unread(f"the material '{found.name}'{at} {text}", file=line)
-    if found.density is None:
+    name = f"the material '{found.name}'{at}" if found.name else f"the material{at}"
+    whole, table = found.elasticity, found.temperature
+    C, lacking = (None if whole is None else whole * stress(system)), []
+    if found.refused and (instead.young is None or not instead.whole):
+        raise Unread(f"{name} has {found.refused} (or --young and --density for all of it)")
+    if C is None or found.refused:
+        C, table = _isotropic(found, system, instead), None
+        if C is not None:
+            E, nu = _young(found, system, instead), _poisson(found, instead)
+            lacking.append(f"elastic constants that suffice (E {E:.4g} Pa, nu {nu:g})")
+    if C is None:
+        text = "has no elastic constants that are read (iso- or orthotropic)" if found.name else "is missing"
+        raise Unread(f"{name} {text}", file=line)
+    rho = None if not found.density else found.density * density(system)
+    if rho is None and instead.density is not None:
+        rho = instead.density
+        lacking.append(f"density ({rho:g} kg/m3)")
+    if rho is None:
         text = "has no density; give it one, no other can stand for it"
-        raise Unread(f"the material '{found.name}'{at} {text}", file=line)
-    if not 0 < found.density < np.inf:
+        raise Unread(f"{name} {text}", file=line)
+    if not 0 < rho < np.inf:
         text = f"has a density of {found.density:g}; correct it"
-        raise Unread(f"the material '{found.name}'{at} {text}", file=line)
-    if not (np.isfinite(found.expansion).all() and np.isfinite(found.elasticity).all()):
-        raise Damaged(f"the material '{found.name}'{at} holds a number that is not finite")
-    table = None if found.temperature is None else found.temperature + np.array([zero, 0.0])
-    return Material(
-        found.density * density(system), found.elasticity * stress(system), found.expansion, table, found.name
-    )
+        raise Unread(f"{name} {text}", file=line)
+    if not (np.isfinite(found.expansion).all() and np.isfinite(C).all()):
+        raise Damaged(f"{name} holds a number that is not finite")
+    if table is not None:
+        table = table + np.array([zero, 0.0])
+    place = f"{line}: " if line else ""
+    said = f"{place}{name} has no {' and no '.join(lacking)}: {STANDS}" if lacking else ""
+    return Material(rho, C, found.expansion, table, found.name or "material"), said
+
+
+def _poisson(found: DeckMaterial, instead: Substitute) -> float | None:
+    return instead.poisson if found.poisson is None else found.poisson
+
+
+def _young(found: DeckMaterial, system: str, instead: Substitute) -> float | None:
+    """Pa: the file's, that of its shear modulus, or another."""
+    nu = _poisson(found, instead)
+    if found.young is not None:
+        return found.young * stress(system)
+    if found.shear is not None and nu is not None:
+        return 2 * found.shear * stress(system) * (1 + nu)
+    return instead.young
+
+
+def _isotropic(found: DeckMaterial, system: str, instead: Substitute) -> Array | None:
+    """Hooke matrix, Pa, of what there is and what stands for the rest; None if that is not all."""
+    E, nu = _young(found, system, instead), _poisson(found, instead)
+    if E is None or nu is None:
+        return None
+    return isotropic_rows(found.name, np.array([[E, nu, 0.0]]))[0]

@@ -38,7 +38,8 @@ class DeckMaterial:
         name: as in the file. elasticity: (6, 6) Hooke matrix in the order `VOIGT`, in body axes; None: missing.
         density: None: missing. expansion: (6,) thermal strain per degree. temperature: (t, 2) temperature and factor on
             the elasticity, or None. where: the set of cells that it was given to. refused: what of it is not read, in
-            words, and what to do. line: its place in the file, ``part.inp, line 12``, if known.
+            words, and what to do. line: its place in the file, ``part.inp, line 12``, if known. young, poisson, shear:
+            what is there of them where they do not suffice for an elasticity.
     """
 
     name: str
@@ -49,6 +50,9 @@ class DeckMaterial:
     where: str = ""
     refused: str = ""
     line: str = ""
+    young: float | None = None
+    poisson: float | None = None
+    shear: float | None = None
 
 
 @dataclass

@@ -26,7 +26,7 @@ from .bdf import read_bdf
 from .cdb import read_cdb
 from .inp import read_inp
 from .linking import renumbered
-from .materials import in_si
+from .materials import NONE, Substitute, in_si
 from .med import read_med
 from .msh import is_msh41, read_msh41
 from .raw import NODES, Damaged, RawMesh, refused
@@ -41,14 +41,17 @@ _IGNORED = {"vertex", "line", "line3"}
 
 
 @in_its_file
-def read_mesh(path: Path | str, unit: str, system: str | None = None, zero: float = 0.0) -> Mesh:
+def read_mesh(
+    path: Path | str, unit: str, system: str | None = None, zero: float = 0.0, instead: Substitute = NONE
+) -> Mesh:
     """Read a volume mesh with its named sets.
 
     Args:
         path: gmsh's ``.msh``, an Abaqus or CalculiX ``.inp``, an Ansys ``.cdb``, ``.med``, ``.unv``, ``.vtu``, ``.vtk``
             or Nastran's ``.bdf``.
         unit: of the file's coordinates, a key of `UNITS`. system: of the units its materials are written in, a key of
-            `units.SYSTEMS`; None: its materials are left out. zero: K of the file's temperature 0.
+            `units.SYSTEMS`; None: its materials are left out. zero: K of the file's temperature 0. instead: what stands
+            for numbers that its materials lack.
 
     Returns:
         The mesh in metres. A named set of facets becomes a face; so does a named set of points in which whole
@@ -67,7 +70,9 @@ def read_mesh(path: Path | str, unit: str, system: str | None = None, zero: floa
         raw = _read_raw(path)
         if (said := unit_of(path)) not in ("", unit):
             raw.lost.append(f"the file tells its lengths in {said}, here they are taken in {unit}: which is right?")
-        materials = tuple(in_si(m, system, zero) for m in raw.materials) if system else ()
+        made = [in_si(m, system, zero, instead) for m in raw.materials] if system else []
+        materials, lacking = tuple(m for m, _ in made), [text for _, text in made if text]
+        raw.lost = [*lacking, *raw.lost]
         mesh = _mesh_of(raw, UNITS[unit])
         return replace(mesh, materials=materials, regions=mesh.regions if materials else {})
     except Damaged as error:

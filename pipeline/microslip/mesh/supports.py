@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ..data import Array, Equation, FaceTie, Indices
+from ..data import Array, Equation, FaceTie, Guide, Indices, Link
 from .raw import Numbering, RawMesh
 
 
@@ -17,16 +17,17 @@ class Constraints:
 
     Attributes:
         sets: set name -> directions out of x, y, z. nodes: node number -> directions.
-        turned: numbers of nodes whose directions are those of a local system, which is not known. all_turned: some may
-            be, unknown which. axes: number of a node -> (3, 3) rows, its own directions.
+        axes: node number -> (3, 3) rows x, y, z of its directions, where these are not the body's.
+        turned: numbers of nodes whose directions are those of a local system that is not read. all_turned: some may be,
+            unknown which.
         left_out: what is not read, in words.
     """
 
     sets: dict[str, set[str]] = field(default_factory=dict)
     nodes: dict[int, set[str]] = field(default_factory=dict)
+    axes: dict[int, Array] = field(default_factory=dict)
     turned: set[int] = field(default_factory=set)
     all_turned: bool = False
-    axes: dict[int, Array] = field(default_factory=dict)
     left_out: list[str] = field(default_factory=list)
 
     def hold(self, where: str | int, directions: Iterable[str]) -> None:
@@ -46,8 +47,6 @@ def add_supports(raw: RawMesh, held: Constraints, numbering: Numbering) -> None:
     Rotations (a, b, c) are those of reference nodes; others have none. Single directions of a local system become
     linear equations, which hold wherever the mesh is used.
     """
-    if held.axes:
-        held = _beside_axes(raw, held, numbering)
     turning = _turning(raw)
     held = replace(held, sets=dict(held.sets), nodes=dict(held.nodes))
     for name, found in held.sets.items():
@@ -56,6 +55,7 @@ def add_supports(raw: RawMesh, held: Constraints, numbering: Numbering) -> None:
     for node, found in held.nodes.items():
         at = raw.node_id[turning] == node
         held.nodes[node] = found if at.any() else found - set("abc")
+    raw.links += _guided(raw, held, numbering)
     left_out = dict.fromkeys(held.left_out)
     for name, found in held.sets.items():
         directions = _in_order(found)
@@ -87,35 +87,45 @@ def add_supports(raw: RawMesh, held: Constraints, numbering: Numbering) -> None:
     raw.not_held = told if len(told) <= 5 else [*told[:4], f"and {len(told) - 4} more like these"]
 
 
-def _beside_axes(raw: RawMesh, held: Constraints, numbering: Numbering) -> Constraints:
-    """What is held in global directions or wholly; what is held in others becomes equations of `raw`."""
-    nodes = {node: set(ways) for node, ways in held.nodes.items()}
-    sets = dict(held.sets)
-    for name, ways in held.sets.items():
+_ALIKE = 1e-9
+"""What the components of an axis may differ by from those of an axis of the body."""
+
+
+def _guided(raw: RawMesh, held: Constraints, numbering: Numbering) -> list[Link]:
+    """Supports in skewed directions, and of rotations alone, which are taken out of what is held; along the body's axes
+    they stay there as directions of the body."""
+    for name in [name for name, ways in held.sets.items() if len(ways & set("xyz")) in (1, 2)]:
         members = raw.node_id[raw.point_sets.get(name, np.zeros(0, dtype=np.int64))].tolist()
-        if len(ways & set("xyz")) in (1, 2) and not held.axes.keys().isdisjoint(members):
-            del sets[name]
+        if not held.axes.keys().isdisjoint(members):
+            directions = held.sets.pop(name)
             for node in members:
-                nodes.setdefault(node, set()).update(ways)
-    count = 0
-    for node, ways in nodes.items():
-        if node not in held.axes or not np.isin(node, numbering.sorted):
-            continue
-        for first, names in ((0, "xyz"), (3, "abc")):
-            local = [way for way in names if way in ways]
-            if len(local) in (0, 3):
-                continue
-            ways.difference_update(names)
-            at, count = numbering.positions([node], ""), count + 1
-            for way in local:
-                direction = held.axes[node][names.index(way)]
-                raw.links.append(in_axes(LOCAL, at, np.array([first]), direction[None]))
-    if count:
-        raw.remarks.append(f"{count} nodes are held in directions of their own, by equations of the mesh")
-    return replace(held, sets=sets, nodes=nodes)
-
-
-LOCAL = "supports in local directions"
+                held.nodes[node] = held.nodes.get(node, set()) | directions
+    skewed: dict[bool, list[tuple[int, Array]]] = {False: [], True: []}
+    for node in held.axes.keys() & held.nodes.keys() & set(numbering.sorted.tolist()):
+        plain = set[str]()
+        for ways in ("xyz", "abc"):
+            chosen = held.nodes[node] & set(ways)
+            axes = held.axes[node][[ways.index(c) for c in chosen]]
+            along = np.abs(axes) > 1 - _ALIKE
+            used = along.any(axis=0) | (len(chosen) == 3)
+            plain |= {ways[i] for i in np.flatnonzero(used)}
+            if len(chosen) < 3:
+                skewed[ways == "abc"] += [(node, e) for e in axes[~along.any(axis=1)]]
+        held.nodes[node] = plain
+    for node, left in held.nodes.items():  # rotations alone, which no line of body.toml holds
+        if left and not left & set("xyz") and np.isin(node, numbering.sorted):
+            skewed[True] += [(node, np.eye(3)["abc".index(c)]) for c in sorted(left)]
+            held.nodes[node] = set()
+    return [
+        Guide(
+            "supports by equations",
+            numbering.positions([node for node, _ in pairs], "a constraint names"),
+            np.array([e for _, e in pairs]),
+            turning,
+        )
+        for turning, pairs in skewed.items()
+        if pairs
+    ]
 
 
 def in_axes(where: str, nodes: Indices, first: Indices, factors: Array) -> Equation:
@@ -138,7 +148,7 @@ def _turning(raw: RawMesh) -> Indices:
     named = [
         link.nodes if isinstance(link, Equation) else [link.reference]
         for link in raw.links
-        if not isinstance(link, FaceTie)
+        if not isinstance(link, FaceTie | Guide)
     ]
     used = np.unique(np.concatenate([np.zeros(0, dtype=np.int64), *(nodes.ravel() for _, nodes in raw.blocks)]))
     return np.setdiff1d(np.concatenate([np.zeros(0, dtype=np.int64), *map(np.asarray, named)]), used)

@@ -300,6 +300,12 @@ class ForeignMaterial(Model):
     """the mesh file's own material, or materials"""
     units: UnitSystem | None = None
     """of the mesh file; m-kg-s, mm-t-s, in-lbf-s go without saying with m, mm, in"""
+    density: Positive | None = None
+    """[kg/m3] of those materials of the mesh file that have none"""
+    young: Positive | None = None
+    """[Pa] Young's modulus of those that have none, or are of a kind that is not read"""
+    poisson: Annotated[float, BeforeValidator(_float), Field(gt=-1, lt=0.5)] | None = None
+    """Poisson's ratio of those that have none"""
     unusual: bool = False
     """silences the warnings about implausible units"""
 

@@ -17,6 +17,7 @@ from ..files.store import ordinary
 from ..mesh import UNITS, boundary_facets, read_mesh, suffix_of
 from ..mesh.cards import files_of
 from ..mesh.chosen import bodies, of_instances, with_parts
+from ..mesh.materials import NONE, Substitute
 from ..mesh.raw import joined
 from ..mesh.touching import touch_of, touching_facets
 from .importing import (
@@ -47,7 +48,8 @@ from .summary import frequency_lines
 
 
 def import_deck(
-    file: Path, folder: Path | None, unit: str | None, report: Report = lambda _: None
+    file: Path, folder: Path | None, unit: str | None, report: Report = lambda _: None,
+    instead: Substitute = NONE,
 ) -> Imported:
     """Import a file; a deck whose contact pairs separate bodies becomes an assembly.
 
@@ -57,13 +59,13 @@ def import_deck(
     pattern = PAIRS.get(suffix_of(file))
     deck = [f.read_bytes() for f in files_of(file) if f.is_file()] if pattern else []
     if pattern is None or not any(map(pattern.search, deck)):
-        return import_file(file, folder, unit, report=report)
+        return import_file(file, folder, unit, report=report, instead=instead)
     unit = length_unit(unit, file)
     mesh = read_mesh(file, unit)
     groups = bodies(mesh)
     joints, told = _between_bodies(mesh, groups)
     if not joints:
-        made = import_file(file, folder, unit, report=report)
+        made = import_file(file, folder, unit, report=report, instead=instead)
         made = replace(made, told=(*made.told[:-1], *told, made.told[-1]))
         return with_page(made) if told and made.mesh is not None else made
     meshes = [of_instances(mesh, group) for group in groups]
@@ -71,7 +73,7 @@ def import_deck(
     pairs = zip(patches, joints, strict=True)
     said = [*told, *(_sentence(groups, patch, joint, unit) for patch, (joint, _) in pairs)]
     force, texts = _pressed(mesh)
-    return _assembly(file, folder, unit, groups, meshes, patches, [*said, *texts], force)
+    return _assembly(file, folder, unit, groups, meshes, patches, [*said, *texts], force, instead)
 
 
 def with_modes(made: Imported, report: Report = lambda _: None) -> Imported:
@@ -89,7 +91,8 @@ def with_modes(made: Imported, report: Report = lambda _: None) -> Imported:
 
 
 def import_apart(
-    file: Path, folder: Path | None, unit: str | None, report: Report = lambda _: None
+    file: Path, folder: Path | None, unit: str | None, report: Report = lambda _: None,
+    instead: Substitute = NONE,
 ) -> Imported:
     """The solids of a CAD file, or the parts of a mesh that share no points, as bodies in contact.
 
@@ -115,7 +118,7 @@ def import_apart(
             "out"
         )
     said = [sentence(parts, patch, unit) for patch in patches]
-    return _assembly(file, folder, unit, groups, meshes, patches, said)
+    return _assembly(file, folder, unit, groups, meshes, patches, said, instead=instead)
 
 
 def _parts(file: Path, folder: Path | None, groups: list[list[str]]) -> list[Part]:
@@ -133,6 +136,7 @@ def _assembly(
     patches: list[Patch],
     said: Sequence[str],
     force: str = "1000.0]       # N",
+    instead: Substitute = NONE,
 ) -> Imported:
     """Write the bodies and the case of a file's parts. force: end of the line of normal forces of
     the case."""
@@ -140,7 +144,9 @@ def _assembly(
     refuse_taken(home / "case.toml", *(part.body for part in parts))
     told: list[str] = []
     for number, (part, group) in enumerate(zip(parts, groups, strict=True)):
-        new = import_file(file, part.body.parent, unit, group, name=part.new_name)
+        new = import_file(
+            file, part.body.parent, unit, group, name=part.new_name, instead=instead
+        )
         told += new.told[:-1]
         add_lines(part, joint_lines(parts, number, patches, unit))
     shapes = [replace(shape_of(m, UNITS[unit]), points=_free(m, UNITS[unit])) for m in meshes]

@@ -9,7 +9,7 @@ import re
 import shlex
 import subprocess
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -22,6 +22,7 @@ from ..errors import UserError
 from ..files.store import ordinary, write_text
 from ..mesh import UNITS, mesh_problems, read_mesh, suffix_of, unit_of
 from ..mesh.chosen import of_instances
+from ..mesh.materials import NONE, STANDS, Substitute
 from ..mesh.raw import Unread, joined, refused
 from ..units import SYSTEMS, usual_system
 from .meshing import run_apart
@@ -60,6 +61,7 @@ def import_file(
     instances: Sequence[str] = (),
     report: Report = lambda _: None,
     name: str = "",
+    instead: Substitute = NONE,
 ) -> Imported:
     """Write a body.toml around a CAD file, a mesh or matrices; nothing is copied, the file is named where it lies.
 
@@ -67,7 +69,8 @@ def import_file(
         file: a CAD file, a mesh with or without materials, or the stiffness matrix of a pair. folder: of the new
             body.toml; by default one of the file's name here. unit: of its lengths; None: that which
             the file tells, else mm. instances: those of a deck that are the body, all if none.
-        name: of the body; the folder's if not given.
+        name: of the body; the folder's if not given. instead: of numbers that the file's materials lack, steel's where
+            it has none.
 
     Raises:
         UserError: unreadable, or there is a body.toml already.
@@ -84,7 +87,7 @@ def import_file(
     target = (folder or Path(name)) / "body.toml"
     refuse_taken(target)
     kind = suffix_of(file)
-    made = _matrices if kind in MATRICES else partial(_mesh, instances=instances)
+    made = _matrices if kind in MATRICES else partial(_mesh, instances=instances, instead=instead)
     if kind in CAD:
         made = partial(_cad, report=report)
     report(f"reading {file}")
@@ -135,6 +138,20 @@ def length_unit(unit: str | None, file: Path) -> str:
     return unit or unit_of(file) or "mm"
 
 
+def substitute(density: float | None, young: float | None, poisson: float | None) -> Substitute:
+    """What --density, --young and --poisson say.
+
+    Raises:
+        UserError: numbers that no material has.
+    """
+    for key, value, least, most in (
+        ("density", density, 0, np.inf), ("young", young, 0, np.inf), ("poisson", poisson, -1, 0.5),
+    ):  # fmt: skip
+        if value is not None and not least < value < most:
+            raise UserError(f"--{key} {value:g}: no material has that; it is in SI, as 7850, 2.1e11 and 0.3 of steel")
+    return Substitute(density, young, poisson)
+
+
 def refuse_taken(*new: Path) -> None:
     """Raise `UserError` of the first of new files that is there already."""
     for path in new:
@@ -182,22 +199,23 @@ def _sets(mesh: Mesh, held: bool = False) -> list[str]:
     return lines
 
 
-def _supports(mesh: Mesh) -> tuple[list[str], list[str]]:
-    """The file's own supports, as comments where they do not hold the body, and what to say of them."""
+def _supports(mesh: Mesh, holding: bool) -> tuple[list[str], list[str]]:
+    """The file's own supports, and what to say of them. holding: they leave no rigid motion."""
     told = [f"warning: not taken as a support: {text}" for text in mesh.not_held]
     if not mesh.supports:
         return [], told
-    lines, mark = ["", "# Held by the file itself:"], "" if _hold(mesh) else "#"
+    lines = ["", "# Held by the file itself:"]
     for name, directions in mesh.supports.items():
-        lines += [f"{mark}[[supports]]", f"{mark}face = {json.dumps(name)}"]
+        lines += ["[[supports]]", f"face = {json.dumps(name)}"]
         moves = "".join(c for c in directions if c in "xyz")
         turns = "".join("xyz"["abc".index(c)] for c in directions if c in "abc")
-        lines += [f'{mark}directions = "{moves}"'] if moves != "xyz" else []
-        lines += [f"{mark}rotations = {'true' if turns == 'xyz' else json.dumps(turns)}"] if turns else []
+        lines += [f'directions = "{moves}"'] if moves != "xyz" else []
+        lines += [f"rotations = {'true' if turns == 'xyz' else json.dumps(turns)}"] if turns else []
     named = ", ".join(f"{name} in {directions}" for name, directions in mesh.supports.items())
-    if mark:
-        lines[1] = "# Held by the file itself, but not against every rigid motion (then remove free = true at the top):"
-        return lines, [*told, f"warning: supports of the file: {named}; they do not hold the body: written as comments"]
+    if not holding:
+        lines[1] = "# Held by the file itself, but not against every rigid motion:"
+        named += "; they leave rigid motions, so the body floats (free = true)"
+        return lines, [*told, f"warning: supports of the file: {named}"]
     return lines, [*told, f"supports of the file: {named}"]
 
 
@@ -208,12 +226,12 @@ def _fixed(mesh: Mesh) -> Indices:
     return joined(3 * s + "xyz".index(c) for s, ways in held for c in ways if c in "xyz")
 
 
-def _count(mesh: Mesh, held: bool) -> int:
+def _count(mesh: Mesh) -> int:
     """How many modes are asked for: those of the sector at a nodal diameter have one cut face."""
     face = "" if mesh.sector is None else mesh.sector.faces[0]
     cut = 3 * len(mesh.set_points(face)) if face in {*mesh.faces, *mesh.point_sets} else 0
     ties = 0 if mesh.ties is None else mesh.ties.rows.shape[0]
-    fixed = len(np.unique(_fixed(mesh))) if held else 0
+    fixed = len(np.unique(_fixed(mesh)))
     return max(min(USUAL, 3 * mesh.n_points - fixed - cut - ties - 2), 1)
 
 
@@ -375,13 +393,18 @@ def _end(count: int = USUAL) -> list[str]:
     return ["", "[modes]", f"count = {count}", "", "[damping]", "ratio = 0.001"]
 
 
+STEEL = Substitute(7850.0, 2.1e11, 0.3)
+
+
 def _mesh(
-    file: Path, folder: Path, unit: str, instances: Sequence[str] = ()
+    file: Path, folder: Path, unit: str, instances: Sequence[str] = (), instead: Substitute = NONE
 ) -> tuple[list[str], list[str], Mesh]:
-    system = usual_system(unit)
+    system, asked = usual_system(unit), instead
+    numbers = {key: getattr(asked, key) or getattr(STEEL, key) for key in ("density", "young", "poisson")}
+    instead = Substitute(**numbers, whole=asked.young is not None)
     told = []
     try:
-        mesh = read_mesh(file, unit, system)
+        mesh = read_mesh(file, unit, system, instead=instead)
     except UserError as error:
         if isinstance(error.__cause__, Unread):  # steel in its place would be wrong
             raise
@@ -391,33 +414,44 @@ def _mesh(
     mesh = of_instances(mesh, instances) if instances else mesh
     mesh, ties = _tied(file, mesh)
     kinds = ", ".join(f"{len(c)} {t}" for t, c in mesh.cells.items())
-    told.insert(0, f"{file}: {mesh.n_points} points, {kinds}")
     again = [f"warning: {text}" for texts in mesh_problems(mesh) for text in texts]
-    told += again
+    lacking = [text for text in again if text.endswith(STANDS)]
+    told = [*lacking, *told, f"{file}: {mesh.n_points} points, {kinds}"]
+    told += [text for text in again if text not in lacking]
     told += [f"note: {text}" for text in mesh.remarks]
     told += [*ties, *((*joints, *_pressed(mesh)) if not instances else ())]
-    held, said = _supports(mesh)
+    holding = _hold(mesh)
+    held, said = _supports(mesh, holding)
     told += said
-    lines = [] if "[[supports]]" in held else ["free = true               # nothing is held yet"]
+    lines = [] if holding else ["free = true               # nothing holds it wholly yet"]
     lines += ["", "[geometry]", f"mesh = {_beside(file, folder)}"]
     lines += [f"instances = {json.dumps(list(instances))}"] if instances else []
     lines += ["", "[material]"]
     if mesh.materials:
         lines.append('from = "mesh"')
+        lines += _keys(numbers) if lacking else []
         lines += [f"# {m.name}: {m.density:.6g} kg/m3, C_xxxx {m.elasticity[0, 0]:.6g} Pa" for m in mesh.materials]
         told += [f"{m.name}: {m.density:.6g} kg/m3 in the units {system}" for m in mesh.materials]
     else:
-        lines += ["density = 7850.0          # the file brings no material that can be used: this is steel"]
-        lines += ["young = 2.1e11", "poisson = 0.3"]
-        told.append("warning: no material was taken from the file; body.toml says steel")
+        lines.append("# the file brings no material that can be used")
+        lines += _keys(numbers)
+        same = instead == replace(STEEL, whole=instead.whole)
+        text = "steel" if same else ", ".join(_keys(numbers))
+        text = f"warning: no material was taken from the file; body.toml says {text}"
+        told.insert(0, f"{text} (--density, --young, --poisson)")
     hot, said = _temperatures(mesh)
     ring, words = _cyclic(mesh, UNITS[unit])
     told += [*said, *words]
-    count = _count(mesh, "[[supports]]" in held)
+    count = _count(mesh)
     if count < USUAL:
         told.append(f"modes: {count} asked for, the body has few degrees of freedom")
     lines = [*_noted([text for text in told if text not in again]), *lines]
     return [*lines, *hot, *ring, *held, *_sets(mesh, bool(held)), *_end(count)], told, mesh
+
+
+def _keys(numbers: Mapping[str, float]) -> list[str]:
+    """Lines of [material]."""
+    return [f"{key} = {f'{value:.9g}'.replace('e+', 'e')}" for key, value in numbers.items()]
 
 
 def _noted(told: Sequence[str]) -> list[str]:

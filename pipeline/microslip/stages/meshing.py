@@ -22,6 +22,7 @@ from ..files import store
 from ..interrupts import look
 from ..mesh import mesh_problems, part_numbers, read_mesh
 from ..mesh.chosen import of_instances, with_parts
+from ..mesh.materials import Substitute
 from ..mesh.raw import in_file, refused
 from ..settings.body import FaceRule, MaterialSettings, implausible
 from ..units import SYSTEMS, usual_system
@@ -296,7 +297,8 @@ def _read_with_materials(job: Job, path: Path) -> tuple[Mesh, list[str]]:
     system = material.units or usual
     if system is None:
         raise UserError(f'with length_unit = "{unit}" it must be said; choose ' + ", ".join(SYSTEMS), "material.units")
-    mesh = read_mesh(path, unit, system, zero)
+    instead = Substitute(material.density, material.young, material.poisson)
+    mesh = read_mesh(path, unit, system, zero, instead)
     if not mesh.materials:
         raise refused(path, "brings no material; write density, young and poisson in [material]")
     return mesh, [] if material.unusual else [text for m in mesh.materials if (text := strange_material(m, system))]

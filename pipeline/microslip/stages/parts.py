@@ -19,6 +19,7 @@ from ..data import Array, Mesh
 from ..errors import UserError
 from ..files.store import ordinary, write_text
 from ..mesh import UNITS, boundary_facets, read_mesh
+from ..mesh.materials import NONE, Substitute
 from ..mesh.touching import touches
 from ..settings.toml import load_toml
 from .importing import (
@@ -92,7 +93,8 @@ class Patch:
 
 
 def import_parts(
-    files: Sequence[Path], folder: Path | None, unit: str | None, report: Report = lambda _: None
+    files: Sequence[Path], folder: Path | None, unit: str | None, report: Report = lambda _: None,
+    instead: Substitute = NONE,
 ) -> Imported:
     """Write a body.toml around each of several files, with its faces where it touches the others, and a case.toml.
 
@@ -118,7 +120,7 @@ def import_parts(
     for number, part in enumerate(parts):
         if not part.there:
             written = import_file(
-                part.file, part.body.parent, unit, report=report, name=part.new_name
+                part.file, part.body.parent, unit, report=report, name=part.new_name, instead=instead
             ).told[:-1]
             told += [text.splitlines()[0] for text in written]  # a table of surfaces stands in the body.toml as well
         add_lines(part, joint_lines(parts, number, patches, unit))
