@@ -20,7 +20,19 @@ from typing import Any
 import damper_study
 import numpy as np
 import scipy.linalg
-from pages import FILES, HERE, figure_states, file_reference, fill, modal_reference, play, public_reference, table, wall
+from pages import (
+    FILES,
+    HERE,
+    figure_states,
+    file_reference,
+    fill,
+    keywords,
+    modal_reference,
+    play,
+    public_reference,
+    table,
+    wall,
+)
 
 from microslip.basis import read_basis
 from microslip.case import CaseSettings, load_case, run_case
@@ -1085,24 +1097,14 @@ def force_picture(
 
 
 def own() -> None:
-    """Everything the page tells the reader to do, and what it looks like."""
+    """The keywords of decks; a bracket's surfaces and a mast's modes, as tutorials make them."""
+    fill("your_own_model.md", "keywords", keywords())
     folder = BUILD / "own"
-    folder.mkdir(parents=True, exist_ok=True)
-    shown = play("your_own_model.md", folder)
-    commands = {"import": "import bracket", "modes": "modes bracket", "two": "modes two", "mast": "modes mast"}
-    commands["joint"] = "import joint/joint.inp bolted"
-    for name, command in ((n, f"$ microslip {c}") for n, c in commands.items()):
-        part = next(p for p in shown.split("\n$ ") if f"$ {p}".startswith(command) or p.startswith(command))
-        fill("your_own_model.md", name, "```\n" + "\n".join(part.strip().splitlines()[1:]) + "\n```")
-    basis = read_basis(folder / "build" / "bracket" / "basis.h5")
-    save(from_file(folder / "bracket" / "surfaces.png"), "bracket_surfaces")
-    with_studio(basis, lambda s: save(views.mesh_picture(s), "bracket"))
-    with_studio(basis, lambda s: save(mode_sheet(s, (0, 1, 2, 3), 0.5), "bracket_modes"))
-    save(from_file(folder / "build" / "bracket" / "pictures" / "response.png"), "bracket_response")
-    upper = read_basis(folder / "build" / "Upper-Bolt" / "basis.h5")
-    with_studio(upper, lambda s: save(mode_sheet(s, (5, 6), 0.35), "joint", smooth=True))
-    save(from_file(folder / "build" / "bolted" / "pictures" / "response.png"), "joint_response")
-    mast = read_basis(folder / "build" / "mast" / "basis.h5")
+    for name in ("own_step", "matrices"):
+        (folder / name).mkdir(parents=True, exist_ok=True)
+        play(f"tutorials/{name}.md", folder / name)
+    save(from_file(folder / "own_step" / "bracket" / "surfaces.png"), "bracket_surfaces")
+    mast = read_basis(folder / "matrices" / "build" / "mast" / "basis.h5")
     save(picture(points_sheet, mast, mast.groups[0, 0], most=4), "mast_modes")
 
 

@@ -127,6 +127,22 @@ def typed(line: str, folder: Path) -> str:
     return f"$ {line}\n{done.stdout}"
 
 
+def keywords() -> str:
+    """Table of the keywords of decks, from the readers."""
+    from microslip.mesh import archive_links, archive_nodes, bdf, cdb, inp
+
+    def words(names: Any, mark: str = "") -> str:
+        return " ".join(f"`{mark}{name}`" for name in sorted({*names}))
+
+    ansys = {*cdb._BLOCKS, *cdb._COMMANDS, *archive_links.COMMANDS, *archive_nodes.COMMANDS}
+    rows = [
+        ["Abaqus, CalculiX", words({*inp.READERS, *inp._LINKING}, "*"), words(inp._REFUSED, "*")],
+        ["Ansys", words(ansys), words(cdb._NOT_READ)],
+        ["Nastran", words(bdf._READ), ""],
+    ]
+    return table(["deck", "read", "not read: refused or said"], rows)
+
+
 # references ---------------------------------------------------------------------------------------
 
 

@@ -1,10 +1,9 @@
-"""The bolted joint of docs/your_own_model.md: from an Abaqus deck to CalculiX's modes and a friction response."""
+"""The bolted joint of `drawn_joint`: from an Abaqus deck to CalculiX's modes and a friction response."""
 
 from __future__ import annotations
 
 import contextlib
 import io
-import re
 import subprocess
 import sys
 import tomllib
@@ -17,7 +16,7 @@ import pytest
 from microslip.basis import read_basis
 from microslip.cli import main
 
-PAGE = Path(__file__).parents[1] / "docs" / "your_own_model.md"
+DRAWN = Path(__file__).parent / "drawn_joint.py"
 
 # where the instances of the page stand, worked out by hand, mm
 PLACES = {
@@ -30,11 +29,8 @@ PLACES = {
 @pytest.fixture(scope="module")
 def joint(tmp_path_factory):
     folder = tmp_path_factory.mktemp("joint")
-    script = re.search(r"<!-- file draw_joint.py -->\n```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.S)
-    assert script
     (folder / "joint").mkdir()
-    (folder / "draw_joint.py").write_text(script[1])
-    subprocess.run([sys.executable, "draw_joint.py"], cwd=folder, check=True)
+    subprocess.run([sys.executable, DRAWN], cwd=folder, check=True)
     return folder
 
 
@@ -96,9 +92,7 @@ def modes(folder: Path, name: str) -> np.ndarray:
 
 
 def test_import_tells_what_a_deck_becomes(joint, told):
-    shown = re.search(r"<!-- table joint -->\n```\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.S)
-    assert shown
-    for line in shown[1].strip().splitlines():
+    for line in DRAWN.with_suffix(".txt").read_text().strip().splitlines():
         assert line in told, line
     case = tomllib.loads((joint / "bolted" / "case.toml").read_text())
     assert case["sweep"]["normal_forces"] == [800] and [c["friction"] for c in case["contacts"]] == [0.15, 0.15]

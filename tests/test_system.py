@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
-import subprocess
-import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -331,21 +328,6 @@ def test_a_read_out_that_nothing_moves_and_a_case_without_contacts(
     tops = {round(one["frequency_Hz"], 3) for one in json.loads(summary.read_text())["resonances"]}
     np.testing.assert_allclose(sorted(tops), omega / (2 * np.pi), rtol=1e-3)
     assert main(["respond", "three-masses", "--set", "damping_ratio=1.5", *few]) == 2
-
-
-@pytest.mark.slow
-def test_three_masses_of_the_page(tmp_path: Path) -> None:
-    """What the page shows is what its lines print."""
-    sys.path.insert(0, str(ROOT / "docs"))
-    import pages
-
-    text = next(s.text for s in pages.steps("your_own_model.md") if s.path == "three.py")
-    (tmp_path / "three.py").write_text(text)
-    environment = {**os.environ, "PYTHONPATH": str(ROOT / "pipeline")}
-    done = subprocess.run(
-        [sys.executable, "three.py"], cwd=tmp_path, env=environment, capture_output=True, text=True, check=True
-    )
-    assert done.stdout.strip() == pages.filled("your_own_model.md", "three").strip("`\n")
 
 
 # nonsense given in Python --------------------------------------------------------------------------------------------
