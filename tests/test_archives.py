@@ -148,7 +148,9 @@ def test_bonded_contact_is_a_tie(capsys):
     Path("c.cdb").write_text(ended(text, *lines[:4], *lines[5:], "MP,MU,3,0.15", *held))
     assert main(["import", "c.cdb"]) == 0
     said = capsys.readouterr().out
-    assert "contact of the real constants 3, frictional" in said
+    assert "contact of the real constants 3, frictional" in said and "77 mm2, friction 0.15" in said
+    case = tomllib.loads(Path("c/case.toml").read_text())
+    assert [b["name"] for b in case["bodies"]] == ["part-1", "part-2"]
 
 
 @pytest.mark.parametrize("mean", [False, True])
@@ -253,3 +255,20 @@ def test_dropped_mid_side_nodes_make_straight_edges(capsys):
 
 STRAIGHT = [1779.041, 2687.528, 12347.96, 15423.66]
 """Hz, CalculiX 2.20: the same mesh, each dropped node by *EQUATION the mean of its ends."""
+
+
+def test_import_ends_with_a_page_of_what_it_said(capsys):
+    """Every sentence stands there, warnings under what to do; the first frequencies with --modes."""
+    mesh = block()
+    lines = ["D,1,UX,0.5", "CEINTF,0.1", "CMSEL,S,X0", "D,ALL,ALL"]
+    Path("a.cdb").write_text(ended(archive(mesh, ("x0",)), *lines))
+    assert main(["import", "a.cdb", "--modes"]) == 0
+    said = capsys.readouterr().out.splitlines()
+    page = Path("a/import.html").read_text()
+    for line in said[:-2]:
+        words = line.removeprefix("warning: ").removeprefix("note: ")
+        assert words[1:].split("'")[0].split("  ")[0] in page, line
+    hertz = read_basis(Path("build/a/basis.h5")).groups[0, 0].frequency
+    assert f"{hertz[0]:.5g}" in page and page.count("data:image/") == 1
+    assert page.index("To do") < page.index("CEINTF") < page.rindex("What was taken")
+    assert sorted(p.name for p in Path("a").iterdir()) == ["body.toml", "import.html"]

@@ -38,6 +38,9 @@ HELD = {
     "blade": BOX.format("-1e3, -1e3, 120.0, 1e3, 1e3, 120.0"),
     "lap-a": BOX.format("0.0, 0.0, 0.0, 0.0, 30.0, 4.0"),
     "lap-b": BOX.format("200.0, 0.0, 4.0, 200.0, 30.0, 8.0"),
+    "lap": BOX.format("0.0, 0.0, 0.0, 0.0, 30.0, 4.0")
+    + "\n"
+    + BOX.format("200.0, 0.0, 4.0, 200.0, 30.0, 8.0").replace("held", "far"),
     "sector": '[[supports]]\nface = "bore"\n[cyclic]\nsectors = 12\nnodal_diameters = [2]\n'
     "[rotation]\naxis = [0.0, 1.0, 0.0]",
 }

@@ -14,13 +14,14 @@ import pytest
 from matplotlib.colors import LogNorm
 
 import microslip as ms
-from microslip.files.png import CURVES, text_in, with_text
+from microslip.files.png import CURVES, draw_beside, text_in, with_text
 from microslip.pictures.lettering import save_png
 from microslip.pictures.plots import empty_figure, panels, save_figure
 from microslip.pictures.touch import curves_of, tell_points
 from microslip.pictures.turning import MOST_VERTICES, Outside, Turned, outside, turned, turning_modes
 from microslip.reduced.coordinates import basis_in_modes
 from microslip.report.page import answer_page
+from microslip.stages.stage import Made, Stage
 
 
 def figure() -> tuple:
@@ -137,6 +138,32 @@ def test_harmonics_and_values_of_a_body_are_those_given_and_a_large_one_is_coars
         np.testing.assert_allclose(shape["most"] * size * numbers(part), factor * at, atol=2e-4)
     assert shape["high"] == pytest.approx(points[:, 0].max())
     assert shape["grown"] == pytest.approx(body["drawn"] * body["extent"] / size)
+
+
+@pytest.mark.parametrize(("kind", "name"), [("svg", "a.svg"), ("pdf", "a.pdf"), ("300dpi", "a_300dpi.png")])
+def test_curves_are_drawn_for_print_beside_and_go_with_their_picture(tmp_path: Path, kind: str, name: str) -> None:
+    """A second time to the last byte; the picture of the page stays as it is; the next answer clears them."""
+    from PIL import Image
+
+    plain = save_figure(figure()[0], tmp_path / "plain.png").read_bytes()
+    draw_beside(kind)
+    try:
+        pictures = [save_figure(figure()[0], tmp_path / end) for end in ("a.png", "b.png")]
+        (tmp_path / "p.json").write_text("{}")
+        stage = Stage(tmp_path / "p.json", ("errors",), force=True)
+        stage.make({}, lambda: Made(pictures))
+    finally:
+        draw_beside(None)
+    assert (tmp_path / "a.png").read_bytes() == plain
+    drawn = (tmp_path / name).read_bytes()
+    assert drawn == (tmp_path / name.replace("a", "b", 1)).read_bytes()
+    if kind == "300dpi":
+        assert Image.open(tmp_path / name).size == (1800, 1200)
+    else:
+        assert drawn[:5] in (b"<?xml", b"%PDF-")
+    stage.begin()
+    stage.make({"more": 1}, lambda: Made([pictures[1]]))
+    assert not (tmp_path / name).exists() and not (tmp_path / "a.png").exists()
 
 
 HOVER = """<script>

@@ -22,6 +22,7 @@ from cyclopts import App, CycloptsError, Parameter
 
 from . import __version__, interrupts
 from .errors import NotConverged, UserError
+from .files.png import draw_beside
 from .progress import announced, progress
 from .settings.meant import case_file, meant
 
@@ -70,6 +71,10 @@ Book = Annotated[bool, Parameter(show_default=False, help="in the book's mode to
 Short = Annotated[bool, Parameter(show_default=False, help="what fails, at its worst speed, and the verdict alone")]
 NoStress = Annotated[bool, Parameter(show_default=False, help="leave out the stresses of the response")]
 NoPictures = Annotated[bool, Parameter(show_default=False, help="leave out all pictures")]
+Figures = Annotated[
+    Literal["svg", "pdf", "300dpi"] | None,
+    Parameter(show_default=False, help="curves as vector graphics too, or as PNG of 300 dpi, beside the others"),
+]
 Everywhere = Annotated[
     bool, Parameter(show_default=False, help="stresses over the whole sweep, not at its resonances alone")
 ]
@@ -212,8 +217,8 @@ def modes(body: Path, /, *, output: Output = None, set_: Set = (), force: Force 
 
 @app.command
 def run(
-    path: Path, /, *, no_stress: NoStress = False, no_pictures: NoPictures = False, set_: Set = (),
-    force: Force = False, quiet: Quiet = False,
+    path: Path, /, *, no_stress: NoStress = False, no_pictures: NoPictures = False, figures: Figures = None,
+    set_: Set = (), force: Force = False, quiet: Quiet = False,
 ) -> None:  # fmt: skip
     """The whole chain of a body or a case: mesh, modal file, friction response, pictures, report.
 
@@ -229,6 +234,7 @@ def run(
     from .stages.running import run_body, run_case_file, run_system, unsolved
     from .stages.summary import frequency_lines
 
+    draw_beside(figures)
     if str(path) == "sample" and not path.exists():
         return respond(path, set_=set_, no_stress=no_stress, no_pictures=no_pictures, force=force, quiet=quiet)
     wanted = Wanted("none" if no_stress else "all", not no_pictures)
@@ -314,7 +320,8 @@ def _figure_of_the_book(file: Path) -> Path:
 def respond(
     case: Path, basis: Path | None = None, /, *, over: Over = None, set_: Set = (), log: Log = False,
     compare_book: Book = False, stability: Stability = False, all_stresses: Everywhere = False,
-    no_stress: NoStress = False, no_pictures: NoPictures = False, force: Force = False, quiet: Quiet = False,
+    no_stress: NoStress = False, no_pictures: NoPictures = False, figures: Figures = None, force: Force = False,
+    quiet: Quiet = False,
 ) -> None:  # fmt: skip
     """Friction response of a case on a modal file that is there already; needs neither gmsh nor VTK.
 
@@ -334,6 +341,7 @@ def respond(
     from .stages.response import Wanted, response_of_case
     from .stages.stage import folder_of_case
 
+    draw_beside(figures)
     case = case_file(case)
     if over is not None:
         _survey(case, basis, over.replace("-", "_"), set_, force, quiet)
@@ -399,8 +407,9 @@ def _tell(found: Written, quiet: bool, lost: str) -> None:
 
 @app.command
 def roll(
-    case: Path, /, *, no_pictures: NoPictures = False, set_: Set = (), force: Force = False, quiet: Quiet = False
-) -> None:
+    case: Path, /, *, no_pictures: NoPictures = False, figures: Figures = None, set_: Set = (), force: Force = False,
+    quiet: Quiet = False,
+) -> None:  # fmt: skip
     """A wheel on a rail, or any two bodies that roll on each other: patches, creep curve, tractions; with [vehicle] how
     unround wheels wear over their circumference, and which waves grow; a tyre whose slip jumps.
 
@@ -409,6 +418,7 @@ def roll(
     """
     from .stages.rolling import roll_stage
 
+    draw_beside(figures)
     case = case_file(case)
     with progress(f"roll {case}", quiet) as report:
         found = roll_stage(case, Path("build"), set_, force, report, not no_pictures)
@@ -417,8 +427,8 @@ def roll(
 
 @app.command
 def stability(
-    path: Path, /, *, speed: int | None = None, no_pictures: NoPictures = False, set_: Set = (), force: Force = False,
-    quiet: Quiet = False,
+    path: Path, /, *, speed: int | None = None, no_pictures: NoPictures = False, figures: Figures = None,
+    set_: Set = (), force: Force = False, quiet: Quiet = False,
 ) -> None:  # fmt: skip
     """Does it move by itself: all complex roots in a window of frequencies and growth rates, none missed.
 
@@ -430,6 +440,7 @@ def stability(
     from .stages.places import is_case
     from .stages.stability import stability_stage
 
+    draw_beside(figures)
     path = path if path.suffix == ".h5" else meant(path)
     if (path / "case.toml").is_file() and not (path / "body.toml").is_file():
         path = path / "case.toml"
@@ -526,7 +537,9 @@ def _say_seal(file: Path, quiet: bool) -> None:
 
 
 @app.command(name="import")
-def import_(file: Path, /, *more: Path, unit: str | None = None, apart: Apart = False) -> None:
+def import_(
+    file: Path, /, *more: Path, unit: str | None = None, apart: Apart = False, modes: bool = False
+) -> None:
     """Make a body.toml around a CAD file, a mesh or matrices, or a modal file from measured modes.
 
     Several CAD files, or several meshes, of parts that touch become an assembly: a body.toml each, with the faces where
@@ -538,8 +551,9 @@ def import_(file: Path, /, *more: Path, unit: str | None = None, apart: Apart = 
         more: the other parts of an assembly, and the folder of the new files, last; one of their names if not given.
             A part may be a folder with a body.toml that is there already.
         unit: of lengths; if not given what the file tells (/UNITS of Ansys, data set 164), else mm.
+        modes: compute them at once; the first frequencies stand on the page.
     """
-    from .stages.decks import import_apart, import_deck
+    from .stages.decks import import_apart, import_deck, with_modes
     from .stages.importing import CAD
     from .stages.parts import import_parts
 
@@ -554,6 +568,9 @@ def import_(file: Path, /, *more: Path, unit: str | None = None, apart: Apart = 
             made = import_deck(file, folder, unit, report)
         else:
             made = import_parts(parts, folder, unit, report)
+    if modes:
+        with progress(f"modes of {made.path.parent}") as report:
+            made = with_modes(made, report)
     for line in made.told:
         print(line)
 
@@ -819,9 +836,10 @@ def _verb(name: str, said: Verb) -> Callable[..., None]:
     """The command of an analysis."""
 
     def verb(
-        case: Path, basis: Path | None = None, /, *, no_pictures: NoPictures = False, set_: Set = (),
-        force: Force = False, quiet: Quiet = False, **keys: tuple[str, ...],
+        case: Path, basis: Path | None = None, /, *, no_pictures: NoPictures = False, figures: Figures = None,
+        set_: Set = (), force: Force = False, quiet: Quiet = False, **keys: tuple[str, ...],
     ) -> None:  # fmt: skip
+        draw_beside(figures)
         given = {key: values[0] if len(values) == 1 else json.dumps(values) for key, values in keys.items() if values}
         more = [f"{name}.{key}={value}" for key, value in given.items()]
         _analyse(name, said.name, case_file(case), basis, no_pictures, [*set_, *more], force, quiet)
@@ -854,6 +872,7 @@ def main(words: list[str] | None = None) -> int:
     """Run the command line and return the exit code: 0, 1, 2 or 130, see the top of this file."""
     _plain_where_needed()
     logging.getLogger("matplotlib").setLevel(logging.ERROR)  # it warns of a home without a place for its fonts
+    draw_beside(None)
     try:
         with announced(sys.argv[1:] if words is None else words, _expected):
             app(words, exit_on_error=False, print_error=False, result_action="return_value")

@@ -4,6 +4,13 @@ from __future__ import annotations
 
 import struct
 import zlib
+from contextvars import ContextVar
+from pathlib import Path
+
+BESIDE: ContextVar[str] = ContextVar("beside", default="")
+"""``svg``, ``pdf`` or ``300dpi``: pictures of curves are drawn so too, beside the PNG; nothing else."""
+
+_ENDS = {"svg": ".svg", "pdf": ".pdf", "300dpi": "_300dpi.png"}
 
 CURVES = "microslip curves"
 """Key of the curves of a picture, JSON for plotly."""
@@ -16,6 +23,17 @@ _PRIVATE = b"msLp"
 
 _SIGNATURE, _END = 8, 12
 """Bytes of the first and of the last part of a PNG file."""
+
+
+def draw_beside(kind: str | None) -> None:
+    """Set `BESIDE` from here on."""
+    BESIDE.set(kind or "")
+
+
+def beside(picture: Path) -> list[Path]:
+    """The file that is drawn beside a picture, if one is."""
+    kind = BESIDE.get()
+    return [picture.with_name(f"{picture.stem}{_ENDS[kind]}")] if kind else []
 
 
 def with_text(png: bytes, key: str, text: str) -> bytes:

@@ -8,12 +8,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from ..data import Array, AverageLink, Equation, FaceTie, Indices, Joint, Link, RigidLink, Sector
 from .archive import Archive, Element, Ring, whole
-from .raw import Damaged, Numbering, RawMesh, is_number, lost, real
+from .raw import Damaged, Numbering, RawMesh, is_number, joined, real
 from .supports import add_supports, in_axes
 from .systems import System
 
@@ -328,69 +329,93 @@ _STATES = {"1": "rough", "2": "no separation", "4": "no separation"}
 _BONDED = ("3", "5", "6")
 
 
+@dataclass
+class _Pair:
+    """Contact elements and their targets of one set of real constants."""
+
+    number: int
+    contact: list[Element] = field(default_factory=list)
+    target: list[Element] = field(default_factory=list)
+
+    @property
+    def where(self) -> str:
+        first = [*self.contact, *self.target][0]
+        place = first.where or f"element {first.number}"
+        return f"{place}: contact of the real constants {self.number}"
+
+    def nodes(self) -> tuple[set[int], set[int]]:
+        """Numbers of the nodes of either side."""
+        sides = (self.contact, self.target)
+        one, other = ({n for element in side for n in element.nodes if n} for side in sides)
+        return one, other
+
+
+_LEFT_OUT = {
+    "which lack their other side": "they join nothing",
+    "on what is no solid": "nothing of them is taken, and what they join falls apart; mesh it with solids, or hold "
+    "what is loose by [[supports]]",
+    "against what is no solid": "their nodes move freely; hold them by [[supports]] or make [[interfaces]] of them",
+    "which say what others say from the other side": "they are taken once",
+}
+"""Kind of pairs that are not taken -> what follows."""
+
+
 def _pairs(archive: Archive, raw: RawMesh, numbering: Numbering) -> list[Link]:
     """Ties, remote points and joints of contact elements; what is neither is told."""
-    sides: dict[int, tuple[list[Element], list[Element]]] = {}
+    pairs: dict[int, _Pair] = {}
     for element in archive.elements:
         kind = archive.kinds.get(element.kind, 0)
         if kind in CONTACTS | TARGETS:
-            sides.setdefault(element.real, ([], []))[kind in TARGETS].append(element)
-    used = np.unique(
-        np.concatenate([np.zeros(0, dtype=np.int64), *(b.ravel() for _, b in raw.blocks)])
-    )
-    solid, found = set(raw.node_id[used].tolist()), list[Link]()
-    for number, (contact, target) in sides.items():
-        found += _pair(archive, raw, numbering, number, contact, target, solid)
+            pair = pairs.setdefault(element.real, _Pair(element.real))
+            (pair.target if kind in TARGETS else pair.contact).append(element)
+    used = np.unique(joined(nodes.ravel() for _, nodes in raw.blocks))
+    solid, found, left = set(raw.node_id[used].tolist()), list[Link](), dict[str, list[_Pair]]()
+    taken: list[tuple[set[int], set[int]]] = []
+    for pair in pairs.values():
+        members, others = pair.nodes()
+        options = archive.options.get(pair.contact[0].kind, {}) if pair.contact else {}
+        bonded = options.get(12, "0") in _BONDED
+        pilots = {e.nodes[0] for e in pair.target if len({*e.nodes} - {0}) == 1}
+        if not members or not others:
+            left.setdefault("which lack their other side", []).append(pair)
+        elif not solid.issuperset(members):
+            left.setdefault("on what is no solid", []).append(pair)
+        elif len(pilots) == 1 and bonded:
+            found.append(_remote(archive, raw, numbering, pair, min(pilots)))
+        elif not solid.issuperset(others):
+            left.setdefault("against what is no solid", []).append(pair)
+        elif any(members & b and others & a for a, b in taken):
+            left.setdefault("which say what others say from the other side", []).append(pair)
+        else:
+            taken.append((members, others))
+            found += _faced(archive, raw, numbering, pair, options.get(12, "0"))
+    for why, several in left.items():
+        counts = [
+            sum(map(len, side))
+            for side in zip(*((p.contact, p.target) for p in several), strict=True)
+        ]
+        more = f" and {len(several) - 1} pairs more" if len(several) > 1 else ""
+        which = f"{several[0].where}{more} ({counts[0]} contact and {counts[1]} target elements)"
+        said = archive.remarks if "other side" in why else archive.lost
+        said.append(f"{which}, {why}: {_LEFT_OUT[why]}")
     return found
 
 
-def _pair(
-    archive: Archive, raw: RawMesh, numbering: Numbering, number: int, contact: list[Element],
-    target: list[Element], solid: set[int],
-) -> Iterator[Link]:  # fmt: skip
-    """A pair; the number is that of its real constants. solid: numbers of the nodes that cells use."""
-    every = [*contact, *target]
-    place = every[0].where or f"element {every[0].number}"
-    size = f"{len(contact)} contact and {len(target)} target elements"
-    where = f"{place}: contact of the real constants {number}"
-    options = archive.options.get(contact[0].kind, {}) if contact else {}
-    state = options.get(12, "0")
-    members = sorted({n for e in contact for n in e.nodes if n})
-    pilots = {e.nodes[0] for e in target if len({*e.nodes} - {0}) == 1}
-    if not contact or not target:
-        archive.lost.append(lost(f"{where} ({size}), which lacks the other side", "it"))
-    elif not solid.issuperset(members):
-        text = f"{where} ({size}) lies on what is no solid: nothing of it is taken, what it joins falls apart"
-        archive.lost.append(text)
-    elif len(pilots) == 1 and state in _BONDED:
-        yield _remote(
-            archive,
-            raw,
-            numbering,
-            where,
-            contact,
-            members,
-            min(pilots),
-            archive.options.get(target[0].kind, {}).get(4, "0"),
-        )
-    elif not solid.issuperset({n for e in target for n in e.nodes if n}):
-        archive.lost.append(
-            f"{where} ({size}) stands against a target that is no solid: these nodes move freely; hold them "
-            "by [[supports]] or make an [[interfaces]] of them"
-        )
-    else:
-        parts = {"contact": contact, "target": target}
-        names = [_facets(raw, numbering, f"{side} {number}", own) for side, own in parts.items()]
-        if state in _BONDED:
-            text = "is bonded: tied, where Ansys has stiff springs (FKN) or a tie (MPC)"
-            archive.remarks.append(f"{where} ({size}) {text}")
-            yield FaceTie(where, names[0], names[1])
-        else:
-            mu = archive.constants.get(contact[0].material, {}).get("MU", {})
-            said = _STATES.get(state, "frictional" if mu else "frictionless")
-            raw.joints.append(
-                Joint(f"{where}, {said}", names[0], names[1], mu[min(mu)] if mu else None)
-            )
+def _faced(
+    archive: Archive, raw: RawMesh, numbering: Numbering, pair: _Pair, state: str
+) -> Iterator[Link]:
+    """A pair of faces of solids: the tie of a bonded one; another is a joint of `raw`."""
+    parts = {"contact": pair.contact, "target": pair.target}
+    names = [_facets(raw, numbering, f"{side} {pair.number}", own) for side, own in parts.items()]
+    if state in _BONDED:
+        text = "is bonded: tied, where Ansys has stiff springs (FKN) or a tie (MPC)"
+        archive.remarks.append(f"{pair.where} {text}")
+        yield FaceTie(pair.where, names[0], names[1])
+        return
+    mu = archive.constants.get(pair.contact[0].material, {}).get("MU", {})
+    said = _STATES.get(state, "frictional" if mu else "frictionless")
+    friction = mu[min(mu)] if mu else None
+    raw.joints.append(Joint(f"{pair.where}, {said}", names[0], names[1], friction))
 
 
 def _facets(raw: RawMesh, numbering: Numbering, name: str, elements: list[Element]) -> str:
@@ -411,29 +436,24 @@ def _facets(raw: RawMesh, numbering: Numbering, name: str, elements: list[Elemen
     return name
 
 
-def _remote(
-    archive: Archive, raw: RawMesh, numbering: Numbering, where: str, contact: list[Element],
-    members: list[int], pilot: int, digits: str,
-) -> Link:  # fmt: skip
+def _remote(archive: Archive, raw: RawMesh, numbering: Numbering, pair: _Pair, pilot: int) -> Link:
     """A pilot node that leads the nodes of a surface, or follows them in the mean (by areas).
 
-    Args:
-        digits: KEYOPT(4) of the target, 1 for each of ROTZ, ROTY, ROTX, UZ, UY, UX that is tied; 0: all.
+    KEYOPT(4) of the target has a digit for each of ROTZ, ROTY, ROTX, UZ, UY, UX, 1 where it is tied; 0: all.
     """
+    first = pair.contact[0]
+    digits = archive.options.get(pair.target[0].kind, {}).get(4, "0")
     tied = digits.rjust(6, "0")[::-1] if int(digits or 0) else "111111"
     ways = "".join(way for way, digit in zip("xyzabc", tied, strict=True) if digit == "1")
-    options, kind = archive.options.get(contact[0].kind, {}), archive.kinds[contact[0].kind]
+    where = f"{pair.where}, pilot node {pilot}"
     reference = int(numbering.positions([pilot], f"{where} names")[0])
-    nodes: Indices = numbering.positions(members, f"{where} names")
-    mean = options.get(4, "0") == "1"  # KEYOPT(4) of any contact element: forces are spread
-    number, where = where.rsplit(" ", 1)[1], f"{where}, pilot node {pilot}"
-    if not mean:
+    nodes: Indices = numbering.positions(sorted(pair.nodes()[0]), f"{where} names")
+    if archive.options.get(first.kind, {}).get(4, "0") != "1":
         return RigidLink(where, reference, nodes, "".join(w for w in ways if w in "xyz"))
-    if kind in (175, 177):
+    if archive.kinds[first.kind] in (175, 177):
         return AverageLink(where, reference, nodes, np.ones(len(nodes)), ways)
-    return AverageLink(
-        where, reference, _facets(raw, numbering, f"contact {number}", contact), None, ways
-    )
+    face = _facets(raw, numbering, f"contact {pair.number}", pair.contact)
+    return AverageLink(where, reference, face, None, ways)
 
 
 COMMANDS = {

@@ -125,10 +125,11 @@ def sector_of(deck: Deck) -> tuple[Sector | None, list[str]]:
     """
     models = deck.linking(MODEL)
     ties = [card for card in deck.linking("TIE") if "CYCLIC SYMMETRY" in card.parameters]
-    if len(models) != 1:
-        return None, [
-            lost(card.where, f"*{card.keyword} of CYCLIC SYMMETRY") for card in [*models, *ties]
-        ]
+    if len(models) > 1:
+        text = f"*{MODEL} is there {len(models)} times: a multistage model is not read"
+        raise Damaged(f"{text}; write a deck of each stage and import these", file=models[1].place)
+    if not models:
+        return None, [lost(card.where, f"*{card.keyword} of CYCLIC SYMMETRY") for card in ties]
     (model,) = models
     named, sectors = model.word("TIE"), model.text("N")
     chosen = [tie for tie in ties if named in ("", tie.word("NAME"))]
@@ -151,6 +152,16 @@ def sector_of(deck: Deck) -> tuple[Sector | None, list[str]]:
     first, last = (
         int(word) if is_number(word) else None for word in map(picked.text, ("NMIN", "NMAX"))
     )
-    diameters = () if last is None else tuple(range(first or 0, min(last, int(sectors) // 2) + 1))
+    diameters = (
+        ()
+        if last is None
+        else tuple(
+            range(
+                first or 0,
+                min(last, int(sectors) // 2) + 1,
+                2 if "EVEN" in picked.parameters else 1,
+            )
+        )
+    )
     where = f"{model.where}: *{MODEL}"
     return Sector(where, int(sectors), (one, other), tuple(axis), tuple(ends[:3]), diameters), []

@@ -12,7 +12,7 @@ from typing import IO, TYPE_CHECKING, Any, TypeVar
 import numpy as np
 
 from ..data import Array, ContactState, ModalBasis, ModalGroup
-from ..files.png import CURVES, with_text
+from ..files.png import CURVES, beside, with_text
 from ..files.store import complete_or_absent
 from ..reduced.truncation import Coordinate, coordinates, percent
 from ..results.checks import UNCERTAIN
@@ -65,9 +65,16 @@ def save(draw: Callable[[Figure], object], path: Path) -> Path:
 
 
 def save_figure(figure: Figure, path: Path) -> Path:
-    """As PNG, complete or absent, without a date in it."""
+    """As PNG, complete or absent, without a date in it; and as `files.png.BESIDE` has it."""
     with complete_or_absent(path) as temporary:
         write_png(figure, temporary)
+    from matplotlib import rc_context
+
+    for place in beside(path):
+        kind = place.suffix[1:]
+        nameless = {"svg": {"Date": None}, "pdf": {"CreationDate": None}, "png": {"Software": None}}
+        with complete_or_absent(place) as temporary, rc_context({"svg.hashsalt": "microslip"}):
+            figure.savefig(temporary, format=kind, metadata=nameless[kind], dpi=300)
     return path
 
 

@@ -16,6 +16,7 @@ from ..case.assemble import Built, build
 from ..data import ModalBasis
 from ..errors import UserError
 from ..files import store
+from ..files.png import BESIDE
 from ..files.tables import columns_csv
 from ..pictures.plots import empty_figure, save, save_figure
 from ..report.page import answer_page
@@ -78,7 +79,7 @@ def made(
         stage.begin()
         return written(answer, stage.product.stem, stage.product.parent, title, pictures, case)
 
-    found = answered(stage, {**inputs, "pictures": pictures}, work)
+    found = answered(stage, {**inputs, "pictures": pictures and (BESIDE.get() or True)}, work)
     points.unlink(missing_ok=True)
     return found
 

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ..basis import read_basis
 from ..data import Array, Indices, Joint, Mesh
 from ..errors import UserError
 from ..files.store import ordinary
@@ -18,7 +19,17 @@ from ..mesh.cards import files_of
 from ..mesh.chosen import bodies, of_instances, with_parts
 from ..mesh.raw import joined
 from ..mesh.touching import touch_of, touching_facets
-from .importing import CAD, Imported, body_name, import_file, length_unit, refuse_taken
+from .importing import (
+    CAD,
+    Imported,
+    body_name,
+    import_file,
+    length_unit,
+    refuse_taken,
+    with_page,
+)
+from .job import open_job
+from .modal import modes_stage
 from .parts import (
     Part,
     Patch,
@@ -32,18 +43,20 @@ from .parts import (
     with_names,
 )
 from .stage import Report
+from .summary import frequency_lines
 
 
 def import_deck(
     file: Path, folder: Path | None, unit: str | None, report: Report = lambda _: None
 ) -> Imported:
-    """Import a file; a deck whose *CONTACT PAIRs separate bodies becomes an assembly.
+    """Import a file; a deck whose contact pairs separate bodies becomes an assembly.
 
     Raises:
         UserError: unreadable files, files that are there already.
     """
-    deck = [f.read_bytes() for f in files_of(file) if f.is_file()] if suffix_of(file) == ".inp" else []
-    if not any(map(PAIR.search, deck)):
+    pattern = PAIRS.get(suffix_of(file))
+    deck = [f.read_bytes() for f in files_of(file) if f.is_file()] if pattern else []
+    if pattern is None or not any(map(pattern.search, deck)):
         return import_file(file, folder, unit, report=report)
     unit = length_unit(unit, file)
     mesh = read_mesh(file, unit)
@@ -51,13 +64,28 @@ def import_deck(
     joints, told = _between_bodies(mesh, groups)
     if not joints:
         made = import_file(file, folder, unit, report=report)
-        return Imported(made.path, (*made.told[:-1], *told, made.told[-1]))
+        made = replace(made, told=(*made.told[:-1], *told, made.told[-1]))
+        return with_page(made) if told and made.mesh is not None else made
     meshes = [of_instances(mesh, group) for group in groups]
     patches = list(_patches(joints, meshes, UNITS[unit]))
     pairs = zip(patches, joints, strict=True)
     said = [*told, *(_sentence(groups, patch, joint, unit) for patch, (joint, _) in pairs)]
     force, texts = _pressed(mesh)
     return _assembly(file, folder, unit, groups, meshes, patches, [*said, *texts], force)
+
+
+def with_modes(made: Imported, report: Report = lambda _: None) -> Imported:
+    """Solve for the modes of an imported body at once: a line of frequencies, told and on its page.
+
+    Raises:
+        UserError, NotConverged: see `modes_stage`; the body.toml stays.
+    """
+    if made.path.name != "body.toml":
+        return made  # several bodies, or modes that are there already
+    path, _ = modes_stage(open_job(made.path), report=report)
+    lines = frequency_lines(read_basis(path))
+    made = replace(made, told=(*made.told[:-1], *lines, made.told[-1]))
+    return made if made.mesh is None else with_page(made, lines)
 
 
 def import_apart(
@@ -128,7 +156,11 @@ def _free(mesh: Mesh, metres: float) -> Array:
     return mesh.points[free if len(free) else surface] / metres
 
 
-PAIR = re.compile(rb"^\s*\*\s*CONTACT\s+PAIR", re.IGNORECASE | re.MULTILINE)
+PAIRS = {
+    ".inp": re.compile(rb"^\s*\*\s*CONTACT\s+PAIR", re.IGNORECASE | re.MULTILINE),
+    ".cdb": re.compile(rb"^\s*ET\s*,.*17[1-57]\s*($|!|,)|^ETBLOCK", re.IGNORECASE | re.MULTILINE),
+}
+"""Suffix -> what stands in decks that may have faces in contact."""
 
 
 Ends = tuple[int, int]

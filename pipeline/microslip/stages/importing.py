@@ -10,7 +10,7 @@ import shlex
 import subprocess
 import tempfile
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
@@ -41,10 +41,16 @@ KINDS = {
 
 @dataclass(frozen=True)
 class Imported:
-    """The body file that was written, and what to say of it."""
+    """The body file that was written, and what to say of it.
+
+    Attributes:
+        mesh: of the file, for its page; None of CAD files, matrices, measured modes and assemblies.
+    """
 
     path: Path
     told: tuple[str, ...]
+    file: Path | None = None
+    mesh: Mesh | None = None
 
 
 def import_file(
@@ -84,12 +90,38 @@ def import_file(
     report(f"reading {file}")
     if made is _matrices and _in_metres(file):
         unit = "m"
-    lines, told = made(file, target.parent, unit)
+    mesh: Mesh | None
+    lines, told, mesh = (*made(file, target.parent, unit), None)[:3]
     head = [f'name = "{name}"', f'length_unit = "{unit}"']
     write_text(target, "\n".join([*head, *lines]) + "\n")
     missing = "interfaces" if "[[supports]]" in lines else "supports, interfaces"
     last = f"{target}: ready. Add {missing} and loads, then: microslip run {shlex.quote(str(target.parent))}"
-    return Imported(target, (*told, last))
+    found = Imported(target, (*told, last), file, mesh)
+    return found if mesh is None else with_page(found)
+
+
+def with_page(imported: Imported, modes: Sequence[str] = ()) -> Imported:
+    """The same with its page beside the body.toml: what the file holds, what was taken, what is left to do.
+
+    Args:
+        modes: lines of the first frequencies among what was told, if there are some.
+    """
+    from ..report.imported import import_page, marked_faces
+
+    assert imported.file is not None and imported.mesh is not None
+    folder, drawn = imported.path.parent, None
+    with contextlib.suppress(ImportError):
+        from ..pictures.sketch import body_sketch
+
+        drawn = body_sketch(imported.mesh, marked_faces(imported.mesh), folder / "import.png")
+    page = str(folder / "import.html")
+    told = [text for text in imported.told[:-1] if not text.startswith(page)]
+    said = [text for text in told if text not in modes]
+    text = import_page(imported.file, imported.mesh, said, drawn, modes, str(imported.path))
+    write_text(folder / "import.html", text)
+    if drawn is not None:
+        drawn.unlink()  # it is in the page
+    return replace(imported, told=(*told, f"{page}: the same as a page", imported.told[-1]))
 
 
 def length_unit(unit: str | None, file: Path) -> str:
@@ -343,7 +375,9 @@ def _end(count: int = USUAL) -> list[str]:
     return ["", "[modes]", f"count = {count}", "", "[damping]", "ratio = 0.001"]
 
 
-def _mesh(file: Path, folder: Path, unit: str, instances: Sequence[str] = ()) -> tuple[list[str], list[str]]:
+def _mesh(
+    file: Path, folder: Path, unit: str, instances: Sequence[str] = ()
+) -> tuple[list[str], list[str], Mesh]:
     system = usual_system(unit)
     told = []
     try:
@@ -383,7 +417,7 @@ def _mesh(file: Path, folder: Path, unit: str, instances: Sequence[str] = ()) ->
     if count < USUAL:
         told.append(f"modes: {count} asked for, the body has few degrees of freedom")
     lines = [*_noted([text for text in told if text not in again]), *lines]
-    return [*lines, *hot, *ring, *held, *_sets(mesh, bool(held)), *_end(count)], told
+    return [*lines, *hot, *ring, *held, *_sets(mesh, bool(held)), *_end(count)], told, mesh
 
 
 def _noted(told: Sequence[str]) -> list[str]:

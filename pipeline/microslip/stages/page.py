@@ -9,6 +9,7 @@ from typing import Any
 from ..basis import read_basis
 from ..data import ModalBasis
 from ..files import store
+from ..files.png import BESIDE
 from ..ring.resonances import resonance_csv, resonances, speeds_of
 from .job import Job
 from .modal import warnings_of
@@ -48,7 +49,7 @@ def report_stage(
         "response": response,
         "engine_orders": engine_orders,
         "messages": list(messages),
-        "pictures": draw,
+        "pictures": draw and (BESIDE.get() or True),
     }
     stage.make(inputs, work)
     return stage.product

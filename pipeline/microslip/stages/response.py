@@ -7,7 +7,7 @@ import importlib.util
 import json
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -24,6 +24,7 @@ from ..case.settings import FIRST_HARMONICS
 from ..data import Array, ModalBasis
 from ..errors import UserError, in_its_file
 from ..files import store
+from ..files.png import BESIDE
 from ..files.tables import rows_csv, write_tables
 from ..harmonic_balance.response import HarmonicResponse
 from ..harmonic_balance.sweeps import overhanging
@@ -49,10 +50,12 @@ class Wanted:
     Attributes:
         stresses: of the body that is watched, where its modal file holds stress modes: at ``all`` points, so that they
             can be drawn over the frequency, at the ``resonances``, or ``none``. pictures: whether any.
+        beside: what else curves are drawn as, see `files.png.BESIDE`.
     """
 
     stresses: Literal["all", "resonances", "none"] = "all"
     pictures: bool = True
+    beside: str = field(default_factory=BESIDE.get)
 
 
 ALL = Wanted()
@@ -78,7 +81,7 @@ def response_stage(
         settings, raw = load_case(case_path, assignments)
         inputs = inputs_of(raw, settings, files)
         more = {"wanted": asdict(ALL)}  # what is there with all that can be made will do
-        if wanted == ALL or not stage.is_made(inputs | more):
+        if wanted == ALL or wanted.beside or not stage.is_made(inputs | more):
             more = {"wanted": asdict(wanted)}
         stage.make(inputs | more, lambda: _work(stage, settings, raw, files, wanted))
         summary = json.loads(stage.product.read_text())

@@ -17,6 +17,7 @@ from typing import Any
 
 from ..errors import UserError
 from ..files import store
+from ..files.png import beside
 from ..progress import Report
 from ..settings.toml import load_toml
 
@@ -76,7 +77,8 @@ class Stage:
             self._refuse_another()
             made = work()
             if made.whole:
-                files = [*made.files]
+                pictures = [path for path in made.files if path.suffix == ".png"]
+                files = [*made.files, *(f for path in pictures for f in beside(path) if f.is_file())]
                 self.clear([self.product, *files])
                 note = {**made.note, **self.origin_noted()}
                 store.note_product(self.product, all_inputs, files, made.opened, **note)
