@@ -295,15 +295,16 @@ def test_a_distributing_coupling_weighs_by_area_or_by_its_numbers(tmp_path):
 
 
 def test_what_counts_and_is_not_read_is_a_warning_with_its_line(tmp_path, monkeypatch, capsys):
-    lines = ["*ELEMENT, TYPE=MASS, ELSET=M", "900, 1", "*MASS, ELSET=M", "0.1", "*EMBEDDED ELEMENT", "EALL"]
+    lines = ["*EMBEDDED ELEMENT", "EALL"]
     lines += ["*INITIAL CONDITIONS, TYPE=STRESS", "EALL, 1., 0., 0., 0., 0., 0."]
     (tmp_path / "part.inp").write_text("\n".join([*base(), *lines, "*CLOAD", "1, 1, 2."]) + "\n")
     monkeypatch.chdir(tmp_path)
     assert main(["import", "part.inp"]) == 0
     told = [line for line in capsys.readouterr().out.splitlines() if "frequencies will differ" in line]
     assert [line.split(": ")[2].split(" is not")[0] for line in told] == [
-        "*ELEMENT, TYPE=MASS", "*MASS", "*EMBEDDED ELEMENT", "*INITIAL CONDITIONS, TYPE=STRESS",
-    ]  # fmt: skip
+        "*EMBEDDED ELEMENT",
+        "*INITIAL CONDITIONS, TYPE=STRESS",
+    ]
     assert all(line.startswith("warning: part.inp, line ") for line in told)
 
 

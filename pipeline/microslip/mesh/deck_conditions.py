@@ -96,7 +96,9 @@ def local_supports(deck: Deck, numbering: Numbering) -> list[Link]:
     links: list[Link] = []
     for word, directions, place in deck.held:
         ways = ["xyz".index(c) for c in directions if c in "xyz"]
-        turned = [node for node in deck.nodes_for("*BOUNDARY", word).tolist() if node in deck.axes]
+        with of_file(place):
+            nodes = deck.nodes_for("*BOUNDARY", word)
+        turned = [node for node in nodes.tolist() if node in deck.axes]
         for node in turned if len(ways) < 3 else ():
             at = np.repeat(numbering.positions(np.array([node]), "*BOUNDARY names"), 3)
             where = f"{Path(place).name}: *BOUNDARY, local"

@@ -471,9 +471,9 @@ def _mesh(
     count = _count(mesh)
     if count < USUAL:
         told.append(f"modes: {count} asked for, the body has few degrees of freedom")
-    lines = [*_noted([text for text in told if text not in again]), *lines]
     turning, loads, words = _state(mesh, UNITS[unit], bool(ring), holding)
     told += words
+    lines = [*_noted([text for text in told if text not in again]), *lines]
     ring = [*ring[:4], *turning, *ring[4:]] if ring or turning else []
     kept, words = _retained(mesh)
     told += words
