@@ -19,7 +19,7 @@ from microslip.fem.discretise import discretise, free_upper
 from microslip.frames import skew
 from microslip.linalg import eigen
 from microslip.mesh import boundary_facets
-from microslip.modal.boundary import fixed_dofs, with_dead_loads
+from microslip.modal.boundary import fixed_dofs, with_loads
 from microslip.modal.equilibrium import BodyModel, StaticState, equilibrium, make_model
 from microslip.settings.body import BodySettings
 
@@ -207,7 +207,7 @@ def matrices(mesh: Mesh, settings: BodySettings, speed: float = 0.0) -> Matrices
         d, settings.material.material(), free, fixed, np.array(rotation.axis), np.array(rotation.point), None, 293.15,
         np.zeros((mesh.n_points, 3)), rotation.spin_softening,
     )  # fmt: skip
-    model = with_dead_loads(model, mesh, settings)
+    model = with_loads(model, mesh, settings, fixed)
     solver = eigen.new_solver("superlu")
     state = equilibrium(model, speed, rotation.prestress, solver)
     dofs = free.free

@@ -145,7 +145,7 @@ MISTAKES: list[tuple[dict[str, Any], str]] = [
     ({"name": "../up"}, "name: must begin with a letter or digit"),
     ({"name": "x" * 65}, "name: must have at most 64 characters"),
     ({"loads": [{"kind": "pressure", "face": "tip"}]}, "loads.tip: a pressure needs face and value"),
-    ({"loads": [{"kind": "wind"}]}, "loads.0.kind: must be 'gravity', 'pressure' or 'force'"),
+    ({"loads": [{"kind": "wind"}]}, "loads.0.kind: must be 'gravity', 'pressure', 'force' or 'mesh'"),
     ({"loads": [{"kind": "force", "face": "a", "point": [0, 0, 0], "vector": [0, 0, 1]}]}, "a force needs vector (N)"),
     ({"mesh": {"size": 0.0}}, "mesh.size: must be greater than 0"),
     ({"mesh": {"order": 3}}, "mesh.order: must be 1 or 2"),

@@ -298,7 +298,7 @@ MISTAKES = [
     (["check", "empty"], "empty: is a folder without a modal file"),
     (["check", "box"], "box: holds a body, not its modal file"),
     (["modes", "meshes/box.msh"], "microslip import meshes/box.msh"),
-    (["modes", "box", "--set", "material.from=mesh"], "density, young, poisson cannot stand beside from"),
+    (["modes", "box", "--set", "material.from=mesh"], "name cannot stand beside density, young, poisson, from"),
     (["check", "bad.toml"], "bad.toml"),
     (["check", "zero.h5"], "zero.h5"),
     (["check", "other.h5"], "other.h5"),

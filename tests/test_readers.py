@@ -285,12 +285,12 @@ def test_bulk_data_that_is_wrong(tmp_path: Path, old: str, new: str, words: str)
     refused(words, read_mesh, tmp_path / "a.bdf", "m", "m-kg-s")
 
 
-def test_grid_points_in_a_local_system_are_refused(tmp_path: Path) -> None:
+def test_grid_points_in_a_system_that_is_missing_are_refused(tmp_path: Path) -> None:
     whole = bulk(meshes.brick("hexahedron", (1, 1, 1)))
     local = re.sub(r"(GRID\* {3} {15}1) {16}", lambda m: f"{m[1]}{5:16d}", whole, count=1)
     assert local != whole
     (tmp_path / "a.bdf").write_text(local)
-    refused("GRID 1 uses the local coordinate system 5", read_mesh, tmp_path / "a.bdf", "m")
+    refused("GRID 1 uses the coordinate system 5, which no CORD card defines", read_mesh, tmp_path / "a.bdf", "m")
 
 
 # MED -----------------------------------------------------------------------------------------------------------------
