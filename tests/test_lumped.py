@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tomllib
+from dataclasses import replace
 from pathlib import Path
 
 import decks
@@ -10,13 +11,17 @@ import meshes
 import numpy as np
 import pytest
 import scipy.linalg
+import touching
 from refusals import refused_command
 from test_bdf import bulk
 from test_cdb import archive
 
 from microslip.basis import read_basis
 from microslip.cli import main
+from microslip.errors import UserError
 from microslip.frames import skew
+from microslip.mesh import read_mesh
+from microslip.mesh.chosen import of_instances, with_parts
 from microslip.modal.compute import unreduced
 from microslip.stages.job import open_job
 from microslip.stages.meshing import load_mesh
@@ -242,3 +247,31 @@ def test_masses_and_springs_of_an_archive_are_the_same_ones():
     rows = [f"{n:9d}{0:9d}{0:9d}" + "".join(f"{v:21.13E}" for v in x) for n, x in places.items()]
     found = hertz(text.replace("N,R5.3", "\n".join([*rows, "N,R5.3"])), "a.cdb")
     np.testing.assert_allclose(found, HANGING, rtol=1e-6)
+
+
+def test_a_part_of_a_deck_keeps_what_is_lumped_on_it():
+    """Two blocks apart: each has its own mass, and one that hangs beside it; a spring between them is refused."""
+    lower = meshes.brick("hexahedron", (1, 1, 1), (0.01, 0.01, 0.01))
+    upper = replace(lower, points=lower.points + [0.0, 0.0, 0.05])
+    both = touching.together(a=lower, b=upper)
+    last = int(both.node_id[-1])
+    lumped = [
+        *["*NODE", "901, 30., 0., 50.", "*ELEMENT, TYPE=MASS, ELSET=EM", "501, 1", f"502, {last}", "503, 901"],
+        *["*MASS, ELSET=EM", "2e-6", "*ELEMENT, TYPE=SPRINGA, ELSET=ES", f"601, {last}, 901"],
+        *["*SPRING, ELSET=ES", "", "1500."],
+    ]
+    section = [*STEEL, decks.section(material="ST")]
+    lines = [*decks.mesh_lines(both), *section, *lumped]
+    Path("a.inp").write_text("\n".join(lines) + "\n")
+    whole = with_parts(read_mesh("a.inp", "mm"))
+    first, second = (of_instances(whole, [name]) for name in list(whole.instances)[:2])
+    for part, where in ((first, [lower.points[0]]), (second, [upper.points[-1], np.array([0.03, 0.0, 0.05])])):
+        assert part.lumps is not None
+        np.testing.assert_allclose(part.points[part.lumps.points], where, atol=1e-9)
+        np.testing.assert_allclose(part.lumps.masses, 2e-3)
+    assert len(first.lumps.pairs) == 0 and first.n_points == 8 and second.n_points == 9
+    ends = np.sort(second.lumps.pairs, axis=1)
+    assert ends.max() == second.n_points - 1
+    Path("a.inp").write_text("\n".join([*lines, "*ELEMENT, TYPE=SPRINGA, ELSET=ES", f"602, 1, {last}"]) + "\n")
+    with pytest.raises(UserError, match="a spring or dashpot of the file ties these instances"):
+        of_instances(with_parts(read_mesh("a.inp", "mm")), list(whole.instances)[:1])

@@ -9,7 +9,7 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 
-from ..data import Equation, FaceTie, Guide, Indices, Link, Mesh
+from ..data import Equation, FaceTie, Guide, Indices, Link, Lumps, Mesh
 from ..errors import UserError
 from .gates import part_numbers
 from .raw import joined
@@ -45,6 +45,8 @@ def of_instances(mesh: Mesh, names: Sequence[str]) -> Mesh:
         raise UserError(f"has no instance '{unknown[0]}'; its instances are {', '.join(mesh.instances) or 'none'}")
     inside = np.zeros(mesh.n_points, dtype=bool)
     inside[np.concatenate([mesh.instances[name] for name in names])] = True
+    inside |= _hanging_on(mesh, inside)
+    left = [] if mesh.state is None or inside.all() else [f"{mesh.state.where}: {_LOADS_OF_PARTS}"]
     kept = {kind: inside[cells].all(axis=1) for kind, cells in mesh.cells.items()}
     cells = {kind: cells[kept[kind]] for kind, cells in mesh.cells.items() if kept[kind].any()}
     number = np.cumsum(inside) - 1
@@ -61,9 +63,51 @@ def of_instances(mesh: Mesh, names: Sequence[str]) -> Mesh:
         cell_id={t: r[kept[t]] for t, r in mesh.cell_id.items() if kept[t].any()},
         temperature=None if mesh.temperature is None else mesh.temperature[inside],
         instances={name: number[mesh.instances[name]] for name in names},
-        state=mesh.state if inside.all() else None,
+        state=mesh.state if inside.all() else None, lost=(*mesh.lost, *left),
+        lumps=_lumps_of(mesh, inside, number),
     )  # fmt: skip
     return _with_links(mesh, part, inside, number)
+
+
+_LOADS_OF_PARTS = "its loads are left out of parts of the file: the modes are those of the unloaded body"
+
+
+def _hanging_on(mesh: Mesh, inside: Indices) -> Indices:
+    """(n,) which points without cells follow points inside, or hang on them by springs."""
+    loose, grown = np.ones(mesh.n_points, dtype=bool), inside.copy()
+    for cells in mesh.cells.values():
+        loose[cells] = False
+    if mesh.lumps is None or not loose.any():
+        return np.zeros(mesh.n_points, dtype=bool)
+    groups = [*(nodes_of(mesh) if mesh.links is not None else ()), *mesh.lumps.pairs]
+    for _ in range(3):  # a mass on a spring on a point that follows a node
+        for nodes in groups:
+            if grown[nodes].any():
+                grown[nodes[loose[nodes]]] = True
+    return grown & loose
+
+
+def _lumps_of(mesh: Mesh, inside: Indices, number: Indices) -> Lumps | None:
+    """The masses, springs and dashpots of the points inside, counted anew.
+
+    Raises:
+        UserError: one that joins them to others.
+    """
+    if (lumps := mesh.lumps) is None:
+        return None
+    ends = inside[lumps.pairs]
+    if (ends.any(axis=1) & ~ends.all(axis=1)).any():
+        raise UserError("a spring or dashpot of the file ties these instances to others; take those in too")
+    heavy, joined_by = inside[lumps.points], ends.all(axis=1)
+    if not heavy.any() and not joined_by.any():
+        return None
+    return Lumps(
+        number[lumps.points[heavy]],
+        lumps.masses[heavy],
+        number[lumps.pairs[joined_by]],
+        lumps.stiffness[joined_by],
+        lumps.damping[joined_by],
+    )
 
 
 def _with_links(mesh: Mesh, part: Mesh, inside: Indices, number: Indices) -> Mesh:
