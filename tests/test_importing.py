@@ -121,6 +121,8 @@ def test_numbers_of_a_missing_material_are_in_si(tmp_path, capsys):
     lines = [*decks.mesh_lines(beam()), "*MATERIAL, NAME=Steel", decks.section()]
     (tmp_path / "part.inp").write_text("\n".join(lines) + "\n")
     options = ["--density", "785", "--young", "0.84e11"]
+    assert main(["import", "part.inp", "without", *options, "--poisson", "0"]) == 0
+    assert "\npoisson = 0\n" in (tmp_path / "without" / "body.toml").read_text()
     assert main(["import", "part.inp", "here", *options]) == 0
     assert main(["modes", "here", "-q"]) == 0
     np.testing.assert_allclose(lowest(tmp_path, "here")[6:9], 2 * exact()[:3], rtol=1e-8)

@@ -32,7 +32,7 @@ def changed(element: Element, changes: Mapping[str, int]) -> Element:
     return Element(**{**element._asdict(), **changes}) if changes else element
 
 
-class Ring(NamedTuple):
+class CyclicCommands(NamedTuple):
     """CYCLIC: number of sectors (0: by the angle between its edges), number of the coordinate system, name."""
 
     where: str
@@ -93,7 +93,7 @@ class Archive:
     ranged: set[int] = field(default_factory=set)
     systems: dict[int, System] = field(default_factory=lambda: dict(BASIC))
     turns: dict[int, System] = field(default_factory=dict)
-    rings: list[Ring] = field(default_factory=list)
+    rings: list[CyclicCommands] = field(default_factory=list)
     diameters: tuple[int, int, int] | None = None
     unused: list[str] = field(default_factory=list)
     remarks: list[str] = field(default_factory=list)

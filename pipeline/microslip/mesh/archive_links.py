@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..data import Array, AverageLink, Equation, FaceTie, Indices, Joint, Link, RigidLink, Sector
-from .archive import Archive, Element, Ring, whole
+from .archive import Archive, CyclicCommands, Element, whole
 from .raw import Damaged, Numbering, RawMesh, is_number, joined, real
 from .supports import add_supports, in_axes
 from .systems import System
@@ -241,7 +241,7 @@ def _ring(archive: Archive, words: list[str]) -> None:
     system = int(words[3]) if plain and is_number(words[3]) else 1
     name = words[4].strip("'") if plain else ""
     archive.rings.append(
-        Ring(
+        CyclicCommands(
             f"{archive.where}: CYCLIC", int(words[1] or 0) if plain else 0, system, name or "CYCLIC"
         )
     )

@@ -421,7 +421,8 @@ def _mesh(
     solids_only: bool = True,
 ) -> tuple[list[str], list[str], Mesh]:
     system, asked = usual_system(unit), instead
-    numbers = {key: getattr(asked, key) or getattr(STEEL, key) for key in ("density", "young", "poisson")}
+    given = {key: getattr(asked, key) for key in ("density", "young", "poisson")}
+    numbers = {key: getattr(STEEL, key) if value is None else value for key, value in given.items()}
     instead = Substitute(**numbers, whole=asked.young is not None)
     told = []
     try:
@@ -452,15 +453,10 @@ def _mesh(
     lines += [f"instances = {json.dumps(list(instances))}"] if instances else []
     rule = f'integration = "{mesh.integration}"  # bricks of 20 nodes by eight points, as the file says'
     lines += ["", "[mesh]", rule] if mesh.integration != "full" else []
-    lines += ["", "[material]"]
+    lines += ["", "[material]", *_material(mesh, numbers, bool(lacking))]
     if mesh.materials:
-        lines.append('from = "mesh"')
-        lines += _keys(numbers) if lacking else []
-        lines += [f"# {m.name}: {m.density:.6g} kg/m3, C_xxxx {m.elasticity[0, 0]:.6g} Pa" for m in mesh.materials]
         told += [f"{m.name}: {m.density:.6g} kg/m3 in the units {system}" for m in mesh.materials]
     else:
-        lines.append("# the file brings no material that can be used")
-        lines += _keys(numbers)
         same = instead == replace(STEEL, whole=instead.whole)
         text = "steel" if same else ", ".join(_keys(numbers))
         text = f"warning: no material was taken from the file; body.toml says {text}"
@@ -479,6 +475,14 @@ def _mesh(
     told += words
     sets = _sets(mesh, bool(held) or holding)
     return [*lines, *hot, *ring, *loads, *held, *kept, *sets, *_end(count)], told, mesh
+
+
+def _material(mesh: Mesh, numbers: Mapping[str, float], lacking: bool) -> list[str]:
+    """Lines of [material]; lacking: whether one of the file's has not all of its numbers."""
+    if not mesh.materials:
+        return ["# the file brings no material that can be used", *_keys(numbers)]
+    of_each = [f"# {m.name}: {m.density:.6g} kg/m3, C_xxxx {m.elasticity[0, 0]:.6g} Pa" for m in mesh.materials]
+    return ['from = "mesh"', *(_keys(numbers) if lacking else ()), *of_each]
 
 
 def _keys(numbers: Mapping[str, float]) -> list[str]:
