@@ -22,9 +22,8 @@ import jax.numpy as jnp
 import numpy as np
 
 from .. import series
-from ..contact.harmonics import CHUNK, CHUNK_ALONE, force_harmonics, force_near
 from ..contact.law import point_axes
-from ..contact.periodic import unknown
+from ..contact.periodic import near, unknown, with_slopes
 from ..data import Array, ComplexArray, Indices
 from ..harmonic_balance.forces import AFT
 from ..harmonic_balance.problem import Problem
@@ -71,7 +70,7 @@ class Rings(NamedTuple):
     Attributes:
         poles: (l, K, p). left: (l, K, r + 1, p), right: (l, K, p, H + r) both sides of 1/(s - pole), of the loads of
             every harmonic in front, and the read-out in the last row. static: (l, K, r + 1, H + r) beside the poles.
-            mean: (l, K, r, 1 + r) all of it in harmonic 0. laws: of every group. offset, preload: (l, N, q).
+            mean: (l, K, r + 1, 1 + r) all of it in harmonic 0. laws: of every group. offset, preload: (l, N, q).
     """
 
     poles: ComplexArray
@@ -103,11 +102,32 @@ class Lanes(NamedTuple):
 
 
 class Marching(NamedTuple):
-    """Samples of a cycle, cycles at most, periodicity."""
+    """How finely rings are balanced.
+
+    Attributes: samples: of a cycle. cycles: at most. periodicity. highest: H. harmonics: those that move, 0 the mean;
+        of forces that are as large either way only the odd ones.
+    """
 
     samples: int
     cycles: int
     periodicity: float
+    highest: int
+    harmonics: tuple[int, ...]
+
+    @property
+    def waves(self) -> tuple[int, ...]:
+        """Without the mean."""
+        return tuple(h for h in self.harmonics if h)
+
+    @property
+    def columns(self) -> Indices:
+        """(W,) places of their coefficients among those of all harmonics."""
+        return np.concatenate([[0] if h == 0 else [2 * h - 1, 2 * h] for h in self.harmonics])
+
+    def series(self) -> tuple[Array, Array]:
+        """(s, W) of them at the samples of a cycle, and (W, s) their coefficients from samples."""
+        values, transform = series.fourier(self.highest, self.samples)
+        return values[:, self.columns], transform[self.columns]
 
 
 @partial(often, static_argnames=("marching",))
@@ -119,11 +139,11 @@ def stepped(
     (l, N, q, W), k = at.d.shape, len(frame.unit)
     force, sliders = _forces(frame, rings, at, marching)
     slope = _secant(frame, at, force)
-    C, reference, read = _seen(frame, rings, at.Omega, W // 2)
-    excess = _amplitudes(force) - jnp.pad(rings.preload[..., None], [(0, 0)] * 3 + [(0, W // 2)])
+    C, reference, read = _seen(frame, rings, at.Omega, marching)
+    excess = _amplitudes(_less_preload(force, rings.preload, marching))
     around = jnp.stack([jnp.roll(excess, -away, axis=1) for away in (0, 1, -1)], axis=1)
-    R = at.d - _coefficients(reference - (C * around[:, :, :, None]).sum(axis=(1, 4)))
-    B = _of_coefficients(C.astype(jnp.complex64))
+    R = at.d - _coefficients(reference - (C * around[:, :, :, None]).sum(axis=(1, 4)), W % 2)
+    B = _of_coefficients(C.astype(jnp.complex64), W % 2)
     S = _of_gaps(slope.astype(jnp.float32), N)
     A = [B[:, i] @ jnp.roll(S, -away, axis=1) for i, away in enumerate((0, 1, -1))]
     A[0] += jnp.eye(q * W, dtype=A[0].dtype)
@@ -136,8 +156,9 @@ def stepped(
     step = (step * unit).reshape(at.d.shape)
     cells = step.reshape(l, -1, k, W)
     after = force + jnp.einsum("lmawbx,lmbx->lmaw", slope, cells).reshape(force.shape)
-    first = (after[..., 1] - 1j * after[..., 2]).reshape(l, -1)
-    y = read[..., 0] - ((first[:, frame.felt] * frame.given[..., 1]) * read[..., 1:]).sum(axis=-1)
+    one = marching.harmonics.index(1)
+    first = _amplitudes(after)[..., one].reshape(l, -1)
+    y = read[..., 0] - ((first[:, frame.felt] * frame.given[..., one]) * read[..., 1:]).sum(axis=-1)
     moved = Lanes(at.Omega, at.d + step, slope, at.d, force, jnp.ones_like(at.told), sliders)
     return moved, length, jnp.abs(y), after
 
@@ -150,11 +171,12 @@ def derived(
     W, k = d.shape[-1], len(frame.unit)
     some = rings._replace(laws=jax.tree_util.tree_map(lambda x: x[lanes], rings.laws), offset=rings.offset[lanes])
     found = []
-    for G, law, u in zip(frame.kinematics, some.laws, _moved(frame, some, d[lanes]), strict=True):
-        given = marching.samples, marching.cycles, CHUNK, marching.periodicity
-        one = force_harmonics(_of_points(law), _points(G, u), 1.0, *given)[1]
-        one = one.reshape(len(lanes), -1, len(G), 3, W, 3, W)
-        found.append(jnp.einsum("nia,lcniwjx,njb->lcawbx", G, one, G))
+    values, transform = marching.series()
+    for group, (G, law) in enumerate(zip(frame.kinematics, some.laws, strict=True)):
+        path, both = _path(frame, some.offset, d[lanes], group, values)
+        one = with_slopes(_of_points(law), path, 1.0, marching.cycles, marching.periodicity, values, transform)[1]
+        one = one.reshape(W, W, 3, *both, len(G), 3)  # of force w by motion x along j, along i
+        found.append(jnp.einsum("nia,wxjlcni,njb->lcawbx", G, one, G))
     return slope.at[lanes].set(_in_cells(frame, found))
 
 
@@ -173,15 +195,14 @@ def _of_points(law: Any) -> Any:
     return jax.tree_util.tree_map(lambda x: jnp.moveaxis(x, 0, -2).reshape(*x.shape[1:-1], -1), law)
 
 
-def _moved(frame: Frame, rings: Rings, d: jax.Array) -> list[jax.Array]:
-    """(l, c, k, W) motions of every group as its law measures them."""
-    l, N, q, W = d.shape
-    u = d.at[..., 0].add(rings.offset).reshape(l, -1, len(frame.unit), W)
-    return [u[:, cells] for cells in frame.cells]
-
-
-def _points(G: jax.Array, u: jax.Array) -> jax.Array:
-    return jnp.einsum("nia,lcaw->lcniw", G, u).reshape(-1, 3, u.shape[3])
+def _path(
+    frame: Frame, offset: jax.Array, d: jax.Array, group: int, values: Array
+) -> tuple[jax.Array, tuple[int, int]]:  # fmt: skip
+    """(s, l c n, 3) of all points of a group, and (l, c)."""
+    k, cells = len(frame.unit), frame.cells[group]
+    u = d.reshape(len(d), -1, k, d.shape[-1])[:, cells]
+    path = jnp.einsum("sw,lcaw->slca", values, u) + offset.reshape(len(d), -1, k)[:, cells]
+    return jnp.einsum("nia,slca->slcni", frame.kinematics[group], path).reshape(len(values), -1, 3), u.shape[:2]
 
 
 def _in_cells(frame: Frame, found: Sequence[jax.Array]) -> jax.Array:
@@ -191,12 +212,12 @@ def _in_cells(frame: Frame, found: Sequence[jax.Array]) -> jax.Array:
 
 def _forces(frame: Frame, rings: Rings, at: Lanes, marching: Marching) -> tuple[jax.Array, tuple[Any, ...]]:
     """(l, N, q, W) forces, and what sliders remember."""
-    found, kept = [], []
-    each = zip(frame.kinematics, rings.laws, _moved(frame, rings, at.d), at.sliders, strict=True)
-    for G, law, u, known in each:
-        given = marching.samples, marching.cycles, CHUNK_ALONE, marching.periodicity
-        force, known = force_near(_of_points(law), _points(G, u), known, 1.0, *given)
-        found.append(jnp.einsum("nia,lcniw->lcaw", G, force.reshape(*u.shape[:2], len(G), 3, u.shape[3])))
+    (values, transform), found, kept = marching.series(), [], []
+    for group, (G, law, known) in enumerate(zip(frame.kinematics, rings.laws, at.sliders, strict=True)):
+        path, both = _path(frame, rings.offset, at.d, group, values)
+        given = 1.0, marching.cycles, marching.periodicity, transform, known
+        force, known = near(_of_points(law), path, *given)
+        found.append(jnp.einsum("nia,wilcn->lcaw", G, force.reshape(len(force), 3, *both, len(G))))
         kept.append(known)
     return _in_cells(frame, found).reshape(at.d.shape), tuple(kept)
 
@@ -213,45 +234,59 @@ def _secant(frame: Frame, at: Lanes, force: jax.Array) -> jax.Array:
 
 
 def _seen(
-    frame: Frame, rings: Rings, Omega: jax.Array, harmonics: int
+    frame: Frame, rings: Rings, Omega: jax.Array, marching: Marching
 ) -> tuple[jax.Array, jax.Array, jax.Array]:
-    """(l, 3, N, q, q, H + 1) C, (l, N, q, H + 1) r, and (l, K, 1 + r) the read-outs by the loads and by forces, in the
-    first harmonic."""
-    l, K, r = rings.mean.shape[:3]
-    h = jnp.arange(1, harmonics + 1)
-    once = 1 / (1j * Omega[:, None, None, None] * h[:, None] - rings.poles[:, :, None])  # (l, K, H, p)
-    rows = rings.left[:, :, None] * once[:, :, :, None]  # (l, K, H, r + 1, p)
-    by_force = rows @ rings.right[:, :, None, :, harmonics:] + rings.static[:, :, None, :, harmonics:]
-    by_load = (rows * rings.right[..., :harmonics].swapaxes(2, 3)[:, :, :, None]).sum(axis=-1)
-    by_load += rings.static[..., :harmonics].swapaxes(2, 3)
-    C = jnp.concatenate([rings.mean[:, :, None, :, 1:], by_force[:, :, :, :-1]], axis=2)  # (l, K, H + 1, r, r)
-    C = jnp.moveaxis(C, 2, -1).reshape(l, K * r * r, -1)
-    d = jnp.concatenate([rings.mean[:, :, None, :, 0], by_load[..., :-1]], axis=2)
-    d = jnp.moveaxis(d, 2, -1).reshape(l, K * r, -1)
-    read = jnp.concatenate([by_load[:, :, 0, -1:], by_force[:, :, 0, -1]], axis=-1)
+    """(l, 3, N, q, q, H) C, (l, N, q, H) r, and (l, K, 1 + r) the read-outs by the loads and by forces in the first
+    harmonic."""
+    C, d = _of_blades(rings, Omega, marching)
+    l, K, r1, r, _ = C.shape
+    one = marching.harmonics.index(1)
+    read = jnp.concatenate([d[:, :, -1:, one], C[:, :, -1, :, one]], axis=-1)
+    C, d = C[:, :, :-1].reshape(l, K * r * r, -1), d[:, :, :-1].reshape(l, K * r, -1)
     both = (C[:, frame.pairs] * frame.factors).sum(axis=-2), (d[:, frame.driven] * frame.signs).sum(axis=-2)
     return *both, read
 
 
+def _of_blades(rings: Rings, Omega: jax.Array, marching: Marching) -> tuple[jax.Array, jax.Array]:
+    """(l, K, r + 1, r, H) receptances and (l, K, r + 1, H) motions under the loads of blades by themselves, read-outs in
+    the last row."""
+    waves = np.array(marching.waves)
+    n = len(waves)
+    once = 1 / (1j * Omega[:, None, None, None] * waves[:, None] - rings.poles[:, :, None])  # (l, K, H, p)
+    rows = rings.left[:, :, None] * once[:, :, :, None]  # (l, K, H, r + 1, p)
+    C = rows @ rings.right[:, :, None, :, n:] + rings.static[:, :, None, :, n:]
+    d = (rows * rings.right[..., :n].swapaxes(2, 3)[:, :, :, None]).sum(axis=-1)
+    d += rings.static[..., :n].swapaxes(2, 3)
+    if 0 in marching.harmonics:
+        C = jnp.concatenate([rings.mean[:, :, None, :, 1:], C], axis=2)
+        d = jnp.concatenate([rings.mean[:, :, None, :, 0], d], axis=2)
+    return jnp.moveaxis(C, 2, -1), jnp.moveaxis(d, 2, -1)
+
+
+def _less_preload(force: jax.Array, preload: jax.Array, marching: Marching) -> jax.Array:
+    return force.at[..., 0].add(-preload) if 0 in marching.harmonics else force
+
+
 def _amplitudes(v: jax.Array) -> jax.Array:
-    """(..., H + 1) complex amplitudes of (..., W) coefficients."""
-    return jnp.concatenate([v[..., :1] + 0j, v[..., 1::2] - 1j * v[..., 2::2]], axis=-1)
+    """(..., H) complex amplitudes of (..., W) coefficients, an odd number of which begins with the mean."""
+    mean = v.shape[-1] % 2
+    return jnp.concatenate([v[..., :mean] + 0j, v[..., mean::2] - 1j * v[..., mean + 1 :: 2]], axis=-1)
 
 
-def _coefficients(v: jax.Array) -> jax.Array:
+def _coefficients(v: jax.Array, mean: int) -> jax.Array:
     """The other way."""
-    waves = jnp.stack([v[..., 1:].real, -v[..., 1:].imag], axis=-1).reshape(*v.shape[:-1], -1)
-    return jnp.concatenate([v[..., :1].real, waves], axis=-1)
+    waves = jnp.stack([v[..., mean:].real, -v[..., mean:].imag], axis=-1).reshape(*v.shape[:-1], -1)
+    return jnp.concatenate([v[..., :mean].real, waves], axis=-1)
 
 
-def _of_coefficients(C: jax.Array) -> jax.Array:
-    """(..., q W, q W) real matrices of (..., q, q, H + 1) complex ones of the harmonics."""
+def _of_coefficients(C: jax.Array, mean: int) -> jax.Array:
+    """(..., q W, q W) real matrices of (..., q, q, H) complex ones of the harmonics."""
     *lead, q, _, count = C.shape
-    W = 2 * count - 1
+    W = 2 * count - mean
     real, imaginary = np.zeros((2, count, W, W), np.float32)
-    real[0, 0, 0] = 1.0
-    for h in range(1, count):
-        a, b = 2 * h - 1, 2 * h
+    real[:mean, :mean, :mean] = 1.0
+    for h in range(mean, count):
+        a, b = 2 * h - mean, 2 * h - mean + 1
         real[h, a, a] = real[h, b, b] = imaginary[h, a, b] = 1.0
         imaginary[h, b, a] = -1.0
     out = jnp.einsum("...pqh,hwx->...pwqx", C.real, real) + jnp.einsum("...pqh,hwx->...pwqx", C.imag, imaginary)
@@ -263,6 +298,8 @@ def _of_gaps(slope: jax.Array, gaps: int) -> jax.Array:
     l, M, k, W, *_ = slope.shape
     each = M // gaps
     S = slope.reshape(l, gaps, each, k * W, k * W)
+    if each == 1:
+        return S[:, :, 0]
     apart = jnp.eye(each, dtype=S.dtype)[:, None, :, None]
     return (S[:, :, :, :, None] * apart).reshape(l, gaps, each * k * W, each * k * W)
 
@@ -302,6 +339,9 @@ MOST = 25
 SEARCHED, ENDED = 1e-6, 1e-9
 """Length of the last step, over that of the motion: while the peak is searched for, and there."""
 
+SIZES = 0.1, 0.5, 2.0, 10.0
+"""Of motions, over about what makes contacts slide, by which forces are tried."""
+
 SLOW = 0.3
 """Of a step over the one before, from which on derivatives are found anew."""
 
@@ -321,8 +361,29 @@ class Batch:
 
     @cached_property
     def marching(self) -> Marching:
-        model = self.problem.groups[0].model
-        return Marching(model.samples, model.cycles, model.periodicity)
+        p, model = self.problem, self.problem.groups[0].model
+        every, odd = range(p.harmonics + 1), range(1, p.harmonics + 1, 2)
+        return Marching(model.samples, model.cycles, model.periodicity, p.harmonics, tuple(every if self._skew else odd))
+
+    @property
+    def _skew(self) -> bool:
+        """Whether forces are not as large either way, or loads have even harmonics."""
+        p, W = self.problem, self.problem.coefficients
+        even = np.array([0, *(i for h in range(2, p.harmonics + 1, 2) for i in (2 * h - 1, 2 * h))])
+        loads = [part for h in range(0, p.harmonics + 1, 2) for part in p.parts[h]]
+        if any(part.load.any() or part.given.any() for part in loads):
+            return True
+        rng = np.random.default_rng(0)
+        for size in SIZES:
+            for g in p.groups:
+                d = rng.normal(size=(*g.offset.shape, W)) * size * p.length
+                d[:, :, even] = 0.0
+                d[:, :, 0] += g.offset
+                force = np.array(g.model.force(d, 1.0))
+                force[:, :, 0] -= g.preload
+                if np.abs(force[:, :, even]).max() > 1e-12 * np.abs(force).max():
+                    return True
+        return False
 
     @cached_property
     def sides(self) -> list[list[tuple[int, float, Indices]]]:
@@ -347,7 +408,7 @@ class Batch:
         gaps, K, r = p.sides.ring, len(self.sides), self.felt
         assert gaps is not None
         N, each, q = gaps.count, gaps.each, gaps.each * k
-        h = np.arange(p.harmonics + 1)
+        h = np.array(self.marching.harmonics)
         phases = np.exp(-1j * np.outer([c.phase for c in p.assembly.contacts], h))
         cell = gaps.gap * each + gaps.place
         pairs, factors = np.zeros((3, N, q, q, 2), int), np.zeros((3, N, q, q, 2, len(h)), complex)
@@ -379,24 +440,23 @@ class Batch:
     @cached_property
     def still(self) -> tuple[Array, ...]:
         """Of every blade what does not scatter: rows (K, r, m) and read-outs (K, m), loads (K, H + 1, m), compliance
-        (K, r + 1, r) beside the coordinates and motions (K, H + 1, r + 1) by the loads."""
-        p, r = self.problem, self.felt
-        K, H, m = len(self.sides), p.harmonics, len(p.parts[0][0].M)
-        rows, output, load = np.zeros((K, r, m)), np.zeros((K, m)), np.zeros((K, H + 1, m), complex)
-        beside, moved = np.zeros((K, r + 1, r), complex), np.zeros((K, H + 1, r + 1), complex)
+        (K, r + 1, r) beside the coordinates and motions (K, H + 1, r + 1) by the loads; of the mean and of all waves."""
+        p, r, waves = self.problem, self.felt, (0, *self.marching.waves)
+        K, H, m = len(self.sides), len(waves), len(p.parts[0][0].M)
+        rows, output, load = np.zeros((K, r, m)), np.zeros((K, m)), np.zeros((K, H, m), complex)
+        beside, moved = np.zeros((K, r + 1, r), complex), np.zeros((K, H, r + 1), complex)
         outputs = [w.component for w in p.assembly.outputs]
         for blade, (component, own) in enumerate(zip(p.assembly.components, self.sides, strict=True)):
-            part = p.parts[1][blade]
+            parts = [p.parts[h][blade] for h in waves]
             felt = np.concatenate([at for *_, at in own])
             n = len(felt)
-            rows[blade, :n] = part.rows[felt]
-            beside[blade, :n, :n] = part.yielding[np.ix_(felt, felt)]
-            for h in range(H + 1):
-                load[blade, h], moved[blade, h, :n] = p.parts[h][blade].load, p.parts[h][blade].given[felt]
+            rows[blade, :n] = parts[1].rows[felt]
+            beside[blade, :n, :n] = parts[1].yielding[np.ix_(felt, felt)]
+            load[blade], moved[blade, :, :n] = [one.load for one in parts], [one.given[felt] for one in parts]
             if component.name in outputs:
                 w = outputs.index(component.name)
-                output[blade], beside[blade, -1, :n] = part.output[w], part.output_residual[w, felt]
-                moved[blade, :, -1] = [p.parts[h][blade].output_given[w] for h in range(H + 1)]
+                output[blade], beside[blade, -1, :n] = parts[1].output[w], parts[1].output_residual[w, felt]
+                moved[blade, :, -1] = [one.output_given[w] for one in parts]
         return rows, output, load, beside, moved
 
     @cached_property
@@ -408,7 +468,7 @@ class Batch:
     def rings(self, rings: Sequence[Assembly]) -> tuple[Rings, Array, Array]:
         """The numbers of rings, (l,) whether each has them, and (l, K, 3, m, m) M, K + i H and C of their blades."""
         rows, output, load, beside, moved = self.still
-        (K, r, m), H = rows.shape, self.problem.harmonics
+        K, r, m = rows.shape
         matrices = np.zeros((len(rings), K, 3, m, m), complex)
         static = np.zeros((len(rings), K, m, m))
         for n, ring in enumerate(rings):
@@ -429,7 +489,8 @@ class Batch:
         good = (np.abs(poles).min(axis=-1) > 1e-9 * np.abs(poles).max(axis=-1)).all(axis=-1)
         static_rows = np.concatenate([moved[:, 1:].swapaxes(1, 2), beside], axis=-1)
         X = np.linalg.solve(static, np.concatenate([load[:, 0].real[..., None], rows.swapaxes(1, 2)], axis=-1))
-        mean = rows @ X + np.concatenate([moved[:, 0, :r, None], beside[:, :r]], axis=-1).real
+        mean = np.concatenate([rows, output[:, None]], axis=1) @ X
+        mean += np.concatenate([moved[:, 0, :, None], beside], axis=-1).real
         laws, offset, preload = self._contacts(rings)
         every = np.broadcast_to(static_rows, (len(rings), *static_rows.shape))
         return Rings(poles, left, right, every, mean, laws, offset, preload), good, matrices
@@ -473,10 +534,11 @@ class Batch:
         if not np.isfinite(top.amplitude):
             return Sample(one.sample, top, on_sweep(self.asked, top), alone=True)
         rows, _, load, *_ = self.still
-        F = series.amplitudes(np.moveaxis(one.known[top.frequency].slope, -1, 0))[1].ravel()
+        first = self.marching.harmonics.index(1)
+        F = np.asarray(_amplitudes(one.known[top.frequency].slope)[..., first]).ravel()
         w = 2 * np.pi * top.frequency
         M, K, C = matrices.swapaxes(0, 1)
-        given = load[:, 1] - np.einsum("jam,ja->jm", rows, F[self.frame.felt] * self.frame.given[..., 1])
+        given = load[:, 1] - np.einsum("jam,ja->jm", rows, F[self.frame.felt] * self.frame.given[..., first])
         motions = np.linalg.solve(K - w**2 * M + 1j * w * C, given[..., None])[..., 0]
         alone = "alone" in vars(one)
         return Sample(one.sample, top, on_sweep(self.asked, top), *worst(one.ring, motions), alone=alone)
@@ -492,34 +554,31 @@ class Batch:
 
     def of_sides(self, one: _Way, point: Point) -> Array:
         """(size,) x of `Problem` from a solution of the batch."""
-        p, (K, r), H = self.problem, self.frame.felt.shape, self.problem.harmonics
-        ring = Rings(*(x if i == 5 else x[one.number] for i, x in enumerate(one.every)))
-        F = series.amplitudes(np.moveaxis(point.slope, -1, 0))
-        F[0] -= ring.preload
-        g = np.moveaxis(F.reshape(H + 1, -1)[:, self.frame.felt] * np.moveaxis(self.frame.given, -1, 0), 0, -1)
-        h = np.arange(1, H + 1)[:, None]
-        rows = ring.left[:, None, :r] / (1j * h * point.Omega - ring.poles[:, None])[:, :, None]
-        Z = rows @ ring.right[:, None] + ring.static[:, None, :r]
+        p, (K, r), marching = self.problem, self.frame.felt.shape, self.marching
+        ring = Rings(*(x if i == 5 else x[one.number : one.number + 1] for i, x in enumerate(one.every)))
+        force = _less_preload(jnp.asarray(point.slope)[None], ring.preload, marching)
+        g = _amplitudes(force).reshape(-1, len(marching.harmonics))[self.frame.felt] * self.frame.given
+        C, d = _of_blades(ring, np.array([point.Omega]), marching)
         v = np.zeros((p.coefficients, K, r))
-        v[0] = ring.mean[..., 0] - (ring.mean[..., 1:] @ g[..., :1].real)[..., 0]
-        for n in range(1, H + 1):
-            wave = Z[:, n - 1, :, n - 1] - (Z[:, n - 1, :, H:] @ g[..., n : n + 1])[..., 0]
-            v[2 * n - 1], v[2 * n] = wave.real, -wave.imag
+        away = d[0] - (C[0] * g[:, None]).sum(axis=2)
+        v[marching.columns] = np.moveaxis(_coefficients(away[:, :r], len(marching.columns) % 2), -1, 0)
         x = np.zeros((p.coefficients, p.count))
         for blade, own in enumerate(self.sides):
             felt = p.begins[blade] + np.concatenate([at for *_, at in own])
             x[:, felt] = v[:, blade, : len(felt)]
-        return (x / p.scale).ravel()
+        return np.asarray(x / p.scale).ravel()
 
     def of_gaps(self, problem: Problem, point: Point) -> tuple[Array, Array]:
         """(N, q, W) motions from a solution of `Problem`, and forces."""
         frame, p = self.frame, self.problem
         found = np.zeros((2, len(frame.order), len(p.ways), p.coefficients))
+        columns = self.marching.columns
         for g, u, cells in zip(problem.groups, _motions(problem, point.x), frame.cells, strict=True):
             force = g.model.force(u, 2 * np.pi / point.Omega)
             u[:, :, 0] -= g.offset
             found[0, cells], found[1, cells] = u[:, p.ways], force[:, p.ways]
-        return tuple(found.reshape(2, len(frame.driven), -1, p.coefficients))
+        d, force = found[..., columns].reshape(2, len(frame.driven), -1, len(columns))
+        return d, force
 
     @cached_property
     def begun(self) -> tuple[Array, float]:
@@ -628,7 +687,8 @@ class _Way(Solutions):
 
 def solved(batch: Batch, numbers: Sequence[int]) -> list[Sample]:
     """Samples; what is hard of them by the solver of single rings."""
-    asked, frame, marching, unit = batch.asked, batch.frame, batch.marching, batch.unit
+    asked, marching, unit = batch.asked, batch.marching, batch.unit
+    frame: Frame = jax.device_put(batch.frame)
     whole = [asked.tuned.mistuned(asked.deviations(n)) for n in numbers]
     every, good, matrices = batch.rings(whole)
     d0, Omega0 = batch.begun
@@ -657,7 +717,7 @@ def solved(batch: Batch, numbers: Sequence[int]) -> list[Sample]:
             break
         at = at._replace(Omega=Omega, d=d, told=told)
         if begin.any():
-            rings = jax.tree_util.tree_map(lambda x: x[rows], every)
+            rings = jax.device_put(jax.tree_util.tree_map(lambda x: x[rows], every))
             at = at._replace(slope=turned(at.slope, top, first, none, none, begin)[0])
         at, *got = stepped(frame, rings, at, marching)
         length, y, force = map(np.asarray, got)
