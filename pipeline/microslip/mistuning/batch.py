@@ -140,7 +140,7 @@ def stepped(
     force, sliders = _forces(frame, rings, at, marching)
     slope = _secant(frame, at, force)
     C, reference, read = _seen(frame, rings, at.Omega, marching)
-    excess = _amplitudes(_less_preload(force, rings.preload, marching))
+    excess = _excess(force, rings.preload, marching)
     around = jnp.stack([jnp.roll(excess, -away, axis=1) for away in (0, 1, -1)], axis=1)
     R = at.d - _coefficients(reference - (C * around[:, :, :, None]).sum(axis=(1, 4)), W % 2)
     B = _of_coefficients(C.astype(jnp.complex64), W % 2)
@@ -247,10 +247,10 @@ def _seen(
     return *both, read
 
 
-def _of_blades(rings: Rings, Omega: jax.Array, marching: Marching) -> tuple[jax.Array, jax.Array]:
+def _of_blades(rings: Rings, Omega: Any, marching: Marching) -> tuple[Any, Any]:
     """(l, K, r + 1, r, H) receptances and (l, K, r + 1, H) motions under the loads of blades by themselves, read-outs in
     the last row."""
-    waves = np.array(marching.waves)
+    xp, waves = rings.mean.__array_namespace__(), np.array(marching.waves)
     n = len(waves)
     once = 1 / (1j * Omega[:, None, None, None] * waves[:, None] - rings.poles[:, :, None])  # (l, K, H, p)
     rows = rings.left[:, :, None] * once[:, :, :, None]  # (l, K, H, r + 1, p)
@@ -258,25 +258,30 @@ def _of_blades(rings: Rings, Omega: jax.Array, marching: Marching) -> tuple[jax.
     d = (rows * rings.right[..., :n].swapaxes(2, 3)[:, :, :, None]).sum(axis=-1)
     d += rings.static[..., :n].swapaxes(2, 3)
     if 0 in marching.harmonics:
-        C = jnp.concatenate([rings.mean[:, :, None, :, 1:], C], axis=2)
-        d = jnp.concatenate([rings.mean[:, :, None, :, 0], d], axis=2)
-    return jnp.moveaxis(C, 2, -1), jnp.moveaxis(d, 2, -1)
+        C = xp.concatenate([rings.mean[:, :, None, :, 1:], C], axis=2)
+        d = xp.concatenate([rings.mean[:, :, None, :, 0], d], axis=2)
+    return xp.moveaxis(C, 2, -1), xp.moveaxis(d, 2, -1)
 
 
-def _less_preload(force: jax.Array, preload: jax.Array, marching: Marching) -> jax.Array:
-    return force.at[..., 0].add(-preload) if 0 in marching.harmonics else force
+def _excess(force: Any, preload: Any, marching: Marching) -> Any:
+    """(..., H) amplitudes of forces (..., W) beyond the preload."""
+    F = _amplitudes(force)
+    if 0 not in marching.harmonics:
+        return F
+    return F - preload[..., None] * (np.arange(F.shape[-1]) == 0)
 
 
-def _amplitudes(v: jax.Array) -> jax.Array:
+def _amplitudes(v: Any) -> Any:
     """(..., H) complex amplitudes of (..., W) coefficients, an odd number of which begins with the mean."""
-    mean = v.shape[-1] % 2
-    return jnp.concatenate([v[..., :mean] + 0j, v[..., mean::2] - 1j * v[..., mean + 1 :: 2]], axis=-1)
+    mean, xp = v.shape[-1] % 2, v.__array_namespace__()
+    return xp.concatenate([v[..., :mean] + 0j, v[..., mean::2] - 1j * v[..., mean + 1 :: 2]], axis=-1)
 
 
-def _coefficients(v: jax.Array, mean: int) -> jax.Array:
+def _coefficients(v: Any, mean: int) -> Any:
     """The other way."""
-    waves = jnp.stack([v[..., mean:].real, -v[..., mean:].imag], axis=-1).reshape(*v.shape[:-1], -1)
-    return jnp.concatenate([v[..., :mean].real, waves], axis=-1)
+    xp = v.__array_namespace__()
+    waves = xp.stack([v[..., mean:].real, -v[..., mean:].imag], axis=-1).reshape(*v.shape[:-1], -1)
+    return xp.concatenate([v[..., :mean].real, waves], axis=-1)
 
 
 def _of_coefficients(C: jax.Array, mean: int) -> jax.Array:
@@ -556,8 +561,8 @@ class Batch:
         """(size,) x of `Problem` from a solution of the batch."""
         p, (K, r), marching = self.problem, self.frame.felt.shape, self.marching
         ring = Rings(*(x if i == 5 else x[one.number : one.number + 1] for i, x in enumerate(one.every)))
-        force = _less_preload(jnp.asarray(point.slope)[None], ring.preload, marching)
-        g = _amplitudes(force).reshape(-1, len(marching.harmonics))[self.frame.felt] * self.frame.given
+        force = _excess(point.slope, ring.preload[0], marching)
+        g = force.reshape(-1, len(marching.harmonics))[self.frame.felt] * self.frame.given
         C, d = _of_blades(ring, np.array([point.Omega]), marching)
         v = np.zeros((p.coefficients, K, r))
         away = d[0] - (C[0] * g[:, None]).sum(axis=2)
