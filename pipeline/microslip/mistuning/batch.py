@@ -341,7 +341,7 @@ LANES = 16
 MOST = 25
 """Steps at a frequency."""
 
-SEARCHED, ENDED = 1e-6, 1e-9
+SEARCHED, ENDED = 2e-7, 1e-9
 """Length of the last step, over that of the motion: while the peak is searched for, and there."""
 
 SIZES = 0.1, 0.5, 2.0, 10.0
@@ -690,6 +690,13 @@ class _Way(Solutions):
         return y
 
 
+def unknown_of(batch: Batch, rings: Rings) -> tuple[Any, ...]:
+    """That nothing is known of the sliders of rings."""
+    l, f = len(rings.mean), batch.frame
+    each = zip(rings.laws, f.cells, f.kinematics, strict=True)
+    return tuple(unknown(_of_points(law), l * len(cells) * len(G)) for law, cells, G in each)
+
+
 def solved(batch: Batch, numbers: Sequence[int]) -> list[Sample]:
     """Samples; what is hard of them by the solver of single rings."""
     asked, marching, unit = batch.asked, batch.marching, batch.unit
@@ -703,8 +710,7 @@ def solved(batch: Batch, numbers: Sequence[int]) -> list[Sample]:
     rows, none = np.zeros(LANES, int), np.zeros(LANES, bool)
     rings = jax.tree_util.tree_map(lambda x: x[rows], every)
     d = np.broadcast_to(d0, (LANES, *d0.shape)).copy()
-    sliders = tuple(unknown(_of_points(law), LANES * len(c) * len(G))
-                    for law, c, G in zip(rings.laws, frame.cells, frame.kinematics, strict=True))  # fmt: skip
+    sliders = unknown_of(batch, rings)
     k, W = len(frame.unit), d.shape[-1]
     slope = top = jnp.zeros((LANES, len(frame.order), k, W, k, W))
     first = derived(frame, rings, d, slope, np.zeros(DERIVED, int), marching)[0]
