@@ -4,6 +4,7 @@
     python benchmarks/mistuning.py --quick       # 6 and 12
     python benchmarks/mistuning.py --scaling     # 12 to 48 blades alone, six samples each
     python benchmarks/mistuning.py --rare 40     # the 99.9 % quantile by chosen samples, so often: a quarter of an hour
+    python benchmarks/mistuning.py --batch 256   # so many rings of 24 vanes with Jenkins elements together, some alone
 
 CPU seconds of one thread, compiled programs warm. The ring: sample vanes (6 modes, H = 3, 64 samples, one point a
 gap), a wave of 30 degrees from blade to blade whatever their number, blade frequencies scattered by 1 %, 24 frequencies
@@ -43,7 +44,7 @@ import microslip as ms
 from microslip.harmonic_balance.blocks import DenseMatrix
 from microslip.harmonic_balance.problem import AtFrequency, Problem
 from microslip.mistuning import rare
-from microslip.mistuning.ensemble import FIRST
+from microslip.mistuning.ensemble import BLOCK, FIRST, several
 from microslip.mistuning.linear import Beside, beside
 from microslip.mistuning.peaks import Highest, highest, told_by
 from microslip.mistuning.ring import Tuned
@@ -295,7 +296,10 @@ def main() -> None:
     parser.add_argument("--quick", action="store_true")
     parser.add_argument("--scaling", action="store_true")
     parser.add_argument("--rare", type=int, default=0)
+    parser.add_argument("--batch", type=int, default=0)
     given = parser.parse_args()
+    if given.batch:
+        return together(given.batch)
     if given.rare:
         return rare_quantile(given.rare)
     scaling((12, 24, 48) if given.scaling else (6, 12) if given.quick else (12, 24, 48, 96), 6 if given.scaling else 2)
@@ -318,6 +322,30 @@ def scaling(blades: tuple[int, ...], samples: int) -> None:
             spent, stuck = np.mean([t for t, _ in each]), timed(sample, linear, 1)[0]
             per = 1e3 * spent / points / N
             print(f"{law:>8} {N:7d} {spent:9.2f} {points:7.0f} {per:15.2f} {stuck:12.3f}", flush=True)
+
+
+ALONE = 16
+"""Rings that are solved one by one too."""
+
+
+def together(count: int) -> None:
+    """Rings solved together beside some of them one by one, in turns, compiled programs warm."""
+    what, begins = asked(24, law="jenkins"), range(0, count, BLOCK)
+    several(what, range(BLOCK)), sample(what, 0)
+    rings, alone, spent = [], [], np.zeros(2)
+    for begin in begins:
+        cpu, found = timed(several, what, range(begin, begin + BLOCK))
+        rings += found
+        spent[0] += cpu
+        for number in range(begin, begin + -(-ALONE // len(begins))):
+            cpu, one = timed(sample, what, number)
+            alone.append(one)
+            spent[1] += cpu
+    off = [rings[one.number].top.amplitude / one.top.amplitude - 1 for one in alone]
+    each = 1e3 * spent / [len(rings), len(alone)]
+    print(f"{len(rings)} rings together: {each[0]:.0f} ms each, {sum(one.alone for one in rings)} asked for the solver of "
+          f"single rings; {len(alone)} of them alone: {each[1]:.0f} ms, {each[1] / each[0]:.1f} times; highest off by "
+          f"{np.abs(off).max():.1e} at most")  # fmt: skip
 
 
 def six_that_slide() -> Asked:

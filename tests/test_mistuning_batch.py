@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from test_mistuning import RUB, sector
 
+from microslip.mistuning import batch as batches
 from microslip.mistuning import ensemble
 from microslip.mistuning.batch import Batch, Lanes, batch, derived, stepped, unknown_of
 from microslip.mistuning.ring import Tuned
@@ -22,6 +23,12 @@ MIXED = tuple(Scatter(of, by) for of, by in [("frequency", 0.01), ("normal_force
 def asked(scatter: tuple[Scatter, ...], grid: np.ndarray, harmonics: int = 3, **contact: object) -> Asked:
     balance = {"harmonics": harmonics, "samples": 32 if harmonics == 1 else 64}
     return Asked(Tuned(sector(**contact), {}), scatter, grid, 3, balance)
+
+
+@pytest.fixture(autouse=True)
+def large(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Gaps of many points too, as on a GPU."""
+    monkeypatch.setattr(batches, "LARGEST", 100)
 
 
 def of(what: Asked) -> Batch:

@@ -12,7 +12,7 @@ batch is a ring at one of its frequencies; whatever ends there makes room at onc
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache, partial
 from typing import Any, NamedTuple
@@ -28,13 +28,17 @@ from ..data import Array, ComplexArray, Indices
 from ..harmonic_balance.forces import AFT
 from ..harmonic_balance.problem import Problem
 from ..harmonic_balance.solver import Point, carried
-from ..programs import often
 from ..interrupts import look
+from ..programs import often
 from ..system.assembly import Assembly
 from .peaks import Highest, Wanted, search
 from .samples import Asked, Sample, SlidingRing, Solutions, ended, on_sweep, sample, worst
 
 # the compiled program --------------------------------------------------------------------------
+
+
+Values = Any
+"""An array of numpy or of jax."""
 
 
 class Frame(NamedTuple):
@@ -52,16 +56,16 @@ class Frame(NamedTuple):
         unit: (k,) m or rad of a motion.
     """
 
-    pairs: Indices
-    factors: ComplexArray
-    driven: Indices
-    signs: ComplexArray
-    felt: Indices
-    given: ComplexArray
-    cells: tuple[Indices, ...]
-    order: Indices
-    kinematics: tuple[Array, ...]
-    unit: Array
+    pairs: Values
+    factors: Values
+    driven: Values
+    signs: Values
+    felt: Values
+    given: Values
+    cells: tuple[Values, ...]
+    order: Values
+    kinematics: tuple[Values, ...]
+    unit: Values
 
 
 class Rings(NamedTuple):
@@ -73,14 +77,14 @@ class Rings(NamedTuple):
             mean: (l, K, r + 1, 1 + r) all of it in harmonic 0. laws: of every group. offset, preload: (l, N, q).
     """
 
-    poles: ComplexArray
-    left: ComplexArray
-    right: ComplexArray
-    static: ComplexArray
-    mean: Array
+    poles: Values
+    left: Values
+    right: Values
+    static: Values
+    mean: Values
     laws: tuple[Any, ...]
-    offset: Array
-    preload: Array
+    offset: Values
+    preload: Values
 
 
 class Lanes(NamedTuple):
@@ -92,12 +96,12 @@ class Lanes(NamedTuple):
             of every group.
     """
 
-    Omega: Array
-    d: Array
-    slope: Array
-    before: Array
-    force: Array
-    told: Array
+    Omega: Values
+    d: Values
+    slope: Values
+    before: Values
+    force: Values
+    told: Values
     sliders: tuple[Any, ...]
 
 
@@ -124,7 +128,7 @@ class Marching(NamedTuple):
         """(W,) places of their coefficients among those of all harmonics."""
         return np.concatenate([[0] if h == 0 else [2 * h - 1, 2 * h] for h in self.harmonics])
 
-    def series(self) -> tuple[Array, Array]:
+    def series(self) -> tuple[Values, Values]:
         """(s, W) of them at the samples of a cycle, and (W, s) their coefficients from samples."""
         values, transform = series.fourier(self.highest, self.samples)
         return values[:, self.columns], transform[self.columns]
@@ -151,7 +155,7 @@ def stepped(
     A = [block * (unit / unit[:, None]) for block in A]
     right = -R.reshape(l, N, q * W) / unit
     size = jnp.abs(right).max(axis=(1, 2), keepdims=True) + 1e-300
-    step = _around(*A, (right / size).astype(A[0].dtype)).astype(float) * size
+    step = _around(A[0], A[1], A[2], (right / size).astype(A[0].dtype)).astype(float) * size
     length = jnp.abs(step).max(axis=(1, 2)) / jnp.abs(at.d.reshape(l, N, q * W) / unit).max(axis=(1, 2))
     step = (step * unit).reshape(at.d.shape)
     cells = step.reshape(l, -1, k, W)
@@ -168,7 +172,7 @@ def derived(
     frame: Frame, rings: Rings, d: jax.Array, slope: jax.Array, lanes: jax.Array, marching: Marching
 ) -> jax.Array:  # fmt: skip
     """Slopes, those of some lanes found exactly at d."""
-    W, k = d.shape[-1], len(frame.unit)
+    W = d.shape[-1]
     some = rings._replace(laws=jax.tree_util.tree_map(lambda x: x[lanes], rings.laws), offset=rings.offset[lanes])
     found = []
     values, transform = marching.series()
@@ -196,8 +200,8 @@ def _of_points(law: Any) -> Any:
 
 
 def _path(
-    frame: Frame, offset: jax.Array, d: jax.Array, group: int, values: Array
-) -> tuple[jax.Array, tuple[int, int]]:  # fmt: skip
+    frame: Frame, offset: Values, d: Values, group: int, values: Values
+) -> tuple[jax.Array, tuple[int, ...]]:  # fmt: skip
     """(s, l c n, 3) of all points of a group, and (l, c)."""
     k, cells = len(frame.unit), frame.cells[group]
     u = d.reshape(len(d), -1, k, d.shape[-1])[:, cells]
@@ -222,7 +226,7 @@ def _forces(frame: Frame, rings: Rings, at: Lanes, marching: Marching) -> tuple[
     return _in_cells(frame, found).reshape(at.d.shape), tuple(kept)
 
 
-def _secant(frame: Frame, at: Lanes, force: jax.Array) -> jax.Array:
+def _secant(frame: Frame, at: Lanes, force: jax.Array) -> Values:
     """S that tells the change of every contact's force over the last step, see `AtFrequency.secant`."""
     l, M, k, W, *_ = at.slope.shape
     change, way = ((now - old).reshape(l, M, k, W) for now, old in ((force, at.force), (at.d, at.before)))
@@ -248,8 +252,8 @@ def _seen(
 
 
 def _of_blades(rings: Rings, Omega: Any, marching: Marching) -> tuple[Any, Any]:
-    """(l, K, r + 1, r, H) receptances and (l, K, r + 1, H) motions under the loads of blades by themselves, read-outs in
-    the last row."""
+    """(l, K, r + 1, r, H) receptances and (l, K, r + 1, H) motions under the loads of blades by
+    themselves, read-outs in the last row."""
     xp, waves = rings.mean.__array_namespace__(), np.array(marching.waves)
     n = len(waves)
     once = 1 / (1j * Omega[:, None, None, None] * waves[:, None] - rings.poles[:, :, None])  # (l, K, H, p)
@@ -338,10 +342,13 @@ def _around(D: jax.Array, behind: jax.Array, before: jax.Array, r: jax.Array) ->
 LANES = 16
 """Rings that are solved side by side."""
 
+LARGEST = 24
+"""Unknowns of a gap, above which a core solves rings no slower one by one: a step goes with their cube."""
+
 MOST = 25
 """Steps at a frequency."""
 
-SEARCHED, ENDED = 2e-7, 1e-9
+SEARCHED, ENDED = 5e-7, 1e-9
 """Length of the last step, over that of the motion: while the peak is searched for, and there."""
 
 SIZES = 0.1, 0.5, 2.0, 10.0
@@ -366,9 +373,14 @@ class Batch:
 
     @cached_property
     def marching(self) -> Marching:
-        p, model = self.problem, self.problem.groups[0].model
-        every, odd = range(p.harmonics + 1), range(1, p.harmonics + 1, 2)
-        return Marching(model.samples, model.cycles, model.periodicity, p.harmonics, tuple(every if self._skew else odd))
+        p, model = self.problem, self.models[0]
+        harmonics = tuple(range(p.harmonics + 1) if self._skew else range(1, p.harmonics + 1, 2))
+        return Marching(model.samples, model.cycles, model.periodicity, p.harmonics, harmonics)
+
+    @property
+    def models(self) -> list[AFT]:
+        """Of every group of contacts."""
+        return [g.model for g in self.problem.groups if isinstance(g.model, AFT)]
 
     @property
     def _skew(self) -> bool:
@@ -437,15 +449,16 @@ class Batch:
                     factors[*at, n] = sign * other * phases[i] * phases[j].conj()
                     pair_count[away, gap, place, gaps.place[j]] += 1
         cells = tuple(cell[list(g.contacts)] for g in p.groups)
-        kinematics = tuple(g.model.patch.kinematics[:, :, p.ways] for g in p.groups)
+        kinematics = tuple(model.patch.kinematics[:, :, p.ways] for model in self.models)
         unit = p.scale[p.groups[0].first[0]][p.ways]
         return Frame(pairs, factors, driven, signs, felt, given, cells, np.argsort(np.concatenate(cells)), kinematics,
                      unit)  # fmt: skip
 
     @cached_property
     def still(self) -> tuple[Array, ...]:
-        """Of every blade what does not scatter: rows (K, r, m) and read-outs (K, m), loads (K, H + 1, m), compliance
-        (K, r + 1, r) beside the coordinates and motions (K, H + 1, r + 1) by the loads; of the mean and of all waves."""
+        """Of every blade what does not scatter: rows (K, r, m) and read-outs (K, m), loads (K, H + 1, m),
+        compliance (K, r + 1, r) beside the coordinates and motions (K, H + 1, r + 1) by the loads; of the mean and of
+        all waves."""
         p, r, waves = self.problem, self.felt, (0, *self.marching.waves)
         K, H, m = len(self.sides), len(waves), len(p.parts[0][0].M)
         rows, output, load = np.zeros((K, r, m)), np.zeros((K, m)), np.zeros((K, H, m), complex)
@@ -506,10 +519,10 @@ class Batch:
         N, k = len(frame.driven), len(p.ways)
         state = np.zeros((2, len(rings), len(frame.order), k))
         laws = []
-        for g, cells in zip(p.groups, frame.cells, strict=True):
-            n = len(g.model.patch.points)
-            axes = point_axes(g.model.patch.law, n)
-            leaves, tree = jax.tree_util.tree_flatten(g.model.patch.law)
+        for g, model, cells in zip(p.groups, self.models, frame.cells, strict=True):
+            n = len(model.patch.points)
+            axes = point_axes(model.patch.law, n)
+            leaves, tree = jax.tree_util.tree_flatten(model.patch.law)
             found: list[list[Array]] = [[] for _ in leaves]
             for i, ring in enumerate(rings):
                 for number, cell in zip(g.contacts, cells, strict=True):
@@ -546,7 +559,7 @@ class Batch:
         given = load[:, 1] - np.einsum("jam,ja->jm", rows, F[self.frame.felt] * self.frame.given[..., first])
         motions = np.linalg.solve(K - w**2 * M + 1j * w * C, given[..., None])[..., 0]
         alone = "alone" in vars(one)
-        return Sample(one.sample, top, on_sweep(self.asked, top), *worst(one.ring, motions), alone=alone)
+        return Sample(one.sample, top, on_sweep(self.asked, top), *worst(one.ring, list(motions)), alone=alone)
 
     @cached_property
     def unit(self) -> Array:
@@ -560,7 +573,7 @@ class Batch:
     def of_sides(self, one: _Way, point: Point) -> Array:
         """(size,) x of `Problem` from a solution of the batch."""
         p, (K, r), marching = self.problem, self.frame.felt.shape, self.marching
-        ring = Rings(*(x if i == 5 else x[one.number : one.number + 1] for i, x in enumerate(one.every)))
+        ring = jax.tree_util.tree_map(lambda x: x[one.number : one.number + 1], one.every)
         force = _excess(point.slope, ring.preload[0], marching)
         g = force.reshape(-1, len(marching.harmonics))[self.frame.felt] * self.frame.given
         C, d = _of_blades(ring, np.array([point.Omega]), marching)
@@ -586,19 +599,19 @@ class Batch:
         return d, force
 
     @cached_property
-    def begun(self) -> tuple[Array, float]:
-        """(N, q, W) the motion of the ring of equal sectors at the first frequency, and that in rad/s."""
-        point = self.asked.tuned_points[0]
-        return self.of_gaps(self.problem, point)[0], point.Omega
+    def begun(self) -> Array:
+        """(N, q, W) the motion of the ring of equal sectors at the first frequency."""
+        return self.of_gaps(self.problem, self.asked.tuned_points[0])[0]
 
 
 class _Way(Solutions):
     """A ring of the batch on its way.
 
-    Attributes: batch. number, sample: among those of the batch, and of the ensemble. ring. asking: see `peaks.search`;
-        wanted: what it asks for now, of the points behind one that many, if any; None: the peak, solved to its end. top:
-        the highest amplitude so far. highest: the answer. alone: the same ring for the solver of single ones, if it was
-        needed.
+    Attributes:
+        batch. every: numbers of all rings. number, sample: its own among those, and of the ensemble. ring. asking: see
+            `peaks.search`. wanted: what it asks for now, None: its peak, solved to the end. behind: of how many points
+            the start is carried on, where a solution is followed. amplitudes: Hz -> (w,). top: the highest so far.
+            highest: the answer. alone: the ring for the solver of single ones, once it is needed.
     """
 
     def __init__(self, batch: Batch, every: Rings, number: int, sample: int, ring: Assembly) -> None:
@@ -624,6 +637,8 @@ class _Way(Solutions):
     def start(self) -> Array:
         """(size,) from what is known."""
         Omega = 2 * np.pi * self.frequency
+        if not self.known:
+            return (self.batch.begun / self.batch.unit).ravel()
         if self.behind and self.wanted and self.wanted.onward:
             return carried(self.beyond(self.frequency, self.wanted.onward[0])[: self.behind], Omega)
         near = self.near(Omega, 4)
@@ -699,72 +714,113 @@ def unknown_of(batch: Batch, rings: Rings) -> tuple[Any, ...]:
 
 def solved(batch: Batch, numbers: Sequence[int]) -> list[Sample]:
     """Samples; what is hard of them by the solver of single rings."""
-    asked, marching, unit = batch.asked, batch.marching, batch.unit
-    frame: Frame = jax.device_put(batch.frame)
-    whole = [asked.tuned.mistuned(asked.deviations(n)) for n in numbers]
-    every, good, matrices = batch.rings(whole)
-    d0, Omega0 = batch.begun
-    waiting = [_Way(batch, every, i, numbers[i], ring) for i, ring in enumerate(whole) if good[i]][::-1]
-    found: dict[int, Sample] = {}
-    lanes: list[_Way | None] = [None] * LANES
-    rows, none = np.zeros(LANES, int), np.zeros(LANES, bool)
-    rings = jax.tree_util.tree_map(lambda x: x[rows], every)
-    d = np.broadcast_to(d0, (LANES, *d0.shape)).copy()
-    sliders = unknown_of(batch, rings)
-    k, W = len(frame.unit), d.shape[-1]
-    slope = top = jnp.zeros((LANES, len(frame.order), k, W, k, W))
-    first = derived(frame, rings, d, slope, np.zeros(DERIVED, int), marching)[0]
-    at = Lanes(np.full(LANES, Omega0), d, slope, d, 0 * d, none, sliders)
-    count, last = np.zeros(LANES, int), np.full(LANES, np.inf)
-    while True:
+    lanes = _Run(batch, numbers)
+    while lanes.filled():
         look()
-        Omega, d, told = np.array(at.Omega), np.array(at.d), np.array(at.told)
-        begin = none.copy()
-        for lane in [i for i in range(LANES) if lanes[i] is None][: len(waiting)]:
-            lanes[lane] = one = waiting.pop()
-            rows[lane], begin[lane], told[lane], count[lane], last[lane] = one.number, True, False, 0, np.inf
-            Omega[lane], d[lane] = 2 * np.pi * one.frequency, d0
-        if not any(lanes):
-            break
-        at = at._replace(Omega=Omega, d=d, told=told)
-        if begin.any():
-            rings = jax.device_put(jax.tree_util.tree_map(lambda x: x[rows], every))
-            at = at._replace(slope=turned(at.slope, top, first, none, none, begin)[0])
-        at, *got = stepped(frame, rings, at, marching)
+        lanes.step()
+    return [lanes.found.get(i) or sample(batch.asked, n) for i, n in enumerate(numbers)]
+
+
+class _Run:
+    """Rings on their way through the lanes.
+
+    Attributes: found: samples, by their places among those asked for.
+    """
+
+    def __init__(self, batch: Batch, numbers: Sequence[int]) -> None:
+        asked, l = batch.asked, LANES
+        whole = [asked.tuned.mistuned(asked.deviations(n)) for n in numbers]
+        self.batch, self.frame = batch, jax.device_put(batch.frame)
+        self.every, good, self.matrices = batch.rings(whole)
+        ways = [_Way(batch, self.every, i, n, ring) for i, (n, ring) in enumerate(zip(numbers, whole, strict=True))]
+        self.waiting = [way for way in ways[::-1] if good[way.number]]
+        self.found: dict[int, Sample] = {}
+        self.lanes: list[_Way | None] = [None] * l
+        self.rows, self.rings = np.zeros(l, int), self.every
+        d = np.broadcast_to(batch.begun, (l, *batch.begun.shape))
+        k, W = len(batch.frame.unit), d.shape[-1]
+        slope = jnp.zeros((l, len(batch.frame.order), k, W, k, W))
+        self._placed(range(l))
+        given = self.rings, d, slope, np.zeros(DERIVED, int), batch.marching
+        self.first = derived(self.frame, *given)[0]
+        self.top = jnp.broadcast_to(self.first, slope.shape)
+        sliders = unknown_of(batch, self.rings)
+        self.at = Lanes(np.ones(l), d, self.top, d, 0 * d, np.zeros(l, bool), sliders)
+        self.count, self.last = np.zeros(l, int), np.full(l, np.inf)
+
+    def _placed(self, lanes: Iterable[int]) -> None:
+        """Numbers of the rings to where they are."""
+        for lane in lanes:
+            self.rows[lane] = self.lanes[lane].number if self.lanes[lane] else self.rows[lane]  # type: ignore[union-attr]
+        self.rings = jax.device_put(jax.tree_util.tree_map(lambda x: x[self.rows], self.every))
+
+    def filled(self) -> bool:
+        """Whether any lane has a ring, those that wait taken in."""
+        free = [i for i, way in enumerate(self.lanes) if way is None][: len(self.waiting)]
+        for lane in free:
+            self.lanes[lane] = self.waiting.pop()
+        if free:
+            self._placed(free)
+            self._begin(free, free)
+        return any(self.lanes)
+
+    def _begin(
+        self, anew: Sequence[int], moved: Sequence[int], keep: Sequence[int] = (), back: Sequence[int] = ()
+    ) -> None:
+        """Lanes to where they go on: some with the first derivatives of all, some with those of their tops, which are
+        kept before."""
+        slope = self.at.slope
+        if anew or keep or back:
+            masks = (np.isin(np.arange(len(self.lanes)), which) for which in (keep, back, anew))
+            slope, self.top = turned(slope, self.top, self.first, *masks)
+        Omega, d, told = (np.array(x) for x in (self.at.Omega, self.at.d, self.at.told))
+        told[list(anew)] = False
+        for lane in moved:
+            way = self.lanes[lane]
+            if way is not None:
+                Omega[lane], d[lane] = 2 * np.pi * way.frequency, way.start().reshape(d[lane].shape) * self.batch.unit
+                self.count[lane], self.last[lane] = 0, np.inf
+        self.at = self.at._replace(Omega=Omega, d=d, told=told, slope=slope)
+
+    def step(self) -> None:
+        """One step in all lanes, and on to other frequencies where that was the last one."""
+        self.at, *got = stepped(self.frame, self.rings, self.at, self.batch.marching)
         length, y, force = map(np.asarray, got)
-        count += 1
-        ratio = np.where(last < np.inf, length / last, 1.0)
+        Omega, d = np.asarray(self.at.Omega), np.asarray(self.at.d) / self.batch.unit
+        self.count += 1
+        ratio = np.where(self.last < np.inf, length / self.last, 1.0)
         error = length * np.minimum(ratio, 0.9) / (1 - np.minimum(ratio, 0.9))
-        last, d, Omega = length.copy(), np.array(at.d), np.array(at.Omega)
-        slow, keep, back = list[int](), none.copy(), none.copy()
-        for lane, one in enumerate(lanes):
-            if one is None:
+        self.last = length.copy()
+        slow, anew, keep, back, moved = list[int](), list[int](), list[int](), list[int](), list[int]()
+        for lane, way in enumerate(self.lanes):
+            if way is None:
                 continue
-            small = error[lane] < (SEARCHED if one.wanted else ENDED)
-            if not small and np.isfinite(length[lane]) and count[lane] < MOST:
-                if count[lane] > 1 and not ratio[lane] < SLOW:
+            small = bool(error[lane] < (SEARCHED if way.wanted else ENDED))
+            if not small and np.isfinite(length[lane]) and self.count[lane] < MOST:
+                if self.count[lane] > 1 and not ratio[lane] < SLOW:
                     slow.append(lane)
                 continue
-            Y = y[lane, batch.readers]
-            if small and Y.max() > one.top:
-                one.top, keep[lane] = float(Y.max()), True
-            point = Point(float(Omega[lane]), (d[lane] / unit).ravel(), slope=force[lane]) if small else None
-            if not one.goes_on(point, Y):
-                found[one.number] = batch.sample(one, matrices[one.number])
-                lanes[lane] = None
-                continue
-            d[lane] = one.start().reshape(d[lane].shape) * unit
-            back[lane] = not small or one.frequency < max(one.known)
-            Omega[lane], count[lane], last[lane] = 2 * np.pi * one.frequency, 0, np.inf
-        at = at._replace(d=d, Omega=Omega)
-        if keep.any() or back.any():
-            slope, top = turned(at.slope, top, first, keep, back, none)
-            at = at._replace(slope=slope)
+            moved.append(lane)
+            Y, point = y[lane, self.batch.readers], None
+            if small:
+                point = Point(float(Omega[lane]), d[lane].ravel(), slope=force[lane])
+                if Y.max() > way.top:
+                    way.top = float(Y.max())
+                    keep.append(lane)
+            if not way.goes_on(point, Y):
+                self.found[way.number] = self.batch.sample(way, self.matrices[way.number])
+                self.lanes[lane] = None
+            elif not small:
+                anew.append(lane)
+            elif way.frequency < max(way.known):
+                back.append(lane)
+        if moved:
+            self._begin(anew, moved, keep, back)
         for begins in range(0, len(slow), DERIVED):
             some = slow[begins : begins + DERIVED]
-            at = at._replace(slope=derived(frame, rings, at.d, at.slope, np.resize(some, DERIVED), marching))
-            last[some] = np.inf
-    return [found.get(i) or sample(asked, n) for i, n in enumerate(numbers)]
+            given = self.at.d, self.at.slope, np.resize(some, DERIVED), self.batch.marching
+            self.at = self.at._replace(slope=derived(self.frame, self.rings, *given))
+            self.last[some] = np.inf
 
 
 @lru_cache(maxsize=1)
@@ -778,12 +834,18 @@ def batch(asked: Asked) -> Batch | None:
     alone = len(p.slices) > 3 and len({len(part.M) for part in p.parts[0]}) == 1
     alike = len({tuple(p.scale[g.first[0]][p.ways]) for g in p.groups}) == 1
     marched = all(isinstance(m, AFT) for m in models)
+    rows = p.coefficients * len(p.ways) * (p.sides.ring.each if p.sides.ring else 1)
+    marched = marched and (rows <= LARGEST or jax.default_backend() != "cpu")
     if not (asked.tuned_points and alone and alike and marched and p.sides.ring and len(set(outputs)) == len(outputs)):
         return None
     for g, u in zip(p.groups, _motions(p, asked.tuned_points[-1].x), strict=True):
         if not np.array_equal(g.model.force(u, 1.0), g.model.force(u, 3.0)):
             return None  # depends on how fast it moves
-    return Batch(asked, p)
+    found = Batch(asked, p)
+    try:
+        return found if found.rings([asked.tuned.whole])[1].all() else None
+    except np.linalg.LinAlgError:  # a body that nothing but its contacts holds
+        return None
 
 
 def _motions(p: Problem, x: Array) -> list[Array]:

@@ -92,7 +92,8 @@ def highest(
             from its other end, and the rest is looked for in what is between. tells: where it is given, no solution is
             followed to where it is told to lead.
     """
-    asking, found = search(frequency, tolerance, most, follow is not None, at_once is not None, tells), None
+    asking = search(frequency, tolerance, most, follow is not None, at_once is not None, tells)
+    found: Any = None
     while True:
         try:
             f, with_little, onward = asking.send(found)
