@@ -357,7 +357,7 @@ SIZES = 0.1, 0.5, 2.0, 10.0
 SLOW = 0.3
 """Of a step over the one before, from which on derivatives are found anew."""
 
-DERIVED = 4
+DERIVED = 2
 """Lanes whose derivatives are found together."""
 
 

@@ -38,7 +38,7 @@ COLUMNS = ("amplitude", "frequency_Hz", "sector", "localisation", "missed", "uns
 ALONE = 16
 """Samples that are solved one by one before others are solved together, whose program takes as long to compile."""
 
-BLOCK = 32
+BLOCK = 64
 """Samples that are solved together: those of the same whole numbers of it, whoever asks for some of them."""
 
 EACH = 4
