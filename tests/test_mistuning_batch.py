@@ -80,8 +80,8 @@ def test_samples_are_those_of_the_solver_of_single_rings(
         missed = one.top.missed + alone.top.missed if one.alone else 0.0
         assert one.top.amplitude == pytest.approx(alone.top.amplitude, rel=1e-6 + missed)
         assert one.grid == pytest.approx(alone.grid, abs=1e-5 * one.top.amplitude, nan_ok=True)
-        if not one.alone:
-            assert (one.top.output, one.stress) == (alone.top.output, pytest.approx(alone.stress, rel=1e-6))
+        if not one.alone:  # the peak is as high, and may be a little beside: stress changes along it
+            assert (one.top.output, one.stress) == (alone.top.output, pytest.approx(alone.stress, rel=1e-4))
 
 
 @pytest.mark.slow
