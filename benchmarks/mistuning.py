@@ -344,7 +344,8 @@ def together(count: int) -> None:
     off = [rings[one.number].top.amplitude / one.top.amplitude - 1 for one in alone]
     each = 1e3 * spent / [len(rings), len(alone)]
     asking = sum(one.alone for one in rings)
-    print(f"{len(rings)} rings together: {each[0]:.0f} ms each, {asking} asked for the solver of single rings; {len(alone)} of them alone: {each[1]:.0f} ms, {each[1] / each[0]:.1f} times; highest off by "
+    print(f"{len(rings)} rings together: {each[0]:.0f} ms each, {asking} asked for the solver of single "
+          f"rings; {len(alone)} of them alone: {each[1]:.0f} ms, {each[1] / each[0]:.1f} times; highest off by "
           f"{np.abs(off).max():.1e} at most")  # fmt: skip
 
 
