@@ -22,10 +22,10 @@ from ..elasticity import strain_tensor, turned, turned_strain
 from ..topology import CELL_TYPES
 from .bdf_lumps import READ as LUMPED
 from .bdf_lumps import bars_of, lumps_of
-from .bulk_systems import Chained, LocalSystem, through
 from .materials import isotropic_rows, orthotropic_row
 from .raw import PRESTRESSED, Damaged, DeckMaterial, Numbering, RawMesh, Structure, ignored, lost
 from .supports import Constraints, add_supports, in_axes
+from .systems import Chained, System, through
 
 _BRICK20, _WEDGE15 = (
     (*range(12), *range(16, 20), *range(12, 16)),
@@ -337,7 +337,7 @@ def _systems(cards: Mapping[str, list[_Card]], file: str) -> Chained:
         within = chained[max(card.whole(2, usual.whole(2, 0)), 0)]
         return within.points(np.array([[card.real(column) or 0.0 for column in (3, 4, 5)]]))[0]
 
-    def made(number: int) -> LocalSystem:
+    def made(number: int) -> System:
         if number not in known:
             raise Damaged(f"uses the coordinate system {number}, which no CORD card defines; add it")
         card, place = known[number]
@@ -347,7 +347,7 @@ def _systems(cards: Mapping[str, list[_Card]], file: str) -> Chained:
             else:
                 rows = [[card.real(3 + 3 * i + k) or 0.0 for k in range(3)] for i in range(3)]
                 points = chained[card.whole(2, 0)].points(np.array(rows))
-            return through(card[0][5], *points)
+            return through({"R": 0, "C": 1, "S": 3}[card[0][5]], *points)
 
     chained = Chained(made)
     return chained
@@ -498,7 +498,7 @@ def _material_axes(bulk: _Bulk, solid: _Card) -> tuple[Array, str]:
         return np.eye(3), f"directions of each cell (CORDM {solid.at(3)}), which are not read; {remedy}"
     with _named(bulk.where(solid)):
         system = bulk.systems[number]
-    if system.kind != "R":
+    if system.kind:
         return np.eye(3), f"directions that turn along the body (CORDM {number}), which are not read; {remedy}"
     return system.axes, ""
 
