@@ -266,7 +266,7 @@ def test_bulk_data_runs_at_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
     ("old", "new", "words"),
     [
         ("CHEXA          1       1", "CHEXA          2       1", "CHEXA 2 is there already"),
-        ("CHEXA          1       1       1", "CHEXA          1       1        ", "CHEXA 1: the element has 7 nodes; 8 or 20"),
+        ("CHEXA          1       1       1", "CHEXA          1       1        ", "has 7 nodes; 8 or 20"),
         ("PSOLID         1       1", "PSOLID         1       3", "MAT1 3 (missing)"),
         ("PSOLID         1 ", "PSOLID         2 ", "no PSOLID defines"),
         ("MAT1  ", "MAT9  ", "MAT9 1"),

@@ -399,6 +399,7 @@ def _constrain(bulk: Bulk, control: Control) -> dict[int, dict[int, float]]:
             ways = "x" if node in scalar else card.directions(place + 1)
             held.hold(node, ways)
             if size := card.real(place + 2) or 0.0:
+                bulk.positions(card, [node])
                 enforced.setdefault(node, {}).update({"xyzabc".index(way): size for way in ways})
     return enforced
 

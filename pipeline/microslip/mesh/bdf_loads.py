@@ -35,7 +35,7 @@ def state_of_bulk(
     Raises:
         Damaged: with file and line, what is wrong with a load.
     """
-    acting = _Acting(bulk, {node: dict(ways) for node, ways in enforced.items()})
+    acting = _Acting(bulk, case.place, {node: dict(ways) for node, ways in enforced.items()})
     number = case.number_of("LOAD")
     if number is not None:
         sets = list(_sets(bulk, number))
@@ -70,6 +70,7 @@ class _Acting:
     """Loads as they are met. displaced: node -> direction -> displacement. nodal, facets: by card or kind."""
 
     bulk: Bulk
+    where: str
     displaced: dict[int, dict[int, float]]
     loads: list[NodalLoad | FacetLoad | BodyLoad | SpinLoad] = field(default_factory=list)
     facets: dict[tuple, tuple[str, list[Indices], list[Array]]] = field(default_factory=dict)
@@ -180,7 +181,13 @@ class _Acting:
         """SPCD: displacements of components that SPC holds."""
         for place in (2, 5):
             if node := card.whole(place, 0):
+                self.bulk.positions(card, [node])
                 for way in card.directions(place + 1):
+                    if way not in self.bulk.held.nodes.get(node, ()):
+                        raise Damaged(
+                            f"{card.where} displaces node {node} in {way}, which no SPC of the "
+                            "subcase holds; hold it"
+                        )
                     size = factor * (card.real(place + 2) or 0.0)
                     self.displaced.setdefault(node, {})["xyzabc".index(way)] = size
 
@@ -339,7 +346,7 @@ class _Acting:
                 ways.append(way)
                 sizes.append(size)
         if nodes:
-            where = f"{self.bulk.file}: SPC or SPCD"
+            where = f"{self.where}: displacements of SPC and SPCD"
             at = self.bulk.numbering.positions(nodes, f"{where} names")
             pressed.append(NodalLoad(where, "displacement", at, np.array(ways), np.array(sizes)))  # type: ignore[arg-type]
         return [*self.loads, *pressed]
