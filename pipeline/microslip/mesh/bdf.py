@@ -18,6 +18,8 @@ import numpy as np
 from ..data import Array, AverageLink, Equation, Link, RigidLink
 from ..topology import CELL_TYPES
 from .bdf_cards import Bulk, BulkCard, at_card, cards_of, lines_of, listed, number_of, parted
+from .bdf_contact import READ as FACED
+from .bdf_contact import faced
 from .bdf_control import Case, Control, control_of
 from .bdf_loads import LOADS, OTHERS, SHELLS, state_of_bulk, temperatures
 from .bdf_lumps import READ as LUMPED
@@ -42,7 +44,7 @@ _SOLIDS["CPYRA"] = _SOLIDS["CPYRAM"]
 _SYSTEMS = ("CORD1R", "CORD1C", "CORD1S", "CORD2R", "CORD2C", "CORD2S")
 _READ = {
     "GRID", "GRDSET", "SPOINT", *_SYSTEMS, "PARAM", "SET1", "SPC", "SPC1", "SPCADD", "RBE2", "RBE3", "MPC", "MPCADD",
-    "ASET", "ASET1", "LOAD", "TEMP", "TEMPD", "MATT1", *TABLES, *_SOLIDS, *SHELLS, *KINDS, *PROPERTIES, *LUMPED,
+    "ASET", "ASET1", "LOAD", "TEMP", "TEMPD", "MATT1", *TABLES, *_SOLIDS, *SHELLS, *KINDS, *PROPERTIES, *LUMPED, *FACED,
 }  # fmt: skip
 _SILENT = re.compile(
     r"EIG\w*|CORD\w+|ENDDATA|TABL\w*|DTI|SET3|MDLPRM|SUPORT1?|PLOTEL\d?|SESET|USET1?|QSET1?|GROUP|"
@@ -55,7 +57,7 @@ _SILENT = re.compile(
 """Cards that say nothing of the body, or only together with others that are named."""
 _COUNTS = re.compile(
     r"C(?!ORD|END|LOAD)[A-Z]+\d?|R(?!FORCE|LOAD|AND|ING)[A-Z]+\d?|GENEL|DMIG|NSM[A-Z]*\d?|MATT\d+|"
-    r"MFLUID|BCTSET|BGSET|BCTABL[E1]|BCBODY1?|PSHELL|PCOMPG?|BCONTACT|BOLT|SPCOFF1?|SPCR|SPLINE\d|AEQUAD4|FEEDGE|FEFACE|GMCURV|GMSURF|PVAL"
+    r"MFLUID|BCTABL[E1]|BCBODY1?|PSHELL|PCOMPG?|BCONTACT|BOLT|SPCOFF1?|SPCR|SPLINE\d|AEQUAD4|FEEDGE|FEFACE|GMCURV|GMSURF|PVAL"
 )
 """Cards that add mass, stiffness or constraints; those beside `_READ` are not read."""
 
@@ -83,6 +85,7 @@ def read_bdf(path: Path) -> RawMesh:
             raw.add_set(f"{label} {card[1]}", listed(card, first, bulk.numbering), bulk.numbering)
     enforced = _constrain(bulk, control)
     raw.links += [*_rigid(bulk), *bars_of(bulk), *_averages(bulk), *_equations(bulk, control)]
+    faced(bulk, control)
     raw.lumps = lumps_of(bulk)
     raw.structures = list(_structures(bulk))
     _retain(bulk)
@@ -200,6 +203,12 @@ def _integrated(bulk: Bulk) -> list[str]:
                 f"{kind} are integrated in full, without Nastran's {how} (PSOLID, IN and ISOP): stiffer, by less on "
                 "finer meshes"
             )
+    coupled = bulk.parameter("COUPMASS")
+    if coupled is None or coupled < 0:
+        told.append(
+            "masses are consistent, where Nastran lumps them without PARAM,COUPMASS,1: its frequencies are lower, by "
+            "less on finer meshes"
+        )
     return [*told, *locks(raw)]
 
 

@@ -24,6 +24,8 @@ from ..files.store import ordinary
 from ..topology import CELL_TYPES, FACET_CORNERS
 from ..units import usual_system
 from .bdf import read_bdf
+from .bdf_cards import included
+from .cards import files_of
 from .cdb import read_cdb
 from .inp import read_inp
 from .linking import renumbered
@@ -101,6 +103,7 @@ _READERS: dict[str, Callable[[Path], RawMesh]] = {
     ".inp": read_inp,
     ".med": read_med,
 }
+
 _BY_MESHIO = (".msh", ".vtu", ".vtk")
 
 
@@ -159,6 +162,12 @@ def _read_raw(path: Path) -> RawMesh:
         return _by_meshio(path, _from_meshio)
     known = ", ".join([*_READERS, *_BY_MESHIO])
     raise UserError(f"meshes are not read from a file '{suffix}'; use one of {known}")
+
+
+def read_files(path: Path) -> list[Path]:
+    """A mesh file and those that it reads (INCLUDE, INPUT); what is missing is told where it is read."""
+    reader = _READERS.get(suffix_of(path))
+    return files_of(path) if reader is read_inp else included(path) if reader is read_bdf else [path]
 
 
 def _mesh_of(raw: RawMesh, metres: float, system: str | None) -> Mesh:

@@ -17,9 +17,7 @@ from ..data import Array, Mesh, ModalBasis
 from ..errors import UserError, in_its_file, of_file
 from ..files import store
 from ..files.hdf5 import refuse_foreign
-from ..mesh import UNITS, suffix_of
-from ..mesh.bdf_cards import included
-from ..mesh.cards import files_of
+from ..mesh import UNITS, read_files
 from ..settings.body import BodySettings, MatrixFiles
 from ..units import rpm_text
 from .job import Job
@@ -142,8 +140,7 @@ def modes_inputs(job: Job, mesh_file: Path) -> dict[str, Any]:
     """What a modal file depends on: settings but those of the drawing and the prose, the mesh, the code."""
     settings = {k: v for k, v in job.raw.items() if k not in ("geometry", "mesh", "description", "note")}
     inputs = {"settings": settings, "mesh": store.hash_file(mesh_file)}
-    others = {".inp": files_of, ".bdf": included}.get(suffix_of(mesh_file), lambda file: [file])
-    if read := others(mesh_file)[1:]:
+    if read := read_files(mesh_file)[1:]:
         inputs["included"] = [store.hash_file(f) for f in read if f.is_file()]
     if job.settings.geometry.mesh is not None:
         inputs["faces"] = job.raw["geometry"].get("faces", [])
