@@ -82,7 +82,7 @@ def _at_speeds(
             report(f"speed {number + 1} of {len(speeds)}: {rpm:g} rpm")
         if b.pressed:
             state = pressed_state(
-                b.model, b.motions, b.centre, rotation.prestress, b.settings.modes.solver, report
+                b.model, b.motions, b.centre, rotation.prestress, b.settings.modes, report
             )
         else:
             within = balanced(b.model, b.floats(0), b.solver)

@@ -164,7 +164,7 @@ def _prepared(
         refuse_unbalanced(
             replace(model, point=np.array(settings.rotation.point)), motions, centre, inertia
         )
-    solver = new_solver(settings.modes.solver)
+    solver = new_solver(settings.modes.solver, settings.modes.ranks)
     return Prepared(
         model, settings, rows, motions, coefficients, mass, centre, inertia, sector, solver, report
     )  # fmt: skip

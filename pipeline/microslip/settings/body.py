@@ -637,8 +637,16 @@ class Modes(Model):
     """[Hz] only modes below it; `count` is then the upper limit"""
     certify: bool = True
     """prove by an inertia count that none is missing"""
-    solver: Literal["auto", "pardiso", "superlu"] = "auto"
+    solver: Literal["auto", "pardiso", "superlu", "petsc"] = "auto"
     """sparse direct solver, see [platforms](platforms.md)"""
+    ranks: Annotated[int, Field(ge=1, le=10000)] = 1
+    """processes that share a factorisation (`solver = "petsc"`)"""
+
+    @model_validator(mode="after")
+    def _ranks_of_petsc(self) -> Modes:
+        if self.ranks > 1 and self.solver != "petsc":
+            raise ValueError('ranks share the work of solver = "petsc"; give that solver, or remove ranks')
+        return self
 
 
 class Damping(Model):
