@@ -123,7 +123,8 @@ def _inertia(reading: _Reading, nodes: Array) -> PointMass:
 
 def _element(reading: _Reading, nodes: Array) -> LumpedElement:
     ways, value = reading.value()
-    if reading.kind.endswith("A"):
+    damps, line = reading.kind.startswith("DASHPOT"), reading.kind.endswith("A")
+    if line:
         along = reading.points[nodes[1]] - reading.points[nodes[0]]
         if not along.any():
             kind = reading.kind
@@ -136,9 +137,8 @@ def _element(reading: _Reading, nodes: Array) -> LumpedElement:
     row = elongation(axes, (1.0, -1.0)[: len(nodes)])
     A = value * np.outer(row, row)
     at = np.concatenate([turn + np.arange(3) for turn in turns])
-    damps = reading.kind.startswith("DASHPOT")
-    zero = np.zeros_like(A)
-    return LumpedElement(reading.where, np.repeat(nodes, 3), at, zero if damps else A, A if damps else zero)
+    zero, pulls = np.zeros_like(A), value if line and not damps else 0.0
+    return LumpedElement(reading.where, np.repeat(nodes, 3), at, zero if damps else A, A if damps else zero, pulls)
 
 
 def elongation(axes: list[Array], signs: tuple[float, ...]) -> Array:

@@ -51,7 +51,9 @@ def spread(raw: RawMesh, system: str | None) -> Lumps | None:
     blocks = np.array(list(made.blocks.values())).reshape(-1, 2, 3, 3)
     points = np.array(list(made.masses), dtype=np.int64)
     weights = mass * np.array(list(made.masses.values()))
-    return Lumps(points, weights, pairs, blocks[:, 0] * mass / time**2, blocks[:, 1] * mass / time)
+    lines = np.array([pair for *pair, _ in made.lines], dtype=np.int64).reshape(-1, 2)
+    tight = np.array([k for *_, k in made.lines]) * mass / time**2
+    return Lumps(points, weights, pairs, blocks[:, 0] * mass / time**2, blocks[:, 1] * mass / time, lines, tight)
 
 
 def on_mesh(lumps: Lumps, number: Indices) -> Lumps:
@@ -59,7 +61,8 @@ def on_mesh(lumps: Lumps, number: Indices) -> Lumps:
     pairs = number[lumps.pairs]
     swapped = (pairs[:, 0] > pairs[:, 1])[:, None, None]
     K, C = (np.where(swapped, np.swapaxes(A, 1, 2), A) for A in (lumps.stiffness, lumps.damping))
-    return Lumps(number[lumps.points], lumps.masses, np.sort(pairs, axis=1), K, C)
+    lines = np.sort(number[lumps.lines], axis=1)
+    return Lumps(number[lumps.points], lumps.masses, np.sort(pairs, axis=1), K, C, lines, lumps.tight)
 
 
 def points_of(lumps: Lumps | None) -> Indices:
@@ -74,7 +77,8 @@ class _Spread:
     Attributes:
         solid: positions that cells use. leading: those that others follow, turning: those with rotations.
         frames: position -> points that follow it: (where, positions). masses: position -> mass. blocks: (a, b) ->
-            stiffness and damping (2, 3, 3). resisted: loose position -> (6, 6) stiffness of its own.
+            stiffness and damping (2, 3, 3). lines: of springs between two points. resisted: loose position -> (6, 6)
+            stiffness of its own.
     """
 
     raw: RawMesh
@@ -89,6 +93,7 @@ class _Spread:
     turned: dict[int, tuple[int, int]] = field(default_factory=dict)
     masses: dict[int, float] = field(default_factory=dict)
     blocks: dict[tuple[int, int], Array] = field(default_factory=dict)
+    lines: list[tuple[int, int, float]] = field(default_factory=list)
     resisted: dict[int, Array] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -149,6 +154,9 @@ class _Spread:
             for j, b in enumerate(points[i:], i):
                 block = [A[3 * i : 3 * i + 3, 3 * j : 3 * j + 3] for A in both]
                 self.blocks[a, b] = self.blocks.get((a, b), np.zeros((2, 3, 3))) + np.array(block)
+        if item.along:
+            ends = [self.point(int(node), item.where) for node in item.nodes[[0, -1]]]
+            self.lines.append((*ends, item.along))
         for node in self.loose & {*item.nodes.tolist()}:
             at = np.flatnonzero(item.nodes == node)
             total = self.resisted.setdefault(node, np.zeros((6, 6)))
