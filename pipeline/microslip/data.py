@@ -354,12 +354,14 @@ class StaticStep:
 
     Attributes:
         where: place of the step. nonlinear: whether its displacements are finite (NLGEOM), else one linear solution.
-        loads: all that act at its end, in a mesh in SI.
+        loads: all that act at its end, in a mesh in SI. supports: point set -> directions that it holds, as
+            `Mesh.supports`; None: those of the modes.
     """
 
     where: str
     nonlinear: bool
     loads: tuple[NodalLoad | FacetLoad | BodyLoad | SpinLoad, ...] = ()
+    supports: Mapping[str, str] | None = None
 
 
 @dataclass(frozen=True, eq=False)

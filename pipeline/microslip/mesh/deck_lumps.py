@@ -37,8 +37,12 @@ def lumps_of(deck: Deck, numbering: Numbering, points: Array) -> Iterator[PointM
                     continue
                 left -= {(cells.kind, int(n)) for n in cells.ids[mine]}
                 reading = _Reading(deck, card, cells.kind, points)
-                for nodes in numbering.positions(cells.nodes[mine], f"*ELEMENT, TYPE={cells.kind} names"):
-                    yield _MAKERS[cells.kind][1](reading, nodes)
+                at = numbering.positions(cells.nodes[mine], f"*ELEMENT, TYPE={cells.kind} names")
+                for number, nodes in zip(cells.ids[mine].tolist(), at, strict=True):
+                    made = _MAKERS[cells.kind][1](reading, nodes)
+                    if isinstance(made, PointMass) and made.mass:
+                        deck.masses[number] = made.node, made.mass
+                    yield made
     if left:
         kind, number = sorted(left)[0]
         place = next(c.where for c in deck.lumped if c.kind == kind and number in c.ids)

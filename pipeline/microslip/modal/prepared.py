@@ -11,7 +11,7 @@ import numpy as np
 from ..data import Array, Mesh
 from ..errors import UserError
 from ..fem.contact import Grip, coupled_points
-from ..fem.cyclic import CyclicUpper
+from ..fem.cyclic import CyclicUpper, cyclic_upper, sector_unknowns
 from ..fem.discretise import REDUCED, Discretisation, discretise, whole
 from ..fem.operators import per_block, spin_projector
 from ..fem.tied import Tied, tied_upper
@@ -25,7 +25,9 @@ from .boundary import (
     fixed_dofs,
     known_materials,
     materials_of,
+    refuse_other_supports,
     refuse_overlap,
+    still_dofs,
     with_loads,
 )
 from .closures import bolt_forces, contact_pairs
@@ -44,7 +46,8 @@ class Prepared:
     Attributes:
         motions: (3n, r) rigid motions that nothing holds. coefficients: (6, r) of these (`rigid.coefficients_of`).
         mass: kg. centre: (3,) m. inertia: (3, 3) about it, kg m2. solver: of the static states, and of the modes of a
-            body that is no sector. report: is told what is done.
+            body that is no sector. report: is told what is done. still: the model as the static step of its file holds it, where its modes are
+        held otherwise.
     """
 
     model: BodyModel
@@ -58,6 +61,7 @@ class Prepared:
     sector: Sector | None
     solver: DirectSolver
     report: Report
+    still: BodyModel | None = None
 
     @property
     def harmonics(self) -> tuple[int, ...]:
@@ -151,8 +155,16 @@ def _prepared(
     )  # fmt: skip
     model = with_lumps(model)
     rows = with_centrifugal(rows, model)
-    model = with_loads(model, mesh, settings, held)
+    rest = still_dofs(mesh, settings)
+    if rest is not None:
+        unmoved = tied_upper(d.pattern, rest, mesh.ties)
+        if sector is not None:
+            unmoved = cyclic_upper(sector_unknowns(d.pattern, rest, sector.unknowns.cut, mesh.ties), d.pattern.size)
+        model = replace(model, free=unmoved)
+        refuse_other_supports(settings)
+    model = with_loads(model, mesh, settings, held if rest is None else rest)
     model = replace(model, contacts=pairs, dead_load=model.dead_load + bolt_forces(mesh, settings))
+    still, model = None if rest is None else model, replace(model, free=free)
     motions = rigid.unresisted(_floating(model, sector, centre), model.springs, d.pattern)
     check_held(mesh, settings, centre, motions)
     refuse_unlinked_parts(model, settings)
@@ -166,7 +178,7 @@ def _prepared(
         )
     solver = new_solver(settings.modes.solver)
     return Prepared(
-        model, settings, rows, motions, coefficients, mass, centre, inertia, sector, solver, report
+        model, settings, rows, motions, coefficients, mass, centre, inertia, sector, solver, report, still
     )  # fmt: skip
 
 

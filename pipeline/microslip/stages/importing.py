@@ -597,6 +597,8 @@ def _state(mesh: Mesh, metres: float, ring: bool, held: bool) -> tuple[list[str]
     acting = [f"{number} {kind}{'s' * (number > 1)}" for kind, number in count.items()]
     acting += ["temperatures"] * (mesh.temperature is not None)
     law = "finite displacements" if state.nonlinear else "one linear solution"
+    if state.supports is not None:
+        law += f"; held there by {', '.join(f'{n} in {w}' for n, w in state.supports.items()) or 'nothing'}"
     said = [f"{state.where}: the modes are about its static state: {', '.join(acting) or 'nothing acts'}; {law}"]
     turning = [] if ring else ["", "[rotation]"]
     turning.append(f'prestress = "{"nonlinear" if state.nonlinear else "linear"}"')
@@ -609,7 +611,9 @@ def _state(mesh: Mesh, metres: float, ring: bool, held: bool) -> tuple[list[str]
     elif spins:
         (spin,) = spins
         axis, speed = spin.axis / np.linalg.norm(spin.axis) + 0.0, to_rpm(spin.speed)
-        said.append(f"{spin.where}: {speed:.6g} rpm")
+        heavy = mesh.lumps is not None and bool(mesh.lumps.masses.any())
+        whole = "; point masses turn with the body, all of them: CalculiX leaves their softening out" * heavy
+        said.append(f"{spin.where}: {speed:.6g} rpm{whole}")
         if not ring:
             numbers = [", ".join(f"{v:.15g}" for v in row) for row in (axis, spin.point / metres + 0.0)]
             turning += [f"axis = [{numbers[0]}]", f"point = [{numbers[1]}]"]
