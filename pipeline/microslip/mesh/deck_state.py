@@ -206,10 +206,9 @@ class _Acting:
         nodes = self.deck.nodes_for(f"*{card.keyword}", words[0], card.space)
         amount = factor * real(value or "0", f"*{card.keyword}")
         for node, way in product(nodes.tolist(), range(int(first) - 1, int(last))):
-            if node in self.deck.turning and way < 3:  # moments and rotations
-                self._put(self.nodal, (kind, self.deck.turning[node], way + 3), number, amount, card.where, kind == "force")
-            else:
-                self._put(self.nodal, (kind, node, way), number, amount, card.where, kind == "force")
+            turns = self.deck.turning.get(node) if way < 3 else None  # moments and rotations
+            key = (kind, node, way) if turns is None else (kind, turns, way + 3)
+            self._put(self.nodal, key, number, amount, card.where, kind == "force")
 
     def _put(self, into: dict, key: tuple, number: int, amount: float, where: str, adds: bool = True) -> None:
         before = into.get(key)
@@ -251,7 +250,8 @@ class _Acting:
         """The weight of the point masses that the load names."""
         heavy = [m for n, m in self.deck.masses.items() if load.cells is None or n in load.cells]
         if heavy:
-            nodes, values = np.repeat([node for node, _ in heavy], 3), np.outer([m for _, m in heavy], load.acceleration)
+            nodes = np.repeat([node for node, _ in heavy], 3)
+            values = np.outer([mass for _, mass in heavy], load.acceleration)
             ways = np.tile(np.arange(3), len(heavy))
             self._field(key, number, NodalLoad(load.where, "force", nodes, ways, values.ravel()))
 

@@ -47,7 +47,8 @@ def still_supports(raw: RawMesh, held: Constraints, numbering: Numbering) -> dic
     still = replace(raw, supports={}, links=list(raw.links), not_held=[], lost=raw.lost)
     add_supports(still, held, numbering)
     if (more := len(still.links) - len(raw.links)) or still.not_held:
-        raw.lost.append(f"{more or len(still.not_held)} supports of the static step are not read: frequencies may differ")
+        number = more or len(still.not_held)
+        raw.lost.append(f"{number} supports of the static step are not read: frequencies may differ")
     return None if _by_node(still) == _by_node(raw) else still.supports
 
 

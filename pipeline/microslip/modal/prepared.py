@@ -44,10 +44,11 @@ class Prepared:
     """A body ready to be solved: its model, the rows on it, what floats, and the sector it may be.
 
     Attributes:
-        motions: (3n, r) rigid motions that nothing holds. coefficients: (6, r) of these (`rigid.coefficients_of`).
-        mass: kg. centre: (3,) m. inertia: (3, 3) about it, kg m2. solver: of the static states, and of the modes of a
-            body that is no sector. report: is told what is done. still: the model as the static step of its file holds it, where its modes are
-        held otherwise.
+        motions: (3n, r) rigid motions that nothing holds. coefficients: (6, r) of these
+            (`rigid.coefficients_of`). mass: kg. centre: (3,) m. inertia: (3, 3) about it, kg m2.
+        solver: of the static states, and of the modes of a body that is no sector. report: is told
+            what is done. still: the model as the static step of its file holds it, where its modes
+            are held otherwise.
     """
 
     model: BodyModel
@@ -92,7 +93,7 @@ class Prepared:
         if self.sector is None:
             return self.coefficients
         cut = self.sector.unknowns.cut
-        return rigid.of_nodal_diameter(self.coefficients, cut.rotation, cut.sectors, k)
+        return rigid.of_nodal_diameter(self.coefficients, cut.ahead, cut.sectors, k)
 
     def with_spares(self) -> Prepared:
         """The same, asking for a few modes more: one that comes down into the band at another speed is then known."""

@@ -21,6 +21,7 @@ from ..basis import write_basis
 from ..data import Array, BodyLoad, FacetLoad, Indices, Material, Mesh, NodalLoad, SpinLoad
 from ..errors import UserError
 from ..files.store import ordinary, write_text
+from ..frames import rotation
 from ..mesh import UNITS, mesh_problems, read_mesh, suffix_of, unit_of
 from ..mesh.chosen import of_instances
 from ..mesh.materials import NONE, STANDS, Substitute
@@ -238,16 +239,20 @@ def _count(mesh: Mesh) -> int:
     return max(min(USUAL, 3 * mesh.n_points - fixed - cut - ties - 2), 1)
 
 
-def _hold(mesh: Mesh) -> bool:
+def _hold(mesh: Mesh, metres: float) -> bool:
     """Whether the file's supports leave no rigid motion."""
     from ..fem.discretise import discretise
     from ..fem.tied import tied_upper
     from ..modal.equilibrium import lumped_springs
-    from ..modal.rigid import free_motions, left_by, unresisted
+    from ..modal.rigid import free_motions, free_motions_of_ring, left_by, unresisted
 
     none, fixed = np.zeros(0, dtype=np.int64), _fixed(mesh)
     centre, pattern = mesh.points.mean(axis=0), discretise(mesh).pattern
-    springs = lumped_springs(mesh, pattern)
+    springs, ring = lumped_springs(mesh, pattern), mesh.sector
+    if ring is not None and mesh.ties is None and len(fixed):  # all sectors together may be held
+        turn = rotation(np.array(ring.axis), 2 * np.pi / ring.sectors)
+        motions = free_motions_of_ring(mesh.points, metres * np.array(ring.point), fixed, turn, ring.sectors)
+        return unresisted(motions, springs, pattern).shape[1] == 0
     if mesh.ties is None:
         return unresisted(free_motions(mesh.points, centre, fixed), springs, pattern).shape[1] == 0
     first, sets = 3 * mesh.n_points, mesh.ties.sets
@@ -445,7 +450,7 @@ def _mesh(
     told += [text for text in again if text not in lacking]
     told += [f"note: {text}" for text in mesh.remarks]
     told += [*ties, *((*joints, *_pressed(mesh)) if not instances else ())]
-    holding = _hold(mesh)
+    holding = _hold(mesh, UNITS[unit])
     held, said = _supports(mesh, holding)
     told += said
     lines = [] if holding else ["free = true               # nothing holds it wholly yet"]
@@ -578,7 +583,11 @@ def _cyclic(mesh: Mesh, metres: float) -> tuple[list[str], list[str]]:
         f"right = {json.dumps(right)}",
     ]
     lines += [f"nodal_diameters = {list(sector.diameters)}"] if sector.diameters else []
-    return lines, [f"{sector.where}: one of {sector.sectors} cyclic sectors, '{right}' ahead of '{left}'"]
+    unlike = len(mesh.face_points(left)) != len(mesh.face_points(right))
+    lines += ['follows = "left"'] if unlike and left == sector.faces[0] else []
+    told = f"{sector.where}: one of {sector.sectors} cyclic sectors, '{right}' ahead of '{left}'"
+    more = f"; they are not meshed alike: the nodes of '{sector.faces[0]}' follow the other face"
+    return lines, [told + more * unlike]
 
 
 _LOADED = {FacetLoad: "loaded facet", BodyLoad: "acceleration field", SpinLoad: "rotation"}
