@@ -164,7 +164,7 @@ class _Acting:
     numbering: Numbering
     nodal: dict[tuple[str, int, int], tuple[int, float, str]] = field(default_factory=dict)
     facets: dict[tuple[int, ...], tuple[int, float, str]] = field(default_factory=dict)
-    fields: dict[tuple[str, str], tuple[int, list[_Loading]]] = field(default_factory=dict)
+    fields: dict[tuple[str, ...], tuple[int, list[_Loading]]] = field(default_factory=dict)
 
     def add(self, number: int, factor: float, card: Card) -> None:
         """Add the loads of a card.

@@ -155,8 +155,8 @@ class _Spread:
                 block = [A[3 * i : 3 * i + 3, 3 * j : 3 * j + 3] for A in both]
                 self.blocks[a, b] = self.blocks.get((a, b), np.zeros((2, 3, 3))) + np.array(block)
         if item.along:
-            ends = [self.point(int(node), item.where) for node in item.nodes[[0, -1]]]
-            self.lines.append((*ends, item.along))
+            a, b = (self.point(int(node), item.where) for node in item.nodes[[0, -1]])
+            self.lines.append((a, b, item.along))
         for node in self.loose & {*item.nodes.tolist()}:
             at = np.flatnonzero(item.nodes == node)
             total = self.resisted.setdefault(node, np.zeros((6, 6)))

@@ -8,11 +8,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..data import Array, Mesh
+from ..data import Array, Indices, Mesh
 from ..errors import UserError
 from ..fem.contact import Grip, coupled_points
 from ..fem.cyclic import CyclicUpper, cyclic_upper, sector_unknowns
-from ..fem.discretise import REDUCED, Discretisation, discretise, whole
+from ..fem.discretise import REDUCED, Discretisation, FreeUpper, discretise, whole
 from ..fem.operators import per_block, spin_projector
 from ..fem.tied import Tied, tied_upper
 from ..linalg.eigen import DirectSolver, Pencil, new_solver
@@ -158,10 +158,7 @@ def _prepared(
     rows = with_centrifugal(rows, model)
     rest = still_dofs(mesh, settings)
     if rest is not None:
-        unmoved = tied_upper(d.pattern, rest, mesh.ties)
-        if sector is not None:
-            unmoved = cyclic_upper(sector_unknowns(d.pattern, rest, sector.unknowns.cut, mesh.ties), d.pattern.size)
-        model = replace(model, free=unmoved)
+        model = replace(model, free=_unknowns(d, rest, sector))
         refuse_other_supports(settings)
     model = with_loads(model, mesh, settings, held if rest is None else rest)
     model = replace(model, contacts=pairs, dead_load=model.dead_load + bolt_forces(mesh, settings))
@@ -181,6 +178,14 @@ def _prepared(
     return Prepared(
         model, settings, rows, motions, coefficients, mass, centre, inertia, sector, solver, report, still
     )  # fmt: skip
+
+
+def _unknowns(d: Discretisation, held: Indices, sector: Sector | None) -> FreeUpper | Tied | CyclicUpper:
+    """Of a static state whose supports are not those of the modes."""
+    if sector is None:
+        return tied_upper(d.pattern, held, d.mesh.ties)
+    unknowns = sector_unknowns(d.pattern, held, sector.unknowns.cut, d.mesh.ties)
+    return cyclic_upper(unknowns, d.pattern.size)
 
 
 def _floating(model: BodyModel, sector: Sector | None, centre: Array) -> Array:
