@@ -41,7 +41,7 @@ def spread(raw: RawMesh, system: str | None) -> Lumps | None:
         return None
     _, mass, time = SYSTEMS[system]
     made = _Spread(raw)
-    for item in raw.lumps:
+    for item in made.joined():
         if isinstance(item, PointMass):
             made.weigh(item)
         else:
@@ -112,6 +112,16 @@ class _Spread:
         self.loose = lumped - self.solid - self.leading - tied
         spinning = {node for item in raw.lumps for node in _turned(item)}
         self.turning = self.leading | (tied - self.solid) | (self.loose & spinning)
+
+    def joined(self) -> list[PointMass | LumpedElement]:
+        """The lumped elements without masses on nodes that nothing joins to anything; these are told."""
+        ends = {n for item in self.raw.lumps if isinstance(item, LumpedElement) for n in _nodes(item)}
+        idle = [m for m in self.raw.lumps if isinstance(m, PointMass) and m.node in self.loose - ends]
+        if idle:
+            self.loose -= {mass.node for mass in idle}
+            said = f"masses on nodes that nothing joins to the solids are left out: {len(idle)}"
+            self.raw.remarks.append(f"{idle[0].where}: {said}")
+        return [item for item in self.raw.lumps if not any(item is mass for mass in idle)]
 
     def weigh(self, item: PointMass) -> None:
         """Add a rigid body."""
@@ -249,8 +259,11 @@ def hanging(raw: RawMesh) -> str:
     for link in raw.links:
         if isinstance(link, Equation | Guide):
             near.update(link.nodes.tolist())
-        elif not isinstance(link, FaceTie):
-            near.update([link.reference, *([] if isinstance(link.members, str) else link.members.tolist())])
+        elif isinstance(link, FaceTie):
+            near.update(_surface(raw, link.slave) | _surface(raw, link.master))
+        else:
+            named = isinstance(link.members, str)
+            near.update(_surface(raw, link.members) if named else link.members.tolist(), [link.reference])
     near.update(node for item in raw.lumps for node in _nodes(item))
     counts, where = list[str](), ""
     for s in raw.structures:
@@ -260,6 +273,12 @@ def hanging(raw: RawMesh) -> str:
             counts.append(f"{len(beside)} {s.kind}")
             where = where or s.where
     return f"{where}: {', '.join(counts)} share nodes with the solids or their constraints" if counts else ""
+
+
+def _surface(raw: RawMesh, name: str) -> set[int]:
+    """Positions of the nodes of a surface."""
+    facets = (block.ravel() for block in raw.facets.get(name, ()))
+    return {*joined([raw.point_sets.get(name, np.zeros(0, dtype=np.int64)), *facets]).tolist()}
 
 
 def _nodes(item: PointMass | LumpedElement) -> list[int]:

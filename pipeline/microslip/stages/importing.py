@@ -439,9 +439,9 @@ def _mesh(
         told.append(f"warning: {error}")
     joints = [f"{j.where}: '{j.slave}' on '{j.master}': make them interfaces and a contact" for j in mesh.joints]
     mesh = of_instances(mesh, instances) if instances else mesh
-    mesh, ties = _tied(file, mesh)
     if not solids_only:
         refuse_hanging(file, mesh)
+    mesh, ties = _tied(file, mesh)
     kinds = ", ".join(f"{len(c)} {t}" for t, c in mesh.cells.items())
     alone = f"; the solids alone: {mesh.hanging.partition(': ')[2]} and are left out" if mesh.hanging else ""
     again = [f"warning: {text}" for texts in mesh_problems(mesh) for text in texts]
