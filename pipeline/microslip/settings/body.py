@@ -377,6 +377,8 @@ class Cyclic(Model):
     """face towards the previous sector"""
     right: FaceName = "cyclic_right"
     """face towards the next sector: the left one turned by 2 pi / N about the rotation axis"""
+    follows: Literal["right", "left"] = "right"
+    """whose nodes follow the other face where the two are not meshed alike"""
     nodal_diameters: NodalDiameters = "all"
     """which to analyse, or all from 0 to N/2"""
 
