@@ -457,7 +457,8 @@ def _mesh(
     alone = f"; the solids alone: {mesh.hanging.partition(': ')[2]} and are left out" if mesh.hanging else ""
     again = [f"warning: {text}" for texts in mesh_problems(mesh) for text in texts]
     lacking = [text for text in again if text.endswith(STANDS)]
-    size = " x ".join(f"{v:.4g}" for v in np.ptp(mesh.points, axis=0) / UNITS[unit])
+    solid = mesh.points[np.unique(joined(c.ravel() for c in mesh.cells.values()))]
+    size = " x ".join(f"{v:.4g}" for v in np.ptp(solid, axis=0) / UNITS[unit])
     told = [*lacking, *told, f"{file}: {mesh.n_points} points, {kinds}, {size} {unit}{alone}"]
     told += [text for text in again if text not in lacking]
     told += [f"note: {text}" for text in mesh.remarks]
