@@ -34,7 +34,7 @@ from .med import read_med
 from .msh import is_msh41, read_msh41
 from .raw import NODES, Damaged, RawMesh, refused, turn_left_handed
 from .surface import boundary_facets, faces_from_points, match_facets
-from .unv import length_unit, read_unv
+from .unv import UNIVERSAL, length_unit, read_unv
 
 UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 0.0254, "ft": 0.3048}
 """Unit of length -> metres."""
@@ -97,7 +97,7 @@ def _refused(path: Path, error: Damaged) -> UserError:
 _READERS: dict[str, Callable[[Path], RawMesh]] = {
     **dict.fromkeys((".cdb", ".anf", ".mac", ".ans"), read_cdb),
     **dict.fromkeys((".bdf", ".nas", ".fem", ".dat"), read_bdf),
-    **dict.fromkeys((".unv", ".uff", ".uf"), read_unv),
+    **dict.fromkeys(UNIVERSAL, read_unv),
     ".inp": read_inp,
     ".med": read_med,
 }
