@@ -68,6 +68,13 @@ def derivative(coefficients: int) -> Array:
     return differentiated(np.arange(1.0, coefficients // 2 + 1))
 
 
+@lru_cache(maxsize=8)
+def cycle_waves(harmonics: int, samples: int) -> tuple[Array, Array, Array]:
+    """(s, W) E at the samples of a cycle, its derivative over the time in cycles, and (W, s) P."""
+    values, transform = fourier(harmonics, samples)
+    return values, 2 * np.pi * values @ derivative(2 * harmonics + 1), transform
+
+
 def amplitudes(v: Array) -> ComplexArray:
     """(H + 1, ...) complex amplitudes, cos - i sin, of (W, ...) coefficients."""
     out = np.empty((len(v) // 2 + 1, *v.shape[1:]), complex)
@@ -131,9 +138,9 @@ class Torus:
         return summed(2 * np.pi * turned.T / self.count)
 
     @property
-    def waves(self) -> tuple[Array, Array]:
-        """`values` and `transform`."""
-        return self.values, self.transform
+    def waves(self) -> tuple[Array, Array, Array]:
+        """`values`, `ahead` and `transform`."""
+        return self.values, self.ahead, self.transform
 
     @cached_property
     def ahead(self) -> Array:

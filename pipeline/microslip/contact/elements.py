@@ -15,6 +15,7 @@ class Spring(Law):
     so that they serve arrays of numpy as well as those of jax."""
 
     smooth: ClassVar[bool] = True
+    viscous: ClassVar[bool] = False
 
     def force(self, u: Any) -> Any:
         """N."""

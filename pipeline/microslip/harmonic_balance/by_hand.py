@@ -37,7 +37,7 @@ class OneCoordinate(AFT):
 
     def _sampled(self, u: Array) -> tuple[Array, Array, Array]:
         """(c, s) the coordinate over a cycle, (s, W) values of the harmonics, (W, s) their transform."""
-        values, transform = self.waves(u.shape[2])
+        values, _, transform = self.waves(u.shape[2])
         return u[:, 0] @ values.T, values, transform
 
     def near(self, u: Array, period: float, known: Known | None) -> tuple[Array, None]:
@@ -48,7 +48,8 @@ class OneCoordinate(AFT):
 
     def _speed(self, u: Array) -> Array:
         """(c, s) change of the coordinate from sample to sample, by its derivative."""
-        return u[:, 0] @ self.ahead(u.shape[2]).T / len(self.waves(u.shape[2])[0])
+        ahead = self.waves(u.shape[2])[1]
+        return u[:, 0] @ ahead.T / len(ahead)
 
     @cached_property
     def _length(self) -> float:
@@ -79,7 +80,7 @@ class ElasticSpring(OneCoordinate):
     def _turned(self, coefficients: int) -> tuple[Array, Array]:
         """(s, W) how far the spring is stretched, and (W, s) coefficients of its force along the coordinate."""
         if coefficients not in self._known:
-            values, transform = self.waves(coefficients)
+            values, _, transform = self.waves(coefficients)
             self._known[coefficients] = self._turn * values, self._turn * transform
         return self._known[coefficients]
 
