@@ -6,12 +6,14 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+import microslip as ms
+from microslip.contact.elements import Stop
 from microslip.contact.friction import Coulomb
 from microslip.contact.normal import Penalty, Preload
 from microslip.contact.patch import Patch
 from microslip.contact.point import PointContact
-from microslip.harmonic_balance.by_hand import JenkinsPlay, model
-from microslip.harmonic_balance.forces import AFT
+from microslip.harmonic_balance.by_hand import ElasticSpring, JenkinsPlay, model
+from microslip.harmonic_balance.forces import AFT, Forces
 
 
 def patch(along: tuple[float, float, float] = (0.0, 0.6, -1.6), **more: object) -> Patch:
@@ -85,3 +87,55 @@ def test_what_never_slides_is_a_spring() -> None:
     """A motion that only sticks is carried by a spring, its mean included."""
     u = 1e-6 * np.array([[[2.0, 1, 0, 0, 1]]])
     np.testing.assert_allclose(JenkinsPlay(patch(), 1, 16, 2).force(u, 1.0), 2e4 * (0.36 + 2.56) * u, atol=1e-13)
+
+
+def test_a_stop_has_its_closed_form_from_few_samples() -> None:
+    """k (A cos t - g) while cos t > g / A = cos a: mean k (A sin a - g a) / pi, first harmonic
+    (2 k / pi) (A (a / 2 + sin 2a / 4) - g sin a)."""
+    k, A = 7.0, 1.3
+    for gap in (0.2, -0.4, 1.2999, -2.0):
+        a = np.pi if gap < -A else np.arccos(gap / A)
+        u = np.zeros((1, 1, 9))
+        u[0, 0, 1] = A
+        F = stop_model(Stop(np.array(k), np.array(gap)), 16).force(u, 1.0)[0, 0]
+        assert F[0] == pytest.approx(k * (A * np.sin(a) - gap * a) / np.pi, rel=1e-8, abs=1e-12)
+        first = 2 * k / np.pi * (A * (0.5 * a + 0.25 * np.sin(2 * a)) - gap * np.sin(a))
+        assert F[1] == pytest.approx(first, rel=1e-8, abs=1e-12)
+
+
+def stop_model(law: Stop, samples: int) -> Forces:
+    """Of one point that moves along t1."""
+    shape = np.zeros((1, 3, 1))
+    shape[0, 1, 0] = 1.0
+    return model([Patch("element", np.zeros((1, 2)), np.ones(1), law, shape)], samples, 2, 1e-10)
+
+
+@pytest.mark.parametrize("both", [False, True])
+def test_a_stop_is_the_limit_of_many_samples_and_its_derivative_that_of_differences(
+    both: bool,
+) -> None:
+    law, rng = Stop(np.array(3.0), np.array(0.3), both), np.random.default_rng(4)
+    exact = stop_model(law, 32)
+    sampled = [ElasticSpring(exact.patch, 1, n, 2) for n in (2048, 8192)]
+    for _ in range(5):
+        u = rng.normal(size=(1, 1, 9)) / (1 + np.arange(9) // 2)
+        F, S = exact.forces(u, 1.0)
+        coarse, fine = (np.abs(one.force(u, 1.0) - F).max() for one in sampled)
+        assert fine < 1e-6 and fine < 0.3 * coarse + 1e-12  # sampling is of second order, to this
+        D = np.stack(
+            [(exact.force(u + e, 1.0) - exact.force(u - e, 1.0))[0, 0] / 2e-6
+             for e in 1e-6 * np.eye(9)[:, None, None]], axis=1,
+        )  # fmt: skip
+        assert np.abs(S[0, 0, :, 0] - D).max() < 1e-5
+
+
+@pytest.mark.slow
+def test_a_curve_through_lift_off_has_no_folds_of_the_sampling() -> None:
+    """A stop a hundred times as stiff as its oscillator, 64 samples a cycle: none of the folds that
+    samples make, and the same peak as with four times as many."""
+    hammer = ms.structure(1.0, 1.0, 0.2, force={0: 1.0}, elements=[ms.stop(100.0, 0.5)])
+    few, many = (
+        ms.follow(hammer, 0.6, 3.0, harmonics=5, samples=n, unit="rad/s") for n in (32, 128)
+    )
+    assert len(few.folds) == len(many.folds)
+    assert few.amplitude.max() == pytest.approx(many.amplitude.max(), rel=1e-3)

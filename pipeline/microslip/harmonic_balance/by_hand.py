@@ -18,7 +18,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from ..contact.elements import Spring
+from ..contact.elements import Spring, Stop
 from ..contact.friction import Coulomb
 from ..contact.jenkins import Jenkins
 from ..contact.law import Law
@@ -27,7 +27,7 @@ from ..contact.patch import Patch
 from ..contact.periodic import Known
 from ..contact.point import PointContact
 from ..data import Array, Indices, largest
-from ..series import Torus
+from ..series import Torus, derivative, integrals, summed
 from .forces import AFT, Cycle, Forces, Traced, above_rounding
 
 
@@ -104,6 +104,82 @@ class ElasticSpring(OneCoordinate):
         """The law with numbers of Python, by which arrays are multiplied faster."""
         assert isinstance(self.patch.law, Spring)
         return jax.tree_util.tree_map(lambda number: np.asarray(number).tolist(), self.patch.law)
+
+
+@dataclass(frozen=True, eq=False)
+class ElasticStop(ElasticSpring):
+    """`contact.elements.Stop`: its force is linear from the instants at which it closes to those at which it opens.
+
+    With E the harmonics over the angle t and the integrals over the contact alone, its coefficients are
+
+        P F = k w (integral of E^T E dt u - gap integral of E^T dt),    w = 1/(2 pi), 1/pi, 1/pi, ...
+
+    exact for every number of samples, which only tell where the instants are. The force is zero at these, so that
+    their own change has no share in the derivative, k w integral of E^T E dt.
+    """
+
+    def force(self, u: Array, period: float) -> Array:
+        return self.forces(u, period)[0]
+
+    def forces(self, u: Array, period: float) -> tuple[Array, Array]:
+        W = u.shape[2]
+        force, slope = np.zeros(u.shape), np.zeros((len(u), 1, W, 1, W))
+        share = np.full(W, self._turn * self._spring.stiffness / np.pi)
+        share[0] *= 0.5
+        for c, one in enumerate(self._turn * u[:, 0]):
+            for sign, gap in self._spring.sides:
+                over = sign * one
+                over[0] -= gap
+                met = integrals(W // 2, *self._instants(over))
+                force[c, 0] += sign * share * (met @ over)
+                slope[c, 0, :, 0] += self._turn * share[:, None] * met
+        return force, slope
+
+    def _instants(self, over: Array) -> tuple[Array, Array]:
+        """Angles at which a signal (W,) gets above zero, and those at which it falls below again."""
+        W = len(over)
+        values, ahead, _ = self.waves(W)
+        y, h = values @ over, 2 * np.pi / len(values)
+        t = np.arange(len(y)) * h
+        slope = ahead @ over / (2 * np.pi)
+        side = np.where(y > 0, -1.0, 1.0)
+        turns = (side * slope > 0) & (side * np.roll(slope, -1) < 0) & (np.roll(side, -1) == side)
+        near = turns & (side * (y + slope * h) > 0)  # it may pass zero twice between two samples
+        if near.any():
+            tops = _zeros(derivative(W) @ over, t[near], t[near] + h)
+            t = np.insert(t, np.flatnonzero(near) + 1, tops)
+            y = np.insert(y, np.flatnonzero(near) + 1, _at(tops, W) @ over)
+        closed, end = y > 0, np.append(t[1:], t[0] + 2 * np.pi)
+        if closed.all():
+            return np.zeros(1), np.full(1, 2 * np.pi)
+        if not closed.any():
+            return np.zeros(0), np.zeros(0)
+        closes, opens = (np.flatnonzero(x) for x in (~closed & np.roll(closed, -1), closed & ~np.roll(closed, -1)))
+        begin, stop = (_zeros(over, t[i], end[i]) for i in (closes, opens))
+        if len(stop) and stop[0] < begin[0]:
+            stop = np.append(stop[1:], stop[0] + 2 * np.pi)
+        return begin, stop
+
+
+def _at(angles: Array, coefficients: int) -> Array:
+    """(..., W) E at angles."""
+    return summed(np.multiply.outer(angles, np.arange(1, coefficients // 2 + 1)))
+
+
+def _zeros(signal: Array, low: Array, high: Array) -> Array:
+    """(k,) angles between low and high, at which a signal (W,) changes its sign: Newton's steps, halved where they
+    leave what is left between both."""
+    rising, slope = _at(high, len(signal)) @ signal > 0, derivative(len(signal)) @ signal
+    both, t = np.stack([signal, slope], axis=1), 0.5 * (low + high)
+    for _ in range(60):
+        y, rate = (_at(t, len(signal)) @ both).T
+        above = (y > 0) == rising
+        low, high = np.where(above, low, t), np.where(above, t, high)
+        step = t - np.divide(y, rate, out=np.zeros_like(y), where=rate != 0)
+        last, t = t, np.where((step >= low) & (step <= high), step, 0.5 * (low + high))
+        if (np.abs(t - last) <= 1e-13).all():  # the next step would be its square
+            break
+    return t
 
 
 @dataclass(frozen=True, eq=False)
@@ -184,7 +260,10 @@ def model(
 ) -> Forces:
     """Of the forces of contacts that are `alike`: by hand where that is possible, else marched."""
     laws = None if all(p is patches[0] for p in patches) else tuple(p.law for p in patches)
-    return _kind(patches[0], cycles)(patches[0], len(patches), samples, cycles, periodicity, torus, laws=laws)
+    kind = _kind(patches[0], cycles)
+    if torus is None and kind is ElasticSpring and isinstance(patches[0].law, Stop):
+        kind = ElasticStop
+    return kind(patches[0], len(patches), samples, cycles, periodicity, torus, laws=laws)
 
 
 def alike(patch: Patch) -> Any:
