@@ -14,6 +14,7 @@ from microslip.contact.patch import Patch
 from microslip.contact.point import PointContact
 from microslip.harmonic_balance.by_hand import ElasticSpring, JenkinsPlay, model
 from microslip.harmonic_balance.forces import AFT, Forces
+from microslip.system.assembly import Assembly
 
 
 def patch(along: tuple[float, float, float] = (0.0, 0.6, -1.6), **more: object) -> Patch:
@@ -129,13 +130,38 @@ def test_a_stop_is_the_limit_of_many_samples_and_its_derivative_that_of_differen
         assert np.abs(S[0, 0, :, 0] - D).max() < 1e-5
 
 
-@pytest.mark.slow
-def test_a_curve_through_lift_off_has_no_folds_of_the_sampling() -> None:
-    """A stop a hundred times as stiff as its oscillator, 64 samples a cycle: none of the folds that
-    samples make, and the same peak as with four times as many."""
-    hammer = ms.structure(1.0, 1.0, 0.2, force={0: 1.0}, elements=[ms.stop(100.0, 0.5)])
+def hammer(damping: float) -> Assembly:
+    """A stop a hundred times as stiff as its oscillator."""
+    return ms.structure(1.0, 1.0, damping, force={0: 1.0}, elements=[ms.stop(100.0, 0.5)])
+
+
+@pytest.mark.parametrize("harmonics", [3, pytest.param(7, marks=pytest.mark.slow)])
+def test_a_curve_through_lift_off_has_no_folds_of_the_sampling(harmonics: int) -> None:
+    """With so few samples that they only tell where the contact is, folds and peak are those of
+    many: of the sampled force there are 218 folds with 64 and 366 with 1,024."""
     few, many = (
-        ms.follow(hammer, 0.6, 3.0, harmonics=5, samples=n, unit="rad/s") for n in (32, 128)
+        ms.follow(hammer(0.2), 0.6, 1.0, harmonics=harmonics, samples=n, unit="rad/s")
+        for n in (4 * harmonics + 4, 256)
     )
-    assert len(few.folds) == len(many.folds)
-    assert few.amplitude.max() == pytest.approx(many.amplitude.max(), rel=1e-3)
+    assert len(few.folds) == 2
+    np.testing.assert_allclose(few.folds, many.folds, rtol=1e-6)
+    assert few.frequency.max() == pytest.approx(many.frequency.max(), rel=1e-6)
+
+
+@pytest.mark.slow
+def test_between_two_folds_of_a_stop_both_motions_stay_in_time() -> None:
+    """0.775 is between the folds of a superharmonic resonance, 0.749 and 0.803: the first and the
+    last of three motions of the curve are those that the motion in time stays on."""
+    omega, system = 0.775, hammer(0.1)
+    curve = ms.follow(
+        system, 0.6, 0.9, harmonics=31, samples=128, unit="rad/s", settings={"targets": (omega,)}
+    )
+    at = np.flatnonzero(np.abs(curve.parameter - omega) < 1e-9)
+    assert len(at) == 3
+    for i in at[[0, 2]]:
+        a = curve.harmonics()[i]
+        speed = -omega * float(np.arange(len(a)) @ a.imag)
+        start = {"displacement": {0: float(a.real.sum())}, "velocity": {0: speed}}
+        seen = ms.integrate(system, omega, unit="rad/s", settle=300, keep=1, start=start)
+        first = 2 * np.mean(seen.y[0, :256] * np.exp(-1j * omega * seen.time[:256]))
+        assert abs(first) == pytest.approx(abs(a[1]), rel=2e-3)

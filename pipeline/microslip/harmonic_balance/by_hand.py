@@ -26,8 +26,8 @@ from ..contact.normal import Preload
 from ..contact.patch import Patch
 from ..contact.periodic import Known
 from ..contact.point import PointContact
-from ..data import Array, Indices, largest
-from ..series import Torus, derivative, integrals, summed
+from ..data import Array, ComplexArray, Indices, largest
+from ..series import Torus, amplitudes, integrals
 from .forces import AFT, Cycle, Forces, Traced, above_rounding
 
 
@@ -137,47 +137,46 @@ class ElasticStop(ElasticSpring):
 
     def _instants(self, over: Array) -> tuple[Array, Array]:
         """Angles at which a signal (W,) gets above zero, and those at which it falls below again."""
-        W = len(over)
-        values, ahead, _ = self.waves(W)
-        y, h = values @ over, 2 * np.pi / len(values)
+        values, ahead, _ = self.waves(len(over))
+        y, h, c = values @ over, 2 * np.pi / len(values), amplitudes(over)
         t = np.arange(len(y)) * h
         slope = ahead @ over / (2 * np.pi)
         side = np.where(y > 0, -1.0, 1.0)
         turns = (side * slope > 0) & (side * np.roll(slope, -1) < 0) & (np.roll(side, -1) == side)
         near = turns & (side * (y + slope * h) > 0)  # it may pass zero twice between two samples
         if near.any():
-            tops = _zeros(derivative(W) @ over, t[near], t[near] + h)
+            tops = _zeros(1j * np.arange(len(c)) * c, t[near], t[near] + h)
             t = np.insert(t, np.flatnonzero(near) + 1, tops)
-            y = np.insert(y, np.flatnonzero(near) + 1, _at(tops, W) @ over)
+            y = np.insert(y, np.flatnonzero(near) + 1, _summed(c, tops))
         closed, end = y > 0, np.append(t[1:], t[0] + 2 * np.pi)
         if closed.all():
             return np.zeros(1), np.full(1, 2 * np.pi)
-        if not closed.any():
-            return np.zeros(0), np.zeros(0)
-        closes, opens = (np.flatnonzero(x) for x in (~closed & np.roll(closed, -1), closed & ~np.roll(closed, -1)))
-        begin, stop = (_zeros(over, t[i], end[i]) for i in (closes, opens))
+        changes = np.flatnonzero(closed != np.roll(closed, -1))
+        found, opens = _zeros(c, t[changes], end[changes]), closed[changes]
+        begin, stop = found[~opens], found[opens]
         if len(stop) and stop[0] < begin[0]:
             stop = np.append(stop[1:], stop[0] + 2 * np.pi)
         return begin, stop
 
 
-def _at(angles: Array, coefficients: int) -> Array:
-    """(..., W) E at angles."""
-    return summed(np.multiply.outer(angles, np.arange(1, coefficients // 2 + 1)))
+def _summed(c: ComplexArray, angles: Array) -> Array:
+    """(k, ...) signals at angles (k,), of complex amplitudes (H + 1, ...), cos - i sin."""
+    return (np.exp(1j * np.multiply.outer(angles, np.arange(len(c)))) @ c).real
 
 
-def _zeros(signal: Array, low: Array, high: Array) -> Array:
-    """(k,) angles between low and high, at which a signal (W,) changes its sign: Newton's steps, halved where they
-    leave what is left between both."""
-    rising, slope = _at(high, len(signal)) @ signal > 0, derivative(len(signal)) @ signal
-    both, t = np.stack([signal, slope], axis=1), 0.5 * (low + high)
+def _zeros(c: ComplexArray, low: Array, high: Array) -> Array:
+    """(k,) angles between low and high, at which a signal of complex amplitudes (H + 1,) changes
+    its sign: Newton's steps from the chord's zero, halved where they leave what is left."""
+    first, last = _summed(c, np.concatenate([low, high])).reshape(2, -1)
+    both = np.stack([c, 1j * np.arange(len(c)) * c], axis=1)
+    t = low + (high - low) * np.divide(first, first - last, out=np.zeros_like(low), where=first != last)
     for _ in range(60):
-        y, rate = (_at(t, len(signal)) @ both).T
-        above = (y > 0) == rising
+        y, rate = _summed(both, t).T
+        above = (y > 0) == (last > 0)
         low, high = np.where(above, low, t), np.where(above, t, high)
         step = t - np.divide(y, rate, out=np.zeros_like(y), where=rate != 0)
-        last, t = t, np.where((step >= low) & (step <= high), step, 0.5 * (low + high))
-        if (np.abs(t - last) <= 1e-13).all():  # the next step would be its square
+        before, t = t, np.where((step >= low) & (step <= high), step, 0.5 * (low + high))
+        if (np.abs(t - before) <= 1e-13).all():  # the next step would be its square
             break
     return t
 
