@@ -36,7 +36,7 @@ from .med import read_med
 from .msh import is_msh41, read_msh41
 from .raw import NODES, Damaged, RawMesh, refused, turn_left_handed
 from .surface import boundary_facets, faces_from_points, match_facets
-from .unv import length_unit, read_unv
+from .unv import UNIVERSAL, length_unit, read_unv
 
 UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 0.0254, "ft": 0.3048}
 """Unit of length -> metres."""
@@ -99,7 +99,7 @@ def _refused(path: Path, error: Damaged) -> UserError:
 _READERS: dict[str, Callable[[Path], RawMesh]] = {
     **dict.fromkeys((".cdb", ".anf", ".mac", ".ans"), read_cdb),
     **dict.fromkeys((".bdf", ".nas", ".fem", ".dat"), read_bdf),
-    **dict.fromkeys((".unv", ".uff", ".uf"), read_unv),
+    **dict.fromkeys(UNIVERSAL, read_unv),
     ".inp": read_inp,
     ".med": read_med,
 }
@@ -348,6 +348,8 @@ def _assemble_mesh(
     state = state_of(raw, replace(mesh, links=links), renumber, boundary, metres, system)
     known = {*mesh.point_sets, *(links.sets if links else ())}
     supports = {n: directions for n, directions in raw.supports.items() if n in known}
+    if idle := ", ".join(f"'{name}'" for name in raw.supports if name not in known):
+        raw.remarks.append(f"held, but no element or constraint uses these nodes, so it holds nothing: {idle}")
     return replace(
         mesh, faces=faces, inner=inner, supports=supports, not_held=tuple(raw.not_held), unended=raw.unended,
         links=links, state=state, integration=raw.integration,
