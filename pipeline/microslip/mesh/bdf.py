@@ -241,7 +241,10 @@ def _grid(cards: Mapping[str, list[BulkCard]], file: str) -> tuple[RawMesh, Cons
             else:
                 frames = system.directions(table[places])
                 held.axes |= dict(zip(ids[places].tolist(), frames, strict=True))
-    scalar = np.unique([n for card in cards["SPOINT"] for n in listed(card, 1)]).astype(np.int64)
+    points = {n: card for card in cards["SPOINT"] for n in listed(card, 1)}
+    scalar = np.array(sorted(points), dtype=np.int64)
+    if len(both := np.intersect1d(scalar, ids)):
+        raise Damaged(f"{points[int(both[0])].where}: point {both[0]} is a GRID as well; take one out")
     middle = np.tile(table.mean(axis=0), (len(scalar), 1))
     return RawMesh(np.vstack([table, middle]), np.concatenate([ids, scalar])), held, systems
 
@@ -337,7 +340,8 @@ def _elements(bulk: Bulk) -> list[int]:
     bulk.raw.add_solids(blocks, bulk.numbering, "an element names")
     turn_left_handed(bulk.raw, bricks=True)
     if fluids and not blocks:
-        raise Damaged("all of its solid cells are a fluid (MAT10); give those of the structure")
+        where = next(card for card in bulk.cards["PSOLID"] if card.whole(1) in fluids).where
+        raise Damaged(f"{where}: all solid cells are a fluid (MAT10); give those of the structure")
     return list(properties)
 
 

@@ -17,6 +17,7 @@ from ..data import Array, BodyLoad, FacetLoad, Indices, NodalLoad, SpinLoad, Sta
 from ..topology import CELL_TYPES, FACET_CORNERS
 from .bdf_cards import Bulk, BulkCard, at_card, listed
 from .bdf_control import Case
+from .bdf_lumps import MASSES
 from .raw import Damaged
 
 SHELLS = {"CTRIA3": 3, "CTRIAR": 3, "CTRIA6": 3, "CQUAD4": 4, "CQUADR": 4, "CQUAD8": 4}
@@ -49,6 +50,9 @@ def state_of_bulk(
             )
         for factor, card in chosen:
             acting.add(factor, card)
+    if any(isinstance(load, BodyLoad | SpinLoad) for load in acting.loads):
+        for card in (card for name in MASSES for card in bulk.cards[name]):
+            acting.lose(card, "the weight of a mass along one direction")
     what = f"SUBCASE {case.number}" if case.number > 0 else "the case control"
     bulk.raw.state = StaticStep(f"{case.place}: {what}", nonlinear, tuple(acting.all()))
 
@@ -287,6 +291,11 @@ class _Acting:
     def on_corners(self, card: BulkCard, factor: float) -> None:
         """PLOAD: a pressure on three or four grid points, along the normal by their order."""
         numbers = [card.whole(place) for place in range(3, 7) if card.at(place)]
+        if any(CELL_TYPES[kind].order > 1 for kind, _ in self.bulk.raw.blocks):
+            self.bulk.raw.lost.append(
+                f"{card.where}: is taken over the whole of its face, where Nastran loads the corners "
+                "alone of cells with mid-side nodes: frequencies may differ a little; write PLOAD4"
+            )
         self.on_face(card, factor * (card.real(2) or 0.0), self.bulk.positions(card, numbers))
 
     def on_shells(self, card: BulkCard, factor: float) -> None:

@@ -204,7 +204,7 @@ class _Spread:
     def connect(self, item: LumpedElement) -> None:
         """Add a spring or dashpot."""
         rows = [self._row(int(n), int(d), item.where) for n, d in zip(item.nodes, item.directions, strict=True)]
-        kept = np.array([row is not None for row in rows])
+        kept = np.array([row is not None for row in rows], dtype=bool)
         given = [row for row in rows if row is not None]
         points = sorted({point for row in given for point, _ in row})
         rows_of = np.zeros((len(given), len(points), 3))

@@ -88,7 +88,7 @@ def in_si(
     whole, table = found.elasticity, found.temperature
     C, lacking = (None if whole is None else whole * stress(system)), []
     if found.refused and (instead.young is None or not instead.whole):
-        raise Unread(f"{name} has {found.refused} (or --young and --density for all of it)")
+        raise Unread(f"{name} has {found.refused} (or --young and --density for all of it)", file=line)
     if C is None or found.refused:
         C, table = _isotropic(found, system, instead), None
         if C is not None:
