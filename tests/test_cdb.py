@@ -358,3 +358,51 @@ def test_a_component_with_nodes_that_are_not_there_is_a_remark(tmp_path):
     read = read_mesh(written(tmp_path, text), "mm")
     assert read.node_id[read.point_sets["LEFT"]].tolist() == list(range(2, BAR.n_points + 1))
     assert "the set 'LEFT' names" in read.remarks[0]
+
+
+DAMAGED = {
+    "ET,1,185": ("ET,1,99999999999999", "type 99999999999999"),
+    "NBLOCK,6,SOLID,        12,        12": ("NBLOCK,6,SOLID,        12,        14", "12 nodes of 14"),
+    "(3i9,6e21.13e3)": ("(3i9,6e0.13e3)", "format"),
+    "(19i10)": ("", "format"),
+    "EBLOCK,19,SOLID,         2,         2": ("EBLOCK,19,SOLID,         2,         5", "announces 5"),
+    "CMBLOCK,Z0,NODE,       4  ! nodes": ("CMBLOCK,Z0,NODE,       9  ! nodes", "Z0"),
+    "CMBLOCK,Z0,NODE,       4  !": ("CMBLOCK,Z0,NODE,       x  !", "whole number"),
+    "(8i10)": ("(8f10)", "format"),
+    "MPTEMP,R5.0, 1, 1,  0.0": ("MPTEMP,R5.0, 1, 1,  warm", "number belongs"),
+    "MPDATA,R5.0, 1,EX  ,1, 1, 210000.0": ("MPDATA,R5.0, 1,EX  ,1, 1, stiff", "number belongs"),
+    "MPDATA,R5.0, 1,NUXY,1, 1, 0.3": ("MPDATA,R5.0, 1,NUXY,1, 1, 0.7", "nu = 0.7"),
+    "FINISH": ("R,1,heavy\nFINISH", "number belongs"),
+    "/PREP7": ("/PREP7\nRLBLOCK,1,1,1\n(2i8,6g16.9)\n(7g16.9)\n       1       9  1.0", "truncated|number"),
+    "ET,2,154": ("ETBLOCK,1,1\n(2i9,19a9)\n        2      154", "number|no end"),
+    "N,R5.3,LOC,       -1,": ("N,R5.3,LOC,       99, 1, here", "number belongs"),
+}
+"""What stands in the archive -> what is written instead, and what is said of it."""
+MORE = {
+    "CE,1,0,1,UX,1,77,UX,-1": "node 77",
+    "CE,1,0.5,1,UX,1,2,UX,-1": "constant",
+    "CP,1,UX,1": "couples",
+    "CERIG,1,NONE": "couples no nodes",
+    "RBE3,1,ALL,NONE": "RBE3",
+    "CS,11,0,1,2,3000": "fewer than three nodes",
+    "CSYS,77\nNROTAT,1": "coordinate system 77",
+    "DBLOCK,3\n(i9)\n        1 UX 0.0": "DBLOCK",
+    "NSEL,S,LOC,X,left": "number belongs",
+    "MSOPT,NEW,B": "multistage",
+    "EN,77,1,2,3,4,5,6,7,900": "node 900",
+    "TB,ELASTIC,1\nTBDATA,1,soft": "number belongs",
+}
+
+
+@pytest.mark.parametrize("place", [*DAMAGED, *MORE])
+def test_damage_is_told_with_its_line(tmp_path, capsys, monkeypatch, place):
+    monkeypatch.chdir(tmp_path)
+    whole = archive(meshes.brick("hexahedron", (1, 1, 2), (0.01, 0.01, 0.02)), ("z0",))
+    new, words = DAMAGED.get(place, (f"{place}\nFINISH", MORE.get(place, "")))
+    old = place if place in DAMAGED else "FINISH"
+    assert old in whole
+    written(tmp_path, whole.replace(old, new, 1))
+    said = refused_command(["import", "part.cdb", "there"], capsys, "part.cdb")
+    assert any(word in said for word in words.split("|")), said
+    assert "line " in said or "nu = 0.7" in said, said
+    assert not (tmp_path / "there").exists()

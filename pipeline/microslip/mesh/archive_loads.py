@@ -6,6 +6,7 @@ SOLVE; modes after PSTRES,ON, or of a perturbed restart (ANTYPE with PERTURB), a
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 
@@ -367,14 +368,14 @@ def state_of_archive(archive: Archive, raw: RawMesh, numbering: Numbering) -> No
     if not archive.prestressed and archive.perturbed is None:
         idle = [*acting.kinds(), *archive.unused]
         if "D" in idle:
-            moved = next(w for v, w in solution.acting.moved.values() if v.strip("0."))
+            moved = next(w for v, w in solution.acting.moved.values() if acting.counts(v))
             raw.remarks.append(f"{moved}: D prescribes displacements: they are zero in modes, as in Ansys")
             idle.remove("D")
         if idle:
             text = "loads, which change no frequency of an unstressed body (PSTRES, PERTURB)"
             raw.remarks.append(f"read and not used: {', '.join(idle)}: {text}")
         return
-    with of_file(solution.where):
+    with of_file(archive.place(solution.where)):
         loads = list(acting.loads())
     if solution.kind != "STATIC":
         archive.lost.append(
@@ -410,10 +411,16 @@ class _Acting:
         """Commands of what acts, without those whose numbers are zero."""
         acting, some = self.solution.acting, list[str]()
         parts = {"F": acting.forces, "D": acting.moved}
-        some += [name for name, part in parts.items() if any(v.strip("0.") for v, _ in part.values())]
-        some += ["SFE"] * any(v.strip("0.") for values, _ in acting.faces.values() for v in values)
+        some += [name for name, part in parts.items() if any(self.counts(v) for v, _ in part.values())]
+        some += ["SFE"] * any(self.counts(v) for values, _ in acting.faces.values() for v in values)
         fields = acting.fields.items()
-        return some + [name for name, (values, _) in fields if any(v.strip("0.+-eE") for v in values)]
+        return some + [name for name, (values, _) in fields if any(map(self.counts, values))]
+
+    def counts(self, word: str) -> bool:
+        """Whether a value is not zero, or a table that is not read."""
+        if re.fullmatch(r"[\s0.+-]*([eEdD][-+]?\d+)?", word):
+            return False
+        return not word.startswith("%") or value_at(self.archive, word, self.solution.time) != 0
 
     def loads(self) -> Iterator[NodalLoad | FacetLoad | BodyLoad | SpinLoad]:
         """All of them, by positions in the file."""

@@ -24,7 +24,7 @@ def commands(archive: Archive, line: str) -> Iterator[list[str]]:
     if line.upper().startswith(_TEXTS):
         return
     for part in line.split("$"):
-        if named := re.match(r"\s*([A-Za-z_]\w*)\s*(\([^()]*\))?\s*=(.*)$", part):
+        if named := re.match(r"\s*([A-Za-z_][\w ]*?)\s*(\([^()]*\))?\s*=(.*)$", part):
             yield ["*SET", named[1] + (named[2] or "").replace(" ", ""), *_words(named[3])]
             continue
         words = _words(part)

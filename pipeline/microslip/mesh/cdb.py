@@ -78,7 +78,7 @@ def read_cdb(path: Path) -> RawMesh:
         Damaged: content that is inconsistent, or elements whose meaning would be lost, by their number.
     """
     lines = path.read_text(encoding="latin-1").splitlines()
-    archive = Archive(path.name, lines, _beginning(lines))
+    archive = Archive(path.name, path.parent, lines, _beginning(lines))
     while archive.at < len(lines) and not archive.modes:
         archive.at += 1
         archive.where = f"{path.name}, line {archive.at}"
@@ -220,31 +220,31 @@ def _read_solid(archive: Archive, first: list[int], fields: Fields) -> None:
     """Material, type, real constants, section, system, three more, count of nodes, one more, number, nodes."""
     if len(first) < 12:
         raise Damaged(f"EBLOCK holds the line '{archive.lines[archive.at - 1].strip()[:60]}', which is too short")
-    count, nodes = first[8], first[11:]
+    count, nodes, line = first[8], first[11:], archive.at
     while len(nodes) < count and archive.at < len(archive.lines):
         more = _row(archive.lines[archive.at], fields)
         archive.at += 1
         if not more or more[0] == -1:
             raise Damaged(f"element {first[10]} has {len(nodes)} nodes instead of {count}")
         nodes += more
-    archive.elements.append(Element(first[10], first[0], first[1], first[2], first[4], nodes[:count]))
+    archive.elements.append(Element(first[10], first[0], first[1], first[2], first[4], nodes[:count], line=line))
 
 
 def _read_compact(archive: Archive, first: list[int], fields: Fields) -> None:
     """Number and nodes of an element of the current type, material and real constants."""
-    now = archive.current
+    now, line = archive.current, archive.at
     nodes = _whole_element(archive, first[1:], now["TYPE"], fields)
     archive.elements.append(
-        Element(first[0], now["MAT"], now["TYPE"], now["REAL"], now.get("ESYS", 0), nodes)
+        Element(first[0], now["MAT"], now["TYPE"], now["REAL"], now.get("ESYS", 0), nodes, line=line)
     )
 
 
 def _read_short(archive: Archive, first: list[int], fields: Fields) -> None:
     """An element of a block without SOLID: number, type, real constants, material, system, nodes."""
     number, *four = [*first[:5], *[0] * (5 - len(first[:5]))]
-    kind, where = four[0] if four[0] in archive.kinds else archive.current["TYPE"], archive.where
+    kind, line = four[0] if four[0] in archive.kinds else archive.current["TYPE"], archive.at
     nodes = _whole_element(archive, first[5:], kind, fields)
-    archive.elements.append(Element(number, four[2], kind, four[1], four[3], nodes, where))
+    archive.elements.append(Element(number, four[2], kind, four[1], four[3], nodes, f"{archive.path}, line {line}", line))
 
 
 def _whole_element(archive: Archive, nodes: list[int], kind: int, fields: Fields) -> list[int]:
@@ -257,8 +257,8 @@ def _whole_element(archive: Archive, nodes: list[int], kind: int, fields: Fields
     return nodes
 
 
-def _row(line: str, fields: Fields) -> list[int]:
-    return [whole(line[a:b], "EBLOCK") for a, b, _ in fields if line[a:b].strip()]
+def _row(line: str, fields: Fields, what: str = "EBLOCK") -> list[int]:
+    return [whole(line[a:b], what) for a, b, _ in fields if line[a:b].strip()]
 
 
 def _read_component(archive: Archive, words: list[str]) -> None:
@@ -270,7 +270,7 @@ def _read_component(archive: Archive, words: list[str]) -> None:
     listed: list[int] = []
     at += 1
     while len(listed) < count:
-        if at >= len(lines) or not (row := _row(lines[at], fields)):
+        if at >= len(lines) or not (row := _row(lines[at], fields, f"the component {words[1]}")):
             raise Damaged(f"the component {words[1]} has {len(listed)} numbers instead of {count}")
         listed += row
         at += 1
@@ -341,7 +341,7 @@ def _read_element(archive: Archive, words: list[str]) -> None:
     nodes = numbers[apart:]
     number = numbers[0] if apart and numbers else max((e.number for e in archive.elements), default=0) + 1
     archive.elements.append(
-        Element(number, now["MAT"], now["TYPE"], now["REAL"], now.get("ESYS", 0), nodes, archive.where)
+        Element(number, now["MAT"], now["TYPE"], now["REAL"], now.get("ESYS", 0), nodes, archive.where, archive.at)
     )
 
 
@@ -518,12 +518,20 @@ def _assembled(archive: Archive) -> RawMesh:
     middle = _Middle(archive)
     regions: dict[tuple[int, int], int] = {}
     blocks: dict[str, list[tuple[int, int, list[int]]]] = {}
+    there = {*archive.node_id, 0}
     for element in archive.elements:
-        named = _form(archive, element)
-        if named is not None:
-            region = regions.setdefault((element.material, element.system), len(regions))
-            cell = element.number, region, middle.filled(element.number, *named)
-            blocks.setdefault(named[0], []).append(cell)
+        try:
+            if (named := _form(archive, element)) is None:
+                continue
+            if not there.issuperset(named[1]):
+                missing = next(n for n in named[1] if n not in there)
+                raise Damaged(f"element {element.number} names node {missing}, which the file does not define")
+            nodes = middle.filled(element.number, *named)
+        except Damaged as error:
+            error.file = error.file or archive.place(element.line)
+            raise
+        region = regions.setdefault((element.material, element.system), len(regions))
+        blocks.setdefault(named[0], []).append((element.number, region, nodes))
     if not blocks:
         told = [text.split(" is not read")[0] for text in _other_elements(archive, archive.path)]
         text = f"holds no solid elements ({'; '.join(told) or 'nothing but nodes'})"
@@ -544,10 +552,9 @@ def _assembled(archive: Archive) -> RawMesh:
         raw.retained.append("M")
     constrain(archive, raw, numbering)
     temperatures_of(archive, raw, numbering)
-    raw.materials = [_material(archive, raw, *key) for key in regions] if archive.constants else []
-    if not raw.materials:
-        raw.regions = []
-        archive.lost += [f"{archive.path}: the material {n} has {text}" for n, text in archive.refused.items()]
+    made = archive.constants or archive.refused
+    raw.materials = [_material(archive, raw, *key) for key in regions] if made else []
+    raw.regions = raw.regions if made else []
     _stress_free(archive, raw, [material for material, _ in regions])
     state_of_archive(archive, raw, numbering)
     return raw
@@ -617,7 +624,7 @@ def _take_mesh200(archive: Archive) -> None:
     for number, kind in list(kinds.items()):
         new = _BY_MESH200.get(archive.options.get(number, {}).get(1, "")) if kind == 200 else None
         if new and any(e.kind == number for e in archive.elements):
-            kinds[number], archive.options[number] = new, {2: "1"}
+            kinds[number], archive.options[number] = new, {2: "1"} if new == 186 else {}
             text = f"the cells MESH200 of the type {number} are taken as SOLID{new}"
             archive.remarks.append(f"{text}: no others are there")
 
@@ -670,6 +677,7 @@ def _integration(archive: Archive, raw: RawMesh) -> list[str]:
         few = 0
     elif few > len(rules) - few:
         raw.integration, few = "reduced", len(rules) - few
+        said.append(f"{len(rules)} bricks of 20 nodes have reduced integration, as their KEYOPT(2) says")
     if few:
         other = "full" if raw.integration == "reduced" else "reduced"
         raw.lost.append(
