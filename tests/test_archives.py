@@ -364,7 +364,8 @@ def test_stress_free_temperatures_of_materials():
 
 
 @pytest.mark.parametrize(
-    ("density", "young", "unit"), [(7850, 2.1e11, "m"), (7.35e-4, 3e7, "in"), (7.85e-9, 2.1e5, "mm"), (7.85e-3, 1, "mm")]
+    ("density", "young", "unit"),
+    [(7850, 2.1e11, "m"), (7.35e-4, 3e7, "in"), (7.85e-9, 2.1e5, "mm"), (7.85e-3, 1, "mm")]
 )
 def test_lengths_are_those_in_which_the_density_is_a_solid_s(capsys, density, young, unit):
     """An archive without /UNITS: of 7850 t/mm3 there is nothing, of 7850 kg/m3 there is."""

@@ -94,7 +94,8 @@ class Archive:
     """What the commands have said.
 
     Attributes:
-        path: name of the file. folder: of it. lines, at: its lines and the number of the next one. where: of the one that is read.
+        path: name of the file. folder: of it. lines, at: its lines and the number of the next one. where: of the one
+            that is read.
         reals: values of each set of real constants; open_reals: the last set of R.
         changes: of EMODIF, by element. table: of TB that is read: material, label. refused: material -> what of its
             elasticity is not read.

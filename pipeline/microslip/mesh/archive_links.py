@@ -167,7 +167,7 @@ def _axes(archive: Archive, raw: RawMesh, numbering: Numbering) -> dict[int, Arr
     """Directions of nodes that are turned against global ones."""
     there = [node for node in archive.turns if np.isin(node, numbering.sorted)]
     at: Indices = numbering.positions(np.array(there, dtype=np.int64), "NROTAT names")
-    axes = {node: archive.turns[node].at(raw.points[p]) for node, p in zip(there, at, strict=True)}
+    axes = {node: archive.turns[node].directions(raw.points[[p]])[0] for node, p in zip(there, at, strict=True)}
     return {node: own for node, own in axes.items() if np.abs(own - np.eye(3)).max() > 1e-12}
 
 

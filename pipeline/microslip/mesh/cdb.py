@@ -244,7 +244,8 @@ def _read_short(archive: Archive, first: list[int], fields: Fields) -> None:
     number, *four = [*first[:5], *[0] * (5 - len(first[:5]))]
     kind, line = four[0] if four[0] in archive.kinds else archive.current["TYPE"], archive.at
     nodes = _whole_element(archive, first[5:], kind, fields)
-    archive.elements.append(Element(number, four[2], kind, four[1], four[3], nodes, f"{archive.path}, line {line}", line))
+    where = f"{archive.path}, line {line}"
+    archive.elements.append(Element(number, four[2], kind, four[1], four[3], nodes, where, line))
 
 
 def _whole_element(archive: Archive, nodes: list[int], kind: int, fields: Fields) -> list[int]:

@@ -86,8 +86,13 @@ def state_of(
         else:
             speed, point = in_si(load.speed, system, time=-1), metres * np.asarray(load.point, dtype=float)
             cells = _cells(mesh, load.cells)
+            cells = None if cells is None or cells.all() else cells
             loads.append(replace(load, speed=float(speed), point=point, cells=cells))
-    return replace(step, loads=tuple(loads))
+    held = step.supports
+    if held is not None:
+        there = {*mesh.point_sets, *(mesh.links.sets if mesh.links else ())}
+        held = {name: ways for name, ways in held.items() if name in there}
+    return replace(step, loads=tuple(loads), supports=held)
 
 
 def _nodal(
@@ -142,8 +147,5 @@ def _facets(raw: RawMesh, load: FacetLoad, boundary: Mapping[str, Indices], syst
 
 
 def _cells(mesh: Mesh, numbers: Indices | None) -> Array | None:
-    """Whether each cell is chosen, type by type; None if all are."""
-    if numbers is None:
-        return None
-    chosen = np.isin(joined(mesh.cell_id[kind] for kind in mesh.cells), numbers)
-    return None if chosen.all() else chosen
+    """Whether each cell is chosen, type by type; None where the file names none."""
+    return None if numbers is None else np.isin(joined(mesh.cell_id[kind] for kind in mesh.cells), numbers)

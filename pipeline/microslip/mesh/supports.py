@@ -50,6 +50,21 @@ class Constraints:
         self.sets, self.nodes = {}, {}
 
 
+def still_supports(raw: RawMesh, held: Constraints, numbering: Numbering) -> dict[str, str] | None:
+    """Point set -> directions of what a static step holds, its sets added to `raw`; None where those of its modes are
+    the same. What of it is skewed, or not read, is told."""
+    still = replace(raw, supports={}, links=list(raw.links), not_held=[], lost=raw.lost)
+    add_supports(still, held, numbering)
+    if (more := len(still.links) - len(raw.links)) or still.not_held:
+        number = more or len(still.not_held)
+        raw.lost.append(f"{number} supports of the static step are not read: frequencies may differ")
+    return None if _by_node(still) == _by_node(raw) else still.supports
+
+
+def _by_node(raw: RawMesh) -> set[tuple[int, str]]:
+    return {(n, way) for name, ways in raw.supports.items() for n in raw.point_sets[name].tolist() for way in ways}
+
+
 def add_supports(raw: RawMesh, held: Constraints, numbering: Numbering) -> None:
     """Give `raw` the supports: named sets as they are; nodes held alike as the set that has just them, or a new one.
 
