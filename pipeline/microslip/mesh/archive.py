@@ -69,13 +69,14 @@ class Acting:
 
 
 class Solution(NamedTuple):
-    """What a SOLVE solves. kind: STATIC, TRANS and so on. time: at its end."""
+    """What a SOLVE solves. kind: STATIC, TRANS and so on. time: at its end. held: its supports."""
 
     where: str
     kind: str
     nonlinear: bool
     time: float
     acting: Acting
+    held: Constraints
 
 
 @dataclass

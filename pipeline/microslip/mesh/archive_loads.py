@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass
+from copy import deepcopy
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -19,6 +20,7 @@ from .archive import Acting, Archive, Command, Element, Solution, whole
 from .archive_parameters import value_at
 from .loading import Terms, facet_loads, nodal_loads
 from .raw import Damaged, Numbering, RawMesh, is_number, real
+from .supports import still_supports
 from .systems import System
 
 WAYS = {"X": "x", "Y": "y", "Z": "z"}
@@ -295,8 +297,15 @@ def _perturbed(archive: Archive, words: list[str]) -> None:
     """PERTURB, MODAL, stiffness, contact, what is kept of the loads."""
     archive.analysis = words[1].upper()[:5] or "MODAL"
     archive.perturbed = archive.perturbed or 0
-    if words[4].upper() in ("NOKEEP", "INERKEEP", "DZEROKEEP", "PARKEEP"):
-        archive.leave_out(f"PERTURB with {words[4].upper()}, which changes supports after the loads,")
+    kept = words[4].upper()
+    if kept in ("NOKEEP", "INERKEEP"):
+        archive.held.clear()
+    elif kept == "DZEROKEEP":
+        for (node, way), (value, _) in archive.acting.moved.items():
+            if value.strip("0."):
+                archive.held.release({node}, {way}, archive.components)
+    elif kept not in ("", "ALLKEEP"):
+        archive.leave_out(f"PERTURB with {kept}, which changes supports after the loads,")
 
 
 def _prestress(archive: Archive, words: list[str]) -> None:
@@ -322,8 +331,10 @@ def _solve(archive: Archive, words: list[str]) -> None:
         return
     time = float(len(archive.solved) + 1) if not archive.time else archive.time
     archive.solved.append(
-        Solution(archive.where, archive.analysis, archive.nonlinear, time, archive.acting.now())
-    )
+        Solution(
+            archive.where, archive.analysis, archive.nonlinear, time, archive.acting.now(), deepcopy(archive.held)
+        )
+    )  # fmt: skip
 
 
 def _more(archive: Archive, words: list[str]) -> None:
@@ -348,7 +359,7 @@ COMMANDS: dict[str, Command] = {
 
 def last_of(archive: Archive) -> Solution:
     """The solution that modes are about, or what acts at the end of the archive."""
-    now = Solution(archive.where, "STATIC", archive.nonlinear, archive.time or 1.0, archive.acting)
+    now = Solution(archive.where, "STATIC", archive.nonlinear, archive.time or 1.0, archive.acting, archive.held)
     if not archive.solved:
         return now._replace(kind="STATIC" if archive.analysis == "MODAL" else archive.analysis)
     number = (archive.perturbed or 0) or len(archive.solved)
@@ -363,7 +374,7 @@ def state_of_archive(archive: Archive, raw: RawMesh, numbering: Numbering) -> No
     Raises:
         Damaged: with the line, what is wrong with a load.
     """
-    solution = last_of(archive)
+    solution, there = last_of(archive), set(archive.node_id)
     acting = _Acting(archive, raw, numbering, solution)
     if not archive.prestressed and archive.perturbed is None:
         idle = [*acting.kinds(), *archive.unused]
@@ -383,7 +394,11 @@ def state_of_archive(archive: Archive, raw: RawMesh, numbering: Numbering) -> No
             "not computed here: frequencies will differ"
         )
     elif loads or solution.acting.nodal or solution.acting.cells or solution.acting.uniform:
-        raw.state = StaticStep(f"{solution.where}: SOLVE", solution.nonlinear, tuple(loads))
+        still, held = solution.held, None
+        if (still.sets, still.nodes) != (archive.held.sets, archive.held.nodes):
+            nodes = {n: w for n, w in still.nodes.items() if n in there or n not in archive.ranged}
+            held = still_supports(raw, replace(still, nodes=nodes, axes=archive.held.axes), numbering)
+        raw.state = StaticStep(f"{solution.where}: SOLVE", solution.nonlinear, tuple(loads), held)
     else:
         archive.lost.append(
             f"{archive.path}: its modes are about a static state whose loads are not in it: frequencies will differ"
@@ -478,7 +493,7 @@ class _Acting:
             if face <= 3 and options.get(2, "0") == "1":
                 system = self.archive.systems.get(element.system, System())
                 centre = self.raw.points[at].mean(axis=0)
-                yield FacetLoad(where, at[None], values[None], system.at(centre)[face - 1])
+                yield FacetLoad(where, at[None], values[None], system.directions(centre[None])[0, face - 1])
                 return
             if face != 1 or options.get(2, "0") not in ("", "0"):
                 self._left(place, "acts along tangents or a vector (faces 2 to 5 of SURF154)")
@@ -502,6 +517,9 @@ class _Acting:
         place = f"{where}: {label}"
         if not values[:3].any():
             return
+        masses = {e.number for e in self.archive.elements if self.archive.kinds.get(e.kind) == 21}
+        if label == "CMACEL" and cells is not None and not masses.isdisjoint(cells.tolist()):
+            self._left(place, "pulls point masses (MASS21) by a component: these")
         if label in ("ACEL", "CMACEL"):
             yield BodyLoad(place, -values[:3], cells)
         elif label == "OMEGA":

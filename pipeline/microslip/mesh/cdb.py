@@ -179,13 +179,8 @@ def _read_node(archive: Archive, words: list[str]) -> None:
     if part != "ANG":
         active = archive.current.get("CSYS", 0) if not part else 0
         system = archive.systems.get(active, BASIC[0])
-        if system.kind not in (0, 1):
-            raise Damaged("N in a spherical system is not read; give global coordinates (CSYS,0)")
-        x, y, z = values[:3]
-        if system.kind == 1:
-            x, y = x * np.cos(np.radians(y)), x * np.sin(np.radians(y))
         archive.node_id.append(number)
-        archive.points.append((system.origin + np.array([x, y, z]) @ system.axes).tolist())
+        archive.points.append(system.points(np.array([values[:3]]))[0].tolist())
 
 
 def _announced(words: list[str]) -> int:
