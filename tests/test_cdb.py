@@ -14,10 +14,11 @@ from refusals import refused_command
 from microslip.basis import check_basis, read_basis
 from microslip.cli import main
 from microslip.data import Mesh
-from microslip.elasticity import isotropic, orthotropic
+from microslip.elasticity import isotropic, orthotropic, turned
 from microslip.errors import UserError
 from microslip.fem.discretise import discretise
 from microslip.mesh import mesh_problems, read_mesh
+from microslip.mesh.systems import axes_by_angles
 from microslip.modal.compute import modal_basis
 from microslip.stages.job import open_job
 from microslip.stages.modal import modes_stage
@@ -158,6 +159,25 @@ def test_materials_of_tables_and_minor_ratios(tmp_path):
     np.testing.assert_allclose(found.elasticity, C, rtol=1e-9, atol=1)
     np.testing.assert_allclose(found.expansion, [1e-5, 2e-5, 3e-5, 0, 0, 0])
     assert found.density == pytest.approx(600)
+
+
+@pytest.mark.parametrize("inverse", [False, True])
+def test_a_matrix_of_elasticity_is_the_material_that_it_was_made_from(tmp_path, inverse):
+    """TB,ANEL of a skewed orthotropic material, as stiffness and as compliance, turned back by ESYS."""
+    wood = orthotropic(np.array([12e3, 900, 500]), np.array([0.37, 0.47, 0.42]), np.array([700, 250, 650]))
+    axes = axes_by_angles(np.array([20.0, 35.0, -50.0]))
+    C = turned(wood, axes.T)
+    D = np.linalg.inv(C) if inverse else C
+    table = [*(D[j:, j] for j in range(6))]
+    words = [f"{v:.16g}" for v in np.concatenate(table)]
+    rows = [f"TBDATA,{i + 1},{','.join(words[i : i + 6])}" for i in range(0, 21, 6)]
+    lines = [f"TB,ANEL,1,1,21,{int(inverse)}", "TBTEMP,0", *rows, "MP,DENS,1,6e-10"]
+    text = archive(meshes.brick("hexahedron", (1, 1, 1)), material=lines)
+    found = read_mesh(written(tmp_path, text), "mm", "mm-t-s").materials[0]
+    np.testing.assert_allclose(found.elasticity, C * 1e6, rtol=1e-9, atol=1)
+    system = "LOCAL,11,0,0,0,0,20,35,-50\nEMODIF,1,ESYS,11\nFINISH"
+    back = read_mesh(written(tmp_path, text.replace("FINISH", system)), "mm", "mm-t-s").materials[0]
+    np.testing.assert_allclose(back.elasticity, turned(C, axes) * 1e6, rtol=1e-9, atol=1)
 
 
 @pytest.mark.parametrize(

@@ -98,6 +98,7 @@ class Archive:
         path: name of the file. folder: of it. lines, at: its lines and the number of the next one. where: of the one
             that is read.
         reals: values of each set of real constants; open_reals: the last set of R.
+        matrices: of TB,ANEL, whether they are compliances, and their constants.
         changes: of EMODIF, by element. table: of TB that is read: material, label. refused: material -> what of its
             elasticity is not read.
         kinds: number of a type -> Ansys's element. options: number of a type -> number of a KEYOPT
@@ -135,6 +136,7 @@ class Archive:
     tables: dict[int, dict[str, dict[int, float]]] = field(default_factory=dict)
     polynomials: dict[tuple[int, str], list[float]] = field(default_factory=dict)
     table: tuple[int, str] | None = None
+    matrices: dict[int, tuple[bool, dict[int, float]]] = field(default_factory=dict)
     refused: dict[int, str] = field(default_factory=dict)
     reference: float | None = None
     held: Constraints = field(default_factory=Constraints)

@@ -435,6 +435,8 @@ def _read_table(archive: Archive, words: list[str]) -> None:
     archive.table, archive.places["TB"] = None, ""
     if label in _LINEAR and option in ("", "ISOT"):
         archive.table = number, label
+    elif label == "ANEL" and option in ("", "0", "1") and words[3] in ("", "0", "1"):
+        archive.table, archive.matrices[number] = (number, label), (option == "1", {})
     elif label in _LINEAR or label in _BENDING:
         archive.refused[number] = f"TB,{label}{',' * bool(option)}{option} ({archive.where}), which is not read"
     elif label not in ("FRIC", "SDAMP", "DENS", "THERM", "JOIN", "FCLI"):
@@ -460,6 +462,10 @@ def _read_table_data(archive: Archive, words: list[str]) -> None:
     if archive.table is None:
         return
     number, table = archive.table
+    if table == "ANEL":
+        places = enumerate(words[2:8], whole(words[1] or "1", "TBDATA"))
+        archive.matrices[number][1].update({p: real(w, "TBDATA") for p, w in places if w})
+        return
     first, text = whole(words[1] or "1", "TBDATA"), archive.places.get("TB", "")
     for place, value in enumerate(words[2:8], first):
         if value and place <= len(_LINEAR[table]):
@@ -794,7 +800,7 @@ def _material(archive: Archive, raw: RawMesh, number: int, system: int) -> DeckM
     if number in archive.refused and "EX" not in c:
         text = f"{archive.refused[number]}; write MP,EX, NUXY and DENS (or nine constants of an orthotropic one)"
         return DeckMaterial(name, None, density, np.zeros(6), refused=text)
-    if "EX" not in c:
+    if "EX" not in c and number not in archive.matrices:
         return DeckMaterial(name, None, density, np.zeros(6))
     along = np.array([_first(c, f"{'ALP' if 'ALPX' in c else 'CTE'}{a}") or 0.0 for a in "XYZ"])
     if ("ALPX" in c and "ALPY" not in c) or ("CTEX" in c and "CTEY" not in c):
@@ -805,22 +811,38 @@ def _material(archive: Archive, raw: RawMesh, number: int, system: int) -> DeckM
     table, axes = None, None
     if len({*c.get("DENS", {}).values()}) > 1:
         archive.remarks.append(f"the density of the {name} depends on temperature: that of its first row is taken")
-    if _orthotropic(c):
+    if number in archive.matrices or _orthotropic(c):
         local = archive.systems.get(system, BASIC[0])
         if local.kind != 0:
             text = f"directions of the element coordinate system {system}, which is no rectangular one"
             text += "; give it in body.toml"
             return DeckMaterial(name, None, density, np.zeros(6), refused=text)
-        if max(len(c[label]) for label in c if label[0] in "EG") > 1:
+        if max((len(c[label]) for label in c if label[0] in "EG"), default=1) > 1:
             archive.remarks.append(f"the orthotropic {name} depends on temperature: its first row is taken")
         axes = local.axes
-        C: Array = turned(orthotropic_row(name, _nine(name, c)), axes)
+        own = _matrix(archive, number) if number in archive.matrices else orthotropic_row(name, _nine(name, c))
+        C: Array = turned(own, axes)
     else:
         nu = c.get("PRXY") or c.get("NUXY") or {1: 0.3}  # 0.3 is what Ansys assumes
         ratio = nu[min(nu)]
         rows = [[E, nu.get(place, ratio), t.get("EX", {}).get(place, 0.0)] for place, E in sorted(c["EX"].items())]
         C, table = isotropic_rows(name, np.array(rows))
     return DeckMaterial(name, C, density, turned_strain(along, axes), table)
+
+
+def _matrix(archive: Archive, number: int) -> Array:
+    """Hooke matrix of TB,ANEL: its 21 constants by columns below the diagonal, of stiffness or of compliance.
+
+    Raises:
+        Damaged: it is not positive definite.
+    """
+    inverse, constants = archive.matrices[number]
+    C = np.zeros((6, 6))
+    row, column = np.triu_indices(6)  # the upper triangle by rows is the lower one by columns
+    C[row, column] = C[column, row] = [constants.get(place, 0.0) for place in range(1, 22)]
+    if not np.isfinite(C).all() or np.linalg.eigvalsh(C).min() <= 0:
+        raise Damaged(f"TB,ANEL of the material {number} is not positive definite; correct its 21 constants")
+    return np.linalg.inv(C) if inverse else C
 
 
 def _orthotropic(c: dict[str, dict[int, float]]) -> bool:
