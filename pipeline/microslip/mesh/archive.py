@@ -96,7 +96,7 @@ class Archive:
 
     Attributes:
         path: name of the file. folder: of it. lines, at: its lines and the number of the next one. where: of the one
-            that is read.
+            that is read. idle: whether results are looked at (/POST1), which changes nothing.
         reals: values of each set of real constants; open_reals: the last set of R.
         matrices: of TB,ANEL, whether they are compliances, and their constants.
         changes: of EMODIF, by element. table: of TB that is read: material, label. refused: material -> what of its
@@ -145,6 +145,7 @@ class Archive:
     spread: list[tuple[int, list[int], list[float], str, str]] = field(default_factory=list)
     open: str = ""
     where: str = ""
+    idle: bool = False
     places: dict[str, str] = field(default_factory=dict)
     current: dict[str, int] = field(default_factory=lambda: {"TYPE": 1, "MAT": 1, "REAL": 1})
     selected: set[int] | None = None

@@ -96,6 +96,10 @@ def _coupled(archive: Archive, words: list[str]) -> None:
         [n for n in nodes if n],
         "xyz" if label.upper() == "ALL" else LABELS.get(label.upper(), ""),
     )
+    if label.upper() in ("TEMP", "VOLT", "MAG", "PRES", "HDSP"):
+        return
+    if len(nodes) == 1 and not is_number(nodes[0]):
+        nodes = [str(node) for node in archive.nodes(nodes[0]) or []]
     lines = archive.lines
     if len(nodes) == 1 and is_number(nodes[0]):
         count, nodes = int(nodes[0]), []

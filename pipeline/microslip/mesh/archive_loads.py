@@ -51,8 +51,8 @@ def sides(archive: Archive, element: Element) -> dict[int, list[int]]:
 
 def _value(word: str, what: str) -> str:
     """A value as it is written: a number, or the name of a table in %; empty: 0."""
-    if not word.startswith("%"):
-        real(word or "0", what)
+    if not word.startswith("%") and not np.isfinite(real(word or "0", what)):
+        raise Damaged(f"{what} holds {word}, which is no finite number; correct it")
     return word or "0"
 
 

@@ -107,6 +107,10 @@ def _execute(archive: Archive, words: list[str]) -> None:
     if skipped(archive, words):
         return
     name = words[0].upper()
+    if name.startswith(("/POST", "/AUX", "/PREP", "/SOL")) or name[:4] == "FINI":
+        archive.idle = name.startswith(("/POST", "/AUX"))
+    if archive.idle and name != "*SET":
+        return
     meaning = _COMMANDS.get(name[:4], name if name[:1].isalpha() or name[:1] == "*" else "")
     if callable(meaning):
         meaning(archive, [*words, *_BLANKS])
@@ -359,6 +363,34 @@ def _end(archive: Archive, words: list[str]) -> None:
     archive.at = len(archive.lines)
 
 
+def _generated(archive: Archive, words: list[str]) -> None:
+    """VMESH, NGEN and others that make nodes or elements."""
+    what = f"{words[0].upper()} makes nodes or elements, which Ansys alone does"
+    raise Damaged(f"{what}; write the mesh that it has made as an archive (CDWRITE,DB)")
+
+
+_IN_LOOPS = {*archive_parameters.COMMANDS, "*DO", "*DOW", "NSEL", "ESEL", "ALLS", "CMSE", "ESLN", "NSLE", "CSYS"}
+"""What a loop may repeat without a change of the model."""
+
+
+def _loop(archive: Archive, words: list[str]) -> None:
+    """*DO up to its *ENDDO, left aside where it changes nothing that is read.
+
+    Raises:
+        Damaged: it repeats something that is.
+    """
+    depth, first = 1, archive.at
+    for number, line in enumerate(archive.lines[first:], first + 1):
+        name = line.split("!")[0].strip().upper().partition(",")[0].strip()
+        depth += (name[:3] == "*DO" and name[:4] != "*DOT") - (name == "*ENDDO")
+        if not depth:
+            archive.at = number
+            return
+        if _COMMANDS.get(name[:4]) and name[:4] not in _IN_LOOPS and not name.startswith("/"):
+            raise Damaged(f"{words[0].upper()} repeats {name}; write the commands out, or an archive (CDWRITE,DB)")
+    raise Damaged(f"{words[0].upper()} has no *ENDDO, the file is truncated")
+
+
 def _other_file(archive: Archive, words: list[str]) -> None:
     """/INPUT, RESUME, CDREAD: what stands in another file."""
     archive.leave_out(f"{words[0].upper()},{words[1]}, which reads another file,")
@@ -490,8 +522,9 @@ _COMMANDS: dict[str, Command | str] = {
     **archive_parameters.COMMANDS, **archive_nodes.COMMANDS, **archive_links.COMMANDS,
     **archive_lumps.COMMANDS, **archive_loads.COMMANDS,
     **dict.fromkeys(("CEIN", "CPIN", "CPNG", "CPLG", "CPCY", "CECY", "CESG", "CPSG"), _CONSTRAINS),
-    **dict.fromkeys(("EGEN", "ENGE", "NGEN", "FILL", "NSYM", "ESYM", "EDEL", "NDEL", "NUMM", "NSCA"), _ADDS),
-    **dict.fromkeys(("NUMC", "ESUR", "VMES", "VSWE", "AMES", "EINT", "TRNF", "TRAN", "EREF", "EMID"), _ADDS),
+    **dict.fromkeys(("VMES", "VSWE", "AMES", "LMES", "KMES", "NGEN", "FILL", "EGEN", "ENGE", "NSYM"), _generated),
+    **dict.fromkeys(("ESYM", "EDEL", "NDEL", "NUMM", "NSCA", "ESUR", "EINT", "TRNF", "EREF", "EMID"), _ADDS),
+    **dict.fromkeys(("*DO", "*DOW"), _loop), "*REP": _generated,
     **dict.fromkeys(("MPCH", "EKIL", "EALI", "MPAM"), "changes materials of elements"),
     **dict.fromkeys(("INIS", "ISTR", "SLOA", "PSLO", "SFGR", "SFFU", "SFSC", "FSCA", "DSCA", "BFSC"), "loads it"),
     "MATW": "holds matrices", "SE": "holds matrices",
@@ -501,7 +534,7 @@ _COMMANDS: dict[str, Command | str] = {
         "CMWR CMDE TBLI TBPT SCOP QRDO MODC CNVT CDWR SAVE WPCS LNSR PRED CUTC OPNC MDAM HROP HARF CGLO ERNO MPLI "
         "NLIS ELIS DLIS FLIS ETLI SLIS CSLI ALLO PARS NORL EXIT EPLO NPLO GPLO PLNS PRNS SET PLDI PRRS PRES SFLI BFLI "
         "MPWR NWRI EWRI SPEC OUTP NOPR GOPR MPPL STEF THOP CYCS RESV SNOP PCGO LANB KEYW PMAP DESI CMLI CMPL SEOP "
-        "PRIN NROP EMAT MONI JPEG MODE BETT CORI DSYS RSYS UIMP CHEC *END *ELS *VWR *CFO *CFC *CRE *MSG *STA *USE *LIS "
+        "PRIN NROP EMAT MONI JPEG MODE BETT CORI DSYS RSYS UIMP CHEC *END *IF *ELS *VWR *CFO *CFC NUMC *MSG *STA *USE *LIS "
         "*VEC *NRM *DOT *MAT *EXP *PRI *VGE *VPU *VFI *VRE *VME *CYC *EXI *RET *ASK *ULI *TRE *DEL".split(), ""
     ),
 }  # fmt: skip
@@ -514,7 +547,7 @@ changes no frequency."""
 
 def _assembled(archive: Archive) -> RawMesh:
     if not archive.node_id:
-        raise Damaged("there is no NBLOCK")
+        raise Damaged("there are no nodes (NBLOCK or N); write the mesh as an archive (CDWRITE,DB)")
     archive.elements = [changed(e, archive.changes.get(e.number, {})) for e in archive.elements]
     _take_mesh200(archive)
     middle = _Middle(archive)
@@ -849,8 +882,9 @@ def _orthotropic(c: dict[str, dict[int, float]]) -> bool:
     """Whether the constants of a material are others than those that EX and NUXY alone make."""
     E = _first(c, "EX") or 0.0
     nu = _first(c, "PRXY") if "PRXY" in c else _first(c, "NUXY") if "NUXY" in c else 0.3
-    plain = {"E": E, "G": E / (2 * (1 + (nu or 0.0)))}
-    return any(abs((_first(c, key) or 0.0) / plain[key[0]] - 1) > 1e-4 for key in c if key[0] in plain)
+    plain = {"E": E, "G": E / (2 * (1 + (nu or 0.0)) or 1.0)}
+    parts = ((_first(c, key) or 0.0, plain[key[0]]) for key in c if key[0] in plain)
+    return any(abs(value - usual) > 1e-4 * abs(usual) for value, usual in parts)
 
 
 def _first(c: dict[str, dict[int, float]], label: str) -> float | None:
