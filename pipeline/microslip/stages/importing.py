@@ -22,11 +22,12 @@ from ..data import Array, BodyLoad, FacetLoad, Indices, Material, Mesh, NodalLoa
 from ..errors import UserError
 from ..files.store import ordinary, write_text
 from ..frames import rotation
-from ..mesh import UNITS, mesh_problems, read_mesh, suffix_of, unit_of
+from ..mesh import UNITS, likely_unit, mesh_problems, read_mesh, suffix_of, unit_of
 from ..mesh.chosen import of_instances
 from ..mesh.materials import NONE, STANDS, Substitute
 from ..mesh.raw import Unread, joined, refused
 from ..mesh.unv import UNIVERSAL, has_solids
+from ..plausible import density
 from ..units import SYSTEMS, to_rpm, usual_system
 from .meshing import run_apart
 from .stage import Report
@@ -137,14 +138,14 @@ def with_page(imported: Imported, modes: Sequence[str] = ()) -> Imported:
 
 
 def length_unit(unit: str | None, file: Path) -> str:
-    """The unit of lengths that was asked for, else that which the file tells, else mm.
+    """The unit of lengths that was asked for, else that which the file tells, or its densities, else mm.
 
     Raises:
         UserError: an unknown one.
     """
     if unit is not None and unit not in UNITS:
         raise UserError(f"--unit {unit}: unknown unit of length; choose one of {', '.join(UNITS)}")
-    return unit or unit_of(file) or "mm"
+    return unit or unit_of(file) or likely_unit(file) or "mm"
 
 
 def substitute(density: float | None, young: float | None, poisson: float | None) -> Substitute:
@@ -466,6 +467,10 @@ def _mesh(
     size = " x ".join(f"{v:.4g}" for v in np.ptp(solid, axis=0) / UNITS[unit])
     told = [*lacking, *told, f"{file}: {mesh.n_points} points, {kinds}, {size} {unit}{alone}"]
     told += [text for text in again if text not in lacking]
+    if unit != "mm" and not unit_of(file) and likely_unit(file) == unit:
+        told.append(f"note: lengths are taken in {unit}, as its densities are no solid's in mm and t; else --unit")
+    doubts = (density(f"{file}: {m.name}: density", m.density) for m in mesh.materials)
+    told += [f"warning: {text}" for text in doubts if text]
     told += [f"note: {text}" for text in mesh.remarks]
     told += [*ties, *((*joints, *_pressed(mesh)) if not instances else ())]
     holding = _hold(mesh, UNITS[unit])

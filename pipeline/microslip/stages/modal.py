@@ -140,6 +140,8 @@ def modes_inputs(job: Job, mesh_file: Path) -> dict[str, Any]:
     """What a modal file depends on: settings but those of the drawing and the prose, the mesh, the code."""
     settings = {k: v for k, v in job.raw.items() if k not in ("geometry", "mesh", "description", "note")}
     inputs = {"settings": settings, "mesh": store.hash_file(mesh_file)}
+    if (rule := job.raw.get("mesh", {}).get("integration", "full")) != "full":
+        inputs["integration"] = rule
     if read := read_files(mesh_file)[1:]:
         inputs["included"] = [store.hash_file(f) for f in read if f.is_file()]
     if job.settings.geometry.mesh is not None:
