@@ -86,7 +86,7 @@ class _Reading:
         axes = None if key is None else self.deck.orientations[key]
         if axes is None or isinstance(axes, str):
             raise Damaged(f"*{self.card.keyword} names the ORIENTATION '{word}', which is not defined or not constant")
-        return axes.T
+        return axes
 
     def value(self) -> tuple[list[int], float]:
         """Directions, from 0, and the value of a spring or dashpot."""

@@ -75,6 +75,7 @@ def read_inp(path: Path) -> RawMesh:
 _LOADS = r"\*(C|D|DS)(LOAD|FLUX)|\*(D|S)?FILM|\*D?RADIATE|\*INERTIA RELIEF|\*MASS FLOW RATE"
 
 
+CALCULIX = ("tetra", "wedge")
 _AS = {
     "C3D8R": "reduced integration becomes full", "C3D8RH": "reduced integration becomes full",
     "C3D8I": "incompatible modes are left out", "C3D8H": "the hybrid form becomes that of displacements",
@@ -90,13 +91,15 @@ def _replaced(raw: RawMesh, deck: Deck, of_parts: bool) -> list[str]:
     """Which cells are taken as others, and how far first-order ones lock in bending.
 
     Where all bricks of 20 nodes are integrated by eight points they are so here, stiffness and mass, if the deck is of
-    CalculiX (it has no parts).
+    CalculiX (it has no parts); so are its tetrahedra of 4 and wedges of 6 nodes by one and two.
     """
     count: dict[str, int] = {}
     for cells in deck.solids:
         count[cells.written] = count.get(cells.written, 0) + len(cells.ids)
     told = []
     bricks20 = {cells.written for cells in deck.solids if cells.kind == "hexahedron20"}
+    if {cells.kind for cells in deck.solids} & set(CALCULIX) and not of_parts:
+        raw.integration = "calculix"
     if bricks20 == {"C3D20R"} and not of_parts:
         raw.integration = "reduced-mass"
         count = {written: number for written, number in count.items() if written != "C3D20R"}

@@ -456,7 +456,7 @@ def _mesh(
     lines = [] if holding else ["free = true               # nothing holds it wholly yet"]
     lines += ["", "[geometry]", f"mesh = {_beside(file, folder)}"]
     lines += [f"instances = {json.dumps(list(instances))}"] if instances else []
-    rule = f'integration = "{mesh.integration}"  # bricks of 20 nodes by eight points, as the file says'
+    rule = f'integration = "{mesh.integration}"  # the points that the program of the file takes'
     lines += ["", "[mesh]", rule] if mesh.integration != "full" else []
     lines += ["", "[material]", *_material(mesh, numbers, bool(lacking))]
     if mesh.materials:
