@@ -70,6 +70,10 @@ class Material:
         temperature_table: (t, 2) temperature in K and the factor on `elasticity` at that temperature;
             linear between the entries, constant outside. ``None``: the modulus does not depend on temperature.
         name: for reports.
+        stiffness_table: temperatures (t,) in K and matrices (t, 6, 6) that take the place of
+            `elasticity` where not only one factor changes, or ``None``.
+        expansion_table: (t, 2) temperature in K and the factor on `expansion`, a secant from `zero`, K;
+            linear between, constant outside. ``None``: it is constant.
     """
 
     density: float
@@ -77,6 +81,37 @@ class Material:
     expansion: Array
     temperature_table: Array | None = None
     name: str = "material"
+    stiffness_table: tuple[Array, Array] | None = None
+    expansion_table: Array | None = None
+    zero: float = 0.0
+
+    @property
+    def softening(self) -> Array | None:
+        """(t, 2) temperature in K and the factor on the first stiffness, None where it is constant."""
+        if self.stiffness_table is None:
+            return self.temperature_table
+        T, C = self.stiffness_table
+        return np.column_stack([T, C[:, 0, 0] / C[0, 0, 0]])
+
+    def stiffness_at(self, temperature: Array) -> Array:
+        """(..., 6, 6) Pa of `stiffness_table` at temperatures (K)."""
+        assert self.stiffness_table is not None
+        T, C = self.stiffness_table
+        at = np.clip(np.interp(temperature, T, np.arange(len(T))), 0, len(T) - 1)
+        low = np.minimum(at.astype(np.int64), max(len(T) - 2, 0))
+        share = (at - low)[..., None, None]
+        return (1 - share) * C[low] + share * C[np.minimum(low + 1, len(T) - 1)]
+
+    def thermal_strain(self, temperature: Array, reference: float) -> Array:
+        """(..., 6) strain at temperatures (K) of what is free of strain at the reference one."""
+        if self.expansion_table is None:
+            return (temperature - reference)[..., None] * self.expansion
+
+        def grown(T: Array) -> Array:
+            assert self.expansion_table is not None
+            return np.interp(T, *self.expansion_table.T) * (T - self.zero)
+
+        return (grown(temperature) - grown(np.array(reference)))[..., None] * self.expansion
 
     def modulus_factor(self, temperature: Array) -> Array:
         """Factor on `elasticity` at the given temperatures (K), any shape."""

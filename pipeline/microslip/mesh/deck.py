@@ -25,7 +25,8 @@ class Cells:
 
 @dataclass
 class DeckConstants:
-    """Constants as written: name, place; (t, 3) E, nu, T or 9 engineering constants, or why they are not read."""
+    """Constants as written: name, place; (t, 3) E, nu, T, or (t, 10) engineering constants or stiffnesses and T, or why
+    they are not read; expansion along the axes, its table over T and the T from which it counts."""
 
     name: str
     where: str = ""
@@ -35,6 +36,8 @@ class DeckConstants:
     refused: str = ""
     density: float | None = None
     expansion: Array = field(default_factory=lambda: np.zeros(3))
+    expansion_table: Array | None = None
+    zero: float = 0.0
 
 
 @dataclass(frozen=True)

@@ -518,7 +518,7 @@ def _noted(told: Sequence[str]) -> list[str]:
 def _temperatures(mesh: Mesh) -> tuple[list[str], list[str]]:
     """Lines of [temperature] and what to say of it: in force where moduli hang on it and nothing is
     strained by it."""
-    hanging = [m for m in mesh.materials if m.temperature_table is not None]
+    hanging = [m for m in mesh.materials if m.softening is not None]
     said = [_softened(m, mesh) for m in hanging]
     if mesh.temperature is None:
         return [], [f"warning: {text}" for text in said]
@@ -546,8 +546,8 @@ def _actual(temperature: Array) -> Array:
 
 def _softened(material: Material, mesh: Mesh) -> str:
     """How far a modulus falls at the temperatures of the file, and the frequencies with it."""
-    assert material.temperature_table is not None
-    T, factor = material.temperature_table.T
+    assert material.softening is not None
+    T, factor = material.softening.T
     text = f"the modulus of {material.name} depends on temperature"
     hot = np.zeros(0) if mesh.temperature is None else _actual(mesh.temperature)
     if not np.isfinite(hot).any():
