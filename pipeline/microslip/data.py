@@ -348,7 +348,7 @@ class FacetLoad:
     Attributes:
         facets: (f, c) corners as a file has them, (f, k) points of facets of the type `kind` in a mesh. values: (f,)
             or (f, c) at the corners, Pa; a pressure is positive into the body. direction: (3,) unit vector of a
-            traction, None for a pressure.
+            traction, None for a pressure. inside: whether it acts on facets between cells, too.
     """
 
     where: str
@@ -356,6 +356,7 @@ class FacetLoad:
     values: Array
     direction: Array | None = None
     kind: str = ""
+    inside: bool = False
 
 
 @dataclass(frozen=True)

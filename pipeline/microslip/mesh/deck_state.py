@@ -313,5 +313,6 @@ class _Acting:
         for corners, (_, amount, where) in self.facets.items():
             facets.setdefault((where, len(corners)), []).append((corners, amount))
         for (where, _), sides in facets.items():
-            loads.append(FacetLoad(where, np.array([c for c, _ in sides]), np.array([a for _, a in sides])))
+            corners, values = (np.array(part) for part in zip(*sides, strict=True))
+            loads.append(FacetLoad(where, corners, values, inside=True))
         return [*loads, *(load for _, chosen in self.fields.values() for load in chosen)]
