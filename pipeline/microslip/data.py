@@ -102,8 +102,8 @@ class Material:
         share = (at - low)[..., None, None]
         return (1 - share) * C[low] + share * C[np.minimum(low + 1, len(T) - 1)]
 
-    def thermal_strain(self, temperature: Array, reference: float) -> Array:
-        """(..., 6) strain at temperatures (K) of what is free of strain at the reference one."""
+    def thermal_strain(self, temperature: Array, reference: Array) -> Array:
+        """(..., 6) strain at temperatures (K) of what is free of strain at the reference ones."""
         if self.expansion_table is None:
             return (temperature - reference)[..., None] * self.expansion
 
@@ -111,7 +111,7 @@ class Material:
             assert self.expansion_table is not None
             return np.interp(T, *self.expansion_table.T) * (T - self.zero)
 
-        return (grown(temperature) - grown(np.array(reference)))[..., None] * self.expansion
+        return (grown(temperature) - grown(reference))[..., None] * self.expansion
 
     def modulus_factor(self, temperature: Array) -> Array:
         """Factor on `elasticity` at the given temperatures (K), any shape."""

@@ -17,6 +17,7 @@ from ..errors import of_file
 from . import deck_conditions, deck_materials, deck_mesh, deck_state
 from .cards import Card, data_of, numbers, read_cards
 from .deck import Deck
+from .deck_cut import cut_bolts
 from .deck_conditions import assign_temperatures, constraints, local_axes, local_supports
 from .deck_joints import KEYWORDS as JOINTS
 from .deck_joints import joints_of, preloads_of, sector_of, unread
@@ -217,6 +218,7 @@ def _assembled(deck: Deck, of_parts: bool) -> RawMesh:
                 raw.facets.setdefault(deck.written[key], []).append(cells.nodes[inside])
     add_surfaces(deck, raw, numbering)
     state_of_deck(deck, raw, numbering, of_parts)
+    cut_bolts(deck, raw, numbering)
     return raw
 
 

@@ -155,16 +155,19 @@ def make_model(
     """Assemble what does not depend on speed.
 
     Args:
-        material: one for all, or one per block. temperature: (n,) K at the nodes, or None for the reference.
+        material: one for all, or one per block. temperature: (n,) K at the nodes, (n, 2) with the stress-free one behind
+            it, or None for the reference.
     """
     own: list[Material] = per_block(d, material)
     factor = strain = hooke = None
     if temperature is not None:
-        at = [np.einsum("qk,ek->eq", _heat_shapes(b), temperature[b.cells]) for b in d.blocks]
+        T = temperature if temperature.ndim == 2 else np.column_stack([temperature, np.full(len(temperature), reference)])
+        both = [np.einsum("qk,eks->seq", _heat_shapes(b), T[b.cells]) for b in d.blocks]
+        at, cold = [t[0] for t in both], [t[1] for t in both]
         if any(m.temperature_table is not None for m in own):
             factor = [m.modulus_factor(t) for m, t in zip(own, at, strict=True)]
         if any(np.any(m.expansion) for m in own):
-            strain = [m.thermal_strain(t, reference) for m, t in zip(own, at, strict=True)]
+            strain = [m.thermal_strain(t, free) for m, t, free in zip(own, at, cold, strict=True)]
         if any(m.stiffness_table is not None for m in own):
             hooke = [
                 m.elasticity if m.stiffness_table is None else m.stiffness_at(t)
@@ -185,9 +188,11 @@ def make_model(
 def _heat_shapes(b: Block) -> Array:
     """(q, k) temperature at a block's points by those at its nodes.
 
-    In bricks of 20 nodes it is the trilinear field nearest to the quadratic one: their strains are
-    linear, and heat that strains quadratically would leave stress in a free body (so does CalculiX).
+    In bricks of 20 nodes it is the trilinear field nearest to the quadratic one, in bricks of 8 the
+    mean: what heat strains is then no finer than the strains they have (so does CalculiX).
     """
+    if b.cell_type == "hexahedron":
+        return np.full(b.N.shape, 1 / 8)
     if b.cell_type != "hexahedron20":
         return b.N
     x, y, z = (b.at - b.at.mean(axis=0)).T

@@ -523,12 +523,13 @@ def _temperatures(mesh: Mesh) -> tuple[list[str], list[str]]:
     if mesh.temperature is None:
         return [], [f"warning: {text}" for text in said]
     free, actual = mesh.temperature[:, 0], _actual(mesh.temperature)
-    whole = not np.isnan(free).any() and np.ptp(free) <= 1e-9 * max(np.abs(free).max(), 1.0)
+    whole = not np.isnan(free).any()
     strained = bool((np.abs(actual - free) > 0).any()) and any(m.expansion.any() for m in mesh.materials)
     lines = ["[temperature]", 'from = "mesh"', 'scale = "C"             # or "K"']
     if whole and (mesh.state is not None or (hanging and not strained)):
         return ["", *lines], [f"temperatures of the file are in force: {text}" for text in said]
     told = "temperatures: used only once [temperature] of body.toml is uncommented"
+    told = f"warning: {told}" if mesh.state is not None else told
     if hanging:
         why = "they strain the body as well" if strained else "not all of them are there"
         return ["", *(f"#{line}" for line in lines)], [
@@ -606,6 +607,11 @@ def _state(mesh: Mesh, metres: float, ring: bool, held: bool) -> tuple[list[str]
     acting = [f"{number} {kind}{'s' * (number > 1)}" for kind, number in count.items()]
     acting += ["temperatures"] * (mesh.temperature is not None)
     law = "finite displacements" if state.nonlinear else "one linear solution"
+    if (grown := _grown(mesh)) and state.nonlinear:
+        law += (
+            f"; heat stretches the body by up to {grown:.2g}, and moduli are those of the heated body: "
+            f"CalculiX raises them by as much, so its frequencies are up to {grown / 2:.1g} higher"
+        )
     if state.supports is not None:
         law += f"; held there by {', '.join(f'{n} in {w}' for n, w in state.supports.items()) or 'nothing'}"
     said = [f"{state.where}: the modes are about its static state: {', '.join(acting) or 'nothing acts'}; {law}"]
@@ -631,8 +637,20 @@ def _state(mesh: Mesh, metres: float, ring: bool, held: bool) -> tuple[list[str]
     return turning, ["", "[[loads]]", 'kind = "mesh"             # those of its static step'] if rest else [], said
 
 
+def _grown(mesh: Mesh) -> float:
+    """The largest stretch by heat, less 1; 0 where the file has no temperatures."""
+    if mesh.temperature is None or not mesh.materials:
+        return 0.0
+    free, actual = mesh.temperature[:, 0], _actual(mesh.temperature)
+    largest = [np.abs(m.thermal_strain(actual, free)).max(initial=0.0) for m in mesh.materials]
+    return float(np.nan_to_num(max(largest)))
+
+
 def _pressed(mesh: Mesh) -> list[str]:
-    """Preloads of bolts that are one body with all that they hold: no contact takes them."""
+    """Preloads of bolts that are one body with all that they hold, and not in its static step: no contact takes them.
+    """
+    if mesh.state is not None:
+        return []
     return [
         f"warning: {where}: the preload of {force:g} N is not used: the bolt and all that it holds are one "
         "body; tie it to one side alone, with a *CONTACT PAIR on the other"
