@@ -2,7 +2,7 @@
 
 Written against the keyword descriptions in the two programs' manuals. It keeps node numbers and reads ``*SURFACE``,
 in which such programs name faces; parts are laid where their instances stand (`instances`). A file whose meaning it
-cannot keep (generated nodes) is refused.
+cannot keep (mapped nodes) is refused.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import numpy as np
 
 from ..data import Array, Indices
 from ..errors import of_file
-from . import deck_conditions, deck_materials, deck_mesh, deck_state
+from . import deck_conditions, deck_generated, deck_materials, deck_mesh, deck_state
 from .cards import Card, data_of, numbers, read_cards
 from .deck import Deck
 from .deck_cut import cut_bolts
@@ -33,13 +33,10 @@ from .instances import numbered, outline, place, placement, places
 from .raw import Damaged, Numbering, RawMesh, Structure, ignored, joined, locks, lost, undefined
 from .supports import add_supports
 
-_REFUSED = {
-    "NGEN": "generates nodes by *NGEN", "NFILL": "generates nodes by *NFILL", "NCOPY": "copies nodes by *NCOPY",
-    "ELGEN": "generates cells by *ELGEN", "ELCOPY": "copies cells by *ELCOPY",
-}  # fmt: skip
+_REFUSED = {"NMAP": "maps nodes by *NMAP"}
 
 _LINKING = (*LINKS, *JOINTS, *LUMPING)
-READERS = deck_mesh.READERS | deck_materials.READERS | deck_conditions.READERS | deck_state.READERS
+READERS = deck_mesh.READERS | deck_generated.READERS | deck_materials.READERS | deck_conditions.READERS | deck_state.READERS
 
 
 def read_inp(path: Path) -> RawMesh:
