@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 
 from ..basis import write_basis
-from ..data import Array, BodyLoad, FacetLoad, Indices, Material, Mesh, NodalLoad, SpinLoad
+from ..data import Array, BodyLoad, FacetLoad, Indices, Material, Mesh, NodalLoad, RigidLink, SpinLoad
 from ..errors import UserError
 from ..files.store import ordinary, write_text
 from ..frames import rotation
@@ -617,6 +617,10 @@ def _state(mesh: Mesh, metres: float, ring: bool, held: bool) -> tuple[list[str]
     said = [f"{state.where}: the modes are about its static state: {', '.join(acting) or 'nothing acts'}; {law}"]
     turning = [] if ring else ["", "[rotation]"]
     turning.append(f'prestress = "{"nonlinear" if state.nonlinear else "linear"}"')
+    if mesh.links is not None and any(isinstance(link, RigidLink) for link in mesh.links.items):
+        text = "that forces turn with the arms of rigid links is left out of the stiffness, as in CalculiX"
+        finite = ", and the arms keep their directions at rest: CalculiX turns them" * state.nonlinear
+        said.append(f"warning: {state.where}: {text}{finite}; where links turn much, mesh their bodies")
     spins = [load for load in state.loads if isinstance(load, SpinLoad) and load.speed]
     if len(spins) > 1 or any(spin.cells is not None for spin in spins):
         said.append(
@@ -634,6 +638,7 @@ def _state(mesh: Mesh, metres: float, ring: bool, held: bool) -> tuple[list[str]
             turning += [f"axis = [{numbers[0]}]", f"point = [{numbers[1]}]"]
         turning.append(f"speeds_rpm = [{speed!r}]")
     rest = len(state.loads) > sum(isinstance(load, SpinLoad) for load in state.loads)
+    rest = rest or state.supports is not None
     return turning, ["", "[[loads]]", 'kind = "mesh"             # those of its static step'] if rest else [], said
 
 
