@@ -40,7 +40,9 @@ def cut_bolts(deck: Deck, raw: RawMesh, numbering: Numbering) -> None:
             name = deck.surface(card.text("SURFACE"), card.space)
             if name is None or name not in raw.facets:
                 raise Damaged(f"*{BOLT} needs a SURFACE of sides of solid cells")
-            node = numbering.positions(deck.nodes_for(f"*{BOLT}", card.text("NODE"), card.space), f"*{BOLT} names")
+            node = numbering.positions(
+                deck.nodes_for(f"*{BOLT}", card.text("NODE"), card.space), f"*{BOLT} names"
+            )
             if len(node) != 1:
                 raise Damaged(f"*{BOLT} needs one node for its force, as NODE")
             _cut(raw, card, name, int(node[0]))
@@ -58,11 +60,15 @@ def _cut(raw: RawMesh, card: Card, name: str, control: int) -> None:
     for block, cell in beyond:
         nodes = raw.blocks[block][1]
         nodes[cell] = number[nodes[cell]]
-    raw.facets = {key: [_moved(f, number, outside) for f in parts] for key, parts in raw.facets.items()}
+    raw.facets = {
+        key: [_moved(f, number, outside) for f in parts] for key, parts in raw.facets.items()
+    }
     state = raw.state
     assert state is not None
     loads = [
-        replace(load, facets=_moved(load.facets, number, outside)) if isinstance(load, FacetLoad) else load
+        replace(load, facets=_moved(load.facets, number, outside))
+        if isinstance(load, FacetLoad)
+        else load
         for load in state.loads
     ]
     raw.points = np.vstack([raw.points, raw.points[olds]])
@@ -129,7 +135,11 @@ def _sides(raw: RawMesh, facets: list[Indices]) -> tuple[list[Cell], list[Cell]]
     section = _keys(facets)
     on = np.zeros(len(raw.points), dtype=bool)
     on[np.unique(joined(part.ravel() for part in facets))] = True
-    cells = [(b, int(i)) for b, (_, nodes) in enumerate(raw.blocks) for i in np.flatnonzero(on[nodes].any(axis=1))]
+    cells = [
+        (b, int(i))
+        for b, (_, nodes) in enumerate(raw.blocks)
+        for i in np.flatnonzero(on[nodes].any(axis=1))
+    ]
     owners: dict[tuple[int, ...], list[int]] = {}
     for i, cell in enumerate(cells):
         for key in _keys(_facets_of(raw, [cell])):
@@ -149,9 +159,13 @@ def _sides(raw: RawMesh, facets: list[Indices]) -> tuple[list[Cell], list[Cell]]
         near.add(int(part[ends[0 if inwards else 1]]))
         beyond.add(int(part[ends[1 if inwards else 0]]))
     if near & beyond:
-        raise Damaged(f"*{BOLT} does not part the bolt: its SURFACE must go all the way through it, seen from one side")
+        raise Damaged(
+            f"*{BOLT} does not part the bolt: its SURFACE must go all the way through it, seen from one side"
+        )
     whole = list(zip(cells, part.tolist(), strict=True))
-    return [cell for cell, p in whole if p not in beyond], [cell for cell, p in whole if p in beyond]
+    return [cell for cell, p in whole if p not in beyond], [
+        cell for cell, p in whole if p in beyond
+    ]
 
 
 def _normal(raw: RawMesh, card: Card, facets: list[Indices]) -> Array:

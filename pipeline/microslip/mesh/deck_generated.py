@@ -65,10 +65,16 @@ def _read_ngen(deck: Deck, card: Card) -> None:
         points = a + share * (b - a)
         if kind in "CP":
             at = [real(w or "0", "*NGEN") for w in words[4:7]]
-            extra = _of(places, _whole(words[3], "*NGEN") + more, "*NGEN") if words[3] else np.array(at)
+            extra = (
+                _of(places, _whole(words[3], "*NGEN") + more, "*NGEN") if words[3] else np.array(at)
+            )
             normal = np.array([real(w or "0", "*NGEN") for w in words[7:10]])
             parabola = 2 * (share - 0.5) * (share - 1) * a + 4 * share * (1 - share) * extra
-            points = parabola + 2 * share * (share - 0.5) * b if kind == "P" else _arc(a, b, extra, normal, count)
+            points = (
+                parabola + 2 * share * (share - 0.5) * b
+                if kind == "P"
+                else _arc(a, b, extra, normal, count)
+            )
         ids = first + step * np.arange(count + 1) + more
         _add_nodes(deck, card, ids[1:-1], points[1:-1], "")
         if name := card.text("NSET"):
@@ -80,10 +86,14 @@ def _arc(a: Array, b: Array, centre: Array, normal: Array, count: int) -> Array:
     x, y = a - centre, b - centre
     n = normal if normal.any() else np.cross(x, y)
     if not np.linalg.norm(n) > 1e-9 * np.linalg.norm(x) * np.linalg.norm(y):
-        raise Damaged("*NGEN, LINE=C has ends on a line with their centre; give the normal of the arc")
+        raise Damaged(
+            "*NGEN, LINE=C has ends on a line with their centre; give the normal of the arc"
+        )
     n = n / np.linalg.norm(n)
     angle = np.arctan2(n @ np.cross(x, y), x @ y) % (2 * np.pi)
-    radius = np.linalg.norm(x) + np.arange(count + 1) / count * (np.linalg.norm(y) - np.linalg.norm(x))
+    radius = np.linalg.norm(x) + np.arange(count + 1) / count * (
+        np.linalg.norm(y) - np.linalg.norm(x)
+    )
     turned = [rotation(n, angle * k / count) @ x / np.linalg.norm(x) for k in range(count + 1)]
     return centre + radius[:, None] * np.array(turned)
 
@@ -96,11 +106,15 @@ def _read_nfill(deck: Deck, card: Card) -> None:
     for line in card.lines:
         words = [word.strip() for word in line.split(",")]
         if len(words) < 4 or not bias > 0:
-            raise Damaged("*NFILL needs two sets, the number of intervals and the increment of numbers a line")
+            raise Damaged(
+                "*NFILL needs two sets, the number of intervals and the increment of numbers a line"
+            )
         ends = [np.unique(deck.nodes_for("*NFILL", word)) for word in words[:2]]
         intervals, step = (_whole(w, "*NFILL") for w in words[2:4])
         if len(ends[0]) != len(ends[1]) or intervals < 1:
-            raise Damaged(f"*NFILL fills between sets of {len(ends[0])} and {len(ends[1])} nodes; they need equally many")
+            raise Damaged(
+                f"*NFILL fills between sets of {len(ends[0])} and {len(ends[1])} nodes; they need equally many"
+            )
         places = _places(deck)
         x, y = (np.array([_of(places, int(n), "*NFILL") for n in end]) for end in ends)
         lengths = bias ** -np.arange(intervals, dtype=float)
@@ -138,7 +152,9 @@ def _mirrored(x: Array, kind: str, values: list[float]) -> Array:
         return a - r
     along = np.cross(*(p - a for p in others)) if kind == "MIRROR" else others[0] - a
     if not np.linalg.norm(along) > 0:
-        raise Damaged(f"*NCOPY, REFLECT={kind} has points that give no {'plane' if kind == 'MIRROR' else 'line'}")
+        raise Damaged(
+            f"*NCOPY, REFLECT={kind} has points that give no {'plane' if kind == 'MIRROR' else 'line'}"
+        )
     e = along / np.linalg.norm(along)
     part = np.outer(r @ e, e)
     return a + (r - 2 * part if kind == "MIRROR" else 2 * part - r)
@@ -167,7 +183,9 @@ def _read_elgen(deck: Deck, card: Card) -> None:
 def _read_elcopy(deck: Deck, card: Card) -> None:
     """Cells of a set with shifted numbers; REFLECT counts nodes of bricks as in a mirror."""
     old = deck.cells_for("*ELCOPY", card.text("OLD SET"))
-    step, by = (_whole(card.text(key), f"*ELCOPY, {key}") for key in ("ELEMENT SHIFT", "SHIFT NODES"))
+    step, by = (
+        _whole(card.text(key), f"*ELCOPY, {key}") for key in ("ELEMENT SHIFT", "SHIFT NODES")
+    )
     for cells in _with(deck, old):
         order = _REFLECTED.get(cells.kind) if "REFLECT" in card.parameters else None
         nodes = cells.nodes if order is None else cells.nodes[:, order]

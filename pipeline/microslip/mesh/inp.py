@@ -17,8 +17,8 @@ from ..errors import of_file
 from . import deck_conditions, deck_generated, deck_materials, deck_mesh, deck_state
 from .cards import Card, data_of, numbers, read_cards
 from .deck import Deck
-from .deck_cut import cut_bolts
 from .deck_conditions import assign_temperatures, constraints, local_axes, local_supports
+from .deck_cut import cut_bolts
 from .deck_joints import KEYWORDS as JOINTS
 from .deck_joints import joints_of, preloads_of, sector_of, unread
 from .deck_links import KEYWORDS as LINKS
@@ -36,7 +36,11 @@ from .supports import add_supports
 _REFUSED = {"NMAP": "maps nodes by *NMAP"}
 
 _LINKING = (*LINKS, *JOINTS, *LUMPING)
-READERS = deck_mesh.READERS | deck_generated.READERS | deck_materials.READERS | deck_conditions.READERS | deck_state.READERS
+READERS = {
+    word: read
+    for of in (deck_mesh, deck_generated, deck_materials, deck_conditions, deck_state)
+    for word, read in of.READERS.items()
+}
 
 
 def read_inp(path: Path) -> RawMesh:

@@ -155,13 +155,14 @@ def make_model(
     """Assemble what does not depend on speed.
 
     Args:
-        material: one for all, or one per block. temperature: (n,) K at the nodes, (n, 2) with the stress-free one behind
-            it, or None for the reference.
+        material: one for all, or one per block. temperature: (n,) K at the nodes, (n, 2) with the
+            stress-free one behind it, or None for the reference.
     """
     own: list[Material] = per_block(d, material)
     factor = strain = hooke = None
     if temperature is not None:
-        T = temperature if temperature.ndim == 2 else np.column_stack([temperature, np.full(len(temperature), reference)])
+        alike = np.full(len(temperature), reference)
+        T = temperature if temperature.ndim == 2 else np.column_stack([temperature, alike])
         both = [np.einsum("qk,eks->seq", _heat_shapes(b), T[b.cells]) for b in d.blocks]
         at, cold = [t[0] for t in both], [t[1] for t in both]
         if any(m.temperature_table is not None for m in own):
