@@ -13,6 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from meshes import body
 from refusals import refused
+from test_petsc import needed
 
 from microslip.basis import check_basis, read_basis, write_basis
 from microslip.data import Mesh
@@ -104,7 +105,7 @@ def test_displacements_obey_the_phase_rule(sector, mesh: Mesh) -> None:
 # ---------------------------------------------------------------- solver
 
 
-@pytest.mark.parametrize("backend", BACKENDS)
+@pytest.mark.parametrize("backend", [*BACKENDS, pytest.param("petsc", marks=[pytest.mark.slow, needed])])
 @pytest.mark.parametrize("k", [0, 1, 2, 3])
 def test_solutions_and_inertia_against_dense_algebra(sector, backend: str, k: int) -> None:
     model, unknowns = sector

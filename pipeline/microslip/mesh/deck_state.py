@@ -13,6 +13,7 @@ from .cards import Card
 from .deck import Deck, Readers
 from .deck_conditions import constraints
 from .deck_mesh import sides_of
+from .loading import Terms, facet_loads, nodal_loads
 from .raw import Damaged, Numbering, RawMesh, lost, real
 from .supports import still_supports
 
@@ -294,25 +295,13 @@ class _Acting:
 
     def all(self) -> list[_Loading]:
         """What is in force, by the places where it was written."""
-        loads: list[_Loading] = []
-        nodal: dict[tuple[str, str], list[tuple[int, int, float]]] = {}
-        for (kind, node, way), (_, amount, where) in self.nodal.items():
-            axes = self.deck.axes.get(node) if way < 3 else None
-            if amount and axes is not None and kind == "displacement":
-                self.raw.lost.append(f"{where}: *BOUNDARY moves node {node} along a local direction, which is not read")
-            elif amount and axes is not None:
-                terms = [(node, j, amount * axes[way][j]) for j in range(3)]
-                nodal.setdefault((kind, f"{where}: *CLOAD"), []).extend(terms)
-            elif amount:
-                word = "CLOAD" if kind == "force" else "BOUNDARY"
-                nodal.setdefault((kind, f"{where}: *{word}"), []).append((node, way, amount))
-        for (kind, where), terms in nodal.items():
-            nodes, ways, amounts = map(np.array, zip(*terms, strict=True))
-            loads.append(NodalLoad(where, kind, self.numbering.positions(nodes, f"{where} names"), ways, amounts))
-        facets: dict[tuple[str, int], list[tuple[tuple[int, ...], float]]] = {}
-        for corners, (_, amount, where) in self.facets.items():
-            facets.setdefault((where, len(corners)), []).append((corners, amount))
-        for (where, _), sides in facets.items():
-            corners, values = (np.array(part) for part in zip(*sides, strict=True))
-            loads.append(FacetLoad(where, corners, values, inside=True))
+        words = {"force": "CLOAD", "displacement": "BOUNDARY"}
+        terms: Terms = {
+            key: (amount, f"{where}: *{words[key[0]]}") for key, (_, amount, where) in self.nodal.items()
+        }
+        facets = {corners: (amount, where) for corners, (_, amount, where) in self.facets.items() if amount}
+        loads: list[_Loading] = [
+            *nodal_loads(self.raw, terms, self.deck.axes, self.numbering),
+            *facet_loads(facets, inside=True),
+        ]  # fmt: skip
         return [*loads, *(load for _, chosen in self.fields.values() for load in chosen)]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -10,7 +10,55 @@ import numpy as np
 from ..data import Array, BodyLoad, FacetLoad, Indices, Mesh, NodalLoad, SpinLoad, StaticStep
 from ..topology import CELL_TYPES, FACET_CORNERS
 from ..units import in_si
-from .raw import RawMesh, joined
+from .raw import Numbering, RawMesh, joined
+
+Terms = dict[tuple[str, int, int], tuple[float, str]]
+"""Kind of a nodal load, number of a node and direction (0 to 5) -> amount, place in the file."""
+
+
+def nodal_loads(
+    raw: RawMesh, terms: Terms, axes: Mapping[int, Array], numbering: Numbering
+) -> Iterator[NodalLoad]:
+    """Forces and displacements of nodes by the places where they are written, along the axes of the body.
+
+    Args:
+        axes: node number -> (3, 3) rows x, y, z of its directions, where these are not the body's.
+
+    Raises:
+        Damaged: a node that is not there.
+    """
+    by_place: dict[tuple[str, str], list[tuple[int, int, float]]] = {}
+    for (kind, node, way), (amount, where) in terms.items():
+        turn = axes.get(node)
+        if not amount:
+            continue
+        if turn is not None and kind == "displacement":
+            raw.lost.append(f"{where} moves node {node} along a local direction, which is not read")
+            continue
+        parts = np.eye(3)[way % 3] * amount if turn is None else amount * turn[way % 3]
+        into = by_place.setdefault((kind, where), [])
+        into += [(node, way // 3 * 3 + int(j), float(parts[j])) for j in np.flatnonzero(parts)]
+    for (kind, where), rows in by_place.items():
+        nodes, ways, amounts = map(np.array, zip(*rows, strict=True))
+        yield NodalLoad(where, kind, numbering.positions(nodes, f"{where} names"), ways, amounts)
+
+
+def facet_loads(
+    facets: Mapping[tuple[int, ...], tuple[float | Array, str]], inside: bool = False
+) -> Iterator[FacetLoad]:
+    """Pressures by the places where they are written.
+
+    Args:
+        facets: corners, by positions -> amount on all of the facet or at each corner, place.
+        inside: see `FacetLoad`.
+    """
+    by_place: dict[tuple[str, int], list[tuple[tuple[int, ...], Array]]] = {}
+    for corners, (amount, where) in facets.items():
+        values = np.broadcast_to(amount, len(corners))
+        by_place.setdefault((where, len(corners)), []).append((corners, values))
+    for (where, _), sides in by_place.items():
+        values = np.array([a for _, a in sides])
+        yield FacetLoad(where, np.array([c for c, _ in sides]), values, inside=inside)
 
 
 def state_of(
@@ -99,8 +147,13 @@ def _facets(
             loads.append(replace(load, facets=facets[at[there]], values=own, kind=kind))
         left &= ~there
     if left.any() and load.inside:
-        inner = replace(load, facets=load.facets[left], values=load.values[left], inside=False)
-        return [*loads, *_facets(raw, mesh, inner, _seen_from_inside(mesh, inner.facets), system)]
+        rest = np.flatnonzero(left)
+        first = np.unique(np.sort(load.facets[rest], axis=1), axis=0, return_index=True)[1]
+        for some in (rest[first], np.delete(rest, first)):  # of both sides one after the other
+            inner = replace(load, facets=load.facets[some], values=load.values[some], inside=False)
+            if len(some):
+                loads += _facets(raw, mesh, inner, _seen_from_inside(mesh, inner.facets), system)
+        return loads
     if left.any():
         raw.lost.append(
             f"{load.where}: {left.sum()} of {len(left)} loaded facets are not on the surface of the body: left out, so "

@@ -12,13 +12,28 @@ that leads none has no rotation. A loose node does not move where nothing resist
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field, fields, replace
 
 import numpy as np
 
-from ..data import Array, Equation, FaceTie, Guide, Indices, LumpedElement, Lumps, PointMass, RigidLink
+from ..data import (
+    Array,
+    Equation,
+    FaceTie,
+    Guide,
+    Indices,
+    Link,
+    Links,
+    LumpedElement,
+    Lumps,
+    Mesh,
+    NodalLoad,
+    PointMass,
+    RigidLink,
+)
 from ..units import SYSTEMS
+from .linking import moved
 from .raw import RawMesh, joined
 
 _WITHOUT = 1e-9
@@ -68,6 +83,44 @@ def on_mesh(lumps: Lumps, number: Indices) -> Lumps:
 def points_of(lumps: Lumps | None) -> Indices:
     """Points that carry masses, springs or dashpots, ascending."""
     return np.unique(joined([] if lumps is None else [lumps.points, lumps.pairs.ravel()]))
+
+
+def attached(
+    mesh: Mesh, references: Array, links: Sequence[Link], lumps: Sequence[PointMass | LumpedElement]
+) -> Mesh:
+    """A mesh with more masses, springs and dashpots, in SI.
+
+    Args:
+        references: (r, 3) m, new nodes without cells, counted on behind the reference nodes that are there. links: of
+            them to the mesh. lumps: on them, or on points of cells.
+    """
+    old = mesh.links or Links((), np.zeros((0, 3)), np.zeros(0, dtype=np.int64))
+    places = np.vstack([mesh.points, old.references, references])
+    raw = RawMesh(places, np.arange(len(places)), list(mesh.cells.items()))
+    raw.links, raw.lumps = [*old.items, *links], list(lumps)
+    new = spread(raw, "m-kg-s")
+    assert new is not None
+    n, count = mesh.n_points, len(raw.points) - len(places)
+    number = np.concatenate([np.arange(n), np.arange(n, len(places)) + count, n + np.arange(count)])
+    new, first = on_mesh(new, number), mesh.node_id.max(initial=0) + old.reference_id.max(initial=0) + 1
+    loads = () if mesh.state is None else mesh.state.loads
+    loads = tuple(replace(f, nodes=number[f.nodes]) if isinstance(f, NodalLoad) else f for f in loads)
+    items = tuple(moved(link, number) for link in raw.links)
+    known = Links(
+        items, np.vstack([old.references, references]),
+        np.concatenate([old.reference_id, first + count + np.arange(len(references))]), old.sets,
+    )  # fmt: skip
+    T = mesh.temperature
+    if T is not None and count:
+        T = np.vstack([T, np.tile(np.nanmedian(T, axis=0), (count, 1))])
+    if mesh.lumps is not None:
+        names = [f.name for f in fields(Lumps)]
+        new = Lumps(*(np.concatenate([getattr(mesh.lumps, n), getattr(new, n)]) for n in names))
+    return replace(
+        mesh, points=np.vstack([mesh.points, raw.points[len(places) :]]), temperature=T, links=known, lumps=new,
+        node_id=np.concatenate([mesh.node_id, first + np.arange(count)]), lost=(*mesh.lost, *raw.lost),
+        state=mesh.state and replace(mesh.state, loads=loads),
+    )  # fmt: skip
 
 
 @dataclass
@@ -264,8 +317,8 @@ def hanging(raw: RawMesh) -> str:
         elif isinstance(link, FaceTie):
             near.update(_surface(raw, link.slave) | _surface(raw, link.master))
         else:
-            named = isinstance(link.members, str)
-            near.update(_surface(raw, link.members) if named else link.members.tolist(), [link.reference])
+            members = link.members
+            near.update(_surface(raw, members) if isinstance(members, str) else members.tolist(), [link.reference])
     near.update(node for item in raw.lumps for node in _nodes(item))
     counts, where = list[str](), ""
     for s in raw.structures:

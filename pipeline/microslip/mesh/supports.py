@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -35,6 +35,15 @@ class Constraints:
         if directions := set(directions):
             known: dict = self.nodes if isinstance(where, int) else self.sets
             known.setdefault(where, set()).update(directions)
+
+    def release(self, nodes: set[int], directions: set[str], members: Mapping[str, Iterable[int]]) -> None:
+        """Take directions away from nodes; `members`: numbers of the nodes of each set."""
+        for name in [name for name in self.sets if not nodes.isdisjoint(members.get(name, ()))]:
+            ways = self.sets.pop(name)
+            for node in members[name]:
+                self.hold(node, ways)
+        for node in nodes & self.nodes.keys():
+            self.nodes[node] -= directions
 
     def clear(self) -> None:
         """Forget what was held before."""

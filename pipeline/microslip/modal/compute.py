@@ -84,7 +84,7 @@ def _at_speeds(
             report(f"speed {number + 1} of {len(speeds)}: {rpm:g} rpm")
         if b.pressed:
             state = pressed_state(
-                b.model, b.motions, b.centre, rotation.prestress, b.settings.modes.solver, report
+                b.model, b.motions, b.centre, rotation.prestress, b.settings.modes, report
             )
         else:
             state = _rest(b, speed, _guess(state, speed), report)

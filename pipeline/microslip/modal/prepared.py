@@ -15,7 +15,8 @@ from ..fem.cyclic import CyclicUpper, cyclic_upper, sector_unknowns
 from ..fem.discretise import RULES, Discretisation, FreeUpper, discretise, whole
 from ..fem.operators import per_block, spin_projector
 from ..fem.tied import Tied, tied_upper
-from ..linalg.eigen import DirectSolver, Pencil, new_solver
+from ..linalg.direct import DirectSolver
+from ..linalg.eigen import Pencil, new_solver
 from ..progress import Report
 from ..settings.body import BodySettings
 from . import rigid
@@ -174,7 +175,7 @@ def _prepared(
         refuse_unbalanced(
             replace(model, point=np.array(settings.rotation.point)), motions, centre, inertia
         )
-    solver = new_solver(settings.modes.solver)
+    solver = new_solver(settings.modes.solver, settings.modes.ranks)
     return Prepared(
         model, settings, rows, motions, coefficients, mass, centre, inertia, sector, solver, report, still
     )  # fmt: skip

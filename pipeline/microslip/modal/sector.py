@@ -97,7 +97,7 @@ def make_sector(d: Discretisation, settings: BodySettings, fixed: Indices, axis:
     refuse_uncyclic(d.mesh, settings)
     unknowns = sector_unknowns(d.pattern, fixed, cut, d.mesh.ties)
     boundary = np.concatenate([unknowns.boundary, _in_contact(d.mesh, settings, unknowns)])
-    condensed = new_condensed(boundary, settings.modes.solver)
+    condensed = new_condensed(boundary, settings.modes.solver, settings.modes.ranks)
     return Sector(settings.cyclic.harmonics, unknowns, cyclic_upper(unknowns, d.pattern.size), condensed)
 
 

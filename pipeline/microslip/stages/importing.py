@@ -26,6 +26,7 @@ from ..mesh import UNITS, mesh_problems, read_mesh, suffix_of, unit_of
 from ..mesh.chosen import of_instances
 from ..mesh.materials import NONE, STANDS, Substitute
 from ..mesh.raw import Unread, joined, refused
+from ..mesh.unv import UNIVERSAL, has_solids
 from ..units import SYSTEMS, to_rpm, usual_system
 from .meshing import run_apart
 from .stage import Report
@@ -82,13 +83,15 @@ def import_file(
         raise UserError(f"{file}: there is no such file; correct the path")
     unit = length_unit(unit, file)
     name = name or body_name((folder.resolve().name if folder else "") or file.stem)
-    if file.suffix.lower() in _UNIVERSAL:
-        from ..exchange.measured import holds_modes
+    modes = False
+    if file.suffix.lower() in UNIVERSAL:
+        from ..exchange.measured import holds_modes, holds_results
 
-        if holds_modes(file):
+        if holds_results(file) and not has_solids(file):
             return _measured(file, (folder or Path(name)) / "basis.h5", unit, name)
+        modes = holds_modes(file)
     target = (folder or Path(name)) / "body.toml"
-    refuse_taken(target)
+    refuse_taken(target, *[target.with_name(FOREIGN)] * modes)
     kind = suffix_of(file)
     of_mesh = partial(_mesh, instances=instances, instead=instead, solids_only=solids_only)
     made = _matrices if kind in MATRICES else of_mesh
@@ -101,6 +104,8 @@ def import_file(
     lines, told, mesh = (*made(file, target.parent, unit), None)[:3]
     head = [f'name = "{name}"', f'length_unit = "{unit}"']
     write_text(target, "\n".join([*head, *lines]) + "\n")
+    if modes:
+        told = [*told, *_foreign(file, target.with_name(FOREIGN), unit, name)]
     missing = "interfaces" if "[[supports]]" in lines else "supports, interfaces"
     last = f"{target}: ready. Add {missing} and loads, then: microslip run {shlex.quote(str(target.parent))}"
     found = Imported(target, (*told, last), file, mesh)
@@ -168,7 +173,8 @@ def body_name(stem: str, none: str = "part") -> str:
     return re.sub(r"[^A-Za-z0-9_.-]", "-", stem).lstrip("-._")[:64] or none
 
 
-_UNIVERSAL = (".uff", ".uf", ".unv", ".u")
+FOREIGN = "modes_of_file.h5"
+"""Modal file of the modes that stand in a mesh file."""
 
 
 def _measured(file: Path, target: Path, unit: str, name: str) -> Imported:
@@ -180,9 +186,19 @@ def _measured(file: Path, target: Path, unit: str, name: str) -> Imported:
     write_basis(target, basis)
     group = basis.groups[0, 0]
     first, last = group.frequency[[0, -1]]
-    size = f"{file}: {group.n_modes} modes from {first:.6g} to {last:.6g} Hz at {basis.mesh.n_points} measured points"
+    size = f"{file}: {group.n_modes} modes from {first:.6g} to {last:.6g} Hz at {basis.mesh.n_points} points"
     end = f"{target}: ready. Beside a computed one: microslip compare {target} OTHER.h5"
     return Imported(target, (size, *told, end))
+
+
+def _foreign(file: Path, target: Path, unit: str, name: str) -> list[str]:
+    """Modes that stand in a mesh file become a modal file beside the body, to compare with."""
+    try:
+        made = _measured(file, target, unit, name)
+    except UserError as error:
+        return [f"note: the modes of the file are left aside: {error}"]
+    body = Path("build") / name / "basis.h5"
+    return [made.told[0], f"{target}: these modes. Beside those of the body: microslip compare {target} {body}"]
 
 
 def _beside(file: Path, folder: Path) -> str:
@@ -446,7 +462,9 @@ def _mesh(
     alone = f"; the solids alone: {mesh.hanging.partition(': ')[2]} and are left out" if mesh.hanging else ""
     again = [f"warning: {text}" for texts in mesh_problems(mesh) for text in texts]
     lacking = [text for text in again if text.endswith(STANDS)]
-    told = [*lacking, *told, f"{file}: {mesh.n_points} points, {kinds}{alone}"]
+    solid = mesh.points[np.unique(joined(c.ravel() for c in mesh.cells.values()))]
+    size = " x ".join(f"{v:.4g}" for v in np.ptp(solid, axis=0) / UNITS[unit])
+    told = [*lacking, *told, f"{file}: {mesh.n_points} points, {kinds}, {size} {unit}{alone}"]
     told += [text for text in again if text not in lacking]
     told += [f"note: {text}" for text in mesh.remarks]
     told += [*ties, *((*joints, *_pressed(mesh)) if not instances else ())]
