@@ -9,6 +9,7 @@ import decks
 import meshes
 import numpy as np
 import pytest
+from refusals import refused_command
 
 from microslip.basis import read_basis
 from microslip.cli import main
@@ -292,4 +293,80 @@ def test_a_copy_in_a_mirror_is_the_other_half():
     Path("body").rename("first")
     np.testing.assert_allclose(
         hertz("\n".join([*half, written[written.index("*MATERIAL") :]])), whole, rtol=1e-9
+    )
+
+
+def said_of(capsys, text: str) -> str:
+    Path("a.inp").write_text(text)
+    assert main(["import", "a.inp", "body"]) == 0
+    return capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ({"model": [*mass(500), "*NODE", "500, 5., 5., 99."]}, "are left out: 1"),
+        (
+            {"model": ["*NODE", "500, 5., 5., 99."], "held": [*CLAMPED, "500, 1, 3"]},
+            "so it holds nothing",
+        ),
+        (
+            {"before": COLD, "loads": WARM, "law": ", NLGEOM"},
+            "heat stretches the body by up to 0.0034",
+        ),
+        ({"before": ["*PLASTIC", "300., 0."], "loads": PULLED}, "*PLASTIC is not read"),
+        ({"model": mass(53), "loads": SPUN}, "point masses turn with the body"),
+    ],
+)
+def test_what_is_taken_otherwise_is_told(capsys, given, words):
+    assert words in said_of(capsys, deck(**given))
+
+
+def test_heat_with_finite_displacements_is_that_of_calculix_but_for_its_moduli(capsys):
+    """CalculiX raises all moduli by 1 + alpha dT = 1.0012 in Green's strain: 1645.651 and 2534.920 Hz."""
+    uniform = ["*TEMPERATURE", "NALL, 150."]
+    found = hertz(deck(before=COLD, loads=uniform, law=", NLGEOM"))
+    np.testing.assert_allclose(found[:2] * 1.0012**0.5, [1645.651, 2534.920], rtol=1e-6)
+
+
+def test_shells_that_hang_by_a_tie_alone_stop_an_import(capsys):
+    shell = [
+        "*NODE",
+        "500, 60., 20., 0.",
+        "501, 60., 20., 7.",
+        "502, 60., 30., 0.",
+        "503, 60., 30., 7.",
+    ]
+    shell += [
+        "*ELEMENT, TYPE=S4, ELSET=SH",
+        "900, 500, 501, 503, 502",
+        "*SURFACE, NAME=A, TYPE=NODE",
+        "x1",
+    ]
+    shell += ["*SURFACE, NAME=B", "SH, SPOS", "*TIE, NAME=T, POSITION TOLERANCE=20.", "A, B"]
+    Path("a.inp").write_text(deck(model=shell))
+    refused_command(["import", "a.inp", "body"], capsys, "1 S4 share nodes with the solids")
+
+
+@pytest.mark.parametrize(
+    ("model", "line"),
+    [
+        ([*BOLT[:3], "2, S3", BOLT[4]], "*PRE-TENSION SECTION, SURFACE=CUT, NODE=900"),
+        (["*NGEN", "1, 8, 2"], "*NGEN"),
+        (["*NFILL", "x0, NALL, 4, 1"], "*NFILL"),
+        (
+            ["*ELCOPY, ELEMENT SHIFT=9, SHIFT NODES=1, OLD SET=GONE"],
+            "*ELCOPY, ELEMENT SHIFT=9, SHIFT NODES=1, OLD SET=GONE",
+        ),
+        (
+            ["*NCOPY, OLD SET=x0, CHANGE NUMBER=500, POLE"],
+            "*NCOPY, OLD SET=x0, CHANGE NUMBER=500, POLE",
+        ),
+    ],
+)
+def test_damaged_cuts_and_copies_are_refused_with_their_line(capsys, model, line):
+    text = deck(model=model, held=ENDS, loads=["*CLOAD", "x1, 1, 1."])
+    Path("a.inp").write_text(text)
+    refused_command(
+        ["import", "a.inp", "body"], capsys, f"a.inp, line {text.splitlines().index(line) + 1}"
     )

@@ -114,7 +114,7 @@ def _read_temperature(deck: Deck, card: Card, column: int = 1) -> None:
     for line in card.lines:
         words = fields(line)
         try:
-            deck.temperatures.append((column, words[0], factor * float(words[1])))
+            deck.temperatures.append((column, words[0], factor * float([*words, "0"][1])))
         except (IndexError, ValueError):
             raise Damaged(f"*TEMPERATURE holds the line '{line[:60]}', no node (or set) and temperature") from None
 

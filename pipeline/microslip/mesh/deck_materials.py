@@ -59,7 +59,9 @@ def _read_density(deck: Deck, card: Card) -> None:
     if not rows or not rows[0]:
         raise Damaged(f"*DENSITY of the material {material.name} holds no number")
     if len({row[0] for row in rows}) > 1:
-        material.refused = "a density that depends on temperature"
+        material.densities = np.array([[*row, 0.0][:2] for row in rows])
+        if (np.diff(material.densities[:, 1]) <= 0).any():
+            raise Damaged(f"the temperatures of *DENSITY of the material {material.name} do not rise")
     material.density = rows[0][0]
 
 
@@ -140,8 +142,22 @@ def assign_materials(deck: Deck, raw: RawMesh) -> None:
             region[region < 0] = len(raw.materials) - 1
 
 
+def _weighed(deck: Deck, found: DeckConstants) -> None:
+    """Density over temperature as it is while free of strain, which the mass of the drawn body is made of."""
+    if found.densities is None:
+        return
+    free = {value for column, _, value in deck.temperatures if column == 0} or {0.0}
+    rho, T = found.densities.T
+    if len({*np.interp(list(free), T, rho).tolist()}) > 1:
+        found.refused = "a density that depends on temperature, and initial temperatures that vary"
+    found.density = float(np.interp(min(free), T, rho))
+    text = f"*DENSITY of {found.name} is {found.density:g} at the initial temperature; heat takes no mass away"
+    deck.remarks.append(f"{found.where.rpartition('/')[2]}: {text}, though CalculiX has another at another temperature")
+
+
 def _deck_material(deck: Deck, key: tuple[str, str], where: str) -> DeckMaterial:
     found = deck.materials[key[0]]
+    _weighed(deck, found)
     turn = deck.orientations[key[1]] if key[1] else None
     axes = None if isinstance(turn, str) else turn
     if refused := found.refused or (turn if isinstance(turn, str) else ""):

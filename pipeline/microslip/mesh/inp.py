@@ -66,6 +66,10 @@ def read_inp(path: Path) -> RawMesh:
         *_replaced(raw, whole, bool(found.instances)),
         *later,
     ]
+    if raw.state is not None and "PLASTIC" in whole.ignored:
+        text = "*PLASTIC is not read: the state is elastic, and where it yields frequencies will differ"
+        raw.lost.append(f"{raw.state.where}: {text}")
+        whole.ignored = [word for word in whole.ignored if word != "PLASTIC"]
     if raw.state is None:
         whole.ignored += [card.keyword for *_, card in whole.steps.acting if card.keyword != "BOUNDARY"]
     raw.remarks += ignored([f"*{word}" for word in whole.ignored], _LOADS, raw.state is not None)
@@ -108,7 +112,9 @@ def _replaced(raw: RawMesh, deck: Deck, of_parts: bool) -> list[str]:
     for written, number in count.items():
         plain = re.match(r"C3D\d+", written)
         if written in _AS and plain:
-            told.append(f"{number} cells {written} are taken as {plain[0]}: {_AS[written]}")
+            text = f"{number} cells {written} are taken as {plain[0]}: {_AS[written]}"
+            bricks = plain[0] == "C3D8" and written != "C3D8H"  # whose bending is another
+            (raw.lost if bricks else told).append(text + "; frequencies will differ" * bricks)
     return [*told, *locks(raw)]
 
 
@@ -206,7 +212,7 @@ def _assembled(deck: Deck, of_parts: bool) -> RawMesh:
     raw.sector, uncut = sector_of(deck)
     raw.preloads, unpressed = preloads_of(deck)
     raw.lost = [*deck.lost, *left_out, *uncut, *unpressed]
-    raw.remarks += unread(deck)
+    raw.remarks += [*dict.fromkeys(deck.remarks), *unread(deck)]
     raw.joints = joints_of(deck)
     raw.instances = {name: numbering.positions(np.unique(ids), "") for name, ids in deck.instances.items()}
     add_supports(raw, constraints(deck, deck.held), numbering)
