@@ -48,7 +48,8 @@ class DeckMaterial:
         density: None: missing. expansion: (6,) thermal strain per degree. temperature: (t, 2) temperature and factor on
             the elasticity, or None. where: the set of cells that it was given to. refused: what of it is not read, in
             words, and what to do. line: its place in the file, ``part.inp, line 12``, if known. young, poisson, shear:
-            what is there of them where they do not suffice for an elasticity.
+            what is there of them where they do not suffice for an elasticity. stiffness_table,
+            expansion_table, zero: as of a `Material`, in the file's units.
     """
 
     name: str
@@ -62,6 +63,9 @@ class DeckMaterial:
     young: float | None = None
     poisson: float | None = None
     shear: float | None = None
+    stiffness_table: tuple[Array, Array] | None = None
+    expansion_table: Array | None = None
+    zero: float = 0.0
 
 
 @dataclass(frozen=True)
