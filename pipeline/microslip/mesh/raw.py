@@ -160,7 +160,7 @@ class RawMesh:
         """
         for kind, found in solids.items():
             ids, regions, nodes = (np.array(part, dtype=np.int64) for part in zip(*found, strict=True))
-            self.blocks.append((kind, numbering.positions(nodes, what)))
+            self.blocks.append((kind, numbering.positions(nodes, what, ids)))
             self.cell_id.append(ids)
             self.regions.append(regions)
         refuse_twice(self.cell_id)
@@ -278,8 +278,8 @@ class Numbering:
         """The numbers from first to last that nodes have, ascending."""
         return self.sorted[np.searchsorted(self.sorted, first) : np.searchsorted(self.sorted, last, "right")]
 
-    def positions(self, numbers: Indices | Sequence[Any], what: str) -> Indices:
-        """Positions of node numbers, any shape.
+    def positions(self, numbers: Indices | Sequence[Any], what: str, of: Indices | None = None) -> Indices:
+        """Positions of node numbers, any shape. of: (e,) the elements that name them, row by row.
 
         Raises:
             Damaged: a number that no node has.
@@ -290,5 +290,7 @@ class Numbering:
         at = np.minimum(np.searchsorted(self.sorted, ids), len(self.sorted) - 1)
         missing = self.sorted[at] != ids
         if missing.any():
+            if of is not None:
+                what = f"element {of[np.nonzero(missing)[0][0]]} names"
             raise Damaged(f"{what} node {ids[missing].flat[0]}, which the file does not define")
         return self.order[at]

@@ -19,7 +19,7 @@ import numpy as np
 
 from ..basis import write_basis
 from ..data import Array, BodyLoad, FacetLoad, Indices, Material, Mesh, NodalLoad, SpinLoad
-from ..errors import UserError
+from ..errors import UserError, of_file
 from ..files.store import ordinary, write_text
 from ..mesh import UNITS, mesh_problems, read_mesh, suffix_of, unit_of
 from ..mesh.chosen import of_instances
@@ -100,7 +100,8 @@ def import_file(
     if made is _matrices and _in_metres(file):
         unit = "m"
     mesh: Mesh | None
-    lines, told, mesh = (*made(file, target.parent, unit), None)[:3]
+    with of_file(file):
+        lines, told, mesh = (*made(file, target.parent, unit), None)[:3]
     head = [f'name = "{name}"', f'length_unit = "{unit}"']
     write_text(target, "\n".join([*head, *lines]) + "\n")
     if modes:
