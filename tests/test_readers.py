@@ -306,8 +306,8 @@ def test_bulk_data_runs_at_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
-        ("CHEXA          1       1", "CHEXA          2       1", "element 2 is defined twice"),
-        ("CHEXA          1       1       1", "CHEXA          1       1        ", "1 (CHEXA) has 7 nodes; 8 or 20"),
+        ("CHEXA          1       1", "CHEXA          2       1", "CHEXA 2 is there already"),
+        ("CHEXA          1       1       1", "CHEXA          1       1        ", "has 7 nodes; 8 or 20"),
         ("PSOLID         1       1", "PSOLID         1       3", "MAT1 3 (missing)"),
         ("PSOLID         1 ", "PSOLID         2 ", "no PSOLID defines"),
         ("MAT1  ", "MAT9  ", "MAT9 1"),
@@ -315,7 +315,7 @@ def test_bulk_data_runs_at_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
         ("      .3", "      .5", "which no solid has"),
         ("GRID* ", "GRIDS ", "GRID"),
         (" 2.1+11", " 2.1x11", "where a number belongs"),
-        ("ENDDATA", "INCLUDE 'more.bdf'", "includes another file"),
+        ("ENDDATA", "INCLUDE 'more.bdf'", "INCLUDE names more.bdf, which is not there"),
         ("ENDDATA", "SET1,3,1,THRU", "THRU without its ends"),
     ],
 )

@@ -1,7 +1,8 @@
 """Factorisation, shift-invert Lanczos and the inertia certificate, with one door for direct solvers.
 
-Backends: ``pardiso`` (Intel MKL through pypardiso; x86-64 Linux and Windows) and ``superlu`` (SciPy; installs
-everywhere). `DirectSolver.analyse` is done once per sparsity pattern and reused for every shift and speed.
+Backends: ``pardiso`` (Intel MKL through pypardiso; x86-64 Linux and Windows), ``superlu`` (SciPy; installs
+everywhere) and ``petsc`` (MUMPS on several ranks, `petsc.Petsc`). The first two analyse a sparsity pattern once, for
+every shift and speed.
 """
 
 from __future__ import annotations
@@ -187,11 +188,12 @@ class SuperLU(DirectSolver):
 
 
 BACKENDS: dict[str, type[DirectSolver]] = {"pardiso": Pardiso, "superlu": SuperLU}
+"""Those of this process, fastest first."""
 
 
 @cache
 def available_backends() -> tuple[str, ...]:
-    """Names of the backends that start on this machine, fastest first."""
+    """Names of the backends of this process that start on this machine, fastest first."""
     found = []
     for name, backend in BACKENDS.items():
         try:
@@ -202,8 +204,16 @@ def available_backends() -> tuple[str, ...]:
     return tuple(found)
 
 
-def new_solver(name: str = "auto") -> DirectSolver:
-    """A fresh direct solver: ``auto`` takes the fastest backend there is."""
+def new_solver(name: str = "auto", ranks: int = 1) -> DirectSolver:
+    """A fresh direct solver: ``auto`` takes the fastest backend there is; ``petsc`` works on `ranks` processes.
+
+    Raises:
+        UserError: ``petsc`` is asked for and is not here.
+    """
+    if name == "petsc":
+        from .petsc import Petsc
+
+        return Petsc(ranks)
     return BACKENDS[available_backends()[0] if name == "auto" else name]()
 
 

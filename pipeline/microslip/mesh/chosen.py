@@ -100,6 +100,7 @@ def _lumps_of(mesh: Mesh, inside: Indices, number: Indices) -> Lumps | None:
     if (ends.any(axis=1) & ~ends.all(axis=1)).any():
         raise UserError("a spring or dashpot of the file ties these instances to others; take those in too")
     heavy, joined_by = inside[lumps.points], ends.all(axis=1)
+    turned = inside[lumps.lines].all(axis=1)
     if not heavy.any() and not joined_by.any():
         return None
     return Lumps(
@@ -108,6 +109,8 @@ def _lumps_of(mesh: Mesh, inside: Indices, number: Indices) -> Lumps | None:
         number[lumps.pairs[joined_by]],
         lumps.stiffness[joined_by],
         lumps.damping[joined_by],
+        number[lumps.lines[turned]],
+        lumps.tight[turned],
     )
 
 

@@ -377,6 +377,8 @@ class Cyclic(Model):
     """face towards the previous sector"""
     right: FaceName = "cyclic_right"
     """face towards the next sector: the left one turned by 2 pi / N about the rotation axis"""
+    follows: Literal["right", "left"] = "right"
+    """whose nodes follow the other face where the two are not meshed alike"""
     nodal_diameters: NodalDiameters = "all"
     """which to analyse, or all from 0 to N/2"""
 
@@ -754,8 +756,16 @@ class Modes(Model):
     """[Hz] only modes below it; `count` is then the upper limit"""
     certify: bool = True
     """prove by an inertia count that none is missing"""
-    solver: Literal["auto", "pardiso", "superlu"] = "auto"
+    solver: Literal["auto", "pardiso", "superlu", "petsc"] = "auto"
     """sparse direct solver, see [platforms](platforms.md)"""
+    ranks: Annotated[int, Field(ge=1, le=10000)] = 1
+    """processes that share a factorisation (`solver = "petsc"`)"""
+
+    @model_validator(mode="after")
+    def _ranks_of_petsc(self) -> Modes:
+        if self.ranks > 1 and self.solver != "petsc":
+            raise ValueError('ranks share the work of solver = "petsc"; give that solver, or remove ranks')
+        return self
 
 
 class Damping(Model):

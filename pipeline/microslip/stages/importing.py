@@ -21,6 +21,7 @@ from ..basis import write_basis
 from ..data import Array, BodyLoad, FacetLoad, Indices, Material, Mesh, NodalLoad, SpinLoad
 from ..errors import UserError, of_file
 from ..files.store import ordinary, write_text
+from ..frames import rotation
 from ..mesh import UNITS, mesh_problems, read_mesh, suffix_of, unit_of
 from ..mesh.chosen import of_instances
 from ..mesh.materials import NONE, STANDS, Substitute
@@ -255,16 +256,20 @@ def _count(mesh: Mesh) -> int:
     return max(min(USUAL, 3 * mesh.n_points - fixed - cut - ties - 2), 1)
 
 
-def _hold(mesh: Mesh) -> bool:
+def _hold(mesh: Mesh, metres: float) -> bool:
     """Whether the file's supports leave no rigid motion."""
     from ..fem.discretise import discretise
     from ..fem.tied import tied_upper
     from ..modal.equilibrium import lumped_springs
-    from ..modal.rigid import free_motions, left_by, unresisted
+    from ..modal.rigid import free_motions, free_motions_of_ring, left_by, unresisted
 
     none, fixed = np.zeros(0, dtype=np.int64), _fixed(mesh)
     centre, pattern = mesh.points.mean(axis=0), discretise(mesh).pattern
-    springs = lumped_springs(mesh, pattern)
+    springs, ring = lumped_springs(mesh, pattern), mesh.sector
+    if ring is not None and mesh.ties is None and len(fixed):  # all sectors together may be held
+        turn = rotation(np.array(ring.axis), 2 * np.pi / ring.sectors)
+        motions = free_motions_of_ring(mesh.points, metres * np.array(ring.point), fixed, turn, ring.sectors)
+        return unresisted(motions, springs, pattern).shape[1] == 0
     if mesh.ties is None:
         return unresisted(free_motions(mesh.points, centre, fixed), springs, pattern).shape[1] == 0
     first, sets = 3 * mesh.n_points, mesh.ties.sets
@@ -451,9 +456,9 @@ def _mesh(
         told.append(f"warning: {error}")
     joints = [f"{j.where}: '{j.slave}' on '{j.master}': make them interfaces and a contact" for j in mesh.joints]
     mesh = of_instances(mesh, instances) if instances else mesh
-    mesh, ties = _tied(file, mesh)
     if not solids_only:
         refuse_hanging(file, mesh)
+    mesh, ties = _tied(file, mesh)
     kinds = ", ".join(f"{len(c)} {t}" for t, c in mesh.cells.items())
     alone = f"; the solids alone: {mesh.hanging.partition(': ')[2]} and are left out" if mesh.hanging else ""
     again = [f"warning: {text}" for texts in mesh_problems(mesh) for text in texts]
@@ -464,7 +469,7 @@ def _mesh(
     told += [text for text in again if text not in lacking]
     told += [f"note: {text}" for text in mesh.remarks]
     told += [*ties, *((*joints, *_pressed(mesh)) if not instances else ())]
-    holding = _hold(mesh)
+    holding = _hold(mesh, UNITS[unit])
     held, said = _supports(mesh, holding)
     told += said
     lines = [] if holding else ["free = true               # nothing holds it wholly yet"]
@@ -597,7 +602,11 @@ def _cyclic(mesh: Mesh, metres: float) -> tuple[list[str], list[str]]:
         f"right = {json.dumps(right)}",
     ]
     lines += [f"nodal_diameters = {list(sector.diameters)}"] if sector.diameters else []
-    return lines, [f"{sector.where}: one of {sector.sectors} cyclic sectors, '{right}' ahead of '{left}'"]
+    unlike = len(mesh.face_points(left)) != len(mesh.face_points(right))
+    lines += ['follows = "left"'] if unlike and left == sector.faces[0] else []
+    told = f"{sector.where}: one of {sector.sectors} cyclic sectors, '{right}' ahead of '{left}'"
+    more = f"; they are not meshed alike: the nodes of '{sector.faces[0]}' follow the other face"
+    return lines, [told + more * unlike]
 
 
 _LOADED = {FacetLoad: "loaded facet", BodyLoad: "acceleration field", SpinLoad: "rotation"}
@@ -616,6 +625,8 @@ def _state(mesh: Mesh, metres: float, ring: bool, held: bool) -> tuple[list[str]
     acting = [f"{number} {kind}{'s' * (number > 1)}" for kind, number in count.items()]
     acting += ["temperatures"] * (mesh.temperature is not None)
     law = "finite displacements" if state.nonlinear else "one linear solution"
+    if state.supports is not None:
+        law += f"; held there by {', '.join(f'{n} in {w}' for n, w in state.supports.items()) or 'nothing'}"
     said = [f"{state.where}: the modes are about its static state: {', '.join(acting) or 'nothing acts'}; {law}"]
     turning = [] if ring else ["", "[rotation]"]
     turning.append(f'prestress = "{"nonlinear" if state.nonlinear else "linear"}"')
@@ -628,7 +639,9 @@ def _state(mesh: Mesh, metres: float, ring: bool, held: bool) -> tuple[list[str]
     elif spins:
         (spin,) = spins
         axis, speed = spin.axis / np.linalg.norm(spin.axis) + 0.0, to_rpm(spin.speed)
-        said.append(f"{spin.where}: {speed:.6g} rpm")
+        heavy = mesh.lumps is not None and bool(mesh.lumps.masses.any())
+        whole = "; point masses turn with the body, all of them: CalculiX leaves their softening out" * heavy
+        said.append(f"{spin.where}: {speed:.6g} rpm{whole}")
         if not ring:
             numbers = [", ".join(f"{v:.15g}" for v in row) for row in (axis, spin.point / metres + 0.0)]
             turning += [f"axis = [{numbers[0]}]", f"point = [{numbers[1]}]"]
