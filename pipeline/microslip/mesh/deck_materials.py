@@ -136,7 +136,8 @@ def _deck_material(deck: Deck, key: tuple[str, str], where: str) -> DeckMaterial
         return DeckMaterial(found.name, None, found.density, np.zeros(6), None, where, text)
     C, table = None, None
     if found.isotropic is not None:
-        C, table = isotropic_rows(found.name, found.isotropic)
+        with of_file(found.where):
+            C, table = isotropic_rows(found.name, found.isotropic)
     elif found.orthotropic is not None:
         C = orthotropic_row(found.name, found.orthotropic)
     elif found.stiffness is not None:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -166,6 +167,17 @@ class RawMesh:
         refuse_twice(self.cell_id)
 
 
+@contextmanager
+def in_its_line(path: Path) -> Iterator[None]:
+    """A mistake in here stands in a file, in the line with which its sentence begins if it does."""
+    try:
+        yield
+    except UserError as error:
+        if error.file:
+            raise
+        raise refused(path, str(error)) from error.__cause__
+
+
 def in_file(path: Path, text: str) -> str:
     """A sentence about a file, with its name once: ``deck/a.inp, line 3: ...`` of ``a.inp, line 3: ...``."""
     return f"{path}{text.removeprefix(path.name)}" if text.startswith(f"{path.name}, ") else f"{path}: {text}"
@@ -309,7 +321,10 @@ class Numbering:
         Raises:
             Damaged: a number that no node has.
         """
-        ids = np.asarray(numbers, dtype=np.int64)
+        try:
+            ids = np.asarray(numbers, dtype=np.int64)
+        except OverflowError:
+            raise Damaged(f"{what} a node whose number is beyond all bounds") from None
         if not len(self.sorted):
             raise Damaged(f"{what} but there are no nodes before it")
         at = np.minimum(np.searchsorted(self.sorted, ids), len(self.sorted) - 1)

@@ -156,6 +156,11 @@ def _read_raw(path: Path) -> RawMesh:
     if suffix == ".msh" and is_msh41(path):
         return read_msh41(path)
     if suffix in _READERS:
+        with ordinary(path).open("rb") as file:
+            head = file.read(4096)
+        if suffix != ".med" and head.count(0) > 8:
+            way = "UTF-16; write it as UTF-8 or ASCII" if head[:2] in (b"\xff\xfe", b"\xfe\xff") else "no text"
+            raise Damaged(f"it is {way}")
         return _READERS[suffix](path)
     if suffix in _BY_MESHIO:
         return _by_meshio(path, _from_meshio)

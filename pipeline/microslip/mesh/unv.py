@@ -196,6 +196,7 @@ def data_sets(text: str) -> Iterator[DataSet]:
     Raises:
         Damaged: the last one has no end.
     """
+    text = text.removeprefix("\xef\xbb\xbf")
     if "\n" not in text:
         text = text.replace("\r", "\n")
     text = re.sub(r"[^\t\r\n\x20-\x7e\xa0-\xff]", " ", text)

@@ -64,7 +64,7 @@ def import_deck(
         UserError: unreadable files, files that are there already.
     """
     pattern = PAIRS.get(suffix_of(file))
-    deck = [f.read_bytes() for f in files_of(file) if f.is_file()] if pattern else []
+    deck = [f.read_bytes().replace(b"\r", b"\n") for f in files_of(file) if f.is_file()] if pattern else []
     if pattern is None or not any(map(pattern.search, deck)):
         return import_file(file, folder, unit, report=report, instead=instead, solids_only=solids_only)
     unit = length_unit(unit, file)
