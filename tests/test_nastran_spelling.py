@@ -8,7 +8,6 @@ from pathlib import Path
 import meshes
 import numpy as np
 import pytest
-from refusals import refused_command
 from test_bdf import CARD, ORDER
 
 from microslip.data import Mesh
@@ -36,7 +35,8 @@ def model() -> list[Card]:
     return [
         *cards, ["GRID", "900", "", "6.", "0.", "0."], ["PSOLID", "1", "2"],
         ["MAT1", "2", "2.1+11", "", ".3", "7.8+3", "1.2-5"], ["SPC1", "7", "123456", *clamped],
-        ["RBE2", "800", "900", "123456", *tip[:7]], ["CONM2", "801", "900", "", "3.5", "", "", "", "", ".1", "0.", ".2", "", "", ".3"],
+        ["RBE2", "800", "900", "123456", *tip[:7]],
+        ["CONM2", "801", "900", "", "3.5", "", "", "", "", ".1", "0.", ".2", "", "", ".3"],
         ["RBE3", "802", "", "900", "123", "1.", "123", *tip[7:]], ["FORCE", "3", "900", "", "1.5+3", "1.", "0.", "-2."],
         ["CELAS2", "803", "1.+5", tip[0], "1"], ["SET1", "9", "1", "THRU", "9"],
     ]  # fmt: skip
@@ -59,7 +59,9 @@ def written(card: Card, rng: np.random.Generator, count: list[int]) -> list[str]
         elif style == "tabs":
             lines.append("\t".join([first, *row, mark]))
         elif style == "free":
-            lines.append(f"{first},{','.join(row)},{mark}" if mark or not last else f"{first},{','.join(row)}".rstrip(","))
+            lines.append(
+                f"{first},{','.join(row)},{mark}" if mark or not last else f"{first},{','.join(row)}".rstrip(",")
+            )
         else:
             begin = f"{name}*" if number == 0 else f"*{mark_of(first)}"
             halves = [row[:4]] if last and not any(row[4:]) and rng.random() < 0.7 else [row[:4], row[4:]]
@@ -68,7 +70,11 @@ def written(card: Card, rng: np.random.Generator, count: list[int]) -> list[str]
                 if style == "wide":
                     lines.append(f"{head:8}{''.join(f'{w:16}' for w in half)}{tail:8}")
                 else:
-                    lines.append(f"{head},{','.join(half)},{tail}".rstrip(",") if tail == "" else f"{head},{','.join(half)},{tail}")
+                    lines.append(
+                        f"{head},{','.join(half)},{tail}".rstrip(",")
+                        if tail == ""
+                        else f"{head},{','.join(half)},{tail}"
+                    )
     return [line.lower() if rng.random() < 0.2 else line for line in lines]
 
 
@@ -103,7 +109,8 @@ def content(mesh: Mesh) -> list:
     assert mesh.links is not None and mesh.lumps is not None and mesh.state is not None
     links = [[v for v in astuple(item)[1:] if v is not None] for item in mesh.links.items]
     return [
-        mesh.points, *mesh.cells.values(), mesh.node_id, mesh.supports, {n: s.tolist() for n, s in mesh.point_sets.items()},
+        mesh.points, *mesh.cells.values(), mesh.node_id, mesh.supports,
+        {n: s.tolist() for n, s in mesh.point_sets.items()},
         links, mesh.links.references, *astuple(mesh.lumps), [astuple(load)[1:] for load in mesh.state.loads],
         [astuple(m)[:3] for m in mesh.materials],
     ]  # fmt: skip
@@ -112,7 +119,9 @@ def content(mesh: Mesh) -> list:
 @pytest.mark.parametrize("seed", range(4))
 def test_a_model_is_the_same_in_every_spelling(seed):
     rng = np.random.default_rng(seed)
-    Path("plain.bdf").write_text("\n".join([*HEAD, *(",".join(c) if len(c) < 10 else free(c) for c in model()), "ENDDATA"]) + "\n")
+    Path("plain.bdf").write_text(
+        "\n".join([*HEAD, *(",".join(c) if len(c) < 10 else free(c) for c in model()), "ENDDATA"]) + "\n"
+    )
     wanted = content(read_mesh("plain.bdf", "m", "m-kg-s"))
     for _ in range(5):
         spelled(rng)

@@ -15,7 +15,8 @@ import scipy.sparse as sp
 
 from ..data import Array, Indices
 from ..errors import NotConverged
-from .eigen import DirectSolver, Pardiso, available_backends, new_solver
+from .direct import DirectSolver, Pardiso
+from .eigen import available_backends, new_solver
 
 
 class Condensed:

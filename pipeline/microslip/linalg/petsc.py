@@ -18,7 +18,7 @@ import scipy.sparse as sp
 
 from ..data import Array
 from ..errors import NotConverged, UserError
-from .eigen import DirectSolver
+from .direct import DirectSolver
 
 AT_DEBIAN = "/usr/lib/petscdir/petsc*/*-real/lib/python3/dist-packages/petsc4py"
 SINGULAR = "the sparse solver met a singular matrix; the body is not held"

@@ -470,7 +470,7 @@ class _Acting:
             if face <= 3 and options.get(2, "0") == "1":
                 system = self.archive.systems.get(element.system, System())
                 centre = self.raw.points[at].mean(axis=0)
-                yield FacetLoad(where, at[None], values[None], system.at(centre)[face - 1])
+                yield FacetLoad(where, at[None], values[None], system.directions(centre[None])[0][face - 1])
                 return
             if face != 1 or options.get(2, "0") not in ("", "0"):
                 self._left(place, "acts along tangents or a vector (faces 2 to 5 of SURF154)")

@@ -315,8 +315,8 @@ def hanging(raw: RawMesh) -> str:
         elif isinstance(link, FaceTie):
             near.update(_surface(raw, link.slave) | _surface(raw, link.master))
         else:
-            named = isinstance(link.members, str)
-            near.update(_surface(raw, link.members) if named else link.members.tolist(), [link.reference])
+            members = link.members
+            near.update(_surface(raw, members) if isinstance(members, str) else members.tolist(), [link.reference])
     near.update(node for item in raw.lumps for node in _nodes(item))
     counts, where = list[str](), ""
     for s in raw.structures:

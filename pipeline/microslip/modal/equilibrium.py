@@ -38,7 +38,8 @@ from ..fem.operators import (
 )
 from ..fem.tied import Tied
 from ..interrupts import look
-from ..linalg.eigen import DirectSolver, Unstable, symmetric_product
+from ..linalg.direct import DirectSolver
+from ..linalg.eigen import Unstable, symmetric_product
 from ..progress import Report
 from ..units import rpm_text
 from .closing import Closing

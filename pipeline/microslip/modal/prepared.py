@@ -15,7 +15,8 @@ from ..fem.cyclic import CyclicUpper, cyclic_upper, sector_unknowns
 from ..fem.discretise import REDUCED, Discretisation, FreeUpper, discretise, whole
 from ..fem.operators import per_block, spin_projector
 from ..fem.tied import Tied, tied_upper
-from ..linalg.eigen import DirectSolver, Pencil, new_solver
+from ..linalg.direct import DirectSolver
+from ..linalg.eigen import Pencil, new_solver
 from ..progress import Report
 from ..settings.body import BodySettings
 from . import rigid
