@@ -291,10 +291,12 @@ def _block(mesh: Mesh, cell_type: str, degree: int | None, region: int, cells: I
     jacobian = np.einsum("eki,qjk->eqij", mesh.points[cells], dN, optimize=True)
     det = np.einsum("...i,...i->...", jacobian[..., 0, :], np.cross(jacobian[..., 1, :], jacobian[..., 2, :]))
     if (bad := (det <= 0).any(axis=1)).any():
+        first = int((mesh.cells[cell_type] == cells[bad][0]).all(axis=1).argmax())
+        known = mesh.cell_id.get(cell_type)
+        name = f"cell {first + 1} of its type" if known is None else f"element {known[first]}"
         raise UserError(
             f"{bad.sum()} of {len(cells)} {cell_type} cells are inside out or degenerate where they are "
-            f"integrated (first: cell {int(np.flatnonzero(bad)[0]) + 1} of its type); straighten their mid-side nodes "
-            "or remesh"
+            f"integrated (first: {name}); straighten their mid-side nodes or remesh"
         )
     grad = np.matmul(_inverse3(jacobian, det).transpose(0, 1, 3, 2), dN[None])
     return Block(cell_type, cells, at, N, grad, det * weights, region)

@@ -71,7 +71,7 @@ def _lines(path: Path, within: tuple[Path, ...], home: Path) -> Iterator[tuple[P
     if path.resolve() in within:
         raise Damaged(f"the file includes itself by way of {path.name}")
     try:
-        text = ordinary(path).read_text(encoding="utf-8", errors="replace")
+        text = ordinary(path).read_text(encoding="utf-8-sig", errors="replace")
     except OSError as error:
         raise Damaged(f"the included file {path} cannot be read ({error.strerror})") from None
     for number, line in enumerate(text.splitlines(), 1):

@@ -95,7 +95,7 @@ class _Reading:
         """Directions, from 0, and the value of a spring or dashpot."""
         rows = self.rows()
         along = self.kind.endswith("A")
-        ways = [] if along else [int(w) for w in (rows[0] if rows else [])]
+        ways = [] if along else [int(w) if abs(w) < 10 else 0 for w in (rows[0] if rows else [])]
         rows = rows if along else rows[1:]
         if self.kind.endswith("2") and len(ways) == 1:
             ways = 2 * ways

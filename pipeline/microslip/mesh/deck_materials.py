@@ -165,9 +165,10 @@ def _deck_material(deck: Deck, key: tuple[str, str], where: str) -> DeckMaterial
         return DeckMaterial(found.name, None, found.density, np.zeros(6), None, where, text)
     C, table, matrices = None, None, None
     if found.isotropic is not None:
-        matrices = isotropic_matrices(found.name, found.isotropic)
-        if matrices is None:
-            C, table = isotropic_rows(found.name, found.isotropic)
+        with of_file(found.where):
+            matrices = isotropic_matrices(found.name, found.isotropic)
+            if matrices is None:
+                C, table = isotropic_rows(found.name, found.isotropic)
     elif found.orthotropic is not None:
         rows = found.orthotropic
         matrices = rows[:, 9], np.array([orthotropic_row(found.name, row[:9]) for row in rows])

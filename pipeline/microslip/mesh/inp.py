@@ -188,7 +188,8 @@ def _assembled(deck: Deck, of_parts: bool) -> RawMesh:
         kinds = ", ".join(dict.fromkeys(deck.kinds))
         raise Damaged(f"it holds no volume cells (C3D4 to C3D27), only {kinds}; mesh the volume first")
     for cells in deck.solids:
-        cells.nodes = numbering.positions(cells.nodes, "*ELEMENT names")
+        with of_file(cells.where):
+            cells.nodes = numbering.positions(cells.nodes, "*ELEMENT names", cells.ids)
         raw.blocks.append((cells.kind, cells.nodes))
     raw.cell_id = [cells.ids for cells in deck.solids]
     raw.remarks += _unknown_cells(deck)

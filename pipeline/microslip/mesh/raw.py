@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -164,10 +165,21 @@ class RawMesh:
         """
         for kind, found in solids.items():
             ids, regions, nodes = (np.array(part, dtype=np.int64) for part in zip(*found, strict=True))
-            self.blocks.append((kind, numbering.positions(nodes, what)))
+            self.blocks.append((kind, numbering.positions(nodes, what, ids)))
             self.cell_id.append(ids)
             self.regions.append(regions)
         refuse_twice(self.cell_id)
+
+
+@contextmanager
+def in_its_line(path: Path) -> Iterator[None]:
+    """A mistake in here stands in a file, in the line with which its sentence begins if it does."""
+    try:
+        yield
+    except UserError as error:
+        if error.file:
+            raise
+        raise refused(path, str(error)) from error.__cause__
 
 
 def in_file(path: Path, text: str) -> str:
@@ -317,17 +329,22 @@ class Numbering:
         """The numbers from first to last that nodes have, ascending."""
         return self.sorted[np.searchsorted(self.sorted, first) : np.searchsorted(self.sorted, last, "right")]
 
-    def positions(self, numbers: Indices | Sequence[Any], what: str) -> Indices:
-        """Positions of node numbers, any shape.
+    def positions(self, numbers: Indices | Sequence[Any], what: str, of: Indices | None = None) -> Indices:
+        """Positions of node numbers, any shape. of: (e,) the elements that name them, row by row.
 
         Raises:
             Damaged: a number that no node has.
         """
-        ids = np.asarray(numbers, dtype=np.int64)
+        try:
+            ids = np.asarray(numbers, dtype=np.int64)
+        except OverflowError:
+            raise Damaged(f"{what} a node whose number is beyond all bounds") from None
         if not len(self.sorted):
             raise Damaged(f"{what} but there are no nodes before it")
         at = np.minimum(np.searchsorted(self.sorted, ids), len(self.sorted) - 1)
         missing = self.sorted[at] != ids
         if missing.any():
+            if of is not None:
+                what = f"element {of[np.nonzero(missing)[0][0]]} names"
             raise Damaged(f"{what} node {ids[missing].flat[0]}, which the file does not define")
         return self.order[at]

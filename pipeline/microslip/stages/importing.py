@@ -25,7 +25,7 @@ from ..frames import rotation
 from ..mesh import UNITS, likely_unit, mesh_problems, read_mesh, suffix_of, unit_of
 from ..mesh.chosen import of_instances
 from ..mesh.materials import NONE, STANDS, Substitute
-from ..mesh.raw import Unread, joined, refused
+from ..mesh.raw import Unread, in_its_line, joined, refused
 from ..mesh.unv import UNIVERSAL, has_solids
 from ..plausible import density
 from ..units import SYSTEMS, to_rpm, usual_system
@@ -102,7 +102,8 @@ def import_file(
     if made is _matrices and _in_metres(file):
         unit = "m"
     mesh: Mesh | None
-    lines, told, mesh = (*made(file, target.parent, unit), None)[:3]
+    with in_its_line(file):
+        lines, told, mesh = (*made(file, target.parent, unit), None)[:3]
     head = [f'name = "{name}"', f'length_unit = "{unit}"']
     write_text(target, "\n".join([*head, *lines]) + "\n")
     if modes:
@@ -290,11 +291,9 @@ def _tied(file: Path, mesh: Mesh) -> tuple[Mesh, list[str]]:
     from ..fem.links import linked
     from ..fem.tied import tied_upper
 
-    try:
+    with in_its_line(file):
         mesh, told = linked(mesh)
         tied_upper(discretise(mesh).pattern, np.zeros(0, dtype=np.int64), mesh.ties)
-    except UserError as error:
-        raise refused(file, str(error)) from None
     said: dict[str, list[str]] = {}
     for link, text in zip(links.items, told, strict=True):
         said.setdefault(link.where, []).append(text)
