@@ -76,8 +76,8 @@ def test_a_mode_fed_too_little_fails_its_checks():
     """With a tenth less than its damping the forces of its contacts do not move the bodies as they move."""
     found, curve = backbone(sliding(), 2.0e-5, 2.1e-5), _Curve(replace(sliding(), share=0.0), 0)
     x, omega, xi = found.x[0], found.Omega[0], 2 * found.Omega[0] * found.damping[0]
-    assert not curve.checks(x, omega, xi).failure
-    assert curve.checks(x, omega, 0.9 * xi).failure.startswith("read-out")
+    assert not curve.motion(x, omega, xi).checks.failure
+    assert curve.motion(x, omega, 0.9 * xi).checks.failure.startswith("read-out")
 
 
 def test_a_free_motion_in_time_decays_as_the_curve_says():
@@ -135,9 +135,15 @@ def test_an_internal_resonance_is_followed_to_its_end_and_back():
 
 
 def test_an_internal_resonance_that_is_passed_over_is_told():
-    """In steps so long that no motion of the tongue is met."""
-    coarse = ms.backbone(chain(5), 40.0, 100.0, measure="readout", settings={"points": 2})
-    assert not coarse.complete and "allow more" in coarse.status
+    """Three times the frequency goes through sqrt(10), coupled by a ten thousandth: no step meets it."""
+    K = np.array([[1.0, -1e-4], [-1e-4, 10.0]])
+    weak = ms.structure(np.eye(2), K, elements=[ms.polynomial({3: 0.5})], output=[0])
+    mode = ms.backbone(weak, 0.1, 2.0, harmonics=3)
+    assert mode.complete and not mode.resonances
+    (said,) = mode.passed
+    passed = 2 * np.pi * float(said.split("times ")[1].split(" Hz")[0])
+    assert said.startswith("3 times") and "mode 2" in said and 3 * passed == pytest.approx(np.sqrt(10), rel=0.05)
+    assert "allow more" in ms.backbone(weak, 0.1, 2.0, harmonics=3, settings={"points": 3}).status
 
 
 def braked(coefficient=0.3, damping=0.01, at=(1.0,), stiffness=1.0):
@@ -292,7 +298,9 @@ def test_a_damper_that_hardly_anything_holds_may_drift_while_it_slides():
     friction = [ms.jenkins(1e6, limit, 0, 1) for limit in (2.0, 8.0)]
     K = np.diag([1e5, 1.0])
     both = ms.structure(np.diag([1.0, 0.1]), K, steady={1: 0.5}, damping_ratio=0.001, elements=friction, output=0)
-    curve = ms.backbone(both, 1e-4, 0.1, mode=0, harmonics=1, samples=24)
+    curve = ms.backbone(
+        both, 1e-4, 0.1, mode=0, harmonics=1, samples=24, measure="readout"
+    )
     assert curve.complete and len(curve.Omega) < 200, curve.status
     np.testing.assert_allclose(curve.Omega[0], np.sqrt(1e5 / 1.1), rtol=1e-3)
     np.testing.assert_allclose(curve.Omega[-1], np.sqrt(1e5), rtol=1e-4)

@@ -23,6 +23,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -523,7 +524,13 @@ class _Curve:
         return np.append(R / unit, y - [1.0, 0.0]), D, np.append(moved, by_x @ ahead - y)
 
     def _given(self, at: AtFrequency, x: Array, force: Array, slopes: list[Array]) -> tuple[Array, Array]:
-        return at.residual_of(x, force), self._measured(at, x, force, slopes)[0]
+        """R, and the value of `_measured`."""
+        R = at.residual_of(x, force)
+        if self.measure == "readout":
+            return R, self._measured(at, x, force, slopes)[0]
+        rows = self._rows(at, motion := [q for q, *_ in at.modal(x, force)][1:])
+        squared, turned = (sum(float((a @ q).real) for a, q in zip(w, motion, strict=True)) for w in rows)
+        return R, np.array([np.sqrt(squared / self.unit), turned])
 
     def _measured(
         self, at: AtFrequency, x: Array, force: Array, slopes: list[Array]
@@ -532,30 +539,34 @@ class _Curve:
         if self.measure == "readout":
             y = amplitude(at, x, force, slopes, self.output)
             return _pair(y.value), np.array([y.by_x.real, y.by_x.imag]), _pair(y.rate)
-        size, by_x, rate = np.zeros(2), np.zeros((2, len(x))), np.zeros(2)
-        motion, unit = at.modal(x, force), self.unit
-        for h, near in enumerate(self.near, 1):
-            q, part = motion[h][0], at.problem.parts[h][0]
-            weight = q.conj() @ part.M
-            if self.measure == "energy":
-                weight *= (h * at.Omega / self.stuck) ** 2
-            elif self.measure == "modal":
-                row = self.shape.conj() @ part.M
-                weight = (row @ q).conj() * row / unit
-            none = np.zeros(part.count, complex)
-            squared, turned = (
-                weighted(at, x, force, slopes, h, [(row, none, 0.0)]) for row in (weight, -1j * h * near.conj())
-            )
-            size += squared.value.real, turned.value.real
-            by_x += np.array([2 * squared.by_x.real, turned.by_x.real])
-            rate += 2 * squared.rate.real, turned.rate.real
+        none = np.zeros(self.problem.count, complex)
+        moved = [
+            [weighted(at, x, force, slopes, h, [(row, none, 0.0)]) for h, row in enumerate(rows, 1)]
+            for rows in self._rows(at, [q for q, *_ in at.modal(x, force)][1:])
+        ]
+        value, rate = (np.array([sum(getattr(y, of).real for y in own) for own in moved]) for of in ("value", "rate"))
+        by_x = np.array([sum(y.by_x.real for y in own) for own in moved])
         if self.measure == "energy":
-            rate[0] += 2 * size[0] / at.Omega
-        size[0] = np.sqrt(size[0] / unit)
-        slope = 1 / (2 * size[0] * unit) if size[0] else np.inf
-        return size, np.array([by_x[0] * slope, by_x[1]]), rate * [slope, 1.0]
+            rate[0] += value[0] / at.Omega
+        value[0] = np.sqrt(value[0] / self.unit)
+        slope = np.array([1 / (value[0] * self.unit) if value[0] else np.inf, 1.0])
+        return value, by_x * slope[:, None], rate * slope
 
-    @property
+    def _rows(self, at: AtFrequency, motion: list[ComplexArray]) -> tuple[list[ComplexArray], list[ComplexArray]]:
+        """Of every harmonic from 1 on the rows (m,) whose products with q (m,), real parts summed up, are the squared
+        size of the motion and what vanishes in the right phase."""
+        sizes, M = [], [parts[0].M for parts in self.problem.parts[1:]]
+        for h, (mass, q) in enumerate(zip(M, motion, strict=True), 1):
+            row = q.conj() @ mass
+            if self.measure == "energy":
+                row = row * (h * at.Omega / self.stuck) ** 2
+            elif self.measure == "modal":
+                mode = self.shape.conj() @ mass
+                row = (mode @ q).conj() * mode / self.unit
+            sizes.append(row)
+        return sizes, [-1j * h * near.conj() for h, near in enumerate(self.near, 1)]
+
+    @cached_property
     def unit(self) -> float:
         """kg, of the linear mode: of the norm squared for a read-out of 1 m."""
         return float((self.shape.conj() @ _only(self.problem).M @ self.shape).real)
