@@ -494,7 +494,8 @@ def depth_of(wheel: Any, far: float, count: int = 1) -> tuple[np.ndarray, Any, f
     return wheel.seen(last.depth, first)[:, 0], last, sum(jump.error for _, jump in history)
 
 
-@pytest.mark.parametrize(("lobes", "off"), [(0.0, 0.03), pytest.param(1.0, 0.3, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize(("lobes", "off"), [(0.0, 0.03), (1.0, 0.3)])
 def test_a_file_and_its_vehicle_wear_alike_as_profiles_are_renewed(
     lobes: float, off: float, case: VehicleCase, rolling: wearing.RunningVehicle, tmp_path: Path
 ) -> None:
