@@ -17,6 +17,7 @@ from refusals import refused, refused_command
 
 from microslip.cli import main
 from microslip.files.tables import columns_csv
+from microslip.programs import program
 from microslip.results import Journal, open_journal, read_journal
 from microslip.rolling.table import creep_table
 from microslip.rolling.wheelset import Pose, patches
@@ -102,7 +103,7 @@ def there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
 
 
-RATES = jax.jit(motion.rates, static_argnums=1)
+RATES = program(motion.rates, static_argnums=1)
 
 
 @jax.jit

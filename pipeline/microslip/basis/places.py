@@ -127,7 +127,8 @@ class Places:
         fields = np.concatenate([g.phi, g.u_static[:, :, None]], axis=2)
         read = np.column_stack([rows.rows, rows.static]) if len(rows.static) else rows.rows
         scale = np.maximum(np.abs(fields).max(axis=(0, 1)), 1e-300)[: read.shape[1]]
-        at = (place.N @ fields[place.nodes].reshape(len(place.nodes), -1) for place in _around(self.mesh, tuple(rows.point)))
+        places = _around(self.mesh, tuple(rows.point))
+        at = (place.N @ fields[place.nodes].reshape(len(place.nodes), -1) for place in places)
         errors = (np.abs((u.reshape(3, -1)[axes, : read.shape[1]] - read) / scale).max() for u in at)
         return float(min(errors, default=np.inf))
 
