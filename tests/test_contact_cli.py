@@ -421,7 +421,7 @@ def test_a_missing_file_and_an_unknown_figure(tmp_path: Path, capsys: pytest.Cap
     for name in ("none.toml", "3.7-99"):
         refused_command(["contact", str(tmp_path / name)], capsys, f"{tmp_path / name}: cannot be read")
     assert _figure_of_the_book(Path("fig-3.7-7")) == _figure_of_the_book(Path("3.7-7")) != Path("3.7-7")
-    refused_command(["contact", "3.7-99"], capsys, "3.7-99: there is no such figure; choose one of 3.5-2")
+    refused_command(["contact", "3.7-99"], capsys, "3.7-99: there is no such figure; choose one of 3.4-1")
 
 
 def test_a_contact_that_never_closes_is_told_so(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

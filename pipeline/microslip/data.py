@@ -205,7 +205,8 @@ class LumpedElement:
 
     Attributes:
         nodes, directions: (t,) of its rows; directions 3 to 5 are rotations. stiffness, damping:
-            (t, t), in the units of the file.
+            (t, t), in the units of the file. along: stiffness of a spring along the line from the
+            first node to the last, which turns with it; 0 of others.
     """
 
     where: str
@@ -213,6 +214,7 @@ class LumpedElement:
     directions: Indices
     stiffness: Array
     damping: Array
+    along: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -224,7 +226,8 @@ class Lumps:
     Attributes:
         points: (j,) with masses (j,), kg; those beside a principal axis of an impossible inertia
             may be negative. pairs: (m, 2) points a <= b. stiffness, damping: (m, 3, 3) what they
-            add to the block of a and b, N/m and N s/m.
+            add to the block of a and b, N/m and N s/m. lines: (s, 2) points a < b of springs along
+            the lines between them, tight: (s,) N/m of these.
     """
 
     points: Indices
@@ -232,6 +235,8 @@ class Lumps:
     pairs: Indices
     stiffness: Array
     damping: Array
+    lines: Indices
+    tight: Array
 
 
 @dataclass(frozen=True)
@@ -349,12 +354,14 @@ class StaticStep:
 
     Attributes:
         where: place of the step. nonlinear: whether its displacements are finite (NLGEOM), else one linear solution.
-        loads: all that act at its end, in a mesh in SI.
+        loads: all that act at its end, in a mesh in SI. supports: point set -> directions that it holds, as
+            `Mesh.supports`; None: those of the modes.
     """
 
     where: str
     nonlinear: bool
     loads: tuple[NodalLoad | FacetLoad | BodyLoad | SpinLoad, ...] = ()
+    supports: Mapping[str, str] | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -65,7 +65,7 @@ class Steps:
             its end. period: its time. amplitudes: name -> time, value rows, and whether in total time.
         acting: cards of loads with step, and factor at its end. static: the last static step, as its keyword line and
             whether it was nonlinear. other: keyword of another one whose state is not read. modes: the keyword line
-            whose modes are meant.
+            whose modes are meant. held: what was held at the end of the last static step, as `Deck.held`.
     """
 
     number: int = 0
@@ -78,6 +78,7 @@ class Steps:
     static: tuple[Card, bool] | None = None
     other: Card | None = None
     modes: Card | None = None
+    held: list[tuple[str, str, str]] | None = None
 
     @property
     def perturbed(self) -> bool:
@@ -107,6 +108,8 @@ class Deck:
         links: constraints, contacts and loads; sections: of solids; both resolved at the end.
         kinds: types of cells. lost: what counts and is not read, in words.
         transforms: cards of local directions of nodes; axes: node number -> (3, 3) these as rows, once all is read.
+        turning: ROT NODE -> reference node whose rotations its displacements are. masses: number of a mass -> its node
+        and mass.
         system: (4, 3) axes and origin in which nodes are written, or None. ignored: keywords that are not used.
     """
 
@@ -133,6 +136,8 @@ class Deck:
     renewed: int = -1
     transforms: list[Card] = field(default_factory=list)
     axes: dict[int, Array] = field(default_factory=dict)
+    turning: dict[int, int] = field(default_factory=dict)
+    masses: dict[int, tuple[int, float]] = field(default_factory=dict)
     spaces: dict[str, Space] = field(default_factory=lambda: {"": Space()})
     links: list[Card] = field(default_factory=list)
     system: Array | None = None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -137,19 +138,23 @@ def assign_temperatures(deck: Deck, raw: RawMesh, numbering: Numbering) -> None:
         raw.temperature[numbering.positions(members, "*TEMPERATURE names"), column] = value
 
 
-def constraints(deck: Deck) -> Constraints:
-    """What *BOUNDARY holds, its sets by the names they were written with."""
+def constraints(deck: Deck, lines: Sequence[tuple[str, str, str]]) -> Constraints:
+    """What *BOUNDARY holds by its lines (see `Deck.held`), its sets by the names they were written with."""
     held = Constraints(left_out=list(deck.not_held))
     known = set(joined(deck.node_id).tolist())
-    for word, directions, place in deck.held:
+    for word, directions, place in lines:
         with of_file(place):
             key, nodes = deck.key(deck.node_sets, word), deck.nodes_for("*BOUNDARY", word)
             if key is None and not known.issuperset(nodes.tolist()):
                 raise Damaged(f"*BOUNDARY names the node {word}, which is not defined")
         single = set(directions) & set("xyz") not in (set(), set("xyz"))
         turned = single and not deck.axes.keys().isdisjoint(nodes.tolist())
+        turned = turned or not deck.turning.keys().isdisjoint(nodes.tolist())
         for node in nodes.tolist() if turned else ():
-            held.hold(node, set(directions) - set("xyz") if node in deck.axes else directions)
+            if node in deck.turning:
+                held.hold(deck.turning[node], ("abc"["xyz".index(c)] for c in directions if c in "xyz"))
+            else:
+                held.hold(node, set(directions) - set("xyz") if single and node in deck.axes else directions)
         if not turned:
             held.hold(int(nodes[0]) if key is None else deck.written[key], directions)
     return held

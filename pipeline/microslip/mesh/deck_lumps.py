@@ -37,8 +37,12 @@ def lumps_of(deck: Deck, numbering: Numbering, points: Array) -> Iterator[PointM
                     continue
                 left -= {(cells.kind, int(n)) for n in cells.ids[mine]}
                 reading = _Reading(deck, card, cells.kind, points)
-                for nodes in numbering.positions(cells.nodes[mine], f"*ELEMENT, TYPE={cells.kind} names"):
-                    yield _MAKERS[cells.kind][1](reading, nodes)
+                at = numbering.positions(cells.nodes[mine], f"*ELEMENT, TYPE={cells.kind} names")
+                for number, nodes in zip(cells.ids[mine].tolist(), at, strict=True):
+                    made = _MAKERS[cells.kind][1](reading, nodes)
+                    if isinstance(made, PointMass) and made.mass:
+                        deck.masses[number] = made.node, made.mass
+                    yield made
     if left:
         kind, number = sorted(left)[0]
         place = next(c.where for c in deck.lumped if c.kind == kind and number in c.ids)
@@ -123,7 +127,8 @@ def _inertia(reading: _Reading, nodes: Array) -> PointMass:
 
 def _element(reading: _Reading, nodes: Array) -> LumpedElement:
     ways, value = reading.value()
-    if reading.kind.endswith("A"):
+    damps, line = reading.kind.startswith("DASHPOT"), reading.kind.endswith("A")
+    if line:
         along = reading.points[nodes[1]] - reading.points[nodes[0]]
         if not along.any():
             kind = reading.kind
@@ -136,9 +141,8 @@ def _element(reading: _Reading, nodes: Array) -> LumpedElement:
     row = elongation(axes, (1.0, -1.0)[: len(nodes)])
     A = value * np.outer(row, row)
     at = np.concatenate([turn + np.arange(3) for turn in turns])
-    damps = reading.kind.startswith("DASHPOT")
-    zero = np.zeros_like(A)
-    return LumpedElement(reading.where, np.repeat(nodes, 3), at, zero if damps else A, A if damps else zero)
+    zero, pulls = np.zeros_like(A), value if line and not damps else 0.0
+    return LumpedElement(reading.where, np.repeat(nodes, 3), at, zero if damps else A, A if damps else zero, pulls)
 
 
 def elongation(axes: list[Array], signs: tuple[float, ...]) -> Array:

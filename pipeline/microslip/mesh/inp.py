@@ -204,7 +204,7 @@ def _assembled(deck: Deck, of_parts: bool) -> RawMesh:
     raw.remarks += unread(deck)
     raw.joints = joints_of(deck)
     raw.instances = {name: numbering.positions(np.unique(ids), "") for name, ids in deck.instances.items()}
-    add_supports(raw, constraints(deck), numbering)
+    add_supports(raw, constraints(deck, deck.held), numbering)
     for cells in deck.facets:
         cells.nodes = numbering.positions(cells.nodes[:, : CORNERS[cells.nodes.shape[1]]], "*ELEMENT names")
     for key in deck.cell_sets:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -10,7 +10,53 @@ import numpy as np
 from ..data import Array, BodyLoad, FacetLoad, Indices, Mesh, NodalLoad, SpinLoad, StaticStep
 from ..topology import FACET_CORNERS
 from ..units import in_si
-from .raw import RawMesh, joined
+from .raw import Numbering, RawMesh, joined
+
+Terms = dict[tuple[str, int, int], tuple[float, str]]
+"""Kind of a nodal load, number of a node and direction (0 to 5) -> amount, place in the file."""
+
+
+def nodal_loads(
+    raw: RawMesh, terms: Terms, axes: Mapping[int, Array], numbering: Numbering
+) -> Iterator[NodalLoad]:
+    """Forces and displacements of nodes by the places where they are written, along the axes of the body.
+
+    Args:
+        axes: node number -> (3, 3) rows x, y, z of its directions, where these are not the body's.
+
+    Raises:
+        Damaged: a node that is not there.
+    """
+    by_place: dict[tuple[str, str], list[tuple[int, int, float]]] = {}
+    for (kind, node, way), (amount, where) in terms.items():
+        turn = axes.get(node)
+        if not amount:
+            continue
+        if turn is not None and kind == "displacement":
+            raw.lost.append(f"{where} moves node {node} along a local direction, which is not read")
+            continue
+        parts = np.eye(3)[way % 3] * amount if turn is None else amount * turn[way % 3]
+        into = by_place.setdefault((kind, where), [])
+        into += [(node, way // 3 * 3 + int(j), float(parts[j])) for j in np.flatnonzero(parts)]
+    for (kind, where), rows in by_place.items():
+        nodes, ways, amounts = map(np.array, zip(*rows, strict=True))
+        yield NodalLoad(where, kind, numbering.positions(nodes, f"{where} names"), ways, amounts)
+
+
+def facet_loads(
+    facets: Mapping[tuple[int, ...], tuple[float | Array, str]]
+) -> Iterator[FacetLoad]:
+    """Pressures by the places where they are written.
+
+    Args:
+        facets: corners, by positions -> amount on all of the facet or at each corner, place.
+    """
+    by_place: dict[tuple[str, int], list[tuple[tuple[int, ...], Array]]] = {}
+    for corners, (amount, where) in facets.items():
+        values = np.broadcast_to(amount, len(corners))
+        by_place.setdefault((where, len(corners)), []).append((corners, values))
+    for (where, _), sides in by_place.items():
+        yield FacetLoad(where, np.array([c for c, _ in sides]), np.array([a for _, a in sides]))
 
 
 def state_of(
@@ -40,8 +86,13 @@ def state_of(
         else:
             speed, point = in_si(load.speed, system, time=-1), metres * np.asarray(load.point, dtype=float)
             cells = _cells(mesh, load.cells)
+            cells = None if cells is None or cells.all() else cells
             loads.append(replace(load, speed=float(speed), point=point, cells=cells))
-    return replace(step, loads=tuple(loads))
+    held = step.supports
+    if held is not None:
+        there = {*mesh.point_sets, *(mesh.links.sets if mesh.links else ())}
+        held = {name: ways for name, ways in held.items() if name in there}
+    return replace(step, loads=tuple(loads), supports=held)
 
 
 def _nodal(
@@ -96,8 +147,5 @@ def _facets(raw: RawMesh, load: FacetLoad, boundary: Mapping[str, Indices], syst
 
 
 def _cells(mesh: Mesh, numbers: Indices | None) -> Array | None:
-    """Whether each cell is chosen, type by type; None if all are."""
-    if numbers is None:
-        return None
-    chosen = np.isin(joined(mesh.cell_id[kind] for kind in mesh.cells), numbers)
-    return None if chosen.all() else chosen
+    """Whether each cell is chosen, type by type; None where the file names none."""
+    return None if numbers is None else np.isin(joined(mesh.cell_id[kind] for kind in mesh.cells), numbers)

@@ -235,6 +235,31 @@ def locking(raw: RawMesh, bricks: list[Indices]) -> float:
         return float(1 + 0.5 * np.median(sides.max(axis=0) / sides.min(axis=0)) ** 2)
 
 
+_MIRRORED = {
+    "tetra": (0, 2, 1, 3),
+    "tetra10": (0, 2, 1, 3, 6, 5, 4, 7, 9, 8),
+    "wedge": (3, 4, 5, 0, 1, 2),
+    "wedge15": (3, 4, 5, 0, 1, 2, 9, 10, 11, 6, 7, 8, 12, 13, 14),
+}
+"""Nodes of a left-handed cell in a right-handed order; of bricks and pyramids such an order is no
+mere habit."""
+
+
+def turn_left_handed(raw: RawMesh) -> None:
+    """Count the nodes of left-handed tetrahedra and wedges the other way, as the solvers that allow
+    them do."""
+    for number, (kind, cells) in enumerate(raw.blocks):
+        if kind not in _MIRRORED or not len(cells):
+            continue
+        corner = raw.points[cells[:, :4]]
+        left = np.linalg.det(corner[:, 1:] - corner[:, :1]) < 0
+        if left.any():
+            cells = cells.copy()
+            cells[left] = cells[left][:, _MIRRORED[kind]]
+            raw.blocks[number] = kind, cells
+            raw.remarks.append(f"{left.sum()} left-handed cells {kind} are counted the other way round")
+
+
 def joined(parts: Iterable[Indices]) -> Indices:
     """Whole numbers one behind the other; none where there are no parts."""
     return np.concatenate([np.zeros(0, dtype=np.int64), *parts])

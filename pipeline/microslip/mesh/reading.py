@@ -32,9 +32,9 @@ from .lumps import hanging, on_mesh, points_of, spread
 from .materials import NONE, Substitute, in_si
 from .med import read_med
 from .msh import is_msh41, read_msh41
-from .raw import NODES, Damaged, RawMesh, refused
+from .raw import NODES, Damaged, RawMesh, refused, turn_left_handed
 from .surface import boundary_facets, faces_from_points, match_facets
-from .unv import length_unit, read_unv
+from .unv import UNIVERSAL, length_unit, read_unv
 
 UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 0.0254, "ft": 0.3048}
 """Unit of length -> metres."""
@@ -97,7 +97,7 @@ def _refused(path: Path, error: Damaged) -> UserError:
 _READERS: dict[str, Callable[[Path], RawMesh]] = {
     **dict.fromkeys((".cdb", ".anf", ".mac", ".ans"), read_cdb),
     **dict.fromkeys((".bdf", ".nas", ".fem", ".dat"), read_bdf),
-    **dict.fromkeys((".unv", ".uff", ".uf"), read_unv),
+    **dict.fromkeys(UNIVERSAL, read_unv),
     ".inp": read_inp,
     ".med": read_med,
 }
@@ -169,7 +169,7 @@ def _mesh_of(raw: RawMesh, metres: float, system: str | None) -> Mesh:
             way += " (in gmsh: Mesh.SecondOrderIncomplete = 1)"
         raise UserError(f"cells of type {', '.join(foreign)} cannot be assembled; {way}")
     _sort_by_region(raw)
-    _turn_left_handed(raw)
+    turn_left_handed(raw)
     cells: dict[str, list[Indices]] = {}
     for kind, connectivity in raw.blocks:
         if len(connectivity):
@@ -186,31 +186,6 @@ def _mesh_of(raw: RawMesh, metres: float, system: str | None) -> Mesh:
     whole = {t: np.concatenate(c) for t, c in cells.items()}
     mesh = _assemble_mesh(raw, points, whole, metres, system, lumps)
     return replace(mesh, hanging=attached, retained=tuple(n for n in raw.retained if n in mesh.point_sets))
-
-
-_MIRRORED = {
-    "tetra": (0, 2, 1, 3),
-    "tetra10": (0, 2, 1, 3, 6, 5, 4, 7, 9, 8),
-    "wedge": (3, 4, 5, 0, 1, 2),
-    "wedge15": (3, 4, 5, 0, 1, 2, 9, 10, 11, 6, 7, 8, 12, 13, 14),
-}
-"""Nodes of a left-handed cell in a right-handed order; of bricks and pyramids such an order is no
-mere habit."""
-
-
-def _turn_left_handed(raw: RawMesh) -> None:
-    """Count the nodes of left-handed tetrahedra and wedges the other way, as the solvers that allow
-    them do."""
-    for number, (kind, cells) in enumerate(raw.blocks):
-        if kind not in _MIRRORED or not len(cells):
-            continue
-        corner = raw.points[cells[:, :4]]
-        left = np.linalg.det(corner[:, 1:] - corner[:, :1]) < 0
-        if left.any():
-            cells = cells.copy()
-            cells[left] = cells[left][:, _MIRRORED[kind]]
-            raw.blocks[number] = kind, cells
-            raw.remarks.append(f"{left.sum()} left-handed cells {kind} are counted the other way round")
 
 
 # other formats, by meshio ----------------------------------------------------------------------------------------
@@ -364,6 +339,8 @@ def _assemble_mesh(
     state = state_of(raw, replace(mesh, links=links), renumber, boundary, metres, system)
     known = {*mesh.point_sets, *(links.sets if links else ())}
     supports = {n: directions for n, directions in raw.supports.items() if n in known}
+    if idle := ", ".join(f"'{name}'" for name in raw.supports if name not in known):
+        raw.remarks.append(f"held, but no element or constraint uses these nodes, so it holds nothing: {idle}")
     return replace(
         mesh, faces=faces, inner=inner, supports=supports, not_held=tuple(raw.not_held), unended=raw.unended,
         links=links, state=state, integration=raw.integration,

@@ -20,6 +20,7 @@ from ..errors import NotConverged, UserError
 from ..fem.contact import ContactPair, Grip
 from ..fem.cyclic import CyclicUpper
 from ..fem.discretise import Discretisation, FreeUpper, Pattern, whole
+from ..fem.line_springs import LineSprings, line_springs
 from ..fem.loads import FollowingPressure
 from ..fem.operators import (
     displacement_gradient,
@@ -37,7 +38,8 @@ from ..fem.operators import (
 )
 from ..fem.tied import Tied
 from ..interrupts import look
-from ..linalg.eigen import DirectSolver, Unstable, symmetric_product
+from ..linalg.direct import DirectSolver
+from ..linalg.eigen import Unstable, symmetric_product
 from ..progress import Report
 from ..units import rpm_text
 from .closing import Closing
@@ -74,7 +76,7 @@ class BodyModel:
         dead_load: (n, 3) forces that act at every speed, N. axis, point: of rotation.
         spin_softening: whether -Omega^2 M P is part of K. contacts: faces that may touch in the static state.
         hooke: per block (6, 6) or (e, q, 6, 6) that takes the place of the materials' (see `heated`), or None.
-        springs, dashpots: (p, 3, 3) of the mesh's lumped elements, N/m and N s/m, or None.
+        springs, dashpots: (p, 3, 3) of the mesh's lumped elements, N/m and N s/m, or None. lines: springs that turn.
         following: pressures that follow the surface. displaced: (n, 3) m, displacements that are prescribed, continued
             as the ties want it and 0 elsewhere, or None.
     """
@@ -96,6 +98,7 @@ class BodyModel:
     hooke: list[Array] | None = None
     springs: Array | None = None
     dashpots: Array | None = None
+    lines: LineSprings | None = None
     following: tuple[FollowingPressure, ...] = ()
     displaced: Array | None = None
 
@@ -181,7 +184,7 @@ def with_lumps(model: BodyModel) -> BodyModel:
     np.add.at(dashpots, pattern.places(*lumps.pairs.T), lumps.damping)
     return replace(
         model, M=M, M_full=pattern.full(M), K0=model.K0 + springs, springs=springs,
-        dashpots=dashpots if dashpots.any() else None,
+        dashpots=dashpots if dashpots.any() else None, lines=line_springs(model.d.mesh),
     )  # fmt: skip
 
 
@@ -198,7 +201,7 @@ def resisting_force(model: BodyModel, stress: list[Array], H: list[Array] | None
     force = internal_force(model.d, stress, H)
     if model.springs is not None:
         force = force + (model.d.pattern.full(model.springs) @ u.reshape(-1)).reshape(u.shape)
-    return force
+    return force if model.lines is None or H is None else force + model.lines.force(u)
 
 
 def stress_of(model: BodyModel, strain: list[Array]) -> list[Array]:
@@ -287,7 +290,7 @@ def _linear(model: BodyModel, speed: float, solver: DirectSolver, soft: Array | 
     solver.factorise(model.free.matrix(model.K0))
     u = first + model.free.expand(solver.solve(model.free.restrict(force.reshape(-1))), n).reshape(n, 3)
     H, stress = _small(model, u)
-    K = _tangent(model, H, stress) + soft + model.following_stiffness(x + u)
+    K = _tangent(model, H, stress, u) + soft + model.following_stiffness(x + u)
     return StaticState(u, H, stress, K, "linear", speed=speed)
 
 
@@ -349,13 +352,15 @@ def _tangent_slope(model: BodyModel, state: StaticState, du: Array) -> Array:
         E = np.swapaxes(np.eye(3) + h, -1, -2) @ dH
         stress = _stress(C, engineering(0.5 * (E + np.swapaxes(E, -1, -2))))
         A.append(tangent_tensor_slope(C, f, h, dH, stress if f is None else stress * f[..., None]))
-    return tangent(model.d, A)
+    K = tangent(model.d, A)
+    return K if model.lines is None else K + model.lines.slope(state.u, du, model.d.pattern)
 
 
-def _tangent(model: BodyModel, H: list[Array], stress: list[Array]) -> Array:
+def _tangent(model: BodyModel, H: list[Array], stress: list[Array], u: Array) -> Array:
     parts = enumerate(zip(model.factors, H, stress, strict=True))
     K = tangent(model.d, [tangent_tensor(model.elasticity(i), *part) for i, part in parts])
-    return K if model.springs is None else K + model.springs
+    K = K if model.springs is None else K + model.springs
+    return K if model.lines is None else K + model.lines.tangent(u, model.d.pattern)
 
 
 def _newton(
@@ -418,14 +423,14 @@ def _newton_at(
             if any((np.linalg.det(np.eye(3) + h) <= 0).any() for h in H):
                 break  # in balance, but turned inside out
             whole = not isinstance(free, CyclicUpper)  # of a sector neighbours count by nodal diameter (`sector`)
-            K = _tangent(model, H, stress) + level * model.following_stiffness(points + u)
+            K = _tangent(model, H, stress, u) + level * model.following_stiffness(points + u)
             K = closing.stiffened(K + soft if model.spin_softening else K, model.d.pattern, True, whole)
             return StaticState(u, H, stress, K, "nonlinear", len(steps), closing.grips, omega)
         pushed = level * (model.dead_load + model.following_force(points + u))
         outer = closing.with_forces(pushed + centrifugal_force(model, omega, u))
         residual = free.restrict((outer - resisting_force(model, stress, H, u)).reshape(-1))
         if model.contacts or not _factors_serve(steps):
-            K = _tangent(model, H, stress) + level * model.following_stiffness(points + u)
+            K = _tangent(model, H, stress, u) + level * model.following_stiffness(points + u)
             solver.factorise(free.matrix(closing.stiffened(K + soft, model.d.pattern)))
             if (negative := solver.negative()) and len(steps) > 3:
                 raise Unstable(negative)  # perhaps only on the way: smaller load steps will tell

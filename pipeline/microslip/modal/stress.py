@@ -105,13 +105,14 @@ def nodal_set(
 ) -> StressSet:
     """The set at Gauss points smoothed to the nodes (location ``nodal-averaged``), made `batch` modes at a time.
 
-    On the cut faces of a cyclic sector the neighbour's cells count too, turned and in the phase of the nodal diameter
-    `harmonic`.
+    On the cut faces of a cyclic sector that match the neighbour's cells count too, turned and in the phase of the nodal
+    diameter `harmonic`.
     """
     n, m = model.d.mesh.n_points, phi.shape[2]
     smoothers = [smoother(b, n) for b in model.d.blocks]
     volumes = np.sum([w for _, w in smoothers], axis=0)
     cut = model.free.unknowns.cut if isinstance(model.free, CyclicUpper) else None
+    cut = cut if cut is None or cut.share is None else None
     weights = np.where(volumes > 0, volumes, 1.0)  # of points without cells
     if cut is not None:
         weights[cut.left] = weights[cut.right] = volumes[cut.left] + volumes[cut.right]

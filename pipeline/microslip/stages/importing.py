@@ -21,10 +21,12 @@ from ..basis import write_basis
 from ..data import Array, BodyLoad, FacetLoad, Indices, Material, Mesh, NodalLoad, SpinLoad
 from ..errors import UserError
 from ..files.store import ordinary, write_text
+from ..frames import rotation
 from ..mesh import UNITS, mesh_problems, read_mesh, suffix_of, unit_of
 from ..mesh.chosen import of_instances
 from ..mesh.materials import NONE, STANDS, Substitute
 from ..mesh.raw import Unread, joined, refused
+from ..mesh.unv import UNIVERSAL, has_solids
 from ..units import SYSTEMS, to_rpm, usual_system
 from .meshing import run_apart
 from .stage import Report
@@ -81,13 +83,15 @@ def import_file(
         raise UserError(f"{file}: there is no such file; correct the path")
     unit = length_unit(unit, file)
     name = name or body_name((folder.resolve().name if folder else "") or file.stem)
-    if file.suffix.lower() in _UNIVERSAL:
-        from ..exchange.measured import holds_modes
+    modes = False
+    if file.suffix.lower() in UNIVERSAL:
+        from ..exchange.measured import holds_modes, holds_results
 
-        if holds_modes(file):
+        if holds_results(file) and not has_solids(file):
             return _measured(file, (folder or Path(name)) / "basis.h5", unit, name)
+        modes = holds_modes(file)
     target = (folder or Path(name)) / "body.toml"
-    refuse_taken(target)
+    refuse_taken(target, *[target.with_name(FOREIGN)] * modes)
     kind = suffix_of(file)
     of_mesh = partial(_mesh, instances=instances, instead=instead, solids_only=solids_only)
     made = _matrices if kind in MATRICES else of_mesh
@@ -100,6 +104,8 @@ def import_file(
     lines, told, mesh = (*made(file, target.parent, unit), None)[:3]
     head = [f'name = "{name}"', f'length_unit = "{unit}"']
     write_text(target, "\n".join([*head, *lines]) + "\n")
+    if modes:
+        told = [*told, *_foreign(file, target.with_name(FOREIGN), unit, name)]
     missing = "interfaces" if "[[supports]]" in lines else "supports, interfaces"
     last = f"{target}: ready. Add {missing} and loads, then: microslip run {shlex.quote(str(target.parent))}"
     found = Imported(target, (*told, last), file, mesh)
@@ -167,7 +173,8 @@ def body_name(stem: str, none: str = "part") -> str:
     return re.sub(r"[^A-Za-z0-9_.-]", "-", stem).lstrip("-._")[:64] or none
 
 
-_UNIVERSAL = (".uff", ".uf", ".unv", ".u")
+FOREIGN = "modes_of_file.h5"
+"""Modal file of the modes that stand in a mesh file."""
 
 
 def _measured(file: Path, target: Path, unit: str, name: str) -> Imported:
@@ -179,9 +186,19 @@ def _measured(file: Path, target: Path, unit: str, name: str) -> Imported:
     write_basis(target, basis)
     group = basis.groups[0, 0]
     first, last = group.frequency[[0, -1]]
-    size = f"{file}: {group.n_modes} modes from {first:.6g} to {last:.6g} Hz at {basis.mesh.n_points} measured points"
+    size = f"{file}: {group.n_modes} modes from {first:.6g} to {last:.6g} Hz at {basis.mesh.n_points} points"
     end = f"{target}: ready. Beside a computed one: microslip compare {target} OTHER.h5"
     return Imported(target, (size, *told, end))
+
+
+def _foreign(file: Path, target: Path, unit: str, name: str) -> list[str]:
+    """Modes that stand in a mesh file become a modal file beside the body, to compare with."""
+    try:
+        made = _measured(file, target, unit, name)
+    except UserError as error:
+        return [f"note: the modes of the file are left aside: {error}"]
+    body = Path("build") / name / "basis.h5"
+    return [made.told[0], f"{target}: these modes. Beside those of the body: microslip compare {target} {body}"]
 
 
 def _beside(file: Path, folder: Path) -> str:
@@ -238,16 +255,20 @@ def _count(mesh: Mesh) -> int:
     return max(min(USUAL, 3 * mesh.n_points - fixed - cut - ties - 2), 1)
 
 
-def _hold(mesh: Mesh) -> bool:
+def _hold(mesh: Mesh, metres: float) -> bool:
     """Whether the file's supports leave no rigid motion."""
     from ..fem.discretise import discretise
     from ..fem.tied import tied_upper
     from ..modal.equilibrium import lumped_springs
-    from ..modal.rigid import free_motions, left_by, unresisted
+    from ..modal.rigid import free_motions, free_motions_of_ring, left_by, unresisted
 
     none, fixed = np.zeros(0, dtype=np.int64), _fixed(mesh)
     centre, pattern = mesh.points.mean(axis=0), discretise(mesh).pattern
-    springs = lumped_springs(mesh, pattern)
+    springs, ring = lumped_springs(mesh, pattern), mesh.sector
+    if ring is not None and mesh.ties is None and len(fixed):  # all sectors together may be held
+        turn = rotation(np.array(ring.axis), 2 * np.pi / ring.sectors)
+        motions = free_motions_of_ring(mesh.points, metres * np.array(ring.point), fixed, turn, ring.sectors)
+        return unresisted(motions, springs, pattern).shape[1] == 0
     if mesh.ties is None:
         return unresisted(free_motions(mesh.points, centre, fixed), springs, pattern).shape[1] == 0
     first, sets = 3 * mesh.n_points, mesh.ties.sets
@@ -434,18 +455,20 @@ def _mesh(
         told.append(f"warning: {error}")
     joints = [f"{j.where}: '{j.slave}' on '{j.master}': make them interfaces and a contact" for j in mesh.joints]
     mesh = of_instances(mesh, instances) if instances else mesh
-    mesh, ties = _tied(file, mesh)
     if not solids_only:
         refuse_hanging(file, mesh)
+    mesh, ties = _tied(file, mesh)
     kinds = ", ".join(f"{len(c)} {t}" for t, c in mesh.cells.items())
     alone = f"; the solids alone: {mesh.hanging.partition(': ')[2]} and are left out" if mesh.hanging else ""
     again = [f"warning: {text}" for texts in mesh_problems(mesh) for text in texts]
     lacking = [text for text in again if text.endswith(STANDS)]
-    told = [*lacking, *told, f"{file}: {mesh.n_points} points, {kinds}{alone}"]
+    solid = mesh.points[np.unique(joined(c.ravel() for c in mesh.cells.values()))]
+    size = " x ".join(f"{v:.4g}" for v in np.ptp(solid, axis=0) / UNITS[unit])
+    told = [*lacking, *told, f"{file}: {mesh.n_points} points, {kinds}, {size} {unit}{alone}"]
     told += [text for text in again if text not in lacking]
     told += [f"note: {text}" for text in mesh.remarks]
     told += [*ties, *((*joints, *_pressed(mesh)) if not instances else ())]
-    holding = _hold(mesh)
+    holding = _hold(mesh, UNITS[unit])
     held, said = _supports(mesh, holding)
     told += said
     lines = [] if holding else ["free = true               # nothing holds it wholly yet"]
@@ -578,7 +601,11 @@ def _cyclic(mesh: Mesh, metres: float) -> tuple[list[str], list[str]]:
         f"right = {json.dumps(right)}",
     ]
     lines += [f"nodal_diameters = {list(sector.diameters)}"] if sector.diameters else []
-    return lines, [f"{sector.where}: one of {sector.sectors} cyclic sectors, '{right}' ahead of '{left}'"]
+    unlike = len(mesh.face_points(left)) != len(mesh.face_points(right))
+    lines += ['follows = "left"'] if unlike and left == sector.faces[0] else []
+    told = f"{sector.where}: one of {sector.sectors} cyclic sectors, '{right}' ahead of '{left}'"
+    more = f"; they are not meshed alike: the nodes of '{sector.faces[0]}' follow the other face"
+    return lines, [told + more * unlike]
 
 
 _LOADED = {FacetLoad: "loaded facet", BodyLoad: "acceleration field", SpinLoad: "rotation"}
@@ -597,6 +624,8 @@ def _state(mesh: Mesh, metres: float, ring: bool, held: bool) -> tuple[list[str]
     acting = [f"{number} {kind}{'s' * (number > 1)}" for kind, number in count.items()]
     acting += ["temperatures"] * (mesh.temperature is not None)
     law = "finite displacements" if state.nonlinear else "one linear solution"
+    if state.supports is not None:
+        law += f"; held there by {', '.join(f'{n} in {w}' for n, w in state.supports.items()) or 'nothing'}"
     said = [f"{state.where}: the modes are about its static state: {', '.join(acting) or 'nothing acts'}; {law}"]
     turning = [] if ring else ["", "[rotation]"]
     turning.append(f'prestress = "{"nonlinear" if state.nonlinear else "linear"}"')
@@ -609,7 +638,9 @@ def _state(mesh: Mesh, metres: float, ring: bool, held: bool) -> tuple[list[str]
     elif spins:
         (spin,) = spins
         axis, speed = spin.axis / np.linalg.norm(spin.axis) + 0.0, to_rpm(spin.speed)
-        said.append(f"{spin.where}: {speed:.6g} rpm")
+        heavy = mesh.lumps is not None and bool(mesh.lumps.masses.any())
+        whole = "; point masses turn with the body, all of them: CalculiX leaves their softening out" * heavy
+        said.append(f"{spin.where}: {speed:.6g} rpm{whole}")
         if not ring:
             numbers = [", ".join(f"{v:.15g}" for v in row) for row in (axis, spin.point / metres + 0.0)]
             turning += [f"axis = [{numbers[0]}]", f"point = [{numbers[1]}]"]

@@ -246,6 +246,11 @@ def load_mesh(job: Job, path: Path | None = None) -> tuple[Mesh, list[str]]:
             mesh = of_instances(mesh, names)
     if job.settings.geometry.mesh is not None:
         mesh = _faces_by_rule(job, mesh)
+    if job.settings.masses or job.settings.springs or job.settings.dashpots:
+        from ..modal.attached import with_attached
+
+        with of_file(job.path):
+            mesh = with_attached(mesh, job.settings)
     mesh = linked_mesh(path, mesh)
     errors, warnings = mesh_problems(mesh)
     if job.settings.cyclic is not None and part_numbers(mesh, tied=True).max() > 0:
