@@ -80,11 +80,10 @@ def freed_memory_stays() -> None:
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Members that a family leaves out are slow; workers begin with the files that take longest, so that they end
+    """What `families` names is slow; workers begin with the files that take longest, so that they end
     together (with --no-loadscope-reorder)."""
-    left_out = tuple(f"tests/{line}" for line in LEFT_OUT.split("\n") if line)
     for item in items:
-        if item.nodeid.startswith(left_out):
+        if item.nodeid.startswith(LEFT_OUT):
             item.add_marker(pytest.mark.slow)
     if hasattr(config, "workerinput"):
         items[:] = longest_first(items, config.getoption("markexpr"))

@@ -1,10 +1,9 @@
-"""Members of families of tests that the quick ones leave out: others of the family prove the same there, at half the
-cost. `make test-slow` runs all.
+"""Tests that the quick ones leave out; `make test-slow` runs them all.
 
 A line is a file, a test, and how the name of a member begins; one that fits no test has outlived it.
 """
 
-LEFT_OUT = r"""
+MEMBERS = r"""
 test_basis.py::test_absurd_numbers_are_findings_and_no_exceptions[1e-200
 test_basis.py::test_absurd_numbers_are_findings_and_no_exceptions[1e+307
 test_cad.py::test_a_picture_that_takes_too_long_is_left_out[60.0
@@ -79,3 +78,67 @@ validation/test_rolling_references.py::test_manchester_roll_is_that_of_equal_for
 validation/test_rolling_references.py::test_manchester_roll_is_that_of_equal_forces[6 mm
 validation/test_sextro_ch6_forces.py::test_fig_6_6_1_forces_over_the_total_slippage[4.0
 """
+"""Of families: others prove the same in the quick tests."""
+
+WHOLE = r"""
+test_case_contacts.py::test_mistakes_at_the_command_line
+test_checks.py::test_a_coarse_sweep_and_a_fine_one_print_the_same_resonances
+test_classification.py::test_the_exponent_of_an_impact_oscillator_is_that_of_its_multipliers
+test_cli.py::test_a_reader_that_leaves_is_no_error
+test_cli.py::test_closure_presses_a_face_step_by_step
+test_compare.py::test_mistakes_are_one_sentence[words0
+test_compare.py::test_pictures_and_table
+test_conformance.py::test_answers_of_the_large_samples_hold[vane-full
+test_contact.py::test_a_range_follows_the_stiffness_through_the_closing_of_an_open_contact
+test_contact_mass.py::test_at_the_printed_damping_of_0_2_it_does_not
+test_curves.py::test_a_curve_that_reaches_its_end_is_not_said_to_end_early
+test_curves.py::test_mistakes_are_one_sentence[text8
+test_cvode.py::test_the_stepper_comes_to_what_the_reference_says[rubs in three
+test_exchange_random.py::test_modal_file_and_xarray_hold_the_body_bit_for_bit
+test_following.py::test_a_backbone_without_normal_force_is_left_out
+test_fuzz.py::test_changed_gmsh_files
+test_fuzz.py::test_nonsense_settings_through_the_command_line[drawn0
+test_ground.py::test_a_seed_makes_the_same_friction_whatever_the_step
+test_ground.py::test_stick_slip_on_a_belt_is_its_closed_form
+test_importing.py::test_numbers_stand_on_the_surfaces_that_are_seen
+test_interrupts.py::test_ctrl_c_at_random_moments_of_a_motion_ends_it_and_loses_nothing
+test_kept.py::test_a_sweep_with_points_that_fail_is_the_same_bit_by_bit_after_interrupts
+test_mistuning.py::test_chosen_samples_of_a_ring_that_sticks
+test_neighbours.py::test_waves_over_a_range_end_in_those_of_its_ends
+test_parts.py::test_where_drawn_parts_touch
+test_public.py::test_a_law_from_another_process_makes_jax_ready_and_leaves_what_the_host_chose
+test_reduction.py::test_friction_response_is_the_same_through_every_method_that_is_statically_exact
+test_refinement.py::test_points_without_a_solution_have_one_beside_them
+test_response_stage.py::test_a_resonance_beyond_the_band_is_told_with_the_range_to_add
+test_response_stage.py::test_files_of_two_runs_do_not_stand_side_by_side
+test_response_stage.py::test_the_energy_on_a_contact_map_is_that_of_the_response
+test_rolling.py::test_a_table_of_contacts_is_the_axle_between_its_poses
+test_roots.py::test_the_modal_file_of_all_modes_has_the_roots_of_the_matrices
+test_rotation.py::test_newton_is_not_misled_by_an_indefinite_step_on_its_way
+test_speed_range.py::test_craig_bampton_keeps_interface_coordinates_at_every_speed
+test_speed_range.py::test_every_nodal_diameter_of_a_sector_has_its_range
+test_store.py::test_no_room_gives_one_sentence_and_leaves_the_old_file
+test_surveys.py::test_the_worst_engine_order_in_stress_and_its_best_normal_force
+test_time_domain.py::test_a_case_runs_up_into_its_stop
+test_time_domain.py::test_orbit_of_a_case_says_the_same_in_table_page_and_file
+test_time_domain.py::test_pictures_are_left_out_when_asked_and_several_motions_stand_together
+test_time_domain.py::test_the_impact_oscillator_of_the_book_is_chaotic_and_does_not_come_to_rest
+test_touch.py::test_curves_are_drawn_for_print_beside_and_go_with_their_picture[300dpi
+test_two_tones.py::test_common_period
+test_vehicle.py::test_the_error_of_jumps_by_a_file_is_less_than_they_tell
+test_workflow.py::test_a_case_of_another_name_has_its_own_folder
+test_workflow.py::test_a_change_of_code_is_another_input
+test_workflow.py::test_bodies_of_one_name_do_not_overwrite_each_other
+test_workflow.py::test_stresses_and_pictures_can_be_left_out
+validation/test_nafems.py::test_fv52_between_hard_supports
+validation/test_sextro_ch3_point.py::test_fig_3_7_3_a_softer_smoothing_makes_the_cycle_smaller
+validation/test_sextro_ch5_bolted.py::test_frequencies_rise_with_the_stiffness_and_torsion_most
+validation/test_sextro_ch5_dampers.py::test_normal_force_of_a_damper_is_its_centrifugal_force_over_the_roof
+validation/test_sextro_ch5_dampers.py::test_twice_the_force_on_twice_the_mass_is_twice_the_strain
+validation/test_sextro_ch5_multicoupling.py::test_faces_of_the_damper
+validation/test_sextro_ch5_rig.py::test_sticking_frequencies_at_780_newton
+"""
+"""Above a second: whole chains from a file to its page, bodies of the book with their meshes, and second ways to a
+number. Quick tests have their parts."""
+
+LEFT_OUT = tuple(f"tests/{line}" for line in (MEMBERS + WHOLE).splitlines() if line)
