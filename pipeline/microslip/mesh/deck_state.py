@@ -249,7 +249,9 @@ class _Acting:
 
     def _pull(self, number: int, load: BodyLoad, key: tuple[str, ...]) -> None:
         """The weight of the point masses that the load names."""
-        heavy = [m for n, m in self.deck.masses.items() if load.cells is None or n in load.cells]
+        if load.cells is None:
+            return  # that of everything has theirs
+        heavy = [m for n, m in self.deck.masses.items() if n in load.cells]
         if heavy:
             nodes = np.repeat([node for node, _ in heavy], 3)
             values = np.outer([mass for _, mass in heavy], load.acceleration)
