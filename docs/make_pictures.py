@@ -1493,10 +1493,12 @@ def book_mode() -> None:
 def book_figures() -> None:
     """Figures of the book that a formula draws, and those of rolling contact."""
     import figure_study as study
+    import heat_study
     import rolling_study as rolled
 
     for name, drawing in (("book_figures", study), ("book_rolling", rolled)):
         save(drawn(drawing.picture(figure(10.5, 5.2), plain)), name, colours=LINES)
+    save(drawn(heat_study.picture(figure(11.5, 10.5))), "book_heat", colours=LINES)
     force, moment = 100 * study.discretisation()
     print(f"Fig. 5.2-2: 8 elements miss {force:.1f} % of the force, {moment:.1f} % of the moment at most")
 
