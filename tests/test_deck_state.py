@@ -199,19 +199,33 @@ ALONG = ["*BOUNDARY", "x1, 1, 1, 0.05", *PULLED[:2], *PRESSED]
     ],
 )  # fmt: skip
 def test_the_static_step_has_supports_of_its_own(capsys, law, before, loads, modes, wanted):
-    said = imported(capsys, deck(BRICK, *before, *static(*loads, law=law), modes=within_modes(*modes)))
+    said = imported(
+        capsys, deck(BRICK, *before, *static(*loads, law=law), modes=within_modes(*modes))
+    )
     assert "held there by" in said
     np.testing.assert_allclose(hertz(), wanted, rtol=1e-6)
 
 
-RIGID = ["*NODE", "200, 90., 10., 5.", "201, 100., 0., 0.", "*RIGID BODY, NSET=x1, REF NODE=200, ROT NODE=201"]
+RIGID = [
+    "*NODE",
+    "200, 90., 10., 5.",
+    "201, 100., 0., 0.",
+    "*RIGID BODY, NSET=x1, REF NODE=200, ROT NODE=201",
+]
 
 
 def pulled(name: str) -> list[str]:
     return ["*DLOAD", f"{name}, GRAV, 5.e7, 1., 0., 0."]
 
 
-HEAVY = ["*ELEMENT, TYPE=MASS, ELSET=MM", "910, 53", "*MASS, ELSET=MM", "2.e-5", "*ELSET, ELSET=BOTH", "EALL, MM"]
+HEAVY = [
+    "*ELEMENT, TYPE=MASS, ELSET=MM",
+    "910, 53",
+    "*MASS, ELSET=MM",
+    "2.e-5",
+    "*ELSET, ELSET=BOTH",
+    "EALL, MM",
+]
 
 
 @pytest.mark.parametrize(

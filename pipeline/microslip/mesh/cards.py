@@ -118,7 +118,11 @@ def keyword(line: str) -> str:
 def parameters(line: str) -> dict[str, str]:
     """Its parameters: in capitals -> as written, without quotes."""
     pairs = (word.partition("=") for word in line.split(",")[1:])
-    named = {" ".join(key.upper().split()): value.strip().strip('"') for key, _, value in pairs if key.strip()}
+    named = {
+        " ".join(key.upper().split()): value.strip().strip('"')
+        for key, _, value in pairs
+        if key.strip()
+    }
     return {_SPACED.get(key.replace(" ", ""), key): value for key, value in named.items()}
 
 

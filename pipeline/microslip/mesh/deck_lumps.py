@@ -147,7 +147,9 @@ def _element(reading: _Reading, nodes: Array) -> LumpedElement:
     A = value * np.outer(row, row)
     at = np.concatenate([turn + np.arange(3) for turn in turns])
     zero, pulls = np.zeros_like(A), value if line and not damps else 0.0
-    return LumpedElement(reading.where, np.repeat(nodes, 3), at, zero if damps else A, A if damps else zero, pulls)
+    return LumpedElement(
+        reading.where, np.repeat(nodes, 3), at, zero if damps else A, A if damps else zero, pulls
+    )
 
 
 def elongation(axes: list[Array], signs: tuple[float, ...]) -> Array:

@@ -145,10 +145,17 @@ def _tell_local(deck: Deck, raw: RawMesh) -> None:
     assert deck.steps.held is not None
     for word, directions, place in {*deck.steps.held} ^ {*deck.held}:
         nodes = deck.nodes_for("*BOUNDARY", word)
-        if set(directions) & set("xyz") not in (set(), set("xyz")) and not deck.axes.keys().isdisjoint(nodes.tolist()):
+        if set(directions) & set("xyz") not in (
+            set(),
+            set("xyz"),
+        ) and not deck.axes.keys().isdisjoint(nodes.tolist()):
             where = place.rpartition("/")[2]
-            text = "holds local directions in the static step and not in its modes, or in these alone"
-            raw.lost.append(f"{where}: *BOUNDARY {text}: it is taken as those of the modes, so frequencies will differ")
+            text = (
+                "holds local directions in the static step and not in its modes, or in these alone"
+            )
+            raw.lost.append(
+                f"{where}: *BOUNDARY {text}: it is taken as those of the modes, so frequencies will differ"
+            )
 
 
 _Loading = NodalLoad | FacetLoad | BodyLoad | SpinLoad
