@@ -281,7 +281,8 @@ def test_a_mass_on_one_of_two_parts_in_contact(capsys):
     """Its point is of no instance; the parts stay two bodies, and the mass is on one."""
     mesh = meshes.brick("hexahedron", (1, 1, 1), (0.01, 0.01, 0.01))
     plain = [line for line in decks.mesh_lines(mesh, sets=("x0",)) if line]
-    part = ["*PART, NAME=P", *plain, "*SURFACE, NAME=F", "EALL, S2", "*SURFACE, NAME=B", "EALL, S1", decks.section(material="ST")]
+    faces = ["*SURFACE, NAME=F", "EALL, S2", "*SURFACE, NAME=B", "EALL, S1"]
+    part = ["*PART, NAME=P", *plain, *faces, decks.section(material="ST")]
     place = ["*ASSEMBLY, NAME=A", "*INSTANCE, NAME=P-1, PART=P", "*END INSTANCE", "*INSTANCE, NAME=P-2, PART=P"]
     mass = ["*NODE", "1, 5., 5., 30.", "*NSET, NSET=RP", "1", "*ELEMENT, TYPE=MASS, ELSET=M"]
     mass += ["1, 1", "*MASS, ELSET=M", "2e-3", "*COUPLING, CONSTRAINT NAME=C, REF NODE=RP, SURFACE=P-1.F", "*KINEMATIC"]
