@@ -141,8 +141,8 @@ def _nodes_selected(archive: Archive, words: list[str]) -> None:
         last = whole(high or low, "NSEL")
         inside = range(int(low), last + 1, max(whole(step or "1", "NSEL"), 1))
         _select(archive, how, {n for n in archive.node_id if n in inside})
-    elif item == "LOC" and axis.upper() in ("X", "Y", "Z") and low:
-        _select(archive, how, _at_place(archive, "XYZ".index(axis.upper()), low, high))
+    elif item == "LOC" and axis.upper() in ("X", "Y", "Z") and archive.points:
+        _select(archive, how, _at_place(archive, "XYZ".index(axis.upper()), low or "0", high))
     else:
         archive.unread = ",".join(word for word in words if word)
 

@@ -7,11 +7,13 @@ versions of MSH, VTU and VTK files go through meshio, which is called here only.
 from __future__ import annotations
 
 import contextlib
+import copy
 import io
 import re
 import warnings
 from collections.abc import Callable
 from dataclasses import replace
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -21,9 +23,12 @@ from ..data import Array, Indices, Lumps, Mesh
 from ..errors import UserError, in_its_file
 from ..files.hostile import tried
 from ..files.store import ordinary
+from ..plausible import DENSITY
 from ..topology import CELL_TYPES, FACET_CORNERS
-from ..units import usual_system
+from ..units import density, usual_system
 from .bdf import read_bdf
+from .bdf_cards import included
+from .cards import files_of
 from .cdb import read_cdb
 from .inp import read_inp
 from .linking import renumbered
@@ -71,6 +76,7 @@ def read_mesh(
         raise UserError("no such mesh file; make it first or correct the path")
     try:
         raw = _read_raw(path)
+        _parsed.cache_clear()  # a file that it includes may change
         if (said := unit_of(path)) not in ("", unit):
             raw.lost.append(f"the file tells its lengths in {said}, here they are taken in {unit}: which is right?")
         made = [in_si(m, system, zero, instead) for m in raw.materials] if system else []
@@ -103,6 +109,7 @@ _READERS: dict[str, Callable[[Path], RawMesh]] = {
     ".inp": read_inp,
     ".med": read_med,
 }
+
 _BY_MESHIO = (".msh", ".vtu", ".vtk")
 
 
@@ -151,7 +158,30 @@ def unit_of(path: Path) -> str:
     return ""
 
 
+def likely_unit(path: Path) -> str:
+    """m or in where the file's densities are a solid's in these and far from it in mm; empty otherwise."""
+    try:
+        raw = _read_raw(path) if path.is_file() and suffix_of(path) in _READERS else None
+    except UserError:
+        return ""
+    densities = [m.density for m in raw.materials if m.density] if raw else []
+    if not densities or min(densities) * density("mm-t-s") < 40 * DENSITY[1]:
+        return ""
+    for unit in ("m", "in"):
+        factor = density(usual_system(unit) or "")
+        if all(DENSITY[0] <= value * factor <= DENSITY[1] for value in densities):
+            return unit
+    return ""
+
+
 def _read_raw(path: Path) -> RawMesh:
+    """A file's content, its own to change; the file that was read last is not parsed again."""
+    found = ordinary(path).stat()
+    return copy.deepcopy(_parsed(path, found.st_mtime_ns, found.st_size))
+
+
+@lru_cache(maxsize=1)
+def _parsed(path: Path, time: int, size: int) -> RawMesh:
     suffix = suffix_of(path)
     if suffix == ".msh" and is_msh41(path):
         return read_msh41(path)
@@ -166,6 +196,12 @@ def _read_raw(path: Path) -> RawMesh:
         return _by_meshio(path, _from_meshio)
     known = ", ".join([*_READERS, *_BY_MESHIO])
     raise UserError(f"meshes are not read from a file '{suffix}'; use one of {known}")
+
+
+def read_files(path: Path) -> list[Path]:
+    """A mesh file and those that it reads (INCLUDE, INPUT); what is missing is told where it is read."""
+    reader = _READERS.get(suffix_of(path))
+    return files_of(path) if reader is read_inp else included(path) if reader is read_bdf else [path]
 
 
 def _mesh_of(raw: RawMesh, metres: float, system: str | None) -> Mesh:

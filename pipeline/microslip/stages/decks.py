@@ -16,8 +16,7 @@ from ..basis import read_basis
 from ..data import Array, Indices, Joint, Mesh
 from ..errors import UserError
 from ..files.store import ordinary
-from ..mesh import UNITS, boundary_facets, read_mesh, suffix_of
-from ..mesh.cards import files_of
+from ..mesh import UNITS, boundary_facets, read_files, read_mesh, suffix_of
 from ..mesh.chosen import bodies, of_instances, with_parts
 from ..mesh.materials import NONE, Substitute
 from ..mesh.raw import joined
@@ -64,7 +63,7 @@ def import_deck(
         UserError: unreadable files, files that are there already.
     """
     pattern = PAIRS.get(suffix_of(file))
-    deck = [f.read_bytes().replace(b"\r", b"\n") for f in files_of(file) if f.is_file()] if pattern else []
+    deck = [f.read_bytes().replace(b"\r", b"\n") for f in read_files(file) if f.is_file()] if pattern else []
     if pattern is None or not any(map(pattern.search, deck)):
         return import_file(file, folder, unit, report=report, instead=instead, solids_only=solids_only)
     unit = length_unit(unit, file)
@@ -187,6 +186,9 @@ def _free(mesh: Mesh, metres: float) -> Array:
 PAIRS = {
     ".inp": re.compile(rb"^\s*\*\s*CONTACT\s+PAIR", re.IGNORECASE | re.MULTILINE),
     ".cdb": re.compile(rb"^\s*ET\s*,.*17[1-57]\s*($|!|,)|^ETBLOCK", re.IGNORECASE | re.MULTILINE),
+    **dict.fromkeys(
+        (".bdf", ".nas", ".fem", ".dat"), re.compile(rb"^\s*BCTSET\b", re.IGNORECASE | re.MULTILINE)
+    ),
 }
 """Suffix -> what stands in decks that may have faces in contact."""
 
