@@ -221,8 +221,9 @@ def _beside(file: Path, folder: Path) -> str:
 def _sets(mesh: Mesh, held: bool = False) -> list[str]:
     """Supports (unless those of the file are there) and interfaces to choose from, as comments."""
     names = sorted(n for n in {*mesh.faces, *mesh.point_sets} if len(mesh.face_points(n)) < mesh.n_points)
+    names = [n for n in names if not held or n not in mesh.supports]
     if not names:
-        return ["# The file names no sets: give faces by box, see docs/body_toml.md."]
+        return ["# The file names no sets to make faces of: give them by box, see docs/body_toml.md."]
     lines = ["", "# Sets of the file: " + ", ".join(names)]
     first = json.dumps(next((n for n in names if n in mesh.faces), names[0]))
     if not held:
@@ -483,6 +484,8 @@ def _mesh(
     doubts = (density(f"{file}: {m.name}: density", m.density) for m in mesh.materials)
     told += [f"warning: {text}" for text in doubts if text]
     told += [f"note: {text}" for text in mesh.remarks]
+    if mesh.lumps is not None and (mass := float(mesh.lumps.masses.sum())):
+        told.append(f"point masses of the file: {mass:.6g} kg")
     told += [*ties, *((*joints, *_pressed(mesh)) if not instances else ())]
     holding = _hold(mesh, UNITS[unit])
     held, said = _supports(mesh, holding)
