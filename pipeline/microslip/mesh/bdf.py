@@ -23,7 +23,7 @@ from .bdf_contact import faced
 from .bdf_control import Case, Control, control_of
 from .bdf_loads import LOADS, OTHERS, SHELLS, state_of_bulk, temperatures
 from .bdf_lumps import READ as LUMPED
-from .bdf_lumps import bars_of, lumps_of
+from .bdf_lumps import bars_of, lumps_of, unlisted_points
 from .bdf_materials import KINDS, PROPERTIES, TABLES, materials_of, stress_free
 from .raw import Damaged, Numbering, RawMesh, Structure, ignored, joined, locks, lost, turn_left_handed
 from .supports import Constraints, add_supports, in_axes
@@ -242,6 +242,7 @@ def _grid(cards: Mapping[str, list[BulkCard]], file: str) -> tuple[RawMesh, Cons
                 frames = system.directions(table[places])
                 held.axes |= dict(zip(ids[places].tolist(), frames, strict=True))
     points = {n: card for card in cards["SPOINT"] for n in listed(card, 1)}
+    points |= {n: c for c, n in unlisted_points(cards) if not np.isin(n, ids)}
     scalar = np.array(sorted(points), dtype=np.int64)
     if len(both := np.intersect1d(scalar, ids)):
         raise Damaged(f"{points[int(both[0])].where}: point {both[0]} is a GRID as well; take one out")
@@ -414,7 +415,7 @@ def _constrain(bulk: Bulk, control: Control) -> dict[int, dict[int, float]]:
     displacements that SPC prescribes in a static step: node -> direction (0 to 5) -> size."""
     held, cards, enforced = bulk.held, bulk.cards, dict[int, dict[int, float]]()
     chosen = _chosen(bulk, control, "SPC", held.left_out)
-    scalar = {n for card in cards["SPOINT"] for n in listed(card, 1)}
+    scalar = set(bulk.raw.node_id[bulk.scalar :].tolist())
     for card in cards["SPC1"]:
         if card.whole(1) in chosen:
             for node in listed(card, 3, bulk.numbering):
