@@ -131,6 +131,33 @@ def test_the_loads_are_those_of_the_solution(commands, each):
     np.testing.assert_allclose(pulled(deck(*commands)), each * len(bar().face_points("x1")), rtol=1e-12)
 
 
+def test_supports_may_change_between_the_loads_and_the_modes():
+    """PERTURB with NOKEEP takes all supports away, D behind it gives others; DZEROKEEP frees what was moved."""
+    first = [*STATIC, "D,X1,UX,0.1", "SOLVE", *PERTURBED[:3]]
+    for keep, more, modes in (
+        ("NOKEEP", ["CMSEL,S,X1", "D,ALL,UZ"], {"X1": "z"}),
+        ("DZEROKEEP", [], {"X0": "xyz"}),
+        ("ALLKEEP", [], {"X0": "xyz", "X1": "x"}),
+    ):
+        Path("a.cdb").write_text(deck(*first, f"PERTURB,MODAL,,,{keep}", *more, "SOLVE"))
+        read = read_mesh("a.cdb", "mm", "mm-t-s")
+        assert dict(read.supports) == modes
+        still = read.supports if read.state.supports is None else read.state.supports
+        assert dict(still) == {"X0": "xyz", "X1": "x"} and not read.lost
+
+
+def test_masses_weigh_under_an_acceleration(capsys):
+    """MASS21 of 0.002 t under ACEL is pulled as by its weight."""
+    mass = ["ET,9,21", "KEYOPT,9,3,2", "R,9,0.002", "TYPE,9", "REAL,9", "E,50"]
+    pull = [*mass, "ACEL,-4.e7,0,-1.e4"]
+    imported(capsys, solved(*pull))
+    both = hertz()
+    Path("body/body.toml").unlink()
+    imported(capsys, solved(*pull[:-1], "CM,BAR,ELEM", "CMACEL,BAR,-4.e7,0,-1.e4", "F,50,FX,8.e4", "F,50,FZ,20",
+                            "ESEL,ALL"))  # fmt: skip
+    np.testing.assert_allclose(hertz(), both, rtol=1e-9)
+
+
 def surface(mesh: Mesh, face: str, kind: int = 2, turned: bool = False) -> list[str]:
     """SURF154 on a face in a short block, as Workbench writes it."""
     cells = [c for block in mesh.faces[face].values() for c in block]
@@ -220,7 +247,7 @@ def test_temperatures_of_elements_are_those_of_their_nodes():
         ("SFE,1,4,PRES,1,%GONE%", "table %GONE%"),
         ("SLOAD,1,9,LOCK,FORC,100", "SLOAD, which loads it"),
         ("FCUM,ADD", "FCUM,ADD"),
-        ("PERTURB,MODAL,,,NOKEEP", "NOKEEP"),
+        ("PERTURB,MODAL,,,PARKEEP", "PARKEEP"),
         ("SFGRAD,PRES,0,Y,0,3", "SFGRAD"),
     ],
 )

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import copy
 import re
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import NamedTuple
 
 from .raw import Damaged, is_number, lost, real
@@ -16,7 +17,7 @@ from .systems import BASIC, System
 class Element(NamedTuple):
     """An element of any kind. `kind`, `real`: numbers of its type and its set of real constants.
 
-    `system`: number of its coordinate system. `where`: line, of those outside EBLOCK,,SOLID.
+    `system`: number of its coordinate system. `where`: line, of those outside EBLOCK,,SOLID. `line`: its number.
     """
 
     number: int
@@ -26,6 +27,7 @@ class Element(NamedTuple):
     system: int
     nodes: list[int]
     where: str = ""
+    line: int = 0
 
 
 def changed(element: Element, changes: Mapping[str, int]) -> Element:
@@ -67,13 +69,14 @@ class Acting:
 
 
 class Solution(NamedTuple):
-    """What a SOLVE solves. kind: STATIC, TRANS and so on. time: at its end."""
+    """What a SOLVE solves. kind: STATIC, TRANS and so on. time: at its end. held: its supports."""
 
     where: str
     kind: str
     nonlinear: bool
     time: float
     acting: Acting
+    held: Constraints
 
 
 @dataclass
@@ -92,8 +95,10 @@ class Archive:
     """What the commands have said.
 
     Attributes:
-        path: name of the file. lines, at: its lines and the number of the next one. where: of the one that is read.
+        path: name of the file. folder: of it. lines, at: its lines and the number of the next one. where: of the one
+            that is read. idle: whether results are looked at (/POST1), which changes nothing.
         reals: values of each set of real constants; open_reals: the last set of R.
+        matrices: of TB,ANEL, whether they are compliances, and their constants.
         changes: of EMODIF, by element. table: of TB that is read: material, label. refused: material -> what of its
             elasticity is not read.
         kinds: number of a type -> Ansys's element. options: number of a type -> number of a KEYOPT
@@ -113,6 +118,7 @@ class Archive:
     """
 
     path: str = ""
+    folder: Path = Path()
     lines: list[str] = field(default_factory=list)
     at: int = 0
     node_id: list[int] = field(default_factory=list)
@@ -130,6 +136,7 @@ class Archive:
     tables: dict[int, dict[str, dict[int, float]]] = field(default_factory=dict)
     polynomials: dict[tuple[int, str], list[float]] = field(default_factory=dict)
     table: tuple[int, str] | None = None
+    matrices: dict[int, tuple[bool, dict[int, float]]] = field(default_factory=dict)
     refused: dict[int, str] = field(default_factory=dict)
     reference: float | None = None
     held: Constraints = field(default_factory=Constraints)
@@ -138,6 +145,7 @@ class Archive:
     spread: list[tuple[int, list[int], list[float], str, str]] = field(default_factory=list)
     open: str = ""
     where: str = ""
+    idle: bool = False
     places: dict[str, str] = field(default_factory=dict)
     current: dict[str, int] = field(default_factory=lambda: {"TYPE": 1, "MAT": 1, "REAL": 1})
     selected: set[int] | None = None
@@ -182,6 +190,13 @@ class Archive:
             return self.node_id if self.selected is None else sorted(self.selected)
         return self.component(word)
 
+    def through(self, first: str, last: str, step: str, what: str) -> Sequence[int]:
+        """Nodes from first to last: of a range beyond what the file can hold those that are there."""
+        span = range(int(first), whole(last, what) + 1, max(whole(step or "1", what), 1))
+        if len(span) <= 10**6:
+            return span
+        return [int(first), *(n for n in self.node_id if n in span and n != int(first))]
+
     def cells(self, word: str) -> Iterable[int] | None:
         """Numbers of elements by number, by component, or those that are selected; None of none of these."""
         if is_number(word):
@@ -192,6 +207,11 @@ class Archive:
             return [e.number for e in self.elements] if self.picked is None else sorted(self.picked)
         named = {group.upper(): group for group in self.groups}
         return self.groups[named[word.upper()]] if word.upper() in named else None
+
+    def place(self, where: str | int) -> str:
+        """The file with its folder and a line, by number or as it is in `where`; without one where it is none."""
+        line = f"{self.path}, line {where}" if isinstance(where, int) else where
+        return str(self.folder / (line if where else self.path))
 
     def leave_out(self, what: str) -> None:
         """Note that what counts is not read, in words."""

@@ -16,7 +16,7 @@ import numpy as np
 from ..data import Array, AverageLink, Equation, FaceTie, Indices, Joint, Link, RigidLink, Sector
 from .archive import Archive, Command, CyclicCommands, Element, whole
 from .archive_loads import LABELS, put
-from .raw import Damaged, Numbering, RawMesh, is_number, joined, real
+from .raw import Damaged, Numbering, RawMesh, Structure, is_number, joined, real
 from .supports import add_supports, in_axes
 from .systems import System
 
@@ -96,6 +96,10 @@ def _coupled(archive: Archive, words: list[str]) -> None:
         [n for n in nodes if n],
         "xyz" if label.upper() == "ALL" else LABELS.get(label.upper(), ""),
     )
+    if label.upper() in ("TEMP", "VOLT", "MAG", "PRES", "HDSP"):
+        return
+    if len(nodes) == 1 and not is_number(nodes[0]):
+        nodes = [str(node) for node in archive.nodes(nodes[0]) or []]
     lines = archive.lines
     if len(nodes) == 1 and is_number(nodes[0]):
         count, nodes = int(nodes[0]), []
@@ -407,6 +411,14 @@ def _pairs(archive: Archive, raw: RawMesh, numbering: Numbering) -> list[Link]:
         else:
             taken.append((members, others))
             found += _faced(archive, raw, numbering, pair, options.get(12, "0"))
+    hanging = {node for s in raw.structures for row in s.elements for node in raw.node_id[row].tolist()}
+    among: dict[str, list[list[int]]] = {}
+    for pair in (pair for why, several in left.items() if "no solid" in why for pair in several):
+        nodes = sorted(set.union(*pair.nodes()))
+        if not hanging.isdisjoint(nodes):
+            at = numbering.positions(nodes, f"{pair.where} names").tolist()
+            among.setdefault(next(iter(among), pair.where), []).append(at)
+    raw.structures += [Structure(where, "contact pairs with these", rows) for where, rows in among.items()]
     for why, several in left.items():
         counts = [
             sum(map(len, side))

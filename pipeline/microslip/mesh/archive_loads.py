@@ -6,8 +6,10 @@ SOLVE; modes after PSTRES,ON, or of a perturbed restart (ANTYPE with PERTURB), a
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass
+from copy import deepcopy
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -18,6 +20,7 @@ from .archive import Acting, Archive, Command, Element, Solution, whole
 from .archive_parameters import value_at
 from .loading import Terms, facet_loads, nodal_loads
 from .raw import Damaged, Numbering, RawMesh, is_number, real
+from .supports import still_supports
 from .systems import System
 
 WAYS = {"X": "x", "Y": "y", "Z": "z"}
@@ -48,8 +51,8 @@ def sides(archive: Archive, element: Element) -> dict[int, list[int]]:
 
 def _value(word: str, what: str) -> str:
     """A value as it is written: a number, or the name of a table in %; empty: 0."""
-    if not word.startswith("%"):
-        real(word or "0", what)
+    if not word.startswith("%") and not np.isfinite(real(word or "0", what)):
+        raise Damaged(f"{what} holds {word}, which is no finite number; correct it")
     return word or "0"
 
 
@@ -66,8 +69,7 @@ def put(archive: Archive, what: str, words: list[str], labels: dict[str, str]) -
         archive.leave_out(f"{what},{where},{label} (it names no nodes that are there)")
         return []
     if last and is_number(where):
-        end = min(whole(last, what), int(where) + 10**8)
-        nodes = range(int(where), end + 1, max(whole(step or "1", what), 1))
+        nodes = archive.through(where, last, step, what)
         archive.ranged.update(nodes[1:])
     into = archive.acting.moved if what == "D" else archive.acting.forces
     places = [(node, way) for node in nodes for way in ways]
@@ -114,7 +116,7 @@ def _deleted(archive: Archive, words: list[str]) -> None:
         archive.leave_out(f"{words[0].upper()},{where}")
         return
     if words[3] and is_number(where):
-        nodes = [*range(int(where), whole(words[3], words[0]) + 1, whole(words[4] or "1", words[0]))]
+        nodes = [*archive.through(where, words[3], words[4], words[0])]
     there = set(nodes)
     for node, way in [place for place in into if place[0] in there and place[1] in ways]:
         del into[node, way]
@@ -294,8 +296,15 @@ def _perturbed(archive: Archive, words: list[str]) -> None:
     """PERTURB, MODAL, stiffness, contact, what is kept of the loads."""
     archive.analysis = words[1].upper()[:5] or "MODAL"
     archive.perturbed = archive.perturbed or 0
-    if words[4].upper() in ("NOKEEP", "INERKEEP", "DZEROKEEP", "PARKEEP"):
-        archive.leave_out(f"PERTURB with {words[4].upper()}, which changes supports after the loads,")
+    kept = words[4].upper()
+    if kept in ("NOKEEP", "INERKEEP"):
+        archive.held.clear()
+    elif kept == "DZEROKEEP":
+        for (node, way), (value, _) in archive.acting.moved.items():
+            if value.strip("0."):
+                archive.held.release({node}, {way}, archive.components)
+    elif kept not in ("", "ALLKEEP"):
+        archive.leave_out(f"PERTURB with {kept}, which changes supports after the loads,")
 
 
 def _prestress(archive: Archive, words: list[str]) -> None:
@@ -321,8 +330,10 @@ def _solve(archive: Archive, words: list[str]) -> None:
         return
     time = float(len(archive.solved) + 1) if not archive.time else archive.time
     archive.solved.append(
-        Solution(archive.where, archive.analysis, archive.nonlinear, time, archive.acting.now())
-    )
+        Solution(
+            archive.where, archive.analysis, archive.nonlinear, time, archive.acting.now(), deepcopy(archive.held)
+        )
+    )  # fmt: skip
 
 
 def _more(archive: Archive, words: list[str]) -> None:
@@ -347,7 +358,7 @@ COMMANDS: dict[str, Command] = {
 
 def last_of(archive: Archive) -> Solution:
     """The solution that modes are about, or what acts at the end of the archive."""
-    now = Solution(archive.where, "STATIC", archive.nonlinear, archive.time or 1.0, archive.acting)
+    now = Solution(archive.where, "STATIC", archive.nonlinear, archive.time or 1.0, archive.acting, archive.held)
     if not archive.solved:
         return now._replace(kind="STATIC" if archive.analysis == "MODAL" else archive.analysis)
     number = (archive.perturbed or 0) or len(archive.solved)
@@ -362,19 +373,19 @@ def state_of_archive(archive: Archive, raw: RawMesh, numbering: Numbering) -> No
     Raises:
         Damaged: with the line, what is wrong with a load.
     """
-    solution = last_of(archive)
+    solution, there = last_of(archive), set(archive.node_id)
     acting = _Acting(archive, raw, numbering, solution)
     if not archive.prestressed and archive.perturbed is None:
         idle = [*acting.kinds(), *archive.unused]
         if "D" in idle:
-            moved = next(w for v, w in solution.acting.moved.values() if v.strip("0."))
+            moved = next(w for v, w in solution.acting.moved.values() if acting.counts(v))
             raw.remarks.append(f"{moved}: D prescribes displacements: they are zero in modes, as in Ansys")
             idle.remove("D")
         if idle:
             text = "loads, which change no frequency of an unstressed body (PSTRES, PERTURB)"
             raw.remarks.append(f"read and not used: {', '.join(idle)}: {text}")
         return
-    with of_file(solution.where):
+    with of_file(archive.place(solution.where)):
         loads = list(acting.loads())
     if solution.kind != "STATIC":
         archive.lost.append(
@@ -382,7 +393,11 @@ def state_of_archive(archive: Archive, raw: RawMesh, numbering: Numbering) -> No
             "not computed here: frequencies will differ"
         )
     elif loads or solution.acting.nodal or solution.acting.cells or solution.acting.uniform:
-        raw.state = StaticStep(f"{solution.where}: SOLVE", solution.nonlinear, tuple(loads))
+        still, held = solution.held, None
+        if (still.sets, still.nodes) != (archive.held.sets, archive.held.nodes):
+            nodes = {n: w for n, w in still.nodes.items() if n in there or n not in archive.ranged}
+            held = still_supports(raw, replace(still, nodes=nodes, axes=archive.held.axes), numbering)
+        raw.state = StaticStep(f"{solution.where}: SOLVE", solution.nonlinear, tuple(loads), held)
     else:
         archive.lost.append(
             f"{archive.path}: its modes are about a static state whose loads are not in it: frequencies will differ"
@@ -410,10 +425,16 @@ class _Acting:
         """Commands of what acts, without those whose numbers are zero."""
         acting, some = self.solution.acting, list[str]()
         parts = {"F": acting.forces, "D": acting.moved}
-        some += [name for name, part in parts.items() if any(v.strip("0.") for v, _ in part.values())]
-        some += ["SFE"] * any(v.strip("0.") for values, _ in acting.faces.values() for v in values)
+        some += [name for name, part in parts.items() if any(self.counts(v) for v, _ in part.values())]
+        some += ["SFE"] * any(self.counts(v) for values, _ in acting.faces.values() for v in values)
         fields = acting.fields.items()
-        return some + [name for name, (values, _) in fields if any(v.strip("0.+-eE") for v in values)]
+        return some + [name for name, (values, _) in fields if any(map(self.counts, values))]
+
+    def counts(self, word: str) -> bool:
+        """Whether a value is not zero, or a table that is not read."""
+        if re.fullmatch(r"[\s0.+-]*([eEdD][-+]?\d+)?", word):
+            return False
+        return not word.startswith("%") or value_at(self.archive, word, self.solution.time) != 0
 
     def loads(self) -> Iterator[NodalLoad | FacetLoad | BodyLoad | SpinLoad]:
         """All of them, by positions in the file."""
@@ -471,7 +492,7 @@ class _Acting:
             if face <= 3 and options.get(2, "0") == "1":
                 system = self.archive.systems.get(element.system, System())
                 centre = self.raw.points[at].mean(axis=0)
-                yield FacetLoad(where, at[None], values[None], system.directions(centre[None])[0][face - 1])
+                yield FacetLoad(where, at[None], values[None], system.directions(centre[None])[0, face - 1])
                 return
             if face != 1 or options.get(2, "0") not in ("", "0"):
                 self._left(place, "acts along tangents or a vector (faces 2 to 5 of SURF154)")
@@ -495,6 +516,9 @@ class _Acting:
         place = f"{where}: {label}"
         if not values[:3].any():
             return
+        masses = {e.number for e in self.archive.elements if self.archive.kinds.get(e.kind) == 21}
+        if label == "CMACEL" and cells is not None and not masses.isdisjoint(cells.tolist()):
+            self._left(place, "pulls point masses (MASS21) by a component: these")
         if label in ("ACEL", "CMACEL"):
             yield BodyLoad(place, -values[:3], cells)
         elif label == "OMEGA":

@@ -70,6 +70,8 @@ def lumps_of(archive: Archive, numbering: Numbering) -> Iterator[PointMass | Lum
             values = [*archive.reals.get(element.real, []), *12 * [0.0]]
             if element.real not in archive.reals:
                 raise Damaged(f"{KINDS[kind]} has no real constants {element.real}; add R,{element.real}")
+            if not nodes:
+                raise Damaged(f"{KINDS[kind]} names no node; write it behind E")
             at = numbering.positions(nodes, f"{KINDS[kind]} names")
             options = {n: w for n, w in archive.options.get(element.kind, {}).items() if w not in ("", "0")}
             made = (_mass if kind == 21 else _spring)(archive, element, values, at, options, f"{where}: {KINDS[kind]}")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import math
 import operator
 import re
 from collections.abc import Callable, Iterator
@@ -24,7 +25,7 @@ def commands(archive: Archive, line: str) -> Iterator[list[str]]:
     if line.upper().startswith(_TEXTS):
         return
     for part in line.split("$"):
-        if named := re.match(r"\s*([A-Za-z_]\w*)\s*(\([^()]*\))?\s*=(.*)$", part):
+        if named := re.match(r"\s*([A-Za-z_][\w ]*?)\s*(\([^()]*\))?\s*=(.*)$", part):
             yield ["*SET", named[1] + (named[2] or "").replace(" ", ""), *_words(named[3])]
             continue
         words = _words(part)
@@ -43,9 +44,9 @@ def _words(text: str) -> list[str]:
 
 _OPERATORS: dict[type, Callable[..., Any]] = {
     ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul, ast.Div: operator.truediv,
-    ast.USub: operator.neg, ast.UAdd: operator.pos,
+    ast.Pow: math.pow, ast.USub: operator.neg, ast.UAdd: operator.pos,
 }  # fmt: skip
-_FUNCTIONS: dict[str, Callable[[float], float]] = {"SQRT": np.sqrt, "ABS": abs}
+_FUNCTIONS: dict[str, Callable[[float], float]] = {"SQRT": math.sqrt, "ABS": abs}
 
 
 def evaluated(archive: Archive, word: str) -> str:
@@ -56,7 +57,8 @@ def evaluated(archive: Archive, word: str) -> str:
     if not re.search(r"[-+*/]", word) or len(word) > 200:
         return word
     try:
-        value = _number(archive, ast.parse(word.strip(), mode="eval").body)
+        plain = re.sub(r"(?<=[\d.])[dD](?=[-+]?\d)", "e", word.strip())
+        value = _number(archive, ast.parse(plain, mode="eval").body)
     except (SyntaxError, ValueError, KeyError, ArithmeticError, RecursionError, MemoryError):
         return word
     return repr(value) if np.isfinite(value) else word
@@ -71,8 +73,6 @@ def _number(archive: Archive, node: ast.AST) -> float:
         return float(_OPERATORS[type(node.op)](_number(archive, node.operand)))
     if isinstance(node, ast.BinOp):
         first, second = _number(archive, node.left), _number(archive, node.right)
-        if isinstance(node.op, ast.Pow):
-            return float(np.float64(first) ** second)
         return float(_OPERATORS[type(node.op)](first, second))
     if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and len(node.args) == 1:
         return float(_FUNCTIONS[node.func.id.upper()](_number(archive, node.args[0])))
@@ -183,9 +183,13 @@ def _holds(words: list[str]) -> bool:
     return first == second if texts else _TESTS[test.upper()](a, b)
 
 
-def _loop(archive: Archive, words: list[str]) -> None:
-    """*DO and its like: what they hold is read once."""
-    archive.leave_out(f"the loop {words[0].upper()} (its commands are read once, write them out)")
+def _macro(archive: Archive, words: list[str]) -> None:
+    """*CREATE: what stands up to *END is another file's."""
+    while archive.at < len(archive.lines):
+        archive.at += 1
+        if archive.lines[archive.at - 1].strip().upper() == "*END":
+            return
+    raise Damaged("*CREATE has no *END, the file is truncated")
 
 
 def _nothing(archive: Archive, words: list[str]) -> None:
@@ -194,5 +198,5 @@ def _nothing(archive: Archive, words: list[str]) -> None:
 
 COMMANDS: dict[str, Command] = {
     "*SET": _set, "*DIM": _dimension, "*TAX": _axis, "*GET": _nothing,
-    **dict.fromkeys(("*DO", "*DOW", "*REP"), _loop),
+    "*CRE": _macro,
 }  # fmt: skip

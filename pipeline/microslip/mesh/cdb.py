@@ -78,7 +78,7 @@ def read_cdb(path: Path) -> RawMesh:
         Damaged: content that is inconsistent, or elements whose meaning would be lost, by their number.
     """
     lines = path.read_text(encoding="latin-1").splitlines()
-    archive = Archive(path.name, lines, _beginning(lines))
+    archive = Archive(path.name, path.parent, lines, _beginning(lines))
     while archive.at < len(lines) and not archive.modes:
         archive.at += 1
         archive.where = f"{path.name}, line {archive.at}"
@@ -107,6 +107,10 @@ def _execute(archive: Archive, words: list[str]) -> None:
     if skipped(archive, words):
         return
     name = words[0].upper()
+    if name.startswith(("/POST", "/AUX", "/PREP", "/SOL")) or name[:4] == "FINI":
+        archive.idle = name.startswith(("/POST", "/AUX"))
+    if archive.idle and name != "*SET":
+        return
     meaning = _COMMANDS.get(name[:4], name if name[:1].isalpha() or name[:1] == "*" else "")
     if callable(meaning):
         meaning(archive, [*words, *_BLANKS])
@@ -179,13 +183,8 @@ def _read_node(archive: Archive, words: list[str]) -> None:
     if part != "ANG":
         active = archive.current.get("CSYS", 0) if not part else 0
         system = archive.systems.get(active, BASIC[0])
-        if system.kind not in (0, 1):
-            raise Damaged("N in a spherical system is not read; give global coordinates (CSYS,0)")
-        x, y, z = values[:3]
-        if system.kind == 1:
-            x, y = x * np.cos(np.radians(y)), x * np.sin(np.radians(y))
         archive.node_id.append(number)
-        archive.points.append((system.origin + np.array([x, y, z]) @ system.axes).tolist())
+        archive.points.append(system.points(np.array([values[:3]]))[0].tolist())
 
 
 def _announced(words: list[str]) -> int:
@@ -220,31 +219,34 @@ def _read_solid(archive: Archive, first: list[int], fields: Fields) -> None:
     """Material, type, real constants, section, system, three more, count of nodes, one more, number, nodes."""
     if len(first) < 12:
         raise Damaged(f"EBLOCK holds the line '{archive.lines[archive.at - 1].strip()[:60]}', which is too short")
-    count, nodes = first[8], first[11:]
+    count, nodes, line = first[8], first[11:], archive.at
     while len(nodes) < count and archive.at < len(archive.lines):
         more = _row(archive.lines[archive.at], fields)
         archive.at += 1
         if not more or more[0] == -1:
             raise Damaged(f"element {first[10]} has {len(nodes)} nodes instead of {count}")
         nodes += more
-    archive.elements.append(Element(first[10], first[0], first[1], first[2], first[4], nodes[:count]))
+    if any(nodes[count:]):
+        raise Damaged(f"element {first[10]} announces {count} nodes and lists more")
+    archive.elements.append(Element(first[10], first[0], first[1], first[2], first[4], nodes[:count], line=line))
 
 
 def _read_compact(archive: Archive, first: list[int], fields: Fields) -> None:
     """Number and nodes of an element of the current type, material and real constants."""
-    now = archive.current
+    now, line = archive.current, archive.at
     nodes = _whole_element(archive, first[1:], now["TYPE"], fields)
     archive.elements.append(
-        Element(first[0], now["MAT"], now["TYPE"], now["REAL"], now.get("ESYS", 0), nodes)
+        Element(first[0], now["MAT"], now["TYPE"], now["REAL"], now.get("ESYS", 0), nodes, line=line)
     )
 
 
 def _read_short(archive: Archive, first: list[int], fields: Fields) -> None:
     """An element of a block without SOLID: number, type, real constants, material, system, nodes."""
     number, *four = [*first[:5], *[0] * (5 - len(first[:5]))]
-    kind, where = four[0] if four[0] in archive.kinds else archive.current["TYPE"], archive.where
+    kind, line = four[0] if four[0] in archive.kinds else archive.current["TYPE"], archive.at
     nodes = _whole_element(archive, first[5:], kind, fields)
-    archive.elements.append(Element(number, four[2], kind, four[1], four[3], nodes, where))
+    where = f"{archive.path}, line {line}"
+    archive.elements.append(Element(number, four[2], kind, four[1], four[3], nodes, where, line))
 
 
 def _whole_element(archive: Archive, nodes: list[int], kind: int, fields: Fields) -> list[int]:
@@ -257,8 +259,8 @@ def _whole_element(archive: Archive, nodes: list[int], kind: int, fields: Fields
     return nodes
 
 
-def _row(line: str, fields: Fields) -> list[int]:
-    return [whole(line[a:b], "EBLOCK") for a, b, _ in fields if line[a:b].strip()]
+def _row(line: str, fields: Fields, what: str = "EBLOCK") -> list[int]:
+    return [whole(line[a:b], what) for a, b, _ in fields if line[a:b].strip()]
 
 
 def _read_component(archive: Archive, words: list[str]) -> None:
@@ -270,7 +272,7 @@ def _read_component(archive: Archive, words: list[str]) -> None:
     listed: list[int] = []
     at += 1
     while len(listed) < count:
-        if at >= len(lines) or not (row := _row(lines[at], fields)):
+        if at >= len(lines) or not (row := _row(lines[at], fields, f"the component {words[1]}")):
             raise Damaged(f"the component {words[1]} has {len(listed)} numbers instead of {count}")
         listed += row
         at += 1
@@ -341,7 +343,7 @@ def _read_element(archive: Archive, words: list[str]) -> None:
     nodes = numbers[apart:]
     number = numbers[0] if apart and numbers else max((e.number for e in archive.elements), default=0) + 1
     archive.elements.append(
-        Element(number, now["MAT"], now["TYPE"], now["REAL"], now.get("ESYS", 0), nodes, archive.where)
+        Element(number, now["MAT"], now["TYPE"], now["REAL"], now.get("ESYS", 0), nodes, archive.where, archive.at)
     )
 
 
@@ -361,6 +363,34 @@ def _mass(archive: Archive, words: list[str]) -> None:
 def _end(archive: Archive, words: list[str]) -> None:
     """/EOF."""
     archive.at = len(archive.lines)
+
+
+def _generated(archive: Archive, words: list[str]) -> None:
+    """VMESH, NGEN and others that make nodes or elements."""
+    what = f"{words[0].upper()} makes nodes or elements, which Ansys alone does"
+    raise Damaged(f"{what}; write the mesh that it has made as an archive (CDWRITE,DB)")
+
+
+_IN_LOOPS = {*archive_parameters.COMMANDS, "*DO", "*DOW", "NSEL", "ESEL", "ALLS", "CMSE", "ESLN", "NSLE", "CSYS"}
+"""What a loop may repeat without a change of the model."""
+
+
+def _loop(archive: Archive, words: list[str]) -> None:
+    """*DO up to its *ENDDO, left aside where it changes nothing that is read.
+
+    Raises:
+        Damaged: it repeats something that is.
+    """
+    depth, first = 1, archive.at
+    for number, line in enumerate(archive.lines[first:], first + 1):
+        name = line.split("!")[0].strip().upper().partition(",")[0].strip()
+        depth += (name[:3] == "*DO" and name[:4] != "*DOT") - (name == "*ENDDO")
+        if not depth:
+            archive.at = number
+            return
+        if _COMMANDS.get(name[:4]) and name[:4] not in _IN_LOOPS and not name.startswith("/"):
+            raise Damaged(f"{words[0].upper()} repeats {name}; write the commands out, or an archive (CDWRITE,DB)")
+    raise Damaged(f"{words[0].upper()} has no *ENDDO, the file is truncated")
 
 
 def _other_file(archive: Archive, words: list[str]) -> None:
@@ -439,6 +469,8 @@ def _read_table(archive: Archive, words: list[str]) -> None:
     archive.table, archive.places["TB"] = None, ""
     if label in _LINEAR and option in ("", "ISOT"):
         archive.table = number, label
+    elif label == "ANEL" and option in ("", "0", "1") and words[3] in ("", "0", "1"):
+        archive.table, archive.matrices[number] = (number, label), (option == "1", {})
     elif label in _LINEAR or label in _BENDING:
         archive.refused[number] = f"TB,{label}{',' * bool(option)}{option} ({archive.where}), which is not read"
     elif label not in ("FRIC", "SDAMP", "DENS", "THERM", "JOIN", "FCLI"):
@@ -464,6 +496,10 @@ def _read_table_data(archive: Archive, words: list[str]) -> None:
     if archive.table is None:
         return
     number, table = archive.table
+    if table == "ANEL":
+        places = enumerate(words[2:8], whole(words[1] or "1", "TBDATA"))
+        archive.matrices[number][1].update({p: real(w, "TBDATA") for p, w in places if w})
+        return
     first, text = whole(words[1] or "1", "TBDATA"), archive.places.get("TB", "")
     for place, value in enumerate(words[2:8], first):
         if value and place <= len(_LINEAR[table]):
@@ -488,8 +524,9 @@ _COMMANDS: dict[str, Command | str] = {
     **archive_parameters.COMMANDS, **archive_nodes.COMMANDS, **archive_links.COMMANDS,
     **archive_lumps.COMMANDS, **archive_loads.COMMANDS,
     **dict.fromkeys(("CEIN", "CPIN", "CPNG", "CPLG", "CPCY", "CECY", "CESG", "CPSG"), _CONSTRAINS),
-    **dict.fromkeys(("EGEN", "ENGE", "NGEN", "FILL", "NSYM", "ESYM", "EDEL", "NDEL", "NUMM", "NSCA"), _ADDS),
-    **dict.fromkeys(("NUMC", "ESUR", "VMES", "VSWE", "AMES", "EINT", "TRNF", "TRAN", "EREF", "EMID"), _ADDS),
+    **dict.fromkeys(("VMES", "VSWE", "AMES", "LMES", "KMES", "NGEN", "FILL", "EGEN", "ENGE", "NSYM"), _generated),
+    **dict.fromkeys(("ESYM", "EDEL", "NDEL", "NUMM", "NSCA", "ESUR", "EINT", "TRNF", "EREF", "EMID"), _ADDS),
+    **dict.fromkeys(("*DO", "*DOW"), _loop), "*REP": _generated,
     **dict.fromkeys(("MPCH", "EKIL", "EALI", "MPAM"), "changes materials of elements"),
     **dict.fromkeys(("INIS", "ISTR", "SLOA", "PSLO", "SFGR", "SFFU", "SFSC", "FSCA", "DSCA", "BFSC"), "loads it"),
     "MATW": "holds matrices", "SE": "holds matrices",
@@ -499,8 +536,8 @@ _COMMANDS: dict[str, Command | str] = {
         "CMWR CMDE TBLI TBPT SCOP QRDO MODC CNVT CDWR SAVE WPCS LNSR PRED CUTC OPNC MDAM HROP HARF CGLO ERNO MPLI "
         "NLIS ELIS DLIS FLIS ETLI SLIS CSLI ALLO PARS NORL EXIT EPLO NPLO GPLO PLNS PRNS SET PLDI PRRS PRES SFLI BFLI "
         "MPWR NWRI EWRI SPEC OUTP NOPR GOPR MPPL STEF THOP CYCS RESV SNOP PCGO LANB KEYW PMAP DESI CMLI CMPL SEOP "
-        "PRIN NROP EMAT MONI JPEG MODE BETT CORI DSYS RSYS UIMP CHEC *END *ELS *VWR *CFO *CFC *CRE *MSG *STA *USE *LIS "
-        "*VEC *NRM *DOT *MAT *EXP *PRI *VGE *VPU *VFI *VRE *VME *CYC *EXI *RET *ASK *ULI *TRE *DEL".split(), ""
+        "PRIN NROP EMAT MONI JPEG MODE BETT CORI DSYS RSYS UIMP CHEC *END *IF *ELS *VWR *CFO *CFC NUMC *MSG *STA *USE "
+        "*LIS *VEC *NRM *DOT *MAT *EXP *PRI *VGE *VPU *VFI *VRE *VME *CYC *EXI *RET *ASK *ULI *TRE *DEL".split(), ""
     ),
 }  # fmt: skip
 """First four letters of a command -> what reads it; or why it counts and is not read; nothing: it
@@ -512,18 +549,26 @@ changes no frequency."""
 
 def _assembled(archive: Archive) -> RawMesh:
     if not archive.node_id:
-        raise Damaged("there is no NBLOCK")
+        raise Damaged("there are no nodes (NBLOCK or N); write the mesh as an archive (CDWRITE,DB)")
     archive.elements = [changed(e, archive.changes.get(e.number, {})) for e in archive.elements]
     _take_mesh200(archive)
     middle = _Middle(archive)
     regions: dict[tuple[int, int], int] = {}
     blocks: dict[str, list[tuple[int, int, list[int]]]] = {}
+    there = {*archive.node_id, 0}
     for element in archive.elements:
-        named = _form(archive, element)
-        if named is not None:
-            region = regions.setdefault((element.material, element.system), len(regions))
-            cell = element.number, region, middle.filled(element.number, *named)
-            blocks.setdefault(named[0], []).append(cell)
+        try:
+            if (named := _form(archive, element)) is None:
+                continue
+            if not there.issuperset(named[1]):
+                missing = next(n for n in named[1] if n not in there)
+                raise Damaged(f"element {element.number} names node {missing}, which the file does not define")
+            nodes = middle.filled(element.number, *named)
+        except Damaged as error:
+            error.file = error.file or archive.place(element.line)
+            raise
+        region = regions.setdefault((element.material, element.system), len(regions))
+        blocks.setdefault(named[0], []).append((element.number, region, nodes))
     if not blocks:
         told = [text.split(" is not read")[0] for text in _other_elements(archive, archive.path)]
         text = f"holds no solid elements ({'; '.join(told) or 'nothing but nodes'})"
@@ -544,10 +589,9 @@ def _assembled(archive: Archive) -> RawMesh:
         raw.retained.append("M")
     constrain(archive, raw, numbering)
     temperatures_of(archive, raw, numbering)
-    raw.materials = [_material(archive, raw, *key) for key in regions] if archive.constants else []
-    if not raw.materials:
-        raw.regions = []
-        archive.lost += [f"{archive.path}: the material {n} has {text}" for n, text in archive.refused.items()]
+    made = archive.constants or archive.refused
+    raw.materials = [_material(archive, raw, *key) for key in regions] if made else []
+    raw.regions = raw.regions if made else []
     _stress_free(archive, raw, [material for material, _ in regions])
     state_of_archive(archive, raw, numbering)
     return raw
@@ -617,7 +661,7 @@ def _take_mesh200(archive: Archive) -> None:
     for number, kind in list(kinds.items()):
         new = _BY_MESH200.get(archive.options.get(number, {}).get(1, "")) if kind == 200 else None
         if new and any(e.kind == number for e in archive.elements):
-            kinds[number], archive.options[number] = new, {2: "1"}
+            kinds[number], archive.options[number] = new, {2: "1"} if new == 186 else {}
             text = f"the cells MESH200 of the type {number} are taken as SOLID{new}"
             archive.remarks.append(f"{text}: no others are there")
 
@@ -670,6 +714,7 @@ def _integration(archive: Archive, raw: RawMesh) -> list[str]:
         few = 0
     elif few > len(rules) - few:
         raw.integration, few = "reduced", len(rules) - few
+        said.append(f"{len(rules)} bricks of 20 nodes have reduced integration, as their KEYOPT(2) says")
     if few:
         other = "full" if raw.integration == "reduced" else "reduced"
         raw.lost.append(
@@ -790,7 +835,7 @@ def _material(archive: Archive, raw: RawMesh, number: int, system: int) -> DeckM
     if number in archive.refused and "EX" not in c:
         text = f"{archive.refused[number]}; write MP,EX, NUXY and DENS (or nine constants of an orthotropic one)"
         return DeckMaterial(name, None, density, np.zeros(6), refused=text)
-    if "EX" not in c:
+    if "EX" not in c and number not in archive.matrices:
         return DeckMaterial(name, None, density, np.zeros(6))
     along = np.array([_first(c, f"{'ALP' if 'ALPX' in c else 'CTE'}{a}") or 0.0 for a in "XYZ"])
     if ("ALPX" in c and "ALPY" not in c) or ("CTEX" in c and "CTEY" not in c):
@@ -801,16 +846,17 @@ def _material(archive: Archive, raw: RawMesh, number: int, system: int) -> DeckM
     table, axes = None, None
     if len({*c.get("DENS", {}).values()}) > 1:
         archive.remarks.append(f"the density of the {name} depends on temperature: that of its first row is taken")
-    if _orthotropic(c):
+    if number in archive.matrices or _orthotropic(c):
         local = archive.systems.get(system, BASIC[0])
         if local.kind != 0:
             text = f"directions of the element coordinate system {system}, which is no rectangular one"
             text += "; give it in body.toml"
             return DeckMaterial(name, None, density, np.zeros(6), refused=text)
-        if max(len(c[label]) for label in c if label[0] in "EG") > 1:
+        if max((len(c[label]) for label in c if label[0] in "EG"), default=1) > 1:
             archive.remarks.append(f"the orthotropic {name} depends on temperature: its first row is taken")
         axes = local.axes
-        C: Array = turned(orthotropic_row(name, _nine(name, c)), axes)
+        own = _matrix(archive, number) if number in archive.matrices else orthotropic_row(name, _nine(name, c))
+        C: Array = turned(own, axes)
     else:
         nu = c.get("PRXY") or c.get("NUXY") or {1: 0.3}  # 0.3 is what Ansys assumes
         ratio = nu[min(nu)]
@@ -819,12 +865,28 @@ def _material(archive: Archive, raw: RawMesh, number: int, system: int) -> DeckM
     return DeckMaterial(name, C, density, turned_strain(along, axes), table)
 
 
+def _matrix(archive: Archive, number: int) -> Array:
+    """Hooke matrix of TB,ANEL: its 21 constants by columns below the diagonal, of stiffness or of compliance.
+
+    Raises:
+        Damaged: it is not positive definite.
+    """
+    inverse, constants = archive.matrices[number]
+    C = np.zeros((6, 6))
+    row, column = np.triu_indices(6)  # the upper triangle by rows is the lower one by columns
+    C[row, column] = C[column, row] = [constants.get(place, 0.0) for place in range(1, 22)]
+    if not np.isfinite(C).all() or np.linalg.eigvalsh(C).min() <= 0:
+        raise Damaged(f"TB,ANEL of the material {number} is not positive definite; correct its 21 constants")
+    return np.linalg.inv(C) if inverse else C
+
+
 def _orthotropic(c: dict[str, dict[int, float]]) -> bool:
     """Whether the constants of a material are others than those that EX and NUXY alone make."""
     E = _first(c, "EX") or 0.0
     nu = _first(c, "PRXY") if "PRXY" in c else _first(c, "NUXY") if "NUXY" in c else 0.3
-    plain = {"E": E, "G": E / (2 * (1 + (nu or 0.0)))}
-    return any(abs((_first(c, key) or 0.0) / plain[key[0]] - 1) > 1e-4 for key in c if key[0] in plain)
+    plain = {"E": E, "G": E / (2 * (1 + (nu or 0.0)) or 1.0)}
+    parts = ((_first(c, key) or 0.0, plain[key[0]]) for key in c if key[0] in plain)
+    return any(abs(value - usual) > 1e-4 * abs(usual) for value, usual in parts)
 
 
 def _first(c: dict[str, dict[int, float]], label: str) -> float | None:

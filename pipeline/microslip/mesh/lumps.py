@@ -244,6 +244,8 @@ class _Spread:
         if raw.temperature is not None:
             usual = [np.nanmedian(t) if np.isfinite(t).any() else np.nan for t in raw.temperature.T]
             raw.temperature = np.vstack([raw.temperature, np.tile(usual, (count, 1))])
+            loose = np.array(sorted({*range(len(raw.points))} - self.solid), dtype=np.int64)
+            raw.temperature[loose] = usual  # of no solid: they heat nothing
 
     def _load(self, point: int, mass: float) -> None:
         self.masses[point] = self.masses.get(point, 0.0) + mass

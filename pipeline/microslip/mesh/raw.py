@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -48,7 +49,8 @@ class DeckMaterial:
         density: None: missing. expansion: (6,) thermal strain per degree. temperature: (t, 2) temperature and factor on
             the elasticity, or None. where: the set of cells that it was given to. refused: what of it is not read, in
             words, and what to do. line: its place in the file, ``part.inp, line 12``, if known. young, poisson, shear:
-            what is there of them where they do not suffice for an elasticity.
+            what is there of them where they do not suffice for an elasticity. stiffness_table,
+            expansion_table, zero: as of a `Material`, in the file's units.
     """
 
     name: str
@@ -62,6 +64,9 @@ class DeckMaterial:
     young: float | None = None
     poisson: float | None = None
     shear: float | None = None
+    stiffness_table: tuple[Array, Array] | None = None
+    expansion_table: Array | None = None
+    zero: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -160,10 +165,21 @@ class RawMesh:
         """
         for kind, found in solids.items():
             ids, regions, nodes = (np.array(part, dtype=np.int64) for part in zip(*found, strict=True))
-            self.blocks.append((kind, numbering.positions(nodes, what)))
+            self.blocks.append((kind, numbering.positions(nodes, what, ids)))
             self.cell_id.append(ids)
             self.regions.append(regions)
         refuse_twice(self.cell_id)
+
+
+@contextmanager
+def in_its_line(path: Path) -> Iterator[None]:
+    """A mistake in here stands in a file, in the line with which its sentence begins if it does."""
+    try:
+        yield
+    except UserError as error:
+        if error.file:
+            raise
+        raise refused(path, str(error)) from error.__cause__
 
 
 def in_file(path: Path, text: str) -> str:
@@ -313,17 +329,22 @@ class Numbering:
         """The numbers from first to last that nodes have, ascending."""
         return self.sorted[np.searchsorted(self.sorted, first) : np.searchsorted(self.sorted, last, "right")]
 
-    def positions(self, numbers: Indices | Sequence[Any], what: str) -> Indices:
-        """Positions of node numbers, any shape.
+    def positions(self, numbers: Indices | Sequence[Any], what: str, of: Indices | None = None) -> Indices:
+        """Positions of node numbers, any shape. of: (e,) the elements that name them, row by row.
 
         Raises:
             Damaged: a number that no node has.
         """
-        ids = np.asarray(numbers, dtype=np.int64)
+        try:
+            ids = np.asarray(numbers, dtype=np.int64)
+        except OverflowError:
+            raise Damaged(f"{what} a node whose number is beyond all bounds") from None
         if not len(self.sorted):
             raise Damaged(f"{what} but there are no nodes before it")
         at = np.minimum(np.searchsorted(self.sorted, ids), len(self.sorted) - 1)
         missing = self.sorted[at] != ids
         if missing.any():
+            if of is not None:
+                what = f"element {of[np.nonzero(missing)[0][0]]} names"
             raise Damaged(f"{what} node {ids[missing].flat[0]}, which the file does not define")
         return self.order[at]

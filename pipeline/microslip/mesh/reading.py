@@ -7,11 +7,13 @@ versions of MSH, VTU and VTK files go through meshio, which is called here only.
 from __future__ import annotations
 
 import contextlib
+import copy
 import io
 import re
 import warnings
 from collections.abc import Callable
 from dataclasses import replace
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -21,8 +23,9 @@ from ..data import Array, Indices, Lumps, Mesh
 from ..errors import UserError, in_its_file
 from ..files.hostile import tried
 from ..files.store import ordinary
+from ..plausible import DENSITY
 from ..topology import CELL_TYPES, FACET_CORNERS
-from ..units import usual_system
+from ..units import density, usual_system
 from .bdf import read_bdf
 from .bdf_cards import included
 from .cards import files_of
@@ -73,6 +76,7 @@ def read_mesh(
         raise UserError("no such mesh file; make it first or correct the path")
     try:
         raw = _read_raw(path)
+        _parsed.cache_clear()  # a file that it includes may change
         if (said := unit_of(path)) not in ("", unit):
             raw.lost.append(f"the file tells its lengths in {said}, here they are taken in {unit}: which is right?")
         made = [in_si(m, system, zero, instead) for m in raw.materials] if system else []
@@ -92,6 +96,8 @@ def _refused(path: Path, error: Damaged) -> UserError:
     remedy = "" if "; " in text else "; correct it or write it again"
     if error.file:
         return UserError(text + remedy, file=error.file)
+    if re.match(r"line \d+: ", text):
+        text = f"{path.name}, {text}"
     told = text if text.startswith(f"{path.name}, ") else f"cannot be used: {text}"
     return refused(path, told + remedy)
 
@@ -152,11 +158,39 @@ def unit_of(path: Path) -> str:
     return ""
 
 
+def likely_unit(path: Path) -> str:
+    """m or in where the file's densities are a solid's in these and far from it in mm; empty otherwise."""
+    try:
+        raw = _read_raw(path) if path.is_file() and suffix_of(path) in _READERS else None
+    except UserError:
+        return ""
+    densities = [m.density for m in raw.materials if m.density] if raw else []
+    if not densities or min(densities) * density("mm-t-s") < 40 * DENSITY[1]:
+        return ""
+    for unit in ("m", "in"):
+        factor = density(usual_system(unit) or "")
+        if all(DENSITY[0] <= value * factor <= DENSITY[1] for value in densities):
+            return unit
+    return ""
+
+
 def _read_raw(path: Path) -> RawMesh:
+    """A file's content, its own to change; the file that was read last is not parsed again."""
+    found = ordinary(path).stat()
+    return copy.deepcopy(_parsed(path, found.st_mtime_ns, found.st_size))
+
+
+@lru_cache(maxsize=1)
+def _parsed(path: Path, time: int, size: int) -> RawMesh:
     suffix = suffix_of(path)
     if suffix == ".msh" and is_msh41(path):
         return read_msh41(path)
     if suffix in _READERS:
+        with ordinary(path).open("rb") as file:
+            head = file.read(4096)
+        if suffix != ".med" and head.count(0) > 8:
+            way = "UTF-16; write it as UTF-8 or ASCII" if head[:2] in (b"\xff\xfe", b"\xfe\xff") else "no text"
+            raise Damaged(f"it is {way}")
         return _READERS[suffix](path)
     if suffix in _BY_MESHIO:
         return _by_meshio(path, _from_meshio)
@@ -177,6 +211,10 @@ def _mesh_of(raw: RawMesh, metres: float, system: str | None) -> Mesh:
         if {"wedge18", "pyramid14"} & set(foreign):
             way += " (in gmsh: Mesh.SecondOrderIncomplete = 1)"
         raise UserError(f"cells of type {', '.join(foreign)} cannot be assembled; {way}")
+    if raw.points.shape[1:] != (3,) or not np.isfinite(raw.points).all():
+        lost = raw.node_id[~np.isfinite(raw.points).reshape(len(raw.points), -1).all(axis=1)]
+        which = f"node {lost[0]} has others" if len(lost) else "there are others"
+        raise UserError(f"coordinates must be three finite numbers a point, and {which}; correct them")
     _sort_by_region(raw)
     turn_left_handed(raw)
     cells: dict[str, list[Indices]] = {}
@@ -188,10 +226,10 @@ def _mesh_of(raw: RawMesh, metres: float, system: str | None) -> Mesh:
     attached = hanging(raw)
     lumps = spread(raw, system)
     points = raw.points * metres
-    if points.shape[1:] != (3,) or not np.isfinite(points).all():
-        raise UserError("coordinates must be three finite numbers a point; the file is damaged or not 3-D")
-    if np.abs(points).max() > _FARTHEST:
-        raise UserError(f"a point lies {np.abs(points).max():.3g} m from the origin; the file is damaged")
+    away = np.abs(points).max(axis=1)
+    if away.max() > _FARTHEST:
+        node = raw.node_id[away.argmax()] if away.argmax() < len(raw.node_id) else ""
+        raise UserError(f"node {node} lies {away.max():.3g} m from the origin; the file is damaged")
     whole = {t: np.concatenate(c) for t, c in cells.items()}
     mesh = _assemble_mesh(raw, points, whole, metres, system, lumps)
     return replace(mesh, hanging=attached, retained=tuple(n for n in raw.retained if n in mesh.point_sets))
