@@ -116,6 +116,13 @@ def _load(
         raw.regions = []
     if static is not None:
         state_of_bulk(bulk, static, nonlinear, enforced)
+        for kind in ("SPC", "MPC"):
+            sets = [c.number_of(kind) for c in (static, control.modal)]
+            if sets[0] != sets[1]:
+                raw.lost.append(
+                    f"{static.place}: its {kind} = {sets[0]} is not that of the modes ({sets[1]}), which holds in both "
+                    "here: frequencies may differ"
+                )
     free = stress_free(bulk, properties) or [0.0]
     varied = any(material.temperature is not None for material in raw.materials)
     if acting is not None and (static is not None or not varied):
