@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..data import Array, AverageLink, Equation, Link, RigidLink
+from ..data import Array, AverageLink, Equation, FaceTie, Link, PointMass, RigidLink
 from ..topology import CELL_TYPES
 from .bdf_cards import Bulk, BulkCard, at_card, cards_of, lines_of, listed, number_of, parted
 from .bdf_contact import READ as FACED
@@ -87,6 +87,7 @@ def read_bdf(path: Path) -> RawMesh:
     raw.links += [*_rigid(bulk), *bars_of(bulk), *_averages(bulk), *_equations(bulk, control)]
     faced(bulk, control)
     raw.lumps = lumps_of(bulk)
+    _drop_islands(raw)
     raw.structures = list(_structures(bulk))
     _retain(bulk)
     _load(bulk, control, properties, enforced)
@@ -541,6 +542,36 @@ def _equations(bulk: Bulk, control: Control) -> Iterator[Link]:
         along = np.array([bulk.held.axes.get(node, np.eye(3))[way % 3] for node, way in pairs])
         first = np.array(ways) // 3 * 3
         yield in_axes(card.where, nodes, first, along * factors[:, None])
+
+
+def _drop_islands(raw: RawMesh) -> None:
+    """Leave out links whose nodes meet neither solids nor lumps, directly or by other links."""
+    near = {*joined(nodes.ravel() for _, nodes in raw.blocks).tolist()}
+    for item in raw.lumps:
+        near.update([item.node] if isinstance(item, PointMass) else item.nodes.tolist())
+    left = [link for link in raw.links if not isinstance(link, FaceTie)]
+    nodes = {id(link): _nodes_of(link) for link in left}
+    size = -1
+    while size != len(near):
+        size = len(near)
+        for link in left:
+            if not near.isdisjoint(nodes[id(link)]):
+                near |= nodes[id(link)]
+    alone = [link for link in left if near.isdisjoint(nodes[id(link)])]
+    if alone:
+        raw.remarks.append(
+            f"{alone[0].where}: it and {len(alone) - 1} other constraints join nothing to the solids: left out"
+        )
+        gone = {id(link) for link in alone}
+        raw.links = [link for link in raw.links if id(link) not in gone]
+
+
+def _nodes_of(link: Link) -> set[int]:
+    """Positions of the nodes of a link that names no face."""
+    if isinstance(link, Equation):
+        return {*link.nodes.tolist()}
+    assert isinstance(link, RigidLink | AverageLink) and not isinstance(link.members, str)
+    return {link.reference, *link.members.tolist()}
 
 
 def _retain(bulk: Bulk) -> None:

@@ -274,6 +274,9 @@ def _joined(lines: list[BulkLine], wanted: Collection[str]) -> Iterator[BulkCard
                         "before it; put it behind the line that it continues"
                     )
                 target = there
+        if inside and "," in line.text:
+            text = f"{name},{' '.join(inside)}{line.text[len(head) :]}"
+            line = BulkLine(line.place, text)
         words, mark, wide = _fields(
             line, name, (target[0] if goes_on else name.rstrip("*")) in wanted
         )
