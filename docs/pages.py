@@ -142,7 +142,7 @@ def keywords() -> str:
             words({*inp._REFUSED, *deck_state._OTHER_STATES}, "*"),
         ],
         ["Ansys", words(ansys), words({*cdb._COMMANDS} - ansys)],
-        ["Nastran", words(bdf._READ), ""],
+        ["Nastran", words({*bdf._READ, *bdf.LOADS}), words(bdf.OTHERS)],
     ]
     return table(["deck", "read", "not read: refused or said"], rows)
 

@@ -178,3 +178,14 @@ def test_what_bulk_data_holds_besides_is_named(tmp_path, capsys):
     line = ["import", str(tmp_path / "a.bdf"), str(tmp_path / "out"), "--unit", "m"]
     refused_command(line, capsys, "PCOMPS 1")
     assert not (tmp_path / "out").exists()
+
+
+def test_a_solid_without_density_beside_others_weighs_nothing(tmp_path):
+    """As in Nastran; a deck without any density gets that of --density or steel's."""
+    mesh = meshes.brick("hexahedron", (1, 1, 2), (0.02, 0.01, 0.03))
+    text = bulk(mesh).replace("CHEXA          2       1", "CHEXA          2       5")
+    cards = ["PSOLID,1,1", "PSOLID,5,2", "MAT1,1,2.1+11,,.3,7800.", "MAT1,2,2.1+11,,.3,0."]
+    (tmp_path / "a.bdf").write_text(text.replace("ENDDATA", "\n".join([*cards, "ENDDATA"])))
+    read = read_mesh(tmp_path / "a.bdf", "m", "m-kg-s")
+    np.testing.assert_allclose([m.density for m in read.materials], [7800, 7.8e-6])
+    assert any("MAT1 2 has no density: its cells weigh nothing" in text for text in read.remarks)

@@ -10,6 +10,7 @@ import pytest
 from refusals import refused_command
 from test_nastran_systems import block, bulk, card, hertz
 
+from microslip.errors import UserError
 from microslip.mesh import read_mesh
 from microslip.mesh.surface import boundary_facets
 from microslip.topology import CELL_TYPES, FACET_CORNERS
@@ -274,3 +275,26 @@ def test_a_damaged_load_is_refused_with_its_line(capsys, text, words):
 def test_a_case_control_that_chooses_what_is_not_there_is_refused(capsys, control, words):
     Path("a.bdf").write_text(deck(control=control))
     refused_command(["import", "a.bdf", "body", "--unit", "m"], capsys, words)
+
+
+def test_stress_free_temperatures_are_those_of_init_or_of_the_material():
+    control = (*HEATING[:2], "TEMP(INIT)=6", *HEATING[2:])
+    Path("a.bdf").write_text(deck("TEMPD,5,120.,6,35.", "TEMP,6,1,36.", control=control))
+    np.testing.assert_array_equal(read_mesh("a.bdf", "m").temperature[:2], [[36, 120], [35, 120]])
+    Path("a.bdf").write_text(deck("TEMPD,5,120.", control=HEATING))
+    np.testing.assert_array_equal(read_mesh("a.bdf", "m").temperature[:2], [[20, 120], [20, 120]])
+    Path("a.bdf").write_text(deck("TEMP,5,1,120.", control=HEATING))
+    with pytest.raises(UserError, match="line 6: TEMPERATURE = 5 gives node 2 no temperature"):
+        read_mesh("a.bdf", "m")
+
+
+def test_a_static_subcase_that_is_held_otherwise_is_told():
+    control = ("METHOD=9", "SUBCASE 1", "SPC=8", "LOAD=3", "SUBCASE 2", "SPC=7", "STATSUB=1")
+    Path("a.bdf").write_text(deck(*PULLED, "SPC1,8,123,1", control=control))
+    assert any("its SPC = 8 is not that of the modes (7)" in text for text in read_mesh("a.bdf", "m").lost)
+
+
+def test_modes_of_a_static_solution_are_those_of_the_unloaded_body(capsys):
+    text = deck(*PULLED, control=("SPC=7", "LOAD=3")).replace("SOL 103", "SOL 101")
+    np.testing.assert_allclose(hertz(text)[:4], [1665.394, 2556.59, 10384.92, 12173.87], rtol=1e-6)
+    assert "FORCE: loads, which change no frequency of an unstressed body" in capsys.readouterr().out

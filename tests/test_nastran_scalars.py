@@ -84,7 +84,7 @@ def test_scalar_elements_along_the_directions_of_a_turned_node():
         ("CELAS2,801,1.", "joins nothing"),
         (f"CMASS2,801,-1.,{A},1", "below 0"),
         (f"CMASS1,801,77,{A},1", "PMASS 77"),
-        ("CDAMP4,801,1.,999", "names node 999"),
+        ("CDAMP3,801,77,999", "PDAMP 77"),
         (f"RBAR,801,{A},{B},12,3", "3 independent components"),
         (f"RBAR,801,{A},{B},123,456,4,1", "no point of which all six"),
         (f"RROD,801,{A},{A}", "at one place"),
@@ -120,3 +120,10 @@ def test_cells_that_are_numbered_left_handed_are_the_same_cells(kind):
         )
         np.testing.assert_allclose(middle, (a + b) / 2, atol=1e-15)
     assert read.n_points == mesh.n_points
+
+
+def test_scalar_points_need_no_spoint_and_a_mass_that_cannot_move_may_be_impossible():
+    cards = [f"CELAS2,801,3.+5,{A},3,901", "CMASS4,802,.02,901", "GRID,950,,0.,0.,0.,,123456"]
+    cards += ["CONM2,803,950,,1.,,,,,+\n+,1.,1.,1.,1.,1.,1."]
+    others = ["SPOINT,901", f"CELAS2,801,3.+5,{A},3,901", "CMASS4,802,.02,901"]
+    np.testing.assert_allclose(hertz(deck(*cards)), hertz(deck(*others), "b"), rtol=1e-9)

@@ -158,6 +158,14 @@ def test_cards_that_copy_the_one_before(copies, wanted):
     assert read.node_id[held].tolist() == wanted
 
 
+def test_a_first_field_before_the_comma_and_constraints_of_nothing():
+    """`NAME 1, 2` as some write it; an RBE2 between grid points of no solid is left out."""
+    cards = ["SPC1  1,  123, 1", "GRID,21,,9.,9.,9.", "GRID,22,,9.,9.,8.", "RBE2,31,21,123,22"]
+    read = plain(*cards)
+    assert read.node_id[read.point_sets["SPC 1"]].tolist() == [1] and read.links is None
+    assert any("RBE2 31: it and 0 other constraints join nothing" in text for text in read.remarks)
+
+
 def test_real_fields_are_copied_with_increments():
     read = plain("GRID,21,,1.-1,5.,0.", "=,*(1),=,*(.25),==", "=(2)", "RBE2,31,21,123456,1,2", "=,*1,*1,==", "=2")
     at = [read.links.references[i].tolist() for i in np.argsort(read.links.reference_id)]

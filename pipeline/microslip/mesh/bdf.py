@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..data import Array, AverageLink, Equation, Link, RigidLink
+from ..data import Array, AverageLink, Equation, FaceTie, Link, PointMass, RigidLink
 from ..topology import CELL_TYPES
 from .bdf_cards import Bulk, BulkCard, at_card, cards_of, lines_of, listed, number_of, parted
 from .bdf_contact import READ as FACED
@@ -23,7 +23,7 @@ from .bdf_contact import faced
 from .bdf_control import Case, Control, control_of
 from .bdf_loads import LOADS, OTHERS, SHELLS, state_of_bulk, temperatures
 from .bdf_lumps import READ as LUMPED
-from .bdf_lumps import bars_of, lumps_of
+from .bdf_lumps import bars_of, lumps_of, unlisted_points
 from .bdf_materials import KINDS, PROPERTIES, TABLES, materials_of, stress_free
 from .raw import Damaged, Numbering, RawMesh, Structure, ignored, joined, locks, lost, turn_left_handed
 from .supports import Constraints, add_supports, in_axes
@@ -87,6 +87,7 @@ def read_bdf(path: Path) -> RawMesh:
     raw.links += [*_rigid(bulk), *bars_of(bulk), *_averages(bulk), *_equations(bulk, control)]
     faced(bulk, control)
     raw.lumps = lumps_of(bulk)
+    _drop_islands(raw)
     raw.structures = list(_structures(bulk))
     _retain(bulk)
     _load(bulk, control, properties, enforced)
@@ -116,6 +117,13 @@ def _load(
         raw.regions = []
     if static is not None:
         state_of_bulk(bulk, static, nonlinear, enforced)
+        for kind in ("SPC", "MPC"):
+            sets = [c.number_of(kind) for c in (static, control.modal)]
+            if sets[0] != sets[1]:
+                raw.lost.append(
+                    f"{static.place}: its {kind} = {sets[0]} is not that of the modes ({sets[1]}), which holds in both "
+                    "here: frequencies may differ"
+                )
     free = stress_free(bulk, properties) or [0.0]
     varied = any(material.temperature is not None for material in raw.materials)
     if acting is not None and (static is not None or not varied):
@@ -242,6 +250,7 @@ def _grid(cards: Mapping[str, list[BulkCard]], file: str) -> tuple[RawMesh, Cons
                 frames = system.directions(table[places])
                 held.axes |= dict(zip(ids[places].tolist(), frames, strict=True))
     points = {n: card for card in cards["SPOINT"] for n in listed(card, 1)}
+    points |= {n: c for c, n in unlisted_points(cards) if not np.isin(n, ids)}
     scalar = np.array(sorted(points), dtype=np.int64)
     if len(both := np.intersect1d(scalar, ids)):
         raise Damaged(f"{points[int(both[0])].where}: point {both[0]} is a GRID as well; take one out")
@@ -414,7 +423,7 @@ def _constrain(bulk: Bulk, control: Control) -> dict[int, dict[int, float]]:
     displacements that SPC prescribes in a static step: node -> direction (0 to 5) -> size."""
     held, cards, enforced = bulk.held, bulk.cards, dict[int, dict[int, float]]()
     chosen = _chosen(bulk, control, "SPC", held.left_out)
-    scalar = {n for card in cards["SPOINT"] for n in listed(card, 1)}
+    scalar = set(bulk.raw.node_id[bulk.scalar :].tolist())
     for card in cards["SPC1"]:
         if card.whole(1) in chosen:
             for node in listed(card, 3, bulk.numbering):
@@ -533,6 +542,36 @@ def _equations(bulk: Bulk, control: Control) -> Iterator[Link]:
         along = np.array([bulk.held.axes.get(node, np.eye(3))[way % 3] for node, way in pairs])
         first = np.array(ways) // 3 * 3
         yield in_axes(card.where, nodes, first, along * factors[:, None])
+
+
+def _drop_islands(raw: RawMesh) -> None:
+    """Leave out links whose nodes meet neither solids nor lumps, directly or by other links."""
+    near = {*joined(nodes.ravel() for _, nodes in raw.blocks).tolist()}
+    for item in raw.lumps:
+        near.update([item.node] if isinstance(item, PointMass) else item.nodes.tolist())
+    left = [link for link in raw.links if not isinstance(link, FaceTie)]
+    nodes = {id(link): _nodes_of(link) for link in left}
+    size = -1
+    while size != len(near):
+        size = len(near)
+        for link in left:
+            if not near.isdisjoint(nodes[id(link)]):
+                near |= nodes[id(link)]
+    alone = [link for link in left if near.isdisjoint(nodes[id(link)])]
+    if alone:
+        raw.remarks.append(
+            f"{alone[0].where}: it and {len(alone) - 1} other constraints join nothing to the solids: left out"
+        )
+        gone = {id(link) for link in alone}
+        raw.links = [link for link in raw.links if id(link) not in gone]
+
+
+def _nodes_of(link: Link) -> set[int]:
+    """Positions of the nodes of a link that names no face."""
+    if isinstance(link, Equation):
+        return {*link.nodes.tolist()}
+    assert isinstance(link, RigidLink | AverageLink) and not isinstance(link.members, str)
+    return {link.reference, *link.members.tolist()}
 
 
 def _retain(bulk: Bulk) -> None:

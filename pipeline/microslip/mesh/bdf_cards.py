@@ -255,7 +255,7 @@ def cards_of(lines: list[BulkLine], wanted: Collection[str]) -> defaultdict[str,
 def _joined(lines: list[BulkLine], wanted: Collection[str]) -> Iterator[BulkCard]:
     """Name and fields of every card, its continuations joined."""
     cards, card, mark = list[BulkCard](), BulkCard([""]), ""
-    marked = dict[str, BulkCard | None]()
+    marked, later = dict[str, BulkCard | None](), dict[str, int]()
     for number, line in enumerate(lines):
         head = line.text.split(",")[0] if "," in line.text else line.text[:8]
         head = line.text.split()[0] if head.startswith("=") and "," not in line.text else head
@@ -264,7 +264,9 @@ def _joined(lines: list[BulkLine], wanted: Collection[str]) -> Iterator[BulkCard
         target = card
         if goes_on:
             sought = name.lstrip("+*")
-            if sought and sought != mark and (sought in marked or _later(lines[number:], sought)):
+            if sought and sought != mark:
+                later = later or _last_marks(lines)
+            if sought and sought != mark and (sought in marked or later.get(sought, -1) > number):
                 there = marked.get(sought)
                 if there is None:
                     raise Damaged(
@@ -272,6 +274,9 @@ def _joined(lines: list[BulkLine], wanted: Collection[str]) -> Iterator[BulkCard
                         "before it; put it behind the line that it continues"
                     )
                 target = there
+        if inside and "," in line.text:
+            text = f"{name},{' '.join(inside)}{line.text[len(head) :]}"
+            line = BulkLine(line.place, text)
         words, mark, wide = _fields(
             line, name, (target[0] if goes_on else name.rstrip("*")) in wanted
         )
@@ -288,13 +293,10 @@ def _joined(lines: list[BulkLine], wanted: Collection[str]) -> Iterator[BulkCard
     yield from cards
 
 
-def _later(lines: list[BulkLine], mark: str) -> bool:
-    """Whether a later line ends with a mark that is sought."""
-    ends = (
-        re.split(r"[,\s]", line.text if "," in line.text else line.text[72:])[-1]
-        for line in lines[1:]
-    )
-    return any(end.lstrip("+*") == mark for end in ends)
+def _last_marks(lines: list[BulkLine]) -> dict[str, int]:
+    """What stands at the end of lines, where a mark would -> the last of these lines."""
+    ends = (re.split(r"[,\s]", t if "," in t else t[72:])[-1] for _, t in lines)
+    return {end.lstrip("+*"): number for number, end in enumerate(ends)}
 
 
 def _fields(line: BulkLine, name: str, counts: bool) -> tuple[list[str], str, bool]:

@@ -15,7 +15,7 @@ from ..data import FaceTie, Joint
 from .bdf_cards import Bulk, BulkCard, listed
 from .bdf_control import Control
 from .bdf_loads import Faces
-from .raw import Damaged
+from .raw import Damaged, lost
 
 READ = {
     "BSURF",
@@ -29,6 +29,9 @@ READ = {
     "BCRPARA",
     "BGPARM",
 }
+
+_OTHERS = ("BEDGE", "BLSEG", "BCPROP", "BCPROPS")
+"""Cards of regions that are not read."""
 
 
 def faced(bulk: Bulk, control: Control) -> None:
@@ -50,7 +53,12 @@ def faced(bulk: Bulk, control: Control) -> None:
         for card in (c for n in {*sets, chosen or 0} for c in bulk.numbered([name], n)):
             for source, target, value in _pairs(card):
                 names = [_region(bulk, faces, made, card, number) for number in (source, target)]
-                if name == "BGSET" or card.whole(1) in tied:
+                if "" in names:
+                    text = (
+                        f"the pair of regions {source} and {target}, which are no faces of solids,"
+                    )
+                    bulk.raw.lost.append(lost(card.where, text))
+                elif name == "BGSET" or card.whole(1) in tied:
                     bulk.raw.links.append(FaceTie(card.where, names[0], names[1]))
                 else:
                     bulk.raw.joints.append(Joint(card.where, names[0], names[1], value or None))
@@ -69,7 +77,7 @@ def _pairs(card: BulkCard) -> Iterator[tuple[int, int, float | None]]:
 
 
 def _region(bulk: Bulk, faces: Faces, made: dict[int, str], card: BulkCard, number: int) -> str:
-    """The name of a region, which becomes a set of facets and of points.
+    """The name of a region, which becomes a set of facets and of points; empty of one that is no face of solids.
 
     Raises:
         Damaged: there is none, a face that no element has.
@@ -78,7 +86,9 @@ def _region(bulk: Bulk, faces: Faces, made: dict[int, str], card: BulkCard, numb
         return made[number]
     corners: dict[int, list[list[int]]] = {}
     own = [*bulk.numbered(["BSURF", "BSURFS"], number)]
-    if not own:
+    if any(True for _ in bulk.numbered(_OTHERS, number)):
+        made[number] = ""
+    elif not own:
         raise Damaged(
             f"{card.where} names the region {number}, which no BSURF or BSURFS defines; add it"
         )
@@ -90,10 +100,15 @@ def _region(bulk: Bulk, faces: Faces, made: dict[int, str], card: BulkCard, numb
             rings = [_by_corners(bulk, faces, region, p) for p in places]
         for ring in rings:
             corners.setdefault(len(ring), []).append(ring)
+    if number in made or not all(
+        tuple(sorted(r)) in faces.nodes for k in corners.values() for r in k
+    ):
+        made[number] = ""
+        return ""
     name = made[number] = f"region {number}"
     for rings in corners.values():
         bulk.raw.facets.setdefault(name, []).append(np.array(rings))
-        every = [faces.nodes.get(tuple(sorted(ring)), ring) for ring in rings]
+        every = [faces.nodes[tuple(sorted(ring))] for ring in rings]
         bulk.raw.add_points(name, np.unique(np.concatenate(every)))
     return name
 

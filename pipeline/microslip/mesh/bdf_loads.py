@@ -43,7 +43,7 @@ def state_of_bulk(
     if number is not None:
         sets = list(_sets(bulk, number))
         chosen = [(factor, card) for factor, s in sets for card in acting.cards(s)]
-        if not chosen and not bulk.cards["LOAD"]:
+        if not chosen:
             place = case.place_of("LOAD")
             raise Damaged(
                 f"{place}: LOAD = {number} chooses loads that the file does not hold; correct it"

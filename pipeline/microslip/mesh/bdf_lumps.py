@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 
@@ -68,6 +68,10 @@ def _round(J: Array) -> bool:
 
 
 def _refuse_impossible(bulk: Bulk, card: BulkCard, m: float, J: Array) -> None:
+    """Raises `Damaged` of a mass that no body has, unless it cannot move."""
+    still = set("xyzabc") <= bulk.held.nodes.get(card.whole(2), set())
+    if still:
+        return
     if m < 0 or np.linalg.eigvalsh(J)[0] < -1e-9 * np.abs(J).max():
         raise Damaged(f"{card.where} has a mass or inertia below 0; correct it")
 
@@ -117,6 +121,15 @@ def _ends(bulk: Bulk, card: BulkCard) -> tuple[Indices, Indices, Array]:
     if not nodes:
         raise Damaged(f"{card.where} joins nothing; name a point")
     return np.array(nodes), np.array(ways), np.array(factors)
+
+
+def unlisted_points(cards: Mapping[str, list[BulkCard]]) -> Iterator[tuple[BulkCard, int]]:
+    """Scalar points that stand on scalar elements, which need no SPOINT; and the element."""
+    for card in (card for name in (*SPRINGS, *MASSES) for card in cards.get(name, ())):
+        for place in (3, 4) if card[0][-1] in "34" else (3, 5):
+            alone = card[0][-1] in "34" or card.at(place + 1) in ("", "0")
+            if alone and (number := card.whole(place, 0)):
+                yield card, number
 
 
 def _scalars(bulk: Bulk) -> Iterator[LumpedElement]:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -21,6 +22,8 @@ from .raw import Damaged, DeckMaterial
 KINDS = ("MAT1", "MAT2", "MAT3", "MAT8", "MAT9", "MAT10", "MAT11", "MATHP", "MATHE")
 PROPERTIES = ("PCOMPS", "PLSOLID", "PCOMPLS", "PSOLID")
 TABLES = ("TABLEM1", "TABLEM2", "TABLEM3", "TABLEM4")
+_LIGHT = 1e-9
+"""Share of the largest density that a solid without mass has: its matrix stays definite."""
 _SAMPLES = 2001
 """Temperatures at which a polynomial stands in a table."""
 _REFUSED = {
@@ -41,7 +44,21 @@ def materials_of(
     Raises:
         Damaged: with file and line, impossible constants, tables that are not there.
     """
-    return [_material(bulk, number, temperature) for number in properties]
+    made = [_material(bulk, number, temperature) for number in properties]
+    heaviest = max((material.density or 0.0 for material in made), default=0.0)
+    for number, material in enumerate(made):
+        if (
+            heaviest
+            and not material.density
+            and material.elasticity is not None
+            and not material.refused
+        ):
+            made[number] = replace(material, density=_LIGHT * heaviest)
+            bulk.raw.remarks.append(
+                f"{material.line} has no density: its cells weigh nothing, as in Nastran, where others "
+                f"have one ({_LIGHT:g} of the heaviest is taken)"
+            )
+    return made
 
 
 def stress_free(bulk: Bulk, properties: Sequence[int]) -> list[float]:
