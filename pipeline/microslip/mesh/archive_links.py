@@ -488,12 +488,12 @@ def _remote(archive: Archive, raw: RawMesh, numbering: Numbering, pair: _Pair, p
 
 COMMANDS: dict[str, Command] = {
     "D": _displacement,
-    "DBLO": _displacements_block,
+    "DBLOCK": _displacements_block,
     "CP": _coupled,
     "CE": _equation,
-    "CERI": _rigid,
+    "CERIG": _rigid,
     "RBE3": _spread,
-    "CYCL": _ring,
-    "CYCO": _cyclic_option,
-    "MSOP": _stages,
+    "CYCLIC": _ring,
+    "CYCOPT": _cyclic_option,
+    "MSOPT": _stages,
 }

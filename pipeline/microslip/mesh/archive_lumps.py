@@ -119,4 +119,4 @@ def _spring(
     return LumpedElement(where, np.repeat(nodes, len(used)), np.tile(used + first, 2), r[0] * both, r[1] * both, pulls)
 
 
-COMMANDS: dict[str, Command] = {"R": _read_reals, "RMOR": _read_reals, "RLBL": _read_block}
+COMMANDS: dict[str, Command] = {"R": _read_reals, "RMORE": _read_reals, "RLBLOCK": _read_block}
