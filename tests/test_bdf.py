@@ -99,10 +99,10 @@ def test_a_deck_in_small_letters_is_the_same(tmp_path):
 @pytest.mark.parametrize(
     "card",
     [
-        "RBE1,61,9,123456",
+        "RTRPLT,61,9,10,11,123456",
         "CTRIAX6,62,1,9,10",
         "CBAR,63,1,9,10,0.,0.,1.",
-        "BGSET,1,2,3",
+        "BCBODY,1,3D,DEFORM,3",
         "BCTABL1,1,2",
         "MFLUID,5,,,1.-9",
     ],

@@ -65,7 +65,11 @@ class LineSprings:
         """Blocks (s, 3, 3) of the springs over the pattern."""
         out = np.zeros((pattern.size, 3, 3))
         a, b = self.pairs.T
-        for places, sign in ((pattern.places(a, a), 1), (pattern.places(b, b), 1), (pattern.places(a, b), -1)):
+        for places, sign in (
+            (pattern.places(a, a), 1),
+            (pattern.places(b, b), 1),
+            (pattern.places(a, b), -1),
+        ):
             np.add.at(out, places, sign * blocks)
         return out
 

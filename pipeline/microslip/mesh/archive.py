@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 import re
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NamedTuple
@@ -189,6 +189,13 @@ class Archive:
                 return None
             return self.node_id if self.selected is None else sorted(self.selected)
         return self.component(word)
+
+    def through(self, first: str, last: str, step: str, what: str) -> Sequence[int]:
+        """Nodes from first to last: of a range beyond what the file can hold those that are there."""
+        span = range(int(first), whole(last, what) + 1, max(whole(step or "1", what), 1))
+        if len(span) <= 10**6:
+            return span
+        return [int(first), *(n for n in self.node_id if n in span and n != int(first))]
 
     def cells(self, word: str) -> Iterable[int] | None:
         """Numbers of elements by number, by component, or those that are selected; None of none of these."""

@@ -69,8 +69,7 @@ def put(archive: Archive, what: str, words: list[str], labels: dict[str, str]) -
         archive.leave_out(f"{what},{where},{label} (it names no nodes that are there)")
         return []
     if last and is_number(where):
-        end = min(whole(last, what), int(where) + 10**8)
-        nodes = range(int(where), end + 1, max(whole(step or "1", what), 1))
+        nodes = archive.through(where, last, step, what)
         archive.ranged.update(nodes[1:])
     into = archive.acting.moved if what == "D" else archive.acting.forces
     places = [(node, way) for node in nodes for way in ways]
@@ -117,7 +116,7 @@ def _deleted(archive: Archive, words: list[str]) -> None:
         archive.leave_out(f"{words[0].upper()},{where}")
         return
     if words[3] and is_number(where):
-        nodes = [*range(int(where), whole(words[3], words[0]) + 1, whole(words[4] or "1", words[0]))]
+        nodes = [*archive.through(where, words[3], words[4], words[0])]
     there = set(nodes)
     for node, way in [place for place in into if place[0] in there and place[1] in ways]:
         del into[node, way]

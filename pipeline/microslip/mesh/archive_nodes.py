@@ -102,8 +102,7 @@ def _turn(archive: Archive, words: list[str]) -> None:
         )
         return
     if words[2] and is_number(words[1]):
-        step = max(whole(words[3] or "1", "NROTAT"), 1)
-        nodes = range(int(words[1]), whole(words[2], "NROTAT") + 1, step)
+        nodes = archive.through(words[1], words[2], words[3], "NROTAT")
     system = _known(archive, archive.current.get("CSYS", 0), "NROTAT")
     archive.turns.update(dict.fromkeys(nodes, system))
 
@@ -266,8 +265,7 @@ def _masters(archive: Archive, words: list[str]) -> None:
         archive.leave_out(f"M,{words[1]} (it names no nodes that are there)")
         return
     if words[3] and is_number(words[1]):
-        step = max(whole(words[4] or "1", "M"), 1)
-        nodes = list(range(int(words[1]), min(whole(words[3], "M"), int(words[1]) + 10**8) + 1, step))
+        nodes = [*archive.through(words[1], words[3], words[4], "M")]
     archive.masters += nodes
 
 

@@ -18,6 +18,8 @@ import numpy as np
 from ..data import Array, AverageLink, Equation, Link, RigidLink
 from ..topology import CELL_TYPES
 from .bdf_cards import Bulk, BulkCard, at_card, cards_of, lines_of, listed, number_of, parted
+from .bdf_contact import READ as FACED
+from .bdf_contact import faced
 from .bdf_control import Case, Control, control_of
 from .bdf_loads import LOADS, OTHERS, SHELLS, state_of_bulk, temperatures
 from .bdf_lumps import READ as LUMPED
@@ -42,16 +44,20 @@ _SOLIDS["CPYRA"] = _SOLIDS["CPYRAM"]
 _SYSTEMS = ("CORD1R", "CORD1C", "CORD1S", "CORD2R", "CORD2C", "CORD2S")
 _READ = {
     "GRID", "GRDSET", "SPOINT", *_SYSTEMS, "PARAM", "SET1", "SPC", "SPC1", "SPCADD", "RBE2", "RBE3", "MPC", "MPCADD",
-    "ASET", "ASET1", "LOAD", "TEMP", "TEMPD", "MATT1", *TABLES, *_SOLIDS, *SHELLS, *KINDS, *PROPERTIES, *LUMPED,
+    "ASET", "ASET1", "LOAD", "TEMP", "TEMPD", "MATT1", *TABLES, *_SOLIDS, *SHELLS, *KINDS, *PROPERTIES, *LUMPED, *FACED,
 }  # fmt: skip
 _SILENT = re.compile(
-    r"EIG\w*|CORD\w+|ENDDATA|DLOAD|TABL\w*|FREQ\d?|TSTEP\w*|NLPARM|DTI|SET3|MDLPRM|SUPORT1?|PLOTEL|SESET|USET1?|"
-    r"QSET1?|D(ESVAR|CONSTR|VPREL\d|VMREL\d|VGRID|RESP\d|OPTPRM|SCREEN|CONADD|EQATN)|MATS1|MAT4|MAT5|RANDPS|DAREA"
+    r"EIG\w*|CORD\w+|ENDDATA|TABL\w*|DTI|SET3|MDLPRM|SUPORT1?|PLOTEL\d?|SESET|USET1?|QSET1?|GROUP|"
+    r"FREQ\d?|TSTEP\w*|[RT]LOAD\d|DLOAD|LSEQ|DAREA|DELAY|DPHASE|TAB\w+|RAND\w+|PBUSHT|PELAST|PDAMPT|"  # in time
+    r"NLPARM|NLPCI|NLSTEP|NLCNTL\w*|MATS1|TSTEPNL|TEMPBC|"  # nonlinear steps
+    r"CHBDY\w|CONVM?|RAD\w+|VIEW3?D?|PCONVM?|PHBDY|Q(BDY\d|VOL|HBDY|VECT)|MAT[45]|MATT[45]|"  # heat
+    r"D(ESVAR|CONSTR|[VT]?V[PMCT]REL\d|VGRID|RESP\d|OPTPRM|SCREEN|CONADD|EQATN|TABLE|LINK|MNCON|MRLAW)|"  # design
+    r"P(BARL?|BEAML?|BEND|ROD|TUBE|SHEAR|VISC|GAP|ACABS|AABSF\d?|MIC)|AC\w+|MICPNT|PANEL|AMLREG"  # of what is told
 )
 """Cards that say nothing of the body, or only together with others that are named."""
 _COUNTS = re.compile(
     r"C(?!ORD|END|LOAD)[A-Z]+\d?|R(?!FORCE|LOAD|AND|ING)[A-Z]+\d?|GENEL|DMIG|NSM[A-Z]*\d?|MATT\d+|"
-    r"MFLUID|BCTSET|BGSET|BCTABL[E1]|BCBODY1?|PSHELL|PCOMPG?|BCONTACT|BOLT|SPCOFF1?|SPCR|SPLINE\d|AEQUAD4"
+    r"MFLUID|BCTABL[E1]|BCBODY1?|PSHELL|PCOMPG?|BCONTACT|BOLT|SPCOFF1?|SPCR|SPLINE\d|AEQUAD4|FEEDGE|FEFACE|GMCURV|GMSURF|PVAL"
 )
 """Cards that add mass, stiffness or constraints; those beside `_READ` are not read."""
 
@@ -71,7 +77,7 @@ def read_bdf(path: Path) -> RawMesh:
     cards = cards_of(data, {*_READ, *LOADS, *OTHERS})
     raw, held, systems = _grid(cards, path.name)
     raw.remarks, raw.lost = told, parts
-    bulk = Bulk(path.name, cards, raw, Numbering(raw.node_id), held, systems)
+    bulk = Bulk(path.name, cards, raw, Numbering(raw.node_id), held, systems, len(cards["GRID"]))
     properties = _elements(bulk)
     _shells(bulk)
     for name, label, first in (("SET1", "SET", 2), ("SPC1", "SPC", 3)):
@@ -79,6 +85,7 @@ def read_bdf(path: Path) -> RawMesh:
             raw.add_set(f"{label} {card[1]}", listed(card, first, bulk.numbering), bulk.numbering)
     enforced = _constrain(bulk, control)
     raw.links += [*_rigid(bulk), *bars_of(bulk), *_averages(bulk), *_equations(bulk, control)]
+    faced(bulk, control)
     raw.lumps = lumps_of(bulk)
     raw.structures = list(_structures(bulk))
     _retain(bulk)
@@ -104,6 +111,7 @@ def _load(
     acting = next((heat[o] for o in ("LOAD", "BOTH") if heat[o] is not None), None)
     if any(bulk.cards[name] for name in (*PROPERTIES, *KINDS)):
         raw.materials = materials_of(bulk, properties, of_material)
+        _merge_alike(raw)
     else:
         raw.regions = []
     if static is not None:
@@ -129,6 +137,15 @@ def _load(
         raw.remarks.append(
             f"{case.place}: the temperatures are of the materials alone and strain nothing, so expansions are 0"
         )
+
+
+def _merge_alike(raw: RawMesh) -> None:
+    """One material for the properties that have the same."""
+    keys = [repr(replace(material, where="")) for material in raw.materials]
+    order = {key: number for number, key in enumerate(dict.fromkeys(keys))}
+    number = np.array([order[key] for key in keys])
+    raw.materials = [raw.materials[keys.index(key)] for key in order]
+    raw.regions = [number[regions] for regions in raw.regions]
 
 
 def _heat(bulk: Bulk, case: Case, option: str) -> Array | None:
@@ -186,6 +203,12 @@ def _integrated(bulk: Bulk) -> list[str]:
                 f"{kind} are integrated in full, without Nastran's {how} (PSOLID, IN and ISOP): stiffer, by less on "
                 "finer meshes"
             )
+    coupled = bulk.parameter("COUPMASS")
+    if coupled is None or coupled < 0:
+        told.append(
+            "masses are consistent, where Nastran lumps them without PARAM,COUPMASS,1: its frequencies are lower, by "
+            "less on finer meshes"
+        )
     return [*told, *locks(raw)]
 
 
@@ -218,7 +241,10 @@ def _grid(cards: Mapping[str, list[BulkCard]], file: str) -> tuple[RawMesh, Cons
             else:
                 frames = system.directions(table[places])
                 held.axes |= dict(zip(ids[places].tolist(), frames, strict=True))
-    scalar = np.unique([n for card in cards["SPOINT"] for n in listed(card, 1)]).astype(np.int64)
+    points = {n: card for card in cards["SPOINT"] for n in listed(card, 1)}
+    scalar = np.array(sorted(points), dtype=np.int64)
+    if len(both := np.intersect1d(scalar, ids)):
+        raise Damaged(f"{points[int(both[0])].where}: point {both[0]} is a GRID as well; take one out")
     middle = np.tile(table.mean(axis=0), (len(scalar), 1))
     return RawMesh(np.vstack([table, middle]), np.concatenate([ids, scalar])), held, systems
 
@@ -263,7 +289,7 @@ def _systems(cards: Mapping[str, list[BulkCard]], file: str) -> Chained:
                 if place == 5 and not card.at(place):
                     continue
                 number = card.whole(place)
-                if number in known and known[number][0][1:] != card[1:]:
+                if number in known and _numbers(known[number][0]) != _numbers(card):
                     raise Damaged(f"{card.where} defines system {number}, which is there already; take one out")
                 known[number] = card, place
     grids = dict[int, BulkCard]()
@@ -312,9 +338,10 @@ def _elements(bulk: Bulk) -> list[int]:
             blocks.setdefault(kind, []).append((number, region, nodes))
     _add_left_out(bulk, blocks)
     bulk.raw.add_solids(blocks, bulk.numbering, "an element names")
-    turn_left_handed(bulk.raw)
+    turn_left_handed(bulk.raw, bricks=True)
     if fluids and not blocks:
-        raise Damaged("all of its solid cells are a fluid (MAT10); give those of the structure")
+        where = next(card for card in bulk.cards["PSOLID"] if card.whole(1) in fluids).where
+        raise Damaged(f"{where}: all solid cells are a fluid (MAT10); give those of the structure")
     return list(properties)
 
 
@@ -472,7 +499,7 @@ def _averages(bulk: Bulk) -> Iterator[Link]:
                 if card[place]:
                     members.append(int(card[place]))
                     axes = bulk.held.axes.get(members[-1], np.eye(3))[digits]
-                    weights.append(weight * axes.T @ axes)
+                    weights.append(weight * (np.eye(3) if len(digits) == 3 else axes.T @ axes))
                 place += 1
         if not members:
             raise Damaged(f"{where} follows no nodes; add them")

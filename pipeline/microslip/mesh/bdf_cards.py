@@ -105,6 +105,7 @@ class Bulk:
 
     Attributes:
         held: what its constraints hold. middles: positions of nodes that are made between two others, with these.
+        scalar: position of the first scalar point, behind the grid points.
     """
 
     file: str
@@ -113,6 +114,7 @@ class Bulk:
     numbering: Numbering
     held: Constraints
     systems: Chained
+    scalar: int
     middles: list[tuple[int, Indices]] = field(default_factory=list)
 
     def frame(self, card: BulkCard, number: int, point: Array) -> Array:
@@ -256,7 +258,8 @@ def _joined(lines: list[BulkLine], wanted: Collection[str]) -> Iterator[BulkCard
     marked = dict[str, BulkCard | None]()
     for number, line in enumerate(lines):
         head = line.text.split(",")[0] if "," in line.text else line.text[:8]
-        name = (head.split() or [""])[0]
+        head = line.text.split()[0] if head.startswith("=") and "," not in line.text else head
+        name, *inside = head.split() or [""]  # `NAME 1, 2` has its first field before the comma
         goes_on = not name or name[0] in "+*"
         target = card
         if goes_on:
@@ -287,8 +290,11 @@ def _joined(lines: list[BulkLine], wanted: Collection[str]) -> Iterator[BulkCard
 
 def _later(lines: list[BulkLine], mark: str) -> bool:
     """Whether a later line ends with a mark that is sought."""
-    pattern = re.compile(rf"(?:[+*]|\s){re.escape(mark)}\s*$")
-    return any(pattern.search(line.text[64:]) for line in lines[1:])
+    ends = (
+        re.split(r"[,\s]", line.text if "," in line.text else line.text[72:])[-1]
+        for line in lines[1:]
+    )
+    return any(end.lstrip("+*") == mark for end in ends)
 
 
 def _fields(line: BulkLine, name: str, counts: bool) -> tuple[list[str], str, bool]:

@@ -15,7 +15,20 @@ from dataclasses import dataclass, field
 from .bdf_cards import BulkLine
 from .raw import PRESTRESSED, Damaged
 
-_ALONE = {"LOAD", "SPC", "MPC", "STEP", "SUBCASE", "SUBCOM", "SYM", "SYMCOM", "SUBSEQ", "REPCASE"}
+_ALONE = {
+    "LOAD",
+    "SPC",
+    "MPC",
+    "STEP",
+    "BCSET",
+    "BGSET",
+    "SUBCASE",
+    "SUBCOM",
+    "SYM",
+    "SYMCOM",
+    "SUBSEQ",
+    "REPCASE",
+}
 _SHORT = {
     "TEMP": "TEMP",
     "METH": "METHOD",

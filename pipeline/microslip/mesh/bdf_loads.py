@@ -17,6 +17,7 @@ from ..data import Array, BodyLoad, FacetLoad, Indices, NodalLoad, SpinLoad, Sta
 from ..topology import CELL_TYPES, FACET_CORNERS
 from .bdf_cards import Bulk, BulkCard, at_card, listed
 from .bdf_control import Case
+from .bdf_lumps import MASSES
 from .raw import Damaged
 
 SHELLS = {"CTRIA3": 3, "CTRIAR": 3, "CTRIA6": 3, "CQUAD4": 4, "CQUADR": 4, "CQUAD8": 4}
@@ -35,7 +36,9 @@ def state_of_bulk(
     Raises:
         Damaged: with file and line, what is wrong with a load.
     """
-    acting = _Acting(bulk, case.place, {node: dict(ways) for node, ways in enforced.items()})
+    acting = _Acting(
+        bulk, Faces(bulk), case.place, {node: dict(ways) for node, ways in enforced.items()}
+    )
     number = case.number_of("LOAD")
     if number is not None:
         sets = list(_sets(bulk, number))
@@ -47,6 +50,9 @@ def state_of_bulk(
             )
         for factor, card in chosen:
             acting.add(factor, card)
+    if any(isinstance(load, BodyLoad | SpinLoad) for load in acting.loads):
+        for card in (card for name in MASSES for card in bulk.cards[name]):
+            acting.lose(card, "the weight of a mass along one direction")
     what = f"SUBCASE {case.number}" if case.number > 0 else "the case control"
     bulk.raw.state = StaticStep(f"{case.place}: {what}", nonlinear, tuple(acting.all()))
 
@@ -65,11 +71,102 @@ def _sets(bulk: Bulk, number: int) -> Iterator[tuple[float, int]]:
                 )
 
 
+class Faces:
+    """Faces of the solids and of the shells that lie on them, by positions of their corners."""
+
+    def __init__(self, bulk: Bulk) -> None:
+        self.bulk = bulk
+
+    @cached_property
+    def elements(self) -> dict[int, BulkCard | tuple[str, Indices]]:
+        """Number of an element -> its type and nodes, or the card of a shell."""
+        raw = self.bulk.raw
+        found: dict[int, BulkCard | tuple[str, Indices]] = {
+            card.whole(1): card for name in SHELLS for card in self.bulk.cards[name]
+        }
+        for (kind, nodes), ids in zip(raw.blocks, raw.cell_id, strict=True):
+            found.update(
+                (int(number), (kind, cell)) for number, cell in zip(ids, nodes, strict=True)
+            )
+        return found
+
+    @cached_property
+    def inward(self) -> dict[tuple[int, ...], list[int]]:
+        """Corners of each facet of the solids, ascending -> in the order whose normal points into the solid."""
+        rings = (
+            ring for kind, nodes in self.bulk.raw.blocks for ring in self.inward_of(kind, nodes)
+        )
+        return {tuple(sorted(ring)): ring for ring in rings}
+
+    def inward_of(self, kind: str, nodes: Indices) -> Iterator[list[int]]:
+        """Corners of the facets of cells (e, k), in the order whose normal points into them."""
+        for facet, sort in zip(CELL_TYPES[kind].facets, CELL_TYPES[kind].facet_types, strict=True):
+            yield from nodes[:, list(facet[: FACET_CORNERS[sort]][::-1])].tolist()
+
+    @cached_property
+    def nodes(self) -> dict[tuple[int, ...], list[int]]:
+        """Corners of each facet of the solids, ascending -> all of its nodes."""
+        return {
+            tuple(sorted(row[: FACET_CORNERS[sort]])): row
+            for kind, nodes in self.bulk.raw.blocks
+            for facet, sort in zip(
+                CELL_TYPES[kind].facets, CELL_TYPES[kind].facet_types, strict=True
+            )
+            for row in nodes[:, list(facet)].tolist()
+        }
+
+    def shell(self, card: BulkCard, number: int) -> Indices:
+        """Corners of a shell.
+
+        Raises:
+            Damaged: there is none of this number.
+        """
+        there = self.elements.get(number)
+        if not isinstance(there, BulkCard):
+            what = (
+                "which the file does not define"
+                if there is None
+                else "a solid, whose face G1 and G3 or G4 tell"
+            )
+            raise Damaged(f"{card.where} loads element {number}, {what}; correct it")
+        return self.bulk.positions(card, [there.whole(3 + k) for k in range(SHELLS[there[0]])])
+
+    def side(self, card: BulkCard, number: int) -> Indices:
+        """Corners of the face of a solid that G1 and G3 (across it) or G4 (of a tetrahedron, off it) tell, from G1 on
+        about its inner normal.
+
+        Raises:
+            Damaged: they tell none.
+        """
+        kind, nodes = self.elements[number]  # type: ignore[misc]
+        first, other = (
+            int(self.bulk.positions(card, [card.whole(p)])[0]) if card.at(p) else -1 for p in (7, 8)
+        )
+        tetrahedron = CELL_TYPES[str(kind)].corners == 4
+        for corners in self.inward_of(str(kind), np.asarray(nodes)[None]):
+            if first not in corners:
+                continue
+            at = corners.index(first)
+            around = [*corners[at:], *corners[:at]]
+            across = len(around) == 4 and around[2] == other
+            if tetrahedron:  # G4 is the corner that is off the face
+                alone = other >= 0 and other not in around
+            else:
+                alone = len(around) == 3 and other in (-1, *around[1:])
+            if across or alone:
+                return np.array(around)
+        raise Damaged(
+            f"{card.where} names no face of element {number} by G1 = {card.at(7) or 'nothing'} and G3 or G4 = "
+            f"{card.at(8) or 'nothing'}; correct them"
+        )
+
+
 @dataclass
 class _Acting:
     """Loads as they are met. displaced: node -> direction -> displacement. nodal, facets: by card or kind."""
 
     bulk: Bulk
+    faces: Faces
     where: str
     displaced: dict[int, dict[int, float]]
     loads: list[NodalLoad | FacetLoad | BodyLoad | SpinLoad] = field(default_factory=list)
@@ -194,18 +291,23 @@ class _Acting:
     def on_corners(self, card: BulkCard, factor: float) -> None:
         """PLOAD: a pressure on three or four grid points, along the normal by their order."""
         numbers = [card.whole(place) for place in range(3, 7) if card.at(place)]
+        if any(CELL_TYPES[kind].order > 1 for kind, _ in self.bulk.raw.blocks):
+            self.bulk.raw.lost.append(
+                f"{card.where}: is taken over the whole of its face, where Nastran loads the corners "
+                "alone of cells with mid-side nodes: frequencies may differ a little; write PLOAD4"
+            )
         self.on_face(card, factor * (card.real(2) or 0.0), self.bulk.positions(card, numbers))
 
     def on_shells(self, card: BulkCard, factor: float) -> None:
         """PLOAD2: a pressure on elements, along their normals."""
         for number in listed(card, 3):
-            self.on_face(card, factor * (card.real(2) or 0.0), self.shell(card, number))
+            self.on_face(card, factor * (card.real(2) or 0.0), self.faces.shell(card, number))
 
     def on_face(
         self, card: BulkCard, size: float | Array, corners: Indices, along: Array | None = None
     ) -> None:
         """Add a pressure along the normal of a facet by its order, where it lies on a solid; or a traction."""
-        inward = self.inward.get(tuple(sorted(corners.tolist())))
+        inward = self.faces.inward.get(tuple(sorted(corners.tolist())))
         if inward is None:
             self.lose(card, "a load on grid points that are no face of a solid")
             return
@@ -234,15 +336,17 @@ class _Acting:
         if last - number > 10**7:
             raise Damaged(f"{card.where} goes over {last - number} elements; correct it")
         for element in range(number, last + 1):
-            if through and element not in self.elements:
+            if through and element not in self.faces.elements:
                 continue
-            solid = element in self.elements and not isinstance(self.elements[element], BulkCard)
+            solid = element in self.faces.elements and not isinstance(
+                self.faces.elements[element], BulkCard
+            )
             if solid and through:
                 raise Damaged(
                     f"{card.where} goes over solid elements, whose faces G1 and G3 or G4 tell; write "
                     "a card for each"
                 )
-            corners = self.side(card, element) if solid else self.shell(card, element)
+            corners = self.faces.side(card, element) if solid else self.faces.shell(card, element)
             vector = card.reals(10, 3)
             along = None
             if vector.any():
@@ -253,78 +357,6 @@ class _Acting:
                 self._press(card, corners, values[: len(corners)], along)
             else:
                 self.on_face(card, values[: len(corners)], corners, along)
-
-    # faces --------------------------------------------------------------------------------------
-
-    @cached_property
-    def elements(self) -> dict[int, BulkCard | tuple[str, Indices]]:
-        """Number of an element -> its type and nodes, or the card of a shell."""
-        raw = self.bulk.raw
-        found: dict[int, BulkCard | tuple[str, Indices]] = {
-            card.whole(1): card for name in SHELLS for card in self.bulk.cards[name]
-        }
-        for (kind, nodes), ids in zip(raw.blocks, raw.cell_id, strict=True):
-            found.update(
-                (int(number), (kind, cell)) for number, cell in zip(ids, nodes, strict=True)
-            )
-        return found
-
-    @cached_property
-    def inward(self) -> dict[tuple[int, ...], list[int]]:
-        """Corners of each facet of the solids, ascending -> in the order whose normal points into the solid."""
-        found = dict[tuple[int, ...], list[int]]()
-        for kind, nodes in self.bulk.raw.blocks:
-            for facet, sort in zip(
-                CELL_TYPES[kind].facets, CELL_TYPES[kind].facet_types, strict=True
-            ):
-                for row in nodes[:, list(facet[: FACET_CORNERS[sort]][::-1])].tolist():
-                    found[tuple(sorted(row))] = row
-        return found
-
-    def shell(self, card: BulkCard, number: int) -> Indices:
-        """Corners of a shell.
-
-        Raises:
-            Damaged: there is none of this number.
-        """
-        there = self.elements.get(number)
-        if not isinstance(there, BulkCard):
-            what = (
-                "which the file does not define"
-                if there is None
-                else "a solid, whose face G1 and G3 or G4 tell"
-            )
-            raise Damaged(f"{card.where} loads element {number}, {what}; correct it")
-        return self.bulk.positions(card, [there.whole(3 + k) for k in range(SHELLS[there[0]])])
-
-    def side(self, card: BulkCard, number: int) -> Indices:
-        """Corners of the face of a solid that G1 and G3 (across it) or G4 (of a tetrahedron, off it) tell, from G1 on
-        about its inner normal.
-
-        Raises:
-            Damaged: they tell none.
-        """
-        kind, nodes = self.elements[number]  # type: ignore[misc]
-        first = int(self.bulk.positions(card, [card.whole(7)])[0]) if card.at(7) else -1
-        other = int(self.bulk.positions(card, [card.whole(8)])[0]) if card.at(8) else -1
-        cell = CELL_TYPES[str(kind)]
-        for facet, sort in zip(cell.facets, cell.facet_types, strict=True):
-            corners = np.asarray(nodes)[list(facet[: FACET_CORNERS[sort]][::-1])].tolist()
-            if first not in corners:
-                continue
-            at = corners.index(first)
-            around = [*corners[at:], *corners[:at]]
-            across = len(around) == 4 and around[2] == other
-            if cell.corners == 4:  # G4 is the corner that is off the face
-                alone = other >= 0 and other not in around
-            else:
-                alone = len(around) == 3 and other in (-1, *around[1:])
-            if across or alone:
-                return np.array(around)
-        raise Damaged(
-            f"{card.where} names no face of element {number} by G1 = {card.at(7) or 'nothing'} and G3 or G4 = "
-            f"{card.at(8) or 'nothing'}; correct them"
-        )
 
     # all ----------------------------------------------------------------------------------------
 

@@ -157,8 +157,10 @@ def _isotropic(bulk: Bulk, card: BulkCard, where: str, temperature: Array | None
         return DeckMaterial(
             name, None, density, nothing, None, where, line=line, young=E, poisson=nu, shear=G
         )
-    with at_card(card):
+    try:
         C, _ = isotropic_rows(name, np.array([[E, nu, 0.0]]))
+    except Damaged as error:
+        raise Damaged(f"{card.place}: {error.args[0]}; correct it") from None
     if table is not None and not (table[:, 1] > 0).all():
         raise Damaged(
             f"{line} has a modulus that is not positive at the temperatures of the file; correct its table"

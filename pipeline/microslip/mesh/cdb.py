@@ -226,6 +226,8 @@ def _read_solid(archive: Archive, first: list[int], fields: Fields) -> None:
         if not more or more[0] == -1:
             raise Damaged(f"element {first[10]} has {len(nodes)} nodes instead of {count}")
         nodes += more
+    if any(nodes[count:]):
+        raise Damaged(f"element {first[10]} announces {count} nodes and lists more")
     archive.elements.append(Element(first[10], first[0], first[1], first[2], first[4], nodes[:count], line=line))
 
 

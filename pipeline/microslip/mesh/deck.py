@@ -25,7 +25,8 @@ class Cells:
 
 @dataclass
 class DeckConstants:
-    """Constants as written: name, place; (t, 3) E, nu, T or 9 engineering constants, or why they are not read."""
+    """Constants as written: name, place; (t, 3) E, nu, T, or (t, 10) engineering constants or stiffnesses and T, or why
+    they are not read; (t, 2) densities and T where they vary; expansion along the axes, its table over T and the T from which it counts."""
 
     name: str
     where: str = ""
@@ -34,7 +35,10 @@ class DeckConstants:
     stiffness: Array | None = None
     refused: str = ""
     density: float | None = None
+    densities: Array | None = None
     expansion: Array = field(default_factory=lambda: np.zeros(3))
+    expansion_table: Array | None = None
+    zero: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -111,6 +115,7 @@ class Deck:
         turning: ROT NODE -> reference node whose rotations its displacements are. masses: number of a mass -> its node
         and mass.
         system: (4, 3) axes and origin in which nodes are written, or None. ignored: keywords that are not used.
+        remarks: what is taken as something else, in words.
     """
 
     node_id: list[Indices] = field(default_factory=list)
@@ -144,6 +149,7 @@ class Deck:
     kinds: list[str] = field(default_factory=list)
     ignored: list[str] = field(default_factory=list)
     lost: list[str] = field(default_factory=list)
+    remarks: list[str] = field(default_factory=list)
     instances: dict[str, Indices] = field(default_factory=dict)
 
     def place(self, word: str, space: str = "") -> tuple[Space, str]:

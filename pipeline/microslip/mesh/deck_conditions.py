@@ -114,7 +114,7 @@ def _read_temperature(deck: Deck, card: Card, column: int = 1) -> None:
     for line in card.lines:
         words = fields(line)
         try:
-            deck.temperatures.append((column, words[0], factor * float(words[1])))
+            deck.temperatures.append((column, words[0], factor * float([*words, "0"][1])))
         except (IndexError, ValueError):
             raise Damaged(f"*TEMPERATURE holds the line '{line[:60]}', no node (or set) and temperature") from None
 
@@ -136,6 +136,11 @@ def assign_temperatures(deck: Deck, raw: RawMesh, numbering: Numbering) -> None:
     for column, word, value in deck.temperatures:
         members = deck.nodes_for("*TEMPERATURE", word)
         raw.temperature[numbering.positions(members, "*TEMPERATURE names"), column] = value
+    cold = np.isnan(raw.temperature[:, 0])
+    raw.temperature[cold, 0] = 0.0
+    used = np.unique(joined(nodes.ravel() for _, nodes in raw.blocks))
+    if count := int(cold[used].sum()):
+        raw.remarks.append(f"{count} nodes have no initial temperature in the file: theirs is 0")
 
 
 def constraints(deck: Deck, lines: Sequence[tuple[str, str, str]]) -> Constraints:

@@ -301,6 +301,7 @@ class _Acting:
         }
         facets = {corners: (amount, where) for corners, (_, amount, where) in self.facets.items() if amount}
         loads: list[_Loading] = [
-            *nodal_loads(self.raw, terms, self.deck.axes, self.numbering), *facet_loads(facets),
+            *nodal_loads(self.raw, terms, self.deck.axes, self.numbering),
+            *facet_loads(facets, inside=True),
         ]  # fmt: skip
         return [*loads, *(load for _, chosen in self.fields.values() for load in chosen)]

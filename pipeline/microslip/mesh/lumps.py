@@ -204,7 +204,7 @@ class _Spread:
     def connect(self, item: LumpedElement) -> None:
         """Add a spring or dashpot."""
         rows = [self._row(int(n), int(d), item.where) for n, d in zip(item.nodes, item.directions, strict=True)]
-        kept = np.array([row is not None for row in rows])
+        kept = np.array([row is not None for row in rows], dtype=bool)
         given = [row for row in rows if row is not None]
         points = sorted({point for row in given for point, _ in row})
         rows_of = np.zeros((len(given), len(points), 3))
@@ -244,6 +244,8 @@ class _Spread:
         if raw.temperature is not None:
             usual = [np.nanmedian(t) if np.isfinite(t).any() else np.nan for t in raw.temperature.T]
             raw.temperature = np.vstack([raw.temperature, np.tile(usual, (count, 1))])
+            loose = np.array(sorted({*range(len(raw.points))} - self.solid), dtype=np.int64)
+            raw.temperature[loose] = usual  # of no solid: they heat nothing
 
     def _load(self, point: int, mass: float) -> None:
         self.masses[point] = self.masses.get(point, 0.0) + mass

@@ -27,6 +27,8 @@ from ..plausible import DENSITY
 from ..topology import CELL_TYPES, FACET_CORNERS
 from ..units import density, usual_system
 from .bdf import read_bdf
+from .bdf_cards import included
+from .cards import files_of
 from .cdb import read_cdb
 from .inp import read_inp
 from .linking import renumbered
@@ -94,6 +96,8 @@ def _refused(path: Path, error: Damaged) -> UserError:
     remedy = "" if "; " in text else "; correct it or write it again"
     if error.file:
         return UserError(text + remedy, file=error.file)
+    if re.match(r"line \d+: ", text):
+        text = f"{path.name}, {text}"
     told = text if text.startswith(f"{path.name}, ") else f"cannot be used: {text}"
     return refused(path, told + remedy)
 
@@ -105,6 +109,7 @@ _READERS: dict[str, Callable[[Path], RawMesh]] = {
     ".inp": read_inp,
     ".med": read_med,
 }
+
 _BY_MESHIO = (".msh", ".vtu", ".vtk")
 
 
@@ -181,11 +186,22 @@ def _parsed(path: Path, time: int, size: int) -> RawMesh:
     if suffix == ".msh" and is_msh41(path):
         return read_msh41(path)
     if suffix in _READERS:
+        with ordinary(path).open("rb") as file:
+            head = file.read(4096)
+        if suffix != ".med" and head.count(0) > 8:
+            way = "UTF-16; write it as UTF-8 or ASCII" if head[:2] in (b"\xff\xfe", b"\xfe\xff") else "no text"
+            raise Damaged(f"it is {way}")
         return _READERS[suffix](path)
     if suffix in _BY_MESHIO:
         return _by_meshio(path, _from_meshio)
     known = ", ".join([*_READERS, *_BY_MESHIO])
     raise UserError(f"meshes are not read from a file '{suffix}'; use one of {known}")
+
+
+def read_files(path: Path) -> list[Path]:
+    """A mesh file and those that it reads (INCLUDE, INPUT); what is missing is told where it is read."""
+    reader = _READERS.get(suffix_of(path))
+    return files_of(path) if reader is read_inp else included(path) if reader is read_bdf else [path]
 
 
 def _mesh_of(raw: RawMesh, metres: float, system: str | None) -> Mesh:
@@ -195,6 +211,10 @@ def _mesh_of(raw: RawMesh, metres: float, system: str | None) -> Mesh:
         if {"wedge18", "pyramid14"} & set(foreign):
             way += " (in gmsh: Mesh.SecondOrderIncomplete = 1)"
         raise UserError(f"cells of type {', '.join(foreign)} cannot be assembled; {way}")
+    if raw.points.shape[1:] != (3,) or not np.isfinite(raw.points).all():
+        lost = raw.node_id[~np.isfinite(raw.points).reshape(len(raw.points), -1).all(axis=1)]
+        which = f"node {lost[0]} has others" if len(lost) else "there are others"
+        raise UserError(f"coordinates must be three finite numbers a point, and {which}; correct them")
     _sort_by_region(raw)
     turn_left_handed(raw)
     cells: dict[str, list[Indices]] = {}
@@ -206,10 +226,10 @@ def _mesh_of(raw: RawMesh, metres: float, system: str | None) -> Mesh:
     attached = hanging(raw)
     lumps = spread(raw, system)
     points = raw.points * metres
-    if points.shape[1:] != (3,) or not np.isfinite(points).all():
-        raise UserError("coordinates must be three finite numbers a point; the file is damaged or not 3-D")
-    if np.abs(points).max() > _FARTHEST:
-        raise UserError(f"a point lies {np.abs(points).max():.3g} m from the origin; the file is damaged")
+    away = np.abs(points).max(axis=1)
+    if away.max() > _FARTHEST:
+        node = raw.node_id[away.argmax()] if away.argmax() < len(raw.node_id) else ""
+        raise UserError(f"node {node} lies {away.max():.3g} m from the origin; the file is damaged")
     whole = {t: np.concatenate(c) for t, c in cells.items()}
     mesh = _assemble_mesh(raw, points, whole, metres, system, lumps)
     return replace(mesh, hanging=attached, retained=tuple(n for n in raw.retained if n in mesh.point_sets))

@@ -167,16 +167,13 @@ def read_unv(path: Path) -> RawMesh:
 
 
 def has_solids(path: Path) -> bool:
-    """Whether a file has solid cells."""
-    with suppress(Damaged):
+    """Whether a file has solid cells, damaged ones too."""
+    try:
         sets = data_sets(path.read_bytes().decode("latin-1"))
-        return any(
-            descriptor in _SOLIDS
-            for data in sets
-            if data.number in _CELLS
-            for _, _, descriptor, _ in _records(data)
-        )
-    return False
+        cells = (cell for data in sets if data.number in _CELLS for cell in _records(data))
+        return any(descriptor in _SOLIDS for _, _, descriptor, _ in cells)
+    except Damaged:
+        return True
 
 
 def length_unit(text: str, units: Mapping[str, float]) -> str:
@@ -199,18 +196,19 @@ def data_sets(text: str) -> Iterator[DataSet]:
     Raises:
         Damaged: the last one has no end.
     """
+    text = text.removeprefix("\xef\xbb\xbf")
     if "\n" not in text:
         text = text.replace("\r", "\n")
     text = re.sub(r"[^\t\r\n\x20-\x7e\xa0-\xff]", " ", text)
     at, line = 0, 1
     while begin := _MARK.search(text, at):
+        line += text.count("\n", at, begin.end())
         head = text[begin.end() + 1 : begin.end() + 82].partition("\n")[0].split()
         end = _MARK.search(text, begin.end() + _binary(head))
         if end is None:
             if text[begin.end() :].strip():
-                raise Damaged("a data set has no end, the file is truncated")
+                raise Damaged(f"line {line}: the data set has no end, the file is truncated")
             return
-        line += text.count("\n", at, begin.end())
         number = int(head[0]) if head and head[0].isdecimal() and len(head[0]) < 9 else 0
         yield DataSet(number, text[begin.end() : end.start()].split("\n")[2:-1], line + 2)
         line, at = line + text.count("\n", begin.end(), end.end()), end.end()
@@ -226,7 +224,7 @@ def _binary(head: list[str]) -> int:
 
 
 def _nodes(path: Path, sets: list[DataSet]) -> RawMesh:
-    ids, points = list[int](), list[list[float]]()
+    ids, points, lines = list[int](), list[list[float]](), dict[int, int]()
     local = {label for data in sets if data.number == 2420 for label in _local(path, data)}
     for data in (d for d in sets if d.number in _NODES):
         with placed(path, data):
@@ -242,6 +240,9 @@ def _nodes(path: Path, sets: list[DataSet]) -> RawMesh:
                         f"node {number} stands in the local coordinate system {system} (data set 2420); "
                         "export it in the global one"
                     )
+                if number in lines:
+                    raise Damaged(f"node {number} is defined twice, first in line {lines[number]}")
+                lines[number] = data.line
                 ids.append(number)
                 points.append(place)
     if not ids:
@@ -269,7 +270,7 @@ def _elements(path: Path, sets: list[DataSet], raw: RawMesh, numbering: Numberin
     """Add the solids and what is left out beside them; shells and lines by their number."""
     solids: dict[str, list[tuple[int, int, list[int]]]] = {}
     flat: dict[int, tuple[str, int, list[int]]] = {}
-    seen: set[int] = set()
+    seen, known = set[int](), {*raw.node_id.tolist()}
     first, others = dict[str, str](), Counter[str]()
     for data in (d for d in sets if d.number in _CELLS):
         with placed(path, data):
@@ -277,6 +278,10 @@ def _elements(path: Path, sets: list[DataSet], raw: RawMesh, numbering: Numberin
                 if number in seen:
                     raise Damaged(f"element {number} is defined twice")
                 seen.add(number)
+                if absent := [n for n in nodes if n not in known]:
+                    raise Damaged(
+                        f"element {number} names node {absent[0]}, which the file does not define"
+                    )
                 where = f"{path.name}, line {line}"
                 if what := _OTHERS.get(descriptor):
                     first.setdefault(what, where)
@@ -292,7 +297,7 @@ def _elements(path: Path, sets: list[DataSet], raw: RawMesh, numbering: Numberin
     raw.lost += [lost(first[w], f"{n} {w}{'s' * (n > 1)}") for w, n in others.items()]
     raw.add_solids(solids, numbering, "an element names")
     raw.regions = []
-    found = {n: numbering.positions(c, f"element {n} names") for n, (*_, c) in flat.items()}
+    found = {n: numbering.positions(c, "") for n, (*_, c) in flat.items()}
     edges = _edges(raw) if any(len(c) == 2 for c in found.values()) else set()
     kinds: dict[int, Structure] = {}
     for n, (where, descriptor, _) in flat.items():

@@ -36,7 +36,8 @@ def modal_basis(
     """The modal basis of a body at each of its rotation speeds (Sextro section 2.4).
 
     Args:
-        mesh: in metres. settings: in SI. temperature: (n,) K at the points, or None. report: told what is done.
+        mesh: in metres. settings: in SI. temperature: (n,) K at the points, (n, 2) with the
+            stress-free one behind it, or None. report: told what is done.
         provenance: texts to carry in the file.
 
     Raises:

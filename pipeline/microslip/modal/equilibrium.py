@@ -19,7 +19,7 @@ from ..elasticity import VOIGT_AXES, pushed, strain_tensor
 from ..errors import NotConverged, UserError
 from ..fem.contact import ContactPair, Grip
 from ..fem.cyclic import CyclicUpper
-from ..fem.discretise import Discretisation, FreeUpper, Pattern, whole
+from ..fem.discretise import Block, Discretisation, FreeUpper, Pattern, quadrature, whole
 from ..fem.line_springs import LineSprings, line_springs
 from ..fem.loads import FollowingPressure
 from ..fem.operators import (
@@ -156,22 +156,51 @@ def make_model(
     """Assemble what does not depend on speed.
 
     Args:
-        material: one for all, or one per block. temperature: (n,) K at the nodes, or None for the reference.
+        material: one for all, or one per block. temperature: (n,) K at the nodes, (n, 2) with the
+            stress-free one behind it, or None for the reference.
     """
     own: list[Material] = per_block(d, material)
-    factor = strain = None
+    factor = strain = hooke = None
     if temperature is not None:
-        at = [np.einsum("qk,ek->eq", b.N, temperature[b.cells]) for b in d.blocks]
+        alike = np.full(len(temperature), reference)
+        T = temperature if temperature.ndim == 2 else np.column_stack([temperature, alike])
+        both = [np.einsum("qk,eks->seq", _heat_shapes(b), T[b.cells]) for b in d.blocks]
+        at, cold = [t[0] for t in both], [t[1] for t in both]
         if any(m.temperature_table is not None for m in own):
             factor = [m.modulus_factor(t) for m, t in zip(own, at, strict=True)]
         if any(np.any(m.expansion) for m in own):
-            strain = [(t - reference)[..., None] * m.expansion for m, t in zip(own, at, strict=True)]
+            strain = [m.thermal_strain(t, free) for m, t, free in zip(own, at, cold, strict=True)]
+        if any(m.stiffness_table is not None for m in own):
+            hooke = [
+                m.elasticity if m.stiffness_table is None else m.stiffness_at(t)
+                for m, t in zip(own, at, strict=True)
+            ]
     M = mass(whole(d), [m.density for m in own])
-    K = stiffness(d, [m.elasticity for m in own], factor)
+    if hooke is None:
+        K = stiffness(d, [m.elasticity for m in own], factor)
+    else:
+        of_each = zip(hooke, [None] * len(hooke) if factor is None else factor, d.blocks, strict=True)
+        K = tangent(d, [tangent_tensor(C, f, None, np.zeros((*b.dx.shape, 6))) for C, f, b in of_each])
     return BodyModel(
         d, tuple(own), factor, strain, M, d.pattern.full(M), K, free, fixed,
-        dead_load, axis / np.linalg.norm(axis), point, spin_softening,
+        dead_load, axis / np.linalg.norm(axis), point, spin_softening, hooke=hooke,
     )  # fmt: skip
+
+
+def _heat_shapes(b: Block) -> Array:
+    """(q, k) temperature at a block's points by those at its nodes.
+
+    In bricks of 20 nodes it is the trilinear field nearest to the quadratic one, in bricks of 8 the
+    mean: what heat strains is then no finer than the strains they have (so does CalculiX).
+    """
+    if b.cell_type == "hexahedron":
+        return np.full(b.N.shape, 1 / 8)
+    if b.cell_type != "hexahedron20":
+        return b.N
+    x, y, z = (b.at - b.at.mean(axis=0)).T
+    A = np.column_stack([np.ones(len(x)), x, y, z, x * y, y * z, x * z, x * y * z])
+    weighted = A.T * quadrature(b.cell_type, 3 if len(b.at) == 8 else None)[1]
+    return A @ np.linalg.solve(weighted @ A, weighted @ b.N)
 
 
 def with_lumps(model: BodyModel) -> BodyModel:
@@ -238,7 +267,8 @@ def heated(model: BodyModel) -> BodyModel:
         U, own = thermal_stretch(model, i), np.ones(e.shape[:-1]) if model.factor is None else model.factor[i]
         strain.append(engineering(0.5 * (U @ U - np.eye(3))))
         alike = np.array_equal(m.expansion, m.expansion[0] * np.array([1, 1, 1, 0, 0, 0]))
-        hooke.append(m.elasticity if alike else pushed(m.elasticity, np.linalg.inv(U)))
+        C = model.elasticity(i)
+        hooke.append(C if alike else pushed(C, np.linalg.inv(U)))
         factor.append(own / U[..., 0, 0] if alike else own)
     return replace(model, thermal_strain=strain, hooke=hooke, factor=factor)
 

@@ -12,7 +12,7 @@ from ..data import Array, Indices, Mesh
 from ..errors import UserError
 from ..fem.contact import Grip, coupled_points
 from ..fem.cyclic import CyclicUpper, cyclic_upper, sector_unknowns
-from ..fem.discretise import REDUCED, Discretisation, FreeUpper, discretise, whole
+from ..fem.discretise import RULES, Discretisation, FreeUpper, discretise, whole
 from ..fem.operators import per_block, spin_projector
 from ..fem.tied import Tied, tied_upper
 from ..linalg.direct import DirectSolver
@@ -132,11 +132,11 @@ def _prepared(
         cut_faces(mesh, settings, axis, point)
     pairs = contact_pairs(mesh, settings, known_materials(mesh, settings))
     rule = settings.mesh.integration
-    degree = REDUCED if rule != "full" else None
-    if degree and not set(mesh.cells) & set(REDUCED):
-        raise UserError(f'mesh.integration: "{rule}" is of bricks of 20 nodes; write "full" or mesh with bricks')
+    degree = RULES[rule]
+    if degree and not set(mesh.cells) & set(degree):
+        raise UserError(f'mesh.integration: "{rule}" is of {", ".join(degree)}, which the mesh has not; write "full"')
     d = discretise(mesh, degree, coupled=[coupled_points(p) for p in pairs])
-    d = replace(d, one_rule=rule == "reduced-mass")
+    d = replace(d, one_rule=rule in ("reduced-mass", "calculix"))
     held = fixed_dofs(mesh, settings)
     fixed = held[held < 3 * mesh.n_points]
     if len(fixed) == 3 * mesh.n_points:

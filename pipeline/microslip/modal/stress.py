@@ -76,7 +76,8 @@ def smoother(block: Block, n_points: int) -> tuple[sp.csr_matrix, Array]:
     volume.
     """
     kind = CELL_TYPES[block.cell_type]
-    at, nodes = _polynomials(block.at, kind.corners), _polynomials(kind.reference, kind.corners)
+    middle = block.at.mean(axis=0)  # from there few points leave a field constant in the directions they do not tell
+    at, nodes = (_polynomials(x - middle, kind.corners) for x in (block.at, kind.reference))
     extrapolate = nodes @ np.linalg.pinv(at)  # (k, q)
     e, q = block.dx.shape
     k = len(nodes)
@@ -92,8 +93,7 @@ def smoother(block: Block, n_points: int) -> tuple[sp.csr_matrix, Array]:
 def _polynomials(x: Array, corners: int) -> Array:
     ones = np.ones(len(x))
     if corners in (4, 5):
-        columns = [ones, x[:, 0], x[:, 1], x[:, 2]]
-        return np.column_stack(columns if len(x) > 1 else columns[:1])
+        return np.column_stack([ones, x[:, 0], x[:, 1], x[:, 2]])
     a, b, c = x.T
     if corners == 6:
         return np.column_stack([ones, a, b, c, a * c, b * c])

@@ -211,9 +211,11 @@ class Meshing(Model):
     """size of the elements; chosen from the body where it is not given"""
     order: Annotated[Literal[1, 2], BeforeValidator(_whole)] = 2
     """order of the elements; 1 is far too stiff in bending"""
-    integration: Literal["full", "reduced", "reduced-mass"] = "full"
+    integration: Literal["full", "reduced", "reduced-mass", "calculix"] = "full"
     """of the stiffness; `"reduced"` takes 8 points in bricks of 20 nodes, which do not lock near
-    a Poisson's ratio of 0.5; `"reduced-mass"` takes them for the mass too, as CalculiX does in C3D20R"""
+    a Poisson's ratio of 0.5; `"reduced-mass"` takes them for the mass too, as CalculiX does in
+    C3D20R; `"calculix"` takes its one and two points in tetrahedra of 4 and wedges of 6 nodes
+    alone"""
     local: dict[str, Positive] = Field(default_factory=dict)
     """[length_unit] table: name of a face = size there"""
 

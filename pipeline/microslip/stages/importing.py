@@ -18,14 +18,14 @@ from pathlib import Path
 import numpy as np
 
 from ..basis import write_basis
-from ..data import Array, BodyLoad, FacetLoad, Indices, Material, Mesh, NodalLoad, SpinLoad
+from ..data import Array, BodyLoad, FacetLoad, Indices, Material, Mesh, NodalLoad, RigidLink, SpinLoad
 from ..errors import UserError
 from ..files.store import ordinary, write_text
 from ..frames import rotation
 from ..mesh import UNITS, likely_unit, mesh_problems, read_mesh, suffix_of, unit_of
 from ..mesh.chosen import of_instances
 from ..mesh.materials import NONE, STANDS, Substitute
-from ..mesh.raw import Unread, joined, refused
+from ..mesh.raw import Unread, in_its_line, joined, refused
 from ..mesh.unv import UNIVERSAL, has_solids
 from ..plausible import density
 from ..units import SYSTEMS, to_rpm, usual_system
@@ -102,7 +102,8 @@ def import_file(
     if made is _matrices and _in_metres(file):
         unit = "m"
     mesh: Mesh | None
-    lines, told, mesh = (*made(file, target.parent, unit), None)[:3]
+    with in_its_line(file):
+        lines, told, mesh = (*made(file, target.parent, unit), None)[:3]
     head = [f'name = "{name}"', f'length_unit = "{unit}"']
     write_text(target, "\n".join([*head, *lines]) + "\n")
     if modes:
@@ -290,11 +291,9 @@ def _tied(file: Path, mesh: Mesh) -> tuple[Mesh, list[str]]:
     from ..fem.links import linked
     from ..fem.tied import tied_upper
 
-    try:
+    with in_its_line(file):
         mesh, told = linked(mesh)
         tied_upper(discretise(mesh).pattern, np.zeros(0, dtype=np.int64), mesh.ties)
-    except UserError as error:
-        raise refused(file, str(error)) from None
     said: dict[str, list[str]] = {}
     for link, text in zip(links.items, told, strict=True):
         said.setdefault(link.where, []).append(text)
@@ -479,7 +478,7 @@ def _mesh(
     lines = [] if holding else ["free = true               # nothing holds it wholly yet"]
     lines += ["", "[geometry]", f"mesh = {_beside(file, folder)}"]
     lines += [f"instances = {json.dumps(list(instances))}"] if instances else []
-    rule = f'integration = "{mesh.integration}"  # bricks of 20 nodes by eight points, as the file says'
+    rule = f'integration = "{mesh.integration}"  # the points that the program of the file takes'
     lines += ["", "[mesh]", rule] if mesh.integration != "full" else []
     lines += ["", "[material]", *_material(mesh, numbers, bool(lacking))]
     if mesh.materials:
@@ -541,17 +540,18 @@ def _noted(told: Sequence[str]) -> list[str]:
 def _temperatures(mesh: Mesh) -> tuple[list[str], list[str]]:
     """Lines of [temperature] and what to say of it: in force where moduli hang on it and nothing is
     strained by it."""
-    hanging = [m for m in mesh.materials if m.temperature_table is not None]
+    hanging = [m for m in mesh.materials if m.softening is not None]
     said = [_softened(m, mesh) for m in hanging]
     if mesh.temperature is None:
         return [], [f"warning: {text}" for text in said]
     free, actual = mesh.temperature[:, 0], _actual(mesh.temperature)
-    whole = not np.isnan(free).any() and np.ptp(free) <= 1e-9 * max(np.abs(free).max(), 1.0)
+    whole = not np.isnan(free).any()
     strained = bool((np.abs(actual - free) > 0).any()) and any(m.expansion.any() for m in mesh.materials)
     lines = ["[temperature]", 'from = "mesh"', 'scale = "C"             # or "K"']
     if whole and (mesh.state is not None or (hanging and not strained)):
         return ["", *lines], [f"temperatures of the file are in force: {text}" for text in said]
     told = "temperatures: used only once [temperature] of body.toml is uncommented"
+    told = f"warning: {told}" if mesh.state is not None else told
     if hanging:
         why = "they strain the body as well" if strained else "not all of them are there"
         return ["", *(f"#{line}" for line in lines)], [
@@ -569,8 +569,8 @@ def _actual(temperature: Array) -> Array:
 
 def _softened(material: Material, mesh: Mesh) -> str:
     """How far a modulus falls at the temperatures of the file, and the frequencies with it."""
-    assert material.temperature_table is not None
-    T, factor = material.temperature_table.T
+    assert material.softening is not None
+    T, factor = material.softening.T
     text = f"the modulus of {material.name} depends on temperature"
     hot = np.zeros(0) if mesh.temperature is None else _actual(mesh.temperature)
     if not np.isfinite(hot).any():
@@ -629,11 +629,20 @@ def _state(mesh: Mesh, metres: float, ring: bool, held: bool) -> tuple[list[str]
     acting = [f"{number} {kind}{'s' * (number > 1)}" for kind, number in count.items()]
     acting += ["temperatures"] * (mesh.temperature is not None)
     law = "finite displacements" if state.nonlinear else "one linear solution"
+    if (grown := _grown(mesh)) and state.nonlinear:
+        law += (
+            f"; heat stretches the body by up to {grown:.2g}, and moduli are those of the heated body: "
+            f"CalculiX raises them by as much, so its frequencies are up to {grown / 2:.1g} higher"
+        )
     if state.supports is not None:
         law += f"; held there by {', '.join(f'{n} in {w}' for n, w in state.supports.items()) or 'nothing'}"
     said = [f"{state.where}: the modes are about its static state: {', '.join(acting) or 'nothing acts'}; {law}"]
     turning = [] if ring else ["", "[rotation]"]
     turning.append(f'prestress = "{"nonlinear" if state.nonlinear else "linear"}"')
+    if mesh.links is not None and any(isinstance(link, RigidLink) for link in mesh.links.items):
+        text = "that forces turn with the arms of rigid links is left out of the stiffness, as in CalculiX"
+        finite = ", and the arms keep their directions at rest: CalculiX turns them" * state.nonlinear
+        said.append(f"warning: {state.where}: {text}{finite}; where links turn much, mesh their bodies")
     spins = [load for load in state.loads if isinstance(load, SpinLoad) and load.speed]
     if len(spins) > 1 or any(spin.cells is not None for spin in spins):
         said.append(
@@ -651,11 +660,24 @@ def _state(mesh: Mesh, metres: float, ring: bool, held: bool) -> tuple[list[str]
             turning += [f"axis = [{numbers[0]}]", f"point = [{numbers[1]}]"]
         turning.append(f"speeds_rpm = [{speed!r}]")
     rest = len(state.loads) > sum(isinstance(load, SpinLoad) for load in state.loads)
+    rest = rest or state.supports is not None
     return turning, ["", "[[loads]]", 'kind = "mesh"             # those of its static step'] if rest else [], said
 
 
+def _grown(mesh: Mesh) -> float:
+    """The largest stretch by heat, less 1; 0 where the file has no temperatures."""
+    if mesh.temperature is None or not mesh.materials:
+        return 0.0
+    free, actual = mesh.temperature[:, 0], _actual(mesh.temperature)
+    largest = [np.abs(m.thermal_strain(actual, free)).max(initial=0.0) for m in mesh.materials]
+    return float(np.nan_to_num(max(largest)))
+
+
 def _pressed(mesh: Mesh) -> list[str]:
-    """Preloads of bolts that are one body with all that they hold: no contact takes them."""
+    """Preloads of bolts that are one body with all that they hold, and not in its static step: no contact takes them.
+    """
+    if mesh.state is not None:
+        return []
     return [
         f"warning: {where}: the preload of {force:g} N is not used: the bolt and all that it holds are one "
         "body; tie it to one side alone, with a *CONTACT PAIR on the other"

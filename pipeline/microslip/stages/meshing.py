@@ -23,7 +23,7 @@ from ..interrupts import look
 from ..mesh import mesh_problems, part_numbers, read_mesh
 from ..mesh.chosen import of_instances, with_parts
 from ..mesh.materials import Substitute
-from ..mesh.raw import in_file, refused
+from ..mesh.raw import in_file, in_its_line, refused
 from ..settings.body import FaceRule, MaterialSettings, implausible
 from ..units import SYSTEMS, usual_system
 from .job import Job
@@ -280,10 +280,8 @@ def linked_mesh(path: Path, mesh: Mesh) -> Mesh:
         return mesh
     from ..fem.links import linked
 
-    try:
+    with in_its_line(path):
         return linked(mesh)[0]
-    except UserError as error:
-        raise refused(path, str(error)) from None
 
 
 def _read_with_materials(job: Job, path: Path) -> tuple[Mesh, list[str]]:
