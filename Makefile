@@ -86,6 +86,9 @@ release-check: $(READY) ## wheel and sdist, installed in clean environments and 
 docs: $(READY) ## the studies and pictures of docs/ (minutes)
 	@$(PYTHON) docs/make_pictures.py
 
+figure-%: $(READY) ## a figure of the book by its number, figure-6.7-5 -> build/figures
+	@$(PYTHON) docs/figures.py $* --figures svg
+
 bench: $(READY) ## timings against CalculiX, NGSolve and pyHarm, of rings and cyclic sectors (minutes)
 	@$(PYTHON) benchmarks/modal.py
 	@$(PYTHON) benchmarks/ring.py

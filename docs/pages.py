@@ -338,8 +338,8 @@ WALL = {
     "book_mode": "5.2-5", "blade_response": "5.3-5", "rig_forces": "5.3-7", "spin_pit": "5.4-4",
     "ring_modes": "5.5-1", "ring_orders": "5.5-2", "ring_forces": "5.5-3", "damping_element": "5.5-6",
     "damping_wire": "5.5-8", "multicoupling": "5.5-9", "mistuning_mistuned": "5.6-3", "bolted_pipes": "5.7-2",
-    "book_rolling": "6.5-1", "rolling_creep": "6.6-1", "half_space": "6.7-3", "unround_wheels": "6.9-1",
-    "tyre": "6.10-4",
+    "book_rolling": "6.5-1", "book_heat": "6.7-1", "rolling_creep": "6.6-1", "half_space": "6.7-3",
+    "unround_wheels": "6.9-1", "tyre": "6.10-4",
 }  # fmt: skip
 """Picture -> one of the figures of the book that it shows."""
 

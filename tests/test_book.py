@@ -123,10 +123,20 @@ def verbs() -> set[str]:
     return {verb_of(name).name for name in places()}
 
 
+@cache
+def drawn() -> set[str]:
+    """Numbers of the figures that docs/figures.py draws."""
+    bodies = [tree(ROOT / "docs" / f"{name}_study.py").body for name in ("figure", "rolling", "heat")]
+    tables = [n.value for body in bodies for n in body if isinstance(n, ast.AnnAssign) and n.target.id == "FIGURES"]
+    return {key.value for table in tables for key in table.keys}
+
+
 def is_command(text: str) -> bool:
     """A verb with its case, body or figure; a target of make; a study of the pictures."""
     program, verb, *rest = shlex.split(text)
     cases, bodies = {p.stem for p in CASES.glob("*.toml")}, {p.parent.name for p in BODIES.glob("*/body.toml")}
+    if program == "make" and verb.startswith("figure-"):
+        return not rest and verb.removeprefix("figure-") in drawn()
     if program == "make":
         return not rest and (verb in cases | bodies or verb.removesuffix("-modes") in bodies)
     if program == "python":

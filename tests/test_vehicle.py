@@ -271,8 +271,8 @@ def test_no_change_is_claimed_that_the_jumps_do_not_tell(rolling: wearing.Runnin
     *_, (fine, _) = wearing.jumps(rolling, 1e6, 2e-8, 1e5)
     off = np.abs(wearing.orders_of(coarse.radius, 6) - wearing.orders_of(fine.radius, 6))
     assert (off <= wearing.uncertain([(coarse, jump)])[:6] + 1e-10).all() and off.max() > 1e-10
-    assert _went(3e-5, 2.992e-5, 1.9e-7).startswith("stays at 30 um: it changes by less than the error")
-    assert _went(3e-5, 2.992e-5, 1e-8).startswith("goes from 30 to 29.92 um")
+    assert _went(3e-5, 2.992e-5, 1.9e-7).startswith("stays at 30 µm: it changes by less than the error")
+    assert _went(3e-5, 2.992e-5, 1e-8).startswith("goes from 30 to 29.92 µm")
 
 
 def test_a_round_wheel_stays_round(rolling: wearing.RunningVehicle) -> None:

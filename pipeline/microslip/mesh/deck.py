@@ -26,7 +26,8 @@ class Cells:
 @dataclass
 class DeckConstants:
     """Constants as written: name, place; (t, 3) E, nu, T, or (t, 10) engineering constants or stiffnesses and T, or why
-    they are not read; (t, 2) densities and T where they vary; expansion along the axes, its table over T and the T from which it counts."""
+    they are not read; (t, 2) densities and T where they vary; expansion along the axes, its table over T and the T from
+    which it counts."""
 
     name: str
     where: str = ""

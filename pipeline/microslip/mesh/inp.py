@@ -102,7 +102,7 @@ def _replaced(raw: RawMesh, deck: Deck, of_parts: bool) -> list[str]:
     count: dict[str, int] = {}
     for cells in deck.solids:
         count[cells.written] = count.get(cells.written, 0) + len(cells.ids)
-    told = []
+    told: list[str] = []
     bricks20 = {cells.written for cells in deck.solids if cells.kind == "hexahedron20"}
     if {cells.kind for cells in deck.solids} & set(CALCULIX) and not of_parts:
         raw.integration = "calculix"

@@ -167,6 +167,21 @@ def _coarser(points: Array, skin: Outside) -> tuple[Indices, Indices, Indices]:
     return kept, place[at[fewer.regular_faces]], place[edges]
 
 
+def turning_assembly(
+    parts: Sequence[tuple[Mesh, Array, ComplexArray]], names: Sequence[str], title: str
+) -> str:
+    """Motions of several bodies that stand together.
+
+    Args:
+        parts: mesh, where its points are (n, 3) m, and (k, n, 3) their motions. names: (k,) of these.
+    """
+    skins = [outside(mesh) for mesh, *_ in parts]
+    points = np.concatenate([at[skin.source] for skin, (_, at, _) in zip(skins, parts, strict=True)])
+    moved = np.concatenate([u[:, skin.source] for skin, (*_, u) in zip(skins, parts, strict=True)], axis=1)
+    shapes = [Turned(name, u[None]) for name, u in zip(names, moved, strict=True)]
+    return turned(points, together(skins), shapes, title)
+
+
 def turning_modes(basis: ModalBasis, group: ModalGroup) -> str:
     """The first elastic modes of a body or of a sector; nothing where the group has no shapes.
 
