@@ -418,7 +418,7 @@ def _pairs(archive: Archive, raw: RawMesh, numbering: Numbering) -> list[Link]:
         if not hanging.isdisjoint(nodes):
             at = numbering.positions(nodes, f"{pair.where} names").tolist()
             among.setdefault(next(iter(among), pair.where), []).append(at)
-    raw.structures += [Structure(where, "contact pairs with these", rows) for where, rows in among.items()]
+    raw.structures += [Structure(where, "contact pairs with beams or shells", rows) for where, rows in among.items()]
     for why, several in left.items():
         counts = [
             sum(map(len, side))
