@@ -134,14 +134,15 @@ def keywords() -> str:
     def words(names: Any, mark: str = "") -> str:
         return " ".join(f"`{mark}{name}`" for name in sorted({*names}))
 
-    ansys = {name for name, read in cdb._COMMANDS.items() if callable(read)}
+    ansys = cdb._COMMANDS.items()
+    refused = {name for name, meaning in ansys if meaning and (not callable(meaning) or meaning is cdb._generated)}
     rows = [
         [
             "Abaqus, CalculiX",
             words({*inp.READERS, *inp._LINKING} - deck_state._OTHER_STATES, "*"),
             words({*inp._REFUSED, *deck_state._OTHER_STATES}, "*"),
         ],
-        ["Ansys", words(ansys), words({*cdb._COMMANDS} - ansys)],
+        ["Ansys", words({name for name, meaning in ansys if callable(meaning)} - refused), words(refused)],
         ["Nastran", words({*bdf._READ, *bdf.LOADS}), words(bdf.OTHERS)],
     ]
     return table(["deck", "read", "not read: refused or said"], rows)

@@ -245,7 +245,7 @@ def test_temperatures_of_elements_are_those_of_their_nodes():
     [
         ("DOMEGA,0,0,5", "DOMEGA is not read"),
         ("SFE,1,4,PRES,1,%GONE%", "table %GONE%"),
-        ("SLOAD,1,9,LOCK,FORC,100", "SLOAD, which loads it"),
+        ("SLOAD,1,9,LOCK,FORC,100", "SLOAD loads the body"),
         ("FCUM,ADD", "FCUM,ADD"),
         ("PERTURB,MODAL,,,PARKEEP", "PARKEEP"),
         ("SFGRAD,PRES,0,Y,0,3", "SFGRAD"),

@@ -418,7 +418,7 @@ def _pairs(archive: Archive, raw: RawMesh, numbering: Numbering) -> list[Link]:
         if not hanging.isdisjoint(nodes):
             at = numbering.positions(nodes, f"{pair.where} names").tolist()
             among.setdefault(next(iter(among), pair.where), []).append(at)
-    raw.structures += [Structure(where, "contact pairs with these", rows) for where, rows in among.items()]
+    raw.structures += [Structure(where, "contact pairs with beams or shells", rows) for where, rows in among.items()]
     for why, several in left.items():
         counts = [
             sum(map(len, side))
@@ -488,12 +488,12 @@ def _remote(archive: Archive, raw: RawMesh, numbering: Numbering, pair: _Pair, p
 
 COMMANDS: dict[str, Command] = {
     "D": _displacement,
-    "DBLO": _displacements_block,
+    "DBLOCK": _displacements_block,
     "CP": _coupled,
     "CE": _equation,
-    "CERI": _rigid,
+    "CERIG": _rigid,
     "RBE3": _spread,
-    "CYCL": _ring,
-    "CYCO": _cyclic_option,
-    "MSOP": _stages,
+    "CYCLIC": _ring,
+    "CYCOPT": _cyclic_option,
+    "MSOPT": _stages,
 }

@@ -341,15 +341,15 @@ def _more(archive: Archive, words: list[str]) -> None:
 
 
 COMMANDS: dict[str, Command] = {
-    "F": _force, "FBLO": _forces_block, "FDEL": _deleted, "DDEL": _deleted, "SF": _on_nodes,
-    "SFE": _on_faces, "SFEB": _faces_block, "SFDE": _faces_deleted, "SFED": _faces_deleted,
-    **dict.fromkeys(("ACEL", "OMEG", "CMOM", "CMAC", "DOME", "CGOM", "DCGO", "CMDO"), _field),
-    "TUNI": _uniform, "BFUN": _uniform, "BF": _temperature, "BFBL": _temperatures_block,
-    "BFE": _cell_temperature, "BFEB": _refuse_blocked, "BFDE": _temperatures_deleted,
-    "BFED": _temperatures_deleted, "LSCL": _cleared, "LSSO": _more,
-    **dict.fromkeys(("FCUM", "DCUM", "SFCU", "BFCU"), _added),
-    "ANTY": _analysis, "PERT": _perturbed, "PSTR": _prestress, "NLGE": _geometry, "TIME": _time,
-    "SOLV": _solve,
+    "F": _force, "FBLOCK": _forces_block, "FDELE": _deleted, "DDELE": _deleted, "SF": _on_nodes,
+    "SFE": _on_faces, "SFEBLOCK": _faces_block, "SFDELE": _faces_deleted, "SFEDELE": _faces_deleted,
+    **dict.fromkeys(("ACEL", "OMEGA", "CMOMEGA", "CMACEL", "DOMEGA", "CGOMGA", "DCGOMG", "CMDOMEGA"), _field),
+    "TUNIF": _uniform, "BFUNIF": _uniform, "BF": _temperature, "BFBLOCK": _temperatures_block,
+    "BFE": _cell_temperature, "BFEBLOCK": _refuse_blocked, "BFDELE": _temperatures_deleted,
+    "BFEDELE": _temperatures_deleted, "LSCLEAR": _cleared, "LSSOLVE": _more,
+    **dict.fromkeys(("FCUM", "DCUM", "SFCUM", "BFCUM"), _added),
+    "ANTYPE": _analysis, "PERTURB": _perturbed, "PSTRES": _prestress, "NLGEOM": _geometry, "TIME": _time,
+    "SOLVE": _solve,
 }  # fmt: skip
 
 

@@ -126,4 +126,4 @@ def _spring(
     )
 
 
-COMMANDS: dict[str, Command] = {"R": _read_reals, "RMOR": _read_reals, "RLBL": _read_block}
+COMMANDS: dict[str, Command] = {"R": _read_reals, "RMORE": _read_reals, "RLBLOCK": _read_block}

@@ -270,17 +270,17 @@ def _masters(archive: Archive, words: list[str]) -> None:
 
 
 COMMANDS: dict[str, Command] = {
-    "LOCA": _system,
+    "LOCAL": _system,
     "CS": _by_nodes,
-    "CLOC": _relative,
+    "CLOCAL": _relative,
     "CSYS": _activate,
-    "NROT": _turn,
-    "NMOD": _modify,
-    "CMSE": _component_selected,
+    "NROTAT": _turn,
+    "NMODIF": _modify,
+    "CMSEL": _component_selected,
     "NSEL": _nodes_selected,
     "ESEL": _cells_selected,
     "ESLN": _cells_of_nodes,
-    "ALLS": _everything,
+    "ALLSEL": _everything,
     "NSLE": _nodes_of_cells,
     **dict.fromkeys(("NSLA", "NSLL", "NSLK", "NSLV"), _not_read),
     "CM": _component,

@@ -197,6 +197,6 @@ def _nothing(archive: Archive, words: list[str]) -> None:
 
 
 COMMANDS: dict[str, Command] = {
-    "*SET": _set, "*DIM": _dimension, "*TAX": _axis, "*GET": _nothing,
-    "*CRE": _macro,
+    "*SET": _set, "*DIM": _dimension, "*TAXIS": _axis, "*GET": _nothing,
+    "*CREATE": _macro,
 }  # fmt: skip

@@ -111,13 +111,13 @@ def _execute(archive: Archive, words: list[str]) -> None:
         archive.idle = name.startswith(("/POST", "/AUX"))
     if archive.idle and name != "*SET":
         return
-    meaning = _COMMANDS.get(name[:4], name if name[:1].isalpha() or name[:1] == "*" else "")
+    meaning = _STEMS.get(name[:4], name if name[:1].isalpha() or name[:1] == "*" else "")
     if callable(meaning):
         meaning(archive, [*words, *_BLANKS])
     elif meaning == name:
         archive.unknown[name] = None
     elif meaning:
-        archive.leave_out(f"{name}, which {meaning},")
+        archive.lost.append(f"{archive.where}: {name} {meaning} and is not read, so frequencies will differ")
 
 
 # blocks --------------------------------------------------------------------------------------------------------------
@@ -371,7 +371,7 @@ def _generated(archive: Archive, words: list[str]) -> None:
     raise Damaged(f"{what}; write the mesh that it has made as an archive (CDWRITE,DB)")
 
 
-_IN_LOOPS = {*archive_parameters.COMMANDS, "*DO", "*DOW", "NSEL", "ESEL", "ALLS", "CMSE", "ESLN", "NSLE", "CSYS"}
+_IN_LOOPS = {*archive_parameters.COMMANDS, "*DO", "*DOWHILE", "NSEL", "ESEL", "ALLSEL", "CMSEL", "ESLN", "CSYS"}
 """What a loop may repeat without a change of the model."""
 
 
@@ -388,7 +388,8 @@ def _loop(archive: Archive, words: list[str]) -> None:
         if not depth:
             archive.at = number
             return
-        if _COMMANDS.get(name[:4]) and name[:4] not in _IN_LOOPS and not name.startswith("/"):
+        stems = {word[:4] for word in _IN_LOOPS}
+        if _STEMS.get(name[:4]) and name[:4] not in stems and not name.startswith("/"):
             raise Damaged(f"{words[0].upper()} repeats {name}; write the commands out, or an archive (CDWRITE,DB)")
     raise Damaged(f"{words[0].upper()} has no *ENDDO, the file is truncated")
 
@@ -511,37 +512,41 @@ def _read_table_data(archive: Archive, words: list[str]) -> None:
             over[row] = real(text, "TBTEMP") if text else 0.0
 
 
-_CONSTRAINS = "constrains nodes"
-_ADDS = "adds or changes nodes or elements"
 _COMMANDS: dict[str, Command | str] = {
-    "NBLO": _read_nodes, "N": _read_node, "EBLO": _read_elements, "CMBL": _read_component, "ETBL": _read_types,
-    **dict.fromkeys(("E", "EN"), _read_element), "EMOR": _read_more_nodes,
+    "NBLOCK": _read_nodes, "N": _read_node, "EBLOCK": _read_elements, "CMBLOCK": _read_component,
+    "ETBLOCK": _read_types,
+    **dict.fromkeys(("E", "EN"), _read_element), "EMORE": _read_more_nodes,
     **dict.fromkeys(("TYPE", "REAL", "MAT", "ESYS"), _read_current),
-    "ET": _read_type, "KEYO": _read_option, "EMOD": _modify,
-    "MPTE": _read_temperatures, "MPDA": _read_data, "MP": _read_constant, "TREF": _read_reference,
-    "TB": _read_table, "TBDA": _read_table_data, **dict.fromkeys(("TBTE", "TBFI"), _read_table_place),
-    "LUMP": _mass, "/EOF": _end, **dict.fromkeys(("/INP", "RESU", "CDRE"), _other_file),
+    "ET": _read_type, "KEYOPT": _read_option, "EMODIF": _modify,
+    "MPTEMP": _read_temperatures, "MPDATA": _read_data, "MP": _read_constant, "TREF": _read_reference,
+    "TB": _read_table, "TBDATA": _read_table_data, **dict.fromkeys(("TBTEMP", "TBFIELD"), _read_table_place),
+    "LUMPM": _mass, "/EOF": _end, **dict.fromkeys(("/INPUT", "RESUME", "CDREAD", "*USE"), _other_file),
     **archive_parameters.COMMANDS, **archive_nodes.COMMANDS, **archive_links.COMMANDS,
     **archive_lumps.COMMANDS, **archive_loads.COMMANDS,
-    **dict.fromkeys(("CEIN", "CPIN", "CPNG", "CPLG", "CPCY", "CECY", "CESG", "CPSG"), _CONSTRAINS),
-    **dict.fromkeys(("VMES", "VSWE", "AMES", "LMES", "KMES", "NGEN", "FILL", "EGEN", "ENGE", "NSYM"), _generated),
-    **dict.fromkeys(("ESYM", "EDEL", "NDEL", "NUMM", "NSCA", "ESUR", "EINT", "TRNF", "EREF", "EMID"), _ADDS),
-    **dict.fromkeys(("*DO", "*DOW"), _loop), "*REP": _generated,
-    **dict.fromkeys(("MPCH", "EKIL", "EALI", "MPAM"), "changes materials of elements"),
-    **dict.fromkeys(("INIS", "ISTR", "SLOA", "PSLO", "SFGR", "SFFU", "SFSC", "FSCA", "DSCA", "BFSC"), "loads it"),
-    "MATW": "holds matrices", "SE": "holds matrices",
+    **dict.fromkeys("CEINTF CPINTF CPNGEN CPLGEN CPCYC CECYC CESGEN CPSGEN".split(), "constrains nodes"),
+    **dict.fromkeys("VMESH VSWEEP AMESH LMESH KMESH NGEN FILL EGEN ENGEN NSYM *REPEAT".split(), _generated),
+    **dict.fromkeys(
+        "ESYM EDELE NDELE NUMMRG NSCALE ESURF EINTF TRANSFER EREF EMID".split(), "changes nodes or elements"
+    ),
+    **dict.fromkeys(("*DO", "*DOWHILE"), _loop),
+    **dict.fromkeys("MPCHG EKILL EALIVE MPAMOD".split(), "changes materials of elements"),
+    **dict.fromkeys(
+        "INISTATE ISTRESS SLOAD PSLOAD SFGRAD SFFUN SFSCALE FSCALE DSCALE BFSCALE".split(), "loads the body"
+    ),
+    "MATWRITE": "holds matrices", "SE": "holds matrices",
     **dict.fromkeys(
         "NUMO DOF KUSE NEQI NCNV ERES EXTO IRLF CRPL BETA ALPH DMPR DMPS TOFF OUTR NLDI SHPP FINI ETCO XMLO EQSL CNTR "
         "CEWR NSUB RESC DMPO SECT SECD SECO SECC SECB AUTO CSCI TRNO TINT TIMI TBIN STAB KBC CNCH RSTS TSHA MODO MXPA "
         "CMWR CMDE TBLI TBPT SCOP QRDO MODC CNVT CDWR SAVE WPCS LNSR PRED CUTC OPNC MDAM HROP HARF CGLO ERNO MPLI "
         "NLIS ELIS DLIS FLIS ETLI SLIS CSLI ALLO PARS NORL EXIT EPLO NPLO GPLO PLNS PRNS SET PLDI PRRS PRES SFLI BFLI "
         "MPWR NWRI EWRI SPEC OUTP NOPR GOPR MPPL STEF THOP CYCS RESV SNOP PCGO LANB KEYW PMAP DESI CMLI CMPL SEOP "
-        "PRIN NROP EMAT MONI JPEG MODE BETT CORI DSYS RSYS UIMP CHEC *END *IF *ELS *VWR *CFO *CFC NUMC *MSG *STA *USE "
-        "*LIS *VEC *NRM *DOT *MAT *EXP *PRI *VGE *VPU *VFI *VRE *VME *CYC *EXI *RET *ASK *ULI *TRE *DEL".split(), ""
+        "PRIN NROP EMAT MONI JPEG MODE BETT CORI DSYS RSYS UIMP CHEC *END *IF *ELS *VWR *CFO *CFC NUMC *MSG *STA *LIS "
+        "*VEC *NRM *DOT *MAT *EXP *PRI *VGE *VPU *VFI *VRE *VME *CYC *EXI *RET *ASK *ULI *TRE *DEL".split(), ""
     ),
 }  # fmt: skip
-"""First four letters of a command -> what reads it; or why it counts and is not read; nothing: it
-changes no frequency."""
+"""Command -> what reads it; or why it counts and is not read; nothing: it changes no frequency."""
+_STEMS = {name[:4]: meaning for name, meaning in _COMMANDS.items()}
+"""The same by the first four letters, which alone count."""
 
 
 # assembly ------------------------------------------------------------------------------------------------------------
