@@ -129,19 +129,19 @@ def typed(line: str, folder: Path) -> str:
 
 def keywords() -> str:
     """Table of the keywords of decks, from the readers."""
-    from microslip.mesh import archive_links, archive_nodes, bdf, cdb, deck_state, inp
+    from microslip.mesh import bdf, cdb, deck_state, inp
 
     def words(names: Any, mark: str = "") -> str:
         return " ".join(f"`{mark}{name}`" for name in sorted({*names}))
 
-    ansys = {*cdb._BLOCKS, *cdb._COMMANDS, *archive_links.COMMANDS, *archive_nodes.COMMANDS}
+    ansys = {name for name, read in cdb._COMMANDS.items() if callable(read)}
     rows = [
         [
             "Abaqus, CalculiX",
             words({*inp.READERS, *inp._LINKING} - deck_state._OTHER_STATES, "*"),
             words({*inp._REFUSED, *deck_state._OTHER_STATES}, "*"),
         ],
-        ["Ansys", words(ansys), words(cdb._NOT_READ)],
+        ["Ansys", words(ansys), words({*cdb._COMMANDS} - ansys)],
         ["Nastran", words({*bdf._READ, *bdf.LOADS}), words(bdf.OTHERS)],
     ]
     return table(["deck", "read", "not read: refused or said"], rows)

@@ -354,7 +354,7 @@ DAMAGED_INP = {
     "a line without number": ("  12, 1., 0., 0.", "  , 1., 0., 0.", "a line without a number"),
     "not a number": ("12, 1., 0., 0.", "12, 1., nan, 0.", "three finite numbers"),
     "another system": ("*NODE, NSET=NALL", "*NODE, SYSTEM=Q", "SYSTEM=Q is not read"),
-    "generated nodes": ("*ELEMENT, TYPE=C3D8R", "*NGEN\n11, 12, 1\n*ELEMENT, TYPE=C3D8", "*NGEN"),
+    "mapped nodes": ("*ELEMENT, TYPE=C3D8R", "*NMAP\n0., 0., 0.\n*ELEMENT, TYPE=C3D8", "*NMAP"),
     "odd cells": ("*ELEMENT, TYPE=S4", "*ELEMENT, TYPE=C3D5\n9, 11, 12, 13, 14, 21\n*ELEMENT, TYPE=S4", "element 9 is"),
     "an odd solid": ("TYPE=C3D8R", "TYPE=C3D9", "element 1 is of type C3D9"),
     "no nodes": ("*NODE", "*NOTHING", "there is no *NODE"),

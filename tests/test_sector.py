@@ -232,7 +232,9 @@ def test_faces_that_do_not_match_are_refused_with_the_distance(mesh: Mesh) -> No
     points[node] += 0.1 * np.cross(AXIS, points[node])
     assert "off the other face" in refusal(replace(mesh, points=points))
     fewer = {t: f[:-1] for t, f in mesh.faces["cyclic_right"].items()}
-    assert "off the other face" in refusal(replace(mesh, faces={**mesh.faces, "cyclic_right": fewer}))
+    assert "off the other face" in refusal(
+        replace(mesh, faces={**mesh.faces, "cyclic_right": fewer})
+    )
 
 
 def test_a_sector_that_reaches_the_axis_is_refused(mesh: Mesh) -> None:
@@ -243,7 +245,9 @@ def test_a_sector_that_reaches_the_axis_is_refused(mesh: Mesh) -> None:
     refused("leave a bore", pair_cut_faces, touching, *faces, AXIS, ORIGIN, N)
 
 
-@pytest.mark.parametrize("held", [{"face": "cyclic_left"}, {"face": "bore", "directions": "x"}, {"face": "bore"}])
+@pytest.mark.parametrize(
+    "held", [{"face": "cyclic_left"}, {"face": "bore", "directions": "x"}, {"face": "bore"}]
+)
 def test_what_one_cut_face_holds_is_held_on_the_other(mesh: Mesh, held: dict) -> None:
     """A node of both sectors is held by both: along x of the one, and along x of the other, turned."""
     d = discretise(mesh)

@@ -624,11 +624,13 @@ def import_(
             made = import_deck(file, folder, unit, report, instead, solids_only)
         else:
             made = import_parts(parts, folder, unit, report, instead)
+    first = made.told[: -1 if modes else None]  # said even where the modes fail
+    for line in first:
+        print(line)
     if modes:
         with progress(f"modes of {made.path.parent}") as report:
             made = with_modes(made, report)
-    for line in made.told:
-        print(line)
+        print("\n".join(line for line in made.told if line not in first))
 
 
 @app.command

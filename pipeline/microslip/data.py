@@ -72,8 +72,8 @@ class Material:
         name: for reports.
         stiffness_table: temperatures (t,) in K and matrices (t, 6, 6) that take the place of
             `elasticity` where not only one factor changes, or ``None``.
-        expansion_table: (t, 2) temperature in K and the factor on `expansion`, a secant from `zero`, K;
-            linear between, constant outside. ``None``: it is constant.
+        expansion_table: (t, 2) temperature in K and the factor on `expansion`, a secant from
+            `zero`, K; linear between, constant outside. ``None``: it is constant.
     """
 
     density: float
@@ -390,8 +390,8 @@ class StaticStep:
 
     Attributes:
         where: place of the step. nonlinear: whether its displacements are finite (NLGEOM), else one linear solution.
-        loads: all that act at its end, in a mesh in SI. supports: point set -> directions that it holds, as
-            `Mesh.supports`; None: those of the modes.
+        loads: all that act at its end, in a mesh in SI. supports: point set -> directions that it
+            holds, as `Mesh.supports`; None: those of the modes.
     """
 
     where: str

@@ -34,9 +34,10 @@ class CutFaces:
     """The nodes of the two cut faces: node ``right[i]`` is node ``left[i]`` turned by the sector angle.
 
     Attributes:
-        sectors: N. left, right: (l,) point indices. rotation: (3, 3) R. share: (r, l) where the faces do not match:
-            what each node of the right one, turned back, follows of those of the left one (N_i at its place); None: the
-            pairs. backward: left and right are exchanged, so that R turns by -2 pi / N.
+        sectors: N. left, right: (l,) point indices. rotation: (3, 3) R. share: (r, l) where the
+            faces do not match: what each node of the right one, turned back, follows of those of
+            the left one (N_i at its place); None: the pairs. backward: left and right are
+            exchanged, so that R turns by -2 pi / N.
     """
 
     sectors: int
@@ -93,7 +94,9 @@ def pair_cut_faces(
         return CutFaces(sectors, a, b[nearest], R)
     _refuse_elsewhere(x, y, left, right, axis, sectors, spacing)
     names = (right, left) if follows == "left" else (left, right)
-    return _tied_faces(mesh, names, R.T if follows == "left" else R, point, sectors, follows == "left")
+    return _tied_faces(
+        mesh, names, R.T if follows == "left" else R, point, sectors, follows == "left"
+    )
 
 
 def _tied_faces(
@@ -107,7 +110,8 @@ def _tied_faces(
     led, leading = mesh.face_points(names[1]), mesh.face_points(names[0])
     back = (mesh.points[led] - point) @ R + point
     distance, nodes, N, _ = nearest_on_face(mesh.points, mesh.faces[names[0]], back)
-    moved = (mesh.points - point) @ R + point  # what leads lies on what follows, too: no part of the cut is left open
+    # what leads lies on what follows, too: no part of the cut is left open
+    moved = (mesh.points - point) @ R + point
     other = nearest_on_face(moved, mesh.faces[names[1]], mesh.points[leading])[0]
     size, off = facet_size(mesh, names[0]), np.r_[distance, other]
     if (off > NEAR * size).any():
@@ -147,13 +151,17 @@ def _nearest(points: Array, to: Array, count: int = 1) -> tuple[Array, Array]:
     return np.asarray(distance), np.asarray(index)
 
 
-def _refuse_elsewhere(x: Array, y: Array, left: str, right: str, axis: Array, N: int, spacing: float) -> None:
+def _refuse_elsewhere(
+    x: Array, y: Array, left: str, right: str, axis: Array, N: int, spacing: float
+) -> None:
     """Refuse faces that another axis, angle or order would bring onto each other."""
     if text := _elsewhere(x, y, left, right, axis, N, spacing):
         raise UserError(text)
 
 
-def _elsewhere(x: Array, y: Array, left: str, right: str, axis: Array, N: int, spacing: float) -> str:
+def _elsewhere(
+    x: Array, y: Array, left: str, right: str, axis: Array, N: int, spacing: float
+) -> str:
     back = _nearest(y, x @ rotation(axis, -2 * np.pi / N).T)[0].max()
     if back < _CLOSE * spacing:
         return (
@@ -207,7 +215,8 @@ class SectorUnknowns:
 
     Attributes:
         apart: upper triangle over the f free degrees of freedom. cut: the pairing.
-        stay: (f, m) T_0. turn: (f, m) T_R. boundary: positions, among the free, of those that move the cut faces.
+        stay: (f, m) T_0. turn: (f, m) T_R. boundary: positions, among the free, of those that move
+        the cut faces.
     """
 
     apart: FreeUpper | Tied
@@ -225,11 +234,15 @@ def sector_unknowns(pattern: Pattern, fixed: Indices, cut: CutFaces, ties: Ties 
     """Eliminate the right cut face: its displacements that are unknowns become those of the left one, turned.
 
     Raises:
-        UserError: ties that do not go on in the next sector, supports of a face that does not match the other one.
+        UserError: ties that do not go on in the next sector, supports of a face that does not match
+        the other one.
     """
     fixed, ties = _held_alike(pattern.n, fixed, cut, ties)
     apart = tied_upper(pattern, fixed, ties)
-    f, rows = apart.size, (apart.T if isinstance(apart, Tied) else sp.identity(apart.size, format="csr"))
+    f, rows = (
+        apart.size,
+        (apart.T if isinstance(apart, Tied) else sp.identity(apart.size, format="csr")),
+    )
     free = apart.apart.free if isinstance(apart, Tied) else apart.free
     position, place = (np.full(3 * pattern.n, -1, dtype=np.int64) for _ in range(2))
     plain = np.flatnonzero(apart.own >= 0)
@@ -237,7 +250,9 @@ def sector_unknowns(pattern: Pattern, fixed: Indices, cut: CutFaces, ties: Ties 
     l, r = (3 * nodes[:, None] + np.arange(3) for nodes in (cut.left, cut.right))
     at = place[l.ravel()]
     on_left = sp.diags((at >= 0).astype(float)) @ rows[np.maximum(at, 0)]
-    followed = (sp.kron(cut.weights, np.where(np.abs(cut.rotation) > 1e-14, cut.rotation, 0.0)) @ on_left).tocsr()
+    followed = (
+        sp.kron(cut.weights, np.where(np.abs(cut.rotation) > 1e-14, cut.rotation, 0.0)) @ on_left
+    ).tocsr()
     gone = position[r.ravel()] >= 0
     right = position[r.ravel()][gone]
     keep = np.ones(f, dtype=bool)
@@ -250,17 +265,22 @@ def sector_unknowns(pattern: Pattern, fixed: Indices, cut: CutFaces, ties: Ties 
     return SectorUnknowns(apart, cut, stay, turn, np.union1d(np.unique(given.col), right))
 
 
-def _held_alike(n: int, fixed: Indices, cut: CutFaces, ties: Ties | None) -> tuple[Indices, Ties | None]:
+def _held_alike(
+    n: int, fixed: Indices, cut: CutFaces, ties: Ties | None
+) -> tuple[Indices, Ties | None]:
     """Supports of both nodes of a pair, where they differ, as those of the left one: the right one follows it.
 
-    What is held on the right as v is held on the left as R^-1 v; along no axis of the body it is an equation.
+    What is held on the right as v is held on the left as R^-1 v; along no axis of the body it is an
+    equation.
     """
     held = np.zeros((max(n, int(fixed.max(initial=0)) // 3 + 1), 3), dtype=bool)
     held.reshape(-1)[fixed] = True
     R = np.abs(cut.rotation) > 1e-12
     if cut.share is not None:
         return fixed, ties
-    unlike = (R[None] & (held[cut.right][:, :, None] != held[cut.left][:, None, :])).any(axis=(1, 2))
+    unlike = (R[None] & (held[cut.right][:, :, None] != held[cut.left][:, None, :])).any(
+        axis=(1, 2)
+    )
     rows = []
     for left, right in zip(cut.left[unlike], cut.right[unlike], strict=True):
         vectors = np.vstack([np.eye(3)[held[left]], cut.rotation[held[right]]])
@@ -280,7 +300,9 @@ def with_rows(ties: Ties | None, n: int, rows: Sequence[tuple[int, Array]]) -> T
         ties = Ties(sp.csr_matrix((0, 3 * n)), none, none, (), (), np.zeros((0, 3)), np.arange(n))
     at, of = 3 * np.array([node for node, _ in rows])[:, None] + np.arange(3), np.arange(len(rows))
     data = np.concatenate([v for _, v in rows])
-    more = sp.csr_matrix((data, (np.repeat(of, 3), at.ravel())), shape=(len(rows), ties.rows.shape[1]))
+    more = sp.csr_matrix(
+        (data, (np.repeat(of, 3), at.ravel())), shape=(len(rows), ties.rows.shape[1])
+    )
     return replace(
         ties, rows=sp.vstack([ties.rows, more]).tocsr(), dependent=np.r_[ties.dependent, np.full(len(rows), -1)],
         of=np.r_[ties.of, np.full(len(rows), len(ties.told))], told=(*ties.told, "supports of the other cut face"),
@@ -288,7 +310,9 @@ def with_rows(ties: Ties | None, n: int, rows: Sequence[tuple[int, Array]]) -> T
     )  # fmt: skip
 
 
-def _refuse_unlike(apart: FreeUpper | Tied, cut: CutFaces, stay: sp.csr_matrix, turn: sp.csr_matrix) -> None:
+def _refuse_unlike(
+    apart: FreeUpper | Tied, cut: CutFaces, stay: sp.csr_matrix, turn: sp.csr_matrix
+) -> None:
     """Refuse ties and supports that do not go on in the next sector: what follows others, or is held, on the right face
     must be so on the left one, turned and in any phase."""
     phase = np.exp(0.7j)

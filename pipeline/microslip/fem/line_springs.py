@@ -14,8 +14,8 @@ from .discretise import Pattern
 class LineSprings:
     """Springs that pull with F = k (l - l0) along e, the line from their first point to their second.
 
-    The tangent is k e e^T + F / l (1 - e e^T); the mesh's lumped stiffness has k e0 e0^T of them already, and what
-    stands here is the difference to that.
+    The tangent is k e e^T + F / l (1 - e e^T); the mesh's lumped stiffness has k e0 e0^T of them
+    already, and what stands here is the difference to that.
 
     Attributes:
         pairs: (s, 2) points a < b. stiffness: (s,) N/m. rest: (s, 3) from a to b at rest, m.

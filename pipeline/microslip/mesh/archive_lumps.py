@@ -116,7 +116,14 @@ def _spring(
     row = np.concatenate([axis[used], -axis[used]])
     both = np.outer(row, row)
     pulls = r[0] if way == "0" else 0.0
-    return LumpedElement(where, np.repeat(nodes, len(used)), np.tile(used + first, 2), r[0] * both, r[1] * both, pulls)
+    return LumpedElement(
+        where,
+        np.repeat(nodes, len(used)),
+        np.tile(used + first, 2),
+        r[0] * both,
+        r[1] * both,
+        pulls,
+    )
 
 
 COMMANDS: dict[str, Command] = {"R": _read_reals, "RMOR": _read_reals, "RLBL": _read_block}

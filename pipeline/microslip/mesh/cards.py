@@ -118,7 +118,11 @@ def keyword(line: str) -> str:
 def parameters(line: str) -> dict[str, str]:
     """Its parameters: in capitals -> as written, without quotes."""
     pairs = (word.partition("=") for word in line.split(",")[1:])
-    named = {" ".join(key.upper().split()): value.strip().strip('"') for key, _, value in pairs if key.strip()}
+    named = {
+        " ".join(key.upper().split()): value.strip().strip('"')
+        for key, _, value in pairs
+        if key.strip()
+    }
     return {_SPACED.get(key.replace(" ", ""), key): value for key, value in named.items()}
 
 
@@ -157,6 +161,9 @@ def numbers(lines: list[str], what: str) -> list[list[float]]:
     """Numbers of the data lines; an empty place counts as 0."""
     try:
         rows = [line.rstrip().rstrip(",").split(",") for line in lines]
-        return [[float(w.replace("D", "e").replace("d", "e")) if w.strip() else 0.0 for w in row] for row in rows]
+        table = [[float(w.replace("D", "e").replace("d", "e")) if w.strip() else 0.0 for w in row] for row in rows]
+        if not all(np.isfinite(v) for row in table for v in row):
+            raise ValueError("it is not finite")
+        return table
     except ValueError as error:
         raise Damaged(f"{what} holds something that is no number ({str(error)[-60:]})") from None

@@ -174,15 +174,16 @@ def _named(mesh: Mesh, link: Link) -> Indices:
 
 
 def bodies(mesh: Mesh) -> list[list[str]]:
-    """Instances (see `with_parts`) that constraints hold together, in the order of the file."""
+    """Instances (see `with_parts`) that constraints and springs hold together, in the order of the file."""
     mesh = with_parts(mesh)
     names = list(mesh.instances)
-    of = np.full(mesh.n_points, -1)
+    of = len(names) + np.arange(mesh.n_points)  # points without cells stand for themselves
     for number, name in enumerate(names):
         of[mesh.instances[name]] = number
-    pairs = [np.unique(of[nodes]) for nodes in (nodes_of(mesh) if mesh.links is not None else ())]
+    joining = [*(nodes_of(mesh) if mesh.links else ()), *(mesh.lumps.pairs if mesh.lumps else ())]
+    pairs = [np.unique(of[nodes]) for nodes in joining]
     edges = [(p[0], q) for p in pairs if len(p) for q in p]
     rows, columns = np.array(edges, dtype=int).reshape(-1, 2).T
-    graph = sp.coo_matrix((np.ones(len(rows)), (rows, columns)), shape=(len(names), len(names)))
-    group = connected_components(graph, directed=False)[1]
+    graph = sp.coo_matrix((np.ones(len(rows)), (rows, columns)), shape=(size := len(names) + mesh.n_points, size))
+    group = connected_components(graph, directed=False)[1][: len(names)]
     return [[n for n, g in zip(names, group, strict=True) if g == number] for number in dict.fromkeys(group.tolist())]

@@ -25,9 +25,10 @@ class Cells:
 
 @dataclass
 class DeckConstants:
-    """Constants as written: name, place; (t, 3) E, nu, T, or (t, 10) engineering constants or stiffnesses and T, or why
-    they are not read; (t, 2) densities and T where they vary; expansion along the axes, its table over T and the T from
-    which it counts."""
+    """Constants as written: name, place; (t, 3) E, nu, T, or (t, 10) engineering constants or
+    stiffnesses and T, or why they are not read; (t, 2) densities and T where they vary; expansion
+    along the axes, its table over T and the T from which it counts.
+    """
 
     name: str
     where: str = ""
@@ -70,7 +71,8 @@ class Steps:
             its end. period: its time. amplitudes: name -> time, value rows, and whether in total time.
         acting: cards of loads with step, and factor at its end. static: the last static step, as its keyword line and
             whether it was nonlinear. other: keyword of another one whose state is not read. modes: the keyword line
-            whose modes are meant. held: what was held at the end of the last static step, as `Deck.held`.
+            whose modes are meant. held: what was held at the end of the last static step, as
+            `Deck.held`.
     """
 
     number: int = 0
@@ -113,8 +115,8 @@ class Deck:
         links: constraints, contacts and loads; sections: of solids; both resolved at the end.
         kinds: types of cells. lost: what counts and is not read, in words.
         transforms: cards of local directions of nodes; axes: node number -> (3, 3) these as rows, once all is read.
-        turning: ROT NODE -> reference node whose rotations its displacements are. masses: number of a mass -> its node
-        and mass.
+        turning: ROT NODE -> reference node whose rotations its displacements are. masses: number of
+        a mass -> its node and mass.
         system: (4, 3) axes and origin in which nodes are written, or None. ignored: keywords that are not used.
         remarks: what is taken as something else, in words.
     """

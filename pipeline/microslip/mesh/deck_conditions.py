@@ -157,9 +157,14 @@ def constraints(deck: Deck, lines: Sequence[tuple[str, str, str]]) -> Constraint
         turned = turned or not deck.turning.keys().isdisjoint(nodes.tolist())
         for node in nodes.tolist() if turned else ():
             if node in deck.turning:
-                held.hold(deck.turning[node], ("abc"["xyz".index(c)] for c in directions if c in "xyz"))
+                held.hold(
+                    deck.turning[node], ("abc"["xyz".index(c)] for c in directions if c in "xyz")
+                )
             else:
-                held.hold(node, set(directions) - set("xyz") if single and node in deck.axes else directions)
+                held.hold(
+                    node,
+                    set(directions) - set("xyz") if single and node in deck.axes else directions,
+                )
         if not turned:
             held.hold(int(nodes[0]) if key is None else deck.written[key], directions)
     return held

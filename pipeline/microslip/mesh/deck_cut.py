@@ -1,8 +1,9 @@
-"""Bolts of an Abaqus or CalculiX deck that a *PRE-TENSION SECTION cuts through: the two sides, shifted into each other.
+"""Bolts of a deck that a *PRE-TENSION SECTION cuts through: two sides, shifted into each other.
 
-The nodes of the section are doubled: those w of the cells beyond it move as those o of the cells that
-name it do, but for the displacement q of the control node along the normal n, u_w = u_o - q n. A force on
-the control node is the bolt's, positive in tension. In the modes q stands still, as in CalculiX.
+The nodes of the section are doubled: those w of the cells beyond it move as those o of the cells
+that name it do, but for the displacement q of the control node along the normal n, u_w = u_o - q n.
+A force on the control node is the bolt's, positive in tension. In the modes q stands still, as in
+CalculiX.
 """
 
 from __future__ import annotations

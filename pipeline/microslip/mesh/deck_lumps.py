@@ -95,7 +95,7 @@ class _Reading:
         """Directions, from 0, and the value of a spring or dashpot."""
         rows = self.rows()
         along = self.kind.endswith("A")
-        ways = [] if along else [int(w) if abs(w) < 10 else 0 for w in (rows[0] if rows else [])]
+        ways = [] if along else [int(w) for w in (rows[0] if rows else [])]
         rows = rows if along else rows[1:]
         if self.kind.endswith("2") and len(ways) == 1:
             ways = 2 * ways
@@ -147,7 +147,9 @@ def _element(reading: _Reading, nodes: Array) -> LumpedElement:
     A = value * np.outer(row, row)
     at = np.concatenate([turn + np.arange(3) for turn in turns])
     zero, pulls = np.zeros_like(A), value if line and not damps else 0.0
-    return LumpedElement(reading.where, np.repeat(nodes, 3), at, zero if damps else A, A if damps else zero, pulls)
+    return LumpedElement(
+        reading.where, np.repeat(nodes, 3), at, zero if damps else A, A if damps else zero, pulls
+    )
 
 
 def elongation(axes: list[Array], signs: tuple[float, ...]) -> Array:
@@ -170,7 +172,7 @@ def read_cells(deck: Deck, card: Card, kind: str, rows: list[list[float]]) -> No
     """
     count, own = NODES[kind], deck.spaces[""]
     table = [[int(v) for v in row] for row in rows]
-    if any(len(row) != count + 1 or min(row) < 1 for row in table):
+    if any(len(row) != count + 1 or min(row) < 1 or max(row) > 10**15 for row in table):
         raise Damaged(f"*ELEMENT, TYPE={kind} needs a number and {count} node{'s' * (count > 1)} a line")
     ids, nodes = np.array(table)[:, 0] + own.cells, np.array(table)[:, 1:] + own.nodes
     deck.lumped.append(Cells(kind, ids, nodes, kind, card.place))

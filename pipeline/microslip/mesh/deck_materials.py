@@ -61,7 +61,9 @@ def _read_density(deck: Deck, card: Card) -> None:
     if len({row[0] for row in rows}) > 1:
         material.densities = np.array([[*row, 0.0][:2] for row in rows])
         if (np.diff(material.densities[:, 1]) <= 0).any():
-            raise Damaged(f"the temperatures of *DENSITY of the material {material.name} do not rise")
+            raise Damaged(
+                f"the temperatures of *DENSITY of the material {material.name} do not rise"
+            )
     material.density = rows[0][0]
 
 
@@ -152,7 +154,9 @@ def _weighed(deck: Deck, found: DeckConstants) -> None:
         found.refused = "a density that depends on temperature, and initial temperatures that vary"
     found.density = float(np.interp(min(free), T, rho))
     text = f"*DENSITY of {found.name} is {found.density:g} at the initial temperature; heat takes no mass away"
-    deck.remarks.append(f"{found.where.rpartition('/')[2]}: {text}, though CalculiX has another at another temperature")
+    deck.remarks.append(
+        f"{found.where.rpartition('/')[2]}: {text}, though CalculiX has another at another temperature"
+    )
 
 
 def _deck_material(deck: Deck, key: tuple[str, str], where: str) -> DeckMaterial:
@@ -174,7 +178,10 @@ def _deck_material(deck: Deck, key: tuple[str, str], where: str) -> DeckMaterial
         matrices = rows[:, 9], np.array([orthotropic_row(found.name, row[:9]) for row in rows])
     elif found.stiffness is not None:
         rows = found.stiffness
-        matrices = rows[:, 9], np.array([_orthotropic_stiffness(found.name, row[:9]) for row in rows])
+        matrices = (
+            rows[:, 9],
+            np.array([_orthotropic_stiffness(found.name, row[:9]) for row in rows]),
+        )
     if matrices is not None:
         if axes is not None:
             matrices = matrices[0], np.array([turned(matrix, axes) for matrix in matrices[1]])
@@ -182,8 +189,16 @@ def _deck_material(deck: Deck, key: tuple[str, str], where: str) -> DeckMaterial
     elif C is not None and axes is not None:
         C = turned(C, axes)
     return DeckMaterial(
-        found.name, C, found.density, turned_strain(found.expansion, axes), table, where, line=found.where,
-        stiffness_table=matrices, expansion_table=found.expansion_table, zero=found.zero,
+        found.name,
+        C,
+        found.density,
+        turned_strain(found.expansion, axes),
+        table,
+        where,
+        line=found.where,
+        stiffness_table=matrices,
+        expansion_table=found.expansion_table,
+        zero=found.zero,
     )
 
 

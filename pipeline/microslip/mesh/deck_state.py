@@ -145,10 +145,17 @@ def _tell_local(deck: Deck, raw: RawMesh) -> None:
     assert deck.steps.held is not None
     for word, directions, place in {*deck.steps.held} ^ {*deck.held}:
         nodes = deck.nodes_for("*BOUNDARY", word)
-        if set(directions) & set("xyz") not in (set(), set("xyz")) and not deck.axes.keys().isdisjoint(nodes.tolist()):
+        if set(directions) & set("xyz") not in (
+            set(),
+            set("xyz"),
+        ) and not deck.axes.keys().isdisjoint(nodes.tolist()):
             where = place.rpartition("/")[2]
-            text = "holds local directions in the static step and not in its modes, or in these alone"
-            raw.lost.append(f"{where}: *BOUNDARY {text}: it is taken as those of the modes, so frequencies will differ")
+            text = (
+                "holds local directions in the static step and not in its modes, or in these alone"
+            )
+            raw.lost.append(
+                f"{where}: *BOUNDARY {text}: it is taken as those of the modes, so frequencies will differ"
+            )
 
 
 _Loading = NodalLoad | FacetLoad | BodyLoad | SpinLoad
@@ -249,7 +256,9 @@ class _Acting:
 
     def _pull(self, number: int, load: BodyLoad, key: tuple[str, ...]) -> None:
         """The weight of the point masses that the load names."""
-        heavy = [m for n, m in self.deck.masses.items() if load.cells is None or n in load.cells]
+        if load.cells is None:
+            return  # that of everything has theirs
+        heavy = [m for n, m in self.deck.masses.items() if n in load.cells]
         if heavy:
             nodes = np.repeat([node for node, _ in heavy], 3)
             values = np.outer([mass for _, mass in heavy], load.acceleration)

@@ -184,4 +184,8 @@ def _turned_round(row: list[int]) -> tuple[int, ...]:
 
 def _cells(mesh: Mesh, numbers: Indices | None) -> Array | None:
     """Whether each cell is chosen, type by type; None where the file names none."""
-    return None if numbers is None else np.isin(joined(mesh.cell_id[kind] for kind in mesh.cells), numbers)
+    return (
+        None
+        if numbers is None
+        else np.isin(joined(mesh.cell_id[kind] for kind in mesh.cells), numbers)
+    )

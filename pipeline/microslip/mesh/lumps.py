@@ -68,7 +68,15 @@ def spread(raw: RawMesh, system: str | None) -> Lumps | None:
     weights = mass * np.array(list(made.masses.values()))
     lines = np.array([pair for *pair, _ in made.lines], dtype=np.int64).reshape(-1, 2)
     tight = np.array([k for *_, k in made.lines]) * mass / time**2
-    return Lumps(points, weights, pairs, blocks[:, 0] * mass / time**2, blocks[:, 1] * mass / time, lines, tight)
+    return Lumps(
+        points,
+        weights,
+        pairs,
+        blocks[:, 0] * mass / time**2,
+        blocks[:, 1] * mass / time,
+        lines,
+        tight,
+    )
 
 
 def on_mesh(lumps: Lumps, number: Indices) -> Lumps:
@@ -77,7 +85,9 @@ def on_mesh(lumps: Lumps, number: Indices) -> Lumps:
     swapped = (pairs[:, 0] > pairs[:, 1])[:, None, None]
     K, C = (np.where(swapped, np.swapaxes(A, 1, 2), A) for A in (lumps.stiffness, lumps.damping))
     lines = np.sort(number[lumps.lines], axis=1)
-    return Lumps(number[lumps.points], lumps.masses, np.sort(pairs, axis=1), K, C, lines, lumps.tight)
+    return Lumps(
+        number[lumps.points], lumps.masses, np.sort(pairs, axis=1), K, C, lines, lumps.tight
+    )
 
 
 def points_of(lumps: Lumps | None) -> Indices:
@@ -130,8 +140,8 @@ class _Spread:
     Attributes:
         solid: positions that cells use. leading: those that others follow, turning: those with rotations.
         frames: position -> points that follow it: (where, positions). masses: position -> mass. blocks: (a, b) ->
-            stiffness and damping (2, 3, 3). lines: of springs between two points. resisted: loose position -> (6, 6)
-            stiffness of its own.
+            stiffness and damping (2, 3, 3). lines: of springs between two points. resisted: loose
+            position -> (6, 6) stiffness of its own.
     """
 
     raw: RawMesh
@@ -168,8 +178,12 @@ class _Spread:
 
     def joined(self) -> list[PointMass | LumpedElement]:
         """The lumped elements without masses on nodes that nothing joins to anything; these are told."""
-        ends = {n for item in self.raw.lumps if isinstance(item, LumpedElement) for n in _nodes(item)}
-        idle = [m for m in self.raw.lumps if isinstance(m, PointMass) and m.node in self.loose - ends]
+        ends = {
+            n for item in self.raw.lumps if isinstance(item, LumpedElement) for n in _nodes(item)
+        }
+        idle = [
+            m for m in self.raw.lumps if isinstance(m, PointMass) and m.node in self.loose - ends
+        ]
         if idle:
             self.loose -= {mass.node for mass in idle}
             said = f"masses on nodes that nothing joins to the solids are left out: {len(idle)}"

@@ -18,11 +18,14 @@ def isotropic_rows(name: str, rows: Array) -> tuple[Array, Array | None]:
     """Hooke matrix at the first temperature and the factor over temperature, from (t, 3) E, nu, temperature.
 
     Raises:
-        Damaged: impossible constants; a Poisson's ratio that depends on temperature (see `isotropic_matrices`).
+        Damaged: impossible constants; a Poisson's ratio that depends on temperature (see
+        `isotropic_matrices`).
     """
     E, nu, T = rows.T
     if not (E > 0).all() or not ((nu > -1) & (nu < 0.5)).all() or not np.isfinite(rows).all():
-        raise Damaged(f"the material '{name}' has E = {E[0]:g} and nu = {nu[0]:g}, which no solid has")
+        raise Damaged(
+            f"the material '{name}' has E = {E[0]:g} and nu = {nu[0]:g}, which no solid has"
+        )
     if np.ptp(nu) > _SAME:
         raise Damaged(
             f"Poisson's ratio of the material '{name}' depends on temperature; only the modulus may (write the mean)"
@@ -37,13 +40,15 @@ def isotropic_rows(name: str, rows: Array) -> tuple[Array, Array | None]:
 def isotropic_matrices(name: str, rows: Array) -> tuple[Array, Array] | None:
     """Temperatures and Hooke matrices where Poisson's ratio depends on temperature, else None.
 
-    E and nu are linear between the rows (t, 3) E, nu, temperature, which a hundred matrices between two of them follow
-    to 1e-6.
+    E and nu are linear between the rows (t, 3) E, nu, temperature, which a hundred matrices between
+    two of them follow to 1e-6.
     """
     E, nu, T = rows.T
     if np.ptp(nu) <= _SAME or not np.isfinite(rows).all() or (np.diff(T) <= 0).any():
         return None
-    fine = np.unique(np.concatenate([np.linspace(a, b, 101) for a, b in zip(T[:-1], T[1:], strict=True)]))
+    fine = np.unique(
+        np.concatenate([np.linspace(a, b, 101) for a, b in zip(T[:-1], T[1:], strict=True)])
+    )
     if not (E > 0).all() or not ((nu > -1) & (nu < 0.5)).all():
         raise Damaged(f"the material '{name}' has E = {E[0]:g} and nu = {nu[0]:g}, which no solid has")
     return fine, np.array([isotropic(np.interp(t, T, E), np.interp(t, T, nu)) for t in fine])

@@ -387,7 +387,9 @@ def _assemble_mesh(
     known = {*mesh.point_sets, *(links.sets if links else ())}
     supports = {n: directions for n, directions in raw.supports.items() if n in known}
     if idle := ", ".join(f"'{name}'" for name in raw.supports if name not in known):
-        raw.remarks.append(f"held, but no element or constraint uses these nodes, so it holds nothing: {idle}")
+        raw.remarks.append(
+            f"held, but no element or constraint uses these nodes, so it holds nothing: {idle}"
+        )
     return replace(
         mesh, faces=faces, inner=inner, supports=supports, not_held=tuple(raw.not_held), unended=raw.unended,
         links=links, state=state, integration=raw.integration,

@@ -57,15 +57,24 @@ def still_supports(raw: RawMesh, held: Constraints, numbering: Numbering) -> dic
     add_supports(still, held, numbering, "held at rest")
     if (more := len(still.links) - len(raw.links)) or still.not_held:
         number = more or len(still.not_held)
-        raw.lost.append(f"{number} supports of the static step are not read: frequencies may differ")
+        raw.lost.append(
+            f"{number} supports of the static step are not read: frequencies may differ"
+        )
     return None if _by_node(still) == _by_node(raw) else still.supports
 
 
 def _by_node(raw: RawMesh) -> set[tuple[int, str]]:
-    return {(n, way) for name, ways in raw.supports.items() for n in raw.point_sets[name].tolist() for way in ways}
+    return {
+        (n, way)
+        for name, ways in raw.supports.items()
+        for n in raw.point_sets[name].tolist()
+        for way in ways
+    }
 
 
-def add_supports(raw: RawMesh, held: Constraints, numbering: Numbering, title: str = "held") -> None:
+def add_supports(
+    raw: RawMesh, held: Constraints, numbering: Numbering, title: str = "held"
+) -> None:
     """Give `raw` the supports: named sets as they are; nodes held alike as the set that has just them, or a new one,
     whose name begins with the title.
 

@@ -39,7 +39,9 @@ def require_face(mesh: Mesh, face: str, key: str, points_suffice: bool = False) 
 def fixed_dofs(mesh: Mesh, settings: BodySettings) -> Indices:
     """Held degrees of freedom: 3 * point + component, and behind those of the points six of each reference node."""
     turns = ["".join("abc"[turn - 3] for turn in s.turns) for s in settings.supports]
-    held = [(s.face, f"{s.directions}{more}") for s, more in zip(settings.supports, turns, strict=True)]
+    held = [
+        (s.face, f"{s.directions}{more}") for s, more in zip(settings.supports, turns, strict=True)
+    ]
     return held_dofs(mesh, held)
 
 
@@ -192,8 +194,10 @@ def refuse_other_supports(settings: BodySettings) -> None:
         UserError: with the key.
     """
     if settings.rotation.range_rpm is not None:
-        raise UserError("rotation.range_rpm: the static step of the mesh file holds the body otherwise than its modes, "
-                        "which a range does not know; write speeds_rpm")
+        raise UserError(
+            "rotation.range_rpm: the static step of the mesh file holds the body otherwise than its modes, "
+            "which a range does not know; write speeds_rpm"
+        )
 
 
 def with_loads(model: BodyModel, mesh: Mesh, settings: BodySettings, held: Indices) -> BodyModel:

@@ -76,7 +76,8 @@ class BodyModel:
         dead_load: (n, 3) forces that act at every speed, N. axis, point: of rotation.
         spin_softening: whether -Omega^2 M P is part of K. contacts: faces that may touch in the static state.
         hooke: per block (6, 6) or (e, q, 6, 6) that takes the place of the materials' (see `heated`), or None.
-        springs, dashpots: (p, 3, 3) of the mesh's lumped elements, N/m and N s/m, or None. lines: springs that turn.
+        springs, dashpots: (p, 3, 3) of the mesh's lumped elements, N/m and N s/m, or None. lines:
+        springs that turn.
         following: pressures that follow the surface. displaced: (n, 3) m, displacements that are prescribed, continued
             as the ties want it and 0 elsewhere, or None.
     """
@@ -179,8 +180,12 @@ def make_model(
     if hooke is None:
         K = stiffness(d, [m.elasticity for m in own], factor)
     else:
-        of_each = zip(hooke, [None] * len(hooke) if factor is None else factor, d.blocks, strict=True)
-        K = tangent(d, [tangent_tensor(C, f, None, np.zeros((*b.dx.shape, 6))) for C, f, b in of_each])
+        of_each = zip(
+            hooke, [None] * len(hooke) if factor is None else factor, d.blocks, strict=True
+        )
+        K = tangent(
+            d, [tangent_tensor(C, f, None, np.zeros((*b.dx.shape, 6))) for C, f, b in of_each]
+        )
     return BodyModel(
         d, tuple(own), factor, strain, M, d.pattern.full(M), K, free, fixed,
         dead_load, axis / np.linalg.norm(axis), point, spin_softening, hooke=hooke,

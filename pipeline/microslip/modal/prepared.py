@@ -134,7 +134,9 @@ def _prepared(
     rule = settings.mesh.integration
     degree = RULES[rule]
     if degree and not set(mesh.cells) & set(degree):
-        raise UserError(f'mesh.integration: "{rule}" is of {", ".join(degree)}, which the mesh has not; write "full"')
+        raise UserError(
+            f'mesh.integration: "{rule}" is of {", ".join(degree)}, which the mesh has not; write "full"'
+        )
     d = discretise(mesh, degree, coupled=[coupled_points(p) for p in pairs])
     d = replace(d, one_rule=rule in ("reduced-mass", "calculix"))
     held = fixed_dofs(mesh, settings)
@@ -181,7 +183,9 @@ def _prepared(
     )  # fmt: skip
 
 
-def _unknowns(d: Discretisation, held: Indices, sector: Sector | None) -> FreeUpper | Tied | CyclicUpper:
+def _unknowns(
+    d: Discretisation, held: Indices, sector: Sector | None
+) -> FreeUpper | Tied | CyclicUpper:
     """Of a static state whose supports are not those of the modes."""
     if sector is None:
         return tied_upper(d.pattern, held, d.mesh.ties)

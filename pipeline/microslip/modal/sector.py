@@ -82,7 +82,9 @@ def cut_faces(mesh: Mesh, settings: BodySettings, axis: Array, point: Array) -> 
     assert cyclic is not None
     for key, face in (("left", cyclic.left), ("right", cyclic.right)):
         require_face(mesh, face, f"cyclic.{key}")
-    return pair_cut_faces(mesh, cyclic.left, cyclic.right, axis, point, cyclic.sectors, cyclic.follows)
+    return pair_cut_faces(
+        mesh, cyclic.left, cyclic.right, axis, point, cyclic.sectors, cyclic.follows
+    )
 
 
 def make_sector(d: Discretisation, settings: BodySettings, fixed: Indices, axis: Array, point: Array) -> Sector:

@@ -277,9 +277,7 @@ def _divergence(b: Prepared, speed: float, count: int, where: str) -> UserError:
             "check length_unit or join the parts",
             "mesh",
         )
-    remedy = (
-        "lower the speed (a rotor above a critical speed, which Coriolis forces alone keep, has no such modes)"
-    )
+    remedy = "lower the speed (a rotor above a critical speed, which Coriolis forces alone keep, has no such modes)"
     if b.settings.rotation.prestress == "none" and speed:
         remedy += ', or use rotation.prestress = "nonlinear": without the stiffening by stress frequencies fall to zero'
     elif not speed:

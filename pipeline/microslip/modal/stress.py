@@ -76,7 +76,9 @@ def smoother(block: Block, n_points: int) -> tuple[sp.csr_matrix, Array]:
     volume.
     """
     kind = CELL_TYPES[block.cell_type]
-    middle = block.at.mean(axis=0)  # from there few points leave a field constant in the directions they do not tell
+    middle = block.at.mean(
+        axis=0
+    )  # from there few points leave a field constant in the directions they do not tell
     at, nodes = (_polynomials(x - middle, kind.corners) for x in (block.at, kind.reference))
     extrapolate = nodes @ np.linalg.pinv(at)  # (k, q)
     e, q = block.dx.shape
@@ -105,8 +107,8 @@ def nodal_set(
 ) -> StressSet:
     """The set at Gauss points smoothed to the nodes (location ``nodal-averaged``), made `batch` modes at a time.
 
-    On the cut faces of a cyclic sector that match the neighbour's cells count too, turned and in the phase of the nodal
-    diameter `harmonic`.
+    On the cut faces of a cyclic sector that match the neighbour's cells count too, turned and in
+    the phase of the nodal diameter `harmonic`.
     """
     n, m = model.d.mesh.n_points, phi.shape[2]
     smoothers = [smoother(b, n) for b in model.d.blocks]

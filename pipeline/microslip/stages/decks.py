@@ -156,7 +156,7 @@ def _assembly(
             new = import_file(
                 file, part.body.parent, unit, group, name=part.new_name, instead=instead
             )
-            told += new.told[:-1]
+            told += [text for text in new.told[:-1] if text not in told]
             add_lines(part, joint_lines(parts, number, patches, unit))
     shapes = [replace(shape_of(m, UNITS[unit]), points=_free(m, UNITS[unit])) for m in meshes]
     return with_case(home, parts, patches, shapes, unit, [*told, *said], force)

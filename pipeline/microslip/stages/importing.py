@@ -18,7 +18,17 @@ from pathlib import Path
 import numpy as np
 
 from ..basis import write_basis
-from ..data import Array, BodyLoad, FacetLoad, Indices, Material, Mesh, NodalLoad, RigidLink, SpinLoad
+from ..data import (
+    Array,
+    BodyLoad,
+    FacetLoad,
+    Indices,
+    Material,
+    Mesh,
+    NodalLoad,
+    RigidLink,
+    SpinLoad,
+)
 from ..errors import UserError
 from ..files.store import ordinary, write_text
 from ..frames import rotation
@@ -211,8 +221,9 @@ def _beside(file: Path, folder: Path) -> str:
 def _sets(mesh: Mesh, held: bool = False) -> list[str]:
     """Supports (unless those of the file are there) and interfaces to choose from, as comments."""
     names = sorted(n for n in {*mesh.faces, *mesh.point_sets} if len(mesh.face_points(n)) < mesh.n_points)
+    names = [n for n in names if not held or n not in mesh.supports]
     if not names:
-        return ["# The file names no sets: give faces by box, see docs/body_toml.md."]
+        return ["# The file names no sets to make faces of: give them by box, see docs/body_toml.md."]
     lines = ["", "# Sets of the file: " + ", ".join(names)]
     first = json.dumps(next((n for n in names if n in mesh.faces), names[0]))
     if not held:
@@ -269,7 +280,9 @@ def _hold(mesh: Mesh, metres: float) -> bool:
     springs, ring = lumped_springs(mesh, pattern), mesh.sector
     if ring is not None and mesh.ties is None and len(fixed):  # all sectors together may be held
         turn = rotation(np.array(ring.axis), 2 * np.pi / ring.sectors)
-        motions = free_motions_of_ring(mesh.points, metres * np.array(ring.point), fixed, turn, ring.sectors)
+        motions = free_motions_of_ring(
+            mesh.points, metres * np.array(ring.point), fixed, turn, ring.sectors
+        )
         return unresisted(motions, springs, pattern).shape[1] == 0
     if mesh.ties is None:
         return unresisted(free_motions(mesh.points, centre, fixed), springs, pattern).shape[1] == 0
@@ -471,6 +484,8 @@ def _mesh(
     doubts = (density(f"{file}: {m.name}: density", m.density) for m in mesh.materials)
     told += [f"warning: {text}" for text in doubts if text]
     told += [f"note: {text}" for text in mesh.remarks]
+    if mesh.lumps is not None and (mass := float(mesh.lumps.masses.sum())):
+        told.append(f"point masses of the file: {mass:.6g} kg")
     told += [*ties, *((*joints, *_pressed(mesh)) if not instances else ())]
     holding = _hold(mesh, UNITS[unit])
     held, said = _supports(mesh, holding)
@@ -641,8 +656,12 @@ def _state(mesh: Mesh, metres: float, ring: bool, held: bool) -> tuple[list[str]
     turning.append(f'prestress = "{"nonlinear" if state.nonlinear else "linear"}"')
     if mesh.links is not None and any(isinstance(link, RigidLink) for link in mesh.links.items):
         text = "that forces turn with the arms of rigid links is left out of the stiffness, as in CalculiX"
-        finite = ", and the arms keep their directions at rest: CalculiX turns them" * state.nonlinear
-        said.append(f"warning: {state.where}: {text}{finite}; where links turn much, mesh their bodies")
+        finite = (
+            ", and the arms keep their directions at rest: CalculiX turns them" * state.nonlinear
+        )
+        said.append(
+            f"warning: {state.where}: {text}{finite}; where links turn much, mesh their bodies"
+        )
     spins = [load for load in state.loads if isinstance(load, SpinLoad) and load.speed]
     if len(spins) > 1 or any(spin.cells is not None for spin in spins):
         said.append(
@@ -653,7 +672,10 @@ def _state(mesh: Mesh, metres: float, ring: bool, held: bool) -> tuple[list[str]
         (spin,) = spins
         axis, speed = spin.axis / np.linalg.norm(spin.axis) + 0.0, to_rpm(spin.speed)
         heavy = mesh.lumps is not None and bool(mesh.lumps.masses.any())
-        whole = "; point masses turn with the body, all of them: CalculiX leaves their softening out" * heavy
+        whole = (
+            "; point masses turn with the body, all of them: CalculiX leaves their softening out"
+            * heavy
+        )
         said.append(f"{spin.where}: {speed:.6g} rpm{whole}")
         if not ring:
             numbers = [", ".join(f"{v:.15g}" for v in row) for row in (axis, spin.point / metres + 0.0)]
