@@ -352,7 +352,7 @@ def test_beams_and_shells_that_hold_the_solids_stop_the_import(capsys):
     far = ["N,901,70,0,0", "N,902,70,11,0", "N,903,70,11,7", "N,904,70,0,7"]
     shells = [*far, "ET,9,181", "TYPE,9", "EN,9500,901,902,903,904"]
     bonded = [*pairs(mesh, "x1", 1, ["KEYOPT,3,12,5"])[:-3], "TYPE,4", "REAL,3", "EN,9600,901,902,903,904"]
-    for more, words in ((beam, "1 beams (type 188)"), ([*shells, *bonded], "contact pairs with these")):
+    for more, words in ((beam, "1 beams (type 188)"), ([*shells, *bonded], "contact pairs with beams or shells")):
         Path("b.cdb").write_text(ended(archive(mesh, ("x0",)), *more))
         refused_command(["import", "b.cdb", "b"], capsys, words, "--solids-only")
     assert main(["import", "b.cdb", "b", "--solids-only"]) == 0
