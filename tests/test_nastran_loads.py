@@ -130,6 +130,18 @@ def test_a_modulus_over_temperature(capsys):
         np.testing.assert_allclose(modulus * 2 * 1.29, [1.925e11, 1.65875e11, 1.55e11], rtol=1e-12)
 
 
+def test_a_table_may_fall_and_jump():
+    """Temperatures in falling order, two values at 100; a table that turns back is refused."""
+    table = "TABLEM1,4,,,1,,,,,+\n+,300.,1.+11,100.,1.+11,100.,2.+11,0.,2.+11,+\n+,ENDT"
+    for hot, E in ((250.0, 1e11), (50.0, 2e11)):
+        Path("a.bdf").write_text(deck("MATT1,1,4", table, f"TEMPD,5,{hot}", control=SOFT))
+        (material,) = read_mesh("a.bdf", "m", "m-kg-s").materials
+        np.testing.assert_allclose(material.elasticity[3, 3], E / 2.58, rtol=1e-12)
+    Path("a.bdf").write_text(deck("MATT1,1,4", table.replace("300.", "50."), "TEMPD,5,9.", control=SOFT))
+    with pytest.raises(UserError, match="TABLEM1 4 has temperatures that neither rise nor fall"):
+        read_mesh("a.bdf", "m", "m-kg-s")
+
+
 def test_constants_over_an_even_temperature():
     """All of MATT1, beyond the ends of its tables in straight lines: E, nu and the density at 520."""
     cards = ["MATT1,1,4,,6,7", TABLES[1], "TABLEM1,6,,,,,,,,+\n+,20.,.29,420.,.31,ENDT"]

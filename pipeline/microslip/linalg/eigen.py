@@ -349,7 +349,13 @@ def _dense(pencil: Pencil, count: int, known: Array) -> tuple[Array, Array]:
     heavy = weight > 1e-12 * weight[-1]
     X, light = Q[:, heavy] / np.sqrt(weight[heavy]), Q[:, ~heavy]
     if light.shape[1]:
-        X = X - light @ np.linalg.solve(light.conj().T @ K @ light, light.conj().T @ (K @ X))
+        try:
+            X = X - light @ np.linalg.solve(light.conj().T @ K @ light, light.conj().T @ (K @ X))
+        except np.linalg.LinAlgError:
+            raise NotConverged(
+                "a motion has neither mass nor stiffness (a loose node, a dashpot that alone joins one); hold it or "
+                "take it out"
+            ) from None
     if known.shape[1]:
         away = np.linalg.qr(X.conj().T @ (M @ (known / size[:, None])), mode="complete")[0]
         X = X @ away[:, known.shape[1] :]

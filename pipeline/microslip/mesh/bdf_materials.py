@@ -222,8 +222,10 @@ def _table(bulk: Bulk, hot: BulkCard, number: int) -> Callable[[Array, float | N
     if len(numbers) < 4 or len(numbers) % 2:
         raise Damaged(f"{card.where} needs two pairs of temperature and value at least; correct it")
     x, y = numbers.reshape(-1, 2).T
-    if (np.diff(x) <= 0).any():
-        raise Damaged(f"{card.where} has temperatures that do not rise; correct it")
+    if (np.diff(x) <= 0).all():
+        x, y = x[::-1], y[::-1]
+    if (np.diff(x) < 0).any() or x[0] == x[1] or x[-1] == x[-2]:
+        raise Damaged(f"{card.where} has temperatures that neither rise nor fall; correct it")
     level = kind == "1" and card.at(4) == "1"
 
     def lines(T: Array, Z: float | None) -> Array:
