@@ -111,8 +111,8 @@ def test_springs_by_hand_are_those_that_are_marched(law):
     shape = np.zeros((1, 3, 1))
     shape[0, 1, 0] = 1.3
     patch = Patch("element", np.zeros((1, 2)), np.ones(1), law, shape)
-    hand, marched = model([patch] * 5, 64, 3, 1e-12), AFT(patch, 5, 64, 3, 1e-12)
-    assert isinstance(hand, ElasticSpring)
+    hand, marched = ElasticSpring(patch, 5, 64, 3, 1e-12), AFT(patch, 5, 64, 3, 1e-12)
+    assert isinstance(model([patch] * 5, 64, 3, 1e-12), ElasticSpring)
     u = 0.3 * np.random.default_rng(1).normal(size=(5, 1, 7))
     for a, b in zip(
         (hand.force(u, 1.0), *hand.forces(u, 1.0)), (marched.force(u, 1.0), *marched.forces(u, 1.0)), strict=True

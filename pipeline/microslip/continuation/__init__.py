@@ -24,6 +24,7 @@ from .extremum import lowest as lowest
 from .extremum import peak as peak
 from .extremum import placed as placed
 from .extremum import rated as rated
+from .extremum import with_peaks as with_peaks
 from .newton import CONVERGED as CONVERGED
 from .newton import Equations as Equations
 from .newton import NewtonSettings as NewtonSettings

@@ -32,7 +32,9 @@ TURN = 0.5
 REACH = 2.0
 """Length of a correction, over that of the step, beyond which the predicted point is of no use."""
 
-Kind = Literal["start", "regular", "fold", "branch point", "target", "bound"]
+Kind = Literal[
+    "start", "regular", "fold", "branch point", "target", "bound", "peak", "period doubling", "Neimark-Sacker"
+]
 
 
 @checked_fields
@@ -75,7 +77,9 @@ class Point:
 
     Attributes:
         x: (n,). lam. kind: "fold" and "branch point" are located between steps, "target" and "bound" have exactly the
-            lambda asked for. kink: the tangent jumps just before this point. arclength: scaled, from the start.
+            lambda asked for, "peak" is what `extremum.with_peaks` adds, period doublings and Neimark-Sacker points
+            are added by those who know multipliers. kink: the tangent jumps just before this point. arclength: scaled,
+            from the start.
         tangent: (n + 1,) unit vector, scaled. evaluations: of R since the step before.
     """
 
