@@ -117,6 +117,12 @@ def is_code(name: str) -> bool:
     return True
 
 
+@cache
+def verbs() -> set[str]:
+    """Of the analyses that have one."""
+    return {verb_of(name).name for name in places()}
+
+
 def is_command(text: str) -> bool:
     """A verb with its case, body or figure; a target of make; a study of the pictures."""
     program, verb, *rest = shlex.split(text)
@@ -129,8 +135,7 @@ def is_command(text: str) -> bool:
     figures = {p.stem.removeprefix("fig-") for p in (CASES / "contact").glob("fig-*.toml")}
     known = figures if verb == "contact" else cases | bodies | {"CASE"}
     there = rest[0] in known or (ROOT / rest[0]).is_file()
-    verbs = {verb_of(name).name for name in places()}
-    return there and (verb in verbs or holds(tree(PACKAGE / "cli.py").body, verb) is not None)
+    return there and (verb in verbs() or holds(tree(PACKAGE / "cli.py").body, verb) is not None)
 
 
 def exists(name: str) -> bool:

@@ -16,12 +16,13 @@ from microslip.contact.periodic import RECALL, periodic, unknown
 from microslip.contact.point import PointContact
 from microslip.contact.rate import RateContact
 from microslip.contact.wear import worn_law
+from microslip.programs import program
 from microslip.series import fourier
 
 ROUGH = EXAMPLES["rough point"]
-NEAR = jax.jit(force_near, static_argnames=("samples", "count", "chunk"))
-MARCHED = jax.jit(march)
-PERIODIC = jax.jit(periodic, static_argnums=3)
+NEAR = program(force_near, static_argnames=("samples", "count", "chunk"))
+MARCHED = program(march)
+PERIODIC = periodic
 
 
 def some(n, harmonics=3, seed=0, example=ROUGH):

@@ -292,6 +292,7 @@ def test_mistakes():
     refused("does not move", ms.backbone, beside, 1e-6, 1e-5)
 
 
+@pytest.mark.slow
 def test_a_damper_that_hardly_anything_holds_may_drift_while_it_slides():
     """0.1 kg on 1 N/m under a steady 0.5 N: as long as a friction contact sticks it stays, and 0.5 m away when all
     slide, a hundred times the motion that makes them. What is left then is the mass without its damper."""

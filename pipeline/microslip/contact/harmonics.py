@@ -65,7 +65,7 @@ def force_near(
     periodicity: Scalar = 0.0,
 ) -> tuple[Array, Known]:  # fmt: skip
     """`force_alone`, begun with what sliders remember of a motion near by, and what they remember now."""
-    values, ahead, transform = cycle_waves(u.shape[2] // 2, samples)
+    values, ahead, transform = map(jnp.asarray, cycle_waves(u.shape[2] // 2, samples))
 
     def one(law: Law, u: Array, *known: Array) -> tuple[Array, ...]:
         path, rate = (jnp.einsum("sh,nkh->snk", of, u) for of in (values, ahead))
@@ -111,7 +111,7 @@ def _with_derivative(
     law: Law, u: Array, period: Scalar, samples: int, count: int, periodicity: Scalar
 ) -> tuple[Array, Array]:
     """With the tangents along every harmonic of every direction."""
-    values, ahead, transform = cycle_waves(u.shape[2] // 2, samples)
+    values, ahead, transform = map(jnp.asarray, cycle_waves(u.shape[2] // 2, samples))
     path, rate = (jnp.einsum("sh,nkh->snk", of, u) for of in (values, ahead))
     found, slope = with_slopes(law, path, rate / period, period, count, periodicity, values, ahead, transform)
     return jnp.einsum("hs,snk->nkh", transform, found.force), jnp.einsum("hzjnk->nkhjz", slope)

@@ -290,7 +290,7 @@ class _Sliders:
         whole, last_begun = self.periodic()
         first_begun = cycle(self.law, beginning(self.ways.all, self.ways.first), self.rest).begun
         found = jax.lax.map(
-            lambda one: linearised(self.law, self.path, self.dt, self.ways, *one, signals, rates, weights),
+            lambda of: linearised(self.law, self.path, self.dt, self.ways, of[0], of[1], signals, rates, weights),
             (jnp.stack([first_begun, last_begun]), jnp.array([False, True])),
         )  # fmt: skip
         first, last = (Linearised(*(leaf[k] for leaf in found)) for k in (0, 1))

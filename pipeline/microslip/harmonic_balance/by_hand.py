@@ -124,10 +124,12 @@ class ElasticStop(ElasticSpring):
     def forces(self, u: Array, period: float) -> tuple[Array, Array]:
         W = u.shape[2]
         force, slope = np.zeros(u.shape), np.zeros((len(u), 1, W, 1, W))
-        share = np.full(W, self._turn * self._spring.stiffness / np.pi)
+        law = self._spring
+        assert isinstance(law, Stop)
+        share = np.full(W, self._turn * law.stiffness / np.pi)
         share[0] *= 0.5
         for c, one in enumerate(self._turn * u[:, 0]):
-            for sign, gap in self._spring.sides:
+            for sign, gap in law.sides:
                 over = sign * one
                 over[0] -= gap
                 met = integrals(W // 2, *self._instants(over))

@@ -63,8 +63,9 @@ def roll_stage(
     force: bool = False,
     report: Report = lambda _: None,
     pictures: bool = True,
+    folder: Path | None = None,
 ) -> Written:
-    """What a case of rolling contact asks for, in the folder of its name below `root`; whole if it
+    """What a case of rolling contact asks for, in a folder, if not given that of its name below `root`; whole if it
     did not end early. Modal files of its bodies are made where they are not up to date.
 
     Raises:
@@ -72,7 +73,7 @@ def roll_stage(
     """
     kind = next((kind for kind in KINDS if kind.keys <= keys_of(path)), KINDS[-1])
     case, raw = kind.load(path, list(assignments))
-    product = folder_of_case(path, case.name, root) / f"{kind.product}.json"
+    product = (folder or folder_of_case(path, case.name, root)) / f"{kind.product}.json"
     stage = Stage(product, ("stages.rolling",), force, report, case=path)
     bodies = _bodies(kind.bodies(case), case, path, report)
     named: list[Path | str] = [*kind.files(case), *bodies]
