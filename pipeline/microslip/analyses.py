@@ -555,6 +555,7 @@ def run_up(
 def bifurcate(
     system: Dynamics | Callable[[float], Assembly | Built], start: Number, stop: Number, *, x: Vector | None = None,
     frequency: Positive | None = None, unit: Unit = "Hz", orbits: bool = True, doublings: Index = 1,
+    branches: Index = 1,
     attractors: Sequence[Number] = (), starts: Count = 64, deflate: Sequence[Number] = (), nodes: Count = 32,
     step: Annotated[Positive, Field(le=1)] = 0.08, points: Count = 400, report: Report = lambda _: None,
 ) -> Diagram:  # fmt: skip
@@ -565,6 +566,7 @@ def bifurcate(
             velocity alone, or it has smooth springs. start, stop: of the parameter. x: (n,) a guess of the equilibrium
             at the start; at rest if not given. frequency: of an assembly's loads, in the unit.
         orbits: whether they are followed. doublings: how often from an orbit on to the one of twice its period.
+            branches: how often from a branch point on to the curve that crosses there.
         attractors: values of the parameter at which `starts` motions are left alone, to find what they come to.
         deflate: values at which orbits, stable or not, are looked for beside those by deflation of what is known.
         nodes: of an orbit. step: the longest, a share of start to stop. points: of a branch. report: is told what is
@@ -621,7 +623,8 @@ def bifurcate(
         raise UserError(f"bifurcate: x: has {len(begin)} numbers; the system has {made.count}")
     made.check(begin, start)
     asked = diagram.DiagramPlan(
-        start, stop, orbits, doublings, nodes, step, points, tuple(attractors), starts, deflate=tuple(deflate)
+        start, stop, orbits, doublings, nodes, step, points, tuple(attractors), starts, deflate=tuple(deflate),
+        branches=branches,
     )
     return diagram.diagram(made, begin, asked, report=report)
 

@@ -15,6 +15,7 @@ from .curve import branch_off as branch_off
 from .curve import follow as follow
 from .curve import root as root
 from .curve import start as start
+from .curve import switched as switched
 from .curve import trace as trace
 from .extremum import NO_OPTIMUM as NO_OPTIMUM
 from .extremum import SEARCH as SEARCH
