@@ -68,7 +68,8 @@ def test_from_a_centre_the_cycles_of_van_der_pol_are_found() -> None:
     assert not found.messages and np.abs(branches[0].parameter[branches[0].swing[:, 0] < 1.9]).max() < 1e-6
     branch = max(branches, key=lambda b: b.parameter.max())
     last = branch.parameter.argmax()
-    assert branch.parameter[last] == 2.0 and branch.stable[last] and branch.period[last] == pytest.approx(7.6298745, rel=1e-6)
+    assert branch.parameter[last] == 2.0 and branch.stable[last]
+    assert branch.period[last] == pytest.approx(7.6298745, rel=1e-6)
     assert branch.swing[last, 0] == pytest.approx(2.0199, abs=1e-4)
 
 
