@@ -316,16 +316,18 @@ def with_stability(
             if before * after >= 0 or (kind == "branch point" and beside):
                 continue
             first = points[last]
-            ends = [equations.pack(q.x, q.lam) for q in (first, p)]
-            segment = continuation.Segment(*ends, first.tangent, p.tangent, p.kink)
+            begin, end = (equations.pack(q.x, q.lam) for q in (first, p))
+            segment = continuation.Segment(begin, end, first.tangent, p.tangent, p.kink)
+
+            def value(y: Array, t: Array, of: Callable[[ComplexArray], float] = test) -> float:
+                return of(of_place(y, t).multipliers)
+
             try:
-                y, t = continuation.root(
-                    equations, segment, ALONG, lambda y, t, of=test: of(of_place(y, t).multipliers), LOCATED
-                )
+                y, t = continuation.root(equations, segment, ALONG, value, LOCATED)
             except Lost:
                 continue
             x, lam = y[:-1] * equations.x_scale, float(y[-1]) * equations.lam_scale
-            out.append(OnCurve(x, lam, kind, False, first.arclength + norm(y - ends[0]), t, 0))
+            out.append(OnCurve(x, lam, kind, False, first.arclength + norm(y - begin), t, 0))
             told.append(of_place(y, t))
         out, told, last = [*out, p], [*told, one], i
     return replace(branch, points=tuple(out)), told
