@@ -77,6 +77,17 @@ def weighted(
     return Amplitude(complex(value), (by_v * p.scale).ravel(), complex(by_Omega))
 
 
+def seen(
+    at: AtFrequency, motion: list[list[ComplexArray]], force: Array, output: int = 0, harmonic: int = 1
+) -> complex:
+    """The value of `amplitude` alone, m, of the bodies' amplitudes and the forces (W, c)."""
+    p, f = at.problem, amplitudes(force)[harmonic]
+    return sum(
+        complex(part.output[output] @ q + p.share * part.output_given[output] - part.output_residual[output] @ f[s])
+        for part, q, s in zip(p.parts[harmonic], motion[harmonic], p.slices, strict=True)
+    )
+
+
 def _waves(harmonic: int) -> list[tuple[int, complex]]:
     """Entries of a signal's harmonics that make up an amplitude, cos part - i sin part, and their factors."""
     return [(2 * harmonic - 1, 1.0), (2 * harmonic, -1.0j)] if harmonic else [(0, 1.0)]
