@@ -86,7 +86,7 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         if item.nodeid.startswith(LEFT_OUT):
             item.add_marker(pytest.mark.slow)
     if hasattr(config, "workerinput"):
-        items[:] = longest_first(items, config.getoption("markexpr"))
+        items[:] = longest_first(items, config.workerinput["took"])
 
 
 def pytest_collection_finish() -> None:

@@ -39,13 +39,11 @@ def rows(asked: str) -> list[dict[str, str]]:
         return []
 
 
-def longest_first(items: list[pytest.Item], asked: str) -> list[pytest.Item]:
-    """File by file: first those that took longest when they were run before, or have many tests."""
-    took: Counter[str] = Counter()
+def longest_first(items: list[pytest.Item], before: dict[str, float]) -> list[pytest.Item]:
+    """File by file: first those that took longest when they were run before (s), or have many tests."""
+    took = Counter(before)
     for item in items:
         took[item.nodeid.partition("::")[0]] += 0.01
-    for row in rows(asked):
-        took[row["test"].partition("::")[0]] += sum(float(row[column]) for column in COLUMNS if column != "compiling_s")
     return sorted(items, key=lambda item: -took[item.nodeid.partition("::")[0]])
 
 
@@ -77,6 +75,14 @@ class Durations:
         self.before = now
         report.user_properties = [("durations", (cpu, min(compiling, cpu), processes))]
         return report
+
+    @pytest.hookimpl(optionalhook=True)
+    def pytest_configure_node(self, node: Any) -> None:
+        """Tell a worker what files took: all have to run them in one order."""
+        took: Counter[str] = Counter()
+        for row in rows(node.config.getoption("markexpr")):
+            took[row["test"].partition("::")[0]] += float(row["cpu_s"]) + float(row["processes_s"])
+        node.workerinput["took"] = dict(took)
 
     def pytest_collection_finish(self) -> None:
         self.before = self.now()  # what is imported is not the first test's

@@ -183,6 +183,7 @@ def test_permutations_from_gmsh_agree_with_those_of_meshio(cell_type: str) -> No
     assert to_vtk(cell_type) == _gmsh_to_meshio_order(cell_type, np.arange(count)[None])[0].tolist()
 
 
+@pytest.mark.usefixtures("untried")
 @pytest.mark.parametrize("version", ["2.2", "4.0", "4.1"])
 @pytest.mark.parametrize("binary", [False, True])
 def test_other_versions_of_gmsh_files(tmp_path: Path, version: str, binary: bool) -> None:

@@ -361,6 +361,7 @@ def med(path: Path) -> Path:
     return path
 
 
+@pytest.mark.usefixtures("untried")
 def test_groups_of_med(tmp_path: Path) -> None:
     mesh = read_mesh(med(tmp_path / "a.med"), "m")
     np.testing.assert_array_equal(mesh.cells["tetra"], tetrahedra().cells["tetra"])
@@ -391,6 +392,7 @@ def unknown(file: h5py.File) -> None:
     next(iter(file["ENS_MAA/part"].values())).move("MAI/TE4", "MAI/POE")
 
 
+@pytest.mark.usefixtures("untried")
 @pytest.mark.parametrize(
     ("change", "words"),
     [
