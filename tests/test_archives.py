@@ -267,7 +267,7 @@ def test_import_ends_with_a_page_of_what_it_said(capsys):
     assert main(["import", "a.cdb", "--modes"]) == 0
     said = capsys.readouterr().out.splitlines()
     page = Path("a/import.html").read_text()
-    for line in said[:-2]:
+    for line in said[:-3]:
         words = line.removeprefix("warning: ").removeprefix("note: ")
         assert words[1:].split("'")[0].split("  ")[0] in page, line
     hertz = read_basis(Path("build/a/basis.h5")).groups[0, 0].frequency
