@@ -7,7 +7,7 @@ CASES    := $(filter-out $(BODIES),$(sort $(basename $(notdir $(wildcard pipelin
 PYTHON   := .venv/bin/python
 RUN      := $(PYTHON) -m microslip
 # A worker that crashes fails the run: one that took its place would wait for ever.
-PYTEST   := $(PYTHON) -m pytest -n 2 --dist loadfile --max-worker-restart=0
+PYTEST   := $(PYTHON) -m pytest -n 2 --dist loadfile --no-loadscope-reorder --max-worker-restart=0
 READY    := .venv/.ready
 
 export OMP_NUM_THREADS ?= 1

@@ -118,6 +118,12 @@ def is_code(name: str) -> bool:
 
 
 @cache
+def verbs() -> set[str]:
+    """Of the analyses that have one."""
+    return {verb_of(name).name for name in places()}
+
+
+@cache
 def drawn() -> set[str]:
     """Numbers of the figures that docs/figures.py draws."""
     bodies = [tree(ROOT / "docs" / f"{name}_study.py").body for name in ("figure", "rolling", "heat")]
@@ -139,8 +145,7 @@ def is_command(text: str) -> bool:
     figures = {p.stem.removeprefix("fig-") for p in (CASES / "contact").glob("fig-*.toml")}
     known = figures if verb == "contact" else cases | bodies | {"CASE"}
     there = rest[0] in known or (ROOT / rest[0]).is_file()
-    verbs = {verb_of(name).name for name in places()}
-    return there and (verb in verbs or holds(tree(PACKAGE / "cli.py").body, verb) is not None)
+    return there and (verb in verbs() or holds(tree(PACKAGE / "cli.py").body, verb) is not None)
 
 
 def exists(name: str) -> bool:

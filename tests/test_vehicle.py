@@ -17,6 +17,7 @@ from refusals import refused, refused_command
 
 from microslip.cli import main
 from microslip.files.tables import columns_csv
+from microslip.programs import program
 from microslip.results import Journal, open_journal, read_journal
 from microslip.rolling.table import creep_table
 from microslip.rolling.wheelset import Pose, patches
@@ -102,7 +103,7 @@ def there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
 
 
-RATES = jax.jit(motion.rates, static_argnums=1)
+RATES = program(motion.rates, static_argnums=1)
 
 
 @jax.jit
@@ -494,7 +495,8 @@ def depth_of(wheel: Any, far: float, count: int = 1) -> tuple[np.ndarray, Any, f
     return wheel.seen(last.depth, first)[:, 0], last, sum(jump.error for _, jump in history)
 
 
-@pytest.mark.parametrize(("lobes", "off"), [(0.0, 0.03), pytest.param(1.0, 0.3, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize(("lobes", "off"), [(0.0, 0.03), (1.0, 0.3)])
 def test_a_file_and_its_vehicle_wear_alike_as_profiles_are_renewed(
     lobes: float, off: float, case: VehicleCase, rolling: wearing.RunningVehicle, tmp_path: Path
 ) -> None:

@@ -19,7 +19,7 @@ from .errors import UserError
 from .harmonic_balance import families, nonlinear_modes
 from .harmonic_balance import problem as balance
 from .harmonic_balance.growing import fed, growing, verdict
-from .harmonic_balance.nonlinear_modes import Backbone
+from .harmonic_balance.nonlinear_modes import Backbone, Measure
 from .harmonic_balance.problem import Problem
 from .harmonic_balance.solved import Motions
 from .harmonic_balance.solver import Point, sweep
@@ -289,8 +289,7 @@ def follow(
     _bends(problem, "harmonic_response")
     if start == stop:
         raise UserError(f"stop: {stop:g} is the start too; give two ends between which the curve is followed")
-    if taken := {"direction", "low", "high"} & set(settings if isinstance(settings, Mapping) else ()):
-        raise UserError(f"settings: {min(taken)}: start and stop say where the curve goes; leave it out")
+    _between(settings, "start and stop")
     if over == "frequency":
         if frequency is not None:
             raise UserError("frequency: is what varies; leave it out, or say over what the curve goes instead")
@@ -329,17 +328,25 @@ def follow(
 @checked
 def backbone(
     system: System, low: Positive, high: Positive, *, mode: Index = 0, output: Index = 0,
-    harmonics: Count | None = None, samples: Count | None = None, report: Report = lambda _: None,
+    harmonics: Count | None = None, samples: Count | None = None,
+    measure: Measure = "norm", settings: Settings | Mapping[str, Any] | None = None,
+    report: Report = lambda _: None,
 ) -> Backbone:  # fmt: skip
     """A nonlinear mode: frequency and damping ratio over the amplitude, from sticking contacts to sliding ones.
 
     Args:
         system: what vibrates; its loads do not matter. low, high: amplitudes (m) of a read-out, from one at which
             contacts hardly slide. mode: number of the mode with sticking contacts, 0 the lowest. output: number of the
-            read-out. harmonics, samples: see `harmonic_response`. report: is told what is under way.
+            read-out. harmonics, samples: see `harmonic_response`.
+        measure: what low and high are values of: "norm" of all coordinates and harmonics, or "modal", its share in the
+            linear mode, as large as the read-out is in that mode; "energy", J; "readout", its first harmonic itself,
+            which vanishes in an internal resonance.
+        settings: of the steps along the curve where they are to be others: ``{"points": 5000}`` for more of them than
+            1000, and all others of `continuation.Settings`. report: is told what is under way.
 
     Returns:
-        The curve, which tabulates, draws and saves itself; `complete` if it reached the high amplitude.
+        The curve, which tabulates, draws and saves itself; `complete` if it reached the high amplitude;
+        ``plot(over="energy")``; ``resonances``, internal ones on the way, and ``passed``, those that are not entered.
 
     Raises:
         UserError: a mode that does not move the read-out, or that there is not.
@@ -361,7 +368,16 @@ def backbone(
     if not high > low:
         raise UserError(f"high: {high:g} is not above low, {low:g}; give the smaller amplitude first")
     _warn("backbone", fed(problem.assembly))
-    return nonlinear_modes.backbone(problem, low, high, mode, output, report=report)
+    _between(settings, "low and high")
+    return nonlinear_modes.backbone(
+        problem, low, high, mode, output, settings=settings, report=report, measure=measure
+    )
+
+
+def _between(settings: Any, ends: str) -> None:
+    """Refuse settings that say again between which ends a curve is followed."""
+    if taken := {"direction", "low", "high"} & set(settings if isinstance(settings, Mapping) else ()):
+        raise UserError(f"settings: {min(taken)}: {ends} say where the curve goes; leave it out")
 
 
 def _bends(problem: Problem, other: str) -> None:

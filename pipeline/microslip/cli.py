@@ -671,26 +671,35 @@ def export(
 @app.command
 def compare(
     first: Path, second: Path, /, *, output: Output = None, speed: int = 0, nodal_diameter: int = 0,
-    distance: float | None = None, least: float = 0.5, quiet: Quiet = False,
+    distance: float | None = None, least: float = 0.5, unit: str = "mm", quiet: Quiet = False,
 ) -> None:  # fmt: skip
     """Frequencies, MAC and pairs of modes of two modal files, computed or measured; pictures side by side.
 
+    Measured functions of a Universal File are laid beside those that the modes of the other file give.
+
     Args:
-        first: a basis.h5.
+        first: a basis.h5, or a Universal File (.uff, .unv) with modes (data sets 55, 2414) or functions (58).
         second: another one, in the same frame.
         output: folder for mac.png, pairs.png and pairs.csv; nothing is written if not given.
         speed: which of the files' speeds, counted from 0.
         nodal_diameter: of cyclic bodies.
         distance: m, largest distance between points that count as the same; a hundredth of the body if not given.
         least: MAC below which modes stay unpaired.
+        unit: of lengths of a Universal File that does not tell it.
     """
-    from .basis import read_basis
+    from .exchange.measured import opened
+    from .mesh.unv import UNIVERSAL
     from .modal.sampling import on_common_points
     from .reduced.correlation import compare_groups, pair_table
 
     if not 0 <= least <= 1:
         raise UserError(f"compare --least {least:g}: a MAC lies between 0 and 1; choose a number there")
-    bodies = (read_basis(_modal_file(first)), read_basis(_modal_file(second)))
+    files = [f if f.suffix.lower() in UNIVERSAL else _modal_file(f) for f in (first, second)]
+    bodies, told = opened(files, (speed, nodal_diameter), unit)
+    for line in told:
+        _say(line, quiet)
+    if len(bodies) < 2:
+        return
     seen = on_common_points(*bodies)
     found = compare_groups(*seen, (speed, nodal_diameter), distance, least)
     _say("\n".join(pair_table(found)), quiet)
@@ -703,7 +712,7 @@ def compare(
 
     reason = pictures.can_draw()
     write_text(output / "pairs.csv", pair_rows(found))
-    drawn = draw_comparison(bodies, seen, found, (speed, nodal_diameter), output, not reason)
+    drawn = draw_comparison((bodies[0], bodies[1]), seen, found, (speed, nodal_diameter), output, not reason)
     _warn([f"no pictures of the shapes: {reason}"] if reason else [])
     _say("\n".join(str(f) for f in (*drawn.values(), output / "pairs.csv")), quiet)
 

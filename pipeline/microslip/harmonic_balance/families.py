@@ -117,11 +117,7 @@ class Family:
         Raises:
             UserError: a setting that there is not.
         """
-        if not isinstance(given, Settings):
-            if odd := set(given or ()) - {f.name for f in fields(Settings)}:
-                names = ", ".join(f.name for f in fields(Settings))
-                raise UserError(f"settings: there is no {', '.join(sorted(odd))}; there are {names}")
-            given = replace(ALONG, **{"targets": tuple(self.narrow[:, 0].tolist()), **(given or {})})
+        given = along(replace(ALONG, targets=tuple(self.narrow[:, 0].tolist())), given)
         way = 1 if self.end > self.begin else -1
         return replace(given, low=min(self.begin, self.end), high=max(self.begin, self.end), direction=way)
 
@@ -148,6 +144,20 @@ class Family:
 
 ALONG = Settings(points=3000, branch_points=False, angle=0.5, step=0.1, step_max=0.5, contraction=0.1)
 """How curves are followed, if not told otherwise."""
+
+
+def along(default: Settings, given: Settings | Mapping[str, Any] | None) -> Settings:
+    """How a curve is followed: as given, or by default but for what is given.
+
+    Raises:
+        UserError: a setting that there is not.
+    """
+    if isinstance(given, Settings):
+        return given
+    if odd := set(given or ()) - {f.name for f in fields(Settings)}:
+        names = ", ".join(f.name for f in fields(Settings))
+        raise UserError(f"settings: there is no {', '.join(sorted(odd))}; there are {names}")
+    return replace(default, **(given or {}))
 
 
 def _longest(state: State, step: float) -> float:

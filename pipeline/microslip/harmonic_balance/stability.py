@@ -323,7 +323,7 @@ def _marched(law: Law, G: jax.Array, d: jax.Array, period: float, steps: int, co
         both = (jnp.einsum("nia,nij,njb->ab", G, k, G) for k in (by_place, by_speed))
         return law.step(*sample, dt, state)[1], (state, *both)
 
-    state = periodic(law, u, period, count, SETTLED)[:2][1]
+    state = periodic(law, u, period, count, SETTLED, v)[:2][1]
     _, (states, slope, drag) = jax.lax.scan(one, state, (u, v))
     return u, v, states, slope, drag
 

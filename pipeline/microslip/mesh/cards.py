@@ -60,6 +60,7 @@ def read_cards(path: Path) -> list[Card]:
     for card, file in zip(found, files, strict=True):
         head = card.keyword
         card.keyword, card.parameters = keyword(head), parameters(head)
+        card.keyword = _SPACED.get(card.keyword.replace(" ", ""), card.keyword)
         if target := card.parameters.get("INPUT"):
             card.parameters["INPUT"] = str(beside(file, target, path.parent))
     return found
@@ -70,7 +71,7 @@ def _lines(path: Path, within: tuple[Path, ...], home: Path) -> Iterator[tuple[P
     if path.resolve() in within:
         raise Damaged(f"the file includes itself by way of {path.name}")
     try:
-        text = ordinary(path).read_text(encoding="utf-8", errors="replace")
+        text = ordinary(path).read_text(encoding="utf-8-sig", errors="replace")
     except OSError as error:
         raise Damaged(f"the included file {path} cannot be read ({error.strerror})") from None
     for number, line in enumerate(text.splitlines(), 1):
@@ -117,7 +118,22 @@ def keyword(line: str) -> str:
 def parameters(line: str) -> dict[str, str]:
     """Its parameters: in capitals -> as written, without quotes."""
     pairs = (word.partition("=") for word in line.split(",")[1:])
-    return {" ".join(key.upper().split()): value.strip().strip('"') for key, _, value in pairs if key.strip()}
+    named = {" ".join(key.upper().split()): value.strip().strip('"') for key, _, value in pairs if key.strip()}
+    return {_SPACED.get(key.replace(" ", ""), key): value for key, value in named.items()}
+
+
+_SPACED = {
+    words.replace(" ", ""): words
+    for words in (
+        "REF NODE", "ROT NODE", "PIN NSET", "TIE NSET", "CONSTRAINT NAME", "POSITION TOLERANCE",
+        "CYCLIC SYMMETRY", "OLD SET", "NEW SET", "CHANGE NUMBER", "ELEMENT SHIFT", "SHIFT NODES",
+        "WEIGHTING METHOD", "INFLUENCE RADIUS", "SOLID SECTION", "RIGID BODY", "CONTACT PAIR",
+        "END STEP", "INITIAL CONDITIONS", "ROTARY INERTIA", "PRE-TENSION SECTION",
+        "CYCLIC SYMMETRY MODEL", "SELECT CYCLIC SYMMETRY MODES", "COMPLEX FREQUENCY",
+        "KINEMATIC COUPLING", "DISTRIBUTING COUPLING", "SURFACE INTERACTION", "SURFACE BEHAVIOR",
+    )
+}  # fmt: skip
+"""Keywords and parameters of several words by what is left of them without blanks: CalculiX reads none."""
 
 
 def fields(line: str) -> list[str]:

@@ -23,6 +23,7 @@ from ..progress import Report
 from ..settings.mistakes import whole
 from ..units import counted, percent
 from . import rare
+from .batch import batch, solved
 from .linear import beside, known_of
 from .peaks import LEFT, Highest
 from .ring import positive
@@ -30,8 +31,15 @@ from .samples import Asked, Sample, again, of_ring, sample
 from .scatter import OF_CONTACTS
 from .statistics import Envelope, Quantile, quantile
 
-COLUMNS = "amplitude", "frequency_Hz", "sector", "localisation", "missed", "unsolved", "at_end", "stress_Pa", "strain"
+COLUMNS = ("amplitude", "frequency_Hz", "sector", "localisation", "missed", "unsolved", "at_end", "stress_Pa", "strain",
+           "alone")  # fmt: skip
 """Of a sample, after its number."""
+
+ALONE = 16
+"""Samples that are solved one by one before others are solved together, whose program takes as long to compile."""
+
+BLOCK = 32
+"""Samples that are solved together: those of the same whole numbers of it, whoever asks for some of them."""
 
 EACH = 4
 """Samples a worker gets, at least, before what is known is written."""
@@ -172,9 +180,10 @@ def run(
     if len(found) > samples:
         found.rows, found.envelope = found.rows[:samples], found.envelope.first(samples)
     workers = workers or min(_cores(), -(-samples // EACH))
+    at_least = workers * (EACH if batch(asked) is None else BLOCK)
     with _computed(asked, workers, executor) as of:
         while len(found) < samples and not _narrow(found, until):
-            _more(found, of, min(samples, _next(len(found), EACH * workers)), until, samples, report)
+            _more(found, of, min(samples, _next(len(found), at_least)), until, samples, report)
             e = found.envelope
             _keep(file, inputs, rows=found.rows, sums=e.sums, bins=e.bins, grids=np.array(e.grids))
     if len(found) < samples:
@@ -194,7 +203,7 @@ def _more(
         unsolved = np.isnan(one.grid).all(axis=1).sum()  # what the search added elsewhere in vain is in `missed`
         made.append(
             [top.amplitude, top.frequency, top.output, one.localisation if solved else np.nan, top.missed,
-             unsolved, top.at_end, one.stress, one.strain]  # fmt: skip
+             unsolved, top.at_end, one.stress, one.strain, one.alone]  # fmt: skip
         )
         report(f"{number} of {samples} samples{told}")
         if number in (judged, end):
@@ -266,7 +275,7 @@ def choose(
     workers = workers or _cores()
     with _computed(asked, workers, executor) as of:
         while len(high) < len(chosen):
-            part = chosen[len(high) : len(high) + EACH * workers]
+            part = chosen[len(high) : len(high) + BLOCK * workers]
             high = np.append(high, [one.top.amplitude for one in of([FIRST + int(i) for i in part])])
             report(f"{len(high)} of {len(chosen)} chosen samples")
             _keep(file, inputs, high=high)
@@ -298,15 +307,30 @@ def _cores() -> int:
 def _computed(
     asked: Asked, workers: int, executor: Executor | None
 ) -> Iterator[Callable[[Sequence[int]], Iterator[Sample]]]:  # fmt: skip
-    if executor is not None:
-        yield lambda numbers: executor.map(sample, [asked] * len(numbers), numbers)
-        return
-    if workers == 1:
-        yield lambda numbers: (sample(asked, n) for n in numbers)
+    together = batch(asked) is not None
+    ready = dict[int, Sample]()  # solved beside others
+
+    def of(numbers: Sequence[int]) -> Iterator[Sample]:
+        found = each(_pieces([n for n in numbers if n not in ready], together))
+        for n in numbers:
+            while n not in ready:
+                ready.update((one.number, one) for one in next(found))
+            yield ready.pop(n)
+
+    def each(pieces: list[list[int]]) -> Iterator[list[Sample]]:
+        if executor is not None:
+            yield from executor.map(several, [asked] * len(pieces), pieces)
+        elif workers == 1:
+            yield from (several(asked, piece) for piece in pieces)
+        else:
+            yield from _in_order([pool.submit(_own_several, piece) for piece in pieces])
+
+    if workers == 1 or executor is not None:
+        yield of
         return
     pool = ProcessPoolExecutor(workers, get_context("spawn"), _begin, (asked,))
     try:
-        yield lambda numbers: _in_order([pool.submit(_one, n) for n in numbers])
+        yield of
     except KeyboardInterrupt:
         pool.shutdown(wait=False, cancel_futures=True)  # the command line ends what they are at
         raise
@@ -316,8 +340,28 @@ def _computed(
     pool.shutdown()
 
 
-def _in_order(awaited: Sequence[Future[Sample]]) -> Iterator[Sample]:
-    """Samples as they are wanted; nothing is waited for in C, where a request to end would wait too."""
+def _pieces(numbers: list[int], together: bool) -> list[list[int]]:
+    """Samples that are solved together: of `BLOCK` numbers all, lest bits depend on which are asked for; of chosen ones
+    as many in their order."""
+    plain = [n for n in numbers if n < (FIRST if together else np.inf)]
+    first = ALONE if together else len(plain) and plain[-1] + 1
+    alone = [[n] for n in plain if n < first]
+    blocks = sorted({(n - first) // BLOCK for n in plain if n >= first})
+    chosen = numbers[len(plain) :]
+    return [
+        *alone, *(list(range(first + BLOCK * b, first + BLOCK * (b + 1))) for b in blocks),
+        *(chosen[i : i + BLOCK] for i in range(0, len(chosen), BLOCK)),
+    ]  # fmt: skip
+
+
+def several(asked: Asked, numbers: Sequence[int]) -> list[Sample]:
+    """Samples, one by one or together."""
+    together = batch(asked) if len(numbers) > 1 else None
+    return [sample(asked, n) for n in numbers] if together is None else solved(together, numbers)
+
+
+def _in_order(awaited: Sequence[Future[Any]]) -> Iterator[Any]:
+    """Answers as they are wanted; nothing is waited for in C, where a request to end would wait too."""
     try:
         for one in awaited:
             while not one.done():
@@ -339,8 +383,8 @@ def _begin(asked: Asked) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # a terminal asks all; who began them ends them
 
 
-def _one(number: int) -> Sample:
-    return sample(_own, number)
+def _own_several(numbers: Sequence[int]) -> list[Sample]:
+    return several(_own, numbers)
 
 
 def _keep(file: Path | None, inputs: str, **arrays: Array) -> None:

@@ -10,8 +10,9 @@ followed to where it ends.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Generator
 from dataclasses import dataclass
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -19,6 +20,21 @@ from ..data import Array, largest
 
 Respond = Callable[[float], Array | None]
 """(w,) amplitudes of the read-outs at a frequency (Hz); None where there is no solution."""
+
+
+class Wanted(NamedTuple):
+    """What a search asks for at a frequency (Hz): amplitudes, with little work or else with all that there is; or, by
+    what else a `Follow` is given, the solution that goes on."""
+
+    frequency: float
+    at_once: bool = False
+    onward: tuple[float, float, bool] | None = None
+
+
+Found = TypeVar("Found")
+
+Asking = Generator[Wanted, Any, Found]
+"""Is sent what a `Respond` or a `Follow` finds, and returns something."""
 
 Follow = Callable[[float, float, float, bool], tuple[list[tuple[float, Array]], bool]]
 """Frequencies and amplitudes of the solution that goes on towards a frequency (Hz) from the one at another, the second,
@@ -76,9 +92,26 @@ def highest(
             from its other end, and the rest is looked for in what is between. tells: where it is given, no solution is
             followed to where it is told to lead.
     """
-    search = _Search(respond, follow, at_once, tells, frequency)
+    asking, found = search(frequency, tolerance, most, follow is not None, at_once is not None, tells), None
+    while True:
+        try:
+            f, with_little, onward = asking.send(found)
+        except StopIteration as ended:
+            return ended.value  # type: ignore[no-any-return]
+        if onward is not None and follow is not None:
+            found = follow(f, *onward)
+        else:
+            found = (at_once if with_little and at_once is not None else respond)(f)
+
+
+def search(
+    frequency: Array, tolerance: float = TOLERANCE, most: int = MOST, follow: bool = True, at_once: bool = True,
+    tells: Tells | None = None,
+) -> Asking[Highest]:  # fmt: skip
+    """`highest`, by what it is sent where it asks for it: whoever solves many rings solves what all ask for."""
+    search = _Search(follow, at_once, tells, frequency)
     known, failed = search.known, search.failed
-    search.sweep([float(f) for f in frequency])
+    yield from search.sweep([float(f) for f in frequency])
     before = np.inf  # what was left where a parabola placed the last point
     count, may_fail = 0, len(failed) + FAILING
     while known and count < most and len(failed) < may_fail:
@@ -87,14 +120,14 @@ def highest(
         promised = told[0] > top * (1 + tolerance) and more - top <= 0.5 * before
         promised = promised and not _beside(told[1], known, failed)
         if more <= top * (1 + (tolerance if promised else LEFT)):
-            if not search.leads_on(top, tolerance) and not search.mended():
+            if not (yield from search.leads_on(top, tolerance)) and not (yield from search.mended()):
                 break
             continue
-        if not promised and search.goes_on(low, high, tolerance):
+        if not promised and (yield from search.goes_on(low, high, tolerance)):
             continue
-        search.look(told[1] if promised else _middle(low, high, failed))
+        yield from search.look(told[1] if promised else _middle(low, high, failed))
         count, before = count + 1, more - top if promised else np.inf
-    while search.mended():
+    while (yield from search.mended()):
         pass
     if not known:
         return Highest(-1, np.nan, np.nan, np.nan, np.zeros(0), np.zeros((0, 0)), tuple(failed), False)
@@ -110,10 +143,8 @@ class _Search:
     Hz, whereto they led. ends: Hz, where they ended. looked: Hz without a solution that were looked for again, and what
     was known beside them then."""
 
-    def __init__(
-        self, respond: Respond, follow: Follow | None, at_once: Respond | None, tells: Tells | None, frequency: Array
-    ) -> None:  # fmt: skip
-        self.respond, self.follow, self.at_once, self.tells = respond, follow, at_once, tells
+    def __init__(self, follow: bool, at_once: bool, tells: Tells | None, frequency: Array) -> None:
+        self.follow, self.at_once, self.tells = follow, at_once, tells
         self.low, self.high = float(min(frequency)), float(max(frequency))
         self.width = largest(np.diff(frequency))
         self.known: dict[float, Array] = {}
@@ -123,31 +154,31 @@ class _Search:
         self.looked: set[tuple[float, float, float]] = set()
         self.ends: list[float] = []
 
-    def look(self, f: float) -> None:
-        y = self.respond(f)
+    def look(self, f: float) -> Asking[None]:
+        y = yield Wanted(f)
         if y is None:
             self.failed.append(f)
         else:
             self.known[f] = y
 
-    def sweep(self, rest: list[float]) -> None:
+    def sweep(self, rest: list[float]) -> Asking[None]:
         """On as far as that leads, back from the other end, then what is between."""
-        if self.at_once is not None:
-            rest = rest[self._leads(rest, self.at_once) :][::-1]
-            rest = rest[self._leads(rest, self.at_once) :]
+        if self.at_once:
+            rest = rest[(yield from self._leads(rest)) :][::-1]
+            rest = rest[(yield from self._leads(rest)) :]
         for f in rest:
-            self.look(f)
+            yield from self.look(f)
 
-    def _leads(self, frequencies: list[float], at_once: Respond) -> int:
+    def _leads(self, frequencies: list[float]) -> Asking[int]:
         """How many in their order are found at once."""
         for count, f in enumerate(frequencies):
-            y = at_once(f)
+            y = yield Wanted(f, True)
             if y is None:
                 return count
             self.known[f] = y
         return len(frequencies)
 
-    def mended(self) -> bool:
+    def mended(self) -> Asking[bool]:
         """Whether one of the points without a solution is found by now, from what is known about it or on either side
         of it."""
         for f in self.failed:
@@ -155,17 +186,17 @@ class _Search:
             if (f, *sides) in self.looked:
                 continue
             self.looked.add((f, *sides))
-            y = self.at_once(f) if self.at_once else None
+            y = (yield Wanted(f, True)) if self.at_once else None
             for near in sides:
-                if y is None and near != f and self.follow is not None:
-                    y = dict(self.follow(f, near, self.width, False)[0]).get(f)
+                if y is None and near != f and self.follow:
+                    y = dict((yield Wanted(f, onward=(near, self.width, False)))[0]).get(f)
             if y is not None:
                 self.failed.remove(f)
                 self.known[f] = y
                 return True
         return False
 
-    def leads_on(self, top: float, tolerance: float) -> bool:
+    def leads_on(self, top: float, tolerance: float) -> Asking[bool]:
         """Whether a solution that is about as high as the top, and beside which there is a lower one, leads to more
         than is known: not only in this interval. A wide one is halved while what is known does not tell."""
         x = sorted(self.known)
@@ -175,9 +206,9 @@ class _Search:
                 continue
             middle = 0.5 * (low + high)
             if self.tells is not None and self._wide(low, high) and middle not in self.failed:
-                self.look(middle)
+                yield from self.look(middle)
                 return True
-            if self.goes_on(low, high, tolerance, True):
+            if (yield from self.goes_on(low, high, tolerance, True)):
                 return True
         return False
 
@@ -189,7 +220,7 @@ class _Search:
         far, near = sorted((low, high), key=lambda f: float(self.known[f].max()))
         return self.tells is not None and self.tells(far, near)
 
-    def goes_on(self, low: float, high: float, tolerance: float, last: bool = False) -> bool:
+    def goes_on(self, low: float, high: float, tolerance: float, last: bool = False) -> Asking[bool]:
         """Whether the higher of two points leads to more at the other one, or on the way there, than is known. Where it
         ends, a point is looked for beside that. last: whether the interval is not halved any more."""
         known = self.known
@@ -198,12 +229,12 @@ class _Search:
         smooth = wide and known[far].max() > STEADY * told and near not in self.led
         ended = any(abs(near - end) < ENDED * self.width for end in self.ends)
         arc = last or not wide
-        if self.follow is None or smooth or ended or (far, near, told, arc) in self.tried:
+        if not self.follow or smooth or ended or (far, near, told, arc) in self.tried:
             return False
         self.tried.add((far, near, told, arc))
         if self._told(low, high):
             return False
-        points, ends = self.follow(far, near, self.width, arc)
+        points, ends = yield Wanted(far, onward=(near, self.width, arc))
         higher = {
             f: y for f, y in points if y.max() > (1 + tolerance) * known[far].max() and self.low <= f <= self.high
         }
@@ -213,7 +244,7 @@ class _Search:
             end = max([near, *higher], key=lambda f: abs(f - near))
             self.ends.append(end)
             beside = end + BESIDE * (far - end)
-            self.look(beside)
+            yield from self.look(beside)
         return bool(higher) or ends
 
 

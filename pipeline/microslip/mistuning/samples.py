@@ -61,7 +61,8 @@ class Asked:
 class Sample:
     """Attributes:
     number. top: see `Highest`; its read-outs are those of the sectors, one each. grid: (f, sectors) amplitudes on the
-        frequencies asked for, NaN where there is no solution. stress, strain: at the highest peak, see `worst`.
+        frequencies asked for, NaN where there is no solution. stress, strain: at the highest peak, see `worst`. alone:
+        whether the solver of single rings was needed.
     """
 
     number: int
@@ -69,6 +70,7 @@ class Sample:
     grid: Array
     stress: float = np.nan
     strain: float = np.nan
+    alone: bool = True
 
     @property
     def localisation(self) -> float:
@@ -87,21 +89,27 @@ def sample(asked: Asked, number: int) -> Sample:
 def of_ring(asked: Asked, ring: Assembly, number: int = 0) -> Sample:
     """A whole ring: its highest blade over the frequency."""
     top, respond = _searched(asked, ring, asked.frequency)
+    strained = worst(ring, respond.coordinates(top.frequency)) if np.isfinite(top.amplitude) else ()
+    return Sample(number, top, on_sweep(asked, top), *strained)
+
+
+def on_sweep(asked: Asked, top: Highest) -> Array:
+    """(f, sectors) amplitudes on the frequencies asked for, NaN where there is no solution."""
     nothing = np.full(asked.tuned.sectors, np.nan)
     known = dict(zip(top.frequencies.tolist(), top.amplitudes, strict=True))
-    grid = np.array([known.get(float(f), nothing) for f in asked.frequency])
-    strained = worst(ring, respond.coordinates(top.frequency)) if np.isfinite(top.amplitude) else ()
-    return Sample(number, top, grid, *strained)
+    return np.array([known.get(float(f), nothing) for f in asked.frequency])
 
 
 def _searched(asked: Asked, ring: Assembly, frequency: Array) -> tuple[Highest, SlidingRing | StickingRing]:
     respond = StickingRing(ring) if asked.stuck else SlidingRing(asked.problem(ring), asked.tuned_points)
     top = highest(respond, frequency, follow=respond.follow, at_once=respond.at_once, tells=respond.tells)
-    if np.isfinite(top.amplitude):
-        y = respond.ended(top.frequency)  # has more digits
-        every = np.where((top.frequencies == top.frequency)[:, None], y, top.amplitudes)
-        top = replace(top, output=int(y.argmax()), amplitude=float(y.max()), amplitudes=every)
-    return top, respond
+    return (ended(top, respond.ended(top.frequency)) if np.isfinite(top.amplitude) else top), respond
+
+
+def ended(top: Highest, y: Array) -> Highest:
+    """With amplitudes (w,) of more digits at the peak."""
+    every = np.where((top.frequencies == top.frequency)[:, None], y, top.amplitudes)
+    return replace(top, output=int(y.argmax()), amplitude=float(y.max()), amplitudes=every)
 
 
 FINER, HIGH = 4, 0.5
@@ -129,15 +137,37 @@ TELLS = 0.5
 """Share of the way from one solution to another, from there on which it leads where it is carried on."""
 
 
-class SlidingRing:
+class Solutions:
+    """Attributes: known: Hz -> solution of a ring."""
+
+    def __init__(self) -> None:
+        self.known: dict[float, Point] = {}
+
+    def tells(self, frequency: float, behind: float) -> bool:
+        """See `peaks.Tells`: a straight line through two solutions."""
+        near, found = self.known[behind].x, self.known[frequency]
+        told = carried(self.beyond(frequency, behind)[:2], found.Omega)
+        return bool(np.linalg.norm(told - found.x) < TELLS * np.linalg.norm(near - found.x))
+
+    def beyond(self, frequency: float, behind: float) -> list[Point]:
+        """What is known from `behind` on away from a frequency, the nearest first."""
+        away = [f for f in self.known if (f - behind) * (frequency - behind) <= 0]
+        return [self.known[f] for f in sorted(away, key=lambda f: abs(f - frequency))]
+
+    def near(self, Omega: float, most: int) -> list[Point]:
+        """The nearest."""
+        return sorted(self.known.values(), key=lambda p: abs(p.Omega - Omega))[:most]
+
+
+class SlidingRing(Solutions):
     """Amplitudes of a ring with friction at any frequency, each started from what is known nearby.
 
-    Attributes: problem. tuned: solutions of the ring of equal sectors, in the same units. known: Hz -> of this one.
+    Attributes: problem. tuned: solutions of the ring of equal sectors, in the same units.
     """
 
     def __init__(self, problem: Problem, tuned: Sequence[Point] = ()) -> None:
+        super().__init__()
         self.problem, self.tuned = problem, tuned
-        self.known: dict[float, Point] = {}
         self.slope: Any = None
         self.balances: dict[float, AtFrequency] = {}
 
@@ -163,7 +193,7 @@ class SlidingRing:
         or on the way there along its arc where asked for, and whether it ends; what is known here stays where that is
         higher. width: Hz, of what is between two points of a sweep."""
         Omega, before = 2 * np.pi * frequency, self.known.get(frequency)
-        side = self._beyond(frequency, behind)
+        side = self.beyond(frequency, behind)
         for count in (2, 1):
             point = among(self._at(Omega), carried(side[:count], Omega), tolerance=SEARCHED)
             y = self._kept(frequency, point)
@@ -175,17 +205,6 @@ class SlidingRing:
             return [], False
         points, ends = Arc(self.problem, self.known[behind], Omega, 2 * np.pi * width).onward()
         return [(f, self._read(f, p)) for p in points if (f := p.Omega / (2 * np.pi)) != frequency], ends
-
-    def tells(self, frequency: float, behind: float) -> bool:
-        """See `peaks.Tells`: a straight line through two solutions."""
-        near, found = self.known[behind].x, self.known[frequency]
-        told = carried(self._beyond(frequency, behind)[:2], found.Omega)
-        return bool(np.linalg.norm(told - found.x) < TELLS * np.linalg.norm(near - found.x))
-
-    def _beyond(self, frequency: float, behind: float) -> list[Point]:
-        """What is known from `behind` on away from a frequency, the nearest first."""
-        away = [f for f in self.known if (f - behind) * (frequency - behind) <= 0]
-        return [self.known[f] for f in sorted(away, key=lambda f: abs(f - frequency))]
 
     def ended(self, frequency: float) -> Array:
         """(w,) m at a frequency that was solved for, by Newton's method to its end."""
@@ -216,7 +235,7 @@ class SlidingRing:
         """Where Newton's method may begin: what is near carried on, by two points or four. Where that leaves much, of
         all the two that leave least: also carried on from either side, which may be those of a jump, and the tuned
         ring's."""
-        near, at = self._near(Omega, 4), self._at(Omega)
+        near, at = self.near(Omega, 4), self._at(Omega)
         sides = [[p for p in near if (p.Omega > Omega) is above] for above in (False, True)]
         tuned = sorted(self.tuned, key=lambda p: abs(p.Omega - Omega))[:3]
         left = dict[tuple[int, ...], tuple[float, Array]]()
@@ -233,10 +252,6 @@ class SlidingRing:
         if Omega not in self.balances:
             self.balances[Omega] = self.problem.at(Omega)
         return self.balances[Omega]
-
-    def _near(self, Omega: float, most: int) -> list[Point]:
-        return sorted(self.known.values(), key=lambda p: abs(p.Omega - Omega))[:most]
-
 
 def amplitudes(at: AtFrequency, x: Array) -> ComplexArray:
     """(w,) complex 0-peak amplitudes of all read-outs at a solution x (size,), m."""

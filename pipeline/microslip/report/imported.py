@@ -127,7 +127,7 @@ def _materials(mesh: Mesh) -> Piece:
         moduli = number(E[0], 6) if plain else ", ".join(number(v, 5) for v in E)
         ratio = number(-compliance[0, 1] / compliance[0, 0], 4)
         count = sum(int((r == place).sum()) for r in mesh.regions.values())
-        hot = "over temperature" if material.temperature_table is not None else ""
+        hot = "over temperature" if material.softening is not None else ""
         rows.append((material.name, number(material.density, 6), moduli, ratio, count or "", hot))
     return table(["material", "kg/m3", "E in GPa", "Poisson's ratio", "cells", "modulus"], rows)
 
