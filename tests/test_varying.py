@@ -169,3 +169,32 @@ def test_section_over_a_parameter(tmp_path: Path) -> None:
     assert len(y) == 3
     np.testing.assert_allclose(y, np.full(3, expected.real), atol=2e-3)
     np.testing.assert_allclose(v, np.full(3, (0.5j * expected).real), atol=2e-3)
+
+
+@pytest.mark.slow
+def test_orbit_over_a_frequency_and_over_a_key(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A row a period of each motion; the largest value beside is that of the table of motions."""
+    monkeypatch.chdir(tmp_path)
+    few = ["--points", "3", "--set", "orbit.settle=2", "--set", "orbit.keep=4", "--set", "orbit.samples=32"]
+    pressed = ["--set", "orbit.normal_force=100.0"]
+    assert main(["orbit", "sample", "--over", "frequency", "--low", "380", "--high", "400", *few, *pressed]) == 0
+    own = tmp_path / "build" / "sample"
+    found, motions = table(own / "orbit_section.csv"), table(own / "orbit.csv")
+    assert found["frequency_Hz"] == ["380"] * 4 + ["390"] * 4 + ["400"] * 4
+    assert motions["frequency_Hz"] == ["380", "390", "400"] and motions["motion"]
+    inside = np.abs(np.array(found["displacement_m"], float)).reshape(3, 4).max(axis=1)
+    tops = np.abs(np.array([motions["largest_m"], motions["smallest_m"]], float)).max(axis=0)
+    assert (inside <= tops).all()
+    over = ["--over", "contacts.right.friction", "--low", "0.1", "--high", "0.3", "--set", "orbit.frequency=390.0"]
+    assert main(["orbit", "sample", *over, *few, *pressed, "--set", "name=keyed"]) == 0
+    found = table(tmp_path / "build" / "keyed" / "orbit_section.csv")
+    assert sorted(set(found["contacts.right.friction"])) == ["0.1", "0.2", "0.3"]
+
+
+def test_a_section_needs_its_range(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    refused_command(["orbit", "sample", "--over", "frequency", "--low", "380"], capsys, "orbit", "low and high")
+    both = ["--over", "friction", "--low", "0.1", "--high", "0.2", "--set", "orbit.frequency=[1.0,2.0]"]
+    refused_command(["orbit", "sample", *both], capsys, "orbit", "one frequency")

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from contextvars import ContextVar
 from functools import partial
 from pathlib import Path
@@ -26,22 +27,30 @@ Columns = dict[str, np.ndarray]
 
 def draw(study: Study, folder: Path) -> list[Path]:
     """A PNG for every table that has a picture."""
-    return [save(partial(_drawn, name, study), folder / f"{name}.png") for name in study.tables if name in _DRAWN]
+    return [save(partial(draw_table, name, study), folder / f"{name}.png") for name in study.tables if name in _DRAWN]
 
 
 DIMENSIONLESS: ContextVar[bool] = ContextVar("numbers without dimension", default=False)
 """While a dimensionless contact is drawn."""
 
 
-def _drawn(name: str, study: Study, figure: Figure) -> None:
+@contextmanager
+def dimensions(study: Study, figure: Figure) -> Iterator[None]:
+    """What is drawn into the figure has units, or a star instead where the file has no dimension."""
     bare = study.contact.file.dimensionless
     before = DIMENSIONLESS.set(bare)
     try:
-        _DRAWN[name](study, figure)
+        yield
     finally:
         DIMENSIONLESS.reset(before)
     for axes in figure.axes if bare else ():
         axes.set(xlabel=_starred(axes.get_xlabel()), ylabel=_starred(axes.get_ylabel()))
+
+
+def draw_table(name: str, study: Study, figure: Figure) -> None:
+    """The picture of a table."""
+    with dimensions(study, figure):
+        _DRAWN[name](study, figure)
 
 
 def _starred(label: str) -> str:
