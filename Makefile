@@ -7,7 +7,7 @@ CASES    := $(filter-out $(BODIES),$(sort $(basename $(notdir $(wildcard pipelin
 PYTHON   := .venv/bin/python
 RUN      := $(PYTHON) -m microslip
 # A worker that crashes fails the run: one that took its place would wait for ever.
-PYTEST   := $(PYTHON) -m pytest -n 2 --dist loadfile --max-worker-restart=0
+PYTEST   := $(PYTHON) -m pytest -n 2 --dist loadfile --no-loadscope-reorder --max-worker-restart=0
 READY    := .venv/.ready
 
 export OMP_NUM_THREADS ?= 1
@@ -85,6 +85,9 @@ release-check: $(READY) ## wheel and sdist, installed in clean environments and 
 
 docs: $(READY) ## the studies and pictures of docs/ (minutes)
 	@$(PYTHON) docs/make_pictures.py
+
+figure-%: $(READY) ## a figure of the book by its number, figure-6.7-5 -> build/figures
+	@$(PYTHON) docs/figures.py $* --figures svg
 
 bench: $(READY) ## timings against CalculiX, NGSolve and pyHarm, of rings and cyclic sectors (minutes)
 	@$(PYTHON) benchmarks/modal.py

@@ -105,7 +105,7 @@ def microslip_worker(mesh_file: str, modes: int) -> dict:
 
 def timed_solver(inner, clock: Clock):
     """The same direct solver; the clock gets the stages ``factor`` and ``solves`` (the eigensolve's yardstick)."""
-    from microslip.linalg.eigen import DirectSolver
+    from microslip.linalg.direct import DirectSolver
 
     class Timed(DirectSolver):
         name = inner.name

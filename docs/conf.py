@@ -6,9 +6,11 @@ import inspect
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 sys.path.insert(0, str(Path(__file__).parent))
 
+import notebooks
 import pages
 
 import microslip
@@ -19,7 +21,7 @@ release = microslip.__version__
 extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "sphinx.ext.mathjax", "sphinx_design"]
 myst_enable_extensions = ["colon_fence"]
 myst_heading_anchors = 4
-exclude_patterns = ["pictures", "generated/gallery.md"]
+exclude_patterns = ["pictures", "generated/gallery.md", "generated/extra"]
 html_theme = "pydata_sphinx_theme"
 html_title = "microslip"
 html_show_sourcelink = False
@@ -29,6 +31,7 @@ html_theme_options = {
     "navbar_align": "left", "header_links_before_dropdown": 6, "secondary_sidebar_items": ["page-toc"],
 }  # fmt: skip
 html_static_path: list[str] = []
+html_extra_path = ["generated/extra"]
 add_module_names = False
 autodoc_typehints = "none"
 autodoc_member_order = "bysource"
@@ -64,8 +67,18 @@ def _help(*verb: str) -> str:
     return subprocess.run(line, capture_output=True, text=True, check=True).stdout.strip()
 
 
-def setup(app: object) -> None:
+def _with_notebook(app: object, name: str, source: list[str]) -> None:
+    """A tutorial leads to its notebook below its heading."""
+    if name.startswith("tutorials/"):
+        file = f"{name.removeprefix('tutorials/')}.ipynb"
+        link = f'<p><a class="notebook" href="../notebooks/{file}" download>Download as a notebook</a></p>'
+        source[0] = source[0].replace("\n\n", f"\n\n{link}\n\n", 1)
+
+
+def setup(app: Any) -> None:
     MADE.mkdir(exist_ok=True)
+    notebooks.write_notebooks(MADE / "extra" / "notebooks")
+    app.connect("source-read", _with_notebook)
     for name, text in (("names.md", _names()), ("verbs.md", _verbs()), ("gallery.md", pages.gallery())):
         file = MADE / name
         if not file.is_file() or file.read_text(encoding="utf-8") != text:

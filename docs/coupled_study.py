@@ -131,7 +131,7 @@ def _finer(dampers: Dampers, normal: float) -> str:
     if normal not in dampers.more:
         return ""
     frequency, amplitude = dampers.largest(normal)
-    return f"{1e6 * amplitude:.3g} um at {frequency:.1f} Hz"
+    return f"{1e6 * amplitude:.3g} µm at {frequency:.1f} Hz"
 
 
 def row(words: str, h: Highest) -> list[str]:

@@ -89,11 +89,15 @@ def exponents(axes: Any) -> None:
     axes.set(title="Fig. 5.6-2", xlabel="s", ylabel="k")
 
 
-PANELS = (modes, laws, densities, pressures, tilted(0), tilted(1), spread, exponents)
+FIGURES: dict[str, Callable[[Any], None]] = {
+    "3.2-1": modes, "3.3-1": laws, "3.3-5": densities, "3.3-7": pressures, "5.2-2a": tilted(0), "5.2-2b": tilted(1),
+    "5.6-1": spread, "5.6-2": exponents,
+}  # fmt: skip
+"""Number -> what draws it into axes."""
 
 
 def picture(fig: Any, plain: Callable[[Any], None]) -> Any:
-    for axes, draw in zip(fig.subplots(2, 4).ravel(), PANELS, strict=True):
+    for axes, draw in zip(fig.subplots(2, 4).ravel(), FIGURES.values(), strict=True):
         plain(axes)
         draw(axes)
         if draw is not modes:

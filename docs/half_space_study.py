@@ -74,7 +74,7 @@ def worn_profiles() -> Table:
 
     first, rows = run(np.zeros(grid.ny)).max(), []
     for depth in (1e-6, 3e-6, 10e-6):
-        row = [f"{1e6 * depth:g} um"]
+        row = [f"{1e6 * depth:g} µm"]
         for length in (0, grid.dy, 2 * grid.dy):
             z = worn(run, np.zeros(grid.ny), grid.dy, 12, depth / first, length)
             largest = [

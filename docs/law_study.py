@@ -11,7 +11,7 @@ import numpy as np
 
 from microslip.contact.friction import Coulomb, Exponential, Falling, Friction, StaticSliding, characteristic, scattered
 from microslip.contact.study import Study, study
-from microslip.pictures.contact import loops_figure, microslip_panel, motion_figure
+from microslip.pictures.contact import dimensions, draw_table, microslip_panel
 from microslip.pictures.plots import figure_of
 
 ROOT = Path(__file__).parents[1]
@@ -69,23 +69,24 @@ def at(law: Friction, speed: np.ndarray) -> np.ndarray:
 
 
 def element() -> Any:
-    return figure_of(partial(motion_figure, of_figure("3.7-7")))
+    return figure_of(partial(draw_table, "motion", of_figure("3.7-7")))
 
 
 def stick_slip() -> Any:
-    return figure_of(partial(motion_figure, of_figure("3.7-3")))
+    return figure_of(partial(draw_table, "motion", of_figure("3.7-3")))
 
 
 def loops() -> Any:
     found = study(OWN / "contact.toml", ["motion.amplitudes=[1.0, 2.0, 4.0, 8.0]", 'name="shroud"'])
-    return figure_of(partial(loops_figure, found))
+    return figure_of(partial(draw_table, "loops", found))
 
 
 def microslip(fig: Any) -> Any:
     """Fig. 3.8-2 a to d."""
     for axes, letter in zip(fig.subplots(2, 2).ravel(), "abcd", strict=True):
         found = of_figure(f"3.8-2{letter}")
-        microslip_panel(found, axes)
+        with dimensions(found, fig):
+            microslip_panel(found, axes)
         axes.set_title(f"{letter})", loc="left", fontsize=10)
         if letter in "ac":
             axes.get_legend().remove()

@@ -605,7 +605,7 @@ def contact() -> None:
         f, a = max(found, key=lambda p: p[1])
         open_ = result.responses[normal].open.max()
         rows.append([f"{normal:g}", f"{f:.1f}", f"{1e6 * a:.1f}", f"{100 * open_:.2g}"])
-    head = ["F_N, N", "resonance, Hz", "amplitude, um", "points times cycle that are open at most, %"]
+    head = ["F_N, N", "resonance, Hz", "amplitude, µm", "points times cycle that are open at most, %"]
     fill("blade.md", "peaks", table(head, rows))
     PICTURES.mkdir(exist_ok=True)
     save(picture(response_picture, result), "blade_response")
@@ -666,7 +666,7 @@ def amplitudes(basis: ModalBasis, settings: CaseSettings) -> None:
     def row(text: str, b: ModalBasis) -> None:
         result = run_case(settings.model_copy(update={"sweep": near}), b)
         best = [max(found, key=lambda p: p[1]) for found in result.resonances.values()]
-        rows.append([text, *(f"{1e6 * a:.0f} um at {f:.2f} Hz" for f, a in best)])
+        rows.append([text, *(f"{1e6 * a:.0f} µm at {f:.2f} Hz" for f, a in best)])
 
     row("as in the files: 285 mm, D = 0.1 %", basis)
     for height in (237.5, 332.5):
@@ -1493,10 +1493,12 @@ def book_mode() -> None:
 def book_figures() -> None:
     """Figures of the book that a formula draws, and those of rolling contact."""
     import figure_study as study
+    import heat_study
     import rolling_study as rolled
 
     for name, drawing in (("book_figures", study), ("book_rolling", rolled)):
         save(drawn(drawing.picture(figure(10.5, 5.2), plain)), name, colours=LINES)
+    save(drawn(heat_study.picture(figure(11.5, 10.5))), "book_heat", colours=LINES)
     force, moment = 100 * study.discretisation()
     print(f"Fig. 5.2-2: 8 elements miss {force:.1f} % of the force, {moment:.1f} % of the moment at most")
 
@@ -1551,14 +1553,14 @@ def ring() -> None:
         "excited and read at 237.5 mm": made("blade-stress-237", "blade", *stress, *at),
         "D = 0.2 %": replace(basis, groups={(0, 0): damped}),
     }
-    head = ["change", "optimum, N", "resonance, Hz", "amplitude, um", "stress, MPa"]
+    head = ["change", "optimum, N", "resonance, Hz", "amplitude, µm", "stress, MPa"]
     fill("ring_case.md", "optimum", table(head, study.assumptions(r, other)))
     rows = []
     for size in (24, 12, 8):
         own = replace(r, basis=made(f"blade-stress-{size}", "blade", "output.gauss=false", f"mesh.size={size}"))
         h = study.highest(own.problem(100.0), own.basis, study.WIDE)
         rows.append([f"{size}", f"{h.frequency:.2f}", f"{1e6 * h.amplitude:.1f}", f"{1e-6 * h.stress:.2f}"])
-    head = ["element size, mm", "resonance at 100 N, Hz", "amplitude, um", "stress, MPa"]
+    head = ["element size, mm", "resonance at 100 N, Hz", "amplitude, µm", "stress, MPa"]
     fill("ring_case.md", "mesh", table(head, rows))
 
 
@@ -1583,7 +1585,7 @@ def rig() -> None:
         for a, b in zip(first, second, strict=True)
     ]
     rows = [[x.replace("nan", "none") for x in row] for row in rows]
-    head = ["F_N, N", "first: resonance, Hz", "amplitude, um", "second: resonance, Hz", "amplitude, um"]
+    head = ["F_N, N", "first: resonance, Hz", "amplitude, µm", "second: resonance, Hz", "amplitude, µm"]
     fill("rig_case.md", "forces", table(head, rows))
 
 
@@ -1602,7 +1604,7 @@ def multicoupling() -> None:
     study.dampers_picture(dampers, ring_study.amplitudes(alone, study.SHOWN), *axes)
     save(drawn(fig), "multicoupling")
     head = [
-        "damper's normal force, N", "resonance, Hz", "amplitude, um", "stress at the foot, MPa",
+        "damper's normal force, N", "resonance, Hz", "amplitude, µm", "stress at the foot, MPa",
         "damper open, largest share", "with nine harmonics",
     ]  # fmt: skip
     fill("multicoupling.md", "forces", table(head, study.rows(without, dampers)))

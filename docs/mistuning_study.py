@@ -54,7 +54,7 @@ def first_order() -> tuple[list[str], list[list[str]]]:
              f"{1e6 * samples['deviation_m'][i]:.3g}", f"{1e6 * near['deviation_m'][j]:.3g}",
              f"{samples['weibull_exponent'][i]:.3g}", f"{near['weibull_exponent'][j]:.3g}"]
         )  # fmt: skip
-    return ["Hz", "tuned, um", "mean, um", "deviation, um", "by first order, um", "k", "k by first order"], rows
+    return ["Hz", "tuned, µm", "mean, µm", "deviation, µm", "by first order, µm", "k", "k by first order"], rows
 
 
 def spin_pit(build: Path = Path("build"), to: Path = Path("tests/validation")) -> None:

@@ -129,20 +129,21 @@ def typed(line: str, folder: Path) -> str:
 
 def keywords() -> str:
     """Table of the keywords of decks, from the readers."""
-    from microslip.mesh import archive_links, archive_nodes, bdf, cdb, deck_state, inp
+    from microslip.mesh import bdf, cdb, deck_state, inp
 
     def words(names: Any, mark: str = "") -> str:
         return " ".join(f"`{mark}{name}`" for name in sorted({*names}))
 
-    ansys = {*cdb._BLOCKS, *cdb._COMMANDS, *archive_links.COMMANDS, *archive_nodes.COMMANDS}
+    ansys = cdb._COMMANDS.items()
+    refused = {name for name, meaning in ansys if meaning and (not callable(meaning) or meaning is cdb._generated)}
     rows = [
         [
             "Abaqus, CalculiX",
             words({*inp.READERS, *inp._LINKING} - deck_state._OTHER_STATES, "*"),
             words({*inp._REFUSED, *deck_state._OTHER_STATES}, "*"),
         ],
-        ["Ansys", words(ansys), words(cdb._NOT_READ)],
-        ["Nastran", words(bdf._READ), ""],
+        ["Ansys", words({name for name, meaning in ansys if callable(meaning)} - refused), words(refused)],
+        ["Nastran", words({*bdf._READ, *bdf.LOADS}), words(bdf.OTHERS)],
     ]
     return table(["deck", "read", "not read: refused or said"], rows)
 
@@ -337,8 +338,8 @@ WALL = {
     "book_mode": "5.2-5", "blade_response": "5.3-5", "rig_forces": "5.3-7", "spin_pit": "5.4-4",
     "ring_modes": "5.5-1", "ring_orders": "5.5-2", "ring_forces": "5.5-3", "damping_element": "5.5-6",
     "damping_wire": "5.5-8", "multicoupling": "5.5-9", "mistuning_mistuned": "5.6-3", "bolted_pipes": "5.7-2",
-    "book_rolling": "6.5-1", "rolling_creep": "6.6-1", "half_space": "6.7-3", "unround_wheels": "6.9-1",
-    "tyre": "6.10-4",
+    "book_rolling": "6.5-1", "book_heat": "6.7-1", "rolling_creep": "6.6-1", "half_space": "6.7-3",
+    "unround_wheels": "6.9-1", "tyre": "6.10-4",
 }  # fmt: skip
 """Picture -> one of the figures of the book that it shows."""
 

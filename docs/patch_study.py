@@ -44,7 +44,7 @@ def pressures(figure: Any) -> Any:
         delta = (forces / (4 / 3 * k * LINE.length * np.sqrt(2 * LINE.radius))) ** (2 / 3)
         right.plot(1e6 * delta, forces, color=colour, label=f"springs, same {match} at 100 N")
     left.set(xlabel="across the line in mm", ylabel="pressure in MPa", xlim=(-0.3, 0.3))
-    right.set(xlabel="approach in um", ylabel="normal force in N", ylim=(0, 300), xlim=(0, None))
+    right.set(xlabel="approach in µm", ylabel="normal force in N", ylim=(0, 300), xlim=(0, None))
     for axes in (left, right):
         axes.grid(alpha=0.3)
         axes.set_ylim(bottom=0)

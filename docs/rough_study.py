@@ -23,7 +23,7 @@ TIMES = (0.0, 0.5, 1.0, 2.0, 4.0, 8.0)
 
 
 def ground(points: int = 4001) -> SurfaceProfile:
-    """An invented ground surface: grooves 20 um apart and waviness, its peaks dulled; 8 mm long, tilted."""
+    """An invented ground surface: grooves 20 µm apart and waviness, its peaks dulled; 8 mm long, tilted."""
     rng = np.random.default_rng(6)
     x = np.linspace(0, 8e-3, points)
     noise = np.convolve(rng.normal(size=points + 60), np.hanning(15), "same")[30:-30]
@@ -33,7 +33,7 @@ def ground(points: int = 4001) -> SurfaceProfile:
 
 def numbers() -> tuple[list[str], list[list[str]]]:
     """Roughness numbers of the invented surface, as measured and levelled."""
-    head = ["`level`", "Ra, um", "Rq, um", "Rz, um", "Rmax, um", "Rt, um", "R_Z of (3.3-4), um", "residual of the area"]
+    head = ["`level`", "Ra, µm", "Rq, µm", "Rz, µm", "Rmax, µm", "Rt, µm", "R_Z of (3.3-4), µm", "residual of the area"]
     rows = []
     for level in (None, 1, 2):
         profile = levelled(ground(), level)

@@ -7,6 +7,7 @@ import re
 import signal
 import sys
 from collections.abc import Iterator
+from contextlib import suppress
 from importlib.metadata import PackageNotFoundError, version
 from importlib.util import find_spec
 from pathlib import Path
@@ -15,7 +16,8 @@ from typing import Any
 os.environ.setdefault("OMP_NUM_THREADS", "1")  # before NumPy and MKL are loaded
 
 import pytest
-from durations import Durations
+from durations import Durations, longest_first
+from families import LEFT_OUT
 from hypothesis import HealthCheck, settings
 
 settings.register_profile(
@@ -56,6 +58,10 @@ def pytest_configure(config: pytest.Config) -> None:
     if sys.platform == "linux":
         freed_memory_stays()
     config.pluginmanager.register(durations := Durations(), "durations-of-tests")
+    with suppress(ImportError, AttributeError):  # what is drawn is to depend on no number of the modules loaded so far
+        from hypothesis.internal.conjecture import providers
+
+        providers.is_local_module_file = lambda path: False
     if find_spec("jax") and not getattr(config.option, "numprocesses", None):
         from microslip.process import forget, prepare
 
@@ -70,6 +76,17 @@ def freed_memory_stays() -> None:
     mallopt = getattr(ctypes.CDLL(None), "mallopt", None)  # glibc alone has it
     for threshold, size in ((-1, 2**28), (-3, 2**25)):  # M_TRIM_THRESHOLD, M_MMAP_THRESHOLD in bytes
         mallopt and mallopt(threshold, size)
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """What `families` names is slow; workers begin with the files that take longest, so that they end
+    together (with --no-loadscope-reorder)."""
+    for item in items:
+        if item.nodeid.startswith(LEFT_OUT):
+            item.add_marker(pytest.mark.slow)
+    if hasattr(config, "workerinput"):
+        items[:] = longest_first(items, config.workerinput["took"])
 
 
 def pytest_collection_finish() -> None:

@@ -1,4 +1,5 @@
-"""What every test costs, in CPU seconds: ``build/durations.csv`` after each run, the dearest first.
+"""What every test costs, in CPU seconds: ``build/durations.csv`` after each run, the dearest first; of slow ones
+``build/durations-slow.csv``. The next run begins with the files that took longest.
 
 Seconds of the wall depend on what runs beside it, and compiling on what has run before: that is kept apart.
 """
@@ -19,10 +20,31 @@ QUICK = 1.5
 """CPU seconds, compiling left out, that a quick test is to take at most: those above are listed."""
 NEVER = 10.0
 """A run of quick tests fails over one above this, whatever the machine is and does beside."""
-FILE = Path(__file__).resolve().parents[1] / "build/durations.csv"
+BUILD = Path(__file__).resolve().parents[1] / "build"
 COLUMNS = ("cpu_s", "compiling_s", "processes_s")
 """Of a test with its fixtures: CPU time of the worker; at most that of it during which jax traced and compiled, by the
 wall; of its processes."""
+
+
+def kept(asked: str) -> Path:
+    """Where the durations of the tests with these marks are."""
+    return BUILD / ("durations.csv" if asked == "not slow" else "durations-slow.csv")
+
+
+def rows(asked: str) -> list[dict[str, str]]:
+    try:
+        with kept(asked).open(newline="") as file:
+            return list(csv.DictReader(file))
+    except OSError:
+        return []
+
+
+def longest_first(items: list[pytest.Item], before: dict[str, float]) -> list[pytest.Item]:
+    """File by file: first those that took longest when they were run before (s), or have many tests."""
+    took = Counter(before)
+    for item in items:
+        took[item.nodeid.partition("::")[0]] += 0.01
+    return sorted(items, key=lambda item: -took[item.nodeid.partition("::")[0]])
 
 
 class Durations:
@@ -54,6 +76,14 @@ class Durations:
         report.user_properties = [("durations", (cpu, min(compiling, cpu), processes))]
         return report
 
+    @pytest.hookimpl(optionalhook=True)
+    def pytest_configure_node(self, node: Any) -> None:
+        """Tell a worker what files took: all have to run them in one order."""
+        took: Counter[str] = Counter()
+        for row in rows(node.config.getoption("markexpr")):
+            took[row["test"].partition("::")[0]] += float(row["cpu_s"]) + float(row["processes_s"])
+        node.workerinput["took"] = dict(took)
+
     def pytest_collection_finish(self) -> None:
         self.before = self.now()  # what is imported is not the first test's
 
@@ -81,12 +111,15 @@ class Durations:
     def pytest_sessionfinish(self, session: pytest.Session) -> None:
         if hasattr(session.config, "workerinput") or not self.tests:
             return
-        quick = session.config.getoption("markexpr") == "not slow"
+        asked = session.config.getoption("markexpr")
+        quick, ran = asked == "not slow", {test.partition("::")[0] for test in self.tests}
         if quick and self.slow and self.slow[0][0] > NEVER and session.exitstatus == 0:
             session.exitstatus = pytest.ExitCode.TESTS_FAILED
-        FILE.parent.mkdir(exist_ok=True)
-        dearest = sorted(self.tests.items(), key=lambda one: -one[1]["cpu_s"] - one[1]["processes_s"])
-        with FILE.open("w", newline="") as file:
-            table = csv.writer(file)
-            table.writerow((*COLUMNS, "test"))
-            table.writerows((*(f"{spent[c]:.3f}" for c in COLUMNS), test) for test, spent in dearest)
+        others = [row for row in rows(asked) if row["test"].partition("::")[0] not in ran]
+        spent = [{c: f"{cost[c]:.3f}" for c in COLUMNS} | {"test": test} for test, cost in self.tests.items()]
+        dearest = sorted(others + spent, key=lambda row: -float(row["cpu_s"]) - float(row["processes_s"]))
+        BUILD.mkdir(exist_ok=True)
+        with kept(asked).open("w", newline="") as file:
+            table = csv.DictWriter(file, (*COLUMNS, "test"))
+            table.writeheader()
+            table.writerows(dearest)

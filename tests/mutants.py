@@ -258,8 +258,8 @@ MISTAKES = (
     Mistake(
         "sector: the turn of the cut faces transposed",
         "fem/cyclic.py",
-        "l[pair, j], cut.rotation[i, j]",
-        "l[pair, j], cut.rotation[j, i]",
+        "> 1e-14, cut.rotation, 0.0)",
+        "> 1e-14, cut.rotation.T, 0.0)",
         "test_sector.py",
         "test_displacements_obey_the_phase_rule",
     ),

@@ -49,7 +49,7 @@ def test_every_card_comes_back_as_its_cell(tmp_path, cell_type):
 
 
 def test_constraints_of_the_chosen_set_are_supports(tmp_path):
-    """SPC1 and SPC by set, GRID's own; SPCADD; another set, a displacement and a local system are left out."""
+    """SPC1 and SPC by set; SPCADD; another set is left out, a displacement is zero in modes."""
     mesh = meshes.brick("hexahedron", (1, 1, 1), (0.02, 0.01, 0.03))
     cards = ["SPC1,7,123,1,THRU,3", "SPC,8,4,1,0.0,5,2,0.1", "SPC1,9,123456,8", "SPCADD,20,7,8"]
     lines = bulk(mesh).replace("CEND", "CEND\nSPC = 20").splitlines()
@@ -59,8 +59,7 @@ def test_constraints_of_the_chosen_set_are_supports(tmp_path):
     named = {
         name: (directions, read.node_id[read.point_sets[name]].tolist()) for name, directions in read.supports.items()
     }
-    assert named == {"SPC 7": ("xyz", [1, 2, 3]), "held x": ("x", [4])}
-    assert read.not_held == ("SPC 8 displaces node 5",)
+    assert named == {"SPC 7": ("xyz", [1, 2, 3]), "held x": ("x", [4]), "held y": ("y", [5])}
     (tmp_path / "a.bdf").write_text("\n".join(lines).replace("SPC = 20", "SUBCASE 1"))
     read = read_mesh(tmp_path / "a.bdf", "m")
     assert not read.supports and "several sets of SPC" in read.not_held[0]
@@ -78,7 +77,8 @@ def test_equations_hold_where_the_case_control_chooses_them(tmp_path):
     cards = ["MPC,5,9,1,1.0,10,1,-1.0"]
     assert constrained(tmp_path, cards, ["MPC = 5"]).links is not None
     both = constrained(tmp_path, [*cards, "MPC,6,11,1,1.0,12,1,-1.0"], ["SUBCASE 1", "MPC = 5", "SUBCASE 2", "MPC = 6"])
-    assert "subcases choose several sets of MPC (5, 6)" in both.lost[0]
+    assert "subcases choose several sets of MPC (5, 6); 5 is taken" in both.remarks[0]
+    assert both.node_id[both.links.items[0].nodes].tolist() == [9, 10]
     left = constrained(tmp_path, cards)
     assert left.links is None and "the only set of MPC, of which the case control chooses none" in left.lost[0]
     assert "MPC = 6 of the case control is not defined" in constrained(tmp_path, [], ["MPC = 6"]).lost[0]
@@ -99,10 +99,10 @@ def test_a_deck_in_small_letters_is_the_same(tmp_path):
 @pytest.mark.parametrize(
     "card",
     [
-        "RBE1,61,9,123456",
+        "RTRPLT,61,9,10,11,123456",
         "CTRIAX6,62,1,9,10",
         "CBAR,63,1,9,10,0.,0.,1.",
-        "BGSET,1,2,3",
+        "BCBODY,1,3D,DEFORM,3",
         "BCTABL1,1,2",
         "MFLUID,5,,,1.-9",
     ],
@@ -165,21 +165,27 @@ def test_a_range_goes_over_numbers_that_are_no_grid_points(tmp_path):
     )
     assert read.node_id[read.point_sets["SET 9"]].tolist() == [10, 30, 50, 70] and not read.not_held
     assert read.node_id[read.point_sets["SET 8"]].tolist() == [10, 80]
-    assert read.remarks == (
-        "the set 'SET 8' names node 11 that the file does not define: left out of it",
-    )
+    assert read.remarks[0] == "the set 'SET 8' names node 11 that the file does not define: left out of it"
 
 
 def test_what_bulk_data_holds_besides_is_named(tmp_path, capsys):
-    """Loads, unknown cards, a prestress subcase; a layered solid refuses the import, where steel
-    took its place."""
-    read = block(
-        tmp_path, "FORCE,1,10,0,1.0,1.0,0.0,0.0", "XYZZY,1", "EIGRL,1,,,8", control=["STATSUB = 1"]
-    )
-    assert "FORCE: loads" in read.remarks[0] and "XYZZY: " in read.remarks[1] and "STATSUB: " in read.lost[0]
-    (told,) = block(tmp_path, "MATT1,1,5").lost
-    assert "MATT1 1: a material over temperature" in told and "by a factor" in told
+    """Loads, unknown cards; a layered solid refuses the import, where steel took its place."""
+    read = block(tmp_path, "FORCE,1,10,0,1.0,1.0,0.0,0.0", "XYZZY,1", "EIGRL,1,,,8")
+    assert "FORCE: loads, which change no frequency" in read.remarks[0] and "XYZZY: " in read.remarks[1]
+    (told,) = block(tmp_path, "MATT9,1,5").lost
+    assert "MATT9 (1 card) is not read" in told
     block(tmp_path, "PCOMPS,1,,,SB", "MAT1,1,2.1+11,,.3,7850.")
     line = ["import", str(tmp_path / "a.bdf"), str(tmp_path / "out"), "--unit", "m"]
     refused_command(line, capsys, "PCOMPS 1")
     assert not (tmp_path / "out").exists()
+
+
+def test_a_solid_without_density_beside_others_weighs_nothing(tmp_path):
+    """As in Nastran; a deck without any density gets that of --density or steel's."""
+    mesh = meshes.brick("hexahedron", (1, 1, 2), (0.02, 0.01, 0.03))
+    text = bulk(mesh).replace("CHEXA          2       1", "CHEXA          2       5")
+    cards = ["PSOLID,1,1", "PSOLID,5,2", "MAT1,1,2.1+11,,.3,7800.", "MAT1,2,2.1+11,,.3,0."]
+    (tmp_path / "a.bdf").write_text(text.replace("ENDDATA", "\n".join([*cards, "ENDDATA"])))
+    read = read_mesh(tmp_path / "a.bdf", "m", "m-kg-s")
+    np.testing.assert_allclose([m.density for m in read.materials], [7800, 7.8e-6])
+    assert any("MAT1 2 has no density: its cells weigh nothing" in text for text in read.remarks)

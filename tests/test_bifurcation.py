@@ -45,6 +45,34 @@ def circles() -> Diagram:
     return diagram(normal_form(), np.zeros(2), DiagramPlan(-1.0, 1.0, nodes=8, doublings=0))
 
 
+def test_at_a_pitchfork_the_other_equilibria_are_followed() -> None:
+    """x' = p x - x^3: x = 0 and, from p = 0 on, +- sqrt(p)."""
+    fork = Dynamics(lambda x, p, _: jnp.stack([p * x[0] - x[0] ** 3]), ("x",), np.ones(1), 3.0)
+    plan = DiagramPlan(-1.0, 2.0, orbits=False, branches=1)
+    still, other = diagram(fork, np.zeros(1), plan).branches
+    assert len(still.of_kind("branch point")) == 1 and other.stable.all()
+    np.testing.assert_allclose(other.x[:, 0, 0] ** 2, other.parameter, atol=1e-8)
+    np.testing.assert_allclose(sorted(other.x[[0, -1], 0, 0]), [-np.sqrt(2), np.sqrt(2)])
+
+
+def test_from_a_centre_the_cycles_of_van_der_pol_are_found() -> None:
+    """x'' - mu (1 - x^2) x' + x = 0: at mu = 0 orbits of every size, of which that of amplitude 2 goes on as the limit
+    cycle; its period is 7.6298745 at mu = 2."""
+
+    def rate(x: Any, mu: Any, _: Any) -> Any:
+        return jnp.stack([x[1], mu * (1 - x[0] ** 2) * x[1] - x[0]])
+
+    plan = DiagramPlan(-0.5, 2.0, branches=1)
+    found = diagram(Dynamics(rate, ("x", "v"), np.ones(2), 2.5), np.zeros(2), plan)
+    _, *branches = found.branches  # the centre, and the cycles by themselves unless rounding joins them to it
+    assert not found.messages and np.abs(branches[0].parameter[branches[0].swing[:, 0] < 1.9]).max() < 1e-6
+    branch = max(branches, key=lambda b: b.parameter.max())
+    last = branch.parameter.argmax()
+    assert branch.parameter[last] == 2.0 and branch.stable[last]
+    assert branch.period[last] == pytest.approx(7.6298745, rel=1e-6)
+    assert branch.swing[last, 0] == pytest.approx(2.0199, abs=1e-4)
+
+
 def test_hopf_normal_form_is_found_with_its_circles() -> None:
     found = circles()
     (point,) = found.hopf

@@ -117,10 +117,26 @@ def is_code(name: str) -> bool:
     return True
 
 
+@cache
+def verbs() -> set[str]:
+    """Of the analyses that have one."""
+    return {verb_of(name).name for name in places()}
+
+
+@cache
+def drawn() -> set[str]:
+    """Numbers of the figures that docs/figures.py draws."""
+    bodies = [tree(ROOT / "docs" / f"{name}_study.py").body for name in ("figure", "rolling", "heat")]
+    tables = [n.value for body in bodies for n in body if isinstance(n, ast.AnnAssign) and n.target.id == "FIGURES"]
+    return {key.value for table in tables for key in table.keys}
+
+
 def is_command(text: str) -> bool:
     """A verb with its case, body or figure; a target of make; a study of the pictures."""
     program, verb, *rest = shlex.split(text)
     cases, bodies = {p.stem for p in CASES.glob("*.toml")}, {p.parent.name for p in BODIES.glob("*/body.toml")}
+    if program == "make" and verb.startswith("figure-"):
+        return not rest and verb.removeprefix("figure-") in drawn()
     if program == "make":
         return not rest and (verb in cases | bodies or verb.removesuffix("-modes") in bodies)
     if program == "python":
@@ -129,8 +145,7 @@ def is_command(text: str) -> bool:
     figures = {p.stem.removeprefix("fig-") for p in (CASES / "contact").glob("fig-*.toml")}
     known = figures if verb == "contact" else cases | bodies | {"CASE"}
     there = rest[0] in known or (ROOT / rest[0]).is_file()
-    verbs = {verb_of(name).name for name in places()}
-    return there and (verb in verbs or holds(tree(PACKAGE / "cli.py").body, verb) is not None)
+    return there and (verb in verbs() or holds(tree(PACKAGE / "cli.py").body, verb) is not None)
 
 
 def exists(name: str) -> bool:

@@ -28,6 +28,7 @@ from microslip.harmonic_balance import book, orbits, response, tables
 from microslip.harmonic_balance import problem as balance
 from microslip.harmonic_balance.forces import Forces
 from microslip.harmonic_balance.solver import solve
+from microslip.programs import program
 
 TABLE, KNOWN = orbits.orbits()
 MU, C_N0, C_R0, R_Z = 0.2, 840e6, 80e6, 7.5e-6
@@ -78,8 +79,8 @@ _held = jax.jit(lambda t: book.orbit_force(TABLE, jnp.ones(()), jnp.ones(()), t)
 _forces = jax.jit(TABLE.forces)
 _point_stiffness = jax.jit(lambda t: book.point_stiffness(TABLE, jnp.ones(()), jnp.ones(()), t))
 _at = jax.jit(lambda found, mean, amplitude: found.at(mean, amplitude))
-_swung = jax.jit(book.describing_function, static_argnums=3)
-_lifting = jax.jit(book.lifting)
+_swung = program(book.describing_function, static_argnums=3)
+_lifting = program(book.lifting)
 
 
 def along(eta: np.ndarray, zeta: np.ndarray) -> np.ndarray:

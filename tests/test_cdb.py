@@ -14,10 +14,11 @@ from refusals import refused_command
 from microslip.basis import check_basis, read_basis
 from microslip.cli import main
 from microslip.data import Mesh
-from microslip.elasticity import isotropic, orthotropic
+from microslip.elasticity import isotropic, orthotropic, turned
 from microslip.errors import UserError
 from microslip.fem.discretise import discretise
 from microslip.mesh import mesh_problems, read_mesh
+from microslip.mesh.systems import axes_by_angles
 from microslip.modal.compute import modal_basis
 from microslip.stages.job import open_job
 from microslip.stages.modal import modes_stage
@@ -54,7 +55,9 @@ def archive(mesh: Mesh, sets=(), material=("MPDATA,R5.0, 1,EX  ,1, 1, 210000.0",
     """CDWRITE's blocked form, in mm."""
     kind = 186 if any(len(c[0]) > 8 for c in mesh.cells.values()) else 185
     ids = mesh.node_id
-    lines = ["/PREP7", f"ET,1,{kind}", "ET,2,154", f"NBLOCK,6,SOLID,{ids.max():10d},{len(ids):10d}", "(3i9,6e21.13e3)"]
+    full = ["KEYOPT,1,2,1"] if kind == 186 else []
+    lines = ["/PREP7", f"ET,1,{kind}", *full, "ET,2,154"]
+    lines += [f"NBLOCK,6,SOLID,{ids.max():10d},{len(ids):10d}", "(3i9,6e21.13e3)"]
     for i, x in zip(ids, mesh.points * scale, strict=True):
         lines.append(f"{i:9d}{0:9d}{0:9d}" + "".join(f"{v:21.13E}" for v in x))
     lines += ["N,R5.3,LOC,       -1,", f"EBLOCK,19,SOLID,{mesh.n_cells:10d},{mesh.n_cells:10d}", "(19i10)"]
@@ -158,6 +161,25 @@ def test_materials_of_tables_and_minor_ratios(tmp_path):
     assert found.density == pytest.approx(600)
 
 
+@pytest.mark.parametrize("inverse", [False, True])
+def test_a_matrix_of_elasticity_is_the_material_that_it_was_made_from(tmp_path, inverse):
+    """TB,ANEL of a skewed orthotropic material, as stiffness and as compliance, turned back by ESYS."""
+    wood = orthotropic(np.array([12e3, 900, 500]), np.array([0.37, 0.47, 0.42]), np.array([700, 250, 650]))
+    axes = axes_by_angles(np.array([20.0, 35.0, -50.0]))
+    C = turned(wood, axes.T)
+    D = np.linalg.inv(C) if inverse else C
+    table = [*(D[j:, j] for j in range(6))]
+    words = [f"{v:.16g}" for v in np.concatenate(table)]
+    rows = [f"TBDATA,{i + 1},{','.join(words[i : i + 6])}" for i in range(0, 21, 6)]
+    lines = [f"TB,ANEL,1,1,21,{int(inverse)}", "TBTEMP,0", *rows, "MP,DENS,1,6e-10"]
+    text = archive(meshes.brick("hexahedron", (1, 1, 1)), material=lines)
+    found = read_mesh(written(tmp_path, text), "mm", "mm-t-s").materials[0]
+    np.testing.assert_allclose(found.elasticity, C * 1e6, rtol=1e-9, atol=1)
+    system = "LOCAL,11,0,0,0,0,20,35,-50\nEMODIF,1,ESYS,11\nFINISH"
+    back = read_mesh(written(tmp_path, text.replace("FINISH", system)), "mm", "mm-t-s").materials[0]
+    np.testing.assert_allclose(back.elasticity, turned(C, axes) * 1e6, rtol=1e-9, atol=1)
+
+
 @pytest.mark.parametrize(
     ("change", "text"),
     [
@@ -165,7 +187,7 @@ def test_materials_of_tables_and_minor_ratios(tmp_path):
         (("ET,1,185", "ET,3,185"), "element 1 is of type 1, which no ET command defines"),
         ((f"{12:10d}\n(3i9", f"{13:10d}\n(3i9"), "NBLOCK holds 12 nodes of 13"),
         ((f"{-1:10d}\nCMBLOCK", "CMBLOCK"), "EBLOCK"),
-        (("EBLOCK,19,SOLID", "EBLOCK,19,COMPACT"), "COMPACT form"),
+        (("EBLOCK,19,SOLID", "EBLOCK,19,COMPACT"), "element 1 has 9 different nodes instead of 8"),
         ((f"{-1:10d}\nCMBLOCK", "      \nCMBLOCK"), "EBLOCK"),
         (("         2,         2\n(19i10)", "         3,         3\n(19i10)"), "announces 3 elements and holds 2"),
         ((" 210000.0", ""), "no elastic constants"),
@@ -224,9 +246,9 @@ def test_displacements_that_are_zero_are_supports(tmp_path):
     other = next(int(i) for i in mesh.node_id if int(i) not in low)
     held += [f"D,{other},UY, 0.0", f"D,{other},UX, 0.25", f"D,{other},TEMP, 3.0"]
     read = read_mesh(written(tmp_path, archive(mesh, ("z0",)) + "\n".join(held) + "\n"), "mm")
-    assert dict(read.supports) == {"Z0": "xyz", "held y": "y"}
-    assert read.node_id[read.point_sets["held y"]].tolist() == [other]
-    assert read.not_held == (f"D,{other},UX prescribes a displacement",)
+    assert dict(read.supports) == {"Z0": "xyz", "held xy": "xy"}
+    assert read.node_id[read.point_sets["held xy"]].tolist() == [other]
+    assert "prescribes displacements: they are zero in modes" in read.remarks[0]
 
 
 BAR = meshes.brick("hexahedron", (1, 1, 2), (0.02, 0.01, 0.03))
@@ -288,8 +310,8 @@ def test_elements_with_mass_that_are_not_read_are_told(tmp_path):
     lines.insert(at, "".join(f"{w:10d}" for w in [1, 2, 1, 1, 0, 0, 0, 0, 4, 0, 99, 1, 2, 3, 4]))
     written(tmp_path, "\n".join(lines).replace("FINISH", "CEINTF,0.25\nFINISH"))
     read = read_mesh(tmp_path / "part.cdb", "mm")
-    assert [text.split(" is not read")[0].partition(", ")[2] for text in read.lost] == [
-        f"line {len(lines)}: CEINTF",
+    assert [text.split(" and is not read")[0].partition(", ")[2] for text in read.lost] == [
+        f"line {len(lines)}: CEINTF constrains nodes",
     ]
 
 
@@ -297,9 +319,9 @@ def test_the_block_of_types_stands_for_et(tmp_path):
     """ETBLOCK: number, element and 18 KEYOPTs; the integration that is not Ansys's is told."""
     block = f"ETBLOCK,1,1\n(2i9,19a9)\n{1:9d}{186:9d}" + f"{0:9d}" * 18 + f"\n{-1:9d}"
     whole = archive(meshes.brick("hexahedron20", (1, 1, 1)), ("z0",))
-    text = whole.replace("ET,1,186", block)
+    text = whole.replace("ET,1,186\nKEYOPT,1,2,1", block)
     read = read_mesh(written(tmp_path, text), "mm")
-    assert read.n_cells == 1 and "1 elements SOLID186" in read.remarks[0]
+    assert read.n_cells == 1 and "1 bricks have no neighbours" in read.remarks[0]
     options = f"{1:9d}{186:9d}{0:9d}{1:9d}"
     full = text.replace(f"{1:9d}{186:9d}{0:9d}{0:9d}", options)
     assert full != text and not read_mesh(written(tmp_path, full), "mm").remarks
@@ -314,9 +336,9 @@ cmsel,s,Z0
 d,all,all
 nsle,s
 d,all,ux,0
-d,12,ux,%_loadx%
 D,5,UZ,0,,900,2
 acel,0,0,9.81
+f,5,fx,%_loadx%
 pstres,on
 FINISH"""
 
@@ -334,7 +356,7 @@ def test_what_workbench_writes_is_read_or_named(tmp_path, monkeypatch, capsys):
     assert main(["import", "ds.dat", "part"]) == 0
     said = capsys.readouterr().out
     assert 'length_unit = "m"' in (tmp_path / "part" / "body.toml").read_text()
-    for words in ("Z0 in xyz, held z in z", "7850 kg/m3", "D,12,ux", "D,all,ux", "ACEL: ", "PSTRES: "):
+    for words in ("Z0 in xyz, held x in x, held xz in xz", "7850 kg/m3", "%_loadx% hangs on", "1 acceleration field"):
         assert words in said, words
     assert main(["import", "ds.dat", "other", "--unit", "mm"]) == 0
     assert "tells its lengths in m, here they are taken in mm" in capsys.readouterr().out
@@ -356,3 +378,57 @@ def test_a_component_with_nodes_that_are_not_there_is_a_remark(tmp_path):
     read = read_mesh(written(tmp_path, text), "mm")
     assert read.node_id[read.point_sets["LEFT"]].tolist() == list(range(2, BAR.n_points + 1))
     assert "the set 'LEFT' names" in read.remarks[0]
+
+
+DAMAGED = {
+    "ET,1,185": ("ET,1,99999999999999", "type 99999999999999"),
+    "NBLOCK,6,SOLID,        12,        12": ("NBLOCK,6,SOLID,        12,        14", "12 nodes of 14"),
+    "(3i9,6e21.13e3)": ("(3i9,6e0.13e3)", "format"),
+    "(19i10)": ("", "format"),
+    "EBLOCK,19,SOLID,         2,         2": ("EBLOCK,19,SOLID,         2,         5", "announces 5"),
+    "CMBLOCK,Z0,NODE,       4  ! nodes": ("CMBLOCK,Z0,NODE,       9  ! nodes", "Z0"),
+    "CMBLOCK,Z0,NODE,       4  !": ("CMBLOCK,Z0,NODE,       x  !", "whole number"),
+    "(8i10)": ("(8f10)", "format"),
+    "MPTEMP,R5.0, 1, 1,  0.0": ("MPTEMP,R5.0, 1, 1,  warm", "number belongs"),
+    "MPDATA,R5.0, 1,EX  ,1, 1, 210000.0": ("MPDATA,R5.0, 1,EX  ,1, 1, stiff", "number belongs"),
+    "MPDATA,R5.0, 1,NUXY,1, 1, 0.3": ("MPDATA,R5.0, 1,NUXY,1, 1, 0.7", "nu = 0.7"),
+    "FINISH": ("R,1,heavy\nFINISH", "number belongs"),
+    "/PREP7": ("/PREP7\nRLBLOCK,1,1,1\n(2i8,6g16.9)\n(7g16.9)\n       1       9  1.0", "truncated|number"),
+    "ET,2,154": ("ETBLOCK,1,1\n(2i9,19a9)\n        2      154", "number|no end"),
+    "N,R5.3,LOC,       -1,": ("N,R5.3,LOC,       99, 1, here", "number belongs"),
+}
+"""What stands in the archive -> what is written instead, and what is said of it."""
+MORE = {
+    "CE,1,0,1,UX,1,77,UX,-1": "node 77",
+    "CE,1,0.5,1,UX,1,2,UX,-1": "constant",
+    "CP,1,UX,1": "couples",
+    "CERIG,1,NONE": "couples no nodes",
+    "RBE3,1,ALL,NONE": "RBE3",
+    "CS,11,0,1,2,3000": "fewer than three nodes",
+    "CSYS,77\nNROTAT,1": "coordinate system 77",
+    "DBLOCK,3\n(i9)\n        1 UX 0.0": "DBLOCK",
+    "NSEL,S,LOC,X,left": "number belongs",
+    "MSOPT,NEW,B": "multistage",
+    "EN,77,1,2,3,4,5,6,7,900": "node 900",
+    "VMESH,ALL": "VMESH makes nodes",
+    "*DO,I,1,3\nD,I,UX\n*ENDDO": "*DO repeats D",
+    "*DO,I,1,3\nA=I": "no *ENDDO",
+    "F,1,FX,nan": "no finite number",
+    "ET,9,21\nR,1,5\nTYPE,9\nE": "MASS21 names no node",
+    "TB,ELASTIC,1\nTBDATA,1,soft": "number belongs",
+}
+
+
+@pytest.mark.parametrize("place", [*DAMAGED, *MORE])
+def test_damage_is_told_with_its_line(tmp_path, capsys, monkeypatch, place):
+    monkeypatch.chdir(tmp_path)
+    whole = archive(meshes.brick("hexahedron", (1, 1, 2), (0.01, 0.01, 0.02)), ("z0",))
+    new, words = DAMAGED.get(place, (f"{place}\nFINISH", MORE.get(place, "")))
+    old = place if place in DAMAGED else "FINISH"
+    assert old in whole
+    written(tmp_path, whole.replace(old, new, 1))
+    said = refused_command(["import", "part.cdb", "there"], capsys, "part.cdb")
+    assert any(word in said for word in words.split("|")), said
+    assert "line " in said or "nu = 0.7" in said, said
+    assert len(said) < 400 and "\n" not in said
+    assert not (tmp_path / "there").exists()

@@ -88,6 +88,7 @@ def duffing_by_hand(damping: float, push: float, periods: int = 40) -> np.ndarra
     return growth / (2 * np.pi * periods)
 
 
+@pytest.mark.slow
 def test_a_chaotic_duffing_oscillator_has_the_exponent_of_its_variational_equation() -> None:
     """And is called chaotic; its interval holds the value, and is not so wide that everything lies in it."""
     duffing = ms.structure(1.0, 1.0, 0.25, force={0: 0.4}, elements=[ms.polynomial({1: -2.0, 3: 1.0})])

@@ -14,13 +14,15 @@ from microslip.contact.law import march, value
 from microslip.contact.normal import Preload, Rough
 from microslip.contact.periodic import RECALL, periodic, unknown
 from microslip.contact.point import PointContact
+from microslip.contact.rate import RateContact
 from microslip.contact.wear import worn_law
+from microslip.programs import program
 from microslip.series import fourier
 
 ROUGH = EXAMPLES["rough point"]
-NEAR = jax.jit(force_near, static_argnames=("samples", "count", "chunk"))
-MARCHED = jax.jit(march)
-PERIODIC = jax.jit(periodic, static_argnums=3)
+NEAR = program(force_near, static_argnames=("samples", "count", "chunk"))
+MARCHED = program(march)
+PERIODIC = periodic
 
 
 def some(n, harmonics=3, seed=0, example=ROUGH):
@@ -269,3 +271,18 @@ def test_sliders_are_remembered_one_by_one() -> None:
     memory = np.asarray(example.law.memory(force[-1], state))
     assert memory.shape == (example.law.count(), 2, 1)
     np.testing.assert_allclose(memory.sum(axis=0)[:, 0], force[-1, 0, 1:], rtol=1e-12)
+
+
+def test_friction_by_the_velocity_has_its_closed_form_whatever_the_samples() -> None:
+    """F = mu F_N 2/pi arctan(k v) under u = A sin: the first harmonic is in phase with the speed,
+    mu F_N (4/pi) (sqrt(1 + z^2) - 1) / z with z = k A omega; the harmonics fall as r^n, r < 0.64."""
+    law = RateContact(Preload(value(10.0)), Coulomb(value(0.3)), value(2.0), value(0.0))
+    A, period, z = 1.0, 2 * np.pi, 2.0
+    u = np.zeros((1, 3, 7))
+    u[0, 1, 2] = A
+    errors = []
+    for samples in (16, 32, 64):
+        F = np.asarray(force_alone(law, u, period, samples))[0, 1]
+        errors.append(abs(F[1] / (3.0 * 4 / np.pi * (np.sqrt(1 + z**2) - 1) / z) - 1))
+        assert abs(F[2]) < 1e-12  # nothing in phase with the displacement
+    assert errors[1] < 1e-2 * errors[0] and errors[2] < 1e-10

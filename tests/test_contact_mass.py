@@ -17,6 +17,7 @@ from microslip.contact.law import march
 from microslip.contact.normal import Penalty, Preload, Rough
 from microslip.contact.point import PointContact
 from microslip.contact.regularised import MassContact, integrate
+from microslip.programs import program
 
 
 def value(number):
@@ -25,7 +26,7 @@ def value(number):
 
 ROUGH = Rough(value(1), value(1), Polynomial())
 COULOMB = Coulomb(value(1))
-MARCH = jax.jit(march)
+MARCH = program(march)
 TIMES = np.linspace(0, 4 * np.pi, 401)
 
 

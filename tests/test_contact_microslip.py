@@ -21,6 +21,7 @@ from microslip.contact.normal import Penalty, Preload
 from microslip.contact.partial_slip import PartialSlip
 from microslip.contact.sliders import Iwan, Strips, jenkins, mindlin, rough_strips, segalman, uniform
 from microslip.contact.solids import Solid
+from microslip.programs import program
 
 MU, K_N, K_T, R_Z = 0.3, 2.4e8, 0.9e8, 12e-6
 SPHERE = Hertz(Solid(2.1e11, 0.3), Solid(2.1e11, 0.3), 20.0, 20.0)
@@ -31,7 +32,13 @@ FEW = pytest.mark.parametrize(
     ids=lambda h: type(h).__name__,
 )
 LOCAL = jax.jit(lambda law, approach: law.local(approach))
-MARCH = jax.jit(lambda law, u: march(law, u, 1e-4, law.init(u.shape[1]))[0])
+MARCHED = program(march)
+
+
+def MARCH(law, u):
+    return MARCHED(law, u, 1e-4, law.init(u.shape[1]))[0]
+
+
 
 
 def along(tangential, approach=0.0):

@@ -24,7 +24,7 @@ from microslip.contact.point import PointContact, PointState, dragged
 MU, N0, K = 0.4, 100.0, 2e7
 LIMIT = MU * N0
 TRIES = hypothesis_settings(max_examples=15)
-CYCLES = jax.jit(periodic, static_argnums=3)
+CYCLES = periodic
 DRAGGED = jax.jit(dragged)
 TURNED = jax.jit(lambda given, moved: jax.jvp(dragged, given, moved)[1])
 COEFFICIENT = jax.jit(lambda friction, speed, pressed: friction.coefficient(speed, pressed))

@@ -220,7 +220,6 @@ def test_over_the_load(case: Path) -> None:
     np.testing.assert_allclose(found["amplitude_m"][-1], abs(operating(problem(case), last).outputs[0, 1]), rtol=1e-6)
 
 
-@pytest.mark.drawn
 def test_over_the_normal_force(case: Path) -> None:
     """In newtons, from the larger to the smaller: at both ends the motion of a case pressed so."""
     case.write_text(CASE.replace("[10.0]", "[15.0, 9.0]") + "[curve]\nfrequency = 100.0\nnormal_force = [15.0, 9.0]\n")

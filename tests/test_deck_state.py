@@ -151,8 +151,94 @@ def test_a_damaged_load_is_refused_with_its_line(capsys, load, line):
     [
         (["*DLOAD", "EALL, HP1, 1."], "is not read"),
         (["*DLOAD", "1, CENTRIF, 4.e6, 0., 0., 0., 0., 0., 1."], "[rotation] turns the whole body"),
-        (["*DLOAD", "EALL, P6, 1.", "EALL, P4, 1."], "are not on the surface of the body"),
     ],
 )
 def test_a_load_that_is_not_taken_is_told(capsys, load, words):
     assert words in imported(capsys, deck(BRICK, *static(*load)))
+
+
+SPUN = [
+    "*NODE", "200, 90., 20., 0.", "*ELEMENT, TYPE=SPRINGA, ELSET=SP", "900, 200, 53", "*SPRING, ELSET=SP", "", "20000.",
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("law", "wanted"),
+    [
+        ("", [1865.284, 3965.591, 10324.74, 12334.0]),
+        pytest.param(LARGE, [1867.495, 3964.101, 10327.44, 12334.35], marks=pytest.mark.slow),
+    ],
+)
+def test_a_spring_along_a_line_turns_with_it(capsys, law, wanted):
+    """F / l across the line, 2 % of the first frequency (ccx with *CONTROLS, FIELD 1e-10 where NLGEOM)."""
+    steps = static("*CLOAD", "53, 1, -6000.", law=law)
+    imported(capsys, deck(BRICK, "*BOUNDARY", "200, 1, 3", *steps, before=SPUN))
+    np.testing.assert_allclose(hertz(), wanted, rtol=1e-6)
+
+
+def within_modes(*lines: str) -> list[str]:
+    return [*MODES[:-1], *lines, MODES[-1]]
+
+
+ALONG = ["*BOUNDARY", "x1, 1, 1, 0.05", *PULLED[:2], *PRESSED]
+
+
+@pytest.mark.parametrize(
+    ("law", "before", "loads", "modes", "wanted"),
+    [
+        ("", ["*BOUNDARY", "x0, 1, 3"], PRESSED, ["*BOUNDARY", "x1, 3, 3"], [2533.216, 7283.712, 14182.47, 20783.55]),
+        (
+            "", [], ["*BOUNDARY", "x0, 1, 3", *PULLED[:2]], ["*BOUNDARY, OP=NEW", "x1, 1, 3"],
+            [1684.672, 2558.297, 9979.722, 12179.68],
+        ),
+        ("", [], ALONG, ["*BOUNDARY, OP=NEW", "x0, 1, 3"], [1848.190, 2665.835, 10190.36, 12147.02]),
+        pytest.param(
+            LARGE, [], ALONG, ["*BOUNDARY, OP=NEW", "x0, 1, 3"], [1943.225, 2734.283, 10302.70, 12141.28],
+            marks=pytest.mark.slow,
+        ),
+    ],
+)  # fmt: skip
+def test_the_static_step_has_supports_of_its_own(capsys, law, before, loads, modes, wanted):
+    said = imported(
+        capsys, deck(BRICK, *before, *static(*loads, law=law), modes=within_modes(*modes))
+    )
+    assert "held there by" in said
+    np.testing.assert_allclose(hertz(), wanted, rtol=1e-6)
+
+
+RIGID = [
+    "*NODE",
+    "200, 90., 10., 5.",
+    "201, 100., 0., 0.",
+    "*RIGID BODY, NSET=x1, REF NODE=200, ROT NODE=201",
+]
+
+
+def pulled(name: str) -> list[str]:
+    return ["*DLOAD", f"{name}, GRAV, 5.e7, 1., 0., 0."]
+
+
+HEAVY = [
+    "*ELEMENT, TYPE=MASS, ELSET=MM",
+    "910, 53",
+    "*MASS, ELSET=MM",
+    "2.e-5",
+    "*ELSET, ELSET=BOTH",
+    "EALL, MM",
+]
+
+
+@pytest.mark.parametrize(
+    ("before", "load", "wanted"),
+    [
+        (RIGID, ["*CLOAD", "201, 1, 2000."], [1644.175, 2532.413, 9933.861, 12160.75]),
+        (HEAVY, pulled("EALL"), [912.0861, 1404.333, 7238.898]),
+        (HEAVY, pulled("BOTH"), [921.6428, 1410.591, 7254.683]),
+        (HEAVY, pulled(""), [921.6428, 1410.591, 7254.683]),
+        (HEAVY, pulled("MM"), [916.1278, 1407.019, 7248.831]),
+    ],
+)  # fmt: skip
+def test_moments_of_rigid_bodies_and_the_weight_of_masses(capsys, before, load, wanted):
+    """The weight of a mass acts where its element is named."""
+    imported(capsys, deck(BRICK, *static(*load), before=before))
+    np.testing.assert_allclose(hertz()[: len(wanted)], wanted, rtol=1e-6)

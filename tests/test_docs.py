@@ -411,14 +411,18 @@ def test_build_file_of_the_geometry_page(tmp_path: Path) -> None:
 
 def test_platforms_page() -> None:
     """Its system libraries are those the set-up installs and the pictures ask for; its solvers are all there are."""
+    from typing import get_args
+
     from microslip import pictures
     from microslip.linalg import eigen
+    from microslip.settings.body import Modes
 
     text = (DOCS / "platforms.md").read_text(encoding="utf-8")
     line = re.search(r"apt-get install -y (lib.*)", text)
     assert line and line[1].split() == list(pictures.PACKAGES)
     assert line[1] in (ROOT / "pipeline" / "setup.sh").read_text(encoding="utf-8")
-    assert set(eigen.BACKENDS) == {"pardiso", "superlu"}
+    solvers = set(get_args(Modes.model_fields["solver"].annotation))
+    assert solvers == {*eigen.BACKENDS, "petsc", "auto"} and all(f'"{name}"' in text for name in solvers)
 
 
 @pytest.mark.slow

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import jax.numpy as jnp
 import numpy as np
 import pytest
 from test_assembly import sector
@@ -11,10 +12,12 @@ from test_harmonic_balance_time import cantilever, duffing, group, held
 
 import microslip as ms
 from microslip.contact.friction import Coulomb
-from microslip.contact.law import value
+from microslip.contact.law import Array, Law, Scalar, State, Step, value
+from microslip.contact.law import settings as contact_law
 from microslip.contact.normal import Penalty
 from microslip.contact.point import PointContact
 from microslip.continuation import Settings
+from microslip.errors import UserError
 from microslip.harmonic_balance import problem as balance
 from microslip.harmonic_balance import response
 from microslip.harmonic_balance.families import OverNormal, followed, of_frequency, of_load, of_normal_force
@@ -140,3 +143,94 @@ def test_amplitudes_far_above_what_a_slider_yields_by_take_few_points() -> None:
     curve = ms.follow(slides, 0.9, 1.1, harmonics=1, samples=64, unit="rad/s")
     assert curve.ended.startswith("bound") and len(curve) < 300
     assert curve.amplitude.max() == pytest.approx((100.0 - 4 * 0.5 / np.pi) / 0.02, rel=2e-4)
+
+
+def test_peaks_of_a_curve_are_those_of_many_times_as_many_points() -> None:
+    """To rounding: both are located, not read off the points."""
+    system = ms.structure(1.0, 1.0, 0.05, force={0: 0.4}, elements=[ms.polynomial({3: 0.05})])
+    curve = ms.follow(system, 0.3, 2.5, harmonics=3, unit="rad/s")
+    fine = ms.follow(
+        system, 0.9, 1.6, harmonics=3, unit="rad/s", settings={"step_max": 0.06, "points": 5000}
+    )
+    assert len(curve.peaks) == len(fine.peaks) == 1 and len(fine) > 3 * len(curve)
+    assert curve.peaks[0] == pytest.approx(fine.peaks[0], rel=1e-9)
+    assert curve.amplitude.max() == pytest.approx(fine.amplitude.max(), rel=1e-10)
+    assert curve.amplitude[curve.parameter == curve.peaks[0]] == curve.amplitude.max()
+
+
+def test_between_its_folds_a_curve_is_unstable_and_dashed() -> None:
+    """Of Duffing's oscillator: nowhere else, and multipliers are 1 at the folds."""
+    system = ms.structure(1.0, 1.0, 0.05, force={0: 0.4}, elements=[ms.polynomial({3: 0.05})])
+    curve = ms.follow(system, 0.9, 1.6, harmonics=5, unit="rad/s", stability=True)
+    turns = np.flatnonzero(curve.arrays["fold"])
+    np.testing.assert_allclose(curve.arrays["growth"][turns], 1.0, atol=1e-3)
+    inside = np.arange(turns[0] + 1, turns[1])
+    assert not curve.stable[inside].any() and np.delete(curve.stable, inside).all()
+    assert list(curve.bifurcations) == ["fold"]
+    solid, dashed = (line.get_xydata() for line in curve.plot().lines[:2])
+    assert np.isnan(solid[:, 1]).any()
+    assert dashed[np.isfinite(dashed[:, 1]), 0].min() >= curve.folds.min() - 1e-3
+    with pytest.raises(UserError, match="stability"):
+        _ = ms.follow(system, 0.9, 1.0, harmonics=3, unit="rad/s").stable
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("element", "force", "damping", "span", "kind"),
+    [
+        (ms.polynomial({3: 1.0}), 10.0, 0.1, (1.3, 2.0), "branch point"),
+        (ms.stop(3.0, 0.0), 1.0, 0.02, (2.1, 2.4), "period doubling"),
+    ],
+)
+def test_where_a_curve_loses_its_stability_a_motion_in_time_leaves_it(
+    element: ms.Element, force: float, damping: float, span: tuple[float, float], kind: str
+) -> None:
+    """A symmetric spring's motion gets a mean, a bilinear spring's the double period; on the other side they are as
+    harmonic balance has them."""
+    system = ms.structure(1.0, 1.0, damping, force={0: force}, elements=[element])
+    curve = ms.follow(system, *span, harmonics=9, unit="rad/s", stability=True)
+    (at,) = curve.bifurcations.pop(kind)
+    start, left = {"displacement": {0: 0.5}}, []
+    for omega in (at - 0.01, at + 0.01):
+        seen = ms.integrate(system, omega, unit="rad/s", settle=800, keep=8, start=start)
+        left.append(seen.repeats == 2 or (kind == "branch point" and abs(seen.y.mean()) > 1e-3))
+    stable = [bool(curve.stable[np.abs(curve.parameter - at - d).argmin()]) for d in (-0.05, 0.05)]
+    assert sorted(left) == [False, True] and left == [not one for one in stable]
+
+
+@contact_law
+class Rayleigh(Law):
+    """Along t1 a force c (v^3 - v): small motions are fed."""
+
+    c: Scalar
+
+    def init(self, n: int) -> tuple[()]:
+        return ()
+
+    def step(self, u: Array, v: Array, dt: Scalar, state: State) -> tuple[Array, State]:
+        return jnp.zeros_like(u).at[:, 1].set(self.c * (v[:, 1] ** 3 - v[:, 1])), state
+
+    def slip(self, state: State) -> Array:
+        return jnp.zeros((1, 2))
+
+    def stored(self, u: Array, state: State) -> Array:
+        return jnp.zeros(len(u))
+
+    def lost(self, step: Step) -> Array:
+        v = step.moved[:, 1] / step.dt
+        return self.c * (v**4 - v**2) * step.dt
+
+
+def test_a_load_that_quenches_a_self_excited_vibration_does_so_at_a_pair_on_the_unit_circle() -> None:
+    """c (v^3 - v) with a speed of amplitude V on top: what disturbs it is fed by c (1 - 3/2 V^2), to the first order
+    of c, so that V^2 = 2/3 where a second frequency dies out."""
+    fed = ms.structure(
+        1.0, 1.0, force={0: 3.0}, elements=[ms.Element(Rayleigh(value(0.01)), at=0, length=0.1)]
+    )
+    curve = ms.follow(
+        fed, 0.2, 1.0, over="load", frequency=2.0, unit="rad/s", harmonics=3, stability=True
+    )
+    (load,) = curve.bifurcations["Neimark-Sacker"]
+    V = 2.0 * np.interp(load, curve.parameter, curve.amplitude)
+    assert V**2 == pytest.approx(2 / 3, rel=2e-3)
+    assert not curve.stable[0] and curve.stable[-1]

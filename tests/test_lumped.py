@@ -208,17 +208,17 @@ def test_damaged_lumped_elements_are_refused_with_their_line(capsys, keywords, w
     ("cards", "words"),
     [
         ([f"CELAS1,603,8,{D},3"], ("PELAS 8",)),
-        ([f"CELAS2,603,1.,{D},9"], None),
+        ([f"CELAS2,603,1.,{D},9"], ("names no component",)),
         ([f"CBUSH,603,8,{D},{C}"], ("PBUSH 8",)),
         ([f"CBUSH,603,8,{D},{C}", "PBUSH,8,K,1.,2."], ("orientation",)),
         ([f"CONM2,603,{C},5,1."], None),
         ([f"CONM2,603,{C},5,1.,1."], ("5",)),
         ([f"CONM2,603,{C},,-1."], ("below 0",)),
-        ([f"RBAR,603,{C},{D},123,456"], ("both ends",)),
+        ([f"RBAR,603,{C},{D},123,45"], ("5 independent components",)),
     ],
 )
 def test_damaged_cards_are_refused_with_their_line(capsys, cards, words):
-    """A direction that no point has is told as not read; a system beside a mass without offset does not count."""
+    """A system beside a mass without offset does not count."""
     Path("a.bdf").write_text(nastran(*cards))
     if words is None:
         assert main(["import", "a.bdf", "body"]) == 0
@@ -275,3 +275,20 @@ def test_a_part_of_a_deck_keeps_what_is_lumped_on_it():
     Path("a.inp").write_text("\n".join([*lines, "*ELEMENT, TYPE=SPRINGA, ELSET=ES", f"602, 1, {last}"]) + "\n")
     with pytest.raises(UserError, match="a spring or dashpot of the file ties these instances"):
         of_instances(with_parts(read_mesh("a.inp", "mm")), list(whole.instances)[:1])
+
+
+def test_a_mass_on_one_of_two_parts_in_contact(capsys):
+    """Its point is of no instance; the parts stay two bodies, and the mass is on one."""
+    mesh = meshes.brick("hexahedron", (1, 1, 1), (0.01, 0.01, 0.01))
+    plain = [line for line in decks.mesh_lines(mesh, sets=("x0",)) if line]
+    faces = ["*SURFACE, NAME=F", "EALL, S2", "*SURFACE, NAME=B", "EALL, S1"]
+    part = ["*PART, NAME=P", *plain, *faces, decks.section(material="ST")]
+    place = ["*ASSEMBLY, NAME=A", "*INSTANCE, NAME=P-1, PART=P", "*END INSTANCE", "*INSTANCE, NAME=P-2, PART=P"]
+    mass = ["*NODE", "1, 5., 5., 30.", "*NSET, NSET=RP", "1", "*ELEMENT, TYPE=MASS, ELSET=M"]
+    mass += ["1, 1", "*MASS, ELSET=M", "2e-3", "*COUPLING, CONSTRAINT NAME=C, REF NODE=RP, SURFACE=P-1.F", "*KINEMATIC"]
+    pair = ["*SURFACE INTERACTION, NAME=I", "*FRICTION", "0.2", "*CONTACT PAIR, INTERACTION=I", "P-2.B, P-1.F"]
+    text = [*part, "*END PART", *place, "0., 0., 10.", "*END INSTANCE", *mass, "*END ASSEMBLY", *STEEL, *pair]
+    Path("a.inp").write_text("\n".join(text) + "\n")
+    assert main(["import", "a.inp", "two"]) == 0
+    assert [p.name for p in sorted(Path("two").iterdir())] == ["P-1", "P-2", "case.toml"]
+    assert "point masses of the file: 2 kg" in capsys.readouterr().out

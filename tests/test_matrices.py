@@ -246,6 +246,7 @@ WAYS = {"mat": by_mat, "h5": by_hdf5, "mat73": by_matlab73, "op4": by_op4, "dmig
 DIGITS = {"dmig": 1e-8}  # cards print nine digits
 
 
+@pytest.mark.usefixtures("untried")
 @pytest.mark.parametrize("way", WAYS)
 def test_every_format_brings_the_numbers_that_were_written(tmp_path, way):
     stiff, mass_ = WAYS[way](tmp_path)
@@ -260,6 +261,7 @@ def test_every_format_brings_the_numbers_that_were_written(tmp_path, way):
     np.testing.assert_allclose(body.mesh.points, beam().points, rtol=1e-15)
 
 
+@pytest.mark.usefixtures("untried")
 @pytest.mark.parametrize("kind", ["grid", "h5", "mat"])
 def test_nodes_come_from_grid_cards_and_tables(tmp_path, kind):
     from microslip.exchange.matrices.nodes import read_nodes
@@ -327,6 +329,7 @@ def superelement(folder: Path, modes=8) -> None:
     write_nodes(folder)
 
 
+@pytest.mark.usefixtures("untried")
 def test_superelement_comes_in_with_its_interface(tmp_path):
     """Held at one end it has the frequencies of the whole body, from above (Rayleigh) and close."""
     superelement(tmp_path)
@@ -342,6 +345,7 @@ def test_superelement_comes_in_with_its_interface(tmp_path):
     assert all(c.passed for c in check_basis(basis))
 
 
+@pytest.mark.usefixtures("untried")
 def test_superelement_whose_interface_does_not_match_is_refused(tmp_path, capsys):
     superelement(tmp_path)
     top = 'dofs = "rows.txt"\nsuperelement = true\n'
@@ -370,6 +374,7 @@ def chain(folder: Path, more: str = "") -> None:
     )
 
 
+@pytest.mark.usefixtures("untried")
 def test_three_masses_with_damper_and_spin_keep_their_own_complex_eigenvalues(tmp_path):
     chain(tmp_path)
     basis, _ = made(tmp_path)
@@ -391,6 +396,7 @@ def test_three_masses_with_damper_and_spin_keep_their_own_complex_eigenvalues(tm
     assert basis.damping_source == "matrix" and all(c.passed for c in check_basis(basis))
 
 
+@pytest.mark.usefixtures("untried")
 def test_a_node_with_rotations_is_an_interface_of_its_own(tmp_path):
     """A rigid block on a six-way spring: rows of the single node are its own displacements and rotations, turned."""
     K, M = np.diag([4e4, 9e4, 1.6e5, 1.0, 4.0, 9.0]), np.diag([1.0, 1, 1, 1e-4, 1e-4, 1e-4])
@@ -528,6 +534,7 @@ def beam_with_rotations(folder: Path, support: str) -> None:
     )
 
 
+@pytest.mark.usefixtures("untried")
 def test_a_node_held_without_its_rotations_is_told_so_about_all_three_axes(tmp_path, capsys):
     """Nodes on a line do not move when it turns about itself: that rotation must be named all the same."""
     beam_with_rotations(tmp_path, "")
@@ -535,6 +542,7 @@ def test_a_node_held_without_its_rotations_is_told_so_about_all_three_axes(tmp_p
     refused_command(["modes", str(tmp_path)], capsys, *axes, "rotations = true")
 
 
+@pytest.mark.usefixtures("untried")
 def test_a_mode_of_rotations_alone_is_not_drawn_from_rounding(tmp_path):
     from microslip.pictures.points import moves
 
@@ -582,6 +590,7 @@ def test_matrices_that_cannot_be_are_refused_in_a_sentence(tmp_path, capsys, spo
     refused_command(["modes", str(tmp_path)], capsys, text)
 
 
+@pytest.mark.usefixtures("untried")
 def test_supports_in_the_matrices_must_be_said(tmp_path, capsys):
     K, M = operators()
     free = np.setdiff1d(np.arange(K.shape[0]), (3 * beam().face_points("z0")[:, None] + np.arange(3)).ravel())

@@ -13,6 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from refusals import refused, refused_command
 from test_fuzz import user_errors_only
+from test_readers import tetrahedra, unv
 
 from microslip.basis import check_basis, read_basis, write_basis
 from microslip.cli import main
@@ -230,3 +231,72 @@ def test_changed_bytes(folder: Path, changes: list[tuple[int, int]], cut: bool) 
     (folder / "a.uff").write_bytes(data[: changes[0][0] % len(data)] if cut else data)
     with user_errors_only():
         read_measured(folder / "a.uff")
+
+
+# modes of another program in a mesh file ------------------------------------------------------------------------------
+
+
+def as_2414(basis: ModalBasis, complex_: bool = False) -> str:
+    """Modes as a solver writes them beside its mesh: data sets 2414 and the stresses of the same modes, left aside."""
+    lines = list[str]()
+    for j, (f, D) in enumerate(zip(basis.groups[0, 0].frequency, basis.groups[0, 0].damping_ratio, strict=True)):
+        for result, count in ((8, 3), (2, 6)):
+            lines += ["    -1", "  2414", f"{j + 1:10d}", f"mode {j + 1}", f"{1:10d}", *["NONE"] * 5]
+            kind = (1, 3 if complex_ else 2, 2, result, 5 if complex_ else 2, count)
+            lines.append("".join(f"{v:10d}" for v in kind))
+            lines += [f"{0:10d}" * 5 + f"{j + 1:10d}{0:10d}{0:10d}", f"{0:10d}{0:10d}"]
+            w = 2 * np.pi * f
+            root = (-D * w, w * np.sqrt(1 - D**2), 0.0, 2 * w * np.sqrt(1 - D**2), 0.0, 0.0)
+            lines.append("".join(f"{v:13.5e}" for v in (0, *([0] * 5 if complex_ else [f, 0, 1, D, 0]))))
+            lines.append("".join(f"{v:13.5e}" for v in (root if complex_ else [0] * 6)))
+            for number, row in zip(basis.mesh.node_id, basis.groups[0, 0].phi[:, :, j], strict=True):
+                values = np.resize(row, count)
+                values = np.column_stack([values, 0 * values]).ravel() if complex_ else values
+                lines.append(f"{number:10d}")
+                lines += ["".join(f"{v:13.5e}" for v in part) for part in np.split(values, range(6, len(values), 6))]
+            lines.append("    -1")
+    return "\n".join(lines) + "\n"
+
+
+@pytest.mark.parametrize("complex_", [False, True])
+def test_modes_in_a_mesh_file_stand_beside_the_body(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], complex_: bool
+) -> None:
+    """Another program's frequencies and shapes (data set 2414) beside the computed ones: MAC 1, six digits."""
+    monkeypatch.chdir(tmp_path)
+    mesh = unv(tetrahedra())
+    Path("a.unv").write_text(mesh)
+    assert main(["import", "a.unv", "part", "--unit", "m"]) == 0
+    assert main(["modes", "part", "-q", "--set", "modes.solver=superlu", "--set", "modes.count=9"]) == 0
+    basis = read_basis(Path("build/part/basis.h5"))
+    Path("b.unv").write_text(mesh + as_2414(basis, complex_))
+    capsys.readouterr()
+    assert main(["import", "b.unv", "other", "--unit", "m"]) == 0
+    said = capsys.readouterr().out
+    assert "microslip compare other/modes_of_file.h5" in said and "MAT" not in said
+    assert main(["compare", "other/modes_of_file.h5", "build/part/basis.h5"]) == 0
+    foreign = read_basis(Path("other/modes_of_file.h5"))
+    likeness = compare_groups(foreign, basis)
+    assert [(p.first, p.second) for p in likeness.pairs] == [(0, 6), (1, 7), (2, 8)]
+    assert all(p.mac > 1 - 1e-9 for p in likeness.pairs)
+    shapes = [np.abs(b.groups[0, 0].phi[:, :, -3:]) for b in (foreign, basis)]
+    np.testing.assert_allclose(*shapes, rtol=1e-5, atol=1e-5 * shapes[1].max())
+
+
+def test_functions_are_laid_beside_a_computed_body(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Functions of the body itself, in mm and mN, with points and no modes: FRAC and level 1."""
+    monkeypatch.chdir(tmp_path)
+    basis = small.basis()
+    group = replace(basis.groups[0, 0], damping_ratio=np.full(basis.groups[0, 0].n_modes, 0.01))
+    basis = replace(basis, groups={(0, 0): group})
+    write_basis("basis.h5", basis)
+    parts = re.findall(r" {4}-1 *\n.*?\n {4}-1 *\n", respond(measure(Path("t.uff"), basis), basis).read_text(), re.S)
+    Path("f.uff").write_text("".join(p for p in parts if p.split()[1] != "55"))
+    assert main(["compare", "basis.h5", "f.uff"]) == 0
+    found = re.search(r"4 of 4 .* FRAC (\S+) \(.*\) to (\S+), levels (\S+) to (\S+) times", capsys.readouterr().out)
+    assert found is not None and all(abs(float(v) - 1) < 1e-3 for v in found.groups())
+    refused_command(["compare", "t.uff", "f.uff"], capsys, "computed modal file")
+    assert main(["compare", "basis.h5", "t.uff"]) == 0
+    refused_command(["import", "f.uff"], capsys, "microslip compare")

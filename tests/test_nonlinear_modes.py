@@ -7,6 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from refusals import refused
+from scipy.interpolate import PchipInterpolator
+from scipy.special import ellipk
 from test_assembly import sector
 from test_harmonic_balance_laws import body
 from test_harmonic_balance_time import slider
@@ -14,9 +16,10 @@ from test_harmonic_balance_time import slider
 import microslip as ms
 from microslip.contact.friction import Coulomb
 from microslip.contact.law import value
-from microslip.contact.normal import Penalty
+from microslip.contact.normal import Penalty, Preload
 from microslip.contact.patch import Patch, grid
 from microslip.contact.point import PointContact
+from microslip.contact.rate import RateContact
 from microslip.harmonic_balance import problem as balance
 from microslip.harmonic_balance.nonlinear_modes import _Curve, backbone, strongest
 from microslip.harmonic_balance.peak import highest, resonance
@@ -73,8 +76,8 @@ def test_a_mode_fed_too_little_fails_its_checks():
     """With a tenth less than its damping the forces of its contacts do not move the bodies as they move."""
     found, curve = backbone(sliding(), 2.0e-5, 2.1e-5), _Curve(replace(sliding(), share=0.0), 0)
     x, omega, xi = found.x[0], found.Omega[0], 2 * found.Omega[0] * found.damping[0]
-    assert not curve.checks(x, omega, xi).failure
-    assert curve.checks(x, omega, 0.9 * xi).failure.startswith("read-out")
+    assert not curve.motion(x, omega, xi).checks.failure
+    assert curve.motion(x, omega, 0.9 * xi).checks.failure.startswith("read-out")
 
 
 def test_a_free_motion_in_time_decays_as_the_curve_says():
@@ -89,6 +92,91 @@ def test_a_free_motion_in_time_decays_as_the_curve_says():
     drawn = np.interp(np.sqrt(swing[:-1] * swing[1:]), mode.amplitude, mode.damping)
     assert len(drawn) > 70 and drawn[-1] > 1.6 * drawn[0]
     np.testing.assert_allclose(np.log(swing[:-1] / swing[1:]) / np.pi, drawn, rtol=6e-3)
+
+
+def highest_of_cubic(amplitude):
+    """rad/s of q'' + q + q^3 = 0: pi sqrt(1 + A^2) / (2 K(m)), m = A^2 / (2 (1 + A^2))."""
+    m = amplitude**2 / (2 * (1 + amplitude**2))
+    return np.pi * np.sqrt(1 + amplitude**2) / (2 * ellipk(m))
+
+
+@pytest.mark.parametrize("measure", ["norm", pytest.param("energy", marks=pytest.mark.slow)])
+def test_duffing_has_its_closed_form(measure):
+    duffing = ms.structure(1.0, 1.0, elements=[ms.polynomial({3: 1.0})], output=[0])
+    problem = balance.of(duffing, 15, 240)
+    mode = ms.backbone(problem, 1e-2, 10.0, measure=measure)
+    cosines = (mode.x.reshape(-1, 31) * problem.scale)[:, 1::2]
+    assert mode.complete and mode.stuck == pytest.approx(1.0, rel=1e-12)
+    np.testing.assert_allclose(mode.Omega, highest_of_cubic(cosines.sum(axis=1)), rtol=1e-8)
+    if measure == "energy":
+        np.testing.assert_allclose(mode.energy[[0, -1]], [1e-2, 10.0], rtol=1e-8)
+
+
+def chain(harmonics):
+    """Two masses and a cubic spring (G. Kerschen et al., Mechanical Systems and Signal Processing 23, 2009)."""
+    K = np.array([[2.0, -1.0], [-1.0, 2.0]])
+    system = ms.structure(np.eye(2), K, elements=[ms.polynomial({3: 0.5})], output=[0])
+    return balance.of(system, harmonics, 64)
+
+
+@pytest.mark.slow
+def test_an_internal_resonance_is_followed_to_its_end_and_back():
+    """The tongue 1:3 of the mode in phase leads to the mode out of phase at a third of its frequency, where its own
+    first harmonic vanishes, and back on another branch: the energies there are those of the other mode."""
+    first, second = (ms.backbone(chain(7), 1e-2, 100.0, mode=mode) for mode in (0, 1))
+    assert first.complete and [h for h, *_ in first.resonances] == [3]
+    (_, hertz, share), end = first.resonances[0], first.amplitude[20:-20].argmin() + 20
+    assert share > 0.98 and first.amplitude[end] < 1e-3 < 0.1 < first.amplitude[end + 20]
+    near = np.argsort(second.Omega)
+    energy = PchipInterpolator(second.Omega[near], second.energy[near])(3 * first.Omega[end])
+    assert first.energy[end] == pytest.approx(float(energy), rel=1e-3)
+    assert hertz == pytest.approx(0.22396, rel=1e-4)
+    assert first.frequency[-1] < np.sqrt(2) / (2 * np.pi) < 1.02 * first.frequency[-1]  # both springs hold
+
+
+def test_an_internal_resonance_that_is_passed_over_is_told():
+    """Three times the frequency goes through sqrt(10), coupled by a ten thousandth: no step meets it."""
+    K = np.array([[1.0, -1e-4], [-1e-4, 10.0]])
+    weak = ms.structure(np.eye(2), K, elements=[ms.polynomial({3: 0.5})], output=[0])
+    mode = ms.backbone(weak, 0.1, 2.0, harmonics=3)
+    assert mode.complete and not mode.resonances
+    (said,) = mode.passed
+    passed = 2 * np.pi * float(said.split("times ")[1].split(" Hz")[0])
+    assert said.startswith("3 times") and "mode 2" in said and 3 * passed == pytest.approx(np.sqrt(10), rel=0.05)
+    assert "allow more" in ms.backbone(weak, 0.1, 2.0, harmonics=3, settings={"points": 3}).status
+
+
+def braked(coefficient=0.3, damping=0.01, at=(1.0,), stiffness=1.0):
+    """Friction by the velocity, 10 N times 2/pi arctan(2 v)."""
+    law = RateContact(Preload(value(10.0)), Coulomb(value(coefficient)), value(2.0), value(0.0))
+    n = len(at)
+    return ms.structure(
+        np.eye(n), stiffness, damping * np.eye(n), elements=[ms.Element(law, at=np.array(at))], output=[0]
+    )
+
+
+def test_friction_by_the_velocity_has_its_linearisation_and_its_closed_form():
+    """One harmonic: omega = 1 and xi = c + mu F_N (4/pi) (sqrt(1 + z^2) - 1) / (z A), z = 2 A: the force
+    in phase with the speed. Small motions are overdamped, and their frequency is positive."""
+    mode = ms.backbone(braked(), 1e-3, 1e2, harmonics=1, samples=2048)
+    z = 2 * mode.amplitude
+    assert mode.complete and len(mode.amplitude) < 100
+    np.testing.assert_allclose(mode.Omega, 1.0, rtol=1e-9)
+    xi = 0.01 + 3 * 4 / np.pi * (np.sqrt(1 + z * z) - 1) / (z * mode.amplitude)
+    np.testing.assert_allclose(2 * mode.damping, xi, rtol=1e-6)
+
+
+def test_both_modes_of_a_braked_chain_begin_where_its_linearisation_has_them():
+    """(K + i Omega C - (Omega^2 + i Omega xi) M) q = 0 with C that of the law at rest, 12/pi."""
+    K = np.array([[2.0, -1.0], [-1.0, 2.0]])
+    system, begun = braked(at=(1.0, 0.0), stiffness=K), []
+    for mode in (0, 1):
+        found = ms.backbone(system, 1e-6, 2e-6, mode=mode, harmonics=1)
+        Omega, xi = found.Omega[0], 2 * found.Omega[0] * found.damping[0]
+        A = K + 1j * Omega * np.diag([12 / np.pi + 0.01, 0.01]) - (Omega**2 + 1j * Omega * xi) * np.eye(2)
+        assert np.abs(np.linalg.det(A)) < 1e-5 and Omega > 0
+        begun.append(xi)
+    assert max(begun) > 5 * min(begun)
 
 
 @pytest.mark.slow
@@ -204,13 +292,16 @@ def test_mistakes():
     refused("does not move", ms.backbone, beside, 1e-6, 1e-5)
 
 
+@pytest.mark.slow
 def test_a_damper_that_hardly_anything_holds_may_drift_while_it_slides():
     """0.1 kg on 1 N/m under a steady 0.5 N: as long as a friction contact sticks it stays, and 0.5 m away when all
     slide, a hundred times the motion that makes them. What is left then is the mass without its damper."""
     friction = [ms.jenkins(1e6, limit, 0, 1) for limit in (2.0, 8.0)]
     K = np.diag([1e5, 1.0])
     both = ms.structure(np.diag([1.0, 0.1]), K, steady={1: 0.5}, damping_ratio=0.001, elements=friction, output=0)
-    curve = ms.backbone(both, 1e-4, 0.1, mode=0, harmonics=1, samples=24)
+    curve = ms.backbone(
+        both, 1e-4, 0.1, mode=0, harmonics=1, samples=24, measure="readout"
+    )
     assert curve.complete and len(curve.Omega) < 200, curve.status
     np.testing.assert_allclose(curve.Omega[0], np.sqrt(1e5 / 1.1), rtol=1e-3)
     np.testing.assert_allclose(curve.Omega[-1], np.sqrt(1e5), rtol=1e-4)

@@ -6,12 +6,15 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+import microslip as ms
+from microslip.contact.elements import Stop
 from microslip.contact.friction import Coulomb
 from microslip.contact.normal import Penalty, Preload
 from microslip.contact.patch import Patch
 from microslip.contact.point import PointContact
-from microslip.harmonic_balance.by_hand import JenkinsPlay, model
-from microslip.harmonic_balance.forces import AFT
+from microslip.harmonic_balance.by_hand import ElasticSpring, JenkinsPlay, model
+from microslip.harmonic_balance.forces import AFT, Forces
+from microslip.system.assembly import Assembly
 
 
 def patch(along: tuple[float, float, float] = (0.0, 0.6, -1.6), **more: object) -> Patch:
@@ -85,3 +88,80 @@ def test_what_never_slides_is_a_spring() -> None:
     """A motion that only sticks is carried by a spring, its mean included."""
     u = 1e-6 * np.array([[[2.0, 1, 0, 0, 1]]])
     np.testing.assert_allclose(JenkinsPlay(patch(), 1, 16, 2).force(u, 1.0), 2e4 * (0.36 + 2.56) * u, atol=1e-13)
+
+
+def test_a_stop_has_its_closed_form_from_few_samples() -> None:
+    """k (A cos t - g) while cos t > g / A = cos a: mean k (A sin a - g a) / pi, first harmonic
+    (2 k / pi) (A (a / 2 + sin 2a / 4) - g sin a)."""
+    k, A = 7.0, 1.3
+    for gap in (0.2, -0.4, 1.2999, -2.0):
+        a = np.pi if gap < -A else np.arccos(gap / A)
+        u = np.zeros((1, 1, 9))
+        u[0, 0, 1] = A
+        F = stop_model(Stop(np.array(k), np.array(gap)), 16).force(u, 1.0)[0, 0]
+        assert F[0] == pytest.approx(k * (A * np.sin(a) - gap * a) / np.pi, rel=1e-8, abs=1e-12)
+        first = 2 * k / np.pi * (A * (0.5 * a + 0.25 * np.sin(2 * a)) - gap * np.sin(a))
+        assert F[1] == pytest.approx(first, rel=1e-8, abs=1e-12)
+
+
+def stop_model(law: Stop, samples: int) -> Forces:
+    """Of one point that moves along t1."""
+    shape = np.zeros((1, 3, 1))
+    shape[0, 1, 0] = 1.0
+    return model([Patch("element", np.zeros((1, 2)), np.ones(1), law, shape)], samples, 2, 1e-10)
+
+
+@pytest.mark.parametrize("both", [False, True])
+def test_a_stop_is_the_limit_of_many_samples_and_its_derivative_that_of_differences(
+    both: bool,
+) -> None:
+    law, rng = Stop(np.array(3.0), np.array(0.3), both), np.random.default_rng(4)
+    exact = stop_model(law, 32)
+    sampled = [ElasticSpring(exact.patch, 1, n, 2) for n in (2048, 8192)]
+    for _ in range(5):
+        u = rng.normal(size=(1, 1, 9)) / (1 + np.arange(9) // 2)
+        F, S = exact.forces(u, 1.0)
+        coarse, fine = (np.abs(one.force(u, 1.0) - F).max() for one in sampled)
+        assert fine < 1e-6 and fine < 0.3 * coarse + 1e-12  # sampling is of second order, to this
+        D = np.stack(
+            [(exact.force(u + e, 1.0) - exact.force(u - e, 1.0))[0, 0] / 2e-6
+             for e in 1e-6 * np.eye(9)[:, None, None]], axis=1,
+        )  # fmt: skip
+        assert np.abs(S[0, 0, :, 0] - D).max() < 1e-5
+
+
+def hammer(damping: float) -> Assembly:
+    """A stop a hundred times as stiff as its oscillator."""
+    return ms.structure(1.0, 1.0, damping, force={0: 1.0}, elements=[ms.stop(100.0, 0.5)])
+
+
+@pytest.mark.parametrize("harmonics", [3, pytest.param(7, marks=pytest.mark.slow)])
+def test_a_curve_through_lift_off_has_no_folds_of_the_sampling(harmonics: int) -> None:
+    """With so few samples that they only tell where the contact is, folds and peak are those of
+    many: of the sampled force there are 218 folds with 64 and 366 with 1,024."""
+    few, many = (
+        ms.follow(hammer(0.2), 0.6, 1.0, harmonics=harmonics, samples=n, unit="rad/s")
+        for n in (4 * harmonics + 4, 256)
+    )
+    assert len(few.folds) == 2
+    np.testing.assert_allclose(few.folds, many.folds, rtol=1e-6)
+    assert few.frequency.max() == pytest.approx(many.frequency.max(), rel=1e-6)
+
+
+@pytest.mark.slow
+def test_between_two_folds_of_a_stop_both_motions_stay_in_time() -> None:
+    """0.775 is between the folds of a superharmonic resonance, 0.749 and 0.803: the first and the
+    last of three motions of the curve are those that the motion in time stays on."""
+    omega, system = 0.775, hammer(0.1)
+    curve = ms.follow(
+        system, 0.6, 0.9, harmonics=31, samples=128, unit="rad/s", settings={"targets": (omega,)}
+    )
+    at = np.flatnonzero(np.abs(curve.parameter - omega) < 1e-9)
+    assert len(at) == 3
+    for i in at[[0, 2]]:
+        a = curve.harmonics()[i]
+        speed = -omega * float(np.arange(len(a)) @ a.imag)
+        start = {"displacement": {0: float(a.real.sum())}, "velocity": {0: speed}}
+        seen = ms.integrate(system, omega, unit="rad/s", settle=300, keep=1, start=start)
+        first = 2 * np.mean(seen.y[0, :256] * np.exp(-1j * omega * seen.time[:256]))
+        assert abs(first) == pytest.approx(abs(a[1]), rel=2e-3)

@@ -350,12 +350,10 @@ CHANGES: dict[str, Callable[[dict[str, Any]], Any]] = {
     "bodies in another order": lambda raw: raw["bodies"].reverse(),
     "description": put("description", "x"),
 }
-QUICK = ("friction",)
 
 
-@pytest.mark.parametrize("what", [
-    pytest.param(one, marks=[] if one in QUICK else pytest.mark.slow) for one in CHANGES
-])  # fmt: skip
+@pytest.mark.slow  # test_response_stage has another sweep that was run before
+@pytest.mark.parametrize("what", CHANGES)
 def test_another_case_that_was_run_before_leaves_no_trace(place: Path, what: str) -> None:
     """The same folder, a case that differs in one entry, and then the case itself: every bit of a fresh folder."""
     _, case, answer = plain(place, 35, MILD)

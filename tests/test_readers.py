@@ -5,8 +5,6 @@ from __future__ import annotations
 import dataclasses
 import random
 import re
-import subprocess
-import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -15,7 +13,8 @@ import h5py
 import meshes
 import numpy as np
 import pytest
-from refusals import refused
+from processes import run
+from refusals import refused, refused_command
 from test_bdf import bulk
 from test_cdb import archive
 from test_fuzz import flipped, user_errors_only
@@ -79,7 +78,8 @@ def by_place(mesh: Mesh, kind: str) -> np.ndarray:
 def test_cells_that_gmsh_writes_are_the_same_in_every_format(kind: str, tmp_path: Path) -> None:
     """Bent cells of second order, against gmsh's own format; the bulk data has nine digits."""
     files = [tmp_path / f"a{suffix}" for suffix in WRITTEN[kind]]
-    done = subprocess.run([sys.executable, "-c", DRAW, kind, *map(str, files)], capture_output=True, text=True)
+    (tmp_path / "draw.py").write_text(DRAW)
+    done = run([str(tmp_path / "draw.py"), kind, *map(str, files)])
     assert done.returncode == 0, done.stderr
     first = read_mesh(files[0], "m")
     assert not mesh_problems(first)[0] and any(t.startswith(kind) for t in first.cells)
@@ -153,7 +153,7 @@ SYSTEM = f"    -1\n  2420\n         1\nPart\n         1{{}}         8\nCS1\n{AXE
         ("       102       111", "       101       111", "element 101 is defined twice"),
         ("  2411", "  2410", "no nodes"),
         ("         5        ", "        77        ", "which the file does not define"),
-        ("         3\nroot", "         9\nroot", "'root' has fewer members"),
+        ("         3\nroot", "         9\nroot", "line 68: the group 'root' is not whole"),
     ],
 )
 def test_universal_files_that_are_wrong(tmp_path: Path, old: str, new: str, words: str) -> None:
@@ -196,7 +196,7 @@ def test_results_beside_a_mesh_are_left_aside(tmp_path, monkeypatch, capsys):
     (tmp_path / "a.unv").write_text(SOLVED.format(mesh=unv(tetrahedra())))
     assert main(["import", "a.unv", "part"]) == 0
     said = capsys.readouterr().out
-    assert "data sets left aside: 55 (results at nodes), 2414" in said
+    assert "no part of the body: 55 (results at nodes), 2414" in said
     assert 'length_unit = "mm"' in (tmp_path / "part" / "body.toml").read_text()
     (tmp_path / "a.unv").write_text(
         SOLVED.format(mesh=unv(tetrahedra())).replace("1.0D+03", "1.0D+00", 1)
@@ -209,7 +209,48 @@ def test_local_systems_of_a_universal_file_are_refused(tmp_path: Path) -> None:
     (tmp_path / "a.unv").write_text(SYSTEM.format("         0") + unv(tetrahedra()))
     assert read_mesh(tmp_path / "a.unv", "m").n_cells == 12
     (tmp_path / "a.unv").write_text(SYSTEM.format("         1") + unv(tetrahedra()))
-    refused("local coordinate systems", read_mesh, tmp_path / "a.unv", "m")
+    refused("node 1 stands in the local coordinate system 1", read_mesh, tmp_path / "a.unv", "m")
+    unused = SYSTEM.format("         1").replace("\n         1         1", "\n         7         1")
+    (tmp_path / "a.unv").write_text(unused + unv(tetrahedra()))
+    assert read_mesh(tmp_path / "a.unv", "m").n_cells == 12
+
+
+def old(text: str) -> str:
+    """The same mesh in the older data sets 15 and 780."""
+    parts = [part.split("\n") for part in text.split("    -1\n") if part.strip()]
+    nodes, cells, *rest = ([line for line in part if line] for part in parts)
+    short = (f"{a}{''.join(f'{float(v):13.5E}' for v in b.replace('D', 'E').split())}"
+             for a, b in zip(nodes[1::2], nodes[2::2], strict=True))  # fmt: skip
+    wide = (line[:20] + "         1         1" * 2 + line[40:] if len(line) == 60 else line for line in cells[1:])
+    sets = (["    15", *short], ["   780", *wide], *rest)
+    return "".join("\n".join(["    -1", *part, "    -1", ""]) for part in sets)
+
+
+def test_old_universal_files_are_the_same(tmp_path: Path) -> None:
+    (tmp_path / "a.unv").write_text(old(unv(tetrahedra())))
+    mesh = read_mesh(tmp_path / "a.unv", "m")
+    np.testing.assert_array_equal(mesh.cells["tetra"], tetrahedra().cells["tetra"])
+    assert sum(map(len, mesh.faces["root"].values())) == 2 and not mesh.hanging
+
+
+LINE, LUMP = (f"{e:10d}{k:10d}{1:10d}{1:10d}{7:10d}{n:10d}\n" for e, k, n in ((90, 21, 2), (92, 161, 1)))
+SPRING = f"{91:10d}{136:10d}{1:10d}{1:10d}{7:10d}{2:10d}\n{1:10d}{2:10d}\n"
+
+
+def test_what_is_no_solid_in_a_universal_file_is_told(tmp_path, monkeypatch, capsys):
+    """Lines along edges are the mesher's; a beam across a cell, a lumped mass and a spring change frequencies."""
+    monkeypatch.chdir(tmp_path)
+    whole = unv(tetrahedra())
+    line = whole.index(LINE) + len(LINE)
+    across = whole[:line] + whole[line:].replace(f"{1:10d}{2:10d}\n", f"{1:10d}{12:10d}\n", 1)
+    Path("a.unv").write_text(across)
+    words = "a.unv, line 34: 1 of type 21 (beam) share nodes", "--solids-only"
+    refused_command(["import", "a.unv", "part"], capsys, *words)
+    lumped = whole.replace(LINE, f"{LUMP}{1:10d}\n{SPRING}{LINE}")
+    Path("b.unv").write_text(lumped)
+    assert main(["import", "b.unv", "part"]) == 0
+    said = capsys.readouterr().out
+    assert "b.unv, line 34: 1 lumped mass is not read" in said and "b.unv, line 36: 1 spring is" in said
 
 
 def test_truncated_universal_files_are_refused(tmp_path: Path) -> None:
@@ -265,8 +306,8 @@ def test_bulk_data_runs_at_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
-        ("CHEXA          1       1", "CHEXA          2       1", "element 2 is defined twice"),
-        ("CHEXA          1       1       1", "CHEXA          1       1        ", "1 (CHEXA) has 7 nodes; 8 or 20"),
+        ("CHEXA          1       1", "CHEXA          2       1", "CHEXA 2 is there already"),
+        ("CHEXA          1       1       1", "CHEXA          1       1        ", "has 7 nodes; 8 or 20"),
         ("PSOLID         1       1", "PSOLID         1       3", "MAT1 3 (missing)"),
         ("PSOLID         1 ", "PSOLID         2 ", "no PSOLID defines"),
         ("MAT1  ", "MAT9  ", "MAT9 1"),
@@ -274,7 +315,7 @@ def test_bulk_data_runs_at_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
         ("      .3", "      .5", "which no solid has"),
         ("GRID* ", "GRIDS ", "GRID"),
         (" 2.1+11", " 2.1x11", "where a number belongs"),
-        ("ENDDATA", "INCLUDE 'more.bdf'", "includes another file"),
+        ("ENDDATA", "INCLUDE 'more.bdf'", "INCLUDE names more.bdf, which is not there"),
         ("ENDDATA", "SET1,3,1,THRU", "THRU without its ends"),
     ],
 )
@@ -320,6 +361,7 @@ def med(path: Path) -> Path:
     return path
 
 
+@pytest.mark.usefixtures("untried")
 def test_groups_of_med(tmp_path: Path) -> None:
     mesh = read_mesh(med(tmp_path / "a.med"), "m")
     np.testing.assert_array_equal(mesh.cells["tetra"], tetrahedra().cells["tetra"])
@@ -350,6 +392,7 @@ def unknown(file: h5py.File) -> None:
     next(iter(file["ENS_MAA/part"].values())).move("MAI/TE4", "MAI/POE")
 
 
+@pytest.mark.usefixtures("untried")
 @pytest.mark.parametrize(
     ("change", "words"),
     [

@@ -8,6 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from microslip import __version__
+
 ROOT = Path(__file__).parents[1]
 
 
@@ -23,6 +25,14 @@ def test_the_citation_is_that_of_the_package() -> None:
     assert cited["cff-version"] == "1.2.0" and cited["message"] and cited["title"].startswith(project["name"])
     assert cited["license"] == project["license"]
     assert [a["name"] for a in cited["authors"]] == [a["name"] for a in project["authors"]]
+
+
+def test_the_version_is_that_of_changelog_and_citation() -> None:
+    """The last dated heading; another one above it is of what comes next."""
+    cited = read("CITATION.cff")
+    text = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
+    heads = re.findall(r"^## (\S+), (\d{4}-\d\d-\d\d)$", text, flags=re.M)
+    assert heads[0] == (__version__, str(cited["date-released"])) and str(cited["version"]) == __version__
 
 
 def test_workflows_call_what_is_there() -> None:

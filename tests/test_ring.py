@@ -487,13 +487,28 @@ def test_the_report_of_a_cyclic_sector() -> None:
     for part in (
         "one of 6 alike round the axis", "nodal diameters 0 to 3", "5 modes each from 2360.3 Hz at each of 2 speeds",
         "k = 0 k = 1 k = 2 k = 3", "5 1 forward", "6 0 standing",  # engine order, nodal diameter, wave
-        f"{basis.groups[0, 2].frequency[1]:#.5g}", "True resonances", "the cyclic faces obey the phase rule",
+        f"{basis.groups[0, 2].frequency[1]:#.5g}", "true resonances between", "the cyclic faces obey the phase rule",
         *(f"{r.speed * 30 / np.pi:.1f} {r.frequency:.2f} {r.order}" for r in found),
     ):  # fmt: skip
         assert part in words
     assert found and words.count("modes of the ring up to") >= 2
     words = said(report_html(sector.basis(6, rpm=(0.0, 60000.0), harmonics=(0, 1)), {}))
     assert "of the engine orders 2" in words and "without the nodal diameters 2, 3" in words
+
+
+def test_diagrams_of_a_sector_name_its_speeds() -> None:
+    """Titles and notes have the speed, not its number in the file."""
+    from functools import partial
+
+    pytest.importorskip("matplotlib")
+    from microslip.pictures import diagrams
+    from microslip.pictures.plots import figure_of
+
+    basis = sector.basis(6, rpm=(0.0, 30000.0, 60000.0))
+    safe = figure_of(partial(diagrams.safe_plot, basis, [1, 2]))
+    assert [axes.get_title() for axes in safe.axes] == ["30000 rpm", "60000 rpm"]
+    (axes,) = figure_of(partial(diagrams.nodal_diameter_plot, basis)).axes
+    assert any(t.get_text().startswith("filled: at 0 rpm; hollow: at 60000 rpm") for t in axes.texts)
 
 
 def test_info_check_and_export_of_a_cyclic_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -435,7 +435,7 @@ def test_ci_stops_where_a_step_or_a_peer_fails(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(("required", "code"), [("required", 1), ("optional", 0)])
 def test_a_skip_for_want_of_a_program_fails_where_it_is_required(required: str, code: int, tmp_path: Path) -> None:
-    for name in ("conftest.py", "durations.py"):
+    for name in ("conftest.py", "durations.py", "families.py"):
         shutil.copy(ROOT / "tests" / name, tmp_path / name)
     (tmp_path / "test_a.py").write_text(
         "import pytest\n"

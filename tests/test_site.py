@@ -47,6 +47,15 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.mark.slow
+def test_notebooks_lead_to_pages(site: Path) -> None:
+    made = sorted((site / "notebooks").glob("*.ipynb"))
+    assert len(made) == 9
+    for file in made:
+        for target in re.findall(r"\]\((\.\./[^)#]+)", file.read_text(encoding="utf-8")):
+            assert (file.parent / target).is_file(), f"{file.name} -> {target}"
+
+
+@pytest.mark.slow
 def test_no_link_is_dead_and_three_clicks_reach_every_page(site: Path) -> None:
     pages = {page: Links(page) for page in site.rglob("*.html")}
     dead, leads = [], dict[Path, set[Path]]()

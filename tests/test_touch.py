@@ -18,7 +18,7 @@ from microslip.files.png import CURVES, draw_beside, text_in, with_text
 from microslip.pictures.lettering import save_png
 from microslip.pictures.plots import empty_figure, panels, save_figure
 from microslip.pictures.touch import curves_of, tell_points
-from microslip.pictures.turning import MOST_VERTICES, Outside, Turned, outside, turned, turning_modes
+from microslip.pictures.turning import MOST_VERTICES, Outside, Turned, outside, turned, turning_assembly, turning_modes
 from microslip.reduced.coordinates import basis_in_modes
 from microslip.report.page import answer_page
 from microslip.stages.stage import Made, Stage
@@ -138,6 +138,22 @@ def test_harmonics_and_values_of_a_body_are_those_given_and_a_large_one_is_coars
         np.testing.assert_allclose(shape["most"] * size * numbers(part), factor * at, atol=2e-4)
     assert shape["high"] == pytest.approx(points[:, 0].max())
     assert shape["grown"] == pytest.approx(body["drawn"] * body["extent"] / size)
+
+
+def test_bodies_stand_and_move_where_a_case_puts_them() -> None:
+    """Two vanes, the second shifted by their length; each moves as it is told, the second half as much."""
+    basis = basis_in_modes(ms.read_basis(ms.sample()))
+    mesh, phi = basis.mesh, basis.groups[min(basis.groups)].phi[:, :, 0]
+    shift = np.array([0.0, 0.0, 0.16])
+    parts = [(mesh, mesh.points, phi[None] + 0j), (mesh, mesh.points + shift, 0.5j * phi[None])]
+    body = json.loads(turning_assembly(parts, ["first"], "both"))
+    at, skin = body["scale"] * numbers(body["points"]), outside(mesh)
+    n = len(skin.source)
+    assert len(at) == 2 * n
+    np.testing.assert_allclose(at[n:] - at[:n], np.tile(shift, (n, 1)), atol=2e-4 * body["scale"])
+    ((real, imag),) = body["shapes"][0]["parts"]
+    np.testing.assert_allclose(0.5 * numbers(real)[:n], numbers(imag)[n:], atol=1e-4)
+    assert not numbers(real)[n:].any() and not numbers(imag)[:n].any()
 
 
 @pytest.mark.parametrize(("kind", "name"), [("svg", "a.svg"), ("pdf", "a.pdf"), ("300dpi", "a_300dpi.png")])

@@ -17,6 +17,7 @@ from refusals import refused, refused_command
 
 from microslip.cli import main
 from microslip.files.tables import columns_csv
+from microslip.programs import program
 from microslip.results import Journal, open_journal, read_journal
 from microslip.rolling.table import creep_table
 from microslip.rolling.wheelset import Pose, patches
@@ -102,7 +103,7 @@ def there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
 
 
-RATES = jax.jit(motion.rates, static_argnums=1)
+RATES = program(motion.rates, static_argnums=1)
 
 
 @jax.jit
@@ -270,8 +271,8 @@ def test_no_change_is_claimed_that_the_jumps_do_not_tell(rolling: wearing.Runnin
     *_, (fine, _) = wearing.jumps(rolling, 1e6, 2e-8, 1e5)
     off = np.abs(wearing.orders_of(coarse.radius, 6) - wearing.orders_of(fine.radius, 6))
     assert (off <= wearing.uncertain([(coarse, jump)])[:6] + 1e-10).all() and off.max() > 1e-10
-    assert _went(3e-5, 2.992e-5, 1.9e-7).startswith("stays at 30 um: it changes by less than the error")
-    assert _went(3e-5, 2.992e-5, 1e-8).startswith("goes from 30 to 29.92 um")
+    assert _went(3e-5, 2.992e-5, 1.9e-7).startswith("stays at 30 µm: it changes by less than the error")
+    assert _went(3e-5, 2.992e-5, 1e-8).startswith("goes from 30 to 29.92 µm")
 
 
 def test_a_round_wheel_stays_round(rolling: wearing.RunningVehicle) -> None:
@@ -494,7 +495,8 @@ def depth_of(wheel: Any, far: float, count: int = 1) -> tuple[np.ndarray, Any, f
     return wheel.seen(last.depth, first)[:, 0], last, sum(jump.error for _, jump in history)
 
 
-@pytest.mark.parametrize(("lobes", "off"), [(0.0, 0.03), pytest.param(1.0, 0.3, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize(("lobes", "off"), [(0.0, 0.03), (1.0, 0.3)])
 def test_a_file_and_its_vehicle_wear_alike_as_profiles_are_renewed(
     lobes: float, off: float, case: VehicleCase, rolling: wearing.RunningVehicle, tmp_path: Path
 ) -> None:

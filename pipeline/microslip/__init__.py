@@ -12,16 +12,16 @@ from __future__ import annotations
 import importlib
 from typing import Any
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 PUBLIC = {
     "errors": "UserError",
     "process": "prepare",
-    "basis": "read_basis write_basis",
+    "basis": "read_basis write_basis sample",
     "results.files": "read_response",
     "time_domain.recorded": "load read_orbits",
     "exchange.labelled": "to_xarray",
-    "bodies": "modes assemble sample stability",
+    "bodies": "modes assemble stability",
     "system.structure": "structure polynomial jenkins stop friction Element",
     "bifurcation.dynamics": "Dynamics",
     "bifurcation.recorded": "read_bifurcation",

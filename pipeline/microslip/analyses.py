@@ -18,8 +18,9 @@ from .continuation import Settings
 from .errors import UserError
 from .harmonic_balance import families, nonlinear_modes
 from .harmonic_balance import problem as balance
+from .harmonic_balance.families import CRITICAL
 from .harmonic_balance.growing import fed, growing, verdict
-from .harmonic_balance.nonlinear_modes import Backbone
+from .harmonic_balance.nonlinear_modes import Backbone, Measure
 from .harmonic_balance.problem import Problem
 from .harmonic_balance.solved import Motions
 from .harmonic_balance.solver import Point, sweep
@@ -254,7 +255,8 @@ def follow(
     system: System, start: Number, stop: Number, *,
     over: Literal["frequency", "load", "normal_force"] = "frequency", frequency: Positive | None = None,
     harmonics: Count | None = None, samples: Count | None = None, unit: Unit = "Hz",
-    settings: Settings | Mapping[str, Any] | None = None, report: Report = lambda _: None,
+    settings: Settings | Mapping[str, Any] | None = None, stability: bool = False,
+    report: Report = lambda _: None,
 ) -> Motions:  # fmt: skip
     """Steady forced vibration along the whole curve of its motions, through folds, stable or not.
 
@@ -264,12 +266,15 @@ def follow(
         frequency: in the unit, at which load or normal force vary. harmonics, samples: see `harmonic_response`.
         settings: of the steps along the curve where they are to be others: ``{"points": 10000}`` for more of them than
             3000, ``{"step_max": 0.1}`` for shorter ones than 0.5, a twentieth of the range, and all others of
-            `continuation.Settings`. report: is told what is under way.
+            `continuation.Settings`. stability: whether every motion is stable, by its Floquet multipliers, and where
+            that changes. report: is told what is under way.
 
     Returns:
-        A `Motions`, with ``folds`` and, in ``ended``, why the curve ended: "bound: 60 Hz is reached", the stop or
-        the start again. Where it comes back to the start or gets stuck, the points of another curve follow, begun at
-        the stop (``arrays["branch"]`` is 1 there), and ``ended`` tells of both. Whether a motion is stable is not told.
+        A `Motions`, with ``folds``, over the frequency ``peaks`` of the first read-out, and, in ``ended``, why the
+        curve ended: "bound: 60 Hz is reached", the stop or the start again. Where it comes back to the start or gets
+        stuck, the points of another curve follow, begun at the stop (``arrays["branch"]`` is 1 there), and ``ended``
+        tells of both. With ``stability`` it has ``stable``, ``growth`` of a disturbance a period, and, located, the
+        ``bifurcations`` beside folds; what is unstable is drawn dashed.
         Over the frequency the modes with sticking contacts and those without are among the points; a resonance that is
         narrow elsewhere may be passed over: give a shorter ``step_max``.
 
@@ -289,8 +294,7 @@ def follow(
     _bends(problem, "harmonic_response")
     if start == stop:
         raise UserError(f"stop: {stop:g} is the start too; give two ends between which the curve is followed")
-    if taken := {"direction", "low", "high"} & set(settings if isinstance(settings, Mapping) else ()):
-        raise UserError(f"settings: {min(taken)}: start and stop say where the curve goes; leave it out")
+    _between(settings, "start and stop")
     if over == "frequency":
         if frequency is not None:
             raise UserError("frequency: is what varies; leave it out, or say over what the curve goes instead")
@@ -308,15 +312,23 @@ def follow(
         make = families.of_load if over == "load" else families.of_normal_force
         family = make(problem, frequency * hertz, start, stop)
     found = families.from_both_ends(family, report, settings)
+    found = tuple(families.with_peaks(family, one) for one in found)
+    judged = [families.with_stability(family, one, report) for one in found] if stability else []
+    found = tuple(one for one, _ in judged) or found
     family = replace(family, unit=family.unit * hertz, words=unit) if over == "frequency" else family
     points = [p for one in found for p in one.points]
     _warn("follow", fed(problem.assembly))
     known = {
         "parameter": np.array([p.lam for p in points]) / family.unit,
-        "fold": np.array([p.kind == "fold" for p in points], dtype=float),
+        **{kind: np.array([p.kind == kind for p in points], dtype=float) for kind in ("fold", "peak")},
+        **{kind: np.array([p.kind == kind for p in points], dtype=float) for kind in CRITICAL if stability},
         "kink": np.array([p.kink for p in points], dtype=float),
         "arclength": np.array([p.arclength for p in points]),
     }
+    if stability:
+        told = [s for _, each in judged for s in each]
+        known["stable"] = np.array([s.stable for s in told], dtype=float)
+        known["growth"] = np.array([s.growth for s in told])
     if len(found) > 1:
         known["branch"] = np.repeat([0.0, 1.0], [len(one.points) for one in found])
     ended = "; another curve, begun at the stop: ".join(map(family.ended, found))
@@ -329,17 +341,25 @@ def follow(
 @checked
 def backbone(
     system: System, low: Positive, high: Positive, *, mode: Index = 0, output: Index = 0,
-    harmonics: Count | None = None, samples: Count | None = None, report: Report = lambda _: None,
+    harmonics: Count | None = None, samples: Count | None = None,
+    measure: Measure = "norm", settings: Settings | Mapping[str, Any] | None = None,
+    report: Report = lambda _: None,
 ) -> Backbone:  # fmt: skip
     """A nonlinear mode: frequency and damping ratio over the amplitude, from sticking contacts to sliding ones.
 
     Args:
         system: what vibrates; its loads do not matter. low, high: amplitudes (m) of a read-out, from one at which
             contacts hardly slide. mode: number of the mode with sticking contacts, 0 the lowest. output: number of the
-            read-out. harmonics, samples: see `harmonic_response`. report: is told what is under way.
+            read-out. harmonics, samples: see `harmonic_response`.
+        measure: what low and high are values of: "norm" of all coordinates and harmonics, or "modal", its share in the
+            linear mode, as large as the read-out is in that mode; "energy", J; "readout", its first harmonic itself,
+            which vanishes in an internal resonance.
+        settings: of the steps along the curve where they are to be others: ``{"points": 5000}`` for more of them than
+            1000, and all others of `continuation.Settings`. report: is told what is under way.
 
     Returns:
-        The curve, which tabulates, draws and saves itself; `complete` if it reached the high amplitude.
+        The curve, which tabulates, draws and saves itself; `complete` if it reached the high amplitude;
+        ``plot(over="energy")``; ``resonances``, internal ones on the way, and ``passed``, those that are not entered.
 
     Raises:
         UserError: a mode that does not move the read-out, or that there is not.
@@ -361,7 +381,16 @@ def backbone(
     if not high > low:
         raise UserError(f"high: {high:g} is not above low, {low:g}; give the smaller amplitude first")
     _warn("backbone", fed(problem.assembly))
-    return nonlinear_modes.backbone(problem, low, high, mode, output, report=report)
+    _between(settings, "low and high")
+    return nonlinear_modes.backbone(
+        problem, low, high, mode, output, settings=settings, report=report, measure=measure
+    )
+
+
+def _between(settings: Any, ends: str) -> None:
+    """Refuse settings that say again between which ends a curve is followed."""
+    if taken := {"direction", "low", "high"} & set(settings if isinstance(settings, Mapping) else ()):
+        raise UserError(f"settings: {min(taken)}: {ends} say where the curve goes; leave it out")
 
 
 def _bends(problem: Problem, other: str) -> None:
@@ -526,6 +555,7 @@ def run_up(
 def bifurcate(
     system: Dynamics | Callable[[float], Assembly | Built], start: Number, stop: Number, *, x: Vector | None = None,
     frequency: Positive | None = None, unit: Unit = "Hz", orbits: bool = True, doublings: Index = 1,
+    branches: Index = 1,
     attractors: Sequence[Number] = (), starts: Count = 64, deflate: Sequence[Number] = (), nodes: Count = 32,
     step: Annotated[Positive, Field(le=1)] = 0.08, points: Count = 400, report: Report = lambda _: None,
 ) -> Diagram:  # fmt: skip
@@ -536,6 +566,7 @@ def bifurcate(
             velocity alone, or it has smooth springs. start, stop: of the parameter. x: (n,) a guess of the equilibrium
             at the start; at rest if not given. frequency: of an assembly's loads, in the unit.
         orbits: whether they are followed. doublings: how often from an orbit on to the one of twice its period.
+            branches: how often from a branch point on to the curve that crosses there.
         attractors: values of the parameter at which `starts` motions are left alone, to find what they come to.
         deflate: values at which orbits, stable or not, are looked for beside those by deflation of what is known.
         nodes: of an orbit. step: the longest, a share of start to stop. points: of a branch. report: is told what is
@@ -592,7 +623,8 @@ def bifurcate(
         raise UserError(f"bifurcate: x: has {len(begin)} numbers; the system has {made.count}")
     made.check(begin, start)
     asked = diagram.DiagramPlan(
-        start, stop, orbits, doublings, nodes, step, points, tuple(attractors), starts, deflate=tuple(deflate)
+        start, stop, orbits, doublings, nodes, step, points, tuple(attractors), starts, deflate=tuple(deflate),
+        branches=branches,
     )
     return diagram.diagram(made, begin, asked, report=report)
 

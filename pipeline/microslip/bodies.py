@@ -32,7 +32,6 @@ if TYPE_CHECKING:
     from .roots.spectrum import Spectrum
 
 
-
 def _from_to(value: Any) -> Any:
     if not isinstance(value, list | tuple | np.ndarray) or len(value) != 2:
         raise ValueError("must be two numbers, from and to")
@@ -44,14 +43,6 @@ def _from_to(value: Any) -> Any:
 
 
 Window = Annotated[Any, BeforeValidator(_from_to)]
-
-
-def sample() -> Path:
-    """The modal file that travels with the package: a twisted steel vane, 8 x 40 x 160 mm.
-
-    It has the interfaces ``right`` and ``left`` at its tip, the excitation ``magnet`` and the monitor ``probe``.
-    """
-    return Path(__file__).parent / "samples" / "basis.h5"
 
 
 @checked

@@ -15,6 +15,7 @@ import shutil
 import signal
 import sys
 from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -50,6 +51,10 @@ app.register_install_completion_command()
 Set = Annotated[
     tuple[str, ...],
     Parameter(name="--set", show_default=False, help="override a setting: key.subkey=value (may be repeated)"),
+]
+Vary = Annotated[
+    str | None,
+    Parameter(show_default=False, help="key.subkey=a,b,c: all these values, in one table and one picture of each kind"),
 ]
 Quiet = Annotated[bool, Parameter(name=("--quiet", "-q"), show_default=False, help="say nothing but errors")]
 Force = Annotated[bool, Parameter(show_default=False, help="do the work even if the products are up to date")]
@@ -291,7 +296,10 @@ def closure(
 
 
 @app.command
-def contact(file: Path, /, *, output: Output = None, set_: Set = (), quiet: Quiet = False) -> None:
+def contact(
+    file: Path, /, *, output: Output = None, vary: Vary = None, figures: Figures = None, set_: Set = (),
+    quiet: Quiet = False,
+) -> None:  # fmt: skip
     """What a contact law does: force, stiffness, loops, slip orbits, friction, microslip, wear; as PNG and CSV.
 
     Args:
@@ -300,10 +308,26 @@ def contact(file: Path, /, *, output: Output = None, set_: Set = (), quiet: Quie
     """
     from .stages.contact import contact_stage
 
+    draw_beside(figures)
     file = file if file.exists() else _figure_of_the_book(file)
+    file = file / "contact.toml" if file.is_dir() else file
     with progress(f"contact {file}", quiet) as report:
-        lines = contact_stage(file, list(set_), output, report)
-    _say("\n".join(lines), quiet)
+
+        def one(own: list[str], folder: Path | None) -> Written:
+            return contact_stage(file, own, folder, report)
+
+        found = _varied(file, vary, set_, one, report) if vary else one(list(set_), output)
+    _tell(found, quiet, "")
+
+
+def _varied(
+    path: Path, vary: str, set_: Sequence[str], one: Callable[[list[str], Path], Written],
+    report: Callable[[str], None], root: Path = Path("build"),
+) -> Written:  # fmt: skip
+    """See `stages.varying.varied`, which is loaded where it is asked for."""
+    from .stages.varying import varied
+
+    return varied(path, vary, set_, one, root, report)
 
 
 def _figure_of_the_book(file: Path) -> Path:
@@ -323,8 +347,8 @@ def _figure_of_the_book(file: Path) -> Path:
 def respond(
     case: Path, basis: Path | None = None, /, *, over: Over = None, set_: Set = (), log: Log = False,
     compare_book: Book = False, stability: Stability = False, all_stresses: Everywhere = False,
-    no_stress: NoStress = False, no_pictures: NoPictures = False, figures: Figures = None, force: Force = False,
-    quiet: Quiet = False,
+    no_stress: NoStress = False, no_pictures: NoPictures = False, figures: Figures = None, vary: Vary = None,
+    force: Force = False, quiet: Quiet = False,
 ) -> None:  # fmt: skip
     """Friction response of a case on a modal file that is there already; needs neither gmsh nor VTK.
 
@@ -346,9 +370,22 @@ def respond(
 
     draw_beside(figures)
     case = case_file(case)
+    if vary and (compare_book or stability):
+        raise UserError("leave --compare-book and --stability out, or --vary", "--vary")
     if over is not None:
-        _survey(case, basis, over.replace("-", "_"), set_, force, quiet)
+        _survey(case, basis, over.replace("-", "_"), set_, force, quiet, vary)
         return
+    stresses: Literal["all", "resonances", "none"] = "all" if all_stresses else "resonances"
+    wanted = Wanted("none" if no_stress else stresses, not no_pictures)
+    if vary:
+        with progress(f"respond {case}", quiet) as report:
+
+            def one(own: list[str], folder: Path) -> Written:
+                running.respond(case, basis, own, force, report, log=log, wanted=wanted, folder=folder)
+                return running.response_of(folder)
+
+            family = _varied(case, vary, set_, one, report)
+        return _tell(family, quiet, f"{family.missing}; {{page}} holds what was found")
     with (
         progress(f"respond {case}", quiet) as report,
         response_of_case(folder_of_case(case, load_case(case, list(set_))[0].name), report=report).making(),
@@ -356,8 +393,6 @@ def respond(
         if compare_book:
             table, pairs, converged = running.compare_book(case, basis, list(set_), force, report, log=log)
         else:
-            stresses: Literal["all", "resonances", "none"] = "all" if all_stresses else "resonances"
-            wanted = Wanted("none" if no_stress else stresses, not no_pictures)
             table, converged = running.respond(case, basis, list(set_), force, report, log=log, wanted=wanted)
         if stability:
             from .stages.answer import case_job
@@ -387,12 +422,19 @@ def identify(
     _survey(case_file(case), basis, "identification", set_, force, quiet)
 
 
-def _survey(case: Path, basis: Path | None, kind: str, set_: Sequence[str], force: bool, quiet: bool) -> None:
+def _survey(
+    case: Path, basis: Path | None, kind: str, set_: Sequence[str], force: bool, quiet: bool, vary: str | None = None
+) -> None:
     from .stages.answer import case_job
     from .stages.surveying import survey_stage
 
     with progress(f"{kind.replace('_', ' ')} of {case}", quiet) as report:
-        found = survey_stage(case_job(case, basis, set_, force, report, make=False), kind)
+
+        def one(own: Sequence[str], folder: Path | None = None) -> Written:
+            job = case_job(case, basis, own, force, report, make=False)
+            return survey_stage(replace(job, folder=folder or job.folder), kind)
+
+        found = _varied(case, vary, set_, one, report) if vary else one(set_)
     _tell(found, quiet, f"{found.missing}; {{page}} holds what was found")
 
 
@@ -410,8 +452,8 @@ def _tell(found: Written, quiet: bool, lost: str) -> None:
 
 @app.command
 def roll(
-    case: Path, /, *, no_pictures: NoPictures = False, figures: Figures = None, set_: Set = (), force: Force = False,
-    quiet: Quiet = False,
+    case: Path, /, *, no_pictures: NoPictures = False, figures: Figures = None, vary: Vary = None, set_: Set = (),
+    force: Force = False, quiet: Quiet = False,
 ) -> None:  # fmt: skip
     """A wheel on a rail, or any two bodies that roll on each other: patches, creep curve, tractions; with [vehicle] how
     unround wheels wear over their circumference, and which waves grow; a tyre whose slip jumps.
@@ -424,14 +466,18 @@ def roll(
     draw_beside(figures)
     case = case_file(case)
     with progress(f"roll {case}", quiet) as report:
-        found = roll_stage(case, Path("build"), set_, force, report, not no_pictures)
+
+        def one(own: Sequence[str], folder: Path | None = None) -> Written:
+            return roll_stage(case, Path("build"), own, force, report, not no_pictures, folder)
+
+        found = _varied(case, vary, set_, one, report) if vary else one(set_)
     _tell(found, quiet, "the run ended early; {page} says why, and holds what was found")
 
 
 @app.command
 def stability(
     path: Path, /, *, speed: int | None = None, no_pictures: NoPictures = False, figures: Figures = None,
-    set_: Set = (), force: Force = False, quiet: Quiet = False,
+    vary: Vary = None, set_: Set = (), force: Force = False, quiet: Quiet = False,
 ) -> None:  # fmt: skip
     """Does it move by itself: all complex roots in a window of frequencies and growth rates, none missed.
 
@@ -450,7 +496,9 @@ def stability(
     if is_case(path):
         if speed is not None:
             raise UserError(f"{path}: --speed {speed}: is of a modal file; a case has bodies.speed")
-        return _analyse("stability", "stability", path, None, no_pictures, set_, force, quiet)
+        return _analyse("stability", "stability", path, None, no_pictures, set_, force, quiet, vary)
+    if vary:
+        raise UserError("is of a case whose contacts slide; leave it out", "--vary", path)
     with progress(f"stability {path}", quiet) as report:
         found = stability_stage(path, list(set_), force, report, not no_pictures, speed)
     _tell(found, quiet, "roots in the window are missing; {page} says what")
@@ -576,11 +624,13 @@ def import_(
             made = import_deck(file, folder, unit, report, instead, solids_only)
         else:
             made = import_parts(parts, folder, unit, report, instead)
+    first = made.told[: -1 if modes else None]  # said even where the modes fail
+    for line in first:
+        print(line)
     if modes:
         with progress(f"modes of {made.path.parent}") as report:
             made = with_modes(made, report)
-    for line in made.told:
-        print(line)
+        print("\n".join(line for line in made.told if line not in first))
 
 
 @app.command
@@ -623,26 +673,35 @@ def export(
 @app.command
 def compare(
     first: Path, second: Path, /, *, output: Output = None, speed: int = 0, nodal_diameter: int = 0,
-    distance: float | None = None, least: float = 0.5, quiet: Quiet = False,
+    distance: float | None = None, least: float = 0.5, unit: str = "mm", quiet: Quiet = False,
 ) -> None:  # fmt: skip
     """Frequencies, MAC and pairs of modes of two modal files, computed or measured; pictures side by side.
 
+    Measured functions of a Universal File are laid beside those that the modes of the other file give.
+
     Args:
-        first: a basis.h5.
+        first: a basis.h5, or a Universal File (.uff, .unv) with modes (data sets 55, 2414) or functions (58).
         second: another one, in the same frame.
         output: folder for mac.png, pairs.png and pairs.csv; nothing is written if not given.
         speed: which of the files' speeds, counted from 0.
         nodal_diameter: of cyclic bodies.
         distance: m, largest distance between points that count as the same; a hundredth of the body if not given.
         least: MAC below which modes stay unpaired.
+        unit: of lengths of a Universal File that does not tell it.
     """
-    from .basis import read_basis
+    from .exchange.measured import opened
+    from .mesh.unv import UNIVERSAL
     from .modal.sampling import on_common_points
     from .reduced.correlation import compare_groups, pair_table
 
     if not 0 <= least <= 1:
         raise UserError(f"compare --least {least:g}: a MAC lies between 0 and 1; choose a number there")
-    bodies = (read_basis(_modal_file(first)), read_basis(_modal_file(second)))
+    files = [f if f.suffix.lower() in UNIVERSAL else _modal_file(f) for f in (first, second)]
+    bodies, told = opened(files, (speed, nodal_diameter), unit)
+    for line in told:
+        _say(line, quiet)
+    if len(bodies) < 2:
+        return
     seen = on_common_points(*bodies)
     found = compare_groups(*seen, (speed, nodal_diameter), distance, least)
     _say("\n".join(pair_table(found)), quiet)
@@ -655,7 +714,7 @@ def compare(
 
     reason = pictures.can_draw()
     write_text(output / "pairs.csv", pair_rows(found))
-    drawn = draw_comparison(bodies, seen, found, (speed, nodal_diameter), output, not reason)
+    drawn = draw_comparison((bodies[0], bodies[1]), seen, found, (speed, nodal_diameter), output, not reason)
     _warn([f"no pictures of the shapes: {reason}"] if reason else [])
     _say("\n".join(str(f) for f in (*drawn.values(), output / "pairs.csv")), quiet)
 
@@ -828,7 +887,7 @@ _ARGUMENTS = """Args:
 
 def _analyse(
     name: str, verb: str, case: Path, basis: Path | None, no_pictures: bool, set_: Sequence[str], force: bool,
-    quiet: bool,
+    quiet: bool, vary: str | None,
 ) -> None:  # fmt: skip
     """The answer of an analysis."""
     from .analysis import analyses
@@ -836,7 +895,12 @@ def _analyse(
     from .stages.answer import case_job
 
     with progress(f"{verb} {case}", quiet) as report:
-        found = analysed(name, case_job(case, basis, set_, force, report, not no_pictures))
+
+        def one(own: Sequence[str], folder: Path | None = None) -> Written:
+            job = case_job(case, basis, own, force, report, not no_pictures)
+            return analysed(name, replace(job, folder=folder or job.folder))
+
+        found = _varied(case, vary, set_, one, report) if vary else one(set_)
     _tell(found, quiet, f"{found.missing or analyses()[name].lost}; {{page}} says which and why")
 
 
@@ -845,12 +909,12 @@ def _verb(name: str, said: Verb) -> Callable[..., None]:
 
     def verb(
         case: Path, basis: Path | None = None, /, *, no_pictures: NoPictures = False, figures: Figures = None,
-        set_: Set = (), force: Force = False, quiet: Quiet = False, **keys: tuple[str, ...],
+        vary: Vary = None, set_: Set = (), force: Force = False, quiet: Quiet = False, **keys: tuple[str, ...],
     ) -> None:  # fmt: skip
         draw_beside(figures)
         given = {key: values[0] if len(values) == 1 else json.dumps(values) for key, values in keys.items() if values}
         more = [f"{name}.{key}={value}" for key, value in given.items()]
-        _analyse(name, said.name, case_file(case), basis, no_pictures, [*set_, *more], force, quiet)
+        _analyse(name, said.name, case_file(case), basis, no_pictures, [*set_, *more], force, quiet, vary)
 
     of = inspect.signature(verb, eval_str=True)
     kept = [p for p in of.parameters.values() if p.kind is not p.VAR_KEYWORD]

@@ -70,6 +70,10 @@ class Material:
         temperature_table: (t, 2) temperature in K and the factor on `elasticity` at that temperature;
             linear between the entries, constant outside. ``None``: the modulus does not depend on temperature.
         name: for reports.
+        stiffness_table: temperatures (t,) in K and matrices (t, 6, 6) that take the place of
+            `elasticity` where not only one factor changes, or ``None``.
+        expansion_table: (t, 2) temperature in K and the factor on `expansion`, a secant from
+            `zero`, K; linear between, constant outside. ``None``: it is constant.
     """
 
     density: float
@@ -77,6 +81,37 @@ class Material:
     expansion: Array
     temperature_table: Array | None = None
     name: str = "material"
+    stiffness_table: tuple[Array, Array] | None = None
+    expansion_table: Array | None = None
+    zero: float = 0.0
+
+    @property
+    def softening(self) -> Array | None:
+        """(t, 2) temperature in K and the factor on the first stiffness, None where it is constant."""
+        if self.stiffness_table is None:
+            return self.temperature_table
+        T, C = self.stiffness_table
+        return np.column_stack([T, C[:, 0, 0] / C[0, 0, 0]])
+
+    def stiffness_at(self, temperature: Array) -> Array:
+        """(..., 6, 6) Pa of `stiffness_table` at temperatures (K)."""
+        assert self.stiffness_table is not None
+        T, C = self.stiffness_table
+        at = np.clip(np.interp(temperature, T, np.arange(len(T))), 0, len(T) - 1)
+        low = np.minimum(at.astype(np.int64), max(len(T) - 2, 0))
+        share = (at - low)[..., None, None]
+        return (1 - share) * C[low] + share * C[np.minimum(low + 1, len(T) - 1)]
+
+    def thermal_strain(self, temperature: Array, reference: Array) -> Array:
+        """(..., 6) strain at temperatures (K) of what is free of strain at the reference ones."""
+        if self.expansion_table is None:
+            return (temperature - reference)[..., None] * self.expansion
+
+        def grown(T: Array) -> Array:
+            assert self.expansion_table is not None
+            return np.interp(T, *self.expansion_table.T) * (T - self.zero)
+
+        return (grown(temperature) - grown(reference))[..., None] * self.expansion
 
     def modulus_factor(self, temperature: Array) -> Array:
         """Factor on `elasticity` at the given temperatures (K), any shape."""
@@ -205,7 +240,8 @@ class LumpedElement:
 
     Attributes:
         nodes, directions: (t,) of its rows; directions 3 to 5 are rotations. stiffness, damping:
-            (t, t), in the units of the file.
+            (t, t), in the units of the file. along: stiffness of a spring along the line from the
+            first node to the last, which turns with it; 0 of others.
     """
 
     where: str
@@ -213,6 +249,7 @@ class LumpedElement:
     directions: Indices
     stiffness: Array
     damping: Array
+    along: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -224,7 +261,8 @@ class Lumps:
     Attributes:
         points: (j,) with masses (j,), kg; those beside a principal axis of an impossible inertia
             may be negative. pairs: (m, 2) points a <= b. stiffness, damping: (m, 3, 3) what they
-            add to the block of a and b, N/m and N s/m.
+            add to the block of a and b, N/m and N s/m. lines: (s, 2) points a < b of springs along
+            the lines between them, tight: (s,) N/m of these.
     """
 
     points: Indices
@@ -232,6 +270,8 @@ class Lumps:
     pairs: Indices
     stiffness: Array
     damping: Array
+    lines: Indices
+    tight: Array
 
 
 @dataclass(frozen=True)
@@ -308,7 +348,7 @@ class FacetLoad:
     Attributes:
         facets: (f, c) corners as a file has them, (f, k) points of facets of the type `kind` in a mesh. values: (f,)
             or (f, c) at the corners, Pa; a pressure is positive into the body. direction: (3,) unit vector of a
-            traction, None for a pressure.
+            traction, None for a pressure. inside: whether it acts on facets between cells, too.
     """
 
     where: str
@@ -316,6 +356,7 @@ class FacetLoad:
     values: Array
     direction: Array | None = None
     kind: str = ""
+    inside: bool = False
 
 
 @dataclass(frozen=True)
@@ -349,12 +390,14 @@ class StaticStep:
 
     Attributes:
         where: place of the step. nonlinear: whether its displacements are finite (NLGEOM), else one linear solution.
-        loads: all that act at its end, in a mesh in SI.
+        loads: all that act at its end, in a mesh in SI. supports: point set -> directions that it
+            holds, as `Mesh.supports`; None: those of the modes.
     """
 
     where: str
     nonlinear: bool
     loads: tuple[NodalLoad | FacetLoad | BodyLoad | SpinLoad, ...] = ()
+    supports: Mapping[str, str] | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -35,8 +35,14 @@ def shape_functions(cell_type: str, at: Array) -> tuple[Array, Array]:
 
 
 @cache
-def rule(cell_type: str) -> tuple[Array, Array]:
-    """Points (q, 3) and weights (q,): 6 and 9 (as CalculiX) in wedges, 8 and 27 in pyramids."""
+def rule(cell_type: str, least: bool = False) -> tuple[Array, Array]:
+    """Points (q, 3) and weights (q,): 6 and 9 in wedges, 8 and 27 in pyramids.
+
+    least: of a wedge of 6 nodes two on its axis, as CalculiX.
+    """
+    if least and cell_type == "wedge":
+        heights = (1 + np.polynomial.legendre.leggauss(2)[0]) / 2
+        return np.array([[1 / 3, 1 / 3, h] for h in heights]), np.full(2, 0.25)
     if cell_type in _WEDGES:
         triangle = np.array([[1 / 6, 1 / 6], [2 / 3, 1 / 6], [1 / 6, 2 / 3]])
         heights, share = np.polynomial.legendre.leggauss(2 if cell_type == "wedge" else 3)

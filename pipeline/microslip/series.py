@@ -68,6 +68,31 @@ def derivative(coefficients: int) -> Array:
     return differentiated(np.arange(1.0, coefficients // 2 + 1))
 
 
+@lru_cache(maxsize=8)
+def cycle_waves(harmonics: int, samples: int) -> tuple[Array, Array, Array]:
+    """(s, W) E at the samples of a cycle, its derivative over the time in cycles, and (W, s) P."""
+    values, transform = fourier(harmonics, samples)
+    return values, 2 * np.pi * values @ derivative(2 * harmonics + 1), transform
+
+
+def integrals(harmonics: int, begin: Array, end: Array) -> Array:
+    """(W, W) integrals of E^T E over t', summed over intervals (k,) from `begin` to `end`."""
+    n = np.arange(1, 2 * harmonics + 1)
+    waves = (np.exp(1j * np.multiply.outer(n, end)) - np.exp(1j * np.multiply.outer(n, begin))).sum(axis=1) / (1j * n)
+    every = np.concatenate([waves.conj()[::-1], [(end - begin).sum()], waves])  # of exp(i n t'), n from -2 H to 2 H
+    h, middle = np.arange(1, harmonics + 1), 2 * harmonics
+    sums, differences = every[middle + h[:, None] + h], every[middle + h[:, None] - h]
+    out = np.empty((2 * harmonics + 1,) * 2)
+    out[0, 0], first = every[middle].real, waves[:harmonics]
+    out[0, 1::2], out[0, 2::2] = first.real, first.imag
+    out[1:, 0] = out[0, 1:]
+    out[1::2, 1::2] = 0.5 * (sums + differences).real
+    out[2::2, 2::2] = 0.5 * (differences - sums).real
+    out[2::2, 1::2] = 0.5 * (sums + differences).imag
+    out[1::2, 2::2] = out[2::2, 1::2].T
+    return out
+
+
 def amplitudes(v: Array) -> ComplexArray:
     """(H + 1, ...) complex amplitudes, cos - i sin, of (W, ...) coefficients."""
     out = np.empty((len(v) // 2 + 1, *v.shape[1:]), complex)
@@ -131,9 +156,9 @@ class Torus:
         return summed(2 * np.pi * turned.T / self.count)
 
     @property
-    def waves(self) -> tuple[Array, Array]:
-        """`values` and `transform`."""
-        return self.values, self.transform
+    def waves(self) -> tuple[Array, Array, Array]:
+        """`values`, `ahead` and `transform`."""
+        return self.values, self.ahead, self.transform
 
     @cached_property
     def ahead(self) -> Array:

@@ -70,7 +70,7 @@ def between_ellipses(cell_type, n, height, growth):
     return brick(cell_type, n, to=to)
 
 
-@pytest.mark.parametrize("cell_type", CELLS)
+@pytest.mark.parametrize("cell_type", CELLS_SLOW)
 def test_le1_elliptic_membrane(cell_type):
     """10 MPa pull on the outer edge of a membrane: target sigma_yy(D) = 92.7 MPa.
 
@@ -226,7 +226,7 @@ def test_fv16_by_flat_tetrahedra():
 FV32 = np.array([44.623, 130.03, 162.70, 246.05, 379.90, 391.44])
 
 
-@pytest.mark.parametrize("cell_type", CELLS)
+@pytest.mark.parametrize("cell_type", CELLS_SLOW)
 def test_fv32_tapered_membrane(cell_type):
     """10 m long, 5 m wide at the root and 1 m at the tip, held in its plane at the root, thickness 0.05 m.
 

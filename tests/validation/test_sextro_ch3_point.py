@@ -4,7 +4,6 @@ The printed numbers and the parameter sets of the figures. The figures are drawi
 of them is tested. Where a statement of the book does not hold, the test says what holds instead and why.
 """
 
-import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -31,7 +30,7 @@ def value(number):
 
 ROUGH = Rough(value(1), value(1), Polynomial())  # c_N0 = R_Z = 1
 MASS, BETA, STIFFNESS, SLOPE = 1e-3, 0.2, 1.0, 1e6  # "if not defined else"
-CYCLES = jax.jit(periodic, static_argnums=3)
+CYCLES = periodic
 T = 2 * np.pi * np.arange(2000) / 2000
 
 # 3.6 -----------------------------------------------------------------------------------------------------------------

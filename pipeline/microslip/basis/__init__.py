@@ -6,4 +6,5 @@ from .files import CONVENTIONS as CONVENTIONS
 from .files import FORMAT as FORMAT
 from .files import FORMAT_VERSION as FORMAT_VERSION
 from .files import read_basis as read_basis
+from .files import sample as sample
 from .files import write_basis as write_basis

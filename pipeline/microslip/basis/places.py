@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from functools import lru_cache
 
 import numpy as np
 from scipy.spatial import ConvexHull, KDTree, QhullError
@@ -99,12 +100,22 @@ def set_error(mesh: Mesh, places: StressSet) -> float:
     return float(away.max(initial=0.0) / np.ptp(mesh.points, axis=0).max())
 
 
+@lru_cache(maxsize=1)
+def _locator(mesh: Mesh) -> Locator:
+    return Locator(mesh, shape_functions)
+
+
+@lru_cache(maxsize=32)
+def _around(mesh: Mesh, point: tuple[float, ...]) -> list[Location]:
+    """The point in every cell that holds it: the same one in all groups of a file."""
+    return _locator(mesh).around(np.array(point))
+
+
 class Places:
     """Loads and read-outs of a group against the shapes where they are said to be."""
 
     def __init__(self, basis: ModalBasis) -> None:
         self.basis, self.mesh = basis, basis.mesh
-        self.locator = Locator(basis.mesh, shape_functions)
         self.size = np.ptp(basis.mesh.points, axis=0).max()
 
     def monitor_error(self, g: ModalGroup, rows: Rows) -> float:
@@ -116,7 +127,8 @@ class Places:
         fields = np.concatenate([g.phi, g.u_static[:, :, None]], axis=2)
         read = np.column_stack([rows.rows, rows.static]) if len(rows.static) else rows.rows
         scale = np.maximum(np.abs(fields).max(axis=(0, 1)), 1e-300)[: read.shape[1]]
-        at = (place.N @ fields[place.nodes].reshape(len(place.nodes), -1) for place in self.locator.around(rows.point))
+        places = _around(self.mesh, tuple(rows.point))
+        at = (place.N @ fields[place.nodes].reshape(len(place.nodes), -1) for place in places)
         errors = (np.abs((u.reshape(3, -1)[axes, : read.shape[1]] - read) / scale).max() for u in at)
         return float(min(errors, default=np.inf))
 
@@ -130,13 +142,13 @@ class Places:
         if rows.labels == ("pressure",):
             return min((float(np.abs(at - rows.point).max() / self.size) for at, _ in faces), default=np.inf)
         moved = [u for at, u in (*faces, *sets) if np.abs(at - rows.point).max() < NEAR * self.size]
-        moved += [np.tensordot(p.N, g.phi[p.nodes], axes=1) for p in self.locator.around(rows.point)]
+        moved += [np.tensordot(p.N, g.phi[p.nodes], axes=1) for p in _around(self.mesh, tuple(rows.point))]
         return min((_along(u, rows.rows[0]) for u in moved), default=np.inf)
 
     def gauge_error(self, g: ModalGroup, rows: Rows) -> float:
         """How far a gauge's strains are from those of the shapes at its point along any one direction, over the
         largest there; of few modes how far beyond the principal ones."""
-        places = self.locator.around(rows.point)
+        places = _around(self.mesh, tuple(rows.point))
         return min((_strain_error(g, place, rows, self.size) for place in places), default=np.inf)
 
     def _beyond(self, point: Array) -> float:

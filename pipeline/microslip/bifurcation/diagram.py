@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..continuation import Lost, Scaled, Settings, advance, newton, start
+from ..continuation import Lost, Scaled, Settings, advance, newton, start, switched
 from ..continuation.curve import State
 from ..data import Array
 from ..errors import UserError
@@ -45,6 +45,7 @@ class DiagramPlan:
     starts: int = 64
     seed: int = 0
     deflate: tuple[float, ...] = ()
+    branches: int = 0
 
     @property
     def settings(self) -> Settings:
@@ -134,10 +135,53 @@ def diagram(
             _beside(work, p, [np.asarray(x, dtype=float)])
     else:
         still = work.add(EQUILIBRIA, lambda: _equilibria(system, x, asked))
+        _branched(work, still, asked.branches)
         points = tuple(_hopf(system, still, i) for i in still.of_kind("Hopf"))
         if asked.orbits:
             _orbits(work, still, points)
+    for branch in [b for b in work.found if not b.still]:
+        _branched(work, branch, asked.branches)
     return Diagram(system, tuple(work.found), points, tuple(work.seen), tuple(work.deflated), tuple(work.messages))
+
+
+def _branched(work: _DiagramWork, parent: DiagramBranch, levels: int) -> None:
+    """The branches that cross one of equilibria or orbits at its branch points, and those that cross these."""
+    system, settings = work.system, work.asked.settings
+    for number, i in enumerate(parent.of_kind("branch point") if levels else [], 1):
+        near = [int(np.clip(j, 0, len(parent) - 1)) for j in (i - 1, i, i + 1)]
+        if parent.still:
+            before, x, after = (parent.x[j, 0] for j in near)
+            problem: equilibria.Still | Shooting = equilibria.Still(system)
+        else:
+            problem = Shooting(system, parent.orbit(system, int(i)), float(parent.period[i]))
+            before, x, after = (problem.unknowns(parent.orbit(system, j)) for j in near)
+        ahead = after - before, float(parent.parameter[near[2]] - parent.parameter[near[0]])
+        states = switched(problem, x, float(parent.parameter[i]), ahead, settings)
+        name, born = f"{parent.name} branched {number}", f"branch point at {parent.parameter[i]:.6g} of {parent.name}"
+
+        def make(
+            name: str = name, born: str = born, problem: equilibria.Still | Shooting = problem,
+            states: list[State] = states,
+        ) -> DiagramBranch:  # fmt: skip
+            if isinstance(problem, Shooting):
+                ways = [followed(name, born, problem, state, settings, work.report) for state in states]
+            else:
+                ways = [_still(system, name, born, state, settings) for state in states]
+            return joined(ways[1], ways[0]) if len(ways) > 1 else ways[0]
+
+        if states and not any(_same(states[0], problem, other, work) for other in work.found if other is not parent):
+            _branched(work, work.add(name, make), levels - 1)
+
+
+def _same(state: State, problem: equilibria.Still | Shooting, branch: DiagramBranch, work: _DiagramWork) -> bool:
+    """Whether a known branch passes where another one begins."""
+    point = state.found[0]
+    if isinstance(problem, Shooting):
+        return _passes(branch, problem.orbit(point.x, point.lam))
+    if not branch.still:
+        return False
+    away = np.abs((branch.x[:, 0] - point.x) / work.system.scale).max(axis=1)
+    return bool((away + np.abs(branch.parameter - point.lam) / work.system.parameter_scale).min() < 1e-3)
 
 
 def _orbits(work: _DiagramWork, still: DiagramBranch, points: Sequence[Hopf]) -> None:
@@ -267,6 +311,12 @@ def _equilibria(system: Dynamics, x: Array, asked: DiagramPlan) -> DiagramBranch
             f"no equilibrium is found near the start: {state.status}; begin at another value of the parameter, or give "
             "another x"
         )
+    return _still(system, EQUILIBRIA, "the start", state, settings)
+
+
+def _still(system: Dynamics, name: str, born: str, state: State, settings: Settings) -> DiagramBranch:
+    """A branch of equilibria from its first state to its end."""
+    problem = equilibria.Still(system)
     rows: list[tuple[Array, float, str]] = [(p.x, p.lam, p.kind) for p in state.found]
     while not state.status:
         before, state = state, advance(problem, state, settings)
@@ -278,7 +328,7 @@ def _equilibria(system: Dynamics, x: Array, asked: DiagramPlan) -> DiagramBranch
     values = np.array([equilibria.eigenvalues(system, a, b) for a, b in zip(X, P, strict=True)])
     seen = np.array([system.seen(a, b) for a, b in zip(X, P, strict=True)])
     return DiagramBranch(
-        EQUILIBRIA, "the start", state.status, 1, system.named, P, np.full(len(P), np.nan), X[:, None], seen, seen,
+        name, born, state.status, 1, system.named, P, np.full(len(P), np.nan), X[:, None], seen, seen,
         values, values.real.max(axis=1) <= 0, np.array([r[2] for r in rows]),
         system.units,
     )  # fmt: skip

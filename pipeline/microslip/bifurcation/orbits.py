@@ -10,13 +10,14 @@ from typing import Literal
 import numpy as np
 
 from ..continuation import Lost, Scaled, Segment, Settings, advance, branch_off, root
+from ..continuation.curve import Kind as CurveKind
 from ..continuation.curve import State
 from ..data import Array, ComplexArray
 from .dynamics import Dynamics
 from .equilibria import Hopf
 from .shooting import PeriodicOrbit, Shooting
 
-Kind = Literal["start", "regular", "fold", "period doubling", "torus", "branch point", "target", "bound"]
+Kind = CurveKind | Literal["torus"]
 
 
 @dataclass(frozen=True)
@@ -34,6 +35,11 @@ class OrbitPoint:
     def stable(self) -> bool:
         return self.orbit.stable
 
+
+CENTRE = "centre: orbits of every size are at one value of the parameter"
+
+EVERY = 100
+"""Orbits at one value of the parameter that are enough to say so."""
 
 OFF = 2e-3
 """Size of the first step off a branch, in scales of the coordinates."""
@@ -92,7 +98,7 @@ def follow(problem: Shooting, state: State, settings: Settings) -> Iterator[tupl
     The phase of every step counts from the orbit before it, so that no orbit is too far from the reference.
     """
     previous = None
-    here = _found(problem, state.y, "start")
+    here, met = _found(problem, state.y, "start"), list[float]()
     yield [here] if not state.status else [], state.status
     while not state.status:
         previous, state = state, advance(problem, state, settings)
@@ -104,10 +110,15 @@ def follow(problem: Shooting, state: State, settings: Settings) -> Iterator[tupl
         passed = _passed(problem, previous, state, here, last, settings) if points else []
         passed = [one for one in passed if settings.low <= one.orbit.p <= settings.high]
         ended = state.status or _collapsed(problem, here.orbit, last.orbit)
+        met = [*met, last.orbit.p][-EVERY:]
+        if not ended and len(met) == EVERY and np.ptp(met) <= 1e-8 * problem.system.parameter_scale:
+            ended = f"{CENTRE}, {last.orbit.p:.6g}"
         if ended == COLLAPSED:
             yield [], ended
             return
         yield sorted([*passed, *points], key=lambda one: _ahead(problem, previous, one)), ended
+        if ended:
+            return
         here = last
         problem = replace(problem, reference=here.orbit)
 

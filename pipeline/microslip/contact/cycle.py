@@ -21,15 +21,15 @@ def around(path: Array, dt: Scalar) -> Array:
 
 
 def push(
-    law: Law, path: Array, dt: Scalar, state: State, tangents: State, moves: Array
+    law: Law, dt: Scalar, state: State, tangents: State, rows: tuple[Array, ...]
 ) -> tuple[tuple[Array, State], tuple[Array, State]]:
     """`law.march`, and its tangents along every parameter: of the force (s, p, n, 3), and of the state.
 
     Args:
-        tangents: of the state at the beginning, parameters first. moves: (s, p, 3) m, by which a parameter moves all
-            points alike: only these numbers a sample, not those of every point, are handed to the tangents of a step.
+        tangents: of the state at the beginning, parameters first. rows: (s, n, 3) m and m/s of the path, and (s, p, 3)
+            by which a parameter moves all points alike: only these numbers a sample, not those of every point, are
+            handed to the tangents of a step.
     """
-    rows = (path, around(path, dt), moves, around(moves, dt))
 
     def one(carried: tuple[State, State], row: tuple[Array, ...]) -> tuple[tuple[State, State], tuple[Array, ...]]:
         state, tangents = carried
@@ -68,9 +68,9 @@ class Ways(NamedTuple):
     first: Any
 
 
-def ways(law: Law, path: Array, dt: Scalar) -> Ways:
-    """Of a periodic path (s, n, 3) m."""
-    rate, rest = around(path, dt), law.init(path.shape[1])
+def ways(law: Law, path: Array, rate: Array, dt: Scalar) -> Ways:
+    """Of a periodic path (s, n, 3) m and its rate (s, n, 3) m/s."""
+    rest = law.init(path.shape[1])
     placed = jax.vmap(lambda u, v: stepped(law, u, v, dt, rest)[1])(path, rate)
     every = jax.vmap(lambda u, v, state: law.way(u, v, dt, state))(path, rate, rolled(placed))
     return Ways(rate, placed, every, law.way(path[0], rate[0], dt, rest))

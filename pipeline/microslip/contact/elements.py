@@ -15,6 +15,7 @@ class Spring(Law):
     so that they serve arrays of numpy as well as those of jax."""
 
     smooth: ClassVar[bool] = True
+    viscous: ClassVar[bool] = False
 
     def force(self, u: Any) -> Any:
         """N."""
@@ -99,6 +100,11 @@ class Stop(Spring):
 
     def overlap(self, u: Array) -> Array:
         return (jnp.abs(u[:, 1]) if self.both else u[:, 1]) - self.gap
+
+    @property
+    def sides(self) -> list[tuple[float, Any]]:
+        """(1 or -1, gap in m) of each: it is met where the displacement times the first is beyond the gap."""
+        return [(1.0, self.gap), (-1.0, self.gap)][: 2 if self.both else 1]
 
     def _pressed(self, u: Any) -> Any:
         over = (u > self.gap) * (u - self.gap)

@@ -13,7 +13,7 @@ import jax
 import jax.numpy as jnp
 
 from ..programs import inner
-from ..series import fourier
+from ..series import cycle_waves
 from .law import Array, Law, Scalar, point_axes
 from .periodic import Known, near, unknown, with_slopes
 
@@ -65,12 +65,12 @@ def force_near(
     periodicity: Scalar = 0.0,
 ) -> tuple[Array, Known]:  # fmt: skip
     """`force_alone`, begun with what sliders remember of a motion near by, and what they remember now."""
-    values, transform = fourier(u.shape[2] // 2, samples)
+    values, ahead, transform = map(jnp.asarray, cycle_waves(u.shape[2] // 2, samples))
 
     def one(law: Law, u: Array, *known: Array) -> tuple[Array, ...]:
-        path = jnp.einsum("sh,nkh->snk", values, u)
+        path, rate = (jnp.einsum("sh,nkh->snk", of, u) for of in (values, ahead))
         begun = Known(*(jnp.moveaxis(x, 0, -1) for x in known))
-        force, found = near(law, path, period, count, periodicity, transform, begun)
+        force, found = near(law, path, rate / period, period, count, periodicity, transform, begun)
         return jnp.einsum("hkn->nkh", force), *(jnp.moveaxis(x, -1, 0) for x in found)
 
     force, *found = _chunked(one, law, chunk, u, *(jnp.moveaxis(x, -1, 0) for x in known))
@@ -111,7 +111,7 @@ def _with_derivative(
     law: Law, u: Array, period: Scalar, samples: int, count: int, periodicity: Scalar
 ) -> tuple[Array, Array]:
     """With the tangents along every harmonic of every direction."""
-    values, transform = fourier(u.shape[2] // 2, samples)
-    path = jnp.einsum("sh,nkh->snk", values, u)
-    found, slope = with_slopes(law, path, period, count, periodicity, values, transform)
+    values, ahead, transform = map(jnp.asarray, cycle_waves(u.shape[2] // 2, samples))
+    path, rate = (jnp.einsum("sh,nkh->snk", of, u) for of in (values, ahead))
+    found, slope = with_slopes(law, path, rate / period, period, count, periodicity, values, ahead, transform)
     return jnp.einsum("hs,snk->nkh", transform, found.force), jnp.einsum("hzjnk->nkhjz", slope)

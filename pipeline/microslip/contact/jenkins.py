@@ -45,6 +45,7 @@ class Jenkins(Law):
     across: Array = number(ge=0)
     held: Array = number(ge=0)
     slider: int = static(default=1)
+    viscous: ClassVar[bool] = False
 
     def scaled(self, share: Array) -> Jenkins:
         own = {name: getattr(self, name) * share for name in ("normal", "along", "across", "held")}

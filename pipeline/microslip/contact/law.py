@@ -276,7 +276,9 @@ class Law(SolvableMemory, DifferentialForm, Braking):
         """Force at the end of a step that ends at ``u`` with velocity ``v``, and the state there.
 
         Args:
-            u: (n, 3) m. v: (n, 3) m/s. dt: length of the step, s. state: at its beginning.
+            u: (n, 3) m. v: (n, 3) m/s at its end, in harmonic balance the exact derivative of the harmonics; what
+                slides in the step, over dt, is its displacement's: a path slid must be whole. dt: length of the
+                step, s. state: at its beginning.
         """
         raise NotImplementedError
 
@@ -300,6 +302,12 @@ class Law(SolvableMemory, DifferentialForm, Braking):
         every solution is checked by that. NaN, the default: the law does not count it, and nothing is checked.
         """
         return jnp.full(step.u.shape[0], jnp.nan)
+
+    @property
+    def viscous(self) -> bool:
+        """Whether `step` reads the velocity: where the memory is solved for, tangents along it are then computed
+        too. The default, and of laws that march: it may."""
+        return True
 
     # what a patch asks -----------------------------------------------------------------------------------------------
 

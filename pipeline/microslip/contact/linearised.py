@@ -2,9 +2,10 @@
 
 A step depends on where it ends, on where it began, and on the memory there. With derivatives of the step alone
 
-    x_s = A_s x_(s-1) + B_s u_s + C_s u_(s-1),    F_s = G_s x_(s-1) + D_s u_s + E_s u_(s-1)
+    x_s = A_s x_(s-1) + B_s m_s,    F_s = G_s x_(s-1) + D_s m_s
 
-for the tangents x of the memory and F of the force under moves u of the samples. These derivatives are taken for many
+for the tangents x of the memory and F of the force under moves m_s = (u_s, u'_s, u_(s-1), u'_(s-1)) of the samples,
+the rates u' only where a law reads them (`Law.viscous`). These derivatives are taken for many
 samples at once; what goes from sample to sample is this recursion. It is linear in the memory that the cycle begins
 with, so that one cycle tells what every beginning would give.
 """
@@ -47,27 +48,26 @@ class _Steps(NamedTuple):
     """Derivatives of steps, samples along the first axis, as named above.
 
     Attributes:
-        A: (s, 2, m, 2, n). B, C: (s, 3, m, 2, n). D, E: (s, 3, 3, n), of the force's directions last but one. G:
-            (s, 3, m, 2, n).
+        A: (s, 2, m, 2, n). B: (s, k, 3, m, 2, n) of k moves. D: (s, k, 3, 3, n), of the force's directions last but
+            one. G: (s, 3, m, 2, n).
     """
 
     A: Array
     B: Array
-    C: Array
     D: Array
-    E: Array
     G: Array
 
 
 def linearised(
-    law: Law, path: Array, dt: Scalar, ways: Ways, memory: Array, whole: Array, signals: Array, weights: Array
+    law: Law, path: Array, dt: Scalar, ways: Ways, memory: Array, whole: Array, signals: Array, rates: Array,
+    weights: Array,
 ) -> Linearised:  # fmt: skip
     """A cycle of a law whose sliders can be solved for (`Law.recalled`).
 
     Args:
         path: (s, n, 3) m. ways: of its steps. memory: that every step begins with. whole: whether the cycle is the
             periodic one, and the tangents of the force are asked for as well, or that from rest. signals: (s, w) by
-            which all points move alike, periodic. weights: (h, s).
+            which all points move alike, periodic; rates: of theirs, over the time. weights: (h, s).
     """
     (samples, w), h, n = signals.shape, len(weights), path.shape[1]
     m = sliders(memory, 1).shape[1]
@@ -75,12 +75,12 @@ def linearised(
 
     def block(carried: tuple, rows: tuple[Array, ...]) -> tuple[tuple, None]:
         x, by_memory, *sums = carried
-        *place, signal, before, weight = rows
+        *place, moves, weight = rows
         steps = jax.lax.map(lambda row: _step(law, dt, *row), tuple(place))  # of all at once each would be found often
-        (x, by_memory), each = jax.lax.scan(_recursion, (x, by_memory), (steps, signal, before))
+        (x, by_memory), each = jax.lax.scan(_recursion, (x, by_memory), (steps, moves))
 
         def more() -> list[Array]:
-            forces = _forces(steps, signal, before, *each)
+            forces = _forces(steps, moves, *each)
             return [a + jnp.einsum("sh,s...->h...", weight, b) for a, b in zip(sums, forces, strict=True)]
 
         sums = jax.lax.cond(whole, more, lambda: sums)
@@ -94,7 +94,9 @@ def linearised(
     )
     each = jnp.broadcast_to(jnp.eye(2)[:, None, :, None], (2, m, 2, n))
     sums = jnp.zeros((h, w, 3, 3, n)), jnp.zeros((h, 2, 3, m, n))
-    rows = (path, ways.rate, begun, held, memory, signals, jnp.roll(signals, 1, axis=0), weights.T)
+    now = jnp.stack([signals, rates] if law.viscous else [signals], axis=1)
+    moves = jnp.concatenate([now, jnp.roll(now, 1, axis=0)], axis=1)
+    rows = (path, ways.rate, begun, held, memory, moves, weights.T)
     blocks = jax.tree_util.tree_map(lambda row: row.reshape(samples // size, size, *row.shape[1:]), rows)
     found, _ = jax.lax.scan(block, (jnp.zeros((w, 3, m, 2, n)), each, *sums), blocks)
     return Linearised(*found)
@@ -111,9 +113,9 @@ def _step(law: Law, dt: Scalar, u: Array, v: Array, state: State, held: State, m
     Args:
         state: that it begins with but for the memory. held: its tangents, see `_held`.
     """
-    moves, none = _ways(u.shape[0]), blank(state, 3)
-    along = jax.tree_util.tree_map(lambda *both: jnp.concatenate(both), none, held)
-    du, dv = jnp.concatenate([moves, 0 * moves]), jnp.concatenate([moves / dt, -moves / dt])
+    moves = _ways(law, u.shape[0])
+    along = jax.tree_util.tree_map(lambda *both: jnp.concatenate(both), blank(state, len(moves[0])), held)
+    du, dv = (jnp.concatenate([of, jnp.zeros_like(of)]) for of in moves)
     way, pushed = jax.vmap(
         lambda *moved: jax.jvp(lambda u, v, s: law.way(u, v, dt, s), (u, v, state), moved), out_axes=(None, 0)
     )(du, dv, along)
@@ -127,7 +129,8 @@ def _step(law: Law, dt: Scalar, u: Array, v: Array, state: State, held: State, m
     (force, after), (by_memory, A) = jax.vmap(moved)(pushed), jax.vmap(remembered)(directions(memory))
     A, after = sliders(A, 1), sliders(after, 1)
     G = by_memory.swapaxes(0, 1)[:, None] if A.shape[1] == 1 else _by_slider(law, way, memory)
-    return _Steps(A, after[:3], after[3:], force[:3], force[3:], G)
+    B, D = (x.reshape(-1, 3, *x.shape[1:]) for x in (after, force))
+    return _Steps(A, B, D, G)
 
 
 def _by_slider(law: Law, way: Any, memory: Array) -> Array:
@@ -138,35 +141,38 @@ def _by_slider(law: Law, way: Any, memory: Array) -> Array:
 
 
 def _held(law: Law, u: Array, v: Array, dt: Scalar) -> State:
-    """(3, ...) tangents of the state at a place along where that is, but for the memory."""
-    ways, rest = _ways(len(u)), law.init(len(u))
+    """Tangents, along `_ways`, of the state at a place but for the memory."""
+    rest = law.init(len(u))
 
     def push(du: Array, dv: Array) -> State:
         return jax.jvp(lambda u, v: stepped(law, u, v, dt, rest)[1], (u, v), (du, dv))[1]
 
-    after = jax.vmap(push)(ways, ways / dt)
+    after = jax.vmap(push)(*_ways(law, len(u)))
     return jax.vmap(law.recalled, (0, None))(after, jnp.zeros_like(law.memory(u, rest)))
 
 
-def _ways(n: int) -> Array:
-    """(3, n, 3) along n, t1 and t2, all points alike."""
-    return jnp.broadcast_to(jnp.eye(3)[:, None], (3, n, 3))
+def _ways(law: Law, n: int) -> tuple[Array, Array]:
+    """Moves (3, n, 3) along n, t1 and t2, all points alike, and of the rate; (6, n, 3) where the law reads this: of
+    the place first."""
+    ways = jnp.broadcast_to(jnp.eye(3)[:, None], (3, n, 3))
+    zero = jnp.zeros_like(ways)
+    return (jnp.concatenate([ways, zero]), jnp.concatenate([zero, ways])) if law.viscous else (ways, zero)
 
 
 def _recursion(
-    carried: tuple[Array, Array], row: tuple[_Steps, Array, Array]
+    carried: tuple[Array, Array], row: tuple[_Steps, Array]
 ) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
     """Tangents (w, 3, m, 2, n) of the memory and (2, m, 2, n) those of the memory at the beginning, a sample on; and as
     they were."""
-    (x, begun), (step, signal, before) = carried, row
+    (x, begun), (step, moves) = carried, row
     turned = [step.A[0] * y[..., :1, :] + step.A[1] * y[..., 1:, :] for y in (x, begun)]
-    way = signal[:, None, None, None, None] * step.B + before[:, None, None, None, None] * step.C
+    way = sum(move[:, None, None, None, None] * B for move, B in zip(moves, step.B, strict=True))
     return (turned[0] + way, turned[1]), carried
 
 
-def _forces(steps: _Steps, signal: Array, before: Array, x: Array, begun: Array) -> tuple[Array, Array]:
+def _forces(steps: _Steps, moves: Array, x: Array, begun: Array) -> tuple[Array, Array]:
     """Tangents (s, w, 3, 3, n) of the force, and (s, 2, 3, m, n) those under the memory at the beginning."""
     force = jnp.sum(steps.G[:, None, None] * x[:, :, :, None], axis=(4, 5))
-    force += signal[:, :, None, None, None] * steps.D[:, None]
-    force += before[:, :, None, None, None] * steps.E[:, None]
+    for k in range(moves.shape[1]):
+        force += moves[:, k, :, None, None, None] * steps.D[:, k, None]
     return force, jnp.sum(steps.G[:, None] * begun[:, :, None], axis=4)

@@ -121,7 +121,8 @@ class _Solving(NamedTuple):
 
 @partial(inner, static_argnames="count")
 def periodic(
-    law: Law, path: Array, period: Scalar, count: int = 2, periodicity: Scalar = 0.0
+    law: Law, path: Array, period: Scalar, count: int = 2, periodicity: Scalar = 0.0,
+    rate: Array | None = None,
 ) -> Periodic:  # fmt: skip
     """Force in the last cycle of a periodic path, marched from rest.
 
@@ -132,17 +133,20 @@ def periodic(
 
     Args:
         path: (s, n, 3) m. period: s. count: of cycles at most. periodicity: tolerance as a share of the cycle's largest
-            force; 0 marches all of them and solves for nothing.
+            force; 0 marches all of them and solves for nothing. rate: (s, n, 3) m/s at the samples; backward
+            differences if not given, of first order in the samples.
     """
     dt = period / len(path)
+    rate = around(path, dt) if rate is None else rate
     if solves(law, count):
-        return _Sliders(law, path, dt, periodicity, count).periodic()[0]
-    loop = _Loop(law, path, dt, periodicity, count)
+        return _Sliders(law, path, rate, dt, periodicity, count).periodic()[0]
+    loop = _Loop(law, path, rate, dt, periodicity, count)
     return jax.lax.while_loop(loop.unfinished, loop.marching, loop.rest()).found
 
 
 def near(
-    law: Law, path: Array, period: Scalar, count: int, periodicity: Scalar, weights: Array, known: Known
+    law: Law, path: Array, rate: Array, period: Scalar, count: int, periodicity: Scalar,
+    weights: Array, known: Known,
 ) -> tuple[Array, Known]:  # fmt: skip
     """Weighted sums of the force of `periodic`, begun with what is known of a path near by; and what is known then.
 
@@ -150,36 +154,39 @@ def near(
     rest.
 
     Args:
-        weights: (h, s) of the sums.
+        rate: (s, n, 3) m/s. weights: (h, s) of the sums.
 
     Returns:
         (h, 3, n) N, and what is known.
     """
     if not solves(law, count):
-        return jnp.einsum("hs,snk->hkn", weights, periodic(law, path, period, count, periodicity).force), known
-    found = _Sliders(law, path, period / len(path), periodicity, count, weights, known).solution
+        force = periodic(law, path, period, count, periodicity, rate).force
+        return jnp.einsum("hs,snk->hkn", weights, force), known
+    found = _Sliders(law, path, rate, period / len(path), periodicity, count, weights, known).solution
     told = jnp.isfinite(found.memory).all(axis=tuple(range(found.memory.ndim - 1)))
     return found.last.force, Known(found.memory, found.slope, told)
 
 
 def with_slopes(
-    law: Law, path: Array, period: Scalar, count: int, periodicity: Scalar, signals: Array, weights: Array
-) -> tuple[Periodic, Array]:
+    law: Law, path: Array, rate: Array, period: Scalar, count: int, periodicity: Scalar,
+    signals: Array, ahead: Array, weights: Array,
+) -> tuple[Periodic, Array]:  # fmt: skip
     """`periodic` and the derivative of the force.
 
     Where sliders can be solved for it is that of the periodic state, from the tangents of the first cycle and those of
     the periodic one; otherwise tangents are marched along, and it is that of the cycles marched.
 
     Args:
-        signals: (s, w) m, by which all points move alike along each of n, t1 and t2. weights: (h, s).
+        rate: (s, n, 3) m/s. signals: (s, w) m, by which all points move alike along each of n, t1 and t2. ahead:
+            (s, w) m, their derivatives over the time in cycles. weights: (h, s).
 
     Returns:
         The cycle, and (h, w, 3, n, 3) weighted sums of the derivatives over its samples.
     """
     dt = period / len(path)
     if solves(law, count):
-        return _Sliders(law, path, dt, periodicity, count).slopes(signals, weights)
-    return _Loop(law, path, dt, periodicity, count).slopes(signals, weights)
+        return _Sliders(law, path, rate, dt, periodicity, count).slopes(signals, ahead / period, weights)
+    return _Loop(law, path, rate, dt, periodicity, count).slopes(signals, ahead / period, weights)
 
 
 def solves(law: Law, count: int) -> bool:
@@ -194,6 +201,7 @@ class _Loop:
 
     law: Law
     path: Array
+    rate: Array
     dt: Scalar
     periodicity: Scalar
     count: int
@@ -210,19 +218,20 @@ class _Loop:
 
     def marching(self, at: _At) -> _At:
         """One cycle more."""
-        return self._marched(at, *march(self.law, self.path, self.dt, at.found.state, around(self.path, self.dt)))
+        return self._marched(at, *march(self.law, self.path, self.dt, at.found.state, self.rate))
 
-    def slopes(self, signals: Array, weights: Array) -> tuple[Periodic, Array]:
+    def slopes(self, signals: Array, rates: Array, weights: Array) -> tuple[Periodic, Array]:
         """Tangents are marched along with every cycle."""
 
         def cycle(carried: tuple[_At, State, Array]) -> tuple[_At, State, Array]:
             at, tangents, _ = carried
-            pushed = push(self.law, self.path, self.dt, at.found.state, tangents, moves)
-            (force, after), (slope, changed) = pushed
+            rows = self.path, self.rate, *moves
+            (force, after), (slope, changed) = push(self.law, self.dt, at.found.state, tangents, rows)
             return self._marched(at, force, after), changed, jnp.einsum("ws,spnk->wpnk", weights, slope)
 
-        moves = jnp.einsum("sw,jk->swjk", signals, jnp.eye(3)).reshape(len(signals), -1, 3)
-        size, rest = moves.shape[1], self.rest()
+        each = (jnp.einsum("sw,jk->swjk", of, jnp.eye(3)) for of in (signals, rates))
+        moves = tuple(of.reshape(len(signals), -1, 3) for of in each)
+        size, rest = moves[0].shape[1], self.rest()
         begin = rest, blank(rest.found.state, size), jnp.zeros((len(weights), size, *self.path.shape[1:]))
         at, _, slope = jax.lax.while_loop(lambda c: self.unfinished(c[0]), cycle, begin)
         return at.found, slope.reshape(len(weights), -1, 3, *self.path.shape[1:])
@@ -246,14 +255,14 @@ class _Sliders:
     """A path through a law whose sliders are solved for; arguments as in `periodic` and `near`."""
 
     def __init__(
-        self, law: Law, path: Array, dt: Scalar, periodicity: Scalar, count: int,
+        self, law: Law, path: Array, rate: Array, dt: Scalar, periodicity: Scalar, count: int,
         weights: Array | None = None, known: Known | None = None,
     ) -> None:  # fmt: skip
         self.law, self.path, self.dt, self.periodicity, self.count = law, path, dt, periodicity, count
         self.weights = jnp.zeros((len(path), 0)) if weights is None else weights.T
         self.known = unknown(law, path.shape[1]) if known is None else known
         self.rest = law.memory(jnp.zeros(path.shape[1:]), law.init(path.shape[1]))
-        self.ways: Ways = ways(law, path, dt)
+        self.ways: Ways = ways(law, path, rate, dt)
         self.first = first_memory(law, self.ways, self.rest)
 
     @cached_property
@@ -276,12 +285,12 @@ class _Sliders:
         last = cycle(self.law, self.ways.all, at.begun)
         return Periodic(last.force.swapaxes(1, 2), self.law.recalled(placed, last.memory), at.cycles), last.begun
 
-    def slopes(self, signals: Array, weights: Array) -> tuple[Periodic, Array]:
+    def slopes(self, signals: Array, rates: Array, weights: Array) -> tuple[Periodic, Array]:
         """Tangents of the first cycle, which sliders that stick keep, and of the periodic one."""
         whole, last_begun = self.periodic()
         first_begun = cycle(self.law, beginning(self.ways.all, self.ways.first), self.rest).begun
         found = jax.lax.map(
-            lambda one: linearised(self.law, self.path, self.dt, self.ways, one[0], one[1], signals, weights),
+            lambda of: linearised(self.law, self.path, self.dt, self.ways, of[0], of[1], signals, rates, weights),
             (jnp.stack([first_begun, last_begun]), jnp.array([False, True])),
         )  # fmt: skip
         first, last = (Linearised(*(leaf[k] for leaf in found)) for k in (0, 1))

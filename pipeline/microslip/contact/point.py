@@ -162,6 +162,10 @@ class PointContact(OnNormal):
     def follows(self) -> float:
         return 0.0 if self.remembers is None else float(_follows(self))
 
+    @property
+    def viscous(self) -> bool:
+        return self.damping is not None
+
     def rates(self, u: Array, v: Array, x: Array, time: Scalar, lag: float) -> tuple[Array, Array]:
         """x: tangential force of the springs, N. Friction holds them and the damper beside them, one of the
         lag where the law has none."""

@@ -35,6 +35,10 @@ class Portion(Law):
         return (self.share * force.T).T, after
 
     @property
+    def viscous(self) -> bool:
+        return self.whole.viscous
+
+    @property
     def remembers(self) -> int | None:
         return self.whole.remembers
 

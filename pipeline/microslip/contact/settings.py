@@ -291,6 +291,8 @@ class ContactFile(ContactLaw):
     """one line for the report"""
     length_unit: Literal["m", "cm", "mm", "um", "in", "ft"] = "m"
     """unit of every length in this file; areas are its square"""
+    dimensionless: bool = False
+    """its numbers have no dimension, as the book's with a star: tables and pictures have no units"""
     motion: Motion | None = None
     microslip: Microslip | None = None
     wear: Wear | None = None

@@ -55,6 +55,7 @@ class Sliders(Law):
 
     mu: Array
     stiffness_ratio: Array | None
+    viscous: ClassVar[bool] = False
 
     def count(self) -> int:
         """Number of sliders."""

@@ -137,7 +137,7 @@ class OfHertz(Stiffness):
         normal = 1.5 * force / HERTZ_DEPTH
         x, y = hertz.tangential_ratio
         t1, t2 = (y, x) if self.axis else (x, y)
-        both = ContactStiffness(normal, (t1 * normal, t2 * normal), BULK, f"Hertz at {1e6 * HERTZ_DEPTH:g} um")
+        both = ContactStiffness(normal, (t1 * normal, t2 * normal), BULK, f"Hertz at {1e6 * HERTZ_DEPTH:g} µm")
         return Source(normal, both, None, Potential(value(force), value(HERTZ_DEPTH), value(1.5)), hertz=hertz)
 
 

@@ -5,6 +5,7 @@ Every table is a CSV of `microslip contact`, and the picture of the same name is
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -23,7 +24,7 @@ from .friction import FASTEST, OfLubricated, coefficients, lubricated, smoothed
 from .jenkins import Jenkins
 from .law import history, values
 from .layer import Layer, quasi_static_error
-from .normal import Preload, Rough
+from .normal import Hyperbolic, Preload, Rough
 from .point import PointContact
 from .regularised import MassContact, integrate
 from .set_valued import REFUSED
@@ -56,20 +57,33 @@ class Study:
     sentences: list[str] = field(default_factory=list)
     working: tuple[float, float] | None = None
 
+    @property
+    def written(self) -> dict[str, Columns]:
+        """The tables as they are written: names of columns of a dimensionless file end with no unit."""
+        if not self.contact.file.dimensionless:
+            return self.tables
+        return {
+            table: {re.sub(r"_(m|N|s|J|Pa|N/m|m/s|m3|K)$", "", name): values for name, values in of.items()}
+            for table, of in self.tables.items()
+        }
+
+    def _sized(self, value: float, unit: str) -> str:
+        return f"{value:.4g}" if self.contact.file.dimensionless else _engineering(value, unit)
+
     # normal law ------------------------------------------------------------------------------------------------------
 
     def normal(self) -> None:
         """The normal law, and the stiffnesses at the working point."""
         c, told = self.contact, self.told
-        told.append(("stiffness of the full area, normal", _engineering(c.normal_0, "N/m")))
+        told.append(("stiffness of the full area, normal", self._sized(c.normal_0, "N/m")))
         if c.stiffness is not None:
-            both = " and ".join(_engineering(t, "N/m") for t in dict.fromkeys(c.tangential))
+            both = " and ".join(self._sized(t, "N/m") for t in dict.fromkeys(c.tangential))
             told.append(("stiffness of the full area, tangential", both))
             told.append(("it counts", c.stiffness.includes.replace("+", " and ")))
         if c.roughness is not None:
-            told.append(("roughness R_Z", _engineering(c.roughness, "m")))
+            told.append(("roughness R_Z", self._sized(c.roughness, "m")))
         if isinstance(c.normal, Preload):
-            told.append(("normal force, constant", f"{float(c.normal.constant):.4g} N"))
+            told.append(("normal force, constant", self._sized(float(c.normal.constant), "N")))
             return
         u = np.linspace(*self._reach(), 401)
         force, stiffness, share = (values(c.normal, what, u) for what in ("force", "stiffness", "share"))
@@ -85,10 +99,10 @@ class Study:
     def _at_working_point(self, approach: float, force: float) -> None:
         c, told = self.contact, self.told
         share, stiffness = (float(values(c.normal, what, approach)) for what in ("share", "stiffness"))
-        told.append(("working point", f"{_engineering(approach, 'm')}, {_engineering(force, 'N')}"))
-        told.append(("normal stiffness there", _engineering(stiffness, "N/m")))
+        told.append(("working point", f"{self._sized(approach, 'm')}, {self._sized(force, 'N')}"))
+        told.append(("normal stiffness there", self._sized(stiffness, "N/m")))
         if c.stiffness is not None:
-            told.append(("tangential stiffness there", _engineering(c.tangential[0] * share, "N/m")))
+            told.append(("tangential stiffness there", self._sized(c.tangential[0] * share, "N/m")))
         if c.roughness is not None:
             touching = 100 * float(self._area(np.array(approach)))
             told.append(("share of the area in contact there", f"{touching:.4g} %"))
@@ -106,6 +120,8 @@ class Study:
         top = 1.4 * (c.roughness or 0.0)
         if c.file.motion is not None and self.working is not None:
             top = max(top, 1.1 * (self.working[0] + sum(map(abs, c.file.motion.normal[1:]))))
+        if isinstance(c.normal, Hyperbolic):  # as far as the law is used: behind that it is a straight line
+            top = min(top, (1 - float(c.normal.shortest)) * float(c.normal.length))
         if isinstance(c.settings.stiffness, OfCurve):
             knots = np.asarray(c.normal.u)  # type: ignore[attr-defined]
             return float(knots[0] - 0.05 * np.ptp(knots)), float(max(top, knots[-1]))
@@ -160,10 +176,12 @@ class Study:
         if isinstance(c.law, MassContact):
             told = integrate(c.law, path, time)
             force, slip, speed = told.force, told.point, told.velocity
+            friction = {f"friction_{name}_N": told.friction[:, i] for i, name in enumerate(AXES[1:])}
             slips = np.linalg.norm(speed, axis=1) * float(c.law.slope) > CREEP
             loop_force = np.asarray(history(c.law, loops, time[1]).force) if amplitudes else loops
         else:
             assert c.law is not None
+            friction = {}
             done = history(c.law, np.concatenate([u[:, None], loops], axis=1), time[1])
             force, slip = np.asarray(done.force[:, 0]), np.array(done.slip[:, 0])
             loop_force = np.asarray(done.force[:, 1:])
@@ -176,7 +194,7 @@ class Study:
         point = self._point(u, force, slip, float(time[1]))
         for i, name in enumerate(AXES[1:]):
             table |= {f"P_{name}_m": point[:, i], f"v_P_{name}_m/s": speed[:, i]}
-        self.tables["motion"] = table | {"state": state.astype(float)}
+        self.tables["motion"] = table | friction | {"state": state.astype(float)}
         if amplitudes:
             self.tables["loops"] = _loop_table(amplitudes, loops, loop_force, motion)
         self._of_a_cycle(u, force, state, motion, max(working[1], 0.0))
@@ -228,9 +246,9 @@ class Study:
     ) -> None:
         c, last = self.contact, _last_cycle(motion, u)
         mu = float(coefficients(c.sliding, 0.0, pressed)[0])
-        self.told.append(("slip limit at the working point", _engineering(mu * pressed, "N")))
+        self.told.append(("slip limit at the working point", self._sized(mu * pressed, "N")))
         what = "work of friction in the last period" if motion.drift else "energy dissipated in the last cycle"
-        self.told.append((what, _engineering(_work(u[last], force[last]), "J")))
+        self.told.append((what, self._sized(_work(u[last], force[last]), "J")))
         shares = [100 * float(np.mean(state[last][1:] == s)) for s in (STICK, SLIP, OPEN)]
         words = "stick or partly slip / slip / open" if c.settings.what.partly else "stick / slip / open"
         self.told.append((f"{words}, of the last cycle", " / ".join(f"{s:.3g} %" for s in shares)))
@@ -313,7 +331,7 @@ class Study:
             "depth_m": R * worn.depth[rows].ravel(),
             "pressure_Pa": scale * worn.pressure[rows].ravel(),
         }
-        self.told.append(("worn volume", _engineering(1e9 * coefficient * energy[-1], "mm³")))
+        self.told.append(("worn volume", self._sized(1e9 * coefficient * energy[-1], "mm³")))
         new, old = (f"{100 * share[i]:.4g} %" for i in (0, -1))
         self.told.append(("area in contact, new and worn", f"{new} and {old}"))
 

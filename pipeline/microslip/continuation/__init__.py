@@ -15,6 +15,7 @@ from .curve import branch_off as branch_off
 from .curve import follow as follow
 from .curve import root as root
 from .curve import start as start
+from .curve import switched as switched
 from .curve import trace as trace
 from .extremum import NO_OPTIMUM as NO_OPTIMUM
 from .extremum import SEARCH as SEARCH
@@ -24,6 +25,7 @@ from .extremum import lowest as lowest
 from .extremum import peak as peak
 from .extremum import placed as placed
 from .extremum import rated as rated
+from .extremum import with_peaks as with_peaks
 from .newton import CONVERGED as CONVERGED
 from .newton import Equations as Equations
 from .newton import NewtonSettings as NewtonSettings

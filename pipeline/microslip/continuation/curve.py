@@ -29,10 +29,15 @@ from .newton import Corrected, Equations, NewtonSettings, Scaled, correct, norm,
 TURN = 0.5
 """Share of the angle by which the tangent may turn in a step that the next step is chosen for."""
 
+OFF = 2e-3
+"""Scaled length of the first step from a branch point onto the other curve."""
+
 REACH = 2.0
 """Length of a correction, over that of the step, beyond which the predicted point is of no use."""
 
-Kind = Literal["start", "regular", "fold", "branch point", "target", "bound"]
+Kind = Literal[
+    "start", "regular", "fold", "branch point", "target", "bound", "peak", "period doubling", "Neimark-Sacker"
+]
 
 
 @checked_fields
@@ -75,7 +80,9 @@ class Point:
 
     Attributes:
         x: (n,). lam. kind: "fold" and "branch point" are located between steps, "target" and "bound" have exactly the
-            lambda asked for. kink: the tangent jumps just before this point. arclength: scaled, from the start.
+            lambda asked for, "peak" is what `extremum.with_peaks` adds, period doublings and Neimark-Sacker points
+            are added by those who know multipliers. kink: the tangent jumps just before this point. arclength: scaled,
+            from the start.
         tangent: (n + 1,) unit vector, scaled. evaluations: of R since the step before.
     """
 
@@ -177,6 +184,25 @@ def across(scaled: Scaled, y: Array, border: Array, settings: Settings) -> State
         return _no_start(y, corrected.status, settings)
     t = corrected.tangent / norm(corrected.tangent)  # border . tangent = 1: it goes ahead
     return _started(scaled, corrected.y, t, corrected.sign, settings)
+
+
+def switched(
+    problem: Equations, x: Array, lam: float, ahead: tuple[Array, float], settings: Settings, off: float = OFF
+) -> list[State]:
+    """The first points, both ways, of the curve that crosses another one at a branch point, (n,) and lambda.
+
+    Both tangents lie in the null space of D, which has two dimensions there: a step `off` across the known one.
+
+    Args:
+        ahead: of x (n,) and of lambda, in their units, along the known curve.
+    """
+    scaled = Scaled(problem)
+    y, known = scaled.pack(x, lam), scaled.pack(*ahead)
+    plane = np.linalg.svd(scaled(y)[1])[2][-2:]
+    along = plane @ known
+    across_it = plane.T @ np.array([-along[1], along[0]]) / norm(along)
+    found = [across(scaled, y + way * off * across_it, way * across_it, settings) for way in (1.0, -1.0)]
+    return [state for state in found if not state.status]
 
 
 def _first(scaled: Scaled, y: Array, border: Array, settings: Settings) -> Corrected:

@@ -20,7 +20,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from ..data import Array
-from .curve import Lost, Segment, Settings, State, across, advance, root
+from .curve import Branch, Lost, Point, Segment, Settings, State, across, advance, root
 from .newton import CONVERGED, Equations, Scaled, correct, norm, unit
 
 
@@ -134,6 +134,32 @@ def _ahead(slope: _Slope, state: State, settings: Settings) -> Peak:
             return best
         status, state, there = after.status, after, here
     return replace(best, status=best.status if best.converged else f"no peak before the end: {status}")
+
+
+def with_peaks(problem: Rated, branch: Branch, height: Callable[[Array, float], float]) -> Branch:
+    """A branch with the peaks of the output between its points, as points of the kind "peak": where its slope falls
+    through zero beside a point that is higher than its neighbours.
+
+    Args:
+        height: (n,) and lambda -> any measure that rises with the output; it costs less than its derivative.
+    """
+    points, scaled, slope = list(branch.points), Scaled(problem), _Slope(problem)
+    heights = np.array([height(p.x, p.lam) for p in points])
+    tops = np.flatnonzero((heights[1:-1] >= heights[:-2]) & (heights[1:-1] >= heights[2:])) + 1
+    added: dict[int, Point] = {}
+    for i in tops:
+        for at in (int(i) - 1, int(i)):
+            first, last = points[at], points[at + 1]
+            if last.arclength <= first.arclength or at in added:  # another curve begins here
+                continue
+            low, high = (slope.at(scaled.pack(p.x, p.lam), p.tangent) for p in (first, last))
+            top = _pinned(slope, low, high, last.kink, SEARCH) if low.slope > 0 > high.slope else None
+            if top is not None:
+                way = norm(scaled.pack(top.x, top.lam) - low.y)
+                added[at] = Point(top.x, top.lam, "peak", False, first.arclength + way, top.tangent, 0)
+    for at in sorted(added, reverse=True):
+        points.insert(at + 1, added[at])
+    return replace(branch, points=tuple(points))
 
 
 NARROW = 1e-6

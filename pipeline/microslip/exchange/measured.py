@@ -1,4 +1,5 @@
-"""Measured modes from a Universal File, by pyuff (data sets 15 or 2411: points, 55: modes, 58: functions, 164: units).
+"""Measured modes, or another program's, from a Universal File, by pyuff (data sets 15 or 2411: points, 55: modes, 58:
+functions, 164: units; 2414: modes, which are read here).
 
 A test knows some directions of some points, no mesh, no mass and nothing of completeness: the modal file says so by
 its attribute ``source`` = ``measured``. Its points are the measured ones; a monitor ``point <number>`` has one row for
@@ -9,19 +10,24 @@ it moves in some mode.
 from __future__ import annotations
 
 import warnings
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from ..basis import read_basis
 from ..data import Array, Compliance, Indices, Mesh, ModalBasis, ModalGroup, Rows
 from ..errors import UserError, in_its_file
 from ..files.store import ordinary
 from ..linalg.canonical import signs
 from ..mesh import UNITS
-from ..mesh.unv import has_solids
+from ..mesh.raw import Damaged
+from ..mesh.unv import UNIVERSAL, DataSet, data_sets, placed
+from ..modal.sampling import at_points
+from ..reduced.coordinates import in_modes
 from ..reduced.correlation import DIRECTIONS, POINT
 
 NORMAL = 2
@@ -45,26 +51,34 @@ class _Mode:
     shape: Array
 
 
-def holds_modes(path: Path | str) -> bool:
-    """Whether a text file has modes or measured functions in the way of Universal Files.
+_SHAPES = {55: 5, 2414: 8}
+"""Data set of results at nodes -> line with their kind: analysis second, result fourth."""
 
-    Beside the solid cells of a mesh only modes count: what else stands there are a solver's
-    results.
-    """
-    before, modes, others, since = b"", False, False, 0
-    try:
-        with open(path, "rb") as file:
-            for line in file:
-                words = line[:80].split()
-                since += 1
-                if before.strip() == b"-1" and words[:1] in ([b"55"], [b"58"], [b"58b"], [b"2414"]):
-                    others, since = True, 0 if words[0] == b"55" else 9
-                elif since == 6 and others:  # record 6 of a data set 55: model, analysis, ...
-                    modes = modes or words[1:2] in [[str(kind).encode()] for kind in _KINDS]
-                before = line[:80]
-    except OSError:
-        return False
-    return modes or (others and not has_solids(Path(path)))
+
+def holds_modes(path: Path | str) -> bool:
+    """Whether a file has mode shapes in the way of Universal Files."""
+    return _holds(Path(path), lambda kind, lines: kind in _SHAPES and _analysis(kind, lines) in _KINDS)
+
+
+def holds_results(path: Path | str) -> bool:
+    """Whether a file has modes, other results at nodes or measured functions in the way of Universal Files."""
+    return _holds(Path(path), lambda kind, _: kind in (58, *_SHAPES))
+
+
+def _holds(path: Path, wanted: Callable[[int, list[str]], bool]) -> bool:
+    with suppress(OSError, Damaged):
+        sets = data_sets(path.read_bytes().decode("latin-1"))
+        return any(wanted(data.number, data.lines) for data in sets)
+    return False
+
+
+def _analysis(kind: int, lines: list[str]) -> int:
+    """The analysis type of displacements at nodes; 0 of damaged ones, other results, or elsewhere."""
+    with suppress(IndexError, ValueError):
+        words = lines[_SHAPES[kind]].split()
+        if kind == 55 or int(lines[2]) == 1 and int(words[3]) in _MOVEMENTS:
+            return int(words[1])
+    return 0
 
 
 @in_its_file
@@ -80,11 +94,20 @@ def read_measured(path: Path | str, unit: str = "m", name: str = "") -> tuple[Mo
     path = Path(path)
     sets = _sets(path)
     length, force, told = _units(sets, unit)
-    modes = [_mode(s, length, force) for s in sets if s["type"] == 55 and s.get("analysis_type") in _KINDS]
+    shapes = [s for s in sets if s["type"] == 55 and s.get("analysis_type") in _KINDS]
+    moving = [s for s in shapes if s.get("spec_data_type") in _MOVEMENTS]
+    shapes = moving or shapes  # stresses of the same modes may stand beside them
+    elastic = [s for s in shapes if _eigenvalue(s, int(s["analysis_type"]))[0] != 0]
+    modes = [_mode(s, length, force) for s in elastic]
+    if len(elastic) < len(shapes):
+        told.append(f"{len(shapes) - len(elastic)} shapes of 0 Hz are left out")
     others = sum(s["type"] == 58 or s["type"] == 55 and s.get("analysis_type") not in _KINDS for s in sets)
     if not modes:
         found = f"{others} measured functions and no" if others else "no"
-        raise UserError(f"holds {found} mode shapes (data set 55); identify modes in the test program first")
+        raise UserError(
+            f"holds {found} mode shapes (data sets 55, 2414); identify modes in the test program first"
+            + ", or lay the functions beside a computed body: microslip compare basis.h5 FILE" * (others > 0)
+        )
     number, place = _points(sets)
     modes.sort(key=lambda m: m.omega)
     used = modes[0].nodes
@@ -92,11 +115,7 @@ def read_measured(path: Path | str, unit: str = "m", name: str = "") -> tuple[Mo
         if not np.array_equal(m.nodes, used):
             hertz = m.omega / (2 * np.pi)
             raise UserError(f"mode {i + 1} ({hertz:.6g} Hz) is at other points than the first one")
-    position = {int(n): i for i, n in enumerate(number)}
-    lost = [int(n) for n in used if int(n) not in position]
-    if lost:
-        raise UserError(f"point {lost[0]} of the modes has no place (data set 15 or 2411)")
-    points = place[[position[int(n)] for n in used]] / length
+    points = _places(number, place, used, "the modes") / length
     phi, scaled = _shapes(modes)
     told.append(
         "shapes are scaled by their modal masses"
@@ -110,6 +129,65 @@ def read_measured(path: Path | str, unit: str = "m", name: str = "") -> tuple[Mo
     return basis, tuple(told)
 
 
+def opened(files: Sequence[Path], key: tuple[int, int], unit: str) -> tuple[list[ModalBasis], list[str]]:
+    """Two modal files, or one and what to say of the measured functions that the other file holds alone.
+
+    Args:
+        files: modal files and Universal Files. key, unit: see `against_functions`.
+
+    Raises:
+        UserError: functions without a computed body, unreadable files.
+    """
+    bodies, functions, told = list[ModalBasis](), list[Path](), list[str]()
+    for file in files:
+        if file.suffix.lower() not in UNIVERSAL:
+            bodies.append(read_basis(file))
+        elif holds_results(file) and not holds_modes(file):
+            functions.append(file)
+        else:
+            body, said = read_measured(file, unit)
+            bodies.append(body)
+            told += said
+    for file in functions:
+        if [body.source for body in bodies] in ([], ["measured"]):
+            raise UserError("holds no mode shapes: give a computed modal file beside it", file=file)
+        told += against_functions(file, bodies[0], key, unit)
+    return bodies, told
+
+
+@in_its_file
+def against_functions(path: Path, basis: ModalBasis, key: tuple[int, int] = (0, 0), unit: str = "m") -> list[str]:
+    """How well the modes of a computed body give the measured functions of a file (data set 58), in words.
+
+    Args:
+        key: speed (counted from 0) and nodal diameter of the body. unit: of the file's lengths if it does not tell.
+
+    Raises:
+        UserError: no functions, points without a place or outside the body.
+    """
+    sets = _sets(path)
+    length, force, told = _units(sets, unit)
+    functions = [s for s in sets if s["type"] == 58]
+    if not functions:
+        raise UserError("holds no functions (data set 58) and no mode shapes (55, 2414): nothing to compare")
+    named = {int(s[end]) for s in functions for end in ("rsp_node", "ref_node") if int(s.get(end) or 0) > 0}
+    used = np.array(sorted(named), dtype=np.int64)
+    seen = at_points(basis, _places(*_points(sets), used, "the functions") / length)
+    if key not in seen.groups:
+        raise UserError(f"'{basis.name}' has no speed {key[0]} with nodal diameter {key[1]}")
+    found = fits(functions, in_modes(seen.groups[key]), used, length / force)
+    return [*told, *fit_messages(found, len(functions))]
+
+
+def _places(number: Indices, place: Array, used: Indices, what: str) -> Array:
+    """(u, 3) places of some of the points."""
+    position = {int(n): i for i, n in enumerate(number)}
+    lost = [int(n) for n in used if int(n) not in position]
+    if lost:
+        raise UserError(f"point {lost[0]} of {what} has no place (data set 15 or 2411)")
+    return place[[position[int(n)] for n in used]]
+
+
 def _sets(path: Path) -> list[dict[str, Any]]:
     """The data sets that are understood.
 
@@ -121,6 +199,7 @@ def _sets(path: Path) -> list[dict[str, Any]]:
     if not ordinary(path).is_file():
         raise UserError("there is no such file; correct the path")
     wanted = (15, 2411, 55, 58, 164, 2420)
+    text = path.read_bytes().decode("latin-1")
     try:
         file = pyuff.UFF(str(path))
         kinds = [int(k) for k in file.get_set_types()]
@@ -128,11 +207,37 @@ def _sets(path: Path) -> list[dict[str, Any]]:
             raise ValueError("it has no data sets")
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            return [file.read_sets(i) | {"type": k} for i, k in enumerate(kinds) if k in wanted]
+            sets = [file.read_sets(i) | {"type": k} for i, k in enumerate(kinds) if k in wanted]
     except Exception as error:  # pyuff raises whatever its parsing meets
         raise UserError(
             f"cannot be read as a Universal File ({type(error).__name__}: {_short(error)}); export it again"
         ) from error
+    return [*sets, *(_solved(path, data) for data in data_sets(text) if data.number == 2414)]
+
+
+def _solved(path: Path, data: DataSet) -> dict[str, Any]:
+    """A data set 2414 (frequency and shape at nodes) by the names that pyuff gives a data set 55."""
+    if _analysis(2414, data.lines) not in _KINDS:
+        return {"type": 2414}
+    with placed(path, data):
+        data.at = 8
+        _, kind, _, result, form, count = data.whole(6, "a mode")[:6]
+        data.at = 11
+        _, hertz, square, mass, viscous, hysteretic = data.reals(6, "a mode")
+        real, imaginary, a, b, *_ = data.reals(6, "a mode")
+        width, nodes, values = count * (1 + (form in (5, 6))), list[int](), list[list[float]]()
+        while data.left:
+            nodes += data.whole(1, "a mode")
+            values.append(data.reals(width, f"the mode at node {nodes[-1]}"))
+    shape = np.array(values).reshape(len(nodes), width)
+    if width > count:
+        shape = shape[:, ::2] + 1j * shape[:, 1::2]
+    parts = dict(zip(("r1", "r2", "r3"), shape.T, strict=False))
+    return parts | {
+        "type": 55, "analysis_type": kind, "spec_data_type": result, "node_nums": nodes,
+        "freq": hertz or np.sqrt(max(square, 0.0)) / (2 * np.pi), "modal_m": mass, "modal_damp_vis": viscous,
+        "modal_damp_his": hysteretic, "eig": complex(real, imaginary), "modal_a": complex(a, b),
+    }  # fmt: skip
 
 
 def _short(error: BaseException) -> str:

@@ -11,7 +11,8 @@ so the unknowns are u = T_k q with T_k = T_0 + exp(+i k 2 pi / N) T_R (D. L. Tho
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.sparse as sp
@@ -22,6 +23,7 @@ from ..errors import UserError
 from ..frames import rotation
 from ..mesh import part_numbers
 from .discretise import FreeUpper, Pattern
+from .links import NEAR, facet_size, nearest_on_face
 from .tied import Tied, congruence, tied_upper
 
 _CLOSE = 1e-3  # share of the distance to the nearest other node within which two nodes are one
@@ -29,31 +31,51 @@ _CLOSE = 1e-3  # share of the distance to the nearest other node within which tw
 
 @dataclass(frozen=True)
 class CutFaces:
-    """The paired nodes of the two cut faces: node ``right[i]`` is node ``left[i]`` turned by the sector angle.
+    """The nodes of the two cut faces: node ``right[i]`` is node ``left[i]`` turned by the sector angle.
 
     Attributes:
-        sectors: N. left, right: (l,) point indices. rotation: (3, 3) R.
+        sectors: N. left, right: (l,) point indices. rotation: (3, 3) R. share: (r, l) where the
+            faces do not match: what each node of the right one, turned back, follows of those of
+            the left one (N_i at its place); None: the pairs. backward: left and right are
+            exchanged, so that R turns by -2 pi / N.
     """
 
     sectors: int
     left: Indices
     right: Indices
     rotation: Array
+    share: sp.csr_matrix | None = None
+    backward: bool = False
+
+    @property
+    def weights(self) -> sp.csr_matrix:
+        """(r, l) shares of left nodes in the motion of right ones."""
+        return sp.identity(len(self.left), format="csr") if self.share is None else self.share
+
+    @property
+    def ahead(self) -> Array:
+        """(3, 3) rotation to the next sector."""
+        return self.rotation.T if self.backward else self.rotation
 
     def phase(self, harmonic: int) -> complex | float:
-        """exp(+i k 2 pi / N); a real number for k = 0 and k = N/2."""
+        """exp(+i k 2 pi / N), its conjugate where left and right are exchanged; real for k = 0 and k = N/2."""
         if harmonic == 0:
             return 1.0
         if 2 * harmonic == self.sectors:
             return -1.0
-        return complex(np.exp(2j * np.pi * harmonic / self.sectors))
+        return complex(np.exp((-2j if self.backward else 2j) * np.pi * harmonic / self.sectors))
 
 
-def pair_cut_faces(mesh: Mesh, left: str, right: str, axis: Array, point: Array, sectors: int) -> CutFaces:
-    """Pair the nodes of the two cut faces.
+def pair_cut_faces(
+    mesh: Mesh, left: str, right: str, axis: Array, point: Array, sectors: int, follows: str = "right"
+) -> CutFaces:  # fmt: skip
+    """Pair the nodes of the two cut faces, or tie those of one to the other where they do not match.
+
+    Args:
+        follows: which face's nodes are tied to the other: ``left`` or ``right``.
 
     Raises:
-        UserError: the right face is not the left one turned by 2 pi / N about the axis, node by node.
+        UserError: the right face is not the left one turned by 2 pi / N about the axis.
     """
     a, b = mesh.face_points(left), mesh.face_points(right)
     if shared := np.intersect1d(a, b).size:
@@ -68,9 +90,40 @@ def pair_cut_faces(mesh: Mesh, left: str, right: str, axis: Array, point: Array,
     turned, there = np.hstack([x @ R.T, apart[a]]), np.hstack([y, apart[b]])
     spacing = float(np.median(_nearest(there, there, 2)[0][:, 1])) if len(y) > 1 else 1.0
     distance, nearest = _nearest(there, turned)
-    if len(a) != len(b) or len(np.unique(nearest)) < len(b) or distance.max() > _CLOSE * spacing:
-        raise UserError(_no_match(x, y, left, right, axis, sectors, float(distance.max()), spacing))
-    return CutFaces(sectors, a, b[nearest], R)
+    if len(a) == len(b) == len(np.unique(nearest)) and distance.max() <= _CLOSE * spacing:
+        return CutFaces(sectors, a, b[nearest], R)
+    _refuse_elsewhere(x, y, left, right, axis, sectors, spacing)
+    names = (right, left) if follows == "left" else (left, right)
+    return _tied_faces(
+        mesh, names, R.T if follows == "left" else R, point, sectors, follows == "left"
+    )
+
+
+def _tied_faces(
+    mesh: Mesh, names: tuple[str, str], R: Array, point: Array, sectors: int, backward: bool
+) -> CutFaces:  # fmt: skip
+    """Faces that do not match: the nodes of the second follow the first at their nearest points, turned.
+
+    Raises:
+        UserError: nodes that lie off it.
+    """
+    led, leading = mesh.face_points(names[1]), mesh.face_points(names[0])
+    back = (mesh.points[led] - point) @ R + point
+    distance, nodes, N, _ = nearest_on_face(mesh.points, mesh.faces[names[0]], back)
+    # what leads lies on what follows, too: no part of the cut is left open
+    moved = (mesh.points - point) @ R + point
+    other = nearest_on_face(moved, mesh.faces[names[1]], mesh.points[leading])[0]
+    size, off = facet_size(mesh, names[0]), np.r_[distance, other]
+    if (off > NEAR * size).any():
+        raise UserError(
+            f"cyclic: '{names[1]}' is not '{names[0]}' turned by 2 pi / {sectors} about the rotation axis: "
+            f"{int((off > NEAR * size).sum())} of their {len(off)} nodes lie up to {off.max():.3g} m off the other "
+            f"face (edges of facets: {size:.3g} m); mesh the two faces alike (gmsh: setPeriodic)"
+        )
+    at = np.searchsorted(leading, nodes)
+    entries = (N.ravel(), (np.repeat(np.arange(len(led)), N.shape[1]), at.ravel()))
+    share = sp.csr_matrix(entries, shape=(len(led), len(leading)))
+    return CutFaces(sectors, leading, led, R, share, backward)
 
 
 def refuse_other_facets(mesh: Mesh, left: str, right: str, cut: CutFaces) -> None:
@@ -79,6 +132,8 @@ def refuse_other_facets(mesh: Mesh, left: str, right: str, cut: CutFaces) -> Non
     Raises:
         UserError: facets of the right face are not those of the left one turned.
     """
+    if cut.share is not None:
+        return
     mate = np.full(mesh.n_points, -1)
     mate[cut.left] = cut.right
     for kind in mesh.faces.get(left, {}):
@@ -96,7 +151,17 @@ def _nearest(points: Array, to: Array, count: int = 1) -> tuple[Array, Array]:
     return np.asarray(distance), np.asarray(index)
 
 
-def _no_match(x: Array, y: Array, left: str, right: str, axis: Array, N: int, distance: float, spacing: float) -> str:
+def _refuse_elsewhere(
+    x: Array, y: Array, left: str, right: str, axis: Array, N: int, spacing: float
+) -> None:
+    """Refuse faces that another axis, angle or order would bring onto each other."""
+    if text := _elsewhere(x, y, left, right, axis, N, spacing):
+        raise UserError(text)
+
+
+def _elsewhere(
+    x: Array, y: Array, left: str, right: str, axis: Array, N: int, spacing: float
+) -> str:
     back = _nearest(y, x @ rotation(axis, -2 * np.pi / N).T)[0].max()
     if back < _CLOSE * spacing:
         return (
@@ -121,14 +186,7 @@ def _no_match(x: Array, y: Array, left: str, right: str, axis: Array, N: int, di
             f"rotation axis, which makes {count:.4g} sectors, not {N}; correct sectors, or rotation.axis "
             "and point"
         )
-    if len(x) != len(y):
-        why = f"they have {len(x)} and {len(y)} nodes"
-    else:
-        why = f"nodes that should meet are up to {distance:.3g} m apart (neighbouring nodes: {spacing:.3g} m)"
-    return (
-        f"cyclic: '{right}' is not '{left}' turned by 2 pi / {N} about the rotation axis, node by node: {why}; mesh "
-        "the two faces alike (gmsh: setPeriodic), cut faces that do not match are not tied"
-    )
+    return ""
 
 
 def _congruent(x: Array, y: Array) -> bool:
@@ -157,17 +215,15 @@ class SectorUnknowns:
 
     Attributes:
         apart: upper triangle over the f free degrees of freedom. cut: the pairing.
-        stay: (f, m) T_0. turn: (f, m) T_R. left, right: (b,) positions, among the free, of the degrees of freedom on
-        the cut faces; right ones are `block` (b, b) times the left ones times the phase.
+        stay: (f, m) T_0. turn: (f, m) T_R. boundary: positions, among the free, of those that move
+        the cut faces.
     """
 
     apart: FreeUpper | Tied
     cut: CutFaces
     stay: sp.csr_matrix
     turn: sp.csr_matrix
-    left: Indices
-    right: Indices
-    block: sp.csr_matrix
+    boundary: Indices
 
     def transformation(self, harmonic: int) -> sp.csr_matrix:
         """(f, m) T_k; real for k = 0 and N/2."""
@@ -175,65 +231,107 @@ class SectorUnknowns:
 
 
 def sector_unknowns(pattern: Pattern, fixed: Indices, cut: CutFaces, ties: Ties | None = None) -> SectorUnknowns:
-    """Eliminate the right cut face.
+    """Eliminate the right cut face: its displacements that are unknowns become those of the left one, turned.
 
     Raises:
-        UserError: a support holds one of a pair of nodes and not the other, or a direction that turning mixes.
+        UserError: ties that do not go on in the next sector, supports of a face that does not match
+        the other one.
     """
+    fixed, ties = _held_alike(pattern.n, fixed, cut, ties)
     apart = tied_upper(pattern, fixed, ties)
-    free_left, free_right = _free_pairs(apart, cut)
-    position = np.full(3 * pattern.n, -1, dtype=np.int64)
+    f, rows = (
+        apart.size,
+        (apart.T if isinstance(apart, Tied) else sp.identity(apart.size, format="csr")),
+    )
+    free = apart.apart.free if isinstance(apart, Tied) else apart.free
+    position, place = (np.full(3 * pattern.n, -1, dtype=np.int64) for _ in range(2))
     plain = np.flatnonzero(apart.own >= 0)
-    position[apart.own[plain]] = plain
-    l, r = position[3 * cut.left[:, None] + np.arange(3)], position[3 * cut.right[:, None] + np.arange(3)]
-    pair, i, j = np.nonzero(free_right[:, :, None] & free_left[:, None, :] & (np.abs(cut.rotation) > 1e-14)[None])
-    rows, columns, values = r[pair, i], l[pair, j], cut.rotation[i, j]
-    f = apart.size
+    position[apart.own[plain]], place[free] = plain, np.arange(len(free))
+    l, r = (3 * nodes[:, None] + np.arange(3) for nodes in (cut.left, cut.right))
+    at = place[l.ravel()]
+    on_left = sp.diags((at >= 0).astype(float)) @ rows[np.maximum(at, 0)]
+    followed = (
+        sp.kron(cut.weights, np.where(np.abs(cut.rotation) > 1e-14, cut.rotation, 0.0)) @ on_left
+    ).tocsr()
+    gone = position[r.ravel()] >= 0
+    right = position[r.ravel()][gone]
     keep = np.ones(f, dtype=bool)
-    keep[r[free_right]] = False
-    number = np.cumsum(keep) - 1
-    m = int(keep.sum())
+    keep[right] = False
+    number, m = np.cumsum(keep) - 1, int(keep.sum())
     stay = sp.csr_matrix((np.ones(m), (np.flatnonzero(keep), np.arange(m))), shape=(f, m))
-    turn = sp.csr_matrix((values, (rows, number[columns])), shape=(f, m))
-    _refuse_tied(apart, cut, stay, turn)
-    left, right = l[free_left], r[free_right]
-    block = sp.csr_matrix((values, (rows, columns)), shape=(f, f))[right][:, left].tocsr()
-    return SectorUnknowns(apart, cut, stay, turn, left, right, block)
+    given = followed[gone].tocoo()
+    turn = sp.csr_matrix((given.data, (right[given.row], number[given.col])), shape=(f, m))
+    _refuse_unlike(apart, cut, stay, turn)
+    return SectorUnknowns(apart, cut, stay, turn, np.union1d(np.unique(given.col), right))
 
 
-def _refuse_tied(apart: FreeUpper | Tied, cut: CutFaces, stay: sp.csr_matrix, turn: sp.csr_matrix) -> None:
-    """Refuse ties that do not go on in the next sector: what follows others on the right face must be what does so on
-    the left one, turned and in any phase."""
-    if isinstance(apart, FreeUpper):
-        return
+def _held_alike(
+    n: int, fixed: Indices, cut: CutFaces, ties: Ties | None
+) -> tuple[Indices, Ties | None]:
+    """Supports of both nodes of a pair, where they differ, as those of the left one: the right one follows it.
+
+    What is held on the right as v is held on the left as R^-1 v; along no axis of the body it is an
+    equation.
+    """
+    held = np.zeros((max(n, int(fixed.max(initial=0)) // 3 + 1), 3), dtype=bool)
+    held.reshape(-1)[fixed] = True
+    R = np.abs(cut.rotation) > 1e-12
+    if cut.share is not None:
+        return fixed, ties
+    unlike = (R[None] & (held[cut.right][:, :, None] != held[cut.left][:, None, :])).any(
+        axis=(1, 2)
+    )
+    rows = []
+    for left, right in zip(cut.left[unlike], cut.right[unlike], strict=True):
+        vectors = np.vstack([np.eye(3)[held[left]], cut.rotation[held[right]]])
+        _, size, V = np.linalg.svd(vectors)
+        S = V[: int((size > 1e-9).sum())]
+        whole = (S**2).sum(axis=0) > 1 - 1e-9
+        held[left], held[right] = whole, False
+        _, size, V = np.linalg.svd(np.where(whole, 0.0, S))
+        rows += [(left, v) for v in V[: int((size > 1e-9).sum())]]
+    return np.flatnonzero(held.reshape(-1)), with_rows(ties, n, rows) if rows else ties
+
+
+def with_rows(ties: Ties | None, n: int, rows: Sequence[tuple[int, Array]]) -> Ties:
+    """The ties with supports of points along directions (3,) besides. n: number of points."""
+    if ties is None:
+        none = np.zeros(0, dtype=np.int64)
+        ties = Ties(sp.csr_matrix((0, 3 * n)), none, none, (), (), np.zeros((0, 3)), np.arange(n))
+    at, of = 3 * np.array([node for node, _ in rows])[:, None] + np.arange(3), np.arange(len(rows))
+    data = np.concatenate([v for _, v in rows])
+    more = sp.csr_matrix(
+        (data, (np.repeat(of, 3), at.ravel())), shape=(len(rows), ties.rows.shape[1])
+    )
+    return replace(
+        ties, rows=sp.vstack([ties.rows, more]).tocsr(), dependent=np.r_[ties.dependent, np.full(len(rows), -1)],
+        of=np.r_[ties.of, np.full(len(rows), len(ties.told))], told=(*ties.told, "supports of the other cut face"),
+        otherwise=(*ties.otherwise, "refuse"),
+    )  # fmt: skip
+
+
+def _refuse_unlike(
+    apart: FreeUpper | Tied, cut: CutFaces, stay: sp.csr_matrix, turn: sp.csr_matrix
+) -> None:
+    """Refuse ties and supports that do not go on in the next sector: what follows others, or is held, on the right face
+    must be so on the left one, turned and in any phase."""
     phase = np.exp(0.7j)
-    place = np.full(3 * (int(max(cut.left.max(), cut.right.max(), apart.apart.free.max() // 3)) + 1), -1)
-    place[apart.apart.free] = np.arange(len(apart.apart.free))
-    moved = apart.T @ (stay + phase * turn)
+    free = apart.apart.free if isinstance(apart, Tied) else apart.free
+    place = np.full(3 * (int(max(cut.left.max(), cut.right.max(), free.max() // 3)) + 1), -1)
+    place[free] = np.arange(len(free))
+    moved = stay + phase * turn
+    moved = apart.T @ moved if isinstance(apart, Tied) else moved
     sides = []
     for nodes in (cut.left, cut.right):
         at = place[(3 * nodes[:, None] + np.arange(3)).ravel()]
         there = sp.diags((at >= 0).astype(float))
         sides.append(there @ moved[np.maximum(at, 0)])
-    wrong = abs(sides[1] - phase * sp.kron(sp.identity(len(cut.left)), cut.rotation).tocsr() @ sides[0]).tocoo()
+    wrong = abs(sides[1] - phase * sp.kron(cut.weights, cut.rotation).tocsr() @ sides[0]).tocoo()
     if bad := len(np.unique(wrong.row[wrong.data > 1e-9] // 3)):
         raise UserError(
-            f"cyclic: {bad} nodes of the cut faces follow others by the ties of the mesh file, and not alike on both "
-            "faces; tie them alike, leave them out of these ties, or make the cut elsewhere"
+            f"cyclic: {bad} nodes of the cut faces are held, or follow others by the ties of the mesh file, and not "
+            "alike on both faces; hold and tie them alike, or make the cut elsewhere"
         )
-
-
-def _free_pairs(apart: FreeUpper | Tied, cut: CutFaces) -> tuple[Array, Array]:
-    """(l, 3) which directions are free on the left and on the right node of each pair."""
-    left, right = (np.isin(3 * nodes[:, None] + np.arange(3), apart.own) for nodes in (cut.left, cut.right))
-    R = np.abs(cut.rotation) > 1e-12
-    mixed = (R[None] & (right[:, :, None] != left[:, None, :])).any(axis=(1, 2))
-    if mixed.any():
-        raise UserError(
-            f"supports: {int(mixed.sum())} pairs of nodes on the cut faces are not held alike once turned by the "
-            "sector angle; hold whole nodes on both faces (all of xyz), or the direction of the rotation axis alone"
-        )
-    return left, right
 
 
 @dataclass(frozen=True)

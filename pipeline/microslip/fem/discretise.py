@@ -81,10 +81,10 @@ def shape_functions(cell_type: str, at: Array) -> tuple[Array, Array]:
 def quadrature(cell_type: str, degree: int | None = None) -> tuple[Array, Array]:
     """Points (q, d) and weights (q,) of the rule for a cell type; default degree as in the table above.
 
-    Wedges and pyramids have one rule each.
+    Pyramids have one rule each, wedges of 6 nodes another of degree 1.
     """
     if cell_type in elements.TYPES:
-        return elements.rule(cell_type)
+        return elements.rule(cell_type, degree == 1)
     from skfem.quadrature import get_quadrature
 
     element, _ = _element(cell_type)
@@ -260,8 +260,13 @@ def discretise(mesh: Mesh, degree: Mapping[str, int] | None = None, coupled: Seq
     return Discretisation(mesh, blocks, pattern, positions)
 
 
-REDUCED = {"hexahedron20": 3}
-"""Degree of the rule by which a nearly incompressible brick does not lock: 2 x 2 x 2 points."""
+_FEW = {"tetra": 1, "wedge": 1}
+RULES: dict[str, dict[str, int]] = {
+    "full": {}, "reduced": {"hexahedron20": 3}, "calculix": _FEW,
+    "reduced-mass": {"hexahedron20": 3, **_FEW},
+}  # fmt: skip
+"""`mesh.integration` -> degrees of rules: 2 x 2 x 2 points, by which a nearly incompressible brick does not lock, and
+those of CalculiX in cells of first order: one point in tetrahedra, two in wedges."""
 
 
 def whole(d: Discretisation) -> Discretisation:
@@ -286,10 +291,12 @@ def _block(mesh: Mesh, cell_type: str, degree: int | None, region: int, cells: I
     jacobian = np.einsum("eki,qjk->eqij", mesh.points[cells], dN, optimize=True)
     det = np.einsum("...i,...i->...", jacobian[..., 0, :], np.cross(jacobian[..., 1, :], jacobian[..., 2, :]))
     if (bad := (det <= 0).any(axis=1)).any():
+        first = int((mesh.cells[cell_type] == cells[bad][0]).all(axis=1).argmax())
+        known = mesh.cell_id.get(cell_type)
+        name = f"cell {first + 1} of its type" if known is None else f"element {known[first]}"
         raise UserError(
             f"{bad.sum()} of {len(cells)} {cell_type} cells are inside out or degenerate where they are "
-            f"integrated (first: cell {int(np.flatnonzero(bad)[0]) + 1} of its type); straighten their mid-side nodes "
-            "or remesh"
+            f"integrated (first: {name}); straighten their mid-side nodes or remesh"
         )
     grad = np.matmul(_inverse3(jacobian, det).transpose(0, 1, 3, 2), dN[None])
     return Block(cell_type, cells, at, N, grad, det * weights, region)

@@ -22,7 +22,7 @@ from ..frames import rigid_fields
 from ..topology import FACET_CORNERS
 from .discretise import face_blocks, shape_functions
 
-_NEAR = 0.05
+NEAR = 0.05
 """Share of the size of a master's facets within which a node is tied where the deck gives no tolerance."""
 
 _CANDIDATES = 8
@@ -250,8 +250,8 @@ def _tied_face(mesh: Mesh, link: FaceTie, rows: _Rows, number: int) -> tuple[Mes
     slaves = np.setdiff1d(mesh.set_points(link.slave), master)
     if not len(slaves):
         raise UserError(f"{link.where}: every node of '{link.slave}' is one of '{link.master}' already; remove the tie")
-    size = _facet_size(mesh, link.master)
-    reach = _NEAR * size if link.tolerance is None else link.tolerance
+    size = facet_size(mesh, link.master)
+    reach = NEAR * size if link.tolerance is None else link.tolerance
     distance, nodes, N, foot = nearest_on_face(mesh.points, mesh.faces[link.master], mesh.points[slaves])
     near = distance <= reach * (1 + 1e-9)
     if not near.any():
@@ -273,7 +273,7 @@ def _tied_face(mesh: Mesh, link: FaceTie, rows: _Rows, number: int) -> tuple[Mes
     return replace(mesh, points=points), text
 
 
-def _facet_size(mesh: Mesh, face: str) -> float:
+def facet_size(mesh: Mesh, face: str) -> float:
     """Mean length of the edges of a face's facets, m."""
     lengths = []
     for kind, facets in mesh.faces[face].items():

@@ -119,9 +119,9 @@ def put(
     if unit:
         dataset.attrs["unit"] = unit
     for i, label in enumerate(dims or [s.name.rsplit("/", 1)[-1] for s in scales]):
-        dataset.dims[i].label = label
+        h5py.h5ds.set_label(dataset.id, i, label.encode())  # dataset.dims[i] asks for the shape each time
     for i, scale in enumerate(scales):
-        dataset.dims[i].attach_scale(scale)
+        h5py.h5ds.attach_scale(dataset.id, scale.id, i)
     return dataset
 
 

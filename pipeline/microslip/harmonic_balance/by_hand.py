@@ -18,7 +18,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from ..contact.elements import Spring
+from ..contact.elements import Spring, Stop
 from ..contact.friction import Coulomb
 from ..contact.jenkins import Jenkins
 from ..contact.law import Law
@@ -26,8 +26,8 @@ from ..contact.normal import Preload
 from ..contact.patch import Patch
 from ..contact.periodic import Known
 from ..contact.point import PointContact
-from ..data import Array, Indices, largest
-from ..series import Torus
+from ..data import Array, ComplexArray, Indices, largest
+from ..series import Torus, amplitudes, integrals
 from .forces import AFT, Cycle, Forces, Traced, above_rounding
 
 
@@ -37,7 +37,7 @@ class OneCoordinate(AFT):
 
     def _sampled(self, u: Array) -> tuple[Array, Array, Array]:
         """(c, s) the coordinate over a cycle, (s, W) values of the harmonics, (W, s) their transform."""
-        values, transform = self.waves(u.shape[2])
+        values, _, transform = self.waves(u.shape[2])
         return u[:, 0] @ values.T, values, transform
 
     def near(self, u: Array, period: float, known: Known | None) -> tuple[Array, None]:
@@ -48,7 +48,8 @@ class OneCoordinate(AFT):
 
     def _speed(self, u: Array) -> Array:
         """(c, s) change of the coordinate from sample to sample, by its derivative."""
-        return u[:, 0] @ self.ahead(u.shape[2]).T / len(self.waves(u.shape[2])[0])
+        ahead = self.waves(u.shape[2])[1]
+        return u[:, 0] @ ahead.T / len(ahead)
 
     @cached_property
     def _length(self) -> float:
@@ -79,7 +80,7 @@ class ElasticSpring(OneCoordinate):
     def _turned(self, coefficients: int) -> tuple[Array, Array]:
         """(s, W) how far the spring is stretched, and (W, s) coefficients of its force along the coordinate."""
         if coefficients not in self._known:
-            values, transform = self.waves(coefficients)
+            values, _, transform = self.waves(coefficients)
             self._known[coefficients] = self._turn * values, self._turn * transform
         return self._known[coefficients]
 
@@ -103,6 +104,83 @@ class ElasticSpring(OneCoordinate):
         """The law with numbers of Python, by which arrays are multiplied faster."""
         assert isinstance(self.patch.law, Spring)
         return jax.tree_util.tree_map(lambda number: np.asarray(number).tolist(), self.patch.law)
+
+
+@dataclass(frozen=True, eq=False)
+class ElasticStop(ElasticSpring):
+    """`contact.elements.Stop`: its force is linear from the instants at which it closes to those at which it opens.
+
+    With E the harmonics over the angle t and the integrals over the contact alone, its coefficients are
+
+        P F = k w (integral of E^T E dt u - gap integral of E^T dt),    w = 1/(2 pi), 1/pi, 1/pi, ...
+
+    exact for every number of samples, which only tell where the instants are. The force is zero at these, so that
+    their own change has no share in the derivative, k w integral of E^T E dt.
+    """
+
+    def force(self, u: Array, period: float) -> Array:
+        return self.forces(u, period)[0]
+
+    def forces(self, u: Array, period: float) -> tuple[Array, Array]:
+        W = u.shape[2]
+        force, slope = np.zeros(u.shape), np.zeros((len(u), 1, W, 1, W))
+        law = self._spring
+        assert isinstance(law, Stop)
+        share = np.full(W, self._turn * law.stiffness / np.pi)
+        share[0] *= 0.5
+        for c, one in enumerate(self._turn * u[:, 0]):
+            for sign, gap in law.sides:
+                over = sign * one
+                over[0] -= gap
+                met = integrals(W // 2, *self._instants(over))
+                force[c, 0] += sign * share * (met @ over)
+                slope[c, 0, :, 0] += self._turn * share[:, None] * met
+        return force, slope
+
+    def _instants(self, over: Array) -> tuple[Array, Array]:
+        """Angles at which a signal (W,) gets above zero, and those at which it falls below again."""
+        values, ahead, _ = self.waves(len(over))
+        y, h, c = values @ over, 2 * np.pi / len(values), amplitudes(over)
+        t = np.arange(len(y)) * h
+        slope = ahead @ over / (2 * np.pi)
+        side = np.where(y > 0, -1.0, 1.0)
+        turns = (side * slope > 0) & (side * np.roll(slope, -1) < 0) & (np.roll(side, -1) == side)
+        near = turns & (side * (y + slope * h) > 0)  # it may pass zero twice between two samples
+        if near.any():
+            tops = _zeros(1j * np.arange(len(c)) * c, t[near], t[near] + h)
+            t = np.insert(t, np.flatnonzero(near) + 1, tops)
+            y = np.insert(y, np.flatnonzero(near) + 1, _summed(c, tops))
+        closed, end = y > 0, np.append(t[1:], t[0] + 2 * np.pi)
+        if closed.all():
+            return np.zeros(1), np.full(1, 2 * np.pi)
+        changes = np.flatnonzero(closed != np.roll(closed, -1))
+        found, opens = _zeros(c, t[changes], end[changes]), closed[changes]
+        begin, stop = found[~opens], found[opens]
+        if len(stop) and stop[0] < begin[0]:
+            stop = np.append(stop[1:], stop[0] + 2 * np.pi)
+        return begin, stop
+
+
+def _summed(c: ComplexArray, angles: Array) -> Array:
+    """(k, ...) signals at angles (k,), of complex amplitudes (H + 1, ...), cos - i sin."""
+    return (np.exp(1j * np.multiply.outer(angles, np.arange(len(c)))) @ c).real
+
+
+def _zeros(c: ComplexArray, low: Array, high: Array) -> Array:
+    """(k,) angles between low and high, at which a signal of complex amplitudes (H + 1,) changes
+    its sign: Newton's steps from the chord's zero, halved where they leave what is left."""
+    first, last = _summed(c, np.concatenate([low, high])).reshape(2, -1)
+    both = np.stack([c, 1j * np.arange(len(c)) * c], axis=1)
+    t = low + (high - low) * np.divide(first, first - last, out=np.zeros_like(low), where=first != last)
+    for _ in range(60):
+        y, rate = _summed(both, t).T
+        above = (y > 0) == (last > 0)
+        low, high = np.where(above, low, t), np.where(above, t, high)
+        step = t - np.divide(y, rate, out=np.zeros_like(y), where=rate != 0)
+        before, t = t, np.where((step >= low) & (step <= high), step, 0.5 * (low + high))
+        if (np.abs(t - before) <= 1e-13).all():  # the next step would be its square
+            break
+    return t
 
 
 @dataclass(frozen=True, eq=False)
@@ -183,7 +261,10 @@ def model(
 ) -> Forces:
     """Of the forces of contacts that are `alike`: by hand where that is possible, else marched."""
     laws = None if all(p is patches[0] for p in patches) else tuple(p.law for p in patches)
-    return _kind(patches[0], cycles)(patches[0], len(patches), samples, cycles, periodicity, torus, laws=laws)
+    kind = _kind(patches[0], cycles)
+    if torus is None and kind is ElasticSpring and isinstance(patches[0].law, Stop):
+        kind = ElasticStop
+    return kind(patches[0], len(patches), samples, cycles, periodicity, torus, laws=laws)
 
 
 def alike(patch: Patch) -> Any:

@@ -15,13 +15,18 @@ from typing import Any
 import numpy as np
 
 from .. import continuation
-from ..continuation import Branch, Settings, State
+from ..continuation import Branch, Lost, Scaled, Settings, State
+from ..continuation import Point as OnCurve
+from ..continuation.curve import Kind
 from ..continuation.newton import norm
-from ..data import Array, largest
+from ..data import Array, ComplexArray, largest
 from ..errors import UserError
 from .problem import AtFrequency, Problem
+from .readout import WithOutput, seen
 from .reduced import sticking_and_free
 from .solver import CONVERGED, OverLoad, Point, Report, led, solve
+from .stability import Settings as Multipliers
+from .stability import Stability, orbit, stability
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,11 +122,7 @@ class Family:
         Raises:
             UserError: a setting that there is not.
         """
-        if not isinstance(given, Settings):
-            if odd := set(given or ()) - {f.name for f in fields(Settings)}:
-                names = ", ".join(f.name for f in fields(Settings))
-                raise UserError(f"settings: there is no {', '.join(sorted(odd))}; there are {names}")
-            given = replace(ALONG, **{"targets": tuple(self.narrow[:, 0].tolist()), **(given or {})})
+        given = along(replace(ALONG, targets=tuple(self.narrow[:, 0].tolist())), given)
         way = 1 if self.end > self.begin else -1
         return replace(given, low=min(self.begin, self.end), high=max(self.begin, self.end), direction=way)
 
@@ -148,6 +149,20 @@ class Family:
 
 ALONG = Settings(points=3000, branch_points=False, angle=0.5, step=0.1, step_max=0.5, contraction=0.1)
 """How curves are followed, if not told otherwise."""
+
+
+def along(default: Settings, given: Settings | Mapping[str, Any] | None) -> Settings:
+    """How a curve is followed: as given, or by default but for what is given.
+
+    Raises:
+        UserError: a setting that there is not.
+    """
+    if isinstance(given, Settings):
+        return given
+    if odd := set(given or ()) - {f.name for f in fields(Settings)}:
+        names = ", ".join(f.name for f in fields(Settings))
+        raise UserError(f"settings: there is no {', '.join(sorted(odd))}; there are {names}")
+    return replace(default, **(given or {}))
 
 
 def _longest(state: State, step: float) -> float:
@@ -241,6 +256,81 @@ def _begun(family: Family, equations: _Noted, settings: Settings) -> State | str
     if not first.converged:
         return first.status
     return equations.told(continuation.start(equations, first.x, family.begin, settings))
+
+
+def with_peaks(family: Family, branch: Branch) -> Branch:
+    """A curve over the frequency with the peaks of its first read-out between its points."""
+    problem = family.equations
+    if not isinstance(problem, Problem) or not problem.assembly.outputs:
+        return branch
+
+    def height(x: Array, Omega: float) -> float:
+        at = problem.at(Omega)
+        force = at.force(x)
+        return float(abs(seen(at, at.modal(x, force), force)))
+
+    return continuation.with_peaks(WithOutput(problem), branch, height)
+
+
+CRITICAL: dict[Kind, Callable[[ComplexArray], float]] = {
+    "branch point": lambda values: values.real[values.imag == 0].max(initial=0.0) - 1,
+    "period doubling": lambda values: -values.real[values.imag == 0].min(initial=0.0) - 1,
+    "Neimark-Sacker": lambda values: np.abs(values[values.imag != 0]).max(initial=0.0) - 1,
+}
+"""What falls or rises through zero where a motion gains or loses stability, by its multipliers."""
+
+LOCATED = 1e-5
+"""Share of a step to which such a place is located."""
+
+
+def with_stability(
+    family: Family, branch: Branch, report: Report = lambda _: None
+) -> tuple[Branch, list[Stability]]:
+    """A curve with the places between its points where a multiplier leaves or enters the unit circle, and what the
+    multipliers of every point are. One that leaves at 1 beside a fold is the fold's.
+
+    Raises:
+        UserError: a sector that stands for a ring.
+    """
+    equations = Scaled(family.equations)
+
+    def at(x: Array, lam: float) -> Stability:
+        return stability(orbit(family.problem(lam), x, family.Omega(lam)), Multipliers(steps=256))
+
+    def of_place(y: Array, _: Array) -> Stability:
+        return at(y[:-1] * equations.x_scale, float(y[-1]) * equations.lam_scale)
+
+    points, judged = list(branch.points), list[Stability]()
+    for number, p in enumerate(points, 1):
+        report(f"stability of {number} of {len(points)} points")
+        judged.append(at(p.x, p.lam))
+    out, told, last = list[OnCurve](), list[Stability](), -1
+    for i, (p, one) in enumerate(zip(points, judged, strict=True)):
+        if p.kind == "fold" or (last >= 0 and p.arclength <= points[last].arclength):
+            last = last if p.kind == "fold" else i
+            out, told = [*out, p], [*told, one]
+            continue
+        for kind, test in CRITICAL.items() if last >= 0 else ():
+            before, after = test(judged[last].multipliers), test(one.multipliers)
+            beside = any(q.kind == "fold" for q in points[max(last - 1, 0) : i + 2])
+            if before * after >= 0 or (kind == "branch point" and beside):
+                continue
+            first = points[last]
+            begin, end = (equations.pack(q.x, q.lam) for q in (first, p))
+            segment = continuation.Segment(begin, end, first.tangent, p.tangent, p.kink)
+
+            def value(y: Array, t: Array, of: Callable[[ComplexArray], float] = test) -> float:
+                return of(of_place(y, t).multipliers)
+
+            try:
+                y, t = continuation.root(equations, segment, ALONG, value, LOCATED)
+            except Lost:
+                continue
+            x, lam = y[:-1] * equations.x_scale, float(y[-1]) * equations.lam_scale
+            out.append(OnCurve(x, lam, kind, False, first.arclength + norm(y - begin), t, 0))
+            told.append(of_place(y, t))
+        out, told, last = [*out, p], [*told, one], i
+    return replace(branch, points=tuple(out)), told
 
 
 @dataclass(frozen=True, eq=False)

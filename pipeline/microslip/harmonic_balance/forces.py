@@ -10,7 +10,7 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache, partial
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol
 
@@ -25,7 +25,7 @@ from ..contact.periodic import Known, periodic, unknown, with_slopes
 from ..contact.point import PointContact
 from ..data import Array
 from ..programs import often, program, seldom
-from ..series import Torus, derivative, fourier
+from ..series import Torus, cycle_waves
 
 
 class Forces(Protocol):
@@ -77,15 +77,10 @@ class AFT:
     seldom: bool = False
     laws: tuple[Law, ...] | None = None
 
-    def waves(self, coefficients: int) -> tuple[Array, Array]:
-        """(s, W) of the series at the samples of a cycle, and (W, s) its coefficients from samples."""
-        return fourier(coefficients // 2, self.samples) if self.torus is None else self.torus.waves
-
-    def ahead(self, coefficients: int) -> Array:
-        """(s, W) derivative of the series over the time in cycles, at the samples."""
-        if self.torus is not None:
-            return self.torus.ahead
-        return _ahead(coefficients // 2, self.samples)
+    def waves(self, coefficients: int) -> tuple[Array, Array, Array]:
+        """(s, W) of the series at the samples of a cycle, its derivative over the time in cycles there, and (W, s) its
+        coefficients from samples."""
+        return cycle_waves(coefficients // 2, self.samples) if self.torus is None else self.torus.waves
 
     @cached_property
     def law(self) -> Law:
@@ -159,14 +154,9 @@ class AFT:
 
     def traced(self, u: Array, period: float) -> list[Traced]:
         G = self.kinematics
-        given = self.samples, self.cycles, self.periodicity, (self.waves(u.shape[2])[0], self.ahead(u.shape[2]))
+        given = self.samples, self.cycles, self.periodicity, self.waves(u.shape[2])[:2]
         laws = self.laws or (self.patch.law,) * len(u)
         return [traced(law, G, one, period, *given) for law, one in zip(laws, u, strict=True)]
-
-
-@lru_cache(maxsize=8)
-def _ahead(harmonics: int, samples: int) -> Array:
-    return 2 * np.pi * fourier(harmonics, samples)[0] @ derivative(2 * harmonics + 1)
 
 
 def repeated(law: Law, n: int, times: int) -> Law:
@@ -242,11 +232,12 @@ def _rate(
 @partial(program, static_argnames=("count",))
 def _slopes_on_line(
     law: Law, G: jax.Array, u: jax.Array, period: jax.Array | float, periodicity: jax.Array | float, values: jax.Array,
-    transform: jax.Array, count: int,
+    ahead: jax.Array, transform: jax.Array, count: int,
 ) -> tuple[jax.Array, jax.Array]:  # fmt: skip
     """`_with_slopes` of any series (s, W) in place of a cycle's."""
     c, n, W = u.shape[0], G.shape[0], u.shape[2]
-    found, slope = with_slopes(law, _path(G, u, values), period, count, periodicity, values, transform)
+    path, rate = _path(G, u, values), _path(G, u, ahead) / period
+    found, slope = with_slopes(law, path, rate, period, count, periodicity, values, ahead, transform)
     slope = slope.reshape(W, W, 3, c, n, 3)  # of force w by motion x along j, of point n of contact c along i
     return _summed(G, found.force, c, transform), jnp.einsum("nia,wxjcni,njb->cawbx", G, slope, G)
 
@@ -254,9 +245,10 @@ def _slopes_on_line(
 @partial(program, static_argnames=("count",))
 def _on_line(
     law: Law, G: jax.Array, u: jax.Array, period: jax.Array | float, periodicity: jax.Array | float, values: jax.Array,
-    transform: jax.Array, count: int,
+    ahead: jax.Array, transform: jax.Array, count: int,
 ) -> jax.Array:  # fmt: skip
-    return _summed(G, periodic(law, _path(G, u, values), period, count, periodicity).force, u.shape[0], transform)
+    path, rate = _path(G, u, values), _path(G, u, ahead) / period
+    return _summed(G, periodic(law, path, period, count, periodicity, rate).force, u.shape[0], transform)
 
 
 def _path(G: jax.Array, u: jax.Array, values: jax.Array) -> jax.Array:
@@ -319,9 +311,7 @@ def traced(
         samples: of a cycle. count: cycles marched at most before. periodicity: see `contact.periodic.periodic`.
         waves: (s, W) of another series at the samples, and its derivative over the time in cycles.
     """
-    if waves is None:
-        values = np.asarray(fourier(u.shape[1] // 2, samples)[0])
-        waves = values, 2 * np.pi * values @ derivative(u.shape[1])
+    waves = waves or cycle_waves(u.shape[1] // 2, samples)[:2]
     parts = _point_cycles(law, G, u, float(period), *waves, count, periodicity)
     dissipated, by_slip, lost, slipping, open_ = (np.asarray(p) for p in parts[:5])
     return Traced(parts[6], Cycle(dissipated, by_slip, lost, slipping, open_, float(parts[5])))
@@ -347,16 +337,19 @@ def _point_cycles(
 ) -> tuple[jax.Array, ...]:  # fmt: skip
     samples = len(values)
     path, ahead = (jnp.einsum("sk,nia,ak->sni", v, G, u) for v in (values, ahead))
-    before, state = periodic(law, path, period, count, periodicity)[:2]
+    before, state = periodic(law, path, period, count, periodicity, ahead / period)[:2]
     moved = path - jnp.roll(path, 1, axis=0)
     dt = period / samples
 
     def one(state: State, row: tuple[jax.Array, ...]) -> tuple[State, tuple[jax.Array, ...]]:
-        force, after = law.step(row[0], row[1] / dt, dt, state)
-        lost = law.lost(Step(row[0], row[1], dt, row[2], force, state, after))
+        u, rate, moved, force_before = row
+        force, after = law.step(u, rate, dt, state)
+        lost = law.lost(Step(u, moved, dt, force_before, force, state, after))
         return after, (force, law.slip(after) - law.slip(state), lost)
 
-    _, (force, slid, lost) = jax.lax.scan(one, state, (path, moved, jnp.roll(before, 1, axis=0)))
+    _, (force, slid, lost) = jax.lax.scan(
+        one, state, (path, ahead / period, moved, jnp.roll(before, 1, axis=0))
+    )
     mean = 0.5 * (force + jnp.roll(force, 1, axis=0))
     open_ = force[..., 0] <= 0
     moves = jnp.abs(slid).max(axis=-1) > 1e-9 * jnp.abs(moved).max()

@@ -46,15 +46,24 @@ def amplitude(
 
     y = W q + e - r F with q = q_ref - X (F - k v): linear in the forces and in v.
     """
+    rows = [(one.output[output], one.output_residual[output], one.output_given[output])
+            for one in at.problem.parts[harmonic]]  # fmt: skip
+    return weighted(at, x, force, slopes, harmonic, rows)
+
+
+def weighted(
+    at: AtFrequency, x: Array, force: Array, slopes: list[Array], harmonic: int,
+    rows: list[tuple[ComplexArray, ComplexArray, complex]],
+) -> Amplitude:  # fmt: skip
+    """The amplitude W q + e - r F of rows (W (m,), r (c,), e), one for each part; see `amplitude`."""
     p, h = at.problem, harmonic
     share = p.share if h else 1.0
     v, f = amplitudes(p.displacement(x))[h], amplitudes(force)[h]
     of_force, of_motion = np.zeros(p.count, dtype=complex), np.zeros(p.count, dtype=complex)
     value, by_Omega = 0.0j, 0.0j
-    for part, seen, k, s in zip(p.parts[h], at.seen[h], p.stiffness, p.slices, strict=True):
-        row, beside = part.output[output], part.output_residual[output]
+    for (row, beside, given), seen, k, s in zip(rows, at.seen[h], p.stiffness, p.slices, strict=True):
         excess = f[s] - k @ v[s]
-        driven = share * (row @ seen.modal + part.output_given[output])
+        driven = share * (row @ seen.modal + given)
         value += complex(driven - row @ (seen.modal_compliance @ excess) - beside @ f[s])
         by_Omega += complex(share * (row @ seen.modal_rate) - row @ (seen.modal_compliance_rate @ excess))
         of_force[s] = -(row @ seen.modal_compliance + beside)
@@ -66,6 +75,17 @@ def amplitude(
         for wave, unit in _waves(h):
             by_Omega += complex(unit * (of_force @ rates[wave]))
     return Amplitude(complex(value), (by_v * p.scale).ravel(), complex(by_Omega))
+
+
+def seen(
+    at: AtFrequency, motion: list[list[ComplexArray]], force: Array, output: int = 0, harmonic: int = 1
+) -> complex:
+    """The value of `amplitude` alone, m, of the bodies' amplitudes and the forces (W, c)."""
+    p, f = at.problem, amplitudes(force)[harmonic]
+    return sum(
+        complex(part.output[output] @ q + p.share * part.output_given[output] - part.output_residual[output] @ f[s])
+        for part, q, s in zip(p.parts[harmonic], motion[harmonic], p.slices, strict=True)
+    )
 
 
 def _waves(harmonic: int) -> list[tuple[int, complex]]:

@@ -69,6 +69,31 @@ class Motions(Series):
     def folds(self) -> Array:
         return self.parameter[np.asarray(self._known.get("fold", np.zeros(len(self))), dtype=bool)]
 
+    @property
+    def peaks(self) -> Array:
+        """(p,) values of the parameter at which the first read-out has a peak along the curve, located."""
+        return self.parameter[np.asarray(self._known.get("peak", np.zeros(len(self))), dtype=bool)]
+
+    @property
+    def stable(self) -> Array:
+        """(f,) whether a disturbance of the motion dies out.
+
+        Raises:
+            UserError: a curve that was followed without stability.
+        """
+        if "stable" not in self._known:
+            raise UserError("stable: was not asked for; follow the curve with stability=True")
+        return np.asarray(self._known["stable"], dtype=bool)
+
+    @property
+    def bifurcations(self) -> dict[str, Array]:
+        """Kind -> values of the parameter at which motions gain or lose their stability, located: "fold", "branch
+        point", "period doubling", "Neimark-Sacker"; of kinds that are there."""
+        kinds = ("fold", "branch point", "period doubling", "Neimark-Sacker")
+        flags = {kind: np.asarray(self._known[kind], dtype=bool) for kind in kinds if kind in self._known}
+        found = {kind: self.parameter[here] for kind, here in flags.items()}
+        return {kind: at for kind, at in found.items() if len(at)}
+
     @cached_property
     def key(self) -> Array:
         """(f,) places."""

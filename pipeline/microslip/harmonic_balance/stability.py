@@ -22,6 +22,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from ..contact.elements import Spring
 from ..contact.law import Law, State
 from ..contact.periodic import periodic
 from ..data import Array, ComplexArray, largest
@@ -323,9 +324,29 @@ def _marched(law: Law, G: jax.Array, d: jax.Array, period: float, steps: int, co
         both = (jnp.einsum("nia,nij,njb->ab", G, k, G) for k in (by_place, by_speed))
         return law.step(*sample, dt, state)[1], (state, *both)
 
-    state = periodic(law, u, period, count, SETTLED)[:2][1]
+    state = periodic(law, u, period, count, SETTLED, v)[:2][1]
     _, (states, slope, drag) = jax.lax.scan(one, state, (u, v))
+    if isinstance(law, Spring):
+        slope = jnp.einsum("na,sn,nb->sab", G[:, 1], _secants(law, G[:, 1], d, u[..., 1]), G[:, 1])
     return u, v, states, slope, drag
+
+
+def _secants(law: Spring, G: jax.Array, d: jax.Array, middle: jax.Array) -> jax.Array:
+    """(s, n) stiffness of a spring over every step, from its beginning to its end: of one that is met within a step
+    that is the share of it, where the stiffness in the middle would be wrong by the first order of the step.
+
+    Args: G: (n, b). d: (b, W) harmonics. middle: (s, n) m.
+    """
+    steps = len(middle)
+    angles = 2 * np.pi * np.arange(steps + 1) / steps
+    edge = jnp.einsum("sk,na,ak->sn", summed(np.outer(angles, np.arange(1, d.shape[1] // 2 + 1))), G, d)
+    moved, force = jnp.diff(edge, axis=0), jnp.diff(law.force(edge), axis=0)
+    moves = jnp.abs(moved) > STILL * jnp.abs(edge).max()
+    return jnp.where(moves, force / jnp.where(moves, moved, 1.0), law.slope(middle))
+
+
+STILL = 1e-7
+"""Share of a motion below which a step has no secant but for rounding."""
 
 
 def _tangents(law: Law, dt: float, state: State, u: jax.Array, v: jax.Array) -> tuple[jax.Array, jax.Array]:

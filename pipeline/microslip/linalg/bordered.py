@@ -6,7 +6,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from ..data import Array
-from .eigen import DirectSolver
+from .direct import DirectSolver
 
 
 class Bordered(DirectSolver):

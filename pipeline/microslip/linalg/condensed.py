@@ -15,7 +15,8 @@ import scipy.sparse as sp
 
 from ..data import Array, Indices
 from ..errors import NotConverged
-from .eigen import DirectSolver, Pardiso, available_backends, new_solver
+from .direct import DirectSolver, Pardiso
+from .eigen import available_backends, new_solver
 
 
 class Condensed:
@@ -85,9 +86,9 @@ class _PardisoCondensed(Condensed):
 class _PlainCondensed(Condensed):
     """The same from any direct solver of the interior: two solves where PARDISO sweeps once each way."""
 
-    def __init__(self, boundary: Indices, backend: str) -> None:
+    def __init__(self, boundary: Indices, solver: DirectSolver) -> None:
         super().__init__(boundary)
-        self._solver = new_solver(backend)
+        self._solver = solver
         self.name = self._solver.name
         self._inner: Indices = boundary
         self._coupling = sp.csr_matrix((0, 0))
@@ -120,10 +121,10 @@ class _PlainCondensed(Condensed):
         self._solver.close()
 
 
-def new_condensed(boundary: Indices, name: str = "auto") -> Condensed:
+def new_condensed(boundary: Indices, name: str = "auto", ranks: int = 1) -> Condensed:
     """A fresh solver; ``auto`` takes the fastest backend there is."""
     chosen = available_backends()[0] if name == "auto" else name
-    return _PardisoCondensed(boundary) if chosen == "pardiso" else _PlainCondensed(boundary, chosen)
+    return _PardisoCondensed(boundary) if chosen == "pardiso" else _PlainCondensed(boundary, new_solver(chosen, ranks))
 
 
 def negative_eigenvalues(A: Array) -> int:

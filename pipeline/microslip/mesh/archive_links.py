@@ -7,59 +7,48 @@ pilot node makes that node lead the surface (or follow it in the mean), other pa
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from ..data import Array, AverageLink, Equation, FaceTie, Indices, Joint, Link, RigidLink, Sector
-from .archive import Archive, CyclicCommands, Element, whole
-from .raw import Damaged, Numbering, RawMesh, is_number, joined, real
+from .archive import Archive, Command, CyclicCommands, Element, whole
+from .archive_loads import LABELS, put
+from .raw import Damaged, Numbering, RawMesh, Structure, is_number, joined, real
 from .supports import add_supports, in_axes
 from .systems import System
 
-LABELS = {"UX": "x", "UY": "y", "UZ": "z", "ROTX": "a", "ROTY": "b", "ROTZ": "c"}
-"""Degree of freedom -> direction."""
-
 
 def _displacement(archive: Archive, words: list[str]) -> None:
-    """D, node or component, UX or UY or UZ or ALL, value, its imaginary part, last node, step, further labels."""
-    where, label, value, _, last, step, *more = words[1:]
-    ways = "".join(
-        "xyzabc" if w.upper() == "ALL" else LABELS.get(w.upper(), "") for w in (label, *more)
-    )
-    if not ways:
+    """D, node or component, UX or UY or UZ or ALL, value, its imaginary part, last node, step, further labels.
+
+    What is moved is held in modes, as in Ansys.
+    """
+    where, label = words[1:3]
+    every = where.upper() == "ALL"
+    if every and archive.unread:
+        text = f"is for the selection {archive.unread}, which is not read"
+        archive.held.left_out.append(f"D,{where},{label} {text}")
         return
     named = {name.upper(): name for name in archive.components}
-    every = where.upper() == "ALL"
     component = named.get(archive.chosen.upper() if every else where.upper())
-    if value.startswith("%"):
-        archive.held.left_out.append(
-            f"D,{where},{label} takes its displacement from the table {value}"
-        )
-    elif value and real(value, "D") != 0:
-        archive.held.left_out.append(f"D,{where},{label} prescribes a displacement")
-    elif component is not None:
-        archive.held.hold(component, ways)
-    elif is_number(where):
-        first, end = int(where), whole(last, "D") if last else int(where)
-        numbers = range(first, min(end, first + 10**8) + 1, max(whole(step or "1", "D"), 1))
-        archive.ranged.update(numbers[1:])
-        for node in numbers:
-            archive.held.hold(node, ways)
-    elif every and not archive.unread:
-        for node in archive.nodes(where) or []:
-            archive.held.hold(node, ways)
+    if component is None and not every and not is_number(where):
+        archive.held.left_out.append(f"D,{where},{label} names no node by its number")
+        return
+    places = put(archive, "D", words, LABELS)
+    if component is not None:
+        archive.held.hold(component, {way for _, way in places})
     else:
-        unread = f"is for the selection {archive.unread}, which is not read"
-        why = unread if every else "names no node by its number"
-        archive.held.left_out.append(f"D,{where},{label} {why}")
+        for node, way in places:
+            archive.held.hold(node, way)
 
 
-def read_displacements(archive: Archive, words: list[str], lines: list[str], at: int) -> int:
+def _displacements_block(archive: Archive, words: list[str]) -> None:
     """DBLOCK, count; then its format and in each line a node, a label, a value."""
     count = whole(words[1] or "0", "DBLOCK")
-    rows = lines[at + 1 : at + 1 + count]
+    rows = archive.lines[archive.at + 1 : archive.at + 1 + count]
     if len(rows) < count:
         raise Damaged("DBLOCK has no end, the file is truncated")
     for row in rows:
@@ -69,7 +58,7 @@ def read_displacements(archive: Archive, words: list[str], lines: list[str], at:
                 f"DBLOCK holds the line '{row.strip()[:60]}'; a node, a label and a value belong there"
             )
         _displacement(archive, ["D", *fields[:3], *[""] * 8])
-    return at + 1 + count
+    archive.at += 1 + count
 
 
 def _equation(archive: Archive, words: list[str]) -> None:
@@ -99,7 +88,7 @@ def _equation(archive: Archive, words: list[str]) -> None:
             found.append((whole(node, "CE"), LABELS[label.upper()], real(factor, "CE")))
 
 
-def coupled_nodes(archive: Archive, words: list[str], lines: list[str], at: int) -> int:
+def _coupled(archive: Archive, words: list[str]) -> None:
     """CP, number, label, nodes: displacements that are equal; or CP, number, label, count and the nodes in the lines
     that follow, as archives have it."""
     number, label, *nodes = [*words[1:], "", ""]
@@ -107,12 +96,16 @@ def coupled_nodes(archive: Archive, words: list[str], lines: list[str], at: int)
         [n for n in nodes if n],
         "xyz" if label.upper() == "ALL" else LABELS.get(label.upper(), ""),
     )
-    end = at
+    if label.upper() in ("TEMP", "VOLT", "MAG", "PRES", "HDSP"):
+        return
+    if len(nodes) == 1 and not is_number(nodes[0]):
+        nodes = [str(node) for node in archive.nodes(nodes[0]) or []]
+    lines = archive.lines
     if len(nodes) == 1 and is_number(nodes[0]):
         count, nodes = int(nodes[0]), []
-        while len(nodes) < count and end < len(lines) and all(map(is_number, lines[end].split())):
-            nodes += lines[end].split()
-            end += 1
+        while len(nodes) < count and archive.at < len(lines) and all(map(is_number, lines[archive.at].split())):
+            nodes += lines[archive.at].split()
+            archive.at += 1
     if len(nodes) < 2 or not ways or not all(map(is_number, nodes)):
         raise Damaged(
             f"CP {number} couples other things than {label or 'UX'} of two nodes or more; use CE"
@@ -122,7 +115,6 @@ def coupled_nodes(archive: Archive, words: list[str], lines: list[str], at: int)
             terms = [(whole(nodes[0], "CP"), way, 1.0), (whole(node, "CP"), way, -1.0)]
             name = f"CP {number}, {label} of node {node}, {way}"
             archive.places[name], archive.equations[name] = f"{archive.where}: CP {number}", terms
-    return end
 
 
 _RIGID = {"": "xyzabc", "ALL": "xyzabc", "UXYZ": "xyz", "RXYZ": "abc"}
@@ -170,6 +162,7 @@ def constrain(archive: Archive, raw: RawMesh, numbering: Numbering) -> None:
     for gap in archive.ranged.difference(archive.node_id):
         archive.held.nodes.pop(gap, None)
     raw.links += [*_equations(archive, numbering), *_leading(archive, numbering)]
+    raw.links += _rigid_elements(archive, raw, numbering)
     raw.links += _pairs(archive, raw, numbering)
     add_supports(raw, archive.held, numbering)
 
@@ -178,7 +171,7 @@ def _axes(archive: Archive, raw: RawMesh, numbering: Numbering) -> dict[int, Arr
     """Directions of nodes that are turned against global ones."""
     there = [node for node in archive.turns if np.isin(node, numbering.sorted)]
     at: Indices = numbering.positions(np.array(there, dtype=np.int64), "NROTAT names")
-    axes = {node: archive.turns[node].at(raw.points[p]) for node, p in zip(there, at, strict=True)}
+    axes = {node: archive.turns[node].directions(raw.points[[p]])[0] for node, p in zip(there, at, strict=True)}
     return {node: own for node, own in axes.items() if np.abs(own - np.eye(3)).max() > 1e-12}
 
 
@@ -217,6 +210,35 @@ def _leading(archive: Archive, numbering: Numbering) -> Iterator[Link]:
             np.array(weights),
             moves,
         )
+
+
+def is_rigid(archive: Archive, element: Element) -> bool:
+    """Whether it is a rigid link or beam, MPC184 with KEYOPT(1) = 0 or 1."""
+    option = archive.options.get(element.kind, {}).get(1, "0")
+    return archive.kinds.get(element.kind) == 184 and option in ("", "0", "1") and len(element.nodes) >= 2
+
+
+def _rigid_elements(archive: Archive, raw: RawMesh, numbering: Numbering) -> Iterator[Link]:
+    """MPC184: beams that share nodes are one rigid body; a link keeps the distance of its nodes."""
+    bodies: list[tuple[str, set[int], Counter[int]]] = []
+    for element in (e for e in archive.elements if is_rigid(archive, e)):
+        where = f"{element.where or f'{archive.path}, element {element.number}'}: MPC184"
+        ends = element.nodes[:2]
+        at = numbering.positions(ends, f"{where} names")
+        if archive.options.get(element.kind, {}).get(1, "0") != "1":
+            along = raw.points[at[1]] - raw.points[at[0]]
+            if not along.any():
+                raise Damaged(f"{where} is a link between two nodes at one place; make it a beam (KEYOPT(1) = 1)")
+            yield in_axes(where, at, np.zeros(2, dtype=np.int64), np.array([along, -along]) / np.linalg.norm(along))
+            continue
+        near = [body for body in bodies if not body[1].isdisjoint(ends)]
+        nodes, count = set(ends).union(*(b[1] for b in near)), sum((b[2] for b in near), Counter(ends))
+        first = near[0][0] if near else where
+        bodies = [*(body for body in bodies if body not in near), (first, nodes, count)]
+    for where, nodes, count in bodies:
+        leader = count.most_common(1)[0][0]
+        members = numbering.positions(sorted(nodes - {leader}), f"{where} names")
+        yield RigidLink(where, int(numbering.positions([leader], where)[0]), members, "xyzabc")
 
 
 def _refuse_turned(archive: Archive, where: str, moves: str, nodes: list[int]) -> None:
@@ -389,6 +411,14 @@ def _pairs(archive: Archive, raw: RawMesh, numbering: Numbering) -> list[Link]:
         else:
             taken.append((members, others))
             found += _faced(archive, raw, numbering, pair, options.get(12, "0"))
+    hanging = {node for s in raw.structures for row in s.elements for node in raw.node_id[row].tolist()}
+    among: dict[str, list[list[int]]] = {}
+    for pair in (pair for why, several in left.items() if "no solid" in why for pair in several):
+        nodes = sorted(set.union(*pair.nodes()))
+        if not hanging.isdisjoint(nodes):
+            at = numbering.positions(nodes, f"{pair.where} names").tolist()
+            among.setdefault(next(iter(among), pair.where), []).append(at)
+    raw.structures += [Structure(where, "contact pairs with beams or shells", rows) for where, rows in among.items()]
     for why, several in left.items():
         counts = [
             sum(map(len, side))
@@ -456,8 +486,10 @@ def _remote(archive: Archive, raw: RawMesh, numbering: Numbering, pair: _Pair, p
     return AverageLink(where, reference, face, None, ways)
 
 
-COMMANDS = {
+COMMANDS: dict[str, Command] = {
     "D": _displacement,
+    "DBLOCK": _displacements_block,
+    "CP": _coupled,
     "CE": _equation,
     "CERIG": _rigid,
     "RBE3": _spread,
@@ -465,4 +497,3 @@ COMMANDS = {
     "CYCOPT": _cyclic_option,
     "MSOPT": _stages,
 }
-BLOCKS = {"DBLOCK": read_displacements, "CP": coupled_nodes}

@@ -9,13 +9,13 @@ import numpy as np
 
 from ..data import LumpedElement, PointMass
 from ..errors import of_file
-from .archive import Archive, Element, whole
+from .archive import Archive, Command, Element, whole
 from .raw import Damaged, Numbering, lost, real
 
 KINDS = {21: "MASS21", 14: "COMBIN14"}
 
 
-def read_reals(archive: Archive, words: list[str]) -> None:
+def _read_reals(archive: Archive, words: list[str]) -> None:
     """R, set, up to six values; RMORE, six more."""
     if words[0].upper() == "R":
         archive.open_reals = whole(words[1] or "1", "R")
@@ -25,9 +25,9 @@ def read_reals(archive: Archive, words: list[str]) -> None:
     values += [real(w, "R") if w else 0.0 for w in [*words[1:], *6 * [""]][:6]]
 
 
-def read_block(archive: Archive, words: list[str], lines: list[str], at: int) -> int:
+def _read_block(archive: Archive, words: list[str]) -> None:
     """RLBLOCK, sets, largest set, largest count: two formats, then each set, seven values a line behind its number."""
-    formats = []
+    formats, lines, at = [], archive.lines, archive.at
     for line in lines[at : at + 2]:
         found = re.findall(r"(\d*)([ig])(\d+)", re.sub(r"\.\d+", "", line.lower()))
         formats.append([int(w) for n, _, w in found for _ in range(int(n or 1))])
@@ -45,7 +45,7 @@ def read_block(archive: Archive, words: list[str], lines: list[str], at: int) ->
                 raise Damaged("RLBLOCK has no end, the file is truncated")
             values, at = [*values, *_cut(lines[at], formats[1])], at + 1
         archive.reals[number] = [real(w, "RLBLOCK") if w else 0.0 for w in values[:count]]
-    return at
+    archive.at = at
 
 
 def _cut(line: str, widths: list[int]) -> list[str]:
@@ -70,6 +70,8 @@ def lumps_of(archive: Archive, numbering: Numbering) -> Iterator[PointMass | Lum
             values = [*archive.reals.get(element.real, []), *12 * [0.0]]
             if element.real not in archive.reals:
                 raise Damaged(f"{KINDS[kind]} has no real constants {element.real}; add R,{element.real}")
+            if not nodes:
+                raise Damaged(f"{KINDS[kind]} names no node; write it behind E")
             at = numbering.positions(nodes, f"{KINDS[kind]} names")
             options = {n: w for n, w in archive.options.get(element.kind, {}).items() if w not in ("", "0")}
             made = (_mass if kind == 21 else _spring)(archive, element, values, at, options, f"{where}: {KINDS[kind]}")
@@ -113,4 +115,15 @@ def _spring(
     used = np.flatnonzero(axis)
     row = np.concatenate([axis[used], -axis[used]])
     both = np.outer(row, row)
-    return LumpedElement(where, np.repeat(nodes, len(used)), np.tile(used + first, 2), r[0] * both, r[1] * both)
+    pulls = r[0] if way == "0" else 0.0
+    return LumpedElement(
+        where,
+        np.repeat(nodes, len(used)),
+        np.tile(used + first, 2),
+        r[0] * both,
+        r[1] * both,
+        pulls,
+    )
+
+
+COMMANDS: dict[str, Command] = {"R": _read_reals, "RMORE": _read_reals, "RLBLOCK": _read_block}

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
 
 import numpy as np
 
 from ..data import Array
-from .archive import Archive, whole
+from .archive import Archive, Command, whole
 from .raw import Damaged, is_number, real
 from .systems import System, axes_by_angles
 
@@ -101,8 +102,7 @@ def _turn(archive: Archive, words: list[str]) -> None:
         )
         return
     if words[2] and is_number(words[1]):
-        step = max(whole(words[3] or "1", "NROTAT"), 1)
-        nodes = range(int(words[1]), whole(words[2], "NROTAT") + 1, step)
+        nodes = archive.through(words[1], words[2], words[3], "NROTAT")
     system = _known(archive, archive.current.get("CSYS", 0), "NROTAT")
     archive.turns.update(dict.fromkeys(nodes, system))
 
@@ -117,14 +117,16 @@ def _modify(archive: Archive, words: list[str]) -> None:
 
 
 def _component_selected(archive: Archive, words: list[str]) -> None:
-    """CMSEL, S or R or A or U, component of nodes; one of elements chooses no nodes."""
+    """CMSEL, S or R or A or U, component of nodes or of elements."""
     how, name = words[1].upper() or "S", words[2]
     nodes = archive.component(name)
     if nodes is not None:
         _select(archive, how, set(nodes))
         archive.chosen = name if how == "S" else ""
-    elif how == "S":
+    elif how == "ALL" or (cells := archive.cells(name)) is None or name.upper() == "ALL":
         archive.unread, archive.chosen = f"CMSEL,{how},{name}", ""
+    else:
+        _pick(archive, how, set(cells))
 
 
 def _nodes_selected(archive: Archive, words: list[str]) -> None:
@@ -139,8 +141,8 @@ def _nodes_selected(archive: Archive, words: list[str]) -> None:
         last = whole(high or low, "NSEL")
         inside = range(int(low), last + 1, max(whole(step or "1", "NSEL"), 1))
         _select(archive, how, {n for n in archive.node_id if n in inside})
-    elif item == "LOC" and axis.upper() in ("X", "Y", "Z") and low:
-        _select(archive, how, _at_place(archive, "XYZ".index(axis.upper()), low, high))
+    elif item == "LOC" and axis.upper() in ("X", "Y", "Z") and archive.points:
+        _select(archive, how, _at_place(archive, "XYZ".index(axis.upper()), low or "0", high))
     else:
         archive.unread = ",".join(word for word in words if word)
 
@@ -183,20 +185,91 @@ def _select(archive: Archive, how: str, nodes: set[int]) -> None:
 def _everything(archive: Archive, words: list[str]) -> None:
     """ALLSEL."""
     archive.selected, archive.chosen, archive.unread = None, "", ""
+    archive.picked, archive.unread_cells = None, ""
 
 
-def _by_elements(archive: Archive, words: list[str]) -> None:
-    """NSLE and others that choose nodes by elements, lines, areas."""
+def _nodes_of_cells(archive: Archive, words: list[str]) -> None:
+    """NSLE, S or R or A or U: nodes of the chosen elements."""
+    if (numbers := archive.cells("ALL")) is None or words[2].upper() not in ("", "ALL"):
+        _not_read(archive, words)
+        return
+    chosen = set(numbers)
+    nodes = {n for e in archive.elements if e.number in chosen for n in e.nodes if n}
+    _select(archive, words[1].upper() or "S", nodes)
+
+
+def _not_read(archive: Archive, words: list[str]) -> None:
+    """NSLA and others that choose nodes by lines, areas, volumes."""
     archive.chosen, archive.unread = "", ",".join(word for word in words if word)
 
 
+def _cells_selected(archive: Archive, words: list[str]) -> None:
+    """ESEL, S or R or A or U, TYPE or MAT or REAL or ESYS or ELEM or ENAME, , from, to, step; ESEL, ALL or
+    NONE or INVE."""
+    how, item, low, high, step = words[1].upper() or "S", words[2].upper(), *words[4:7]
+    known = {"TYPE": "kind", "MAT": "material", "REAL": "real", "ESYS": "system", "ELEM": "number", "": "number"}
+    if how in ("ALL", "NONE"):
+        archive.unread_cells, archive.picked = "", None if how == "ALL" else set()
+    elif how == "INVE":
+        archive.picked = {e.number for e in archive.elements} - set(archive.cells("ALL") or ())
+    elif is_number(low) and (item in known or item[:4] == "ENAM"):
+        inside = range(int(low), whole(high or low, "ESEL") + 1, max(whole(step or "1", "ESEL"), 1))
+        if item in known:
+            numbers = {e.number for e in archive.elements if getattr(e, known[item]) in inside}
+        else:
+            numbers = {e.number for e in archive.elements if archive.kinds.get(e.kind, 0) in inside}
+        _pick(archive, how, numbers)
+    elif item[:4] == "ENAM" and (number := re.search(r"\d+$", low)):
+        numbers = {e.number for e in archive.elements if archive.kinds.get(e.kind) == int(number[0])}
+        _pick(archive, how, numbers)
+    else:
+        archive.unread_cells = ",".join(word for word in words if word)
+
+
+def _cells_of_nodes(archive: Archive, words: list[str]) -> None:
+    """ESLN, S or R or A or U, 1 if all of their nodes must be chosen."""
+    if (nodes := archive.nodes("ALL")) is None or words[3].upper() not in ("", "ALL"):
+        archive.unread_cells = ",".join(word for word in words if word)
+        return
+    there, whole_ones = set(nodes), words[2] == "1"
+    inside = {
+        e.number
+        for e in archive.elements
+        if (there.issuperset({*e.nodes} - {0}) if whole_ones else not there.isdisjoint(e.nodes))
+    }
+    _pick(archive, words[1].upper() or "S", inside)
+
+
+def _pick(archive: Archive, how: str, cells: set[int]) -> None:
+    before = set(archive.cells("ALL") or ())
+    made = {"S": cells, "R": before & cells, "A": before | cells, "U": before - cells}
+    if how == "S":
+        archive.unread_cells = ""
+    if how in made:
+        archive.picked = made[how]
+    else:
+        archive.unread_cells = f"of the kind '{how}'"
+
+
 def _component(archive: Archive, words: list[str]) -> None:
-    """CM, name, NODE: the nodes that are chosen."""
-    if words[2].upper() == "NODE" and (nodes := archive.nodes("ALL")) is not None:
+    """CM, name, NODE or ELEM: what is chosen."""
+    if words[2].upper().startswith("NODE") and (nodes := archive.nodes("ALL")) is not None:
         archive.components[words[1]] = list(nodes)
+    if words[2].upper().startswith("ELEM") and (cells := archive.cells("ALL")) is not None:
+        archive.groups[words[1]] = list(cells)
 
 
-COMMANDS = {
+def _masters(archive: Archive, words: list[str]) -> None:
+    """M, node, direction, last node, step, further directions: degrees of freedom that are kept."""
+    if (nodes := archive.nodes(words[1])) is None:
+        archive.leave_out(f"M,{words[1]} (it names no nodes that are there)")
+        return
+    if words[3] and is_number(words[1]):
+        nodes = [*archive.through(words[1], words[3], words[4], "M")]
+    archive.masters += nodes
+
+
+COMMANDS: dict[str, Command] = {
     "LOCAL": _system,
     "CS": _by_nodes,
     "CLOCAL": _relative,
@@ -205,8 +278,11 @@ COMMANDS = {
     "NMODIF": _modify,
     "CMSEL": _component_selected,
     "NSEL": _nodes_selected,
+    "ESEL": _cells_selected,
+    "ESLN": _cells_of_nodes,
     "ALLSEL": _everything,
-    "ALLS": _everything,
-    **dict.fromkeys(("NSLE", "NSLA", "NSLL", "NSLK", "NSLV"), _by_elements),
+    "NSLE": _nodes_of_cells,
+    **dict.fromkeys(("NSLA", "NSLL", "NSLK", "NSLV"), _not_read),
     "CM": _component,
+    "M": _masters,
 }

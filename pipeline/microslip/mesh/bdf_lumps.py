@@ -1,36 +1,35 @@
-"""Of Nastran bulk data: concentrated masses, scalar springs and dampers, bushes, rigid bars."""
+"""Of Nastran bulk data: concentrated and scalar masses, springs and dampers, bushes, rigid bars."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import TYPE_CHECKING
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from ..data import Array, Link, LumpedElement, PointMass, RigidLink
+from ..data import Array, Equation, Indices, Link, LumpedElement, PointMass, RigidLink
 from ..frames import skew
+from .bdf_cards import Bulk, BulkCard
 from .raw import Damaged, lost
+from .supports import in_axes
 
-if TYPE_CHECKING:
-    from .bdf import _Bulk, _Card
-
-READ = {
-    "CONM1", "CONM2", "CELAS1", "CELAS2", "PELAS", "CDAMP1", "CDAMP2", "PDAMP", "CBUSH", "PBUSH", "RBAR",
-}  # fmt: skip
+SPRINGS = ("CELAS1", "CELAS2", "CELAS3", "CELAS4", "CDAMP1", "CDAMP2", "CDAMP3", "CDAMP4")
+MASSES = ("CMASS1", "CMASS2", "CMASS3", "CMASS4")
+RIGID = ("RBAR", "RBAR1", "RBE1", "RROD")
+READ = {"CONM1", "CONM2", *SPRINGS, "PELAS", "PDAMP", *MASSES, "PMASS", "CBUSH", "PBUSH", *RIGID}
 
 
-def lumps_of(bulk: _Bulk) -> list[PointMass | LumpedElement]:
+def lumps_of(bulk: Bulk) -> list[PointMass | LumpedElement]:
     """The lumped elements of bulk data, nodes by their positions in the file.
 
     Raises:
         Damaged: with the card, what is wrong with one.
     """
-    factor = next((c.real(2) for c in bulk.cards["PARAM"] if c.at(1) == "WTMASS"), None)
+    factor = bulk.parameter("WTMASS")
     scale = 1.0 if factor is None else factor
-    return [*_masses(bulk, scale), *_scalars(bulk), *_bushes(bulk)]
+    return [*_masses(bulk, scale), *_scalar_masses(bulk, scale), *_scalars(bulk), *_bushes(bulk)]
 
 
-def _masses(bulk: _Bulk, scale: float) -> Iterator[PointMass]:
+def _masses(bulk: Bulk, scale: float) -> Iterator[PointMass]:
     for card in bulk.cards["CONM2"]:
         node, system = int(bulk.positions(card, [card.whole(2)])[0]), card.whole(3, 0)
         m, x = card.real(4) or 0.0, np.array([card.real(p) or 0.0 for p in (5, 6, 7)])
@@ -41,10 +40,10 @@ def _masses(bulk: _Bulk, scale: float) -> Iterator[PointMass]:
         elif system and not (x.any() or _round(J)):
             pass  # alike in every system
         elif system:
-            Q = bulk.frame(card, system, node)
+            Q = bulk.frame(card, system, bulk.raw.points[node])
             x, J = Q.T @ x, Q.T @ J @ Q
         _refuse_impossible(bulk, card, m, J)
-        yield PointMass(bulk.where(card), node, scale * m, x, scale * J)
+        yield PointMass(card.where, node, scale * m, x, scale * J)
     for card in bulk.cards["CONM1"]:
         M, at = np.zeros((6, 6)), 4
         for i in range(6):
@@ -57,10 +56,10 @@ def _masses(bulk: _Bulk, scale: float) -> Iterator[PointMass]:
         size = np.abs(M).max() or 1.0
         rigid = np.block([[m * np.eye(3), -m * skew(c)], [m * skew(c), M[3:, 3:]]])
         if card.whole(3, 0) or np.abs(rigid - M).max() > 1e-6 * size:
-            bulk.raw.lost.append(lost(bulk.where(card), "a CONM1 that is no rigid body in the basic system"))
+            bulk.raw.lost.append(lost(card.where, "a CONM1 that is no rigid body in the basic system"))
             continue
         _refuse_impossible(bulk, card, m, J)
-        yield PointMass(bulk.where(card), int(bulk.positions(card, [card.whole(2)])[0]), scale * m, c, scale * J)
+        yield PointMass(card.where, int(bulk.positions(card, [card.whole(2)])[0]), scale * m, c, scale * J)
 
 
 def _round(J: Array) -> bool:
@@ -68,58 +67,125 @@ def _round(J: Array) -> bool:
     return bool(np.abs(J - np.trace(J) / 3 * np.eye(3)).max() > 0)
 
 
-def _refuse_impossible(bulk: _Bulk, card: _Card, m: float, J: Array) -> None:
+def _refuse_impossible(bulk: Bulk, card: BulkCard, m: float, J: Array) -> None:
+    """Raises `Damaged` of a mass that no body has, unless it cannot move."""
+    still = set("xyzabc") <= bulk.held.nodes.get(card.whole(2), set())
+    if still:
+        return
     if m < 0 or np.linalg.eigvalsh(J)[0] < -1e-9 * np.abs(J).max():
-        raise Damaged(f"{bulk.where(card)} has a mass or inertia below 0; correct it")
+        raise Damaged(f"{card.where} has a mass or inertia below 0; correct it")
 
 
-def _scalars(bulk: _Bulk) -> Iterator[LumpedElement]:
-    """CELAS1, CELAS2, CDAMP1, CDAMP2 between components of grid points, or one and the ground."""
-    for name in ("CELAS1", "CELAS2", "CDAMP1", "CDAMP2"):
-        for card in bulk.cards[name]:
-            value = card.real(2) if name[-1] == "2" else _property(bulk, card, f"P{name[1:-1]}")
-            ends = [(card.whole(p, 0), card.whole(p + 1, 0)) for p in (3, 5)]
-            ends = [(node, way) for node, way in ends if node]
-            if any(not 1 <= way <= 6 for _, way in ends) or not ends:
-                bulk.raw.lost.append(lost(bulk.where(card), f"{card.name} on scalar points"))
-                continue
-            basic, signs = np.eye(3), (1.0, -1.0)
-            axes = [sign * bulk.held.axes.get(n, basic)[(w - 1) % 3] for (n, w), sign in zip(ends, signs, strict=False)]
-            row = np.concatenate(axes)
-            used = row != 0
-            A = (value or 0.0) * np.outer(row[used], row[used])
-            zero = np.zeros_like(A)
-            nodes = np.repeat(bulk.positions(card, [node for node, _ in ends]), 3)[used]
-            ways = np.concatenate([3 * ((way - 1) // 3) + np.arange(3) for _, way in ends])[used]
-            both = (A, zero) if name[1] == "E" else (zero, A)
-            yield LumpedElement(bulk.where(card), nodes, ways, *both)
+def _value(bulk: Bulk, card: BulkCard) -> float:
+    """Of a scalar spring, damper or mass: its own (even kinds) or that of its property.
 
-
-def _property(bulk: _Bulk, card: _Card, kind: str) -> float:
-    """The value of PELAS (four fields a property) or PDAMP (two)."""
-    number, step = card.whole(2, card.whole(1)), 4 if kind == "PELAS" else 2
+    Raises:
+        Damaged: there is no such property.
+    """
+    if card[0][-1] in "24":
+        return card.real(2) or 0.0
+    kind, number = f"P{card[0][1:-1]}", card.whole(2, card.whole(1))
     for other in bulk.cards[kind]:
-        for place in range(1, min(len(other), 9), step):
+        for place in range(1, min(len(other), 9), 4 if kind == "PELAS" else 2):
             if other.at(place) == str(number):
                 return other.real(place + 1) or 0.0
-    raise Damaged(f"{bulk.where(card)} names {kind} {number}, which is not there")
+    raise Damaged(f"{card.where} names {kind} {number}, which is not there")
 
 
-def _in_basic(bulk: _Bulk, card: _Card, nodes: list[int]) -> None:
-    if turned := next((node for node in nodes if node in bulk.held.axes), None):
-        raise Damaged(
-            f"{bulk.where(card)} takes single directions of GRID {turned} in a local system (CD); write it in the "
-            "basic one"
-        )
+def _ends(bulk: Bulk, card: BulkCard) -> tuple[Indices, Indices, Array]:
+    """Nodes, directions and factors (t,) whose sum is the displacement that a scalar element acts on: that of its
+    first end less that of its second.
+
+    Kinds 3 and 4 join scalar points, 1 and 2 components of grid points or scalar points; 0 and blank are the ground.
+
+    Raises:
+        Damaged: it has no end, a component that is none.
+    """
+    places = (3, 4) if card[0][-1] in "34" else (3, 5)
+    nodes, ways, factors = list[int](), list[int](), list[float]()
+    for place, sign in zip(places, (1.0, -1.0), strict=True):
+        if not (number := card.whole(place, 0)):
+            continue
+        node = int(bulk.positions(card, [number])[0])
+        if node >= bulk.scalar:
+            way, axis = 0, np.array([sign, 0.0, 0.0])
+        else:
+            way = card.whole(place + 1, 0) - 1 if places[1] == 5 else -1
+            if not 0 <= way < 6:
+                raise Damaged(f"{card.where} names no component (1 to 6) of grid point {number}; write one")
+            axis = sign * bulk.held.axes.get(number, np.eye(3))[way % 3]
+        for k in np.flatnonzero(axis):
+            nodes.append(node)
+            ways.append(3 * (way // 3) + int(k))
+            factors.append(float(axis[k]))
+    if not nodes:
+        raise Damaged(f"{card.where} joins nothing; name a point")
+    return np.array(nodes), np.array(ways), np.array(factors)
 
 
-def _bushes(bulk: _Bulk) -> Iterator[LumpedElement]:
+def unlisted_points(cards: Mapping[str, list[BulkCard]]) -> Iterator[tuple[BulkCard, int]]:
+    """Scalar points that stand on scalar elements, which need no SPOINT; and the element."""
+    for card in (card for name in (*SPRINGS, *MASSES) for card in cards.get(name, ())):
+        for place in (3, 4) if card[0][-1] in "34" else (3, 5):
+            alone = card[0][-1] in "34" or card.at(place + 1) in ("", "0")
+            if alone and (number := card.whole(place, 0)):
+                yield card, number
+
+
+def _scalars(bulk: Bulk) -> Iterator[LumpedElement]:
+    """CELAS1 to 4, CDAMP1 to 4 between two displacements, or one and the ground."""
+    for card in (card for name in SPRINGS for card in bulk.cards[name]):
+        nodes, ways, row = _ends(bulk, card)
+        A = _value(bulk, card) * np.outer(row, row)
+        zero = np.zeros_like(A)
+        yield LumpedElement(card.where, nodes, ways, *((A, zero) if card[0][1] == "E" else (zero, A)))
+
+
+def _scalar_masses(bulk: Bulk, scale: float) -> Iterator[PointMass]:
+    """CMASS1 to 4: the mass of a scalar point; of a grid point what is alike in all directions, else a mass on a point
+    that moves along one direction as the element's two ends move apart."""
+    alike: dict[int, dict[int, tuple[float, str]]] = {}
+    for card in (card for name in MASSES for card in bulk.cards[name]):
+        nodes, ways, row = _ends(bulk, card)
+        m = scale * _value(bulk, card)
+        if m < 0:
+            raise Damaged(f"{card.where} has a mass below 0; correct it")
+        if len(nodes) == 1:
+            before = alike.setdefault(int(nodes[0]), {})
+            way = int(ways[0])
+            before[way] = m + before.get(way, (0.0, ""))[0], before.get(way, (0.0, card.where))[1]
+        else:
+            yield _alone(bulk, card.where, nodes, ways, row, m)
+    for node, found in alike.items():
+        sizes = np.array([found.get(way, (0.0, ""))[0] for way in range(6)])
+        where = next(iter(found.values()))[1]
+        least = np.array([sizes[0] if node >= bulk.scalar else sizes[:3].min(), sizes[3:].min()])
+        if least.any():
+            yield PointMass(where, node, float(least[0]), inertia=float(least[1]) * np.eye(3))
+        for at in np.flatnonzero((sizes > np.repeat(least, 3)) & (node < bulk.scalar)):
+            rest = float(sizes[at] - least[at // 3])
+            yield _alone(bulk, where, np.array([node]), np.array([at]), np.ones(1), rest)
+
+
+def _alone(bulk: Bulk, where: str, nodes: Indices, ways: Indices, row: Array, mass: float) -> PointMass:
+    """The mass of one displacement, on a new point that has no other."""
+    raw = bulk.raw
+    new, way = len(raw.points), int(ways[np.abs(row).argmax()]) % 3
+    raw.points = np.vstack([raw.points, raw.points[nodes[:1]]])
+    raw.node_id = np.append(raw.node_id, raw.node_id.max() + 1)
+    every, factors = np.append(new, nodes), np.append(1.0, -row)
+    raw.links.append(Equation(where, every, np.append(way, ways), factors))
+    raw.links += [Equation(where, np.array([new]), np.array([k]), np.ones(1)) for k in range(3) if k != way]
+    return PointMass(where, new, mass)
+
+
+def _bushes(bulk: Bulk) -> Iterator[LumpedElement]:
     """CBUSH: six springs and dashpots at a place between two grid points, which it meets by rigid arms."""
     for card in bulk.cards["CBUSH"]:
         numbers = [n for n in (card.whole(3, 0), card.whole(4, 0)) if n]
         nodes = bulk.positions(card, numbers)
         if not numbers or card.whole(10, -1) > -1 or any(card.at(p) for p in (11, 12, 13)):
-            raise Damaged(f"{bulk.where(card)} has no grid point or an offset (OCID), which is not read; leave it out")
+            raise Damaged(f"{card.where} has no grid point or an offset (OCID), which is not read; leave it out")
         K, B = _bush_values(bulk, card)
         x = bulk.raw.points[nodes]
         Q, share = _bush_axes(bulk, card, x, K, B), 0.5 if card.real(9) is None else card.real(9)
@@ -134,15 +200,15 @@ def _bushes(bulk: _Bulk) -> Iterator[LumpedElement]:
         used = (np.abs(both[0]) + np.abs(both[1])).max(axis=0) > 0
         at = np.ix_(used, used)
         ways = np.tile(np.arange(6), len(nodes))[used]
-        yield LumpedElement(bulk.where(card), np.repeat(nodes, 6)[used], ways, both[0][at], both[1][at])
+        yield LumpedElement(card.where, np.repeat(nodes, 6)[used], ways, both[0][at], both[1][at])
 
 
-def _bush_values(bulk: _Bulk, card: _Card) -> tuple[Array, Array]:
+def _bush_values(bulk: Bulk, card: BulkCard) -> tuple[Array, Array]:
     """(6,) stiffness and damping of PBUSH: words K and B, each before six numbers."""
     number = card.whole(2, card.whole(1))
     found = next(bulk.numbered(["PBUSH"], number), None)
     if found is None:
-        raise Damaged(f"{bulk.where(card)} names PBUSH {number}, which is not there")
+        raise Damaged(f"{card.where} names PBUSH {number}, which is not there")
     values = {"K": np.zeros(6), "B": np.zeros(6)}
     for place in range(2, len(found)):
         if found[place] in values:
@@ -150,51 +216,80 @@ def _bush_values(bulk: _Bulk, card: _Card) -> tuple[Array, Array]:
     return values["K"], values["B"]
 
 
-def _bush_axes(bulk: _Bulk, card: _Card, x: Array, K: Array, B: Array) -> Array:
+def _bush_axes(bulk: Bulk, card: BulkCard, x: Array, K: Array, B: Array) -> Array:
     """(3, 3) rows are the axes of a bush."""
     system = card.whole(8, -1)
     if system == 0:
         return np.eye(3)
     if system > 0:
-        return bulk.frame(card, system, int(bulk.positions(card, [card.whole(3)])[0]))
+        return bulk.frame(card, system, x[0])
     along = x[-1] - x[0]
     if not along.any():
         if all(np.ptp(v[part]) == 0 for v in (K, B) for part in (slice(0, 3), slice(3, 6))):
             return np.eye(3)
-        raise Damaged(f"{bulk.where(card)} joins points at one place and has no CID; write 0 for the basic system")
+        raise Damaged(f"{card.where} joins points at one place and has no CID; write 0 for the basic system")
     along = along / np.linalg.norm(along)
     if card.at(6) or "." in card.at(5):
         v = np.array([card.real(p) or 0.0 for p in (5, 6, 7)])
     elif card.at(5):
         v = bulk.raw.points[bulk.positions(card, [card.whole(5)])[0]] - x[0]
     elif any(value[k] for value in (K, B) for k in (1, 2, 4, 5)):
-        raise Damaged(f"{bulk.where(card)} has no orientation (GO, X or CID) for its lateral springs; give one")
+        raise Damaged(f"{card.where} has no orientation (GO, X or CID) for its lateral springs; give one")
     else:
         v = np.eye(3)[int(np.abs(along).argmin())]
     z = np.cross(along, v)
     if not np.linalg.norm(z) > 1e-9 * np.linalg.norm(v):
-        raise Damaged(f"{bulk.where(card)} has an orientation along its line; correct it")
+        raise Damaged(f"{card.where} has an orientation along its line; correct it")
     z = z / np.linalg.norm(z)
     return np.array([along, np.cross(z, along), z])
 
 
-def bars_of(bulk: _Bulk) -> Iterator[Link]:
-    """RBAR: a point that follows another one rigidly.
+def bars_of(bulk: Bulk) -> Iterator[Link]:
+    """RBAR, RBAR1, RBE1: points that move as one rigid body; RROD: two that keep their distance.
+
+    The equations are the same whichever displacements are called independent: six of them at several points, one of
+    which takes part with all its six.
 
     Raises:
-        Damaged: independent components at both ends.
+        Damaged: independent components that are not six, or no such point.
     """
-    for card in bulk.cards["RBAR"]:
-        a, b = card.whole(2), card.whole(3)
-        first, second = card.directions(4), card.directions(5)
-        if (first, second) not in (("xyzabc", ""), ("", "xyzabc")):
-            raise Damaged(
-                f"{bulk.where(card)} has independent components at both ends ({card.at(4)}, {card.at(5)}), which is "
-                "not read; write 123456 at one end"
-            )
-        leading, following = (a, b) if first else (b, a)
-        ways = card.directions(7 if first else 6) or "xyzabc"
-        if ways not in ("xyz", "abc", "xyzabc"):
-            _in_basic(bulk, card, [a, b])
-        at = bulk.positions(card, [leading, following])
-        yield RigidLink(bulk.where(card), int(at[0]), at[1:], ways)
+    for card in bulk.cards["RROD"]:
+        ends = bulk.positions(card, [card.whole(2), card.whole(3)])
+        along = np.diff(bulk.raw.points[ends], axis=0)[0]
+        if not along.any():
+            raise Damaged(f"{card.where} joins points at one place; take it out")
+        yield in_axes(card.where, ends, np.zeros(2, dtype=np.int64), np.array([along, -along]))
+    for card in (card for name in RIGID[:3] for card in bulk.cards[name]):
+        free, bound = _components(card)
+        if sum(map(len, free.values())) != 6:
+            raise Damaged(f"{card.where} has {sum(map(len, free.values()))} independent components; write six")
+        ways = {n: free.get(n, "") + bound.get(n, "") for n in [*free, *bound]}
+        leading = next((n for n, w in ways.items() if set(w) == set("xyzabc")), None)
+        if leading is None:
+            raise Damaged(f"{card.where} has no point of which all six components take part; write an RBE2")
+        for node, taken in ways.items():
+            axes = bulk.held.axes.get(node) if taken not in ("xyz", "abc", "xyzabc") else None
+            at = bulk.positions(card, [leading, node])
+            if node != leading:
+                yield RigidLink(card.where, int(at[0]), at[1:], "".join(sorted(set(taken), key="xyzabc".index)), axes)
+
+
+def _components(card: BulkCard) -> tuple[dict[int, str], dict[int, str]]:
+    """Of each point of a rigid element its independent and its dependent components."""
+    free, bound = dict[int, str](), dict[int, str]()
+    if card[0] == "RBE1":
+        middle = card.index("UM") if "UM" in card else len(card)
+        end = card.index("ALPHA") if "ALPHA" in card else len(card)
+        for into, first, last in ((free, 2, middle), (bound, middle + 1, end)):
+            words = [p for p in range(first, min(last, len(card))) if card[p] and "." not in card[p]]
+            for p, q in zip(words[::2], words[1::2], strict=False):
+                into[card.whole(p)] = into.get(card.whole(p), "") + card.directions(q)
+        return free, bound
+    a, b = card.whole(2), card.whole(3)
+    if card[0] == "RBAR1":
+        return {a: "xyzabc"}, {b: card.directions(4) or "xyzabc"}
+    for node, first, then in ((a, 4, 6), (b, 5, 7)):
+        free[node], bound[node] = card.directions(first), card.directions(then)
+    if not any(bound.values()):
+        bound = {n: "".join(w for w in "xyzabc" if w not in own) for n, own in free.items()}
+    return free, bound

@@ -60,6 +60,7 @@ def read_cards(path: Path) -> list[Card]:
     for card, file in zip(found, files, strict=True):
         head = card.keyword
         card.keyword, card.parameters = keyword(head), parameters(head)
+        card.keyword = _SPACED.get(card.keyword.replace(" ", ""), card.keyword)
         if target := card.parameters.get("INPUT"):
             card.parameters["INPUT"] = str(beside(file, target, path.parent))
     return found
@@ -70,7 +71,7 @@ def _lines(path: Path, within: tuple[Path, ...], home: Path) -> Iterator[tuple[P
     if path.resolve() in within:
         raise Damaged(f"the file includes itself by way of {path.name}")
     try:
-        text = ordinary(path).read_text(encoding="utf-8", errors="replace")
+        text = ordinary(path).read_text(encoding="utf-8-sig", errors="replace")
     except OSError as error:
         raise Damaged(f"the included file {path} cannot be read ({error.strerror})") from None
     for number, line in enumerate(text.splitlines(), 1):
@@ -117,7 +118,26 @@ def keyword(line: str) -> str:
 def parameters(line: str) -> dict[str, str]:
     """Its parameters: in capitals -> as written, without quotes."""
     pairs = (word.partition("=") for word in line.split(",")[1:])
-    return {" ".join(key.upper().split()): value.strip().strip('"') for key, _, value in pairs if key.strip()}
+    named = {
+        " ".join(key.upper().split()): value.strip().strip('"')
+        for key, _, value in pairs
+        if key.strip()
+    }
+    return {_SPACED.get(key.replace(" ", ""), key): value for key, value in named.items()}
+
+
+_SPACED = {
+    words.replace(" ", ""): words
+    for words in (
+        "REF NODE", "ROT NODE", "PIN NSET", "TIE NSET", "CONSTRAINT NAME", "POSITION TOLERANCE",
+        "CYCLIC SYMMETRY", "OLD SET", "NEW SET", "CHANGE NUMBER", "ELEMENT SHIFT", "SHIFT NODES",
+        "WEIGHTING METHOD", "INFLUENCE RADIUS", "SOLID SECTION", "RIGID BODY", "CONTACT PAIR",
+        "END STEP", "INITIAL CONDITIONS", "ROTARY INERTIA", "PRE-TENSION SECTION",
+        "CYCLIC SYMMETRY MODEL", "SELECT CYCLIC SYMMETRY MODES", "COMPLEX FREQUENCY",
+        "KINEMATIC COUPLING", "DISTRIBUTING COUPLING", "SURFACE INTERACTION", "SURFACE BEHAVIOR",
+    )
+}  # fmt: skip
+"""Keywords and parameters of several words by what is left of them without blanks: CalculiX reads none."""
 
 
 def fields(line: str) -> list[str]:
@@ -141,6 +161,9 @@ def numbers(lines: list[str], what: str) -> list[list[float]]:
     """Numbers of the data lines; an empty place counts as 0."""
     try:
         rows = [line.rstrip().rstrip(",").split(",") for line in lines]
-        return [[float(w.replace("D", "e").replace("d", "e")) if w.strip() else 0.0 for w in row] for row in rows]
+        table = [[float(w.replace("D", "e").replace("d", "e")) if w.strip() else 0.0 for w in row] for row in rows]
+        if not all(np.isfinite(v) for row in table for v in row):
+            raise ValueError("it is not finite")
+        return table
     except ValueError as error:
         raise Damaged(f"{what} holds something that is no number ({str(error)[-60:]})") from None

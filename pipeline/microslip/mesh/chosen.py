@@ -12,6 +12,7 @@ from scipy.sparse.csgraph import connected_components
 from ..data import Equation, FaceTie, Guide, Indices, Link, Lumps, Mesh
 from ..errors import UserError
 from .gates import part_numbers
+from .linking import moved
 from .raw import joined
 
 
@@ -99,6 +100,7 @@ def _lumps_of(mesh: Mesh, inside: Indices, number: Indices) -> Lumps | None:
     if (ends.any(axis=1) & ~ends.all(axis=1)).any():
         raise UserError("a spring or dashpot of the file ties these instances to others; take those in too")
     heavy, joined_by = inside[lumps.points], ends.all(axis=1)
+    turned = inside[lumps.lines].all(axis=1)
     if not heavy.any() and not joined_by.any():
         return None
     return Lumps(
@@ -107,6 +109,8 @@ def _lumps_of(mesh: Mesh, inside: Indices, number: Indices) -> Lumps | None:
         number[lumps.pairs[joined_by]],
         lumps.stiffness[joined_by],
         lumps.damping[joined_by],
+        number[lumps.lines[turned]],
+        lumps.tight[turned],
     )
 
 
@@ -114,20 +118,21 @@ def _with_links(mesh: Mesh, part: Mesh, inside: Indices, number: Indices) -> Mes
     """The part with the constraints that are its own."""
     if mesh.links is None:
         return replace(part, supports={n: d for n, d in mesh.supports.items() if n in part.point_sets})
-    own = []
+    own, after = [], np.arange(len(mesh.links.references)) + part.n_points
+    number = np.concatenate([number, after])
     for link, nodes in zip(mesh.links.items, nodes_of(mesh), strict=True):
         there = inside[nodes]
         if there.any() and not there.all():
             raise UserError(f"{link.where} ties these instances to others; take those in too")
         if there.any():
-            own.append(_moved(link, mesh.n_points, part.n_points, number))
+            own.append(moved(link, number))
     used = {n - part.n_points for link in own for n in _references(link) if n >= part.n_points}
     sets = {name: s for name, s in mesh.links.sets.items() if np.isin(s, list(used)).all()}
     places = np.concatenate([inside, np.isin(np.arange(len(mesh.links.references)), list(used))])
     for guide in (link for link in mesh.links.items if isinstance(link, Guide)):
         if (there := places[guide.nodes]).any():
             cut = replace(guide, nodes=guide.nodes[there], axes=guide.axes[there])
-            own.append(_moved(cut, mesh.n_points, part.n_points, number))
+            own.append(moved(cut, number))
     links = replace(mesh.links, items=tuple(own), sets=sets) if own else None
     known = {*part.point_sets, *(links.sets if links else ())}
     return replace(part, links=links, supports={n: d for n, d in mesh.supports.items() if n in known})
@@ -138,21 +143,6 @@ def _references(link: Link) -> list[int]:
     if isinstance(link, FaceTie | Guide):
         return []
     return link.nodes.tolist() if isinstance(link, Equation) else [link.reference]
-
-
-def _moved(link: Link, before: int, after: int, number: Indices) -> Link:
-    """A link with its points and reference nodes counted anew."""
-
-    def new(nodes: Indices) -> Indices:
-        nodes = np.asarray(nodes)
-        return np.where(nodes < before, number[np.minimum(nodes, before - 1)], nodes - before + after)
-
-    if isinstance(link, FaceTie):
-        return link
-    if isinstance(link, Equation | Guide):
-        return replace(link, nodes=new(link.nodes))
-    members = link.members if isinstance(link.members, str) else new(link.members)
-    return replace(link, reference=int(new(np.array(link.reference))), members=members)
 
 
 def nodes_of(mesh: Mesh) -> list[Indices]:
@@ -184,15 +174,16 @@ def _named(mesh: Mesh, link: Link) -> Indices:
 
 
 def bodies(mesh: Mesh) -> list[list[str]]:
-    """Instances (see `with_parts`) that constraints hold together, in the order of the file."""
+    """Instances (see `with_parts`) that constraints and springs hold together, in the order of the file."""
     mesh = with_parts(mesh)
     names = list(mesh.instances)
-    of = np.full(mesh.n_points, -1)
+    of = len(names) + np.arange(mesh.n_points)  # points without cells stand for themselves
     for number, name in enumerate(names):
         of[mesh.instances[name]] = number
-    pairs = [np.unique(of[nodes]) for nodes in (nodes_of(mesh) if mesh.links is not None else ())]
+    joining = [*(nodes_of(mesh) if mesh.links else ()), *(mesh.lumps.pairs if mesh.lumps else ())]
+    pairs = [np.unique(of[nodes]) for nodes in joining]
     edges = [(p[0], q) for p in pairs if len(p) for q in p]
     rows, columns = np.array(edges, dtype=int).reshape(-1, 2).T
-    graph = sp.coo_matrix((np.ones(len(rows)), (rows, columns)), shape=(len(names), len(names)))
-    group = connected_components(graph, directed=False)[1]
+    graph = sp.coo_matrix((np.ones(len(rows)), (rows, columns)), shape=(size := len(names) + mesh.n_points, size))
+    group = connected_components(graph, directed=False)[1][: len(names)]
     return [[n for n, g in zip(names, group, strict=True) if g == number] for number in dict.fromkeys(group.tolist())]

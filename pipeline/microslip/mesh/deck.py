@@ -25,7 +25,10 @@ class Cells:
 
 @dataclass
 class DeckConstants:
-    """Constants as written: name, place; (t, 3) E, nu, T or 9 engineering constants, or why they are not read."""
+    """Constants as written: name, place; (t, 3) E, nu, T, or (t, 10) engineering constants or
+    stiffnesses and T, or why they are not read; (t, 2) densities and T where they vary; expansion
+    along the axes, its table over T and the T from which it counts.
+    """
 
     name: str
     where: str = ""
@@ -34,7 +37,10 @@ class DeckConstants:
     stiffness: Array | None = None
     refused: str = ""
     density: float | None = None
+    densities: Array | None = None
     expansion: Array = field(default_factory=lambda: np.zeros(3))
+    expansion_table: Array | None = None
+    zero: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -65,7 +71,8 @@ class Steps:
             its end. period: its time. amplitudes: name -> time, value rows, and whether in total time.
         acting: cards of loads with step, and factor at its end. static: the last static step, as its keyword line and
             whether it was nonlinear. other: keyword of another one whose state is not read. modes: the keyword line
-            whose modes are meant.
+            whose modes are meant. held: what was held at the end of the last static step, as
+            `Deck.held`.
     """
 
     number: int = 0
@@ -78,6 +85,7 @@ class Steps:
     static: tuple[Card, bool] | None = None
     other: Card | None = None
     modes: Card | None = None
+    held: list[tuple[str, str, str]] | None = None
 
     @property
     def perturbed(self) -> bool:
@@ -107,7 +115,10 @@ class Deck:
         links: constraints, contacts and loads; sections: of solids; both resolved at the end.
         kinds: types of cells. lost: what counts and is not read, in words.
         transforms: cards of local directions of nodes; axes: node number -> (3, 3) these as rows, once all is read.
+        turning: ROT NODE -> reference node whose rotations its displacements are. masses: number of
+        a mass -> its node and mass.
         system: (4, 3) axes and origin in which nodes are written, or None. ignored: keywords that are not used.
+        remarks: what is taken as something else, in words.
     """
 
     node_id: list[Indices] = field(default_factory=list)
@@ -133,12 +144,15 @@ class Deck:
     renewed: int = -1
     transforms: list[Card] = field(default_factory=list)
     axes: dict[int, Array] = field(default_factory=dict)
+    turning: dict[int, int] = field(default_factory=dict)
+    masses: dict[int, tuple[int, float]] = field(default_factory=dict)
     spaces: dict[str, Space] = field(default_factory=lambda: {"": Space()})
     links: list[Card] = field(default_factory=list)
     system: Array | None = None
     kinds: list[str] = field(default_factory=list)
     ignored: list[str] = field(default_factory=list)
     lost: list[str] = field(default_factory=list)
+    remarks: list[str] = field(default_factory=list)
     instances: dict[str, Indices] = field(default_factory=dict)
 
     def place(self, word: str, space: str = "") -> tuple[Space, str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -113,7 +114,7 @@ def _read_temperature(deck: Deck, card: Card, column: int = 1) -> None:
     for line in card.lines:
         words = fields(line)
         try:
-            deck.temperatures.append((column, words[0], factor * float(words[1])))
+            deck.temperatures.append((column, words[0], factor * float([*words, "0"][1])))
         except (IndexError, ValueError):
             raise Damaged(f"*TEMPERATURE holds the line '{line[:60]}', no node (or set) and temperature") from None
 
@@ -135,21 +136,35 @@ def assign_temperatures(deck: Deck, raw: RawMesh, numbering: Numbering) -> None:
     for column, word, value in deck.temperatures:
         members = deck.nodes_for("*TEMPERATURE", word)
         raw.temperature[numbering.positions(members, "*TEMPERATURE names"), column] = value
+    cold = np.isnan(raw.temperature[:, 0])
+    raw.temperature[cold, 0] = 0.0
+    used = np.unique(joined(nodes.ravel() for _, nodes in raw.blocks))
+    if count := int(cold[used].sum()):
+        raw.remarks.append(f"{count} nodes have no initial temperature in the file: theirs is 0")
 
 
-def constraints(deck: Deck) -> Constraints:
-    """What *BOUNDARY holds, its sets by the names they were written with."""
+def constraints(deck: Deck, lines: Sequence[tuple[str, str, str]]) -> Constraints:
+    """What *BOUNDARY holds by its lines (see `Deck.held`), its sets by the names they were written with."""
     held = Constraints(left_out=list(deck.not_held))
     known = set(joined(deck.node_id).tolist())
-    for word, directions, place in deck.held:
+    for word, directions, place in lines:
         with of_file(place):
             key, nodes = deck.key(deck.node_sets, word), deck.nodes_for("*BOUNDARY", word)
             if key is None and not known.issuperset(nodes.tolist()):
                 raise Damaged(f"*BOUNDARY names the node {word}, which is not defined")
         single = set(directions) & set("xyz") not in (set(), set("xyz"))
         turned = single and not deck.axes.keys().isdisjoint(nodes.tolist())
+        turned = turned or not deck.turning.keys().isdisjoint(nodes.tolist())
         for node in nodes.tolist() if turned else ():
-            held.hold(node, set(directions) - set("xyz") if node in deck.axes else directions)
+            if node in deck.turning:
+                held.hold(
+                    deck.turning[node], ("abc"["xyz".index(c)] for c in directions if c in "xyz")
+                )
+            else:
+                held.hold(
+                    node,
+                    set(directions) - set("xyz") if single and node in deck.axes else directions,
+                )
         if not turned:
             held.hold(int(nodes[0]) if key is None else deck.written[key], directions)
     return held

@@ -63,7 +63,7 @@ def unread(deck: Deck) -> list[str]:
     """What is said of contacts whose law is more than one coefficient, or that are tied."""
     said = []
     for card in deck.links:
-        if card.keyword == "FRICTION" and (card.parameters or len(card.lines) > 1):
+        if card.keyword == "FRICTION" and ({*card.parameters} - {"SLIP TOLERANCE"} or len(card.lines) > 1):
             said.append(f"{card.where}: of *FRICTION only the first coefficient is read")
         if card.keyword == "SURFACE BEHAVIOR":
             said.append(

@@ -287,6 +287,7 @@ def _rigid_body(reading: _Reading) -> Iterator[Link]:
         yield RigidLink(reading.where, reference, np.array(sorted(pinned), dtype=np.int64))
     if "ROT NODE" in card.parameters:
         turns = reading.node("ROT NODE")
+        deck.turning[int(reading.numbers[turns])] = int(reading.numbers[reference])
         for way in range(3):
             pair, ways = np.array([turns, reference]), np.array([way, 3 + way])
             yield Equation(

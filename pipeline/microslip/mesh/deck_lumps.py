@@ -30,6 +30,9 @@ def lumps_of(deck: Deck, numbering: Numbering, points: Array) -> Iterator[PointM
     for card in deck.links:
         if card.keyword not in KEYWORDS:
             continue
+        if card.keyword == "DASHPOT" and len(card.lines) > 2:
+            text = "the value of a *DASHPOT over frequency is not read: it is left out, undamped frequencies stay"
+            deck.lost.append(f"{card.where}: {text}")
         with of_file(card.place):
             chosen = deck.cells_for(f"*{card.keyword}", card.text("ELSET"), card.space)
             for cells in deck.lumped:
@@ -37,8 +40,12 @@ def lumps_of(deck: Deck, numbering: Numbering, points: Array) -> Iterator[PointM
                     continue
                 left -= {(cells.kind, int(n)) for n in cells.ids[mine]}
                 reading = _Reading(deck, card, cells.kind, points)
-                for nodes in numbering.positions(cells.nodes[mine], f"*ELEMENT, TYPE={cells.kind} names"):
-                    yield _MAKERS[cells.kind][1](reading, nodes)
+                at = numbering.positions(cells.nodes[mine], f"*ELEMENT, TYPE={cells.kind} names")
+                for number, nodes in zip(cells.ids[mine].tolist(), at, strict=True):
+                    made = _MAKERS[cells.kind][1](reading, nodes)
+                    if isinstance(made, PointMass) and made.mass:
+                        deck.masses[number] = made.node, made.mass
+                    yield made
     if left:
         kind, number = sorted(left)[0]
         place = next(c.where for c in deck.lumped if c.kind == kind and number in c.ids)
@@ -82,7 +89,7 @@ class _Reading:
         axes = None if key is None else self.deck.orientations[key]
         if axes is None or isinstance(axes, str):
             raise Damaged(f"*{self.card.keyword} names the ORIENTATION '{word}', which is not defined or not constant")
-        return axes.T
+        return axes
 
     def value(self) -> tuple[list[int], float]:
         """Directions, from 0, and the value of a spring or dashpot."""
@@ -94,7 +101,7 @@ class _Reading:
             ways = 2 * ways
         if not along and (len(ways) != NODES[self.kind] or not all(1 <= w <= 6 for w in ways)):
             raise Damaged(f"*{self.card.keyword} needs a line with a direction (1 to 6) of each node of {self.kind}")
-        if len(rows) != 1:
+        if not rows or (len(rows) > 1 and self.card.keyword == "SPRING"):
             raise Damaged(
                 f"*{self.card.keyword} has {len(rows)} lines of values; give one, that at the temperature of the model"
             )
@@ -123,7 +130,10 @@ def _inertia(reading: _Reading, nodes: Array) -> PointMass:
 
 def _element(reading: _Reading, nodes: Array) -> LumpedElement:
     ways, value = reading.value()
-    if reading.kind.endswith("A"):
+    if len(reading.card.lines) > 2 and reading.kind.startswith("DASHPOT"):
+        value = 0.0  # over frequency, which is told
+    damps, line = reading.kind.startswith("DASHPOT"), reading.kind.endswith("A")
+    if line:
         along = reading.points[nodes[1]] - reading.points[nodes[0]]
         if not along.any():
             kind = reading.kind
@@ -136,9 +146,10 @@ def _element(reading: _Reading, nodes: Array) -> LumpedElement:
     row = elongation(axes, (1.0, -1.0)[: len(nodes)])
     A = value * np.outer(row, row)
     at = np.concatenate([turn + np.arange(3) for turn in turns])
-    damps = reading.kind.startswith("DASHPOT")
-    zero = np.zeros_like(A)
-    return LumpedElement(reading.where, np.repeat(nodes, 3), at, zero if damps else A, A if damps else zero)
+    zero, pulls = np.zeros_like(A), value if line and not damps else 0.0
+    return LumpedElement(
+        reading.where, np.repeat(nodes, 3), at, zero if damps else A, A if damps else zero, pulls
+    )
 
 
 def elongation(axes: list[Array], signs: tuple[float, ...]) -> Array:
@@ -161,7 +172,7 @@ def read_cells(deck: Deck, card: Card, kind: str, rows: list[list[float]]) -> No
     """
     count, own = NODES[kind], deck.spaces[""]
     table = [[int(v) for v in row] for row in rows]
-    if any(len(row) != count + 1 or min(row) < 1 for row in table):
+    if any(len(row) != count + 1 or min(row) < 1 or max(row) > 10**15 for row in table):
         raise Damaged(f"*ELEMENT, TYPE={kind} needs a number and {count} node{'s' * (count > 1)} a line")
     ids, nodes = np.array(table)[:, 0] + own.cells, np.array(table)[:, 1:] + own.nodes
     deck.lumped.append(Cells(kind, ids, nodes, kind, card.place))

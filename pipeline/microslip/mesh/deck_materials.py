@@ -10,8 +10,8 @@ from ..errors import of_file
 from ..frames import rotation
 from .cards import Card, numbers
 from .deck import Deck, DeckConstants, Readers
-from .materials import isotropic_rows, orthotropic_row
-from .raw import Damaged, DeckMaterial, RawMesh
+from .materials import isotropic_matrices, isotropic_rows, orthotropic_row
+from .raw import Damaged, DeckMaterial, RawMesh, real
 
 
 def _read_material(deck: Deck, card: Card) -> None:
@@ -40,12 +40,17 @@ def _read_elastic(deck: Deck, card: Card) -> None:
     values = np.array([v for row in rows for v in row])
     if kind not in ("ENGINEERING CONSTANTS", "ORTHO", "ORTHOTROPIC"):
         material.refused = f"*ELASTIC, TYPE={kind}"
-    elif len(values) not in (9, 10):
-        material.refused = f"{what} with {len(values)} numbers (nine, at one temperature, are read)"
+        return
+    if len(values) == 9:
+        values = np.append(values, 0.0)
+    if not len(values) or len(values) % 10:
+        material.refused = f"{what} with {len(values)} numbers (nine and a temperature are read)"
+    elif (np.diff(values[9::10]) <= 0).any():
+        raise Damaged(f"the temperatures of {what} do not rise")
     elif kind == "ENGINEERING CONSTANTS":
-        material.orthotropic = values[:9]
+        material.orthotropic = values.reshape(-1, 10)
     else:
-        material.stiffness = values[:9]
+        material.stiffness = values.reshape(-1, 10)
 
 
 def _read_density(deck: Deck, card: Card) -> None:
@@ -54,7 +59,11 @@ def _read_density(deck: Deck, card: Card) -> None:
     if not rows or not rows[0]:
         raise Damaged(f"*DENSITY of the material {material.name} holds no number")
     if len({row[0] for row in rows}) > 1:
-        material.refused = "a density that depends on temperature"
+        material.densities = np.array([[*row, 0.0][:2] for row in rows])
+        if (np.diff(material.densities[:, 1]) <= 0).any():
+            raise Damaged(
+                f"the temperatures of *DENSITY of the material {material.name} do not rise"
+            )
     material.density = rows[0][0]
 
 
@@ -65,9 +74,17 @@ def _read_expansion(deck: Deck, card: Card) -> None:
     if not rows or any(len(row) not in (count, count + 1) for row in rows) or kind.startswith("ANISO"):
         raise Damaged(f"*EXPANSION, TYPE={kind} of the material {material.name} is not read; use ISO or ORTHO")
     values = np.array([row[:count] for row in rows])
-    if np.ptp(values, axis=0).any():
-        material.refused = "an expansion that depends on temperature"
+    material.zero = real(card.text("ZERO") or "0", "*EXPANSION, ZERO")
     material.expansion = np.broadcast_to(values[0], 3).copy()
+    if not np.ptp(values, axis=0).any():
+        return
+    T, first = np.array([[*row, 0.0][count] for row in rows]), np.abs(values[0]).argmax()
+    factor = values[:, first] / values[0, first] if values[0, first] else np.zeros(len(T))
+    if (np.diff(T) <= 0).any():
+        raise Damaged(f"the temperatures of *EXPANSION of the material {material.name} do not rise")
+    if not np.allclose(values, factor[:, None] * values[0], rtol=1e-9, atol=0):
+        material.refused = "an expansion whose axes depend on temperature differently"
+    material.expansion_table = np.column_stack([T, factor])
 
 
 def _read_section(deck: Deck, card: Card) -> None:
@@ -127,24 +144,61 @@ def assign_materials(deck: Deck, raw: RawMesh) -> None:
             region[region < 0] = len(raw.materials) - 1
 
 
+def _weighed(deck: Deck, found: DeckConstants) -> None:
+    """Density over temperature as it is while free of strain, which the mass of the drawn body is made of."""
+    if found.densities is None:
+        return
+    free = {value for column, _, value in deck.temperatures if column == 0} or {0.0}
+    rho, T = found.densities.T
+    if len({*np.interp(list(free), T, rho).tolist()}) > 1:
+        found.refused = "a density that depends on temperature, and initial temperatures that vary"
+    found.density = float(np.interp(min(free), T, rho))
+    text = f"*DENSITY of {found.name} is {found.density:g} at the initial temperature; heat takes no mass away"
+    deck.remarks.append(
+        f"{found.where.rpartition('/')[2]}: {text}, though CalculiX has another at another temperature"
+    )
+
+
 def _deck_material(deck: Deck, key: tuple[str, str], where: str) -> DeckMaterial:
     found = deck.materials[key[0]]
+    _weighed(deck, found)
     turn = deck.orientations[key[1]] if key[1] else None
     axes = None if isinstance(turn, str) else turn
     if refused := found.refused or (turn if isinstance(turn, str) else ""):
         text = f"{refused}, which is not read; write another form, or give density and stiffness in a body.toml"
         return DeckMaterial(found.name, None, found.density, np.zeros(6), None, where, text)
-    C, table = None, None
+    C, table, matrices = None, None, None
     if found.isotropic is not None:
-        C, table = isotropic_rows(found.name, found.isotropic)
+        with of_file(found.where):
+            matrices = isotropic_matrices(found.name, found.isotropic)
+            if matrices is None:
+                C, table = isotropic_rows(found.name, found.isotropic)
     elif found.orthotropic is not None:
-        C = orthotropic_row(found.name, found.orthotropic)
+        rows = found.orthotropic
+        matrices = rows[:, 9], np.array([orthotropic_row(found.name, row[:9]) for row in rows])
     elif found.stiffness is not None:
-        C = _orthotropic_stiffness(found.name, found.stiffness)
-    if C is not None and axes is not None:
+        rows = found.stiffness
+        matrices = (
+            rows[:, 9],
+            np.array([_orthotropic_stiffness(found.name, row[:9]) for row in rows]),
+        )
+    if matrices is not None:
+        if axes is not None:
+            matrices = matrices[0], np.array([turned(matrix, axes) for matrix in matrices[1]])
+        C, matrices = matrices[1][0], matrices if len(matrices[0]) > 1 else None
+    elif C is not None and axes is not None:
         C = turned(C, axes)
     return DeckMaterial(
-        found.name, C, found.density, turned_strain(found.expansion, axes), table, where, line=found.where
+        found.name,
+        C,
+        found.density,
+        turned_strain(found.expansion, axes),
+        table,
+        where,
+        line=found.where,
+        stiffness_table=matrices,
+        expansion_table=found.expansion_table,
+        zero=found.zero,
     )
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from itertools import product
 
 import numpy as np
 
@@ -10,8 +11,11 @@ from ..data import BodyLoad, FacetLoad, NodalLoad, SpinLoad, StaticStep
 from ..errors import of_file
 from .cards import Card
 from .deck import Deck, Readers
+from .deck_conditions import constraints
 from .deck_mesh import sides_of
+from .loading import Terms, facet_loads, nodal_loads
 from .raw import Damaged, Numbering, RawMesh, lost, real
+from .supports import still_supports
 
 _MODES = ("FREQUENCY", "COMPLEX FREQUENCY")
 _OTHER_STATES = {
@@ -34,6 +38,8 @@ def until_modes(cards: list[Card]) -> tuple[list[Card], list[str]]:
 
 def _read_step(deck: Deck, card: Card) -> None:
     steps = deck.steps
+    if steps.static is not None and steps.static[0] is steps.card:
+        steps.held = list(deck.held)
     steps.number, steps.card, steps.period = steps.number + 1, card, 1.0
     if "NLGEOM" in card.parameters:
         steps.nonlinear = card.word("NLGEOM") != "NO"
@@ -127,9 +133,32 @@ def state_of_deck(deck: Deck, raw: RawMesh, numbering: Numbering, of_parts: bool
         with of_file(card.place):
             loads.add(number, factor, card)
     step, nonlinear = steps.static
-    raw.state = StaticStep(f"{step.where}: *STEP", nonlinear, tuple(loads.all()))
+    held = None
+    if steps.held is not None and steps.held != deck.held:
+        held = still_supports(raw, constraints(deck, steps.held), numbering)
+        _tell_local(deck, raw)
+    raw.state = StaticStep(f"{step.where}: *STEP", nonlinear, tuple(loads.all()), held)
 
 
+def _tell_local(deck: Deck, raw: RawMesh) -> None:
+    """Supports along local directions are equations, which the static step shares with its modes."""
+    assert deck.steps.held is not None
+    for word, directions, place in {*deck.steps.held} ^ {*deck.held}:
+        nodes = deck.nodes_for("*BOUNDARY", word)
+        if set(directions) & set("xyz") not in (
+            set(),
+            set("xyz"),
+        ) and not deck.axes.keys().isdisjoint(nodes.tolist()):
+            where = place.rpartition("/")[2]
+            text = (
+                "holds local directions in the static step and not in its modes, or in these alone"
+            )
+            raw.lost.append(
+                f"{where}: *BOUNDARY {text}: it is taken as those of the modes, so frequencies will differ"
+            )
+
+
+_Loading = NodalLoad | FacetLoad | BodyLoad | SpinLoad
 _NOT_READ = {"USER", "LOAD CASE", "SUBMODEL", "SECTOR", "OMEGA0", "ORIENTATION", "FILE"}
 
 
@@ -143,7 +172,7 @@ class _Acting:
     numbering: Numbering
     nodal: dict[tuple[str, int, int], tuple[int, float, str]] = field(default_factory=dict)
     facets: dict[tuple[int, ...], tuple[int, float, str]] = field(default_factory=dict)
-    fields: dict[tuple[str, str], tuple[int, list[BodyLoad | SpinLoad | FacetLoad]]] = field(default_factory=dict)
+    fields: dict[tuple[str, ...], tuple[int, list[_Loading]]] = field(default_factory=dict)
 
     def add(self, number: int, factor: float, card: Card) -> None:
         """Add the loads of a card.
@@ -184,9 +213,10 @@ class _Acting:
             raise Damaged(f"*{card.keyword} names the direction '{words[1][:20]}', which is none of 1 to 6")
         nodes = self.deck.nodes_for(f"*{card.keyword}", words[0], card.space)
         amount = factor * real(value or "0", f"*{card.keyword}")
-        for node in nodes.tolist():
-            for way in range(int(first) - 1, int(last)):
-                self._put(self.nodal, (kind, node, way), number, amount, card.where, kind == "force")
+        for node, way in product(nodes.tolist(), range(int(first) - 1, int(last))):
+            turns = self.deck.turning.get(node) if way < 3 else None  # moments and rotations
+            key = (kind, node, way) if turns is None else (kind, turns, way + 3)
+            self._put(self.nodal, key, number, amount, card.where, kind == "force")
 
     def _put(self, into: dict, key: tuple, number: int, amount: float, where: str, adds: bool = True) -> None:
         before = into.get(key)
@@ -213,6 +243,7 @@ class _Acting:
             if not way.any():
                 raise Damaged(f"*{card.keyword} with GRAV has a direction of no length")
             load = BodyLoad(where, factor * numbers[0] * way / np.linalg.norm(way), chosen)
+            self._pull(number, load, (word, label, "masses"))
         elif label == "CENTRIF" and len(numbers) == 7:
             if factor * numbers[0] < 0 or not any(numbers[4:]):
                 raise Damaged(f"*{card.keyword} with CENTRIF needs the square of a speed, a point and an axis")
@@ -223,7 +254,18 @@ class _Acting:
             return
         self._field((word, label), number, load)
 
-    def _field(self, key: tuple[str, str], number: int, load: BodyLoad | SpinLoad | FacetLoad) -> None:
+    def _pull(self, number: int, load: BodyLoad, key: tuple[str, ...]) -> None:
+        """The weight of the point masses that the load names."""
+        if load.cells is None:
+            return  # that of everything has theirs
+        heavy = [m for n, m in self.deck.masses.items() if n in load.cells]
+        if heavy:
+            nodes = np.repeat([node for node, _ in heavy], 3)
+            values = np.outer([mass for _, mass in heavy], load.acceleration)
+            ways = np.tile(np.arange(3), len(heavy))
+            self._field(key, number, NodalLoad(load.where, "force", nodes, ways, values.ravel()))
+
+    def _field(self, key: tuple[str, ...], number: int, load: _Loading) -> None:
         before = self.fields.get(key)
         self.fields[key] = number, [*(before[1] if before and before[0] == number else []), load]
 
@@ -260,26 +302,15 @@ class _Acting:
             load = FacetLoad(where, facets, np.full(len(facets), factor * numbers[0]), direction)
             self._field((f"surface {name}", label), number, load)
 
-    def all(self) -> list[NodalLoad | FacetLoad | BodyLoad | SpinLoad]:
+    def all(self) -> list[_Loading]:
         """What is in force, by the places where it was written."""
-        loads: list[NodalLoad | FacetLoad | BodyLoad | SpinLoad] = []
-        nodal: dict[tuple[str, str], list[tuple[int, int, float]]] = {}
-        for (kind, node, way), (_, amount, where) in self.nodal.items():
-            axes = self.deck.axes.get(node) if way < 3 else None
-            if amount and axes is not None and kind == "displacement":
-                self.raw.lost.append(f"{where}: *BOUNDARY moves node {node} along a local direction, which is not read")
-            elif amount and axes is not None:
-                terms = [(node, j, amount * axes[way][j]) for j in range(3)]
-                nodal.setdefault((kind, f"{where}: *CLOAD"), []).extend(terms)
-            elif amount:
-                word = "CLOAD" if kind == "force" else "BOUNDARY"
-                nodal.setdefault((kind, f"{where}: *{word}"), []).append((node, way, amount))
-        for (kind, where), terms in nodal.items():
-            nodes, ways, amounts = map(np.array, zip(*terms, strict=True))
-            loads.append(NodalLoad(where, kind, self.numbering.positions(nodes, f"{where} names"), ways, amounts))
-        facets: dict[tuple[str, int], list[tuple[tuple[int, ...], float]]] = {}
-        for corners, (_, amount, where) in self.facets.items():
-            facets.setdefault((where, len(corners)), []).append((corners, amount))
-        for (where, _), sides in facets.items():
-            loads.append(FacetLoad(where, np.array([c for c, _ in sides]), np.array([a for _, a in sides])))
+        words = {"force": "CLOAD", "displacement": "BOUNDARY"}
+        terms: Terms = {
+            key: (amount, f"{where}: *{words[key[0]]}") for key, (_, amount, where) in self.nodal.items()
+        }
+        facets = {corners: (amount, where) for corners, (_, amount, where) in self.facets.items() if amount}
+        loads: list[_Loading] = [
+            *nodal_loads(self.raw, terms, self.deck.axes, self.numbering),
+            *facet_loads(facets, inside=True),
+        ]  # fmt: skip
         return [*loads, *(load for _, chosen in self.fields.values() for load in chosen)]

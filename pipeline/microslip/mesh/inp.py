@@ -2,7 +2,7 @@
 
 Written against the keyword descriptions in the two programs' manuals. It keeps node numbers and reads ``*SURFACE``,
 in which such programs name faces; parts are laid where their instances stand (`instances`). A file whose meaning it
-cannot keep (generated nodes) is refused.
+cannot keep (mapped nodes) is refused.
 """
 
 from __future__ import annotations
@@ -14,10 +14,11 @@ import numpy as np
 
 from ..data import Array, Indices
 from ..errors import of_file
-from . import deck_conditions, deck_materials, deck_mesh, deck_state
+from . import deck_conditions, deck_generated, deck_materials, deck_mesh, deck_state
 from .cards import Card, data_of, numbers, read_cards
 from .deck import Deck
 from .deck_conditions import assign_temperatures, constraints, local_axes, local_supports
+from .deck_cut import cut_bolts
 from .deck_joints import KEYWORDS as JOINTS
 from .deck_joints import joints_of, preloads_of, sector_of, unread
 from .deck_links import KEYWORDS as LINKS
@@ -32,13 +33,14 @@ from .instances import numbered, outline, place, placement, places
 from .raw import Damaged, Numbering, RawMesh, Structure, ignored, joined, locks, lost, undefined
 from .supports import add_supports
 
-_REFUSED = {
-    "NGEN": "generates nodes by *NGEN", "NFILL": "generates nodes by *NFILL", "NCOPY": "copies nodes by *NCOPY",
-    "ELGEN": "generates cells by *ELGEN", "ELCOPY": "copies cells by *ELCOPY",
-}  # fmt: skip
+_REFUSED = {"NMAP": "maps nodes by *NMAP"}
 
 _LINKING = (*LINKS, *JOINTS, *LUMPING)
-READERS = deck_mesh.READERS | deck_materials.READERS | deck_conditions.READERS | deck_state.READERS
+READERS = {
+    word: read
+    for of in (deck_mesh, deck_generated, deck_materials, deck_conditions, deck_state)
+    for word, read in of.READERS.items()
+}
 
 
 def read_inp(path: Path) -> RawMesh:
@@ -64,6 +66,10 @@ def read_inp(path: Path) -> RawMesh:
         *_replaced(raw, whole, bool(found.instances)),
         *later,
     ]
+    if raw.state is not None and "PLASTIC" in whole.ignored:
+        text = "*PLASTIC is not read: the state is elastic, and where it yields frequencies will differ"
+        raw.lost.append(f"{raw.state.where}: {text}")
+        whole.ignored = [word for word in whole.ignored if word != "PLASTIC"]
     if raw.state is None:
         whole.ignored += [card.keyword for *_, card in whole.steps.acting if card.keyword != "BOUNDARY"]
     raw.remarks += ignored([f"*{word}" for word in whole.ignored], _LOADS, raw.state is not None)
@@ -75,6 +81,7 @@ def read_inp(path: Path) -> RawMesh:
 _LOADS = r"\*(C|D|DS)(LOAD|FLUX)|\*(D|S)?FILM|\*D?RADIATE|\*INERTIA RELIEF|\*MASS FLOW RATE"
 
 
+CALCULIX = ("tetra", "wedge")
 _AS = {
     "C3D8R": "reduced integration becomes full", "C3D8RH": "reduced integration becomes full",
     "C3D8I": "incompatible modes are left out", "C3D8H": "the hybrid form becomes that of displacements",
@@ -90,20 +97,24 @@ def _replaced(raw: RawMesh, deck: Deck, of_parts: bool) -> list[str]:
     """Which cells are taken as others, and how far first-order ones lock in bending.
 
     Where all bricks of 20 nodes are integrated by eight points they are so here, stiffness and mass, if the deck is of
-    CalculiX (it has no parts).
+    CalculiX (it has no parts); so are its tetrahedra of 4 and wedges of 6 nodes by one and two.
     """
     count: dict[str, int] = {}
     for cells in deck.solids:
         count[cells.written] = count.get(cells.written, 0) + len(cells.ids)
-    told = []
+    told: list[str] = []
     bricks20 = {cells.written for cells in deck.solids if cells.kind == "hexahedron20"}
+    if {cells.kind for cells in deck.solids} & set(CALCULIX) and not of_parts:
+        raw.integration = "calculix"
     if bricks20 == {"C3D20R"} and not of_parts:
         raw.integration = "reduced-mass"
         count = {written: number for written, number in count.items() if written != "C3D20R"}
     for written, number in count.items():
         plain = re.match(r"C3D\d+", written)
         if written in _AS and plain:
-            told.append(f"{number} cells {written} are taken as {plain[0]}: {_AS[written]}")
+            text = f"{number} cells {written} are taken as {plain[0]}: {_AS[written]}"
+            bricks = plain[0] == "C3D8" and written != "C3D8H"  # whose bending is another
+            (raw.lost if bricks else told).append(text + "; frequencies will differ" * bricks)
     return [*told, *locks(raw)]
 
 
@@ -177,7 +188,8 @@ def _assembled(deck: Deck, of_parts: bool) -> RawMesh:
         kinds = ", ".join(dict.fromkeys(deck.kinds))
         raise Damaged(f"it holds no volume cells (C3D4 to C3D27), only {kinds}; mesh the volume first")
     for cells in deck.solids:
-        cells.nodes = numbering.positions(cells.nodes, "*ELEMENT names")
+        with of_file(cells.where):
+            cells.nodes = numbering.positions(cells.nodes, "*ELEMENT names", cells.ids)
         raw.blocks.append((cells.kind, cells.nodes))
     raw.cell_id = [cells.ids for cells in deck.solids]
     raw.remarks += _unknown_cells(deck)
@@ -201,10 +213,10 @@ def _assembled(deck: Deck, of_parts: bool) -> RawMesh:
     raw.sector, uncut = sector_of(deck)
     raw.preloads, unpressed = preloads_of(deck)
     raw.lost = [*deck.lost, *left_out, *uncut, *unpressed]
-    raw.remarks += unread(deck)
+    raw.remarks += [*dict.fromkeys(deck.remarks), *unread(deck)]
     raw.joints = joints_of(deck)
     raw.instances = {name: numbering.positions(np.unique(ids), "") for name, ids in deck.instances.items()}
-    add_supports(raw, constraints(deck), numbering)
+    add_supports(raw, constraints(deck, deck.held), numbering)
     for cells in deck.facets:
         cells.nodes = numbering.positions(cells.nodes[:, : CORNERS[cells.nodes.shape[1]]], "*ELEMENT names")
     for key in deck.cell_sets:
@@ -214,6 +226,7 @@ def _assembled(deck: Deck, of_parts: bool) -> RawMesh:
                 raw.facets.setdefault(deck.written[key], []).append(cells.nodes[inside])
     add_surfaces(deck, raw, numbering)
     state_of_deck(deck, raw, numbering, of_parts)
+    cut_bolts(deck, raw, numbering)
     return raw
 
 

@@ -33,6 +33,16 @@ def renumbered(raw: RawMesh, points: Array, number: Indices, metres: float) -> L
     return Links(tuple(items), points[at], raw.node_id[at], {name: s for name, s in sets.items() if len(s)})
 
 
+def moved(link: Link, number: Indices) -> Link:
+    """A link with its points and reference nodes counted anew. number: (n + k,) of all of them."""
+    if isinstance(link, FaceTie):
+        return link
+    if isinstance(link, Equation | Guide):
+        return replace(link, nodes=number[link.nodes])
+    members = link.members if isinstance(link.members, str) else number[link.members]
+    return replace(link, reference=int(number[link.reference]), members=members)
+
+
 @dataclass
 class _References:
     """Reference nodes as they are met. known: position in the file -> number among them."""

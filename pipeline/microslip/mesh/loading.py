@@ -2,15 +2,63 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 
 import numpy as np
 
 from ..data import Array, BodyLoad, FacetLoad, Indices, Mesh, NodalLoad, SpinLoad, StaticStep
-from ..topology import FACET_CORNERS
+from ..topology import CELL_TYPES, FACET_CORNERS
 from ..units import in_si
-from .raw import RawMesh, joined
+from .raw import Numbering, RawMesh, joined
+
+Terms = dict[tuple[str, int, int], tuple[float, str]]
+"""Kind of a nodal load, number of a node and direction (0 to 5) -> amount, place in the file."""
+
+
+def nodal_loads(
+    raw: RawMesh, terms: Terms, axes: Mapping[int, Array], numbering: Numbering
+) -> Iterator[NodalLoad]:
+    """Forces and displacements of nodes by the places where they are written, along the axes of the body.
+
+    Args:
+        axes: node number -> (3, 3) rows x, y, z of its directions, where these are not the body's.
+
+    Raises:
+        Damaged: a node that is not there.
+    """
+    by_place: dict[tuple[str, str], list[tuple[int, int, float]]] = {}
+    for (kind, node, way), (amount, where) in terms.items():
+        turn = axes.get(node)
+        if not amount:
+            continue
+        if turn is not None and kind == "displacement":
+            raw.lost.append(f"{where} moves node {node} along a local direction, which is not read")
+            continue
+        parts = np.eye(3)[way % 3] * amount if turn is None else amount * turn[way % 3]
+        into = by_place.setdefault((kind, where), [])
+        into += [(node, way // 3 * 3 + int(j), float(parts[j])) for j in np.flatnonzero(parts)]
+    for (kind, where), rows in by_place.items():
+        nodes, ways, amounts = map(np.array, zip(*rows, strict=True))
+        yield NodalLoad(where, kind, numbering.positions(nodes, f"{where} names"), ways, amounts)
+
+
+def facet_loads(
+    facets: Mapping[tuple[int, ...], tuple[float | Array, str]], inside: bool = False
+) -> Iterator[FacetLoad]:
+    """Pressures by the places where they are written.
+
+    Args:
+        facets: corners, by positions -> amount on all of the facet or at each corner, place.
+        inside: see `FacetLoad`.
+    """
+    by_place: dict[tuple[str, int], list[tuple[tuple[int, ...], Array]]] = {}
+    for corners, (amount, where) in facets.items():
+        values = np.broadcast_to(amount, len(corners))
+        by_place.setdefault((where, len(corners)), []).append((corners, values))
+    for (where, _), sides in by_place.items():
+        values = np.array([a for _, a in sides])
+        yield FacetLoad(where, np.array([c for c, _ in sides]), values, inside=inside)
 
 
 def state_of(
@@ -33,15 +81,20 @@ def state_of(
         if isinstance(load, NodalLoad):
             loads += _nodal(raw, mesh, load, number, metres, system)
         elif isinstance(load, FacetLoad):
-            loads += _facets(raw, replace(load, facets=number[load.facets]), boundary, system)
+            loads += _facets(raw, mesh, replace(load, facets=number[load.facets]), boundary, system)
         elif isinstance(load, BodyLoad):
             acceleration = in_si(np.asarray(load.acceleration, dtype=float), system, length=1, time=-2)
             loads.append(replace(load, acceleration=acceleration, cells=_cells(mesh, load.cells)))
         else:
             speed, point = in_si(load.speed, system, time=-1), metres * np.asarray(load.point, dtype=float)
             cells = _cells(mesh, load.cells)
+            cells = None if cells is None or cells.all() else cells
             loads.append(replace(load, speed=float(speed), point=point, cells=cells))
-    return replace(step, loads=tuple(loads))
+    held = step.supports
+    if held is not None:
+        there = {*mesh.point_sets, *(mesh.links.sets if mesh.links else ())}
+        held = {name: ways for name, ways in held.items() if name in there}
+    return replace(step, loads=tuple(loads), supports=held)
 
 
 def _nodal(
@@ -68,8 +121,14 @@ def _nodal(
     return [replace(load, nodes=nodes[kept], directions=load.directions[kept], values=load.values[kept] * unit)]
 
 
-def _facets(raw: RawMesh, load: FacetLoad, boundary: Mapping[str, Indices], system: str) -> list[FacetLoad]:
-    """Loads on whole facets of the surface, type by type; corner values follow their corners."""
+def _facets(
+    raw: RawMesh, mesh: Mesh, load: FacetLoad, boundary: Mapping[str, Indices], system: str
+) -> list[FacetLoad]:  # fmt: skip
+    """Loads on whole facets of the surface, type by type; corner values follow their corners.
+
+    Facets between cells are those of the cell that sees them in the other order of corners: a file
+    gives a side's corners so that their normal points into its cell.
+    """
     count, loads, left = load.facets.shape[1], [], np.ones(len(load.facets), dtype=bool)
     order = np.argsort(load.facets, axis=1)
     wanted = np.take_along_axis(load.facets, order, axis=1)
@@ -87,6 +146,14 @@ def _facets(raw: RawMesh, load: FacetLoad, boundary: Mapping[str, Indices], syst
             np.put_along_axis(own, order[at[there]], values[there], axis=1)
             loads.append(replace(load, facets=facets[at[there]], values=own, kind=kind))
         left &= ~there
+    if left.any() and load.inside:
+        rest = np.flatnonzero(left)
+        first = np.unique(np.sort(load.facets[rest], axis=1), axis=0, return_index=True)[1]
+        for some in (rest[first], np.delete(rest, first)):  # of both sides one after the other
+            inner = replace(load, facets=load.facets[some], values=load.values[some], inside=False)
+            if len(some):
+                loads += _facets(raw, mesh, inner, _seen_from_inside(mesh, inner.facets), system)
+        return loads
     if left.any():
         raw.lost.append(
             f"{load.where}: {left.sum()} of {len(left)} loaded facets are not on the surface of the body: left out, so "
@@ -95,9 +162,30 @@ def _facets(raw: RawMesh, load: FacetLoad, boundary: Mapping[str, Indices], syst
     return loads
 
 
+def _seen_from_inside(mesh: Mesh, wanted: Indices) -> dict[str, Indices]:
+    """Facets of cells, by type, whose corners run against those of the wanted ones (f, c)."""
+    keys = {_turned_round(row[::-1]) for row in wanted.tolist()}
+    found: dict[str, list[Indices]] = {}
+    for kind, cells in mesh.cells.items():
+        for side, name in zip(CELL_TYPES[kind].facets, CELL_TYPES[kind].facet_types, strict=True):
+            count = FACET_CORNERS[name]
+            corners = cells[:, list(side[:count])].tolist() if count == wanted.shape[1] else []
+            chosen = [i for i, row in enumerate(corners) if _turned_round(row) in keys]
+            if chosen:
+                found.setdefault(name, []).append(cells[chosen][:, list(side)])
+    return {name: np.concatenate(parts) for name, parts in found.items()}
+
+
+def _turned_round(row: list[int]) -> tuple[int, ...]:
+    """Corners from the least on, in their order."""
+    first = row.index(min(row))
+    return (*row[first:], *row[:first])
+
+
 def _cells(mesh: Mesh, numbers: Indices | None) -> Array | None:
-    """Whether each cell is chosen, type by type; None if all are."""
-    if numbers is None:
-        return None
-    chosen = np.isin(joined(mesh.cell_id[kind] for kind in mesh.cells), numbers)
-    return None if chosen.all() else chosen
+    """Whether each cell is chosen, type by type; None where the file names none."""
+    return (
+        None
+        if numbers is None
+        else np.isin(joined(mesh.cell_id[kind] for kind in mesh.cells), numbers)
+    )

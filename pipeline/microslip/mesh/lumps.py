@@ -12,13 +12,28 @@ that leads none has no rotation. A loose node does not move where nothing resist
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field, fields, replace
 
 import numpy as np
 
-from ..data import Array, Equation, FaceTie, Guide, Indices, LumpedElement, Lumps, PointMass, RigidLink
+from ..data import (
+    Array,
+    Equation,
+    FaceTie,
+    Guide,
+    Indices,
+    Link,
+    Links,
+    LumpedElement,
+    Lumps,
+    Mesh,
+    NodalLoad,
+    PointMass,
+    RigidLink,
+)
 from ..units import SYSTEMS
+from .linking import moved
 from .raw import RawMesh, joined
 
 _WITHOUT = 1e-9
@@ -41,7 +56,7 @@ def spread(raw: RawMesh, system: str | None) -> Lumps | None:
         return None
     _, mass, time = SYSTEMS[system]
     made = _Spread(raw)
-    for item in raw.lumps:
+    for item in made.joined():
         if isinstance(item, PointMass):
             made.weigh(item)
         else:
@@ -51,7 +66,17 @@ def spread(raw: RawMesh, system: str | None) -> Lumps | None:
     blocks = np.array(list(made.blocks.values())).reshape(-1, 2, 3, 3)
     points = np.array(list(made.masses), dtype=np.int64)
     weights = mass * np.array(list(made.masses.values()))
-    return Lumps(points, weights, pairs, blocks[:, 0] * mass / time**2, blocks[:, 1] * mass / time)
+    lines = np.array([pair for *pair, _ in made.lines], dtype=np.int64).reshape(-1, 2)
+    tight = np.array([k for *_, k in made.lines]) * mass / time**2
+    return Lumps(
+        points,
+        weights,
+        pairs,
+        blocks[:, 0] * mass / time**2,
+        blocks[:, 1] * mass / time,
+        lines,
+        tight,
+    )
 
 
 def on_mesh(lumps: Lumps, number: Indices) -> Lumps:
@@ -59,12 +84,53 @@ def on_mesh(lumps: Lumps, number: Indices) -> Lumps:
     pairs = number[lumps.pairs]
     swapped = (pairs[:, 0] > pairs[:, 1])[:, None, None]
     K, C = (np.where(swapped, np.swapaxes(A, 1, 2), A) for A in (lumps.stiffness, lumps.damping))
-    return Lumps(number[lumps.points], lumps.masses, np.sort(pairs, axis=1), K, C)
+    lines = np.sort(number[lumps.lines], axis=1)
+    return Lumps(
+        number[lumps.points], lumps.masses, np.sort(pairs, axis=1), K, C, lines, lumps.tight
+    )
 
 
 def points_of(lumps: Lumps | None) -> Indices:
     """Points that carry masses, springs or dashpots, ascending."""
     return np.unique(joined([] if lumps is None else [lumps.points, lumps.pairs.ravel()]))
+
+
+def attached(
+    mesh: Mesh, references: Array, links: Sequence[Link], lumps: Sequence[PointMass | LumpedElement]
+) -> Mesh:
+    """A mesh with more masses, springs and dashpots, in SI.
+
+    Args:
+        references: (r, 3) m, new nodes without cells, counted on behind the reference nodes that are there. links: of
+            them to the mesh. lumps: on them, or on points of cells.
+    """
+    old = mesh.links or Links((), np.zeros((0, 3)), np.zeros(0, dtype=np.int64))
+    places = np.vstack([mesh.points, old.references, references])
+    raw = RawMesh(places, np.arange(len(places)), list(mesh.cells.items()))
+    raw.links, raw.lumps = [*old.items, *links], list(lumps)
+    new = spread(raw, "m-kg-s")
+    assert new is not None
+    n, count = mesh.n_points, len(raw.points) - len(places)
+    number = np.concatenate([np.arange(n), np.arange(n, len(places)) + count, n + np.arange(count)])
+    new, first = on_mesh(new, number), mesh.node_id.max(initial=0) + old.reference_id.max(initial=0) + 1
+    loads = () if mesh.state is None else mesh.state.loads
+    loads = tuple(replace(f, nodes=number[f.nodes]) if isinstance(f, NodalLoad) else f for f in loads)
+    items = tuple(moved(link, number) for link in raw.links)
+    known = Links(
+        items, np.vstack([old.references, references]),
+        np.concatenate([old.reference_id, first + count + np.arange(len(references))]), old.sets,
+    )  # fmt: skip
+    T = mesh.temperature
+    if T is not None and count:
+        T = np.vstack([T, np.tile(np.nanmedian(T, axis=0), (count, 1))])
+    if mesh.lumps is not None:
+        names = [f.name for f in fields(Lumps)]
+        new = Lumps(*(np.concatenate([getattr(mesh.lumps, n), getattr(new, n)]) for n in names))
+    return replace(
+        mesh, points=np.vstack([mesh.points, raw.points[len(places) :]]), temperature=T, links=known, lumps=new,
+        node_id=np.concatenate([mesh.node_id, first + np.arange(count)]), lost=(*mesh.lost, *raw.lost),
+        state=mesh.state and replace(mesh.state, loads=loads),
+    )  # fmt: skip
 
 
 @dataclass
@@ -74,7 +140,8 @@ class _Spread:
     Attributes:
         solid: positions that cells use. leading: those that others follow, turning: those with rotations.
         frames: position -> points that follow it: (where, positions). masses: position -> mass. blocks: (a, b) ->
-            stiffness and damping (2, 3, 3). resisted: loose position -> (6, 6) stiffness of its own.
+            stiffness and damping (2, 3, 3). lines: of springs between two points. resisted: loose
+            position -> (6, 6) stiffness of its own.
     """
 
     raw: RawMesh
@@ -89,6 +156,7 @@ class _Spread:
     turned: dict[int, tuple[int, int]] = field(default_factory=dict)
     masses: dict[int, float] = field(default_factory=dict)
     blocks: dict[tuple[int, int], Array] = field(default_factory=dict)
+    lines: list[tuple[int, int, float]] = field(default_factory=list)
     resisted: dict[int, Array] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -107,6 +175,20 @@ class _Spread:
         self.loose = lumped - self.solid - self.leading - tied
         spinning = {node for item in raw.lumps for node in _turned(item)}
         self.turning = self.leading | (tied - self.solid) | (self.loose & spinning)
+
+    def joined(self) -> list[PointMass | LumpedElement]:
+        """The lumped elements without masses on nodes that nothing joins to anything; these are told."""
+        ends = {
+            n for item in self.raw.lumps if isinstance(item, LumpedElement) for n in _nodes(item)
+        }
+        idle = [
+            m for m in self.raw.lumps if isinstance(m, PointMass) and m.node in self.loose - ends
+        ]
+        if idle:
+            self.loose -= {mass.node for mass in idle}
+            said = f"masses on nodes that nothing joins to the solids are left out: {len(idle)}"
+            self.raw.remarks.append(f"{idle[0].where}: {said}")
+        return [item for item in self.raw.lumps if not any(item is mass for mass in idle)]
 
     def weigh(self, item: PointMass) -> None:
         """Add a rigid body."""
@@ -136,7 +218,7 @@ class _Spread:
     def connect(self, item: LumpedElement) -> None:
         """Add a spring or dashpot."""
         rows = [self._row(int(n), int(d), item.where) for n, d in zip(item.nodes, item.directions, strict=True)]
-        kept = np.array([row is not None for row in rows])
+        kept = np.array([row is not None for row in rows], dtype=bool)
         given = [row for row in rows if row is not None]
         points = sorted({point for row in given for point, _ in row})
         rows_of = np.zeros((len(given), len(points), 3))
@@ -149,6 +231,9 @@ class _Spread:
             for j, b in enumerate(points[i:], i):
                 block = [A[3 * i : 3 * i + 3, 3 * j : 3 * j + 3] for A in both]
                 self.blocks[a, b] = self.blocks.get((a, b), np.zeros((2, 3, 3))) + np.array(block)
+        if item.along:
+            a, b = (self.point(int(node), item.where) for node in item.nodes[[0, -1]])
+            self.lines.append((a, b, item.along))
         for node in self.loose & {*item.nodes.tolist()}:
             at = np.flatnonzero(item.nodes == node)
             total = self.resisted.setdefault(node, np.zeros((6, 6)))
@@ -173,6 +258,8 @@ class _Spread:
         if raw.temperature is not None:
             usual = [np.nanmedian(t) if np.isfinite(t).any() else np.nan for t in raw.temperature.T]
             raw.temperature = np.vstack([raw.temperature, np.tile(usual, (count, 1))])
+            loose = np.array(sorted({*range(len(raw.points))} - self.solid), dtype=np.int64)
+            raw.temperature[loose] = usual  # of no solid: they heat nothing
 
     def _load(self, point: int, mass: float) -> None:
         self.masses[point] = self.masses.get(point, 0.0) + mass
@@ -241,8 +328,11 @@ def hanging(raw: RawMesh) -> str:
     for link in raw.links:
         if isinstance(link, Equation | Guide):
             near.update(link.nodes.tolist())
-        elif not isinstance(link, FaceTie):
-            near.update([link.reference, *([] if isinstance(link.members, str) else link.members.tolist())])
+        elif isinstance(link, FaceTie):
+            near.update(_surface(raw, link.slave) | _surface(raw, link.master))
+        else:
+            members = link.members
+            near.update(_surface(raw, members) if isinstance(members, str) else members.tolist(), [link.reference])
     near.update(node for item in raw.lumps for node in _nodes(item))
     counts, where = list[str](), ""
     for s in raw.structures:
@@ -252,6 +342,12 @@ def hanging(raw: RawMesh) -> str:
             counts.append(f"{len(beside)} {s.kind}")
             where = where or s.where
     return f"{where}: {', '.join(counts)} share nodes with the solids or their constraints" if counts else ""
+
+
+def _surface(raw: RawMesh, name: str) -> set[int]:
+    """Positions of the nodes of a surface."""
+    facets = (block.ravel() for block in raw.facets.get(name, ()))
+    return {*joined([raw.point_sets.get(name, np.zeros(0, dtype=np.int64)), *facets]).tolist()}
 
 
 def _nodes(item: PointMass | LumpedElement) -> list[int]:

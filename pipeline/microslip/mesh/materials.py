@@ -18,11 +18,14 @@ def isotropic_rows(name: str, rows: Array) -> tuple[Array, Array | None]:
     """Hooke matrix at the first temperature and the factor over temperature, from (t, 3) E, nu, temperature.
 
     Raises:
-        Damaged: impossible constants; a Poisson's ratio that depends on temperature.
+        Damaged: impossible constants; a Poisson's ratio that depends on temperature (see
+        `isotropic_matrices`).
     """
     E, nu, T = rows.T
     if not (E > 0).all() or not ((nu > -1) & (nu < 0.5)).all() or not np.isfinite(rows).all():
-        raise Damaged(f"the material '{name}' has E = {E[0]:g} and nu = {nu[0]:g}, which no solid has")
+        raise Damaged(
+            f"the material '{name}' has E = {E[0]:g} and nu = {nu[0]:g}, which no solid has"
+        )
     if np.ptp(nu) > _SAME:
         raise Damaged(
             f"Poisson's ratio of the material '{name}' depends on temperature; only the modulus may (write the mean)"
@@ -32,6 +35,23 @@ def isotropic_rows(name: str, rows: Array) -> tuple[Array, Array | None]:
     if (np.diff(T) <= 0).any():
         raise Damaged(f"the temperatures of the material '{name}' do not rise")
     return isotropic(E[0], nu[0]), np.column_stack([T, E / E[0]])
+
+
+def isotropic_matrices(name: str, rows: Array) -> tuple[Array, Array] | None:
+    """Temperatures and Hooke matrices where Poisson's ratio depends on temperature, else None.
+
+    E and nu are linear between the rows (t, 3) E, nu, temperature, which a hundred matrices between
+    two of them follow to 1e-6.
+    """
+    E, nu, T = rows.T
+    if np.ptp(nu) <= _SAME or not np.isfinite(rows).all() or (np.diff(T) <= 0).any():
+        return None
+    fine = np.unique(
+        np.concatenate([np.linspace(a, b, 101) for a, b in zip(T[:-1], T[1:], strict=True)])
+    )
+    if not (E > 0).all() or not ((nu > -1) & (nu < 0.5)).all():
+        raise Damaged(f"the material '{name}' has E = {E[0]:g} and nu = {nu[0]:g}, which no solid has")
+    return fine, np.array([isotropic(np.interp(t, T, E), np.interp(t, T, nu)) for t in fine])
 
 
 def orthotropic_row(name: str, c: Array) -> Array:
@@ -88,7 +108,7 @@ def in_si(
     whole, table = found.elasticity, found.temperature
     C, lacking = (None if whole is None else whole * stress(system)), []
     if found.refused and (instead.young is None or not instead.whole):
-        raise Unread(f"{name} has {found.refused} (or --young and --density for all of it)")
+        raise Unread(f"{name} has {found.refused} (or --young and --density for all of it)", file=line)
     if C is None or found.refused:
         C, table = _isotropic(found, system, instead), None
         if C is not None:
@@ -111,9 +131,14 @@ def in_si(
         raise Damaged(f"{name} holds a number that is not finite")
     if table is not None:
         table = table + np.array([zero, 0.0])
+    matrices, grown = found.stiffness_table, found.expansion_table
+    if matrices is not None:
+        matrices = matrices[0] + zero, matrices[1] * stress(system)
+    grown = None if grown is None else grown + np.array([zero, 0.0])
     place = f"{line}: " if line else ""
     said = f"{place}{name} has no {' and no '.join(lacking)}: {STANDS}" if lacking else ""
-    return Material(rho, C, found.expansion, table, found.name or "material"), said
+    name = found.name or "material"
+    return Material(rho, C, found.expansion, table, name, matrices, grown, found.zero + zero), said
 
 
 def _poisson(found: DeckMaterial, instead: Substitute) -> float | None:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -48,7 +49,8 @@ class DeckMaterial:
         density: None: missing. expansion: (6,) thermal strain per degree. temperature: (t, 2) temperature and factor on
             the elasticity, or None. where: the set of cells that it was given to. refused: what of it is not read, in
             words, and what to do. line: its place in the file, ``part.inp, line 12``, if known. young, poisson, shear:
-            what is there of them where they do not suffice for an elasticity.
+            what is there of them where they do not suffice for an elasticity. stiffness_table,
+            expansion_table, zero: as of a `Material`, in the file's units.
     """
 
     name: str
@@ -62,6 +64,9 @@ class DeckMaterial:
     young: float | None = None
     poisson: float | None = None
     shear: float | None = None
+    stiffness_table: tuple[Array, Array] | None = None
+    expansion_table: Array | None = None
+    zero: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -160,10 +165,21 @@ class RawMesh:
         """
         for kind, found in solids.items():
             ids, regions, nodes = (np.array(part, dtype=np.int64) for part in zip(*found, strict=True))
-            self.blocks.append((kind, numbering.positions(nodes, what)))
+            self.blocks.append((kind, numbering.positions(nodes, what, ids)))
             self.cell_id.append(ids)
             self.regions.append(regions)
         refuse_twice(self.cell_id)
+
+
+@contextmanager
+def in_its_line(path: Path) -> Iterator[None]:
+    """A mistake in here stands in a file, in the line with which its sentence begins if it does."""
+    try:
+        yield
+    except UserError as error:
+        if error.file:
+            raise
+        raise refused(path, str(error)) from error.__cause__
 
 
 def in_file(path: Path, text: str) -> str:
@@ -235,6 +251,41 @@ def locking(raw: RawMesh, bricks: list[Indices]) -> float:
         return float(1 + 0.5 * np.median(sides.max(axis=0) / sides.min(axis=0)) ** 2)
 
 
+_MIRRORED = {
+    "tetra": (0, 2, 1, 3),
+    "tetra10": (0, 2, 1, 3, 6, 5, 4, 7, 9, 8),
+    "wedge": (3, 4, 5, 0, 1, 2),
+    "wedge15": (3, 4, 5, 0, 1, 2, 9, 10, 11, 6, 7, 8, 12, 13, 14),
+    "hexahedron": (4, 5, 6, 7, 0, 1, 2, 3),
+    "hexahedron20": (4, 5, 6, 7, 0, 1, 2, 3, 12, 13, 14, 15, 8, 9, 10, 11, 16, 17, 18, 19),
+    "pyramid": (0, 3, 2, 1, 4),
+    "pyramid13": (0, 3, 2, 1, 4, 8, 7, 6, 5, 9, 12, 11, 10),
+}
+"""Nodes of a left-handed cell in a right-handed order."""
+_AROUND = {
+    "hexa": ((1, 3, 4), (2, 0, 5), (3, 1, 6), (0, 2, 7), (7, 5, 0), (4, 6, 1), (5, 7, 2), (6, 4, 3)),
+    "pyra": ((1, 3, 4), (2, 0, 4), (3, 1, 4), (0, 2, 4)),
+}
+"""Ends of the three edges from each corner, in a right-handed order."""
+
+
+def turn_left_handed(raw: RawMesh, bricks: bool = False) -> None:
+    """Count the nodes of left-handed tetrahedra and wedges the other way, as the solvers that allow
+    them do. bricks: those of bricks and pyramids as well, where all of their corners are left-handed."""
+    for number, (kind, cells) in enumerate(raw.blocks):
+        if kind not in _MIRRORED or not len(cells) or (kind[:4] in _AROUND and not bricks):
+            continue
+        left = np.ones(len(cells), dtype=bool)
+        for corner, ends in enumerate(_AROUND.get(kind[:4], ((1, 2, 3),))):
+            edges = raw.points[cells[:, ends]] - raw.points[cells[:, corner]][:, None]
+            left &= np.linalg.det(edges) < 0
+        if left.any():
+            cells = cells.copy()
+            cells[left] = cells[left][:, _MIRRORED[kind]]
+            raw.blocks[number] = kind, cells
+            raw.remarks.append(f"{left.sum()} left-handed cells {kind} are counted the other way round")
+
+
 def joined(parts: Iterable[Indices]) -> Indices:
     """Whole numbers one behind the other; none where there are no parts."""
     return np.concatenate([np.zeros(0, dtype=np.int64), *parts])
@@ -278,17 +329,22 @@ class Numbering:
         """The numbers from first to last that nodes have, ascending."""
         return self.sorted[np.searchsorted(self.sorted, first) : np.searchsorted(self.sorted, last, "right")]
 
-    def positions(self, numbers: Indices | Sequence[Any], what: str) -> Indices:
-        """Positions of node numbers, any shape.
+    def positions(self, numbers: Indices | Sequence[Any], what: str, of: Indices | None = None) -> Indices:
+        """Positions of node numbers, any shape. of: (e,) the elements that name them, row by row.
 
         Raises:
             Damaged: a number that no node has.
         """
-        ids = np.asarray(numbers, dtype=np.int64)
+        try:
+            ids = np.asarray(numbers, dtype=np.int64)
+        except OverflowError:
+            raise Damaged(f"{what} a node whose number is beyond all bounds") from None
         if not len(self.sorted):
             raise Damaged(f"{what} but there are no nodes before it")
         at = np.minimum(np.searchsorted(self.sorted, ids), len(self.sorted) - 1)
         missing = self.sorted[at] != ids
         if missing.any():
+            if of is not None:
+                what = f"element {of[np.nonzero(missing)[0][0]]} names"
             raise Damaged(f"{what} node {ids[missing].flat[0]}, which the file does not define")
         return self.order[at]

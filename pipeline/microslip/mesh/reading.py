@@ -7,11 +7,13 @@ versions of MSH, VTU and VTK files go through meshio, which is called here only.
 from __future__ import annotations
 
 import contextlib
+import copy
 import io
 import re
 import warnings
 from collections.abc import Callable
 from dataclasses import replace
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -21,9 +23,12 @@ from ..data import Array, Indices, Lumps, Mesh
 from ..errors import UserError, in_its_file
 from ..files.hostile import tried
 from ..files.store import ordinary
+from ..plausible import DENSITY
 from ..topology import CELL_TYPES, FACET_CORNERS
-from ..units import usual_system
+from ..units import density, usual_system
 from .bdf import read_bdf
+from .bdf_cards import included
+from .cards import files_of
 from .cdb import read_cdb
 from .inp import read_inp
 from .linking import renumbered
@@ -32,9 +37,9 @@ from .lumps import hanging, on_mesh, points_of, spread
 from .materials import NONE, Substitute, in_si
 from .med import read_med
 from .msh import is_msh41, read_msh41
-from .raw import NODES, Damaged, RawMesh, refused
+from .raw import NODES, Damaged, RawMesh, refused, turn_left_handed
 from .surface import boundary_facets, faces_from_points, match_facets
-from .unv import length_unit, read_unv
+from .unv import UNIVERSAL, length_unit, read_unv
 
 UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 0.0254, "ft": 0.3048}
 """Unit of length -> metres."""
@@ -71,6 +76,7 @@ def read_mesh(
         raise UserError("no such mesh file; make it first or correct the path")
     try:
         raw = _read_raw(path)
+        _parsed.cache_clear()  # a file that it includes may change
         if (said := unit_of(path)) not in ("", unit):
             raw.lost.append(f"the file tells its lengths in {said}, here they are taken in {unit}: which is right?")
         made = [in_si(m, system, zero, instead) for m in raw.materials] if system else []
@@ -90,6 +96,8 @@ def _refused(path: Path, error: Damaged) -> UserError:
     remedy = "" if "; " in text else "; correct it or write it again"
     if error.file:
         return UserError(text + remedy, file=error.file)
+    if re.match(r"line \d+: ", text):
+        text = f"{path.name}, {text}"
     told = text if text.startswith(f"{path.name}, ") else f"cannot be used: {text}"
     return refused(path, told + remedy)
 
@@ -97,10 +105,11 @@ def _refused(path: Path, error: Damaged) -> UserError:
 _READERS: dict[str, Callable[[Path], RawMesh]] = {
     **dict.fromkeys((".cdb", ".anf", ".mac", ".ans"), read_cdb),
     **dict.fromkeys((".bdf", ".nas", ".fem", ".dat"), read_bdf),
-    **dict.fromkeys((".unv", ".uff", ".uf"), read_unv),
+    **dict.fromkeys(UNIVERSAL, read_unv),
     ".inp": read_inp,
     ".med": read_med,
 }
+
 _BY_MESHIO = (".msh", ".vtu", ".vtk")
 
 
@@ -149,16 +158,50 @@ def unit_of(path: Path) -> str:
     return ""
 
 
+def likely_unit(path: Path) -> str:
+    """m or in where the file's densities are a solid's in these and far from it in mm; empty otherwise."""
+    try:
+        raw = _read_raw(path) if path.is_file() and suffix_of(path) in _READERS else None
+    except UserError:
+        return ""
+    densities = [m.density for m in raw.materials if m.density] if raw else []
+    if not densities or min(densities) * density("mm-t-s") < 40 * DENSITY[1]:
+        return ""
+    for unit in ("m", "in"):
+        factor = density(usual_system(unit) or "")
+        if all(DENSITY[0] <= value * factor <= DENSITY[1] for value in densities):
+            return unit
+    return ""
+
+
 def _read_raw(path: Path) -> RawMesh:
+    """A file's content, its own to change; the file that was read last is not parsed again."""
+    found = ordinary(path).stat()
+    return copy.deepcopy(_parsed(path, found.st_mtime_ns, found.st_size))
+
+
+@lru_cache(maxsize=1)
+def _parsed(path: Path, time: int, size: int) -> RawMesh:
     suffix = suffix_of(path)
     if suffix == ".msh" and is_msh41(path):
         return read_msh41(path)
     if suffix in _READERS:
+        with ordinary(path).open("rb") as file:
+            head = file.read(4096)
+        if suffix != ".med" and head.count(0) > 8:
+            way = "UTF-16; write it as UTF-8 or ASCII" if head[:2] in (b"\xff\xfe", b"\xfe\xff") else "no text"
+            raise Damaged(f"it is {way}")
         return _READERS[suffix](path)
     if suffix in _BY_MESHIO:
         return _by_meshio(path, _from_meshio)
     known = ", ".join([*_READERS, *_BY_MESHIO])
     raise UserError(f"meshes are not read from a file '{suffix}'; use one of {known}")
+
+
+def read_files(path: Path) -> list[Path]:
+    """A mesh file and those that it reads (INCLUDE, INPUT); what is missing is told where it is read."""
+    reader = _READERS.get(suffix_of(path))
+    return files_of(path) if reader is read_inp else included(path) if reader is read_bdf else [path]
 
 
 def _mesh_of(raw: RawMesh, metres: float, system: str | None) -> Mesh:
@@ -168,8 +211,12 @@ def _mesh_of(raw: RawMesh, metres: float, system: str | None) -> Mesh:
         if {"wedge18", "pyramid14"} & set(foreign):
             way += " (in gmsh: Mesh.SecondOrderIncomplete = 1)"
         raise UserError(f"cells of type {', '.join(foreign)} cannot be assembled; {way}")
+    if raw.points.shape[1:] != (3,) or not np.isfinite(raw.points).all():
+        lost = raw.node_id[~np.isfinite(raw.points).reshape(len(raw.points), -1).all(axis=1)]
+        which = f"node {lost[0]} has others" if len(lost) else "there are others"
+        raise UserError(f"coordinates must be three finite numbers a point, and {which}; correct them")
     _sort_by_region(raw)
-    _turn_left_handed(raw)
+    turn_left_handed(raw)
     cells: dict[str, list[Indices]] = {}
     for kind, connectivity in raw.blocks:
         if len(connectivity):
@@ -179,38 +226,13 @@ def _mesh_of(raw: RawMesh, metres: float, system: str | None) -> Mesh:
     attached = hanging(raw)
     lumps = spread(raw, system)
     points = raw.points * metres
-    if points.shape[1:] != (3,) or not np.isfinite(points).all():
-        raise UserError("coordinates must be three finite numbers a point; the file is damaged or not 3-D")
-    if np.abs(points).max() > _FARTHEST:
-        raise UserError(f"a point lies {np.abs(points).max():.3g} m from the origin; the file is damaged")
+    away = np.abs(points).max(axis=1)
+    if away.max() > _FARTHEST:
+        node = raw.node_id[away.argmax()] if away.argmax() < len(raw.node_id) else ""
+        raise UserError(f"node {node} lies {away.max():.3g} m from the origin; the file is damaged")
     whole = {t: np.concatenate(c) for t, c in cells.items()}
     mesh = _assemble_mesh(raw, points, whole, metres, system, lumps)
     return replace(mesh, hanging=attached, retained=tuple(n for n in raw.retained if n in mesh.point_sets))
-
-
-_MIRRORED = {
-    "tetra": (0, 2, 1, 3),
-    "tetra10": (0, 2, 1, 3, 6, 5, 4, 7, 9, 8),
-    "wedge": (3, 4, 5, 0, 1, 2),
-    "wedge15": (3, 4, 5, 0, 1, 2, 9, 10, 11, 6, 7, 8, 12, 13, 14),
-}
-"""Nodes of a left-handed cell in a right-handed order; of bricks and pyramids such an order is no
-mere habit."""
-
-
-def _turn_left_handed(raw: RawMesh) -> None:
-    """Count the nodes of left-handed tetrahedra and wedges the other way, as the solvers that allow
-    them do."""
-    for number, (kind, cells) in enumerate(raw.blocks):
-        if kind not in _MIRRORED or not len(cells):
-            continue
-        corner = raw.points[cells[:, :4]]
-        left = np.linalg.det(corner[:, 1:] - corner[:, :1]) < 0
-        if left.any():
-            cells = cells.copy()
-            cells[left] = cells[left][:, _MIRRORED[kind]]
-            raw.blocks[number] = kind, cells
-            raw.remarks.append(f"{left.sum()} left-handed cells {kind} are counted the other way round")
 
 
 # other formats, by meshio ----------------------------------------------------------------------------------------
@@ -364,6 +386,10 @@ def _assemble_mesh(
     state = state_of(raw, replace(mesh, links=links), renumber, boundary, metres, system)
     known = {*mesh.point_sets, *(links.sets if links else ())}
     supports = {n: directions for n, directions in raw.supports.items() if n in known}
+    if idle := ", ".join(f"'{name}'" for name in raw.supports if name not in known):
+        raw.remarks.append(
+            f"held, but no element or constraint uses these nodes, so it holds nothing: {idle}"
+        )
     return replace(
         mesh, faces=faces, inner=inner, supports=supports, not_held=tuple(raw.not_held), unended=raw.unended,
         links=links, state=state, integration=raw.integration,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -36,13 +36,47 @@ class Constraints:
             known: dict = self.nodes if isinstance(where, int) else self.sets
             known.setdefault(where, set()).update(directions)
 
+    def release(self, nodes: set[int], directions: set[str], members: Mapping[str, Iterable[int]]) -> None:
+        """Take directions away from nodes; `members`: numbers of the nodes of each set."""
+        for name in [name for name in self.sets if not nodes.isdisjoint(members.get(name, ()))]:
+            ways = self.sets.pop(name)
+            for node in members[name]:
+                self.hold(node, ways)
+        for node in nodes & self.nodes.keys():
+            self.nodes[node] -= directions
+
     def clear(self) -> None:
         """Forget what was held before."""
         self.sets, self.nodes = {}, {}
 
 
-def add_supports(raw: RawMesh, held: Constraints, numbering: Numbering) -> None:
-    """Give `raw` the supports: named sets as they are; nodes held alike as the set that has just them, or a new one.
+def still_supports(raw: RawMesh, held: Constraints, numbering: Numbering) -> dict[str, str] | None:
+    """Point set -> directions of what a static step holds, its sets added to `raw`; None where those of its modes are
+    the same. What of it is skewed, or not read, is told."""
+    still = replace(raw, supports={}, links=list(raw.links), not_held=[], lost=raw.lost)
+    add_supports(still, held, numbering, "held at rest")
+    if (more := len(still.links) - len(raw.links)) or still.not_held:
+        number = more or len(still.not_held)
+        raw.lost.append(
+            f"{number} supports of the static step are not read: frequencies may differ"
+        )
+    return None if _by_node(still) == _by_node(raw) else still.supports
+
+
+def _by_node(raw: RawMesh) -> set[tuple[int, str]]:
+    return {
+        (n, way)
+        for name, ways in raw.supports.items()
+        for n in raw.point_sets[name].tolist()
+        for way in ways
+    }
+
+
+def add_supports(
+    raw: RawMesh, held: Constraints, numbering: Numbering, title: str = "held"
+) -> None:
+    """Give `raw` the supports: named sets as they are; nodes held alike as the set that has just them, or a new one,
+    whose name begins with the title.
 
     Rotations (a, b, c) are those of reference nodes; others have none. Single directions of a local system become
     linear equations, which hold wherever the mesh is used.
@@ -80,7 +114,7 @@ def add_supports(raw: RawMesh, held: Constraints, numbering: Numbering) -> None:
     for directions, nodes in alike.items():
         members = np.unique(numbering.positions(nodes, "a constraint names"))
         same = (n for n, s in raw.point_sets.items() if n not in raw.supports and np.array_equal(s, members))
-        name = next(same, f"held {directions}")
+        name = next(same, f"{title} {directions}")
         raw.add_points(name, members)
         raw.supports[name] = directions
     told = list(left_out)

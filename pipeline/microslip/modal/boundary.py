@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -37,16 +38,35 @@ def require_face(mesh: Mesh, face: str, key: str, points_suffice: bool = False) 
 
 def fixed_dofs(mesh: Mesh, settings: BodySettings) -> Indices:
     """Held degrees of freedom: 3 * point + component, and behind those of the points six of each reference node."""
+    turns = ["".join("abc"[turn - 3] for turn in s.turns) for s in settings.supports]
+    held = [
+        (s.face, f"{s.directions}{more}") for s, more in zip(settings.supports, turns, strict=True)
+    ]
+    return held_dofs(mesh, held)
+
+
+def still_dofs(mesh: Mesh, settings: BodySettings) -> Indices | None:
+    """Those held in the mesh file's static step, where its loads act and it holds others than its modes."""
+    loaded = any(load.kind == "mesh" for load in settings.loads)
+    own = loaded and mesh.state is not None and mesh.state.supports is not None
+    return held_dofs(mesh, list(mesh.state.supports.items())) if own else None  # type: ignore[union-attr]
+
+
+def held_dofs(mesh: Mesh, held: Sequence[tuple[str, str]]) -> Indices:
+    """Degrees of freedom of faces or point sets held in directions x, y, z and rotations a, b, c.
+
+    Raises:
+        UserError: a face that is not there.
+    """
     fixed = [np.zeros(0, dtype=np.int64)]
-    for support in settings.supports:
+    for face, ways in held:
         nodes = np.zeros(0, dtype=np.int64)
-        moves = mesh.ties.sets.get(support.face, nodes) if mesh.ties is not None else nodes
-        if not len(moves) or support.face in {*mesh.faces, *mesh.point_sets}:
-            require_face(mesh, support.face, f"supports.{support.face}.face", points_suffice=True)
-            nodes = mesh.set_points(support.face)
-        fixed += [3 * nodes + AXES[c] for c in support.directions]
-        ways = [AXES[c] for c in support.directions] + support.turns
-        fixed += [3 * mesh.n_points + 6 * moves + way for way in ways]
+        moves = mesh.ties.sets.get(face, nodes) if mesh.ties is not None else nodes
+        if not len(moves) or face in {*mesh.faces, *mesh.point_sets}:
+            require_face(mesh, face, f"supports.{face}.face", points_suffice=True)
+            nodes = mesh.set_points(face)
+        fixed += [3 * nodes + AXES[c] for c in ways if c in AXES]
+        fixed += [3 * mesh.n_points + 6 * moves + "xyzabc".index(c) for c in ways]
     return np.unique(np.concatenate(fixed))
 
 
@@ -165,6 +185,19 @@ def refuse_overlap(mesh: Mesh, settings: BodySettings) -> None:
                 f"interfaces.{item.name}.coordinates: characteristic shapes are made of a lone body, not of a sector "
                 '([cyclic]); use "rigid"'
             )
+
+
+def refuse_other_supports(settings: BodySettings) -> None:
+    """Refuse what has one set of supports, where a static step has others than its modes.
+
+    Raises:
+        UserError: with the key.
+    """
+    if settings.rotation.range_rpm is not None:
+        raise UserError(
+            "rotation.range_rpm: the static step of the mesh file holds the body otherwise than its modes, "
+            "which a range does not know; write speeds_rpm"
+        )
 
 
 def with_loads(model: BodyModel, mesh: Mesh, settings: BodySettings, held: Indices) -> BodyModel:

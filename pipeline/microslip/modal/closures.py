@@ -12,7 +12,7 @@ from ..errors import UserError
 from ..fem.contact import ContactPair, Grip, Plane, gap_at, make_pair, node_values
 from ..fem.discretise import face_blocks, quadrature
 from ..fem.loads import traction
-from ..linalg.eigen import DirectSolver
+from ..linalg.direct import DirectSolver
 from ..progress import Report
 from ..settings.body import GROUND, BodySettings, Closure
 from .boundary import require_face

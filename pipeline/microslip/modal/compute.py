@@ -10,6 +10,7 @@ import scipy.sparse as sp
 from ..data import Array, Mesh, ModalBasis, ModalGroup
 from ..errors import UserError
 from ..fem.cyclic import CyclicUpper
+from ..linalg.eigen import new_solver
 from ..progress import Whole
 from ..settings.body import BodySettings
 from ..units import from_rpm
@@ -35,7 +36,8 @@ def modal_basis(
     """The modal basis of a body at each of its rotation speeds (Sextro section 2.4).
 
     Args:
-        mesh: in metres. settings: in SI. temperature: (n,) K at the points, or None. report: told what is done.
+        mesh: in metres. settings: in SI. temperature: (n,) K at the points, (n, 2) with the
+            stress-free one behind it, or None. report: told what is done.
         provenance: texts to carry in the file.
 
     Raises:
@@ -82,13 +84,10 @@ def _at_speeds(
             report(f"speed {number + 1} of {len(speeds)}: {rpm:g} rpm")
         if b.pressed:
             state = pressed_state(
-                b.model, b.motions, b.centre, rotation.prestress, b.settings.modes.solver, report
+                b.model, b.motions, b.centre, rotation.prestress, b.settings.modes, report
             )
         else:
-            within = balanced(b.model, b.floats(0), b.solver)
-            state = equilibrium(
-                b.model, speed, rotation.prestress, within, _guess(state, speed), report
-            )
+            state = _rest(b, speed, _guess(state, speed), report)
         settled[speed] = state
         end = rpm in (rotation.range_rpm or ())  # whose basis begins with its modes and a few more
         searched = searched_state(b.with_spares() if end else b, state)
@@ -101,6 +100,21 @@ def _at_speeds(
         for k, s in searched.items():
             groups[number, k] = assemble_group(b, state, reduced_solution(b, s), k)
     return groups, settled, ends
+
+
+def _rest(b: Prepared, speed: float, start: StaticState | None, report: Report) -> StaticState:
+    """The static state at a speed, held as its step says."""
+    prestress = b.settings.rotation.prestress
+    if b.still is None:
+        within = balanced(b.model, b.floats(0), b.solver)
+        return equilibrium(b.model, speed, prestress, within, start, report)
+    solver = new_solver(
+        b.settings.modes.solver
+    )  # the other one keeps its analysis of what the modes leave free
+    try:
+        return equilibrium(b.still, speed, prestress, solver, start, report)
+    finally:
+        solver.close()
 
 
 def _guess(state: StaticState | None, speed: float) -> StaticState | None:

@@ -19,7 +19,8 @@ from ..elasticity import VOIGT_AXES, pushed, strain_tensor
 from ..errors import NotConverged, UserError
 from ..fem.contact import ContactPair, Grip
 from ..fem.cyclic import CyclicUpper
-from ..fem.discretise import Discretisation, FreeUpper, Pattern, whole
+from ..fem.discretise import Block, Discretisation, FreeUpper, Pattern, quadrature, whole
+from ..fem.line_springs import LineSprings, line_springs
 from ..fem.loads import FollowingPressure
 from ..fem.operators import (
     displacement_gradient,
@@ -37,7 +38,8 @@ from ..fem.operators import (
 )
 from ..fem.tied import Tied
 from ..interrupts import look
-from ..linalg.eigen import DirectSolver, Unstable, symmetric_product
+from ..linalg.direct import DirectSolver
+from ..linalg.eigen import Unstable, symmetric_product
 from ..progress import Report
 from ..units import rpm_text
 from .closing import Closing
@@ -74,7 +76,8 @@ class BodyModel:
         dead_load: (n, 3) forces that act at every speed, N. axis, point: of rotation.
         spin_softening: whether -Omega^2 M P is part of K. contacts: faces that may touch in the static state.
         hooke: per block (6, 6) or (e, q, 6, 6) that takes the place of the materials' (see `heated`), or None.
-        springs, dashpots: (p, 3, 3) of the mesh's lumped elements, N/m and N s/m, or None.
+        springs, dashpots: (p, 3, 3) of the mesh's lumped elements, N/m and N s/m, or None. lines:
+        springs that turn.
         following: pressures that follow the surface. displaced: (n, 3) m, displacements that are prescribed, continued
             as the ties want it and 0 elsewhere, or None.
     """
@@ -96,6 +99,7 @@ class BodyModel:
     hooke: list[Array] | None = None
     springs: Array | None = None
     dashpots: Array | None = None
+    lines: LineSprings | None = None
     following: tuple[FollowingPressure, ...] = ()
     displaced: Array | None = None
 
@@ -153,22 +157,55 @@ def make_model(
     """Assemble what does not depend on speed.
 
     Args:
-        material: one for all, or one per block. temperature: (n,) K at the nodes, or None for the reference.
+        material: one for all, or one per block. temperature: (n,) K at the nodes, (n, 2) with the
+            stress-free one behind it, or None for the reference.
     """
     own: list[Material] = per_block(d, material)
-    factor = strain = None
+    factor = strain = hooke = None
     if temperature is not None:
-        at = [np.einsum("qk,ek->eq", b.N, temperature[b.cells]) for b in d.blocks]
+        alike = np.full(len(temperature), reference)
+        T = temperature if temperature.ndim == 2 else np.column_stack([temperature, alike])
+        both = [np.einsum("qk,eks->seq", _heat_shapes(b), T[b.cells]) for b in d.blocks]
+        at, cold = [t[0] for t in both], [t[1] for t in both]
         if any(m.temperature_table is not None for m in own):
             factor = [m.modulus_factor(t) for m, t in zip(own, at, strict=True)]
         if any(np.any(m.expansion) for m in own):
-            strain = [(t - reference)[..., None] * m.expansion for m, t in zip(own, at, strict=True)]
+            strain = [m.thermal_strain(t, free) for m, t, free in zip(own, at, cold, strict=True)]
+        if any(m.stiffness_table is not None for m in own):
+            hooke = [
+                m.elasticity if m.stiffness_table is None else m.stiffness_at(t)
+                for m, t in zip(own, at, strict=True)
+            ]
     M = mass(whole(d), [m.density for m in own])
-    K = stiffness(d, [m.elasticity for m in own], factor)
+    if hooke is None:
+        K = stiffness(d, [m.elasticity for m in own], factor)
+    else:
+        of_each = zip(
+            hooke, [None] * len(hooke) if factor is None else factor, d.blocks, strict=True
+        )
+        K = tangent(
+            d, [tangent_tensor(C, f, None, np.zeros((*b.dx.shape, 6))) for C, f, b in of_each]
+        )
     return BodyModel(
         d, tuple(own), factor, strain, M, d.pattern.full(M), K, free, fixed,
-        dead_load, axis / np.linalg.norm(axis), point, spin_softening,
+        dead_load, axis / np.linalg.norm(axis), point, spin_softening, hooke=hooke,
     )  # fmt: skip
+
+
+def _heat_shapes(b: Block) -> Array:
+    """(q, k) temperature at a block's points by those at its nodes.
+
+    In bricks of 20 nodes it is the trilinear field nearest to the quadratic one, in bricks of 8 the
+    mean: what heat strains is then no finer than the strains they have (so does CalculiX).
+    """
+    if b.cell_type == "hexahedron":
+        return np.full(b.N.shape, 1 / 8)
+    if b.cell_type != "hexahedron20":
+        return b.N
+    x, y, z = (b.at - b.at.mean(axis=0)).T
+    A = np.column_stack([np.ones(len(x)), x, y, z, x * y, y * z, x * z, x * y * z])
+    weighted = A.T * quadrature(b.cell_type, 3 if len(b.at) == 8 else None)[1]
+    return A @ np.linalg.solve(weighted @ A, weighted @ b.N)
 
 
 def with_lumps(model: BodyModel) -> BodyModel:
@@ -181,7 +218,7 @@ def with_lumps(model: BodyModel) -> BodyModel:
     np.add.at(dashpots, pattern.places(*lumps.pairs.T), lumps.damping)
     return replace(
         model, M=M, M_full=pattern.full(M), K0=model.K0 + springs, springs=springs,
-        dashpots=dashpots if dashpots.any() else None,
+        dashpots=dashpots if dashpots.any() else None, lines=line_springs(model.d.mesh),
     )  # fmt: skip
 
 
@@ -198,7 +235,7 @@ def resisting_force(model: BodyModel, stress: list[Array], H: list[Array] | None
     force = internal_force(model.d, stress, H)
     if model.springs is not None:
         force = force + (model.d.pattern.full(model.springs) @ u.reshape(-1)).reshape(u.shape)
-    return force
+    return force if model.lines is None or H is None else force + model.lines.force(u)
 
 
 def stress_of(model: BodyModel, strain: list[Array]) -> list[Array]:
@@ -235,7 +272,8 @@ def heated(model: BodyModel) -> BodyModel:
         U, own = thermal_stretch(model, i), np.ones(e.shape[:-1]) if model.factor is None else model.factor[i]
         strain.append(engineering(0.5 * (U @ U - np.eye(3))))
         alike = np.array_equal(m.expansion, m.expansion[0] * np.array([1, 1, 1, 0, 0, 0]))
-        hooke.append(m.elasticity if alike else pushed(m.elasticity, np.linalg.inv(U)))
+        C = model.elasticity(i)
+        hooke.append(C if alike else pushed(C, np.linalg.inv(U)))
         factor.append(own / U[..., 0, 0] if alike else own)
     return replace(model, thermal_strain=strain, hooke=hooke, factor=factor)
 
@@ -287,7 +325,7 @@ def _linear(model: BodyModel, speed: float, solver: DirectSolver, soft: Array | 
     solver.factorise(model.free.matrix(model.K0))
     u = first + model.free.expand(solver.solve(model.free.restrict(force.reshape(-1))), n).reshape(n, 3)
     H, stress = _small(model, u)
-    K = _tangent(model, H, stress) + soft + model.following_stiffness(x + u)
+    K = _tangent(model, H, stress, u) + soft + model.following_stiffness(x + u)
     return StaticState(u, H, stress, K, "linear", speed=speed)
 
 
@@ -349,13 +387,15 @@ def _tangent_slope(model: BodyModel, state: StaticState, du: Array) -> Array:
         E = np.swapaxes(np.eye(3) + h, -1, -2) @ dH
         stress = _stress(C, engineering(0.5 * (E + np.swapaxes(E, -1, -2))))
         A.append(tangent_tensor_slope(C, f, h, dH, stress if f is None else stress * f[..., None]))
-    return tangent(model.d, A)
+    K = tangent(model.d, A)
+    return K if model.lines is None else K + model.lines.slope(state.u, du, model.d.pattern)
 
 
-def _tangent(model: BodyModel, H: list[Array], stress: list[Array]) -> Array:
+def _tangent(model: BodyModel, H: list[Array], stress: list[Array], u: Array) -> Array:
     parts = enumerate(zip(model.factors, H, stress, strict=True))
     K = tangent(model.d, [tangent_tensor(model.elasticity(i), *part) for i, part in parts])
-    return K if model.springs is None else K + model.springs
+    K = K if model.springs is None else K + model.springs
+    return K if model.lines is None else K + model.lines.tangent(u, model.d.pattern)
 
 
 def _newton(
@@ -418,14 +458,14 @@ def _newton_at(
             if any((np.linalg.det(np.eye(3) + h) <= 0).any() for h in H):
                 break  # in balance, but turned inside out
             whole = not isinstance(free, CyclicUpper)  # of a sector neighbours count by nodal diameter (`sector`)
-            K = _tangent(model, H, stress) + level * model.following_stiffness(points + u)
+            K = _tangent(model, H, stress, u) + level * model.following_stiffness(points + u)
             K = closing.stiffened(K + soft if model.spin_softening else K, model.d.pattern, True, whole)
             return StaticState(u, H, stress, K, "nonlinear", len(steps), closing.grips, omega)
         pushed = level * (model.dead_load + model.following_force(points + u))
         outer = closing.with_forces(pushed + centrifugal_force(model, omega, u))
         residual = free.restrict((outer - resisting_force(model, stress, H, u)).reshape(-1))
         if model.contacts or not _factors_serve(steps):
-            K = _tangent(model, H, stress) + level * model.following_stiffness(points + u)
+            K = _tangent(model, H, stress, u) + level * model.following_stiffness(points + u)
             solver.factorise(free.matrix(closing.stiffened(K + soft, model.d.pattern)))
             if (negative := solver.negative()) and len(steps) > 3:
                 raise Unstable(negative)  # perhaps only on the way: smaller load steps will tell

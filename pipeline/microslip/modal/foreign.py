@@ -51,7 +51,7 @@ def foreign_basis(
     _refuse_missing_nodes(body, settings)
     rows, odd = _padded(body_rows(body.mesh, settings), body, layout)
     messages += odd
-    solver = eigen.new_solver(settings.modes.solver)
+    solver = eigen.new_solver(settings.modes.solver, settings.modes.ranks)
     try:
         pencil = _pencil(body.stiffness[free][:, free], body.mass[free][:, free], solver)
         R = _free_motions(body, motions, free)

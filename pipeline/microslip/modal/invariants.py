@@ -15,7 +15,7 @@ from ..data import Array, Invariants, ModalGroup, RunUp
 from ..errors import NotConverged
 from ..fem.operators import displacement_gradient, green_strain, spin_projector, stress_stiffness
 from ..frames import skew
-from ..linalg.eigen import DirectSolver
+from ..linalg.direct import DirectSolver
 from . import rigid
 from .equilibrium import BodyModel, StaticState, stress_of
 from .spectrum import make_pencil, rigid_shift

@@ -23,12 +23,13 @@ from ..fem.tied import Tied, tied_upper
 from ..linalg import eigen
 from ..linalg.bordered import Bordered
 from ..progress import Report
+from ..settings.body import Modes
 from . import rigid
 from .equilibrium import BodyModel, StaticState, equilibrium
 
 
 def pressed_state(
-    model: BodyModel, motions: Array, centre: Array, prestress: str, solver_name: str, report: Report
+    model: BodyModel, motions: Array, centre: Array, prestress: str, modes: Modes, report: Report
 ) -> StaticState:
     """The static state of a free body at rest under its bolts and contacts.
 
@@ -46,7 +47,7 @@ def pressed_state(
     plain[model.free.own[model.free.own >= 0]] = 1.0
     fixed = np.union1d(model.free.fixed if isinstance(model.free, Tied) else model.fixed, determinate(plain * left))
     held = replace(model, free=tied_upper(model.d.pattern, fixed, model.d.mesh.ties))
-    solver = eigen.new_solver(solver_name)
+    solver = eigen.new_solver(modes.solver, modes.ranks)
     try:
         return equilibrium(held, 0.0, prestress, solver, None, report)
     finally:

@@ -8,14 +8,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..data import Array, Mesh
+from ..data import Array, Indices, Mesh
 from ..errors import UserError
 from ..fem.contact import Grip, coupled_points
-from ..fem.cyclic import CyclicUpper
-from ..fem.discretise import REDUCED, Discretisation, discretise, whole
+from ..fem.cyclic import CyclicUpper, cyclic_upper, sector_unknowns
+from ..fem.discretise import RULES, Discretisation, FreeUpper, discretise, whole
 from ..fem.operators import per_block, spin_projector
 from ..fem.tied import Tied, tied_upper
-from ..linalg.eigen import DirectSolver, Pencil, new_solver
+from ..linalg.direct import DirectSolver
+from ..linalg.eigen import Pencil, new_solver
 from ..progress import Report
 from ..settings.body import BodySettings
 from . import rigid
@@ -25,7 +26,9 @@ from .boundary import (
     fixed_dofs,
     known_materials,
     materials_of,
+    refuse_other_supports,
     refuse_overlap,
+    still_dofs,
     with_loads,
 )
 from .closures import bolt_forces, contact_pairs
@@ -42,9 +45,11 @@ class Prepared:
     """A body ready to be solved: its model, the rows on it, what floats, and the sector it may be.
 
     Attributes:
-        motions: (3n, r) rigid motions that nothing holds. coefficients: (6, r) of these (`rigid.coefficients_of`).
-        mass: kg. centre: (3,) m. inertia: (3, 3) about it, kg m2. solver: of the static states, and of the modes of a
-            body that is no sector. report: is told what is done.
+        motions: (3n, r) rigid motions that nothing holds. coefficients: (6, r) of these
+            (`rigid.coefficients_of`). mass: kg. centre: (3,) m. inertia: (3, 3) about it, kg m2.
+        solver: of the static states, and of the modes of a body that is no sector. report: is told
+            what is done. still: the model as the static step of its file holds it, where its modes
+            are held otherwise.
     """
 
     model: BodyModel
@@ -58,6 +63,7 @@ class Prepared:
     sector: Sector | None
     solver: DirectSolver
     report: Report
+    still: BodyModel | None = None
 
     @property
     def harmonics(self) -> tuple[int, ...]:
@@ -88,7 +94,7 @@ class Prepared:
         if self.sector is None:
             return self.coefficients
         cut = self.sector.unknowns.cut
-        return rigid.of_nodal_diameter(self.coefficients, cut.rotation, cut.sectors, k)
+        return rigid.of_nodal_diameter(self.coefficients, cut.ahead, cut.sectors, k)
 
     def with_spares(self) -> Prepared:
         """The same, asking for a few modes more: one that comes down into the band at another speed is then known."""
@@ -126,11 +132,13 @@ def _prepared(
         cut_faces(mesh, settings, axis, point)
     pairs = contact_pairs(mesh, settings, known_materials(mesh, settings))
     rule = settings.mesh.integration
-    degree = REDUCED if rule != "full" else None
-    if degree and not set(mesh.cells) & set(REDUCED):
-        raise UserError(f'mesh.integration: "{rule}" is of bricks of 20 nodes; write "full" or mesh with bricks')
+    degree = RULES[rule]
+    if degree and not set(mesh.cells) & set(degree):
+        raise UserError(
+            f'mesh.integration: "{rule}" is of {", ".join(degree)}, which the mesh has not; write "full"'
+        )
     d = discretise(mesh, degree, coupled=[coupled_points(p) for p in pairs])
-    d = replace(d, one_rule=rule == "reduced-mass")
+    d = replace(d, one_rule=rule in ("reduced-mass", "calculix"))
     held = fixed_dofs(mesh, settings)
     fixed = held[held < 3 * mesh.n_points]
     if len(fixed) == 3 * mesh.n_points:
@@ -151,8 +159,13 @@ def _prepared(
     )  # fmt: skip
     model = with_lumps(model)
     rows = with_centrifugal(rows, model)
-    model = with_loads(model, mesh, settings, held)
+    rest = still_dofs(mesh, settings)
+    if rest is not None:
+        model = replace(model, free=_unknowns(d, rest, sector))
+        refuse_other_supports(settings)
+    model = with_loads(model, mesh, settings, held if rest is None else rest)
     model = replace(model, contacts=pairs, dead_load=model.dead_load + bolt_forces(mesh, settings))
+    still, model = None if rest is None else model, replace(model, free=free)
     motions = rigid.unresisted(_floating(model, sector, centre), model.springs, d.pattern)
     check_held(mesh, settings, centre, motions)
     refuse_unlinked_parts(model, settings)
@@ -164,10 +177,20 @@ def _prepared(
         refuse_unbalanced(
             replace(model, point=np.array(settings.rotation.point)), motions, centre, inertia
         )
-    solver = new_solver(settings.modes.solver)
+    solver = new_solver(settings.modes.solver, settings.modes.ranks)
     return Prepared(
-        model, settings, rows, motions, coefficients, mass, centre, inertia, sector, solver, report
+        model, settings, rows, motions, coefficients, mass, centre, inertia, sector, solver, report, still
     )  # fmt: skip
+
+
+def _unknowns(
+    d: Discretisation, held: Indices, sector: Sector | None
+) -> FreeUpper | Tied | CyclicUpper:
+    """Of a static state whose supports are not those of the modes."""
+    if sector is None:
+        return tied_upper(d.pattern, held, d.mesh.ties)
+    unknowns = sector_unknowns(d.pattern, held, sector.unknowns.cut, d.mesh.ties)
+    return cyclic_upper(unknowns, d.pattern.size)
 
 
 def _floating(model: BodyModel, sector: Sector | None, centre: Array) -> Array:

@@ -239,15 +239,20 @@ class Locator:
     _first: list[int] = field(default_factory=list)  # number of the first cell of each type
     _low: Array = field(default_factory=lambda: np.zeros((0, 3)))
     _high: Array = field(default_factory=lambda: np.zeros((0, 3)))
+    _middle: dict[str, tuple[Array, tuple[Array, Array]]] = field(default_factory=dict)
+    """Where Newton's iteration begins in each type of cell, and the shape functions there."""
 
     def __post_init__(self) -> None:
         low: list[Array] = []
         high: list[Array] = []
         for cell_type, cells in self.mesh.cells.items():
+            kind = CELL_TYPES[cell_type]
+            middle = kind.reference[: kind.corners].mean(axis=0)
+            self._middle[cell_type] = middle, self.shapes(cell_type, middle[None])
             self._first.append(sum(len(boxes) for boxes in low))
             first, last = self.mesh.points[cells].min(axis=1), self.mesh.points[cells].max(axis=1)
             # the sides of a quadratic cell may bulge beyond its nodes, by an eighth of their second difference
-            bulge = 0.1 * (last - first).max(axis=1, keepdims=True) * (CELL_TYPES[cell_type].order > 1)
+            bulge = 0.1 * (last - first).max(axis=1, keepdims=True) * (kind.order > 1)
             low.append(first - bulge)
             high.append(last + bulge)
         self._low, self._high = np.concatenate(low), np.concatenate(high)
@@ -294,15 +299,13 @@ class Locator:
     def _in_cell(self, cell_type: str, nodes: Indices, point: Array) -> Location:
         kind = CELL_TYPES[cell_type]
         x = self.mesh.points[nodes]
-        xi = kind.reference[: kind.corners].mean(axis=0)
+        xi, (N, dN) = self._middle[cell_type]
         for _ in range(25):
-            N, dN = self.shapes(cell_type, xi[None])
-            J = (dN[0] @ x).T
-            before = xi
+            J, before = (dN[0] @ x).T, xi
             xi = _into_cell(J, xi + np.linalg.lstsq(J, point - N[0] @ x, rcond=None)[0], kind)
+            N, dN = self.shapes(cell_type, xi[None])
             if np.abs(xi - before).max() < 1e-13:
                 break
-        N, dN = self.shapes(cell_type, xi[None])
         place = N[0] @ x
         distance = float(np.linalg.norm(point - place))
         if distance < 1e-9 * np.ptp(x, axis=0).max():

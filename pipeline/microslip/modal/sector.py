@@ -82,7 +82,9 @@ def cut_faces(mesh: Mesh, settings: BodySettings, axis: Array, point: Array) -> 
     assert cyclic is not None
     for key, face in (("left", cyclic.left), ("right", cyclic.right)):
         require_face(mesh, face, f"cyclic.{key}")
-    return pair_cut_faces(mesh, cyclic.left, cyclic.right, axis, point, cyclic.sectors)
+    return pair_cut_faces(
+        mesh, cyclic.left, cyclic.right, axis, point, cyclic.sectors, cyclic.follows
+    )
 
 
 def make_sector(d: Discretisation, settings: BodySettings, fixed: Indices, axis: Array, point: Array) -> Sector:
@@ -96,8 +98,8 @@ def make_sector(d: Discretisation, settings: BodySettings, fixed: Indices, axis:
     refuse_other_facets(d.mesh, settings.cyclic.left, settings.cyclic.right, cut)
     refuse_uncyclic(d.mesh, settings)
     unknowns = sector_unknowns(d.pattern, fixed, cut, d.mesh.ties)
-    boundary = np.concatenate([unknowns.left, unknowns.right, _in_contact(d.mesh, settings, unknowns)])
-    condensed = new_condensed(boundary, settings.modes.solver)
+    boundary = np.concatenate([unknowns.boundary, _in_contact(d.mesh, settings, unknowns)])
+    condensed = new_condensed(boundary, settings.modes.solver, settings.modes.ranks)
     return Sector(settings.cyclic.harmonics, unknowns, cyclic_upper(unknowns, d.pattern.size), condensed)
 
 
@@ -110,7 +112,7 @@ def _in_contact(mesh: Mesh, settings: BodySettings, unknowns: SectorUnknowns) ->
     dofs = (3 * points[:, None] + np.arange(3)).ravel()
     moves = sp.csr_matrix((np.ones(len(dofs)), (np.zeros(len(dofs), dtype=int), dofs)), shape=(1, 3 * mesh.n_points))
     found = np.unique(unknowns.apart.rows(moves).indices)
-    return np.setdiff1d(found, np.concatenate([unknowns.left, unknowns.right]))
+    return np.setdiff1d(found, unknowns.boundary)
 
 
 def contact_between(grips: Sequence[Grip], unknowns: SectorUnknowns, harmonic: int) -> sp.csr_matrix | None:

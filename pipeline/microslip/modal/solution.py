@@ -277,14 +277,14 @@ def _divergence(b: Prepared, speed: float, count: int, where: str) -> UserError:
             "check length_unit or join the parts",
             "mesh",
         )
-    remedy = "lower the speed"
+    remedy = "lower the speed (a rotor above a critical speed, which Coriolis forces alone keep, has no such modes)"
     if b.settings.rotation.prestress == "none" and speed:
         remedy += ', or use rotation.prestress = "nonlinear": without the stiffening by stress frequencies fall to zero'
     elif not speed:
         remedy = "it buckles under what loads it at rest: reduce that, or check the material"
     return UserError(
         f"at {rpm_text(speed)}{where and ', ' + where + ','} {count} "
-        f"eigenvalue{'s are' if count > 1 else ' is'} negative: the body diverges; {remedy}",
+        f"eigenvalue{'s are' if count > 1 else ' is'} negative: without Coriolis forces the body diverges; {remedy}",
         what_loads(b.model, speed),
     )
 

@@ -76,7 +76,10 @@ def smoother(block: Block, n_points: int) -> tuple[sp.csr_matrix, Array]:
     volume.
     """
     kind = CELL_TYPES[block.cell_type]
-    at, nodes = _polynomials(block.at, kind.corners), _polynomials(kind.reference, kind.corners)
+    middle = block.at.mean(
+        axis=0
+    )  # from there few points leave a field constant in the directions they do not tell
+    at, nodes = (_polynomials(x - middle, kind.corners) for x in (block.at, kind.reference))
     extrapolate = nodes @ np.linalg.pinv(at)  # (k, q)
     e, q = block.dx.shape
     k = len(nodes)
@@ -92,8 +95,7 @@ def smoother(block: Block, n_points: int) -> tuple[sp.csr_matrix, Array]:
 def _polynomials(x: Array, corners: int) -> Array:
     ones = np.ones(len(x))
     if corners in (4, 5):
-        columns = [ones, x[:, 0], x[:, 1], x[:, 2]]
-        return np.column_stack(columns if len(x) > 1 else columns[:1])
+        return np.column_stack([ones, x[:, 0], x[:, 1], x[:, 2]])
     a, b, c = x.T
     if corners == 6:
         return np.column_stack([ones, a, b, c, a * c, b * c])
@@ -105,13 +107,14 @@ def nodal_set(
 ) -> StressSet:
     """The set at Gauss points smoothed to the nodes (location ``nodal-averaged``), made `batch` modes at a time.
 
-    On the cut faces of a cyclic sector the neighbour's cells count too, turned and in the phase of the nodal diameter
-    `harmonic`.
+    On the cut faces of a cyclic sector that match the neighbour's cells count too, turned and in
+    the phase of the nodal diameter `harmonic`.
     """
     n, m = model.d.mesh.n_points, phi.shape[2]
     smoothers = [smoother(b, n) for b in model.d.blocks]
     volumes = np.sum([w for _, w in smoothers], axis=0)
     cut = model.free.unknowns.cut if isinstance(model.free, CyclicUpper) else None
+    cut = cut if cut is None or cut.share is None else None
     weights = np.where(volumes > 0, volumes, 1.0)  # of points without cells
     if cut is not None:
         weights[cut.left] = weights[cut.right] = volumes[cut.left] + volumes[cut.right]

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import re
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -24,7 +27,40 @@ Columns = dict[str, np.ndarray]
 
 def draw(study: Study, folder: Path) -> list[Path]:
     """A PNG for every table that has a picture."""
-    return [save(partial(_DRAWN[name], study), folder / f"{name}.png") for name in study.tables if name in _DRAWN]
+    return [save(partial(draw_table, name, study), folder / f"{name}.png") for name in study.tables if name in _DRAWN]
+
+
+DIMENSIONLESS: ContextVar[bool] = ContextVar("numbers without dimension", default=False)
+"""While a dimensionless contact is drawn."""
+
+
+@contextmanager
+def dimensions(study: Study, figure: Figure) -> Iterator[None]:
+    """What is drawn into the figure has units, or a star instead where the file has no dimension."""
+    bare = study.contact.file.dimensionless
+    before = DIMENSIONLESS.set(bare)
+    try:
+        yield
+    finally:
+        DIMENSIONLESS.reset(before)
+    for axes in figure.axes if bare else ():
+        axes.set(xlabel=_starred(axes.get_xlabel()), ylabel=_starred(axes.get_ylabel()))
+
+
+def draw_table(name: str, study: Study, figure: Figure) -> None:
+    """The picture of a table."""
+    with dimensions(study, figure):
+        _DRAWN[name](study, figure)
+
+
+def _starred(label: str) -> str:
+    """A label as the book has it: a star instead of the unit."""
+    what, *unit = re.split(r",? in (?=\S*$)", label)
+    return f"{what[:-1]}^{{*}}$" if unit and what.endswith("$") else f"{what}*" if unit and unit != ["%"] else label
+
+
+def _in_unit(of: Quantity, *values: Array) -> tuple[list[Array], str]:
+    return (list(values), "") if DIMENSIONLESS.get() else in_unit(of, *values)
 
 
 def _title(figure: Figure, study: Study, what: str) -> None:
@@ -33,10 +69,12 @@ def _title(figure: Figure, study: Study, what: str) -> None:
 
 def _sized(table: Columns, *names: str) -> tuple[list[Array], str]:
     """Columns of a table in the unit that suits them all; theirs is what their names end with."""
-    return in_unit(Quantity(names[0].rsplit("_", 1)[1]), *(table[name] for name in names))
+    return _in_unit(Quantity(names[0].rsplit("_", 1)[1]), *(table[name] for name in names))
 
 
 def _number(value: float, unit: str) -> str:
+    if not unit:
+        return f"{value:.3g}"
     return f"{value:.3g} {unit}" if abs(value) < 1000 else f"{value:.0f} {unit}"
 
 
@@ -99,7 +137,7 @@ def loops_figure(study: Study, figure: Figure) -> None:
             left.plot(u[chosen], force[chosen], line, color=colour, linewidth=1.5, label=label)
     left.set(xlabel=f"displacement $u_{{t1}}$ in {unit}", ylabel=f"tangential force $F_{{t1}}$ in {newton}")
     left.legend(title="amplitude\n(dotted: first loading)", title_fontsize=8, **BESIDE)
-    (energy,), joule = in_unit(Quantity("J"), t["dissipated_J"][first])
+    (energy,), joule = _in_unit(Quantity("J"), t["dissipated_J"][first])
     right.plot(sizes, energy, "-o", linewidth=1.5, markersize=4.5)
     right.set(xlabel=f"amplitude in {unit}", ylabel=f"energy dissipated in a cycle in {joule}")
     right.set_xlim(left=0)
@@ -114,17 +152,19 @@ _NAMES, _TINTS = ("n", "t1", "t2"), (COLOURS[2], COLOURS[0], COLOURS[1])
 
 
 def motion_figure(study: Study, figure: Figure) -> None:
-    """As the book's Fig. 3.7-7: orbits of M and P, displacements, forces, and the force over each displacement."""
+    """As the book's Fig. 3.7-7: orbits of M and P, displacements, forces, and the force over each displacement; of a
+    contact that is driven on, as Figs. 3.7-3 and 3.7-4: phases of P, its velocity and the friction on it over time."""
     t, motion = study.tables["motion"], study.contact.file.motion
     assert motion is not None
     last = slice(None) if motion.drift else slice(len(t["time_s"]) - motion.samples - 1, None)
     t = {name: column[last] for name, column in t.items()}
-    (time,), second = in_unit(Quantity("s"), t["time_s"] - t["time_s"][0])
+    (time,), second = _in_unit(Quantity("s"), t["time_s"] - t["time_s"][0])
     u, unit = _sized(t, *(f"u_{i}_m" for i in _NAMES), "P_t1_m", "P_t2_m")
     forces, newton = _sized(t, *(f"F_{i}_N" for i in _NAMES))
     moving = [i for i in range(3) if np.ptp(u[i]) > 0]
     orbit = bool(motion.drift) or {1, 2} <= set(moving)
-    count = 2 + orbit + len(moving)
+    of_point = [name for name in ("v_P_t1_m/s", "friction_t1_N") if motion.drift and name in t]
+    count = 2 + orbit + len(of_point or moving)
     places = in_rows(figure, count, 2 if count == 4 else 3, 3.67, 3.3)
     if motion.drift:
         _phase_panel(places.pop(0), t, u, unit)
@@ -141,7 +181,12 @@ def motion_figure(study: Study, figure: Figure) -> None:
     _shade(pressed, time, t["state"], "stick, partly slip" if partly else "stick")
     for axes in (above, pressed):
         _legend_above(axes)
-    for axes, i in zip(loops, moving, strict=True):
+    for axes, name in zip(loops, of_point, strict=False):
+        (values,), size = _sized(t, name)
+        axes.plot(time, values, color=COLOURS[3], linewidth=1.4)
+        word = "velocity of P" if name.startswith("v") else "friction force on P"
+        axes.set(xlabel=f"time in {second}", ylabel=f"{word}, t1, in {size}")
+    for axes, i in () if of_point else zip(loops, moving, strict=True):
         axes.plot(u[i], forces[i], color=_TINTS[i], linewidth=1.6)
         axes.set(xlabel=f"$u_{{{_NAMES[i]}}}$ in {unit}", ylabel=f"$F_{{{_NAMES[i]}}}$ in {newton}")
     _title(figure, study, "motion from the start" if motion.drift else "last cycle of the motion")
@@ -169,7 +214,7 @@ def _orbit_panel(axes: Axes, u: list[Array], unit: str, state: Array) -> None:
 def _phase_panel(axes: Axes, t: Columns, u: list[Array], unit: str) -> None:
     """Velocity of P over the stretch of its spring, as the book's Fig. 3.7-3."""
     axes.plot(u[1] - u[3], t["v_P_t1_m/s"], color=COLOURS[3], linewidth=1.4)
-    axes.set(xlabel=f"M less P, t1, in {unit}", ylabel="velocity of P in m/s")
+    axes.set(xlabel=f"M less P, t1, in {unit}", ylabel=f"velocity of P in {'' if DIMENSIONLESS.get() else 'm/s'}")
 
 
 def _shade(axes: Any, time: Array, state: Array, stick: str) -> None:
@@ -218,7 +263,7 @@ def friction_figure(study: Study, figure: Figure) -> None:
             warm.set_ylim(bottom=0)
     if speed[0] > 0 and speed[-1] / speed[0] > 50:
         axes.set_xscale("log")
-    axes.set(xlabel="speed of sliding in m/s", ylabel="friction coefficient")
+    axes.set(xlabel=f"speed of sliding in {'' if DIMENSIONLESS.get() else 'm/s'}", ylabel="friction coefficient")
     axes.set_ylim(0, 1.05 * float(np.max(t.get("mean_plus_deviation", t["coefficient"]))) or 1.0)
     _legend_above(axes)
     _title(figure, study, "friction characteristic")
@@ -307,9 +352,9 @@ def yield_figure(study: Study, figure: Figure) -> None:
     """Mean pressure and shear of the area in contact, and the largest shear stress against the yield limit."""
     t = study.tables["yield"]
     (axes,) = panels(figure, (6.8, 4.0))
-    (time,), second = in_unit(Quantity("s"), t["time_s"] - t["time_s"][0])
+    (time,), second = _in_unit(Quantity("s"), t["time_s"] - t["time_s"][0])
     shear = np.hypot(t["shear_t1_Pa"], t["shear_t2_Pa"])
-    both, pascal = in_unit(Quantity("Pa"), t["pressure_Pa"], shear)
+    both, pascal = _in_unit(Quantity("Pa"), t["pressure_Pa"], shear)
     axes.plot(time, both[0], color=COLOURS[2], linewidth=1.5, label="pressure")
     axes.plot(time, both[1], color=COLOURS[0], linewidth=1.5, label="shear")
     axes.plot([], [], "--", color=COLOURS[1], label="share of the yield limit (right)")

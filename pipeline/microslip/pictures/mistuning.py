@@ -83,7 +83,7 @@ def sensitivity_picture(near: Approximation, figure: Figure, title: str) -> None
     figure.colorbar(image, label="% of amplitude by % of frequency")
 
 
-SHOWN = {"added_mass": (1e3, "g"), "gap": (1e6, "um"), "modal_file": (1.0, "number")}
+SHOWN = {"added_mass": (1e3, "g"), "gap": (1e6, "µm"), "modal_file": (1.0, "number")}
 """What is no share of something nominal, in which unit it is drawn."""
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from ..case.assemble import Built
-from ..case.loaded import Loaded
+from ..case.loaded import Loaded, Place
 from ..data import Array, ComplexArray, ModalBasis, ModalGroup
 from ..exchange.vtu import write_motion
 from ..operating.cycle import longest
@@ -18,7 +18,8 @@ from ..time_domain import classification
 from ..time_domain.orbit import Orbit
 from ..units import METRES
 from . import can_draw, lettering, ring_views, views
-from .scene import Stage, fit, quiet_vtk
+from .scene import Stage, axes_towards, fit, quiet_vtk, surface
+from .turning import turning_assembly
 
 FRAMES = 32
 """Of a period that is animated."""
@@ -73,6 +74,43 @@ def moving_shape(
             path = folder / "pictures" / f"root_{number}_{name}.gif"
             made.append(moving_gif(bases[name], moved, path, title))
     return made
+
+
+def assembled_picture(
+    shapes: Mapping[str, Mapping[str, ComplexArray]], bases: Mapping[str, ModalBasis], places: Mapping[str, Place],
+    title: str, path: Path,
+) -> Path:  # fmt: skip
+    """All bodies where a case puts them, in the first of some motions, farthest out; on a page they turn and move.
+
+    Args:
+        shapes: name of a motion -> body -> (n, 3) complex motion of its points. places: of the bodies.
+    """
+    quiet_vtk()
+    names = list(next(iter(shapes.values())))
+    at = {n: bases[n].mesh.points @ places[n].turn.T + places[n].shift for n in names}
+    moved = {n: np.array([shape[n] @ places[n].turn.T for shape in shapes.values()]) for n in names}
+    every, first = np.concatenate(list(at.values())), [moved[n][0] for n in names]
+    sizes = [longest(u) for u in first]
+    most = int(np.argmax([size.max() for size in sizes]))
+    top = float(sizes[most].max())
+    phase = 0.5 * np.angle(np.sum(first[most][int(sizes[most].argmax())] ** 2))  # at which that point is farthest out
+    factor = views.AMPLITUDE * float(np.ptp(every, axis=0).max()) / top
+    stage, shown = Stage(), []
+    try:
+        for n, u, size in zip(names, first, sizes, strict=True):
+            skin = surface(bases[n].mesh)
+            shown.append(at[n] + factor * np.real(u * np.exp(-1j * phase)))
+            look = {"cmap": views.DISPLACEMENT_MAP, "clim": (0.0, 1.0)}
+            stage.skin(shown[-1][skin.source], skin.triangles, size[skin.source] / top, **look)
+            stage.lines(at[n], skin.outline, (150, 154, 164), 1.0)
+        axes = axes_towards(np.array([0.5, -0.8, 0.55]))
+        picture = stage.shoot(fit(np.concatenate(shown), axes, 0.7 * views.AREA))
+    finally:
+        stage.close()
+    note = "colour: largest displacement in the cycle over that of all; grey lines: at rest"
+    told = f"{title}: {next(iter(shapes))}"
+    body = turning_assembly([(bases[n].mesh, at[n], moved[n]) for n in names], list(shapes), title)
+    return lettering.save_png(lettering.captioned(picture, told, note, 16), path, body)
 
 
 def _moved(body: Loaded, q: Array) -> Array:

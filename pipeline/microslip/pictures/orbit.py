@@ -79,13 +79,29 @@ def portraits(orbits: Sequence[tuple[str, Orbit]], figure: Figure, title: str) -
     figure.suptitle(title, fontweight="bold")
 
 
+def section_picture(orbits: Sequence[tuple[float, Orbit]], over: str, figure: Figure, title: str) -> None:
+    """The read-out after every period, and the largest one between, over a parameter whose values stand before the
+    motions. over: label of the parameter, with its unit."""
+    axes, below = panels(figure, (8.0, 6.4), 2, 1, sharex=True)
+    if orbits:
+        first = orbits[0][1]
+        sections = [one.section[0] for _, one in orbits]
+        at = np.repeat([value for value, _ in orbits], [len(y) for y in sections])
+        tops = np.array([np.abs(one.y[0]).max() for _, one in orbits])
+        (y, top), unit = in_unit(first.of(), np.concatenate(sections), tops)
+        axes.plot(at, y, ".", color=COLOURS[0], markersize=2.5)
+        axes.set(ylabel=f"{first.labels[0]} after every period in {unit}")
+        below.plot([value for value, _ in orbits], top, ".-", color=COLOURS[1], markersize=4, linewidth=1.0)
+        below.set(xlabel=over, ylabel=f"largest in the motion in {unit}")
+    figure.suptitle(title, fontweight="bold")
+
+
 def _section(orbit: Orbit, axes: Axes) -> None:
     """Velocity over displacement after every period: the Poincare section."""
-    last = slice(orbit.samples - 1, None, orbit.samples)
-    ((y,), unit), ((v,), per_second) = (in_unit(orbit.of(), x[0]) for x in (orbit.y, orbit.v))
-    axes.plot(y[last], v[last], ".", color=COLOURS[1], markersize=5)
+    ((y,), unit), ((v,), per_second) = (in_unit(orbit.of(), x) for x in orbit.section)
+    axes.plot(y, v, ".", color=COLOURS[1], markersize=5)
     axes.set(xlabel=f"{orbit.labels[0]} in {unit}", ylabel=f"velocity in {per_second}/s")
-    axes.set_title(f"Poincaré section, {len(y[last])} periods", fontsize=9)
+    axes.set_title(f"Poincaré section, {len(y)} periods", fontsize=9)
 
 
 def _over_frequency(orbit: Orbit, axes: Axes) -> None:

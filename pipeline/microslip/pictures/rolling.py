@@ -91,7 +91,7 @@ def wearing_picture(worn: ProfileWear, figure: Figure, title: str) -> None:
         left.plot(1e3 * body.y, 1e6 * body.depth, label=name)
     touched = [1e3 * body.y[body.depth > 0] for body in bodies.values()]
     ends = min(y.min() for y in touched) - 3, max(y.max() for y in touched) + 3
-    left.set(xlim=ends, xlabel="y of the profile in mm", ylabel="worn off in um")
+    left.set(xlim=ends, xlabel="y of the profile in mm", ylabel="worn off in µm")
     left.invert_yaxis()
     left.legend(fontsize=9)
     over = worn.columns()

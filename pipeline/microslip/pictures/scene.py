@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -74,27 +75,14 @@ def surface(mesh: Mesh, coarse: bool = False) -> Surface:
     import pyvista as pv
 
     facets = boundary_facets(mesh)
-    flat, owner, sides = [], [], []
-    keys: dict[tuple[int, ...], int] = {}
-    count = 0
-    for kind, nodes in facets.items():
-        pattern = np.array(_COARSE[_corners(kind)] if coarse else _TRIANGLES[kind])
-        flat.append(nodes[:, pattern].reshape(-1, 3))
-        owner.append(np.repeat(np.arange(count, count + len(nodes)), len(pattern)))
-        sides.append(element_sides(kind, nodes))
-        for number, row in enumerate(np.sort(nodes[:, : _corners(kind)], axis=1).tolist()):
-            keys[tuple(row)] = count + number
-        count += len(nodes)
-    triangles, facet = np.concatenate(flat), np.concatenate(owner)
+    triangles, facet = flat_triangles(facets, coarse)
+    sides = [element_sides(kind, nodes) for kind, nodes in facets.items()]
+    corners = (row for kind, f in facets.items() for row in np.sort(f[:, : _corners(kind)], axis=1).tolist())
+    keys = {tuple(row): number for number, row in enumerate(corners)}
+    outline = sharp_edges(mesh.points, triangles)
     used, local = np.unique(triangles, return_inverse=True)
     raw: Any = pv.PolyData.from_regular_faces(mesh.points[used], local.reshape(-1, 3).astype(int))
     raw.point_data["source"] = used
-    edges = raw.extract_feature_edges(
-        SHARP, boundary_edges=True, non_manifold_edges=False, feature_edges=True, manifold_edges=False
-    )
-    outline = (
-        np.asarray(edges.point_data["source"])[edges.lines.reshape(-1, 3)[:, 1:]] if edges.n_cells else np.zeros((0, 2))
-    )
     split = raw.compute_normals(
         cell_normals=False,
         split_vertices=True,
@@ -104,8 +92,30 @@ def surface(mesh: Mesh, coarse: bool = False) -> Surface:
     )
     return Surface(
         np.asarray(split.point_data["source"], dtype=np.int64), split.regular_faces.astype(np.int64), facet, keys,
-        np.unique(np.concatenate(sides), axis=0), outline.astype(np.int64),
+        np.unique(np.concatenate(sides), axis=0), outline,
     )  # fmt: skip
+
+
+def flat_triangles(facets: Mapping[str, Indices], coarse: bool) -> tuple[Indices, Indices]:
+    """(t, 3) mesh points of the flat triangles that facets are parted into, coarse: by their corners alone, and (t,)
+    the numbers of their facets."""
+    flat, owner, count = [], [], 0
+    for kind, nodes in facets.items():
+        pattern = np.array(_COARSE[_corners(kind)] if coarse else _TRIANGLES[kind])
+        flat.append(nodes[:, pattern].reshape(-1, 3))
+        owner.append(np.repeat(np.arange(count, count + len(nodes)), len(pattern)))
+        count += len(nodes)
+    return np.concatenate(flat), np.concatenate(owner)
+
+
+def sharp_edges(points: Array, triangles: Indices) -> Indices:
+    """(s, 2) points of the edges at which triangles meet at a sharp angle, or none meets another."""
+    ends = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+    pairs, which = np.unique(ends, axis=0, return_inverse=True)
+    total, normal = np.zeros((len(pairs), 3)), triangle_normals(points, triangles)
+    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
+    np.add.at(total, which.ravel(), np.repeat(normal, 3, axis=0))
+    return pairs[np.linalg.norm(total, axis=1) < 2 * np.cos(np.radians(SHARP / 2))].astype(np.int64)
 
 
 def element_sides(kind: str, nodes: Indices) -> Indices:

@@ -33,7 +33,10 @@ def body_sketch(mesh: Mesh, marked: Mapping[str, tuple[int, int, int]], path: Pa
     facets = boundary_facets(mesh)
     used = np.unique(np.concatenate([f.ravel() for f in facets.values()]))
     spread = np.cov((mesh.points[used] - mesh.points[used].mean(axis=0)).T) + 1e-30 * np.eye(3)
-    axes = view_axes(np.trace(spread) * np.eye(3) - spread)
+    inertia = np.trace(spread) * np.eye(3) - spread
+    axes, thin = view_axes(inertia), np.linalg.eigh(inertia)[1][:, 2]
+    behind = axes @ (2 * np.outer(thin, thin) - np.eye(3))  # half a turn about the shortest axis
+    axes = max(axes, behind, key=lambda a: _shown(mesh, marked, a[2]))
     camera = fit(mesh.points[used], axes, AREA)
     colours = _colours(mesh, marked)
     size = (FINER * camera.size[0], FINER * camera.size[1])
@@ -57,6 +60,17 @@ def body_sketch(mesh: Mesh, marked: Mapping[str, tuple[int, int, int]], path: Pa
         fill = tuple(round(min(1.18 * shade, 1.0) * c) for c in colour)
         draw.polygon([tuple(p) for p in pixels[ring].tolist()], fill=fill, outline=outline)
     return save_png(image.resize(camera.size, Image.Resampling.LANCZOS), path)
+
+
+def _shown(mesh: Mesh, marked: Mapping[str, object], towards: Array) -> int:
+    """How many of the named faces turn towards the viewer."""
+    count = 0
+    for name in marked:
+        for kind, nodes in mesh.faces.get(name, {}).items():
+            corners = mesh.points[nodes[:, : 3 if kind.startswith("triangle") else 4]]
+            normal = np.cross(corners[:, 2] - corners[:, 0], corners[:, -1] - corners[:, 1]).sum(axis=0)
+            count += bool(normal @ towards > 0.1 * np.linalg.norm(normal))
+    return count
 
 
 _LIGHT: Array = np.array([-0.36, 0.48, 0.8])

@@ -53,7 +53,7 @@ def curves_of(figure: Figure) -> dict[str, Any] | None:
     traces: list[Trace] = []
     layout: dict[str, Any] = {
         "margin": {"l": 20, "r": 20, "t": 20, "b": 20}, "hovermode": "closest", "plot_bgcolor": "white",
-        "font": {"size": 12}, "annotations": [], "showlegend": False,
+        "font": {"size": 12}, "annotations": [], "shapes": [], "showlegend": False,
         "legend": {"orientation": "h", "x": 0, "y": -0.13, "yanchor": "top", "yref": "paper"},
     }  # fmt: skip
     bounds = np.array([axes.get_position().extents for axes in panels])
@@ -73,14 +73,32 @@ def curves_of(figure: Figure) -> dict[str, Any] | None:
 
 
 def _other(axes: Axes) -> bool:
-    """Whether it holds what is neither a line, nor points, nor a map over a grid, nor words."""
+    """Whether it holds what is neither a line, nor points, nor a map over a grid, nor a shaded strip, nor words."""
     from matplotlib.collections import LineCollection, PathCollection, QuadMesh
 
     drawn = (PathCollection, QuadMesh, LineCollection)
-    return bool(axes.name != "rectilinear" or axes.images or axes.patches or axes.tables) or any(
-        not isinstance(one, drawn) or (isinstance(one, QuadMesh) and _edges(one) is None)
+    return bool(
+        axes.name != "rectilinear" or axes.images or axes.tables or not all(_span(axes, p) for p in axes.patches)
+    ) or any(
+        not isinstance(one, drawn) and not _between(one) or (isinstance(one, QuadMesh) and _edges(one) is None)
         for one in axes.collections
     )
+
+
+def _span(axes: Axes, patch: Any) -> bool:
+    """Whether it shades all that is between two abscissae."""
+    from matplotlib.patches import Rectangle
+
+    whole = isinstance(patch, Rectangle) and (patch.get_y(), patch.get_height()) == (0.0, 1.0)
+    return bool(whole and patch.get_data_transform() == axes.get_xaxis_transform())
+
+
+def _between(some: Any) -> bool:
+    """Whether it fills what is between two curves."""
+    from matplotlib.collections import PolyCollection
+
+    kind = type(some).__name__ in ("PolyCollection", "FillBetweenPolyCollection")
+    return isinstance(some, PolyCollection) and kind and some.get_array() is None and len(some.get_paths()) == 1
 
 
 def _together(axes: Axes, other: Axes) -> bool:
@@ -109,7 +127,11 @@ def _panel(
     for line in axes.lines:
         traces += [{**trace, **here} for trace in _line(axes, line, named.get(line, ""), pointed)]
     for some in axes.collections:
-        traces += [{**trace, **here} for trace in _collection(some, frame)]
+        drawn = _filled(some, named.get(some, "")) if _between(some) else _collection(some, frame)
+        traces += [{**trace, **here} for trace in drawn]
+    for patch in axes.patches:
+        where = {"xref": here["xaxis"], "yref": f"y{number} domain"}
+        layout["shapes"].append(_strip(patch, named.get(patch, "")) | where)
     if not over:
         layout[f"xaxis{number}"] = _axis(axes.get_xlabel(), axes.get_xscale(), axes.get_xlim()) | {
             "domain": place[::2], "anchor": f"y{number}",
@@ -187,6 +209,29 @@ def _line(axes: Axes, line: Line2D, label: str, pointed: bool) -> list[Trace]:
         edge = {"color": colour, "width": 1}
         trace["marker"] = {"symbol": marker, "color": inside, "size": line.get_markersize() * 1.2, "line": edge}
     return [trace | ({"hoverinfo": "skip"} if pointed and dashes else {})]
+
+
+def _filled(some: Any, label: str) -> list[Trace]:
+    """What is between two curves."""
+    from matplotlib.colors import to_hex
+
+    x, y = np.asarray(some.get_paths()[0].vertices).T
+    shade = {"fill": "toself", "fillcolor": to_hex(some.get_facecolor()[0]), "opacity": some.get_alpha() or 1.0}
+    return [{
+        "type": "scatter", "mode": "lines", "x": _numbers(x), "y": _numbers(y), "line": {"width": 0}, **shade,
+        "hoverinfo": "skip", "showlegend": bool(label), "name": _text(label),
+    }]  # fmt: skip
+
+
+def _strip(patch: Any, label: str) -> dict[str, Any]:
+    """What shades a stretch of the abscissa; hatched ones are light."""
+    from matplotlib.colors import to_hex
+
+    colour = "#f3f4f7" if patch.get_hatch() else to_hex(patch.get_facecolor())
+    legend: dict[str, Any] = {"showlegend": True, "name": _text(label)} if label else {}
+    ends = {"x0": float(patch.get_x()), "x1": float(patch.get_x() + patch.get_width()), "y0": 0, "y1": 1}
+    look = {"fillcolor": colour, "opacity": patch.get_alpha() or 1.0, "layer": "below"}
+    return {"type": "rect", "line": {"width": 0}, **ends, **look, **legend}
 
 
 def _bar(some: Any, frame: tuple[Array, Array]) -> Trace:

@@ -15,15 +15,13 @@ from ..data import Array, ComplexArray, Indices, Mesh, ModalBasis, ModalGroup
 from ..mesh import boundary_facets
 from ..modal.stress import von_mises
 from ..units import rpm_text
+from .scene import flat_triangles, sharp_edges
 
 MOST_SHAPES, MOST_VERTICES = 16, 9_000
 """Shapes of a body, and vertices above which its outside is made coarser, so that a page stays quick."""
 
 DRAWN = 0.08
 """Largest displacement as it is first shown, over the largest extent of the body."""
-
-SHARP = 35.0
-"""Degrees between facets from which on an edge is drawn."""
 
 _FINEST = 32767
 """Coordinates are whole numbers up to this one: to 3e-5 of the largest."""
@@ -59,33 +57,16 @@ class Outside:
 
 def outside(mesh: Mesh, without: Collection[str] = ()) -> Outside:
     """The outside of a mesh, without the facets of some named faces."""
-    gone = {tuple(sorted(row[: _corners(kind)])) for name in without if name in mesh.faces
-            for kind, rows in mesh.faces[name].items() for row in rows.tolist()}  # fmt: skip
-    facets = []
-    for kind, nodes in boundary_facets(mesh).items():
-        rows = nodes[:, : _corners(kind)]
-        kept = [tuple(sorted(row)) not in gone for row in rows.tolist()] if gone else slice(None)
-        facets.append(rows[kept])
-    flat = [f[:, pick] for f in facets for pick in ([0, 1, 2], [0, 2, 3])[: f.shape[1] - 2]]
-    used, local = np.unique(np.concatenate(flat), return_inverse=True)
-    place = np.zeros(mesh.n_points, dtype=np.int64)
-    place[used] = np.arange(len(used))
-    sides, normals = [], []
-    for f in facets:
-        at = mesh.points[f]
-        normal = np.cross(at[:, 1] - at[:, 0], at[:, 2] - at[:, 0])
-        for i in range(f.shape[1]):
-            sides.append(np.sort(f[:, [i, (i + 1) % f.shape[1]]], axis=1))
-            normals.append(normal / np.linalg.norm(normal, axis=1, keepdims=True))
-    pairs, which = np.unique(np.concatenate(sides), axis=0, return_inverse=True)
-    total = np.zeros((len(pairs), 3))
-    np.add.at(total, which.ravel(), np.concatenate(normals))
-    sharp = np.linalg.norm(total, axis=1) < 2 * np.cos(np.radians(SHARP / 2))
-    return Outside(used, local.reshape(-1, 3), place[pairs[sharp]])
-
-
-def _corners(kind: str) -> int:
-    return 3 if kind.startswith("triangle") else 4
+    facets = boundary_facets(mesh)
+    triangles, facet = flat_triangles(facets, coarse=True)
+    gone = {tuple(sorted(row)) for name in without if name in mesh.faces
+            for f in mesh.faces[name].values() for row in f.tolist()}  # fmt: skip
+    if gone:
+        kept = [tuple(sorted(row)) not in gone for f in facets.values() for row in f.tolist()]
+        triangles = triangles[np.array(kept)[facet]]
+    used, local = np.unique(triangles, return_inverse=True)
+    edges = np.searchsorted(used, sharp_edges(mesh.points, triangles))
+    return Outside(used, local.reshape(-1, 3), edges)
 
 
 def together(parts: Iterable[Outside]) -> Outside:
@@ -165,6 +146,21 @@ def _coarser(points: Array, skin: Outside) -> tuple[Indices, Indices, Indices]:
     place[kept] = np.arange(len(kept))
     edges = skin.edges[(place[skin.edges] >= 0).all(axis=1)]
     return kept, place[at[fewer.regular_faces]], place[edges]
+
+
+def turning_assembly(
+    parts: Sequence[tuple[Mesh, Array, ComplexArray]], names: Sequence[str], title: str
+) -> str:
+    """Motions of several bodies that stand together.
+
+    Args:
+        parts: mesh, where its points are (n, 3) m, and (k, n, 3) their motions. names: (k,) of these.
+    """
+    skins = [outside(mesh) for mesh, *_ in parts]
+    points = np.concatenate([at[skin.source] for skin, (_, at, _) in zip(skins, parts, strict=True)])
+    moved = np.concatenate([u[:, skin.source] for skin, (*_, u) in zip(skins, parts, strict=True)], axis=1)
+    shapes = [Turned(name, u[None]) for name, u in zip(names, moved, strict=True)]
+    return turned(points, together(skins), shapes, title)
 
 
 def turning_modes(basis: ModalBasis, group: ModalGroup) -> str:

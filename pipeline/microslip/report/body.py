@@ -51,9 +51,9 @@ def report_html(
     album, cyclic = Album(pictures), basis.sectors > 1
     answered = answer(response, album) if response is not None else []
     sections = {
-        "Body": [table((), _facts(basis)), album.take("mesh")],
-        "Frequencies": ring.frequencies(basis, album) if cyclic else _frequencies(basis, album),
         "Engine orders": ring.orders(basis, album) if cyclic else [],
+        "Frequencies": ring.frequencies(basis, album) if cyclic else _frequencies(basis, album),
+        "Body": [table((), _facts(basis)), album.take("mesh")],
         "Modes": _modes(basis, album),
         "Stresses": [album.take("stress_modes", tone="wide"), _static(basis), album.take("static")],
         "Interfaces": _interfaces(basis, album),

@@ -53,7 +53,7 @@ def import_page(
     taken = [text for text in told if not text.startswith(("warning: ", "note: "))]
     count = len(warnings)
     lead = (
-        "Everything that decides frequencies was read."
+        "Nothing that is known to decide frequencies was left out."
         if not count
         else f"{count} thing{'s' * (count > 1)} to look at before the frequencies can be trusted: see To do."
     )
@@ -88,7 +88,9 @@ def import_page(
 
 
 def _whole(words: str) -> str:
-    return words if words.endswith(".") else f"{words[:1].upper()}{words[1:]}."
+    if not re.match(r"\S+\.\w+[,:]", words):  # the name of a file stays as it is
+        words = f"{words[:1].upper()}{words[1:]}"
+    return words if words.endswith(".") else f"{words}."
 
 
 def _grouped(warnings: Sequence[str]) -> list[Piece]:
@@ -105,7 +107,8 @@ def _grouped(warnings: Sequence[str]) -> list[Piece]:
 
 
 def _counts(file: Path, mesh: Mesh) -> Piece:
-    size = 1e3 * np.ptp(mesh.points, axis=0)
+    solid = np.unique(np.concatenate([c.ravel() for c in mesh.cells.values()]))
+    size = 1e3 * np.ptp(mesh.points[solid], axis=0)
     cells = ", ".join(f"{len(c)} {kind}" for kind, c in mesh.cells.items())
     rows = [
         ("file", str(file)),
@@ -113,6 +116,7 @@ def _counts(file: Path, mesh: Mesh) -> Piece:
         ("points", mesh.n_points),
         ("cells", cells),
         ("links", len(mesh.links.items) if mesh.links else ""),
+        ("point masses", f"{mesh.lumps.masses.sum():.6g} kg" if mesh.lumps else ""),
         ("instances", ", ".join(mesh.instances)),
     ]
     return table([], [row for row in rows if row[1] != ""])
@@ -127,7 +131,7 @@ def _materials(mesh: Mesh) -> Piece:
         moduli = number(E[0], 6) if plain else ", ".join(number(v, 5) for v in E)
         ratio = number(-compliance[0, 1] / compliance[0, 0], 4)
         count = sum(int((r == place).sum()) for r in mesh.regions.values())
-        hot = "over temperature" if material.temperature_table is not None else ""
+        hot = "over temperature" if material.softening is not None else ""
         rows.append((material.name, number(material.density, 6), moduli, ratio, count or "", hot))
     return table(["material", "kg/m3", "E in GPa", "Poisson's ratio", "cells", "modulus"], rows)
 

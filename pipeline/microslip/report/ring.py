@@ -10,7 +10,7 @@ from ..data import ModalBasis, ModalGroup
 from ..modal.campbell import engine_orders
 from ..ring import resonances
 from ..ring.expansion import aliased, certificate_words, certify_ring
-from ..units import rpm_text
+from ..units import counted, rpm_text
 from .page import Album, Piece, fold, say, table
 from .words import hertz, number_list, range_sentence
 
@@ -64,15 +64,15 @@ def orders(basis: ModalBasis, album: Album) -> list[Piece]:
     several = bool(basis.ranges) or len(resonances.speeds_of(basis)) > 1
     found = resonances.resonances(basis, asked) if several else []
     none = "No engine order meets a mode of its nodal diameter between the lowest and the highest speed."
+    meets = f"{counted(len(found), 'true resonance')} between the lowest and the highest speed."
     return [
+        say(meets if found else none if pairs and several else ""),
+        album.take("campbell", "Campbell diagram; circles are true resonances."),
+        table(resonances.HEAD, resonances.rows(found)),
+        album.take("safe"),
         Piece("paragraph", "engine orders"),
         table(["engine order", "nodal diameter", "wave on the rotor"], pairs),
         say(f"The file lacks the nodal diameters of the engine orders {lacking}." if lacking else "", tone="warn"),
-        album.take("safe"),
-        album.take("campbell", "Campbell diagram; circles are true resonances."),
-        Piece("h3", "True resonances" if found else ""),
-        table(resonances.HEAD, resonances.rows(found)),
-        say(none if pairs and several and not found else "", tone="note"),
         _nearest(basis, asked),
     ]
 

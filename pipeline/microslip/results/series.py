@@ -311,8 +311,11 @@ class Series:
         top = float(np.nanmax(np.abs(size), initial=0.0))
         quantity = Quantity(unit_of(self._place(readout)[0]))
         scale, unit = quantity.scale(10 * top) if top else (1.0, quantity.said)
-        x, y = self._drawn(scale * size)
-        (drawn,) = axes.plot(x, y, **{"label": self.name, **line})
+        x, y, unstable = self._drawn(scale * size)
+        (drawn,) = axes.plot(x, np.where(unstable >= 1, np.nan, y), **{"label": self.name, **line})
+        if (unstable > 0).any():
+            dashed = {**line, "color": drawn.get_color(), "linestyle": "--", "label": "_unstable"}
+            axes.plot(x, np.where(unstable <= 0, np.nan, y), **dashed)
         turns = np.isin(self.parameter, self.folds)
         if 0 < turns.sum() <= 12:  # a stop that few samples meet ripples
             axes.plot(self.parameter[turns], scale * size[turns], "o", mfc="none", color=drawn.get_color())
@@ -322,13 +325,26 @@ class Series:
         axes.set_ylabel(f"{which} in {unit}")
         return axes
 
-    def _drawn(self, y: Array) -> tuple[Array, Array]:
-        """What a line is drawn through; of a curve, smooth between its points, and broken where another one begins."""
+    def _drawn(self, y: Array) -> tuple[Array, Array, Array]:
+        """What a line is drawn through; of a curve, smooth between its points, and broken where another one begins.
+        And whether that is unstable, 0 or 1, between both where that changes."""
         begins = np.flatnonzero(np.diff(self.arrays.get("branch", np.zeros(len(y))))) + 1
-        pieces = [self._smooth(part, y[part]) for part in np.split(np.arange(len(y)), begins)]
-        broken = [np.hstack([np.array(piece), [[np.nan], [np.nan]]]) for piece in pieces]
-        x, y = np.hstack(broken)[:, :-1]
-        return x, y
+        pieces = []
+        for part in np.split(np.arange(len(y)), begins):
+            line = self._smooth(part, y[part])
+            along = np.linspace(0, len(part) - 1, len(line[0]))
+            pieces.append(np.vstack([*line, np.interp(along, np.arange(len(part)), self._unstable[part])]))
+        broken = [np.hstack([piece, np.full((3, 1), np.nan)]) for piece in pieces]
+        x, y, unstable = np.hstack(broken)[:, :-1]
+        return x, y, unstable
+
+    @property
+    def _unstable(self) -> Array:
+        """(f,) 1 of unstable motions, 0 of others, 1/2 where that changes."""
+        out = 1.0 - np.asarray(self.arrays.get("stable", np.ones(len(self))))
+        for kind in ("fold", "branch point", "period doubling", "Neimark-Sacker"):
+            out[np.asarray(self.arrays.get(kind, np.zeros(len(out))), dtype=bool)] = 0.5
+        return out if "stable" in self.arrays else np.zeros(len(out))
 
     def _smooth(self, part: Indices, y: Array) -> tuple[Array, Array]:
         """A line through some points that follow each other, y (part,)."""

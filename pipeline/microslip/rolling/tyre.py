@@ -343,7 +343,7 @@ class TyreAnswer:
             "On a rigid wheel 1 - 1/e of the smallest jump is done after "
             f"{c['rigid_up_reached_s'][0] / pass_time:.4f} of that time (closed form for springs that all stick: "
             "1 - exp(-1/2) = 0.3935).",
-            f"The mode at {self.frequency:.4g} Hz gives way by {1e6 * b.compliance:.3g} um/N along rolling and makes "
+            f"The mode at {self.frequency:.4g} Hz gives way by {1e6 * b.compliance:.3g} µm/N along rolling and makes "
             f"the smallest jump {c['up_reached_s'][0] / c['rigid_up_reached_s'][0]:.3g} times as slow.",
         ]
 

@@ -89,8 +89,8 @@ class ProfileWear:
     def sentence(self) -> str:
         first, last = self.moments[0], self.moments[-1]
         return (
-            f"After {last.passages:.4g} passages {1e6 * last.wheel:.3g} um are worn off the wheel and "
-            f"{1e6 * last.rail:.3g} um off the rail at the deepest; the largest pressure went from "
+            f"After {last.passages:.4g} passages {1e6 * last.wheel:.3g} µm are worn off the wheel and "
+            f"{1e6 * last.rail:.3g} µm off the rail at the deepest; the largest pressure went from "
             f"{first.pressure / 1e6:.4g} to {last.pressure / 1e6:.4g} MPa."
         )
 

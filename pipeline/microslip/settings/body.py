@@ -211,9 +211,11 @@ class Meshing(Model):
     """size of the elements; chosen from the body where it is not given"""
     order: Annotated[Literal[1, 2], BeforeValidator(_whole)] = 2
     """order of the elements; 1 is far too stiff in bending"""
-    integration: Literal["full", "reduced", "reduced-mass"] = "full"
+    integration: Literal["full", "reduced", "reduced-mass", "calculix"] = "full"
     """of the stiffness; `"reduced"` takes 8 points in bricks of 20 nodes, which do not lock near
-    a Poisson's ratio of 0.5; `"reduced-mass"` takes them for the mass too, as CalculiX does in C3D20R"""
+    a Poisson's ratio of 0.5; `"reduced-mass"` takes them for the mass too, as CalculiX does in
+    C3D20R; `"calculix"` takes its one and two points in tetrahedra of 4 and wedges of 6 nodes
+    alone"""
     local: dict[str, Positive] = Field(default_factory=dict)
     """[length_unit] table: name of a face = size there"""
 
@@ -377,6 +379,8 @@ class Cyclic(Model):
     """face towards the previous sector"""
     right: FaceName = "cyclic_right"
     """face towards the next sector: the left one turned by 2 pi / N about the rotation axis"""
+    follows: Literal["right", "left"] = "right"
+    """whose nodes follow the other face where the two are not meshed alike"""
     nodal_diameters: NodalDiameters = "all"
     """which to analyse, or all from 0 to N/2"""
 
@@ -522,6 +526,123 @@ class Bolt(Model):
     """[N] force of the bolt; keeps its direction"""
 
 
+class _Attached(Model):
+    """What is fastened to a face, or at a point."""
+
+    face: FaceName | None = None
+    """face, or set of points, that it is fastened to"""
+    point: Point | None = None
+    """or a place: the nearest node, which moves and does not turn"""
+    centre: Point | None = None
+    """where it acts, beside the face too; the middle of the face if not given"""
+    coupling: Literal["mean", "rigid"] = "mean"
+    """`mean`: it follows the mean motion of the face, which stays as soft as it is; `rigid`: the face moves as
+    one rigid body"""
+
+    @model_validator(mode="after")
+    def _one_place(self) -> _Attached:
+        only_one(self, "face", "point")
+        if self.point is not None and self._turned():
+            raise ValueError("a point does not turn: centre, inertia and rotational need a face")
+        return self
+
+    def _turned(self) -> bool:
+        return self.centre is not None
+
+
+class AttachedMass(_Attached):
+    """A point mass, or a rigid body by its mass and inertia: what is bolted on and not meshed."""
+
+    mass: Positive
+    """[kg]"""
+    inertia: Annotated[tuple[Number, ...] | None, BeforeValidator(_finite_vector)] = None
+    """[kg m2] moments about its centre along body axes: xx, yy, zz, or these and the entries xy, yz, xz of its
+    tensor"""
+
+    @model_validator(mode="after")
+    def _body(self) -> AttachedMass:
+        if self.inertia is not None:
+            if len(self.inertia) not in (3, 6):
+                raise ValueError("inertia is three numbers, xx, yy, zz, or six, with xy, yz, xz")
+            principal = np.linalg.eigvalsh(self.tensor())
+            if not 0 <= principal[0] or principal[2] > (1 + 1e-9) * (principal[0] + principal[1]):
+                raise ValueError("inertia: no rigid body has these moments; each is at most the sum of the others")
+        return self
+
+    def _turned(self) -> bool:
+        return super()._turned() or self.inertia is not None
+
+    def tensor(self) -> Array:
+        """(3, 3) of the inertia."""
+        xx, yy, zz, xy, yz, xz = (*(self.inertia or (0.0,) * 3), 0.0, 0.0, 0.0)[:6]
+        return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+
+
+class _Between(_Attached):
+    """What acts between a face and another one, or the ground."""
+
+    against: FaceName = GROUND
+    """the face at its other end, or `ground`"""
+    direction: Direction | None = None
+    """of a single number; its length does not matter"""
+    rotational: Annotated[tuple[NotNegative, NotNegative, NotNegative] | None, BeforeValidator(_finite_vector)] = None
+    """[N m or N m s per rad] of rotations about x, y, z"""
+
+    @model_validator(mode="after")
+    def _directed(self) -> _Between:
+        values = self.values()
+        if (self.direction is None) == isinstance(values, float):
+            raise ValueError("a single number needs a direction, three along x, y, z have none")
+        if values is None and self.rotational is None:
+            raise ValueError("gives no force; write numbers along x, y, z, one with a direction, or rotational")
+        if self.against == self.face:
+            raise ValueError("against is the face itself; name another one, or ground")
+        if self.against != GROUND and self.point is not None:
+            raise ValueError("against: a point is joined to the ground alone; give a face in its place")
+        return self
+
+    def _turned(self) -> bool:
+        return super()._turned() or self.rotational is not None
+
+    def values(self) -> float | tuple[float, ...] | None:
+        """Along `direction`, or along x, y, z."""
+        raise NotImplementedError
+
+    def matrix(self) -> Array:
+        """(6, 6) over displacements and rotations along body axes."""
+        A, values = np.zeros((6, 6)), self.values()
+        if isinstance(values, float):
+            e = np.array(self.direction) / np.linalg.norm(np.array(self.direction))
+            A[:3, :3] = values * np.outer(e, e)
+        elif values is not None:
+            A[:3, :3] = np.diag(values)
+        A[3:, 3:] = np.diag(self.rotational or np.zeros(3))
+        return A
+
+
+_ThreeOrOne = Positive | Annotated[tuple[NotNegative, NotNegative, NotNegative], BeforeValidator(_finite_vector)]
+
+
+class AttachedSpring(_Between):
+    """A spring from a face or point to the ground or another face."""
+
+    stiffness: _ThreeOrOne | None = None
+    """[N/m] along x, y, z, or one along `direction`"""
+
+    def values(self) -> float | tuple[float, ...] | None:
+        return self.stiffness
+
+
+class AttachedDashpot(_Between):
+    """A dashpot from a face or point to the ground or another face."""
+
+    damping: _ThreeOrOne | None = None
+    """[N s/m] along x, y, z, or one along `direction`"""
+
+    def values(self) -> float | tuple[float, ...] | None:
+        return self.damping
+
+
 class InterfaceSettings(Model):
     """A contact patch with the frame n, t1, t2; n points outwards."""
 
@@ -637,8 +758,16 @@ class Modes(Model):
     """[Hz] only modes below it; `count` is then the upper limit"""
     certify: bool = True
     """prove by an inertia count that none is missing"""
-    solver: Literal["auto", "pardiso", "superlu"] = "auto"
+    solver: Literal["auto", "pardiso", "superlu", "petsc"] = "auto"
     """sparse direct solver, see [platforms](platforms.md)"""
+    ranks: Annotated[int, Field(ge=1, le=10000)] = 1
+    """processes that share a factorisation (`solver = "petsc"`)"""
+
+    @model_validator(mode="after")
+    def _ranks_of_petsc(self) -> Modes:
+        if self.ranks > 1 and self.solver != "petsc":
+            raise ValueError('ranks share the work of solver = "petsc"; give that solver, or remove ranks')
+        return self
 
 
 class Damping(Model):
@@ -739,6 +868,9 @@ class BodySettings(Model):
     loads: Annotated[tuple[Load, ...], BeforeValidator(_tuple)] = ()
     closures: Annotated[tuple[Closure, ...], BeforeValidator(_tuple)] = ()
     bolts: Annotated[tuple[Bolt, ...], BeforeValidator(_tuple)] = ()
+    masses: Annotated[tuple[AttachedMass, ...], BeforeValidator(_tuple)] = ()
+    springs: Annotated[tuple[AttachedSpring, ...], BeforeValidator(_tuple)] = ()
+    dashpots: Annotated[tuple[AttachedDashpot, ...], BeforeValidator(_tuple)] = ()
     interfaces: Annotated[tuple[InterfaceSettings, ...], BeforeValidator(_tuple)] = ()
     excitations: Annotated[tuple[Excitation, ...], BeforeValidator(_tuple)] = ()
     monitors: Annotated[tuple[Monitor, ...], BeforeValidator(_tuple)] = ()
@@ -794,6 +926,7 @@ class BodySettings(Model):
             raise ValueError("material: the matrices hold the material already; remove [material]")
         needs = {
             "cyclic": self.cyclic, "closures": self.closures, "bolts": self.bolts, "loads": self.loads,
+            "masses": self.masses, "springs": self.springs, "dashpots": self.dashpots,
             "gauges": self.gauges, "excitations.centrifugal": any(e.centrifugal for e in self.excitations),
             "rotation.range_rpm": self.rotation.range_rpm, "temperature.file": self.temperature.file,
             "temperature.uniform": self.temperature.uniform, "geometry.faces": self.geometry.faces,

@@ -105,7 +105,7 @@ def written(answer: Answer, name: str, folder: Path, title: str, pictures: bool,
         places = {folder / "pictures" / f"{_named(name, end)}.png": d for end, d in answer.diagrams.items()}
         shown += [drawn(diagram, place, case) for place, diagram in places.items()]
         moving = answer.moving(folder)
-    shown += [path for path in moving if path.suffix == ".gif"]
+    shown += [path for path in moving if path.suffix in (".gif", ".png")]
     page = folder / f"{name}.html"
     store.write_text(page, answer_page(title, answer.sentences, shown, *answer.tables))
     whole = answer.whole and not answer.missing

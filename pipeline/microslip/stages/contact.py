@@ -6,16 +6,17 @@ from pathlib import Path
 
 from ..files import store
 from ..files.tables import rows_csv, write_tables
+from .answer import Written
 from .stage import Made, Report, Stage
 
 
 def contact_stage(
     path: Path, assignments: list[str], output: Path | None, report: Report = lambda _: None
-) -> list[str]:
+) -> Written:
     """What a contact law does: tables (CSV) and pictures (PNG) in build/<name>/ or `output`.
 
     Returns:
-        Lines to print: the short table, judgements, files.
+        The short table and judgements; files.
 
     Raises:
         UserError, NotConverged: see `contact.study.study`; then nothing is written.
@@ -23,7 +24,6 @@ def contact_stage(
     from ..contact.study import study
     from ..pictures.contact import draw
 
-    path = path / "contact.toml" if path.is_dir() else path
     report("laws and motions")
     found = study(path, assignments)
     folder = output or Path("build") / found.contact.file.name
@@ -32,7 +32,7 @@ def contact_stage(
     report("pictures and tables")
 
     def work() -> Made:
-        named = {f"{name}.csv": columns for name, columns in found.tables.items()}
+        named = {f"{name}.csv": columns for name, columns in found.written.items()}
         files.extend([*write_tables(folder, named, 10), *draw(found, folder)])
         store.write_text(summary, rows_csv(("what", "value"), rows))
         return Made(files)
@@ -41,4 +41,4 @@ def contact_stage(
     Stage(summary, ("contact.study",), True, report, origin).make({}, work)
     width = max(len(what) for what, _ in found.told)
     lines = [f"{what:{width}}  {value}" for what, value in found.told]
-    return [*lines, *found.sentences, *map(str, sorted([*files, summary]))]
+    return Written(sorted([*files, summary]), [*lines, *found.sentences])

@@ -4,7 +4,9 @@ and preload."""
 from __future__ import annotations
 
 import re
+import shutil
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,8 +16,7 @@ from ..basis import read_basis
 from ..data import Array, Indices, Joint, Mesh
 from ..errors import UserError
 from ..files.store import ordinary
-from ..mesh import UNITS, boundary_facets, read_mesh, suffix_of
-from ..mesh.cards import files_of
+from ..mesh import UNITS, boundary_facets, read_files, read_mesh, suffix_of
 from ..mesh.chosen import bodies, of_instances, with_parts
 from ..mesh.materials import NONE, Substitute
 from ..mesh.raw import joined
@@ -62,7 +63,7 @@ def import_deck(
         UserError: unreadable files, files that are there already.
     """
     pattern = PAIRS.get(suffix_of(file))
-    deck = [f.read_bytes() for f in files_of(file) if f.is_file()] if pattern else []
+    deck = [f.read_bytes().replace(b"\r", b"\n") for f in read_files(file) if f.is_file()] if pattern else []
     if pattern is None or not any(map(pattern.search, deck)):
         return import_file(file, folder, unit, report=report, instead=instead, solids_only=solids_only)
     unit = length_unit(unit, file)
@@ -150,14 +151,27 @@ def _assembly(
     home, parts = folder or Path(body_name(file.stem)), _parts(file, folder, groups)
     refuse_taken(home / "case.toml", *(part.body for part in parts))
     told: list[str] = []
-    for number, (part, group) in enumerate(zip(parts, groups, strict=True)):
-        new = import_file(
-            file, part.body.parent, unit, group, name=part.new_name, instead=instead
-        )
-        told += new.told[:-1]
-        add_lines(part, joint_lines(parts, number, patches, unit))
+    with whole_or_absent(home, *(part.body.parent for part in parts)):
+        for number, (part, group) in enumerate(zip(parts, groups, strict=True)):
+            new = import_file(
+                file, part.body.parent, unit, group, name=part.new_name, instead=instead
+            )
+            told += [text for text in new.told[:-1] if text not in told]
+            add_lines(part, joint_lines(parts, number, patches, unit))
     shapes = [replace(shape_of(m, UNITS[unit]), points=_free(m, UNITS[unit])) for m in meshes]
     return with_case(home, parts, patches, shapes, unit, [*told, *said], force)
+
+
+@contextmanager
+def whole_or_absent(*folders: Path) -> Iterator[None]:
+    """New folders are taken away again where what is written into them ends in a mistake."""
+    new = [folder for folder in folders if not folder.exists()]
+    try:
+        yield
+    except UserError:
+        for folder in new:
+            shutil.rmtree(folder, ignore_errors=True)
+        raise
 
 
 def _free(mesh: Mesh, metres: float) -> Array:
@@ -172,6 +186,9 @@ def _free(mesh: Mesh, metres: float) -> Array:
 PAIRS = {
     ".inp": re.compile(rb"^\s*\*\s*CONTACT\s+PAIR", re.IGNORECASE | re.MULTILINE),
     ".cdb": re.compile(rb"^\s*ET\s*,.*17[1-57]\s*($|!|,)|^ETBLOCK", re.IGNORECASE | re.MULTILINE),
+    **dict.fromkeys(
+        (".bdf", ".nas", ".fem", ".dat"), re.compile(rb"^\s*BCTSET\b", re.IGNORECASE | re.MULTILINE)
+    ),
 }
 """Suffix -> what stands in decks that may have faces in contact."""
 

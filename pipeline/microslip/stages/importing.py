@@ -18,13 +18,26 @@ from pathlib import Path
 import numpy as np
 
 from ..basis import write_basis
-from ..data import Array, BodyLoad, FacetLoad, Indices, Material, Mesh, NodalLoad, SpinLoad
+from ..data import (
+    Array,
+    BodyLoad,
+    FacetLoad,
+    Indices,
+    Material,
+    Mesh,
+    NodalLoad,
+    RigidLink,
+    SpinLoad,
+)
 from ..errors import UserError
 from ..files.store import ordinary, write_text
-from ..mesh import UNITS, mesh_problems, read_mesh, suffix_of, unit_of
+from ..frames import rotation
+from ..mesh import UNITS, likely_unit, mesh_problems, read_mesh, suffix_of, unit_of
 from ..mesh.chosen import of_instances
 from ..mesh.materials import NONE, STANDS, Substitute
-from ..mesh.raw import Unread, joined, refused
+from ..mesh.raw import Unread, in_its_line, joined, refused
+from ..mesh.unv import UNIVERSAL, has_solids
+from ..plausible import density
 from ..units import SYSTEMS, to_rpm, usual_system
 from .meshing import run_apart
 from .stage import Report
@@ -81,13 +94,15 @@ def import_file(
         raise UserError(f"{file}: there is no such file; correct the path")
     unit = length_unit(unit, file)
     name = name or body_name((folder.resolve().name if folder else "") or file.stem)
-    if file.suffix.lower() in _UNIVERSAL:
-        from ..exchange.measured import holds_modes
+    modes = False
+    if file.suffix.lower() in UNIVERSAL:
+        from ..exchange.measured import holds_modes, holds_results
 
-        if holds_modes(file):
+        if holds_results(file) and not has_solids(file):
             return _measured(file, (folder or Path(name)) / "basis.h5", unit, name)
+        modes = holds_modes(file)
     target = (folder or Path(name)) / "body.toml"
-    refuse_taken(target)
+    refuse_taken(target, *[target.with_name(FOREIGN)] * modes)
     kind = suffix_of(file)
     of_mesh = partial(_mesh, instances=instances, instead=instead, solids_only=solids_only)
     made = _matrices if kind in MATRICES else of_mesh
@@ -97,9 +112,12 @@ def import_file(
     if made is _matrices and _in_metres(file):
         unit = "m"
     mesh: Mesh | None
-    lines, told, mesh = (*made(file, target.parent, unit), None)[:3]
+    with in_its_line(file):
+        lines, told, mesh = (*made(file, target.parent, unit), None)[:3]
     head = [f'name = "{name}"', f'length_unit = "{unit}"']
     write_text(target, "\n".join([*head, *lines]) + "\n")
+    if modes:
+        told = [*told, *_foreign(file, target.with_name(FOREIGN), unit, name)]
     missing = "interfaces" if "[[supports]]" in lines else "supports, interfaces"
     last = f"{target}: ready. Add {missing} and loads, then: microslip run {shlex.quote(str(target.parent))}"
     found = Imported(target, (*told, last), file, mesh)
@@ -131,14 +149,14 @@ def with_page(imported: Imported, modes: Sequence[str] = ()) -> Imported:
 
 
 def length_unit(unit: str | None, file: Path) -> str:
-    """The unit of lengths that was asked for, else that which the file tells, else mm.
+    """The unit of lengths that was asked for, else that which the file tells, or its densities, else mm.
 
     Raises:
         UserError: an unknown one.
     """
     if unit is not None and unit not in UNITS:
         raise UserError(f"--unit {unit}: unknown unit of length; choose one of {', '.join(UNITS)}")
-    return unit or unit_of(file) or "mm"
+    return unit or unit_of(file) or likely_unit(file) or "mm"
 
 
 def substitute(density: float | None, young: float | None, poisson: float | None) -> Substitute:
@@ -167,7 +185,8 @@ def body_name(stem: str, none: str = "part") -> str:
     return re.sub(r"[^A-Za-z0-9_.-]", "-", stem).lstrip("-._")[:64] or none
 
 
-_UNIVERSAL = (".uff", ".uf", ".unv", ".u")
+FOREIGN = "modes_of_file.h5"
+"""Modal file of the modes that stand in a mesh file."""
 
 
 def _measured(file: Path, target: Path, unit: str, name: str) -> Imported:
@@ -179,9 +198,19 @@ def _measured(file: Path, target: Path, unit: str, name: str) -> Imported:
     write_basis(target, basis)
     group = basis.groups[0, 0]
     first, last = group.frequency[[0, -1]]
-    size = f"{file}: {group.n_modes} modes from {first:.6g} to {last:.6g} Hz at {basis.mesh.n_points} measured points"
+    size = f"{file}: {group.n_modes} modes from {first:.6g} to {last:.6g} Hz at {basis.mesh.n_points} points"
     end = f"{target}: ready. Beside a computed one: microslip compare {target} OTHER.h5"
     return Imported(target, (size, *told, end))
+
+
+def _foreign(file: Path, target: Path, unit: str, name: str) -> list[str]:
+    """Modes that stand in a mesh file become a modal file beside the body, to compare with."""
+    try:
+        made = _measured(file, target, unit, name)
+    except UserError as error:
+        return [f"note: the modes of the file are left aside: {error}"]
+    body = Path("build") / name / "basis.h5"
+    return [made.told[0], f"{target}: these modes. Beside those of the body: microslip compare {target} {body}"]
 
 
 def _beside(file: Path, folder: Path) -> str:
@@ -192,8 +221,9 @@ def _beside(file: Path, folder: Path) -> str:
 def _sets(mesh: Mesh, held: bool = False) -> list[str]:
     """Supports (unless those of the file are there) and interfaces to choose from, as comments."""
     names = sorted(n for n in {*mesh.faces, *mesh.point_sets} if len(mesh.face_points(n)) < mesh.n_points)
+    names = [n for n in names if not held or n not in mesh.supports]
     if not names:
-        return ["# The file names no sets: give faces by box, see docs/body_toml.md."]
+        return ["# The file names no sets to make faces of: give them by box, see docs/body_toml.md."]
     lines = ["", "# Sets of the file: " + ", ".join(names)]
     first = json.dumps(next((n for n in names if n in mesh.faces), names[0]))
     if not held:
@@ -238,16 +268,22 @@ def _count(mesh: Mesh) -> int:
     return max(min(USUAL, 3 * mesh.n_points - fixed - cut - ties - 2), 1)
 
 
-def _hold(mesh: Mesh) -> bool:
+def _hold(mesh: Mesh, metres: float) -> bool:
     """Whether the file's supports leave no rigid motion."""
     from ..fem.discretise import discretise
     from ..fem.tied import tied_upper
     from ..modal.equilibrium import lumped_springs
-    from ..modal.rigid import free_motions, left_by, unresisted
+    from ..modal.rigid import free_motions, free_motions_of_ring, left_by, unresisted
 
     none, fixed = np.zeros(0, dtype=np.int64), _fixed(mesh)
     centre, pattern = mesh.points.mean(axis=0), discretise(mesh).pattern
-    springs = lumped_springs(mesh, pattern)
+    springs, ring = lumped_springs(mesh, pattern), mesh.sector
+    if ring is not None and mesh.ties is None and len(fixed):  # all sectors together may be held
+        turn = rotation(np.array(ring.axis), 2 * np.pi / ring.sectors)
+        motions = free_motions_of_ring(
+            mesh.points, metres * np.array(ring.point), fixed, turn, ring.sectors
+        )
+        return unresisted(motions, springs, pattern).shape[1] == 0
     if mesh.ties is None:
         return unresisted(free_motions(mesh.points, centre, fixed), springs, pattern).shape[1] == 0
     first, sets = 3 * mesh.n_points, mesh.ties.sets
@@ -268,11 +304,9 @@ def _tied(file: Path, mesh: Mesh) -> tuple[Mesh, list[str]]:
     from ..fem.links import linked
     from ..fem.tied import tied_upper
 
-    try:
+    with in_its_line(file):
         mesh, told = linked(mesh)
         tied_upper(discretise(mesh).pattern, np.zeros(0, dtype=np.int64), mesh.ties)
-    except UserError as error:
-        raise refused(file, str(error)) from None
     said: dict[str, list[str]] = {}
     for link, text in zip(links.items, told, strict=True):
         said.setdefault(link.where, []).append(text)
@@ -434,24 +468,32 @@ def _mesh(
         told.append(f"warning: {error}")
     joints = [f"{j.where}: '{j.slave}' on '{j.master}': make them interfaces and a contact" for j in mesh.joints]
     mesh = of_instances(mesh, instances) if instances else mesh
-    mesh, ties = _tied(file, mesh)
     if not solids_only:
         refuse_hanging(file, mesh)
+    mesh, ties = _tied(file, mesh)
     kinds = ", ".join(f"{len(c)} {t}" for t, c in mesh.cells.items())
     alone = f"; the solids alone: {mesh.hanging.partition(': ')[2]} and are left out" if mesh.hanging else ""
     again = [f"warning: {text}" for texts in mesh_problems(mesh) for text in texts]
     lacking = [text for text in again if text.endswith(STANDS)]
-    told = [*lacking, *told, f"{file}: {mesh.n_points} points, {kinds}{alone}"]
+    solid = mesh.points[np.unique(joined(c.ravel() for c in mesh.cells.values()))]
+    size = " x ".join(f"{v:.4g}" for v in np.ptp(solid, axis=0) / UNITS[unit])
+    told = [*lacking, *told, f"{file}: {mesh.n_points} points, {kinds}, {size} {unit}{alone}"]
     told += [text for text in again if text not in lacking]
+    if unit != "mm" and not unit_of(file) and likely_unit(file) == unit:
+        told.append(f"note: lengths are taken in {unit}, as its densities are no solid's in mm and t; else --unit")
+    doubts = (density(f"{file}: {m.name}: density", m.density) for m in mesh.materials)
+    told += [f"warning: {text}" for text in doubts if text]
     told += [f"note: {text}" for text in mesh.remarks]
+    if mesh.lumps is not None and (mass := float(mesh.lumps.masses.sum())):
+        told.append(f"point masses of the file: {mass:.6g} kg")
     told += [*ties, *((*joints, *_pressed(mesh)) if not instances else ())]
-    holding = _hold(mesh)
+    holding = _hold(mesh, UNITS[unit])
     held, said = _supports(mesh, holding)
     told += said
     lines = [] if holding else ["free = true               # nothing holds it wholly yet"]
     lines += ["", "[geometry]", f"mesh = {_beside(file, folder)}"]
     lines += [f"instances = {json.dumps(list(instances))}"] if instances else []
-    rule = f'integration = "{mesh.integration}"  # bricks of 20 nodes by eight points, as the file says'
+    rule = f'integration = "{mesh.integration}"  # the points that the program of the file takes'
     lines += ["", "[mesh]", rule] if mesh.integration != "full" else []
     lines += ["", "[material]", *_material(mesh, numbers, bool(lacking))]
     if mesh.materials:
@@ -513,17 +555,18 @@ def _noted(told: Sequence[str]) -> list[str]:
 def _temperatures(mesh: Mesh) -> tuple[list[str], list[str]]:
     """Lines of [temperature] and what to say of it: in force where moduli hang on it and nothing is
     strained by it."""
-    hanging = [m for m in mesh.materials if m.temperature_table is not None]
+    hanging = [m for m in mesh.materials if m.softening is not None]
     said = [_softened(m, mesh) for m in hanging]
     if mesh.temperature is None:
         return [], [f"warning: {text}" for text in said]
     free, actual = mesh.temperature[:, 0], _actual(mesh.temperature)
-    whole = not np.isnan(free).any() and np.ptp(free) <= 1e-9 * max(np.abs(free).max(), 1.0)
+    whole = not np.isnan(free).any()
     strained = bool((np.abs(actual - free) > 0).any()) and any(m.expansion.any() for m in mesh.materials)
     lines = ["[temperature]", 'from = "mesh"', 'scale = "C"             # or "K"']
     if whole and (mesh.state is not None or (hanging and not strained)):
         return ["", *lines], [f"temperatures of the file are in force: {text}" for text in said]
     told = "temperatures: used only once [temperature] of body.toml is uncommented"
+    told = f"warning: {told}" if mesh.state is not None else told
     if hanging:
         why = "they strain the body as well" if strained else "not all of them are there"
         return ["", *(f"#{line}" for line in lines)], [
@@ -541,8 +584,8 @@ def _actual(temperature: Array) -> Array:
 
 def _softened(material: Material, mesh: Mesh) -> str:
     """How far a modulus falls at the temperatures of the file, and the frequencies with it."""
-    assert material.temperature_table is not None
-    T, factor = material.temperature_table.T
+    assert material.softening is not None
+    T, factor = material.softening.T
     text = f"the modulus of {material.name} depends on temperature"
     hot = np.zeros(0) if mesh.temperature is None else _actual(mesh.temperature)
     if not np.isfinite(hot).any():
@@ -578,7 +621,11 @@ def _cyclic(mesh: Mesh, metres: float) -> tuple[list[str], list[str]]:
         f"right = {json.dumps(right)}",
     ]
     lines += [f"nodal_diameters = {list(sector.diameters)}"] if sector.diameters else []
-    return lines, [f"{sector.where}: one of {sector.sectors} cyclic sectors, '{right}' ahead of '{left}'"]
+    unlike = len(mesh.face_points(left)) != len(mesh.face_points(right))
+    lines += ['follows = "left"'] if unlike and left == sector.faces[0] else []
+    told = f"{sector.where}: one of {sector.sectors} cyclic sectors, '{right}' ahead of '{left}'"
+    more = f"; they are not meshed alike: the nodes of '{sector.faces[0]}' follow the other face"
+    return lines, [told + more * unlike]
 
 
 _LOADED = {FacetLoad: "loaded facet", BodyLoad: "acceleration field", SpinLoad: "rotation"}
@@ -597,9 +644,24 @@ def _state(mesh: Mesh, metres: float, ring: bool, held: bool) -> tuple[list[str]
     acting = [f"{number} {kind}{'s' * (number > 1)}" for kind, number in count.items()]
     acting += ["temperatures"] * (mesh.temperature is not None)
     law = "finite displacements" if state.nonlinear else "one linear solution"
+    if (grown := _grown(mesh)) and state.nonlinear:
+        law += (
+            f"; heat stretches the body by up to {grown:.2g}, and moduli are those of the heated body: "
+            f"CalculiX raises them by as much, so its frequencies are up to {grown / 2:.1g} higher"
+        )
+    if state.supports is not None:
+        law += f"; held there by {', '.join(f'{n} in {w}' for n, w in state.supports.items()) or 'nothing'}"
     said = [f"{state.where}: the modes are about its static state: {', '.join(acting) or 'nothing acts'}; {law}"]
     turning = [] if ring else ["", "[rotation]"]
     turning.append(f'prestress = "{"nonlinear" if state.nonlinear else "linear"}"')
+    if mesh.links is not None and any(isinstance(link, RigidLink) for link in mesh.links.items):
+        text = "that forces turn with the arms of rigid links is left out of the stiffness, as in CalculiX"
+        finite = (
+            ", and the arms keep their directions at rest: CalculiX turns them" * state.nonlinear
+        )
+        said.append(
+            f"warning: {state.where}: {text}{finite}; where links turn much, mesh their bodies"
+        )
     spins = [load for load in state.loads if isinstance(load, SpinLoad) and load.speed]
     if len(spins) > 1 or any(spin.cells is not None for spin in spins):
         said.append(
@@ -609,17 +671,35 @@ def _state(mesh: Mesh, metres: float, ring: bool, held: bool) -> tuple[list[str]
     elif spins:
         (spin,) = spins
         axis, speed = spin.axis / np.linalg.norm(spin.axis) + 0.0, to_rpm(spin.speed)
-        said.append(f"{spin.where}: {speed:.6g} rpm")
+        heavy = mesh.lumps is not None and bool(mesh.lumps.masses.any())
+        whole = (
+            "; point masses turn with the body, all of them: CalculiX leaves their softening out"
+            * heavy
+        )
+        said.append(f"{spin.where}: {speed:.6g} rpm{whole}")
         if not ring:
             numbers = [", ".join(f"{v:.15g}" for v in row) for row in (axis, spin.point / metres + 0.0)]
             turning += [f"axis = [{numbers[0]}]", f"point = [{numbers[1]}]"]
         turning.append(f"speeds_rpm = [{speed!r}]")
     rest = len(state.loads) > sum(isinstance(load, SpinLoad) for load in state.loads)
+    rest = rest or state.supports is not None
     return turning, ["", "[[loads]]", 'kind = "mesh"             # those of its static step'] if rest else [], said
 
 
+def _grown(mesh: Mesh) -> float:
+    """The largest stretch by heat, less 1; 0 where the file has no temperatures."""
+    if mesh.temperature is None or not mesh.materials:
+        return 0.0
+    free, actual = mesh.temperature[:, 0], _actual(mesh.temperature)
+    largest = [np.abs(m.thermal_strain(actual, free)).max(initial=0.0) for m in mesh.materials]
+    return float(np.nan_to_num(max(largest)))
+
+
 def _pressed(mesh: Mesh) -> list[str]:
-    """Preloads of bolts that are one body with all that they hold: no contact takes them."""
+    """Preloads of bolts that are one body with all that they hold, and not in its static step: no contact takes them.
+    """
+    if mesh.state is not None:
+        return []
     return [
         f"warning: {where}: the preload of {force:g} N is not used: the bolt and all that it holds are one "
         "body; tie it to one side alone, with a *CONTACT PAIR on the other"

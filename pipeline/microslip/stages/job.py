@@ -122,5 +122,5 @@ def system_file(path: Path) -> Path | None:
     if path.is_dir() and not (path / "body.toml").is_file():
         path = path / "system.toml"
     if path.is_file() and path.suffix == ".toml" and {"masses", "bodies", "matrices"} & set(keys := load_toml(path)):
-        return None if ASKED & set(keys) else path  # a case has bodies too
+        return None if {*ASKED, "geometry"} & set(keys) else path  # a case has bodies, a body masses too
     return None

@@ -23,7 +23,7 @@ from ..interrupts import look
 from ..mesh import mesh_problems, part_numbers, read_mesh
 from ..mesh.chosen import of_instances, with_parts
 from ..mesh.materials import Substitute
-from ..mesh.raw import in_file, refused
+from ..mesh.raw import in_file, in_its_line, refused
 from ..settings.body import FaceRule, MaterialSettings, implausible
 from ..units import SYSTEMS, usual_system
 from .job import Job
@@ -246,6 +246,11 @@ def load_mesh(job: Job, path: Path | None = None) -> tuple[Mesh, list[str]]:
             mesh = of_instances(mesh, names)
     if job.settings.geometry.mesh is not None:
         mesh = _faces_by_rule(job, mesh)
+    if job.settings.masses or job.settings.springs or job.settings.dashpots:
+        from ..modal.attached import with_attached
+
+        with of_file(job.path):
+            mesh = with_attached(mesh, job.settings)
     mesh = linked_mesh(path, mesh)
     errors, warnings = mesh_problems(mesh)
     if job.settings.cyclic is not None and part_numbers(mesh, tied=True).max() > 0:
@@ -275,10 +280,8 @@ def linked_mesh(path: Path, mesh: Mesh) -> Mesh:
         return mesh
     from ..fem.links import linked
 
-    try:
+    with in_its_line(path):
         return linked(mesh)[0]
-    except UserError as error:
-        raise refused(path, str(error)) from None
 
 
 def _read_with_materials(job: Job, path: Path) -> tuple[Mesh, list[str]]:

@@ -17,8 +17,7 @@ from ..data import Array, Mesh, ModalBasis
 from ..errors import UserError, in_its_file, of_file
 from ..files import store
 from ..files.hdf5 import refuse_foreign
-from ..mesh import UNITS
-from ..mesh.cards import files_of
+from ..mesh import UNITS, read_files
 from ..settings.body import BodySettings, MatrixFiles
 from ..units import rpm_text
 from .job import Job
@@ -141,7 +140,9 @@ def modes_inputs(job: Job, mesh_file: Path) -> dict[str, Any]:
     """What a modal file depends on: settings but those of the drawing and the prose, the mesh, the code."""
     settings = {k: v for k, v in job.raw.items() if k not in ("geometry", "mesh", "description", "note")}
     inputs = {"settings": settings, "mesh": store.hash_file(mesh_file)}
-    if mesh_file.suffix.lower() == ".inp" and (read := files_of(mesh_file)[1:]):
+    if (rule := job.raw.get("mesh", {}).get("integration", "full")) != "full":
+        inputs["integration"] = rule
+    if read := read_files(mesh_file)[1:]:
         inputs["included"] = [store.hash_file(f) for f in read if f.is_file()]
     if job.settings.geometry.mesh is not None:
         inputs["faces"] = job.raw["geometry"].get("faces", [])
@@ -182,10 +183,11 @@ def _temperature_file(job: Job) -> Path:
 
 
 def with_temperature(job: Job, mesh: Mesh) -> tuple[BodySettings, Array | None]:
-    """The settings with the stress-free temperature, and the nodal one, of the settings or of the mesh file.
+    """The settings with the stress-free temperature, and the nodal one, of the settings or of the mesh file: (n,), or
+    (n, 2) with the stress-free one where that is not the same everywhere.
 
     Raises:
-        UserError: the mesh file brings none, or a stress-free one that is not the same everywhere.
+        UserError: the mesh file brings none.
     """
     setting = job.settings.temperature
     if setting.source is None:
@@ -193,16 +195,18 @@ def with_temperature(job: Job, mesh: Mesh) -> tuple[BodySettings, Array | None]:
     if mesh.temperature is None:
         raise UserError("temperature.from: the mesh file brings no temperatures; use uniform or file")
     free, actual = mesh.temperature.T
-    if np.isnan(free).any() or np.ptp(free) > 1e-9 * max(np.abs(free).max(), 1.0):
+    if np.isnan(free).any():
         raise UserError(
             "temperature.from: the stress-free temperature (*INITIAL CONDITIONS, TYPE=TEMPERATURE) must be "
-            "given for every node and be the same everywhere"
+            "given for every node"
         )
     hot = np.where(np.isnan(actual), free, actual) + setting.zero
-    if hot.min() <= 0 or free[0] + setting.zero <= 0:
+    if hot.min() <= 0 or free.min() + setting.zero <= 0:
         raise UserError("temperature.scale: the mesh file's temperatures fall below absolute zero; choose C or K")
     reference = setting.model_copy(update={"reference": float(free[0] + setting.zero)})
-    return job.settings.model_copy(update={"temperature": reference}), hot
+    alike = np.ptp(free) <= 1e-9 * max(np.abs(free).max(), 1.0)
+    both = hot if alike else np.column_stack([hot, free + setting.zero])
+    return job.settings.model_copy(update={"temperature": reference}), both
 
 
 def nodal_temperature(job: Job, mesh: Mesh) -> Array | None:

@@ -9,14 +9,19 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from ..analysis import Answer, Files
 from ..basis import read_basis
 from ..errors import UserError, in_its_file, of_file
 from ..files import store
 from ..files.tables import csv_files, rows_csv
+from ..pictures import can_draw
+from ..pictures.moving import assembled_picture
 from ..pictures.rolling import curve_picture, traction_picture, wearing_picture, write_tractions_vtu
 from ..pictures.tyre import tyre_picture
 from ..pictures.vehicle import circumference_picture, growth_picture, recorded_picture
+from ..reduced.coordinates import basis_in_modes
 from ..report.page import Piece, number, say, table
 from ..report.response import number_tables
 from ..results import Journal
@@ -27,6 +32,7 @@ from ..rolling.settings import RollingCase, SectionKeys, load_rolling
 from ..rolling.study import RollingAnswer, rows_of_patches, study
 from ..rolling.table import creep_table, write_creep_table
 from ..rolling.wearing import wearing
+from ..system.pairing import Place
 from ..vehicle import kinematics
 from ..vehicle import study as vehicle
 from ..vehicle.settings import KinematicsCase, VehicleCase, load_kinematics, load_vehicle
@@ -63,8 +69,9 @@ def roll_stage(
     force: bool = False,
     report: Report = lambda _: None,
     pictures: bool = True,
+    folder: Path | None = None,
 ) -> Written:
-    """What a case of rolling contact asks for, in the folder of its name below `root`; whole if it
+    """What a case of rolling contact asks for, in a folder, if not given that of its name below `root`; whole if it
     did not end early. Modal files of its bodies are made where they are not up to date.
 
     Raises:
@@ -72,7 +79,7 @@ def roll_stage(
     """
     kind = next((kind for kind in KINDS if kind.keys <= keys_of(path)), KINDS[-1])
     case, raw = kind.load(path, list(assignments))
-    product = folder_of_case(path, case.name, root) / f"{kind.product}.json"
+    product = (folder or folder_of_case(path, case.name, root)) / f"{kind.product}.json"
     stage = Stage(product, ("stages.rolling",), force, report, case=path)
     bodies = _bodies(kind.bodies(case), case, path, report)
     named: list[Path | str] = [*kind.files(case), *bodies]
@@ -144,14 +151,35 @@ def _wheel_on_rail(
     if worn is not None and found.forces is not None:
         files["pictures/wearing.png"] = partial(wearing_picture, worn, title=case.name)
 
-    def in_paraview(folder: Path) -> list[Path]:
-        if found.forces is None or found.tractions is None or not find_spec("meshio"):
-            return []
-        write_tractions_vtu(found.tractions, file := folder / "tractions.vtu")
-        return [file]
+    def moving(folder: Path) -> list[Path]:
+        made = [_yielding(case, bodies, folder)] if elastic is not None and can_draw() is None else []
+        if found.forces is not None and found.tractions is not None and find_spec("meshio"):
+            write_tractions_vtu(found.tractions, file := folder / "tractions.vtu")
+            made.append(file)
+        return made
 
     notes = [_patches(found), say(OF_PATCHES, tone="note")]
-    return Answer(said, tables=notes, files=files, moving=in_paraview)
+    return Answer(said, tables=notes, files=files, moving=moving)
+
+
+def _yielding(case: RollingCase, bodies: list[Path], folder: Path) -> Path:
+    """The wheel on its rail, and how their modes yield to equal and opposite forces on the patch."""
+    assert case.elastic is not None
+    bases = {n: basis_in_modes(read_basis(file)) for n, file in zip(("wheel", "rail"), bodies, strict=True)}
+    groups = {name: basis.groups[0, 0] for name, basis in bases.items()}
+    faces = {name: group.interfaces[case.elastic.face] for name, group in groups.items()}
+    places = {name: Place(np.eye(3), faces["rail"].origin - face.origin) for name, face in faces.items()}
+    shapes = {}
+    for direction, row in ROWS.items():
+        number = ("u_n", "u_t1", "u_t2").index(row)
+        along = faces["wheel"].rotation[number]
+        forces = {"wheel": along, "rail": -along}  # N, of unit size
+        shapes[direction] = {
+            name: group.phi @ ((faces[name].rotation @ forces[name]) @ faces[name].rows[:3] / group.omega**2) + 0j
+            for name, group in groups.items()
+        }
+    path = folder / "pictures" / "behind.png"
+    return assembled_picture(shapes, bases, places, f"{case.name}: forces on the patch", path)
 
 
 def _behind(found: RollingAnswer, bodies: list[Path]) -> Behind | None:

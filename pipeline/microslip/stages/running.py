@@ -21,7 +21,7 @@ from ..results.names import apart
 from ..results.series import unit_of
 from ..units import Quantity, amplitude_of
 from .analysing import analysed
-from .answer import CaseJob
+from .answer import CaseJob, Written
 from .job import Job, open_job
 from .modal import modes_stage, system_stage
 from .page import report_stage
@@ -113,8 +113,10 @@ def run_system(
 def respond(
     case_path: Path, basis_file: Path | None, assignments: list[str] | None = None, force: bool = False,
     report: Report = lambda _: None, root: Path = Path("."), log: bool = False, wanted: Wanted = ALL,
+    folder: Path | None = None,
 ) -> tuple[Path, bool]:  # fmt: skip
-    """Friction response of a case on modal files that are there already: CSV, JSON, picture in build/<case>/.
+    """Friction response of a case on modal files that are there already: CSV, JSON, picture in a folder, if not given
+    build/<case>/.
 
     Args:
         basis_file: of the only body; None: basis.h5 beside the case, or build/<body>/basis.h5 of every body.
@@ -134,10 +136,20 @@ def respond(
             raise UserError(
                 f"{case_path}: body: it names '{b.body or b.name}', but {files[b.name]} holds '{name}'; make them agree"
             )
-    folder = folder_of_case(case_path, case.name, root / "build")
+    folder = folder or folder_of_case(case_path, case.name, root / "build")
     summary, converged = response_stage(case_path, files, folder, assignments, force, report, log, wanted)
     _tell(summary, report)
     return folder / "response.csv", converged
+
+
+def response_of(folder: Path) -> Written:
+    """What a response in a folder has left for a reader."""
+    summary = json.loads((folder / "response.json").read_text())
+    files = [folder / name for name in summary["files"]]
+    pictures = [folder / "pictures" / name for name in summary["pictures"].values()]
+    said = [_at(row) for row in summary["resonances"]] or ["no resonance in the band"]
+    whole = not summary["failed_points"]
+    return Written([folder / "response.html", *files, *pictures], ["; ".join(said)], whole, unsolved(folder))
 
 
 def unsolved(folder: Path, compared: bool = False) -> str:

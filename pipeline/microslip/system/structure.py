@@ -254,6 +254,7 @@ def stop(
 def structure(
     M: Matrix, K: Matrix, C: Matrix | None = None, *, force: Force | None = None, second_force: Force | None = None,
     steady: Force | None = None, elements: Annotated[Sequence[Element], BeforeValidator(_elements)] = (),
+    base_acceleration: Annotated[Any, numbers(0, 1)] | None = None,
     output: Annotated[Any, numbers(0, 1)] | None = None, damping_ratio: Annotated[Any, numbers(0, 1, ge=0)] = 0.0,
     name: Text = "structure",
 ) -> Assembly:  # fmt: skip
@@ -265,6 +266,8 @@ def structure(
         force: coordinate -> 0-peak amplitude (N) of the harmonic force, or (n,) of all.
         second_force: the same of a force with a second frequency, see `microslip.two_tones`.
         steady: coordinate -> force (N) that does not change, or (n,) of all.
+        base_acceleration: 0-peak amplitude (m/s2) of the ground's harmonic acceleration along every coordinate, or (n,)
+            along each; displacements, those of springs and elements to the ground too, are then relative to it.
         elements: see `polynomial`, `jenkins`, `stop`, `friction` and `Element`.
         output: coordinates that are read; where a force acts, if not given.
         damping_ratio: of the modes without elements, one for all or one a mode from the lowest, beside C.
@@ -292,7 +295,8 @@ def structure(
         )
     C = C + _modal_damping(M, K, damping_ratio)
     f, f_2, f_0 = _force(force, n), _force(second_force, n, "second_force"), _force(steady, n, "steady").real
-    driven = np.abs(f) + np.abs(f_2) + np.abs(f_0)
+    f_b = _base(base_acceleration, M)
+    driven = np.abs(f) + np.abs(f_2) + np.abs(f_0) + np.abs(f_b)
     read = np.flatnonzero(driven) if output is None else np.atleast_1d(output)
     rows = np.array([_row(i, n, "structure: output") for i in read]).reshape(-1, n)
     watched = [int(i) for i in read]
@@ -301,15 +305,16 @@ def structure(
         speed=0.0, omega=np.zeros(n), kind=("normal",) * n, damping_ratio=np.zeros(n), M_r=M, K_r=K, C_r=C,
         G_r=np.zeros((n, n)), phi=np.zeros((0, 3, n)), interfaces={},
         excitations={k: Rows(x[None].conj(), (k,), "m", nowhere)
-                     for k, x in (("force", f), ("second", f_2), ("steady", f_0)) if k != "second" or x.any()},
+                     for k, x in (("force", f), ("second", f_2), ("steady", f_0), ("base", f_b))
+                     if k in ("force", "steady") or x.any()},
         monitors={"q": Rows(rows, tuple(map(str, watched)), "m", nowhere)}, gauges={},
         compliance=Compliance((), np.zeros((0, 0)), np.zeros((0, 0)), False), stresses={}, u_static=np.zeros((0, 3)),
         checks={},
     )  # fmt: skip
-    asked = (("force", f, 1, 1), ("second", f_2, 1, 2), ("steady", f_0, 0, 1))
+    asked = (("force", f, 1, 1), ("base", f_b, 1, 1), ("second", f_2, 1, 2), ("steady", f_0, 0, 1))
     loads = tuple(Load(name, k, 1.0, h, tone) for k, x, h, tone in asked if x.any())
     outputs = tuple(Output(name, "q", str(i)) for i in watched)
-    contacts = _contacts(elements, name, K, np.abs(f) + np.abs(f_2))
+    contacts = _contacts(elements, name, K, np.abs(f) + np.abs(f_2) + np.abs(f_b))
     return Assembly((Component(name, {0: group}),), contacts, loads, outputs)
 
 
@@ -360,6 +365,18 @@ def _force(force: Any, n: int, key: str = "force") -> Array:
     if f.shape != (n,):
         raise UserError(f"structure: {key}: has shape {f.shape}; the structure has {n} coordinates")
     return f
+
+
+def _base(acceleration: Any, M: Array) -> Array:
+    """(n,) N, the inertia of ground that accelerates by so much: M r."""
+    if acceleration is None:
+        return np.zeros(len(M), dtype=complex)
+    r = np.asarray(acceleration, dtype=float)
+    if np.ndim(r) and len(r) != len(M):
+        raise UserError(
+            f"structure: base_acceleration: has shape {np.shape(r)}; the structure has {len(M)} coordinates"
+        )
+    return -(M @ np.broadcast_to(r, len(M))).astype(complex)
 
 
 def _contacts(elements: Sequence[Element], component: str, K: Array, force: Array) -> tuple[Contact, ...]:

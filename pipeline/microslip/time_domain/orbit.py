@@ -176,6 +176,12 @@ class Orbit(Ended, Announced):
         return Quantity(self.units[read_out]) if read_out < len(self.units) else METRES
 
     @property
+    def section(self) -> tuple[Array, Array]:
+        """The first read-out and its velocity after every period: the Poincare section."""
+        last = slice(self.samples - 1, None, self.samples)
+        return self.y[0][last], self.v[0][last]
+
+    @property
     def contacts(self) -> tuple[str, ...]:
         """Their names."""
         return tuple(c.name for c in self.touching)

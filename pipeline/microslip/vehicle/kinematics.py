@@ -323,18 +323,18 @@ class KinematicsAnswer:
         orders = orders_of(depth[:, None], len(depth) // 8)[:, 0]
         n = int(orders.argmax())
         sentences = [
-            f"After {now.turns:.4g} turns, by {files} of the file, {1e6 * depth.mean():.4g} um "
+            f"After {now.turns:.4g} turns, by {files} of the file, {1e6 * depth.mean():.4g} µm "
             f"are worn where the contact runs, {1e9 * volume:.4g} mm3 in all: the coefficient times the work of "
             f"friction, {work / now.turns if now.turns else now.friction[0]:.4g} J a turn.",
         ]
         less = max(uncertain(self.history)[n, 0], np.nan_to_num(error).max())
         if orders[n] > less:
             sentences.append(
-                f"Over the circumference it differs by {1e6 * np.ptp(depth):.4g} um; order {n + 1} is largest, "
-                f"{1e6 * orders[n]:.3g} um."
+                f"Over the circumference it differs by {1e6 * np.ptp(depth):.4g} µm; order {n + 1} is largest, "
+                f"{1e6 * orders[n]:.3g} µm."
             )
         else:
-            sentences.append(f"Over the circumference it differs by no more than its error, {1e6 * less:.2g} um.")
+            sentences.append(f"Over the circumference it differs by no more than its error, {1e6 * less:.2g} µm.")
         if self.wheel.tracks is not None:
             sentences.append(error_of(self.history))
         if files == 1:
@@ -342,7 +342,7 @@ class KinematicsAnswer:
                 "warning: the file holds one whole turn, so that no error can be told of the jump over many."
             )
         else:
-            sentences.append(f"Turns of the file differ: its standard error is at most {1e6 * error.max():.2g} um.")
+            sentences.append(f"Turns of the file differ: its standard error is at most {1e6 * error.max():.2g} µm.")
         return [*sentences, f"warning: it ends there: {self.ended}."] if self.ended else sentences
 
 

@@ -37,8 +37,8 @@ WHEELS = ("right", "left")
 def _went(first: float, last: float, less: float) -> str:
     """From one amplitude to another, m, if that is more than it may be off."""
     if abs(last - first) <= max(less, 1e-9):
-        return f"stays at {1e6 * first:.4g} um: it changes by less than the error of the jumps, {1e6 * less:.2g} um,"
-    return f"goes from {1e6 * first:.4g} to {1e6 * last:.4g} um (its error is below {1e6 * less:.2g} um)"
+        return f"stays at {1e6 * first:.4g} µm: it changes by less than the error of the jumps, {1e6 * less:.2g} µm,"
+    return f"goes from {1e6 * first:.4g} to {1e6 * last:.4g} µm (its error is below {1e6 * less:.2g} µm)"
 
 
 SMALL = 1e-6
@@ -125,7 +125,7 @@ class VehicleAnswer:
             )
             m = int((last - first).argmax())
             if m != n and last[m] - first[m] > max(less[m], 1e-9):
-                sentences.append(f"Of the others order {m + 1} grows most, to {1e6 * last[m]:.3g} um.")
+                sentences.append(f"Of the others order {m + 1} grows most, to {1e6 * last[m]:.3g} µm.")
         sentences += self._shifted()
         sentences.append(error_of(self.history))
         sentences += [self._hunts(), *self._deep()]

@@ -97,7 +97,7 @@ class LeavesTheRail(Exception):
 
 SMOOTHING = 2 * STRIP
 """m, standard deviation by which the worn profile is smoothed for where it touches: with half axes of some mm the waves
-of the strips then die out in jumps of up to 40 um, see `rolling.wear.shortest_smoothing`."""
+of the strips then die out in jumps of up to 40 µm, see `rolling.wear.shortest_smoothing`."""
 SETTLED = np.array([1e-9] * Q + [1e-6] * Q + [1e-6])
 """By which states of one turn and the next may differ: m and rad, m/s and rad/s."""
 TURNS = 40
@@ -401,7 +401,7 @@ def error_of(history: Sequence[tuple[WearState, Jump]]) -> str:
     error = sum(j.error for _, j in history)
     return (
         f"{len(history) - 1} jumps: their errors, each less than its difference to a jump of first order, "
-        f"are together below {1e6 * error:.2g} um of the radius."
+        f"are together below {1e6 * error:.2g} µm of the radius."
     )
 
 

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -18,7 +20,7 @@ from ..case.contacts import swept
 from ..case.problem import problem_of
 from ..errors import UserError, at, of_file
 from ..files.tables import write_columns
-from ..pictures.orbit import chatter_picture, orbit_picture, portraits
+from ..pictures.orbit import chatter_picture, orbit_picture, portraits, section_picture
 from ..report.page import Piece
 from ..report.response import number_tables
 from ..settings.numbers import Model, NotNegative, Number, Positive, _finite_vector, _tuple
@@ -27,7 +29,7 @@ from ..time_domain import classification, equations, orbit, recorded, starts
 from ..time_domain.classification import Exponent
 from ..time_domain.orbit import Orbit
 from ..time_domain.ramp import Ramp
-from ..units import counted, percent
+from ..units import Quantity, counted, percent
 
 Row = Mapping[str, float]
 Named = Sequence[tuple[str, Orbit]]
@@ -38,6 +40,10 @@ def _several(value: object) -> object:
 
 
 Several = Annotated[tuple[Positive, ...], BeforeValidator(_several, json_schema_input_type=Positive | list[Positive])]
+
+
+FREQUENCY = "frequency"
+"""Parameter of a Poincare section that is no key of the case."""
 
 
 class RunUp(Model):
@@ -100,11 +106,24 @@ class Keys(Model):
     release: Release | None = None
     normal_force: NotNegative | None = None
     """[N] of the contacts that the sweep presses"""
+    over: str | None = None
+    """Poincare section over a parameter: `frequency` (Hz), any key of the case by its dotted name, or
+    of its system.toml behind `system.`; each motion begins as `start` says"""
+    low: Number | None = None
+    """first value of it"""
+    high: Number | None = None
+    """last one"""
+    points: Annotated[int, Field(ge=2, le=100000)] = 41
+    """values of it, equally spaced"""
 
     @model_validator(mode="after")
     def _one_of_both(self) -> Keys:
-        if sum(map(bool, (self.frequency, self.Omega, self.run_up))) != 1:
+        if sum(map(bool, (self.frequency, self.Omega, self.run_up, self.over == FREQUENCY))) != 1:
             raise ValueError("frequency: give frequency (Hz) or Omega (rad/s), one or more of them, or run_up")
+        if self.over is not None and (None in (self.low, self.high) or self.low == self.high):
+            raise ValueError("over: give low and high, two different numbers")
+        if self.over not in (None, FREQUENCY) and (self.run_up or len(self.hertz) > 1):
+            raise ValueError("over: give one frequency, at which it varies")
         if self.run_up and (wrong := sorted(self.model_fields_set & {"settle", "keep"})):
             raise ValueError(f"{wrong[0]}: a run-up is kept from its beginning to its end; leave it out")
         if self.release is not None and "start" in self.model_fields_set:
@@ -114,7 +133,14 @@ class Keys(Model):
         return self
 
     @property
+    def values(self) -> list[float]:
+        """Of the parameter of a Poincare section; none without one."""
+        return np.linspace(self.low or 0.0, self.high or 0.0, self.points).tolist() if self.over else []
+
+    @property
     def hertz(self) -> tuple[float, ...]:
+        if self.over == FREQUENCY:
+            return tuple(self.values)
         return self.frequency or tuple(w / (2 * math.pi) for w in self.Omega or ())
 
 
@@ -122,8 +148,10 @@ def solve(q: Question) -> Answer:
     """The motions in time, a sentence a motion; whole if none diverged. The file is filled as they go."""
     file, built = q.folder / "orbit.h5", q.built
     with of_file(q.varied.path):
-        ran = recorded.run(file, _asked(q.asked, built), q.inputs, q.fresh, q.report)
+        ran = recorded.run(file, _motions(q), q.inputs, q.fresh, q.report)
     found: Named = [(one.name, one) for one in ran]
+    if q.asked.over:
+        return _sections(q.asked, found, built)
     files: Files = {"orbit.csv": partial(write_columns, _columns(found), 8)}
     files["orbit.h5"] = lambda _: None  # is there
     ends = [_ends(one) for _, one in found if len(one.time)]
@@ -136,6 +164,45 @@ def solve(q: Question) -> Answer:
         whole=not any(np.isfinite(one.diverged) for _, one in found),
         files=files | _pictures(found, built.settings.name),
         moving=lambda folder: _moving(found, built, folder),
+    )
+
+
+def _motions(q: Question) -> list[recorded.Integration]:
+    """Those that a case asks for."""
+    asked, over = q.asked, q.asked.over
+    if over in (None, FREQUENCY):
+        return _asked(asked, q.built)
+    motions = []
+    for value in asked.values:
+        (one,) = _asked(asked, q.varied.built({over: value}, "orbit.over"))
+        motions.append(replace(one, name=f"{over} = {value:.6g}"))
+    return motions
+
+
+def _sections(asked: Keys, found: Named, built: Built) -> Answer:
+    """Where the read-out and its velocity are after every period, over the parameter."""
+    over, case = asked.over or "", built.settings.name
+    kept = [(value, one) for value, (_, one) in zip(asked.values, found, strict=True) if len(one.time)]
+    of = kept[0][1].of() if kept else Quantity()
+    names = "frequency_Hz" if over == FREQUENCY else over, of.column("displacement"), f"{of.column('velocity')}_s"
+    rows = [np.array([np.full_like(y, value), y, v]) for value, one in kept for y, v in [one.section]]
+    columns = dict(zip(names, np.concatenate([np.zeros((3, 0)), *rows], axis=1), strict=True))
+    table = {names[0]: asked.values, "motion": [classification.kind(one) for _, one in found], **_columns(found)}
+    kinds = ", ".join(f"{n} {KIND.get(kind, kind)}" for kind, n in Counter(table["motion"]).most_common())
+    label = "frequency in Hz" if over == FREQUENCY else over
+    draw = partial(section_picture, kept, label, title=f"{case}: Poincaré section over {over}")
+    said = f"{over} from {asked.low:g} to {asked.high:g}, {counted(len(found), 'motion')}: {kinds}."
+    return Answer(
+        [said, *_messages(found, built)],
+        largest=max((0.5 * (top - low) for top, low in (_ends(one) for _, one in kept)), default=0.0),
+        judged={"normal": asked.normal_force, "in_time": True},
+        whole=not any(np.isfinite(one.diverged) for _, one in found),
+        files={
+            "orbit.csv": partial(write_columns, table, 8),
+            "orbit_section.csv": partial(write_columns, columns, 8),
+            "orbit.h5": lambda _: None,  # is there
+            "pictures/section.png": draw,
+        },
     )
 
 
@@ -303,8 +370,9 @@ def _band(asked: Mapping[str, Any]) -> dict[str, float]:
     if not isinstance(asked, Mapping):
         return {}
     ramp = asked.get("run_up")
+    over = [asked.get("low"), asked.get("high")] if asked.get("over") == FREQUENCY else None
     ends = [ramp.get("start"), ramp.get("stop")] if isinstance(ramp, Mapping) else None
-    for values, unit in ((asked.get("frequency"), 1.0), (asked.get("Omega"), 2 * math.pi), (ends, 1.0)):
+    for values, unit in ((asked.get("frequency"), 1.0), (asked.get("Omega"), 2 * math.pi), (ends, 1.0), (over, 1.0)):
         every = values if isinstance(values, list | tuple) else [values]
         some = [v for v in every if isinstance(v, int | float)]
         if some and min(some) > 0:
@@ -319,6 +387,7 @@ ANALYSIS = Analysis(
     lost="a motion diverged",
     needed="frequency (Hz), Omega (rad/s) or run_up",
     swept=False,
+    options=("over", "low", "high", "points"),
     band=_band,
     unloaded=lambda asked: asked.release is not None,
 )

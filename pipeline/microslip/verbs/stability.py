@@ -15,6 +15,7 @@ from pydantic import BeforeValidator, Field, model_validator
 from .. import sliding
 from ..analysis import Analysis, Answer, Files, Question
 from ..case import CaseSettings, headline
+from ..case.loaded import placed
 from ..case.questions import Pair
 from ..case.settings import GROUND
 from ..data import Array, ComplexArray, ModalBasis
@@ -199,14 +200,21 @@ def moving(
     """Shapes of the fastest `FASTEST` roots that grow and swing, as motions of their bodies; those whose material turns
     are animated, or all where none does."""
     grow = sorted((i for i in growing_ones(found) if found.frequency[i] > 0), key=lambda i: -found.growth[i])
-    from ..pictures.moving import moving_shape
+    from ..pictures import can_draw
+    from ..pictures.moving import assembled_picture, moving_shape
 
-    made = list[Path]()
+    made, every = list[Path](), dict[str, Mapping[str, ComplexArray]]()
     for number, i in enumerate(grow[:FASTEST], 1):
         u = {n: v for n, v in state.shapes(found.roots.x[:, i], bases).items() if bases[n].mesh.n_cells}
-        title = f"{found.frequency[i]:.6g} Hz, grows by {found.growth[i]:.4g} 1/s; size chosen"
+        name = f"{found.frequency[i]:.6g} Hz, grows by {found.growth[i]:.4g} 1/s"
         if u:
-            made += moving_shape(u, bases, found.frequency[i], turned(settings) or u, title, number, folder)
+            of, said = turned(settings) or u, f"{name}; size chosen"
+            made += moving_shape(u, bases, found.frequency[i], of, said, number, folder)
+            every[name] = u
+    if len(next(iter(every.values()), ())) > 1 and can_draw() is None:
+        places = {b.name: placed(b, bases[b.name]) for b in settings.components}
+        picture = folder / "pictures" / "assembled.png"
+        made.insert(0, assembled_picture(every, bases, places, settings.name, picture))
     return made
 
 
