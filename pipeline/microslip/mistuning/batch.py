@@ -32,7 +32,7 @@ from ..interrupts import look
 from ..programs import often
 from ..system.assembly import Assembly
 from .peaks import Highest, Wanted, search
-from .samples import Asked, Sample, SlidingRing, Solutions, ended, on_sweep, sample, worst
+from .samples import Asked, Sample, Solutions, ended, on_sweep, sample, worst
 
 # the compiled program --------------------------------------------------------------------------
 
@@ -178,7 +178,8 @@ def derived(
     values, transform = marching.series()
     for group, (G, law) in enumerate(zip(frame.kinematics, some.laws, strict=True)):
         path, both = _path(frame, some.offset, d[lanes], group, values)
-        one = with_slopes(_of_points(law), path, 1.0, marching.cycles, marching.periodicity, values, transform)[1]
+        still = jnp.zeros_like(path), 1.0, marching.cycles, marching.periodicity  # no law here asks how fast
+        one = with_slopes(_of_points(law), path, *still, values, np.zeros_like(values), transform)[1]
         one = one.reshape(W, W, 3, *both, len(G), 3)  # of force w by motion x along j, along i
         found.append(jnp.einsum("nia,wxjlcni,njb->lcawbx", G, one, G))
     return slope.at[lanes].set(_in_cells(frame, found))
@@ -219,8 +220,8 @@ def _forces(frame: Frame, rings: Rings, at: Lanes, marching: Marching) -> tuple[
     (values, transform), found, kept = marching.series(), [], []
     for group, (G, law, known) in enumerate(zip(frame.kinematics, rings.laws, at.sliders, strict=True)):
         path, both = _path(frame, rings.offset, at.d, group, values)
-        given = 1.0, marching.cycles, marching.periodicity, transform, known
-        force, known = near(_of_points(law), path, *given)
+        still = jnp.zeros_like(path), 1.0, marching.cycles, marching.periodicity
+        force, known = near(_of_points(law), path, *still, transform, known)
         found.append(jnp.einsum("nia,wilcn->lcaw", G, force.reshape(len(force), 3, *both, len(G))))
         kept.append(known)
     return _in_cells(frame, found).reshape(at.d.shape), tuple(kept)
@@ -549,8 +550,6 @@ class Batch:
         """Of a ring that has ended; matrices: (K, 3, m, m)."""
         top = one.highest
         assert top is not None
-        if not np.isfinite(top.amplitude):
-            return Sample(one.sample, top, on_sweep(self.asked, top), alone=True)
         rows, _, load, *_ = self.still
         first = self.marching.harmonics.index(1)
         F = np.asarray(_amplitudes(one.known[top.frequency].slope)[..., first]).ravel()
@@ -558,8 +557,7 @@ class Batch:
         M, K, C = matrices.swapaxes(0, 1)
         given = load[:, 1] - np.einsum("jam,ja->jm", rows, F[self.frame.felt] * self.frame.given[..., first])
         motions = np.linalg.solve(K - w**2 * M + 1j * w * C, given[..., None])[..., 0]
-        alone = "alone" in vars(one)
-        return Sample(one.sample, top, on_sweep(self.asked, top), *worst(one.ring, list(motions)), alone=alone)
+        return Sample(one.sample, top, on_sweep(self.asked, top), *worst(one.ring, list(motions)), alone=False)
 
     @cached_property
     def unit(self) -> Array:
@@ -569,22 +567,6 @@ class Batch:
     @cached_property
     def felt_of_gap(self) -> int:
         return self.frame.driven.shape[1]
-
-    def of_sides(self, one: _Way, point: Point) -> Array:
-        """(size,) x of `Problem` from a solution of the batch."""
-        p, (K, r), marching = self.problem, self.frame.felt.shape, self.marching
-        ring = jax.tree_util.tree_map(lambda x: x[one.number : one.number + 1], one.every)
-        force = _excess(point.slope, ring.preload[0], marching)
-        g = force.reshape(-1, len(marching.harmonics))[self.frame.felt] * self.frame.given
-        C, d = _of_blades(ring, np.array([point.Omega]), marching)
-        v = np.zeros((p.coefficients, K, r))
-        away = d[0] - (C[0] * g[:, None]).sum(axis=2)
-        v[marching.columns] = np.moveaxis(_coefficients(away[:, :r], len(marching.columns) % 2), -1, 0)
-        x = np.zeros((p.coefficients, p.count))
-        for blade, own in enumerate(self.sides):
-            felt = p.begins[blade] + np.concatenate([at for *_, at in own])
-            x[:, felt] = v[:, blade, : len(felt)]
-        return np.asarray(x / p.scale).ravel()
 
     def of_gaps(self, problem: Problem, point: Point) -> tuple[Array, Array]:
         """(N, q, W) motions from a solution of `Problem`, and forces."""
@@ -611,7 +593,8 @@ class _Way(Solutions):
         batch. every: numbers of all rings. number, sample: its own among those, and of the ensemble. ring. asking: see
             `peaks.search`. wanted: what it asks for now, None: its peak, solved to the end. behind: of how many points
             the start is carried on, where a solution is followed. amplitudes: Hz -> (w,). top: the highest so far.
-            highest: the answer. alone: the ring for the solver of single ones, once it is needed.
+            highest: the answer. hard: whether it is left to the solver of single rings: beside a jump, or without a
+            solution.
     """
 
     def __init__(self, batch: Batch, every: Rings, number: int, sample: int, ring: Assembly) -> None:
@@ -622,17 +605,13 @@ class _Way(Solutions):
         self.amplitudes: dict[float, Array] = {}
         self.behind, self.top = 0, 0.0
         self.highest: Highest | None = None
+        self.hard = False
 
     @property
     def frequency(self) -> float:
         """Hz, at which it is."""
         assert self.wanted is not None or self.highest is not None
         return self.wanted.frequency if self.wanted else self.highest.frequency  # type: ignore[union-attr]
-
-    @cached_property
-    def alone(self) -> SlidingRing:
-        asked = self.batch.asked
-        return SlidingRing(asked.problem(self.ring), asked.tuned_points)
 
     def start(self) -> Array:
         """(size,) from what is known."""
@@ -647,31 +626,29 @@ class _Way(Solutions):
 
     def goes_on(self, point: Point | None, y: Array) -> bool:
         """Whether there is more to solve in a lane, by the solution at the frequency, None where there is none."""
-        f = self.frequency
         if self.wanted is None:
-            if point is None:
-                y = self._alone().ended(f)
-                self._taken(f)
-            else:
-                self.known[f] = point
             assert self.highest is not None
-            self.highest = ended(self.highest, y)
+            self.hard = point is None
+            if point is not None:
+                self.known[self.frequency] = point
+                self.highest = ended(self.highest, y)
             return False
-        answer: Any
+        f = self.frequency
+        answer: Any = None
         if self.wanted.onward is None:
-            if point is None and not self.wanted.at_once:
-                found = self._alone()(f)
-                answer = None if found is None else self._taken(f)
-            else:
-                answer = None if point is None else self._kept(point, y)
+            if point is not None:
+                answer = self._kept(point, y)
+            elif not self.wanted.at_once:
+                self.hard = True
+                return False
         elif point is not None and not y.max() <= self.amplitudes.get(f, np.zeros(1)).max():
             answer = [(f, self._kept(point, y))], False
         elif self.behind > 1:
             self.behind -= 1
             return True
         elif self.wanted.onward[2]:
-            points, ends = self._alone().follow(f, *self.wanted.onward)
-            answer = [(at, self._taken(at)) for at, _ in points], ends
+            self.hard = True
+            return False
         else:
             answer = [], False
         return self._asks(answer)
@@ -681,27 +658,14 @@ class _Way(Solutions):
             self.wanted, self.behind = self.asking.send(answer), 0
         except StopIteration as found:
             self.wanted, self.highest = None, found.value
-            return bool(np.isfinite(self.highest.amplitude))
+            self.hard = not np.isfinite(self.highest.amplitude)
+            return not self.hard
         if self.wanted.onward:
             self.behind = min(2, len(self.beyond(self.frequency, self.wanted.onward[0])))
         return True
 
     def _kept(self, point: Point, y: Array) -> Array:
         self.known[self.frequency], self.amplitudes[self.frequency] = point, y
-        return y
-
-    def _alone(self) -> SlidingRing:
-        """The solver of single rings, told what is known."""
-        for f in self.known.keys() - self.alone.known.keys():
-            self.alone.known[f] = Point(self.known[f].Omega, self.batch.of_sides(self, self.known[f]))
-        return self.alone
-
-    def _taken(self, f: float) -> Array:
-        """What that has found."""
-        point = self.alone.known[f]
-        d, force = self.batch.of_gaps(self.alone.problem, point)
-        self.known[f] = Point(point.Omega, (d / self.batch.unit).ravel(), slope=force)
-        self.amplitudes[f] = y = self.alone.ended(f)
         return y
 
 
@@ -713,7 +677,7 @@ def unknown_of(batch: Batch, rings: Rings) -> tuple[Any, ...]:
 
 
 def solved(batch: Batch, numbers: Sequence[int]) -> list[Sample]:
-    """Samples; what is hard of them by the solver of single rings."""
+    """Samples; hard ones by the solver of single rings."""
     lanes = _Run(batch, numbers)
     while lanes.filled():
         look()
@@ -808,7 +772,8 @@ class _Run:
                     way.top = float(Y.max())
                     keep.append(lane)
             if not way.goes_on(point, Y):
-                self.found[way.number] = self.batch.sample(way, self.matrices[way.number])
+                if not way.hard:
+                    self.found[way.number] = self.batch.sample(way, self.matrices[way.number])
                 self.lanes[lane] = None
             elif not small:
                 anew.append(lane)
