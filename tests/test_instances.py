@@ -113,7 +113,7 @@ def test_first_order_bricks_lock_as_far_as_is_told(tmp_path, monkeypatch, capsys
         ("*End Assembly\n", "", "the *ASSEMBLY has no *END ASSEMBLY before the end"),
         ("*Assembly, name=Assembly\n", "", "the *INSTANCE stands outside of an *ASSEMBLY"),
         ("name=Root-1, part=Root", "name=Root-1", "names no PART and has no nodes"),
-        ("40.0, 5.0, 1.0", "40.0, nan, 1.0", "a number that is not finite"),
+        ("40.0, 5.0, 1.0", "40.0, nan, 1.0", "not finite"),
     ],
 )
 def test_wrong_assemblies_are_told_with_file_and_line(tmp_path, monkeypatch, capsys, old, new, text):

@@ -353,7 +353,7 @@ DAMAGED_INP = {
     "a word in a cell": ("31, 32, 33, 34\n*ELEMENT", "31, 32, x, 34\n*ELEMENT", "no whole number"),
     "a word in a node": ("12, 1., 0., 0.", "12, 1., x, 0.", "no number"),
     "a line without number": ("  12, 1., 0., 0.", "  , 1., 0., 0.", "a line without a number"),
-    "not a number": ("12, 1., 0., 0.", "12, 1., nan, 0.", "three finite numbers"),
+    "not a number": ("12, 1., 0., 0.", "12, 1., nan, 0.", "not finite"),
     "another system": ("*NODE, NSET=NALL", "*NODE, SYSTEM=Q", "SYSTEM=Q is not read"),
     "mapped nodes": ("*ELEMENT, TYPE=C3D8R", "*NMAP\n0., 0., 0.\n*ELEMENT, TYPE=C3D8", "*NMAP"),
     "odd cells": ("*ELEMENT, TYPE=S4", "*ELEMENT, TYPE=C3D5\n9, 11, 12, 13, 14, 21\n*ELEMENT, TYPE=S4", "element 9 is"),

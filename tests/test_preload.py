@@ -120,7 +120,7 @@ def squeezed():
     )  # fmt: skip
     centre = BLOCK.points.mean(axis=0)
     motions = rigid.free_motions(BLOCK.points, centre, fixed)
-    state = pressed_state(model, motions, centre, "nonlinear", "auto", lambda _: None)
+    state = pressed_state(model, motions, centre, "nonlinear", settings.modes, lambda _: None)
     return settings, model, state, centre
 
 

@@ -19,7 +19,7 @@ from microslip.cli import main
 from microslip.data import ContactState, Mesh
 from microslip.elasticity import isotropic
 from microslip.fem.contact import Grip, Plane, coupled_points, make_pair
-from microslip.fem.discretise import REDUCED, discretise, face_blocks, free_upper
+from microslip.fem.discretise import RULES, discretise, face_blocks, free_upper
 from microslip.fem.loads import pressure
 from microslip.fem.operators import stiffness
 from microslip.linalg import eigen
@@ -28,6 +28,7 @@ from microslip.rolling.tyre import Brush, TyreAnswer, fitted, jump, parabola, re
 from microslip.stages.job import open_job
 from microslip.stages.modal import modes_stage
 
+REDUCED = RULES["reduced"]
 ROOT = Path(__file__).parents[1]
 BRUSH = Brush(parabola(20), 0.012, 2e4, 1.0, 0.04)
 PASS = BRUSH.length / BRUSH.speed

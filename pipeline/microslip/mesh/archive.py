@@ -104,7 +104,8 @@ class Archive:
         kinds: number of a type -> Ansys's element. options: number of a type -> number of a KEYOPT
             -> its value.
         components: of nodes. groups: of elements.
-        places: of equations, by name. rigid: master, slaves, directions, place. spread: RBE3, likewise with weights.
+        places: of equations, by name. primes: first nodes of CP, by number and label.
+        rigid: master, slaves, directions, place. spread: RBE3, likewise with weights.
         current: of elements that follow: TYPE, REAL, MAT, ESYS, and CSYS. selected: numbers of the nodes that are
             chosen, None: all. chosen: the component that they are. unread: a selection that is not read. picked,
             unread_cells: those of elements.
@@ -141,6 +142,7 @@ class Archive:
     reference: float | None = None
     held: Constraints = field(default_factory=Constraints)
     equations: dict[str, list[tuple[int, str, float]]] = field(default_factory=dict)
+    primes: dict[tuple[str, str], str] = field(default_factory=dict)
     rigid: list[tuple[int, list[int], str, str]] = field(default_factory=list)
     spread: list[tuple[int, list[int], list[float], str, str]] = field(default_factory=list)
     open: str = ""

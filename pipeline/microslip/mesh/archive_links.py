@@ -72,6 +72,7 @@ def _equation(archive: Archive, words: list[str]) -> None:
             number, constant, terms = archive.open, "", words[3:]
     else:
         number, constant, *terms = words[1:]
+        number = _numbered(archive, "CE", number)
     if constant and real(constant, "CE") != 0:
         raise Damaged(
             f"the constraint equation CE {number} has the constant {constant}; only 0 is read"
@@ -86,6 +87,15 @@ def _equation(archive: Archive, words: list[str]) -> None:
                     f"the constraint equation CE {number} takes in {label or 'nothing'} of node {node}"
                 )
             found.append((whole(node, "CE"), LABELS[label.upper()], real(factor, "CE")))
+
+
+def _numbered(archive: Archive, command: str, number: str) -> str:
+    """The number of a set, which may be NEXT, or HIGH: the highest there is."""
+    if number.upper() in ("NEXT", "HIGH", ""):
+        first = (name.split()[1].rstrip(",") for name in archive.equations if name.startswith(f"{command} "))
+        highest = max((int(text) for text in first if text.isdecimal()), default=0)
+        return str(max(1, highest + (number.upper() != "HIGH")))
+    return number
 
 
 def _coupled(archive: Archive, words: list[str]) -> None:
@@ -110,6 +120,9 @@ def _coupled(archive: Archive, words: list[str]) -> None:
         raise Damaged(
             f"CP {number} couples other things than {label or 'UX'} of two nodes or more; use CE"
         )
+    number = _numbered(archive, "CP", number)
+    prime = archive.primes.setdefault((number, label.upper()), nodes[0])  # more nodes of a set join its first one
+    nodes = [prime, *(node for node in nodes if node != prime)]
     for node in nodes[1:]:
         for way in ways:
             terms = [(whole(nodes[0], "CP"), way, 1.0), (whole(node, "CP"), way, -1.0)]
@@ -123,8 +136,9 @@ _RIGID = {"": "xyzabc", "ALL": "xyzabc", "UXYZ": "xyz", "RXYZ": "abc"}
 def _rigid(archive: Archive, words: list[str]) -> None:
     """CERIG, master, slave node or component, directions."""
     master, slave, label = words[1:4]
-    ways = _RIGID.get(label.upper(), LABELS.get(label.upper(), "?"))
-    if ways == "?" or slave == "":
+    labels = [label, *(word for word in words[4:8] if word)]
+    ways = "".join(_RIGID.get(word.upper(), LABELS.get(word.upper(), "?")) for word in labels)
+    if "?" in ways or slave == "":
         raise Damaged(
             f"CERIG,{master},{slave},{label} is not read; name one node or component, and ALL, UXYZ or UX"
         )

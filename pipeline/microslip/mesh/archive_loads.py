@@ -142,9 +142,10 @@ def _on_nodes(archive: Archive, words: list[str]) -> None:
         for face, corners in sides(archive, element).items():
             if len({*corners}) > 2 and there.issuperset(corners) and (face == 1 or not surface):
                 at.setdefault(frozenset(corners), []).append((element.number, face))
+    skins = {e.number for e in archive.elements if archive.kinds.get(e.kind, 0) in SURFACES}
     for places in at.values():
-        kinds = {number for number, _ in places}
-        if len(kinds) == 1:
+        places = [place for place in places if place[0] in skins] or places
+        if len({number for number, _ in places}) == 1:
             archive.acting.faces[places[0]] = [value], archive.where
     if not at:
         archive.leave_out(f"SF,{words[1]},PRES finds no face of the chosen elements; it")
@@ -297,13 +298,9 @@ def _perturbed(archive: Archive, words: list[str]) -> None:
     archive.analysis = words[1].upper()[:5] or "MODAL"
     archive.perturbed = archive.perturbed or 0
     kept = words[4].upper()
-    if kept in ("NOKEEP", "INERKEEP"):
+    if kept == "NOKEEP":
         archive.held.clear()
-    elif kept == "DZEROKEEP":
-        for (node, way), (value, _) in archive.acting.moved.items():
-            if value.strip("0."):
-                archive.held.release({node}, {way}, archive.components)
-    elif kept not in ("", "ALLKEEP"):
+    elif kept not in ("", "ALLKEEP", "INERKEEP", "PARKEEP", "DZEROKEEP"):  # which keep what is held
         archive.leave_out(f"PERTURB with {kept}, which changes supports after the loads,")
 
 
@@ -498,7 +495,8 @@ class _Acting:
                 self._left(place, "acts along tangents or a vector (faces 2 to 5 of SURF154)")
                 return
             values = sign * values
-        solid[tuple(at.tolist())] = values, where
+        key = tuple(at.tolist())  # several surface elements may lie on a face
+        solid[key] = values + (solid[key][0] if key in solid else 0.0), where
 
     def _left(self, place: str, what: str) -> None:
         self.raw.lost.append(f"{place} {what}: left out, {_IMPORTANT}")

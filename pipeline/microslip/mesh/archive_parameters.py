@@ -192,11 +192,12 @@ def _macro(archive: Archive, words: list[str]) -> None:
     raise Damaged("*CREATE has no *END, the file is truncated")
 
 
-def _nothing(archive: Archive, words: list[str]) -> None:
-    """Commands that change no frequency."""
+def _got(archive: Archive, words: list[str]) -> None:
+    """*GET, parameter: its value comes from the program's database; what it was before does not stand any more."""
+    archive.parameters.pop(words[1].upper(), None)
 
 
 COMMANDS: dict[str, Command] = {
-    "*SET": _set, "*DIM": _dimension, "*TAXIS": _axis, "*GET": _nothing,
+    "*SET": _set, "*DIM": _dimension, "*TAXIS": _axis, "*GET": _got,
     "*CREATE": _macro,
 }  # fmt: skip

@@ -33,8 +33,10 @@ def _read_boundary(deck: Deck, card: Card) -> None:
         words = [word.strip() for word in line.split(",")] + 3 * [""]
         try:
             directions = _HELD.get(words[1].upper()) or _directions(words)
-            if words[3] and real(words[3], "*BOUNDARY"):
-                moved.lines.append(line)
+            value = real(words[3] or "0", "*BOUNDARY")
+            if value or any(before.keyword == "BOUNDARY" for *_, before in deck.steps.acting):
+                ways = ("xyzabc".index(way) + 1 for way in directions)
+                moved.lines += [f"{words[0]},{way},,{value!r}" for way in ways]
             deck.held.append((words[0].strip('"'), directions, card.place))
         except ValueError:
             deck.not_held.append(f"the line '{line[:60]}' of *BOUNDARY")
@@ -110,6 +112,9 @@ def local_supports(deck: Deck, numbering: Numbering) -> list[Link]:
 def _read_temperature(deck: Deck, card: Card, column: int = 1) -> None:
     if "FILE" in card.parameters or "BSTEP" in card.parameters:
         raise Damaged("*TEMPERATURE reads from a results file; write the temperatures out")
+    if column and deck.steps.perturbed and deck.steps.static is not None:
+        deck.lost.append(lost(card.where, "*TEMPERATURE of a step with PERTURBATION"))
+        return
     factor = deck.steps.factor(card)
     for line in card.lines:
         words = fields(line)

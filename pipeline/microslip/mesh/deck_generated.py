@@ -8,7 +8,7 @@ import numpy as np
 
 from ..data import Array, Indices
 from ..frames import rotation
-from .cards import Card, fields, numbers
+from .cards import Card, numbers
 from .deck import Cells, Deck, Readers
 from .instances import placement
 from .raw import Damaged, is_number, real
@@ -164,7 +164,7 @@ def _read_elgen(deck: Deck, card: Card) -> None:
     """Rows, layers and blocks of cells like one."""
     more = deck.spaces[""].cells
     for line in card.lines:
-        words = [*fields(line), *10 * [""]]
+        words = [*(word.strip() for word in line.split(",")), *10 * [""]]
         master = _whole(words[0], "*ELGEN") + more
         parts: list[Indices] = []
         for cells in _with(deck, np.array([master])):

@@ -230,7 +230,9 @@ class _Acting:
         if card.keyword == "DSLOAD":
             self._on_surface(number, factor, card, word, label, [w for w in more if w])
             return
-        numbers = [real(w, f"*{card.keyword}") for w in more if w]
+        while more and not more[-1]:
+            more.pop()
+        numbers = [real(w or "0", f"*{card.keyword}") for w in more]
         chosen = self.deck.cells_for(f"*{card.keyword}", word, card.space) if word else None
         where = f"{card.where}: *{card.keyword}, {label}"
         if label in ("P1", "P2", "P3", "P4", "P5", "P6") and chosen is not None:

@@ -55,7 +55,8 @@ def still_supports(raw: RawMesh, held: Constraints, numbering: Numbering) -> dic
     the same. What of it is skewed, or not read, is told."""
     still = replace(raw, supports={}, links=list(raw.links), not_held=[], lost=raw.lost)
     add_supports(still, held, numbering, "held at rest")
-    if (more := len(still.links) - len(raw.links)) or still.not_held:
+    guides = sum(isinstance(link, Guide) for link in raw.links)
+    if (more := abs(len(still.links) - len(raw.links) - guides)) or still.not_held:
         number = more or len(still.not_held)
         raw.lost.append(
             f"{number} supports of the static step are not read: frequencies may differ"

@@ -108,9 +108,8 @@ def _rest(b: Prepared, speed: float, start: StaticState | None, report: Report) 
     if b.still is None:
         within = balanced(b.model, b.floats(0), b.solver)
         return equilibrium(b.model, speed, prestress, within, start, report)
-    solver = new_solver(
-        b.settings.modes.solver
-    )  # the other one keeps its analysis of what the modes leave free
+    modes = b.settings.modes  # the other solver keeps its analysis of what the modes leave free
+    solver = new_solver(modes.solver, modes.ranks)
     try:
         return equilibrium(b.still, speed, prestress, solver, start, report)
     finally:

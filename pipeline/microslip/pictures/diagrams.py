@@ -78,6 +78,11 @@ def end_labels(axes: Axes, labels: list[Label], last: float, top: float) -> None
 # nodal diameters ---------------------------------------------------------------------------------
 
 
+def _rpm(basis: ModalBasis, number: int) -> str:
+    """A speed of the body by its number."""
+    return rpm_text(basis.groups[number, harmonics_of(basis)[0]].speed)
+
+
 def nodal_diameter_plot(basis: ModalBasis, figure: Figure) -> None:
     """Frequency over nodal diameter at the lowest and the highest speed, one line a family."""
     (axes,) = panels(figure, (8.6, 6.0))
@@ -91,7 +96,7 @@ def nodal_diameter_plot(basis: ModalBasis, figure: Figure) -> None:
     axes.set_title(f"{basis.name}: nodal diameters of {basis.sectors} sectors", fontweight="bold")
     note = "lines join modes of the same shape (MAC)"
     if len(shown) > 1:
-        first, last = (rpm_text(found.speed) for found in shown)
+        first, last = (_rpm(basis, s) for s in ends)
         note = f"filled: at {first}; hollow: at {last}; {note}"
     note_below(axes, note, -0.11, wrap=True)
 
@@ -147,7 +152,7 @@ def stuck_plot(basis: ModalBasis, figure: Figure) -> None:
     _nodal_frame(axes, basis, found, top)
     kept = any(c.modes == "closed" and c.sector_shift for c in basis.groups[speed, harmonics[0]].contacts.values())
     apart, state = ("sliding", "closed along their normal") if kept else ("apart", "open")
-    axes.set_title(f"{basis.name}: neighbours {apart} and stuck, {rpm_text(found.speed)}", fontweight="bold")
+    axes.set_title(f"{basis.name}: neighbours {apart} and stuck, {_rpm(basis, speed)}", fontweight="bold")
     note = f"lines: contacts {state}; black squares: the contact '{name}' and its neighbour do not move on each other"
     note_below(axes, note, -0.11, wrap=True)
 
@@ -192,7 +197,7 @@ def _safe_panel(axes: Axes, basis: ModalBasis, speed: int, orders: Sequence[int]
     _others(axes, basis, speed, found, top)
     _close_ones(axes, margins(basis, speed, orders, CLOSE), top)
     _nodal_frame(axes, basis, found, top)
-    axes.set_title(rpm_text(found.speed), fontsize=11)
+    axes.set_title(_rpm(basis, speed), fontsize=11)
 
 
 def _safe_ceiling(found: Families, orders: Sequence[int], turns: float) -> float:

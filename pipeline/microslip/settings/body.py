@@ -542,6 +542,8 @@ class _Attached(Model):
     @model_validator(mode="after")
     def _one_place(self) -> _Attached:
         only_one(self, "face", "point")
+        if self.face == GROUND:
+            raise ValueError("face: the ground is no face; name one of the body")
         if self.point is not None and self._turned():
             raise ValueError("a point does not turn: centre, inertia and rotational need a face")
         return self
