@@ -182,6 +182,9 @@ def test_a_pressure_is_said_in_many_ways(kind):
         forms += [
             [*surface(mesh, "z1"), *select],
             [*surface(mesh, "z1", turned=True), "SFE,ALL,1,PRES,1,-20"],
+            [*surface(mesh, "z1"), "ALLSEL", *nodes],  # of both that lie there once
+            [*surface(mesh, "z1"), *(line.replace("  90", "  91") for line in surface(mesh, "z1")),
+             "SFE,ALL,1,PRES,1,10"],
             ["SFE,1,6,PRES,1,R5.0", " 20. 20. 20. 20.", "SFE,2,6,PRES,,20", "SFE,2,1,PRES,2,9"],
             [*block, *rows, "SFE,end,LOC,       -1,"],
         ]

@@ -405,3 +405,20 @@ def test_reduced_integration_is_asked_for_by_the_archive(capsys):
     Path("bar.cdb").write_text(bar)
     read = read_mesh("bar.cdb", "mm", "mm-t-s")
     assert read.integration == "full" and "4 bricks have no neighbours in two directions" in read.remarks[0]
+
+
+def test_constraints_go_on_in_later_commands():
+    """Nodes of a CP set that is named again join it; CE,NEXT is another equation and CE,HIGH more of the last one;
+    CERIG has up to five directions."""
+    mesh = block((2, 1, 1))
+    a, b, c, d = (mesh.node_id[i] for i in range(4))
+    lines = [f"CP,1,UZ,{a},{b}", f"CP,1,UZ,{c},{d}", f"CE,1,0,{a},UX,1,{b},UX,-1", f"CE,NEXT,0,{c},UX,1,{d},UX,-1",
+             f"CE,HIGH,0,{a},UX,3"]  # fmt: skip
+    Path("a.cdb").write_text(ended(archive(mesh, ("x0",)), *lines))
+    links = read_mesh("a.cdb", "mm").links.items
+    terms = [[*zip(link.nodes.tolist(), link.factors.tolist(), strict=True)] for link in links]
+    pairs = [[(0, 1), (node, -1)] for node in (1, 2, 3, 1)]
+    assert terms == [*pairs, [(2, 1), (3, -1), (0, 3)]]
+    Path("a.cdb").write_text(ended(archive(mesh, ("x0",)), f"CERIG,{a},{b},UX,UZ,,,ROTY"))
+    *_, link = read_mesh("a.cdb", "mm").links.items
+    assert {*link.directions} == {*"xzb"}

@@ -125,6 +125,17 @@ def test_loads_of_several_steps_and_their_amplitudes(steps, before, pull):
     np.testing.assert_allclose(along, 8 * pull, rtol=1e-12)
 
 
+def test_a_displacement_is_taken_back_and_fields_may_be_blank():
+    """0.1 mm of the first step is 0 in the second; weight along -z, of a line whose second number is blank."""
+    first = static("*BOUNDARY", "x1, 3, 3, 0.1")
+    second = static("*BOUNDARY", "x1, 3, 3, 0.", "*DLOAD", "EALL, GRAV, 9810., , 0., -1.")
+    Path("a.inp").write_text(deck(BRICK, *first[:-1], "*END STEP", *second))
+    state = read_mesh("a.inp", "mm", "mm-t-s").state
+    assert state is not None
+    (weight,) = state.loads
+    np.testing.assert_allclose(weight.acceleration, [0.0, 0.0, -9.81], rtol=1e-12)
+
+
 @pytest.mark.parametrize(
     ("load", "line"),
     [
