@@ -55,6 +55,28 @@ def test_at_a_pitchfork_the_other_equilibria_are_followed() -> None:
     np.testing.assert_allclose(sorted(other.x[[0, -1], 0, 0]), [-np.sqrt(2), np.sqrt(2)])
 
 
+def lorenz() -> Dynamics:
+    """Of Lorenz with 10 and 8/3: the equilibria off zero lose their stability at 10 (10 + 8/3 + 3) / (10 - 8/3 - 1)."""
+
+    def rate(x: Any, p: Any, _: Any) -> Any:
+        return jnp.stack([10 * (x[1] - x[0]), x[0] * (p - x[2]) - x[1], x[0] * x[1] - 8 / 3 * x[2]])
+
+    return Dynamics(rate, ("x", "y", "z"), np.array([10.0, 10.0, 20.0]), 28.0)
+
+
+def test_hopf_points_of_a_branch_that_crosses_are_found() -> None:
+    found = diagram(lorenz(), np.zeros(3), DiagramPlan(0.1, 30.0, orbits=False, branches=1))
+    np.testing.assert_allclose([h.p for h in found.hopf], 2 * [470 / 19], rtol=1e-6)
+
+
+@pytest.mark.slow
+def test_orbits_whose_period_grows_at_one_parameter_end_beside_a_homoclinic_one() -> None:
+    """Those born at Lorenz's Hopf points do so at 13.926 (Sparrow, The Lorenz Equations, 1982)."""
+    start = np.array([np.sqrt(72.0), np.sqrt(72.0), 27.0])
+    _, cycles = diagram(lorenz(), start, DiagramPlan(5.0, 28.0, doublings=0)).branches
+    assert cycles.ended.startswith("near a homoclinic orbit") and "13.926" in cycles.ended
+
+
 def test_from_a_centre_the_cycles_of_van_der_pol_are_found() -> None:
     """x'' - mu (1 - x^2) x' + x = 0: at mu = 0 orbits of every size, of which that of amplitude 2 goes on as the limit
     cycle; its period is 7.6298745 at mu = 2."""

@@ -167,6 +167,7 @@ def test_between_its_folds_a_curve_is_unstable_and_dashed() -> None:
     inside = np.arange(turns[0] + 1, turns[1])
     assert not curve.stable[inside].any() and np.delete(curve.stable, inside).all()
     assert list(curve.bifurcations) == ["fold"]
+    assert curve.plot(c="k", ls=":").lines[0].get_color() == "k"
     solid, dashed = (line.get_xydata() for line in curve.plot().lines[:2])
     assert np.isnan(solid[:, 1]).any()
     assert dashed[np.isfinite(dashed[:, 1]), 0].min() >= curve.folds.min() - 1e-3

@@ -46,6 +46,7 @@ def curves(file: Path) -> dict:
         ("law.damping=0,0.1, 0.2", ["0", "0.1", "0.2"]),
         ("sweep.normal_forces=[1,2],[3]", ["[1,2]", "[3]"]),
         ('law.kind="point,a","b"', ['"point,a"', '"b"']),
+        ("k=[[1,2],[3,4]],[[1,2],[3,5]]", ["[[1,2],[3,4]]", "[[1,2],[3,5]]"]),
         ("friction={mu=0.1,kind=1},{mu=0.2}", ["{mu=0.1,kind=1}", "{mu=0.2}"]),
     ],
 )
@@ -53,7 +54,7 @@ def test_values_are_parted_at_commas_outside_brackets(text: str, values: list[st
     assert values_of(text) == (text.partition("=")[0], values)
 
 
-@pytest.mark.parametrize("text", ["law.damping", "law.damping=0.1", "law.damping=0.1,0.1", "=1,2", "law.damping="])
+@pytest.mark.parametrize("text", ["law.damping", "law.damping=0.1", "law.damping=0.1,0.1", "=1,2", "law.damping=", "k=1,,2", "name=a,b"])
 def test_less_than_two_values_are_refused(text: str) -> None:
     with pytest.raises(UserError) as told:
         values_of(text)

@@ -315,6 +315,9 @@ def follow(
     found = tuple(families.with_peaks(family, one) for one in found)
     judged = [families.with_stability(family, one, report) for one in found] if stability else []
     found = tuple(one for one, _ in judged) or found
+    if any(p.kind == "branch point" for one in found for p in one.points):
+        text = "a multiplier passes 1 where there is no fold: a branch point, if it is there with more harmonics too"
+        _warn("follow", [text])
     family = replace(family, unit=family.unit * hertz, words=unit) if over == "frequency" else family
     points = [p for one in found for p in one.points]
     _warn("follow", fed(problem.assembly))

@@ -316,6 +316,8 @@ def contact(
         def one(own: list[str], folder: Path | None) -> Written:
             return contact_stage(file, own, folder, report)
 
+        if vary and output:
+            raise UserError("each value has a folder of its own; leave one of the two out", "--output with --vary")
         found = _varied(file, vary, set_, one, report) if vary else one(list(set_), output)
     _tell(found, quiet, "")
 

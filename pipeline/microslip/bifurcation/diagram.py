@@ -136,9 +136,11 @@ def diagram(
     else:
         still = work.add(EQUILIBRIA, lambda: _equilibria(system, x, asked))
         _branched(work, still, asked.branches)
-        points = tuple(_hopf(system, still, i) for i in still.of_kind("Hopf"))
-        if asked.orbits:
-            _orbits(work, still, points)
+        for branch in [b for b in work.found if b.still]:
+            begun = tuple(_hopf(system, branch, i) for i in branch.of_kind("Hopf"))
+            points += begun
+            if asked.orbits:
+                _orbits(work, branch, begun)
     for branch in [b for b in work.found if not b.still]:
         _branched(work, branch, asked.branches)
     return Diagram(system, tuple(work.found), points, tuple(work.seen), tuple(work.deflated), tuple(work.messages))

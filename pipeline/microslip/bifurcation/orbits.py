@@ -37,6 +37,7 @@ class OrbitPoint:
 
 
 CENTRE = "centre: orbits of every size are at one value of the parameter"
+HOMOCLINIC = "near a homoclinic orbit: the period grows at one value of the parameter"
 
 EVERY = 100
 """Orbits at one value of the parameter that are enough to say so."""
@@ -98,7 +99,7 @@ def follow(problem: Shooting, state: State, settings: Settings) -> Iterator[tupl
     The phase of every step counts from the orbit before it, so that no orbit is too far from the reference.
     """
     previous = None
-    here, met = _found(problem, state.y, "start"), list[float]()
+    here, met = _found(problem, state.y, "start"), list[PeriodicOrbit]()
     yield [here] if not state.status else [], state.status
     while not state.status:
         previous, state = state, advance(problem, state, settings)
@@ -110,9 +111,12 @@ def follow(problem: Shooting, state: State, settings: Settings) -> Iterator[tupl
         passed = _passed(problem, previous, state, here, last, settings) if points else []
         passed = [one for one in passed if settings.low <= one.orbit.p <= settings.high]
         ended = state.status or _collapsed(problem, here.orbit, last.orbit)
-        met = [*met, last.orbit.p][-EVERY:]
-        if not ended and len(met) == EVERY and np.ptp(met) <= 1e-8 * problem.system.parameter_scale:
-            ended = f"{CENTRE}, {last.orbit.p:.6g}"
+        met = [*met, last.orbit][-EVERY:]
+        still = np.ptp([of.p for of in met]) <= 1e-8 * problem.system.parameter_scale
+        if not ended and len(met) == EVERY and still:
+            first, size = met[0], [np.ptp(of.x, axis=0).max() for of in met]
+            grows = size[-1] > 1.05 * size[0] or last.orbit.period < 1.05 * first.period
+            ended = f"{CENTRE if grows else HOMOCLINIC}, {last.orbit.p:.6g}"
         if ended == COLLAPSED:
             yield [], ended
             return

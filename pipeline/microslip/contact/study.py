@@ -331,7 +331,8 @@ class Study:
             "depth_m": R * worn.depth[rows].ravel(),
             "pressure_Pa": scale * worn.pressure[rows].ravel(),
         }
-        self.told.append(("worn volume", self._sized(1e9 * coefficient * energy[-1], "mm³")))
+        cubes = 1.0 if self.contact.file.dimensionless else 1e9
+        self.told.append(("worn volume", self._sized(cubes * coefficient * energy[-1], "mm³")))
         new, old = (f"{100 * share[i]:.4g} %" for i in (0, -1))
         self.told.append(("area in contact, new and worn", f"{new} and {old}"))
 

@@ -282,6 +282,9 @@ CRITICAL: dict[Kind, Callable[[ComplexArray], float]] = {
 LOCATED = 1e-5
 """Share of a step to which such a place is located."""
 
+CROSSED = 1e-2
+"""How near the unit circle a multiplier is there; one further away has met another one, and crosses nothing."""
+
 
 def with_stability(
     family: Family, branch: Branch, report: Report = lambda _: None
@@ -313,6 +316,7 @@ def with_stability(
         for kind, test in CRITICAL.items() if last >= 0 else ():
             before, after = test(judged[last].multipliers), test(one.multipliers)
             beside = any(q.kind == "fold" for q in points[max(last - 1, 0) : i + 2])
+            beside |= points[last].tangent[-1] * p.tangent[-1] < 0  # one that was not located
             if before * after >= 0 or (kind == "branch point" and beside):
                 continue
             first = points[last]
@@ -326,9 +330,12 @@ def with_stability(
                 y, t = continuation.root(equations, segment, ALONG, value, LOCATED)
             except Lost:
                 continue
+            place = of_place(y, t)
+            if abs(test(place.multipliers)) > CROSSED:
+                continue  # it has only ceased to be real
             x, lam = y[:-1] * equations.x_scale, float(y[-1]) * equations.lam_scale
             out.append(OnCurve(x, lam, kind, False, first.arclength + norm(y - begin), t, 0))
-            told.append(of_place(y, t))
+            told.append(place)
         out, told, last = [*out, p], [*told, one], i
     return replace(branch, points=tuple(out)), told
 

@@ -304,6 +304,10 @@ class Series:
             import matplotlib.pyplot as plt
 
             axes = plt.subplots(layout="constrained")[1]
+        from matplotlib.cbook import normalize_kwargs
+        from matplotlib.lines import Line2D
+
+        line = normalize_kwargs(line, Line2D)  # c is color, ls is linestyle
         a = self.harmonics(readout)
         numbered("harmonic", harmonic, a.shape[1], "harmonic")
         a = a[:, harmonic]

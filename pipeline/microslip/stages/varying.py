@@ -77,9 +77,19 @@ def values_of(vary: str) -> tuple[str, list[str]]:
         UserError: no key, or not two different values.
     """
     key, _, text = (part.strip() for part in vary.partition("="))
-    values = [v.strip() for v in re.findall(r"(?:\[[^\]]*\]|\{[^}]*\}|\"[^\"]*\"|[^,\[{\"])+", text)]
+    parts, depth, quoted = [""], 0, False
+    for sign in text:
+        quoted ^= sign == '"'
+        depth += 0 if quoted else (sign in "[{") - (sign in "]}")
+        if sign == "," and not depth and not quoted:
+            parts.append("")
+        else:
+            parts[-1] += sign
+    values = [part.strip() for part in parts]
     if not key or len(set(values)) < max(2, len(values)) or "" in values:
         raise UserError("give two or more different values: --vary key.subkey=a,b,c", f"--vary {key}")
+    if key == "name":
+        raise UserError("names do not vary, products are kept by them; give a number of the case", "--vary name")
     return key, values
 
 
@@ -129,7 +139,8 @@ def _joined(key: str, tables: Mapping[str, Mapping[str, Sequence[str]]]) -> Data
     columns: dict[str, Any] = {key: [v for v, n in zip(tables, counts, strict=True) for _ in range(n)]}
     for name in names:
         each = zip(tables.values(), counts, strict=True)
-        columns[name] = [cell for table, n in each for cell in table.get(name, [""] * n)]
+        own = f"{name} of the table" if name == key else name
+        columns[own] = [cell for table, n in each for cell in table.get(name, [""] * n)]
     return Dataset("varied", dict(_variable(name, cells) for name, cells in columns.items()), {"key": key})
 
 
@@ -140,6 +151,7 @@ def _variable(column: str, cells: Sequence[str]) -> tuple[str, Variable]:
     except ValueError:
         values = np.array(cells)
     name, _, unit = column.rpartition("_")
-    known = unit in ("m", "rad", "N", "Hz", "Pa", "J", "s", "kg", "W", "K") and name
+    alone = name and not re.search(r"_(m|rad|N|Pa|J|kg|W|1)$", name)  # not m_s, rad_s, which the name tells
+    known = unit in ("m", "rad", "N", "Hz", "Pa", "J", "s", "kg", "W", "K") and alone
     assert not known or Quantity(unit).column(name) == column
     return (name, Variable(values, unit)) if known else (column, Variable(values))

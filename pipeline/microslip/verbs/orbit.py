@@ -122,6 +122,10 @@ class Keys(Model):
             raise ValueError("frequency: give frequency (Hz) or Omega (rad/s), one or more of them, or run_up")
         if self.over is not None and (None in (self.low, self.high) or self.low == self.high):
             raise ValueError("over: give low and high, two different numbers")
+        if self.over is None and (wrong := sorted(self.model_fields_set & {"low", "high", "points"})):
+            raise ValueError(f"{wrong[0]}: belongs to over, the key that varies; give over, or leave it out")
+        if (self.over or "").startswith("orbit."):
+            raise ValueError("over: orbit's own keys do not vary; give frequency, or a key of the case")
         if self.over not in (None, FREQUENCY) and (self.run_up or len(self.hertz) > 1):
             raise ValueError("over: give one frequency, at which it varies")
         if self.run_up and (wrong := sorted(self.model_fields_set & {"settle", "keep"})):
