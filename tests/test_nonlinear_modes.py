@@ -123,13 +123,14 @@ def chain(harmonics):
 def test_an_internal_resonance_is_followed_to_its_end_and_back():
     """The tongue 1:3 of the mode in phase leads to the mode out of phase at a third of its frequency, where its own
     first harmonic vanishes, and back on another branch: the energies there are those of the other mode."""
-    first, second = (ms.backbone(chain(7), 1e-2, 100.0, mode=mode) for mode in (0, 1))
+    first = ms.backbone(chain(7), 1e-2, 100.0)
+    second = ms.backbone(chain(2), 1e-2, 100.0, mode=1)  # of 7 harmonics of a third these are there
     assert first.complete and [h for h, *_ in first.resonances] == [3]
     (_, hertz, share), end = first.resonances[0], first.amplitude[20:-20].argmin() + 20
     assert share > 0.98 and first.amplitude[end] < 1e-3 < 0.1 < first.amplitude[end + 20]
     near = np.argsort(second.Omega)
     energy = PchipInterpolator(second.Omega[near], second.energy[near])(3 * first.Omega[end])
-    assert first.energy[end] == pytest.approx(float(energy), rel=1e-3)
+    assert first.energy[end] == pytest.approx(float(energy), rel=1e-4)
     assert hertz == pytest.approx(0.22396, rel=1e-4)
     assert first.frequency[-1] < np.sqrt(2) / (2 * np.pi) < 1.02 * first.frequency[-1]  # both springs hold
 

@@ -54,6 +54,8 @@ class Keys(Model):
     """whether the orbits born at Hopf points are followed"""
     doublings: Annotated[int, Field(ge=0, le=8)] = 1
     """how often from an orbit on to that of twice its period"""
+    branches: Annotated[int, Field(ge=0, le=4)] = 0
+    """how often from a curve on to those that cross it at its branch points"""
     attractors: Values = ()
     """values of the parameter at which motions from many starts are left alone, to find orbits
     that coexist"""
