@@ -86,7 +86,8 @@ def cyclic_worker(mesh_file: str, modes: int, clock: modal.Clock) -> dict:
         for k in sorted(found, key=lambda k: shifts[k]):
             found[k] = eigen.certify(pencils[k], replace(found[k], upper_shift=shifts[k]), tolerance=modal.TOLERANCE)
     return {
-        "dof": pencils[0].n, "cut": len(sector.unknowns.boundary) // 2, "certified": all(s.certified for s in found.values()),
+        "dof": pencils[0].n, "cut": len(sector.unknowns.boundary) // 2,
+        "certified": all(s.certified for s in found.values()),
         "shifts": len(set(shifts)), "solves": sum(s.solves for s in found.values()),
         "frequencies": [(np.sqrt(s.values[:modes]) / 2 / np.pi).tolist() for s in found.values()],
     }  # fmt: skip
