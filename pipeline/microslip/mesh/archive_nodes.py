@@ -170,14 +170,16 @@ def _selected(archive: Archive) -> set[int]:
     return {*archive.node_id} if archive.selected is None else archive.selected
 
 
+def _changed(before: set[int], how: str, some: set[int]) -> set[int] | None:
+    """A selection after S, R, A or U of some; None after another command."""
+    return {"S": some, "R": before & some, "A": before | some, "U": before - some}.get(how)
+
+
 def _select(archive: Archive, how: str, nodes: set[int]) -> None:
-    before = _selected(archive)
-    made = {"S": nodes, "R": before & nodes, "A": before | nodes, "U": before - nodes}
     archive.chosen = ""
-    if how == "S":
-        archive.unread = ""
-    if how in made:
-        archive.selected = made[how]
+    archive.unread = "" if how == "S" else archive.unread
+    if (made := _changed(_selected(archive), how, nodes)) is not None:
+        archive.selected = made
     else:
         archive.unread = f"of the kind '{how}'"
 
@@ -242,11 +244,9 @@ def _cells_of_nodes(archive: Archive, words: list[str]) -> None:
 
 def _pick(archive: Archive, how: str, cells: set[int]) -> None:
     before = set(archive.cells("ALL") or ())
-    made = {"S": cells, "R": before & cells, "A": before | cells, "U": before - cells}
-    if how == "S":
-        archive.unread_cells = ""
-    if how in made:
-        archive.picked = made[how]
+    archive.unread_cells = "" if how == "S" else archive.unread_cells
+    if (made := _changed(before, how, cells)) is not None:
+        archive.picked = made
     else:
         archive.unread_cells = f"of the kind '{how}'"
 

@@ -465,27 +465,15 @@ def _mesh(
         if isinstance(error.__cause__, Unread):  # steel in its place would be wrong
             raise
         mesh = read_mesh(file, unit)  # its materials alone may be at fault
-        told.append(f"warning: {error}")
+        told = [f"warning: {error}"]
     joints = [f"{j.where}: '{j.slave}' on '{j.master}': make them interfaces and a contact" for j in mesh.joints]
     mesh = of_instances(mesh, instances) if instances else mesh
     if not solids_only:
         refuse_hanging(file, mesh)
     mesh, ties = _tied(file, mesh)
-    kinds = ", ".join(f"{len(c)} {t}" for t, c in mesh.cells.items())
-    alone = f"; the solids alone: {mesh.hanging.partition(': ')[2]} and are left out" if mesh.hanging else ""
     again = [f"warning: {text}" for texts in mesh_problems(mesh) for text in texts]
     lacking = [text for text in again if text.endswith(STANDS)]
-    solid = mesh.points[np.unique(joined(c.ravel() for c in mesh.cells.values()))]
-    size = " x ".join(f"{v:.4g}" for v in np.ptp(solid, axis=0) / UNITS[unit])
-    told = [*lacking, *told, f"{file}: {mesh.n_points} points, {kinds}, {size} {unit}{alone}"]
-    told += [text for text in again if text not in lacking]
-    if unit != "mm" and not unit_of(file) and likely_unit(file) == unit:
-        told.append(f"note: lengths are taken in {unit}, as its densities are no solid's in mm and t; else --unit")
-    doubts = (density(f"{file}: {m.name}: density", m.density) for m in mesh.materials)
-    told += [f"warning: {text}" for text in doubts if text]
-    told += [f"note: {text}" for text in mesh.remarks]
-    if mesh.lumps is not None and (mass := float(mesh.lumps.masses.sum())):
-        told.append(f"point masses of the file: {mass:.6g} kg")
+    told = [*lacking, *told, *_holds(file, mesh, unit, [text for text in again if text not in lacking])]
     told += [*ties, *((*joints, *_pressed(mesh)) if not instances else ())]
     holding = _hold(mesh, UNITS[unit])
     held, said = _supports(mesh, holding)
@@ -517,6 +505,23 @@ def _mesh(
     told += words
     sets = _sets(mesh, bool(held) or holding)
     return [*lines, *hot, *ring, *loads, *held, *kept, *sets, *_end(count)], told, mesh
+
+
+def _holds(file: Path, mesh: Mesh, unit: str, warnings: Sequence[str]) -> list[str]:
+    """What the file holds, its size, and what is to be doubted of it."""
+    kinds = ", ".join(f"{len(c)} {t}" for t, c in mesh.cells.items())
+    alone = f"; the solids alone: {mesh.hanging.partition(': ')[2]} and are left out" if mesh.hanging else ""
+    solid = mesh.points[np.unique(joined(c.ravel() for c in mesh.cells.values()))]
+    size = " x ".join(f"{v:.4g}" for v in np.ptp(solid, axis=0) / UNITS[unit])
+    told = [f"{file}: {mesh.n_points} points, {kinds}, {size} {unit}{alone}", *warnings]
+    if unit != "mm" and not unit_of(file) and likely_unit(file) == unit:
+        told.append(f"note: lengths are taken in {unit}, as its densities are no solid's in mm and t; else --unit")
+    doubts = (density(f"{file}: {m.name}: density", m.density) for m in mesh.materials)
+    told += [f"warning: {text}" for text in doubts if text]
+    told += [f"note: {text}" for text in mesh.remarks]
+    if mesh.lumps is not None and (mass := float(mesh.lumps.masses.sum())):
+        told.append(f"point masses of the file: {mass:.6g} kg")
+    return told
 
 
 def _material(mesh: Mesh, numbers: Mapping[str, float], lacking: bool) -> list[str]:
